@@ -1,0 +1,1 @@
+"""Flight-test host tool: decode logs, fly virtual tests, identify the aircraft."""
