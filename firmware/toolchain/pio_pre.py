@@ -1,0 +1,72 @@
+"""Before a PlatformIO build: FatFs sources and the sanitizers of `native`.
+
+PlatformIO runs this ahead of the platform's own build script.
+"""
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from types import ModuleType
+
+from SCons.Script import DefaultEnvironment
+
+env = DefaultEnvironment()
+TOOLCHAIN = Path(env.subst("$PROJECT_DIR")) / "firmware" / "toolchain"
+SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"]
+
+
+def load(name: str) -> ModuleType:
+    """Import a module of this folder by its path; the folder is not a package."""
+    spec = importlib.util.spec_from_file_location(name, TOOLCHAIN / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def sanitizers_work(compiler: str) -> bool:
+    """Compile and run a program with the sanitizers; the answer is kept per compiler."""
+    path = shutil.which(compiler)
+    if path is None:
+        return False
+    stamp = f"{path} {Path(path).resolve().stat().st_mtime_ns}"
+    memory = Path(env.subst("$BUILD_DIR")) / "sanitizers.txt"
+    if memory.is_file():
+        known, _, answer = memory.read_text().partition("\n")
+        if known == stamp:
+            return answer == "yes"
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "probe.cpp"
+        source.write_text("int main() { return 0; }\n")
+        program = Path(folder) / "probe"
+        built = subprocess.run(
+            [path, *SANITIZERS, str(source), "-o", str(program)], capture_output=True, check=False
+        )
+        works = built.returncode == 0
+        if works:
+            works = subprocess.run([program], capture_output=True, check=False).returncode == 0
+    memory.parent.mkdir(parents=True, exist_ok=True)
+    memory.write_text(f"{stamp}\n{'yes' if works else 'no'}")
+    return works
+
+
+if env["PIOENV"] != "arduimu":
+    fatfs = load("fatfs")
+    try:
+        env.Append(CPPPATH=[str(fatfs.ensure(python=env.subst("$PYTHONEXE")))])
+    except fatfs.FetchError as error:
+        sys.stderr.write(f"fatfs: {error}\n")
+        env.Exit(1)
+
+if env["PIOENV"] == "native":
+    if sanitizers_work(env.subst("$CXX")):
+        env.Append(CCFLAGS=SANITIZERS, LINKFLAGS=SANITIZERS)
+    elif os.environ.get("CI"):
+        sys.stderr.write(f"{env.subst('$CXX')} has no address and undefined sanitizers; CI needs them\n")
+        env.Exit(1)
+    else:
+        print(f"{env.subst('$CXX')} has no sanitizers: tests run without them")
