@@ -1,0 +1,1 @@
+"""Make protocol/generated/ from frames.toml and cases.toml. Standard library only."""
