@@ -108,7 +108,10 @@ def _install(source: Path, target: Path, kind: str, package_version: str) -> Non
         shutil.rmtree(target)
     shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
     # Without this note the package has no owner, and PlatformIO asks the registry for it.
-    spec = dict.fromkeys(("id", "requirements", "uri")) | {"owner": "platformio", "name": target.name}
+    spec = dict.fromkeys(("id", "requirements", "uri")) | {
+        "owner": "platformio",
+        "name": target.name,
+    }
     note = {"type": kind, "name": target.name, "version": package_version, "spec": spec}
     (target / ".piopm").write_text(json.dumps(note))
 
@@ -121,7 +124,8 @@ def _require_accepted(scons: str) -> None:
     if Version(scons) not in SimpleSpec(wanted):
         sys.exit(
             f"platformio {version('platformio')} wants tool-scons {wanted}, "
-            f"found SCons {version('scons')} ({scons}): pin the matching pair in .ci/requirements.txt"
+            f"found SCons {version('scons')} ({scons}): "
+            "pin the matching pair in .ci/requirements.txt"
         )
 
 

@@ -16,8 +16,12 @@ archives = []
 
 archive_filter = env.GetProjectOption("custom_archive_filter", "")
 if archive_filter:
-    archives.append(projenv.BuildLibrary("$BUILD_DIR/firmware_archive", "$PROJECT_SRC_DIR", archive_filter))
+    archives.append(
+        projenv.BuildLibrary("$BUILD_DIR/firmware_archive", "$PROJECT_SRC_DIR", archive_filter)
+    )
 if env["PIOENV"] != "arduimu":
-    archives.append(env.BuildLibrary("$BUILD_DIR/fatfs_archive", "$PROJECT_DIR/build/fatfs-0.1.2", "+<ff.c>"))
+    archives.append(
+        env.BuildLibrary("$BUILD_DIR/fatfs_archive", "$PROJECT_DIR/build/fatfs-0.1.2", "+<ff.c>")
+    )
 
 env.Append(LIBS=archives)

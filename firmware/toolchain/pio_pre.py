@@ -3,29 +3,22 @@
 PlatformIO runs this ahead of the platform's own build script.
 """
 
-import importlib.util
+import importlib
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from types import ModuleType
 
 from SCons.Script import DefaultEnvironment
 
 env = DefaultEnvironment()
-TOOLCHAIN = Path(env.subst("$PROJECT_DIR")) / "firmware" / "toolchain"
-SANITIZERS = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer"]
-
-
-def load(name: str) -> ModuleType:
-    """Import a module of this folder by its path; the folder is not a package."""
-    spec = importlib.util.spec_from_file_location(name, TOOLCHAIN / f"{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+SANITIZERS = [
+    "-fsanitize=address,undefined",
+    "-fno-sanitize-recover=all",
+    "-fno-omit-frame-pointer",
+]
 
 
 def sanitizers_work(compiler: str) -> bool:
@@ -55,7 +48,8 @@ def sanitizers_work(compiler: str) -> bool:
 
 
 if env["PIOENV"] != "arduimu":
-    fatfs = load("fatfs")
+    sys.path.insert(0, env.subst("$PROJECT_DIR/firmware/toolchain"))
+    fatfs = importlib.import_module("fatfs")
     try:
         env.Append(CPPPATH=[str(fatfs.ensure(python=env.subst("$PYTHONEXE")))])
     except fatfs.FetchError as error:
@@ -66,7 +60,9 @@ if env["PIOENV"] == "native":
     if sanitizers_work(env.subst("$CXX")):
         env.Append(CCFLAGS=SANITIZERS, LINKFLAGS=SANITIZERS)
     elif os.environ.get("CI"):
-        sys.stderr.write(f"{env.subst('$CXX')} has no address and undefined sanitizers; CI needs them\n")
+        sys.stderr.write(
+            f"{env.subst('$CXX')} has no address and undefined sanitizers; CI needs them\n"
+        )
         env.Exit(1)
     else:
         print(f"{env.subst('$CXX')} has no sanitizers: tests run without them")

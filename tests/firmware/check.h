@@ -46,29 +46,29 @@ void equal(const Left& left, const Right& right, const char* text_flash, uint16_
 #define CHECK_JOIN_(a, b) a##b
 #define CHECK_JOIN(a, b) CHECK_JOIN_(a, b)
 
-#define CHECK_CASE(body, title)                                \
-  static void body();                                          \
-  static const char CHECK_JOIN(body, _name)[] PROGMEM = title; \
+#define CHECK_CASE(body, title)                                              \
+  static void body();                                                        \
+  static const char CHECK_JOIN(body, _name)[] PROGMEM = title;               \
   static check::Case CHECK_JOIN(body, _case)(CHECK_JOIN(body, _name), body); \
   static void body()
 
 #define TEST_CASE(title) CHECK_CASE(CHECK_JOIN(check_body_, __LINE__), title)
 
-#define CHECK(expression)                          \
-  do {                                             \
-    if (!(expression)) {                           \
-      check::fail(PSTR(#expression), __LINE__);    \
-    }                                              \
+#define CHECK(expression)                       \
+  do {                                          \
+    if (!(expression)) {                        \
+      check::fail(PSTR(#expression), __LINE__); \
+    }                                           \
   } while (false)
 
 #define CHECK_EQ(left, right) check::equal(left, right, PSTR(#left " == " #right), __LINE__)
 
-#define REQUIRE(expression)                        \
-  do {                                             \
-    if (!(expression)) {                           \
-      check::fail(PSTR(#expression), __LINE__);    \
-      return;                                      \
-    }                                              \
+#define REQUIRE(expression)                     \
+  do {                                          \
+    if (!(expression)) {                        \
+      check::fail(PSTR(#expression), __LINE__); \
+      return;                                   \
+    }                                           \
   } while (false)
 
 #endif

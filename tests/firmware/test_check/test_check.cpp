@@ -5,7 +5,9 @@
 
 namespace {
 
-uint16_t add(uint16_t left, uint16_t right) { return static_cast<uint16_t>(left + right); }
+uint16_t add(uint16_t left, uint16_t right) {
+  return static_cast<uint16_t>(left + right);
+}
 
 }  // namespace
 

@@ -1,0 +1,41 @@
+# Two commands: `make demo` and `make test`. Both set up what they need first.
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test native mega sitl lint format bench clean
+PYTHON := .venv/bin/python
+PIO := .venv/bin/pio
+
+help: ## list the targets
+	@sed -nE 's/^([a-z]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 16
+
+setup: ## put everything needed into .venv and this clone
+	@.ci/setup.sh
+
+demo: ## fly two scripted minutes in simulated time and decode the log
+	@.ci/setup.sh demo
+	@$(PYTHON) tests/sitl/demo.py
+
+test: setup ## run every test (STAGES="lint native" runs some)
+	@$(PYTHON) .ci/stages.py $(STAGES)
+
+native: setup ## unit tests of the firmware on this computer
+	@$(PIO) test -e native
+
+mega: setup ## image of the Mega
+	@$(PIO) run
+
+sitl: ## the firmware as a shared library for this computer
+	@.ci/setup.sh demo
+	@$(PYTHON) firmware/toolchain/build_sitl.py
+
+lint: setup ## format, lint and types, nothing else
+	@$(PYTHON) .ci/stages.py format lint types
+
+format: setup ## rewrite C++ and Python in the house format
+	@find firmware tests -name '*.h' -o -name '*.cpp' -o -name '*.c' | xargs clang-format -i
+	@.venv/bin/ruff format --quiet .
+
+bench: setup ## damage table and speed beside pyulog and pymavlink
+	@$(PYTHON) tests/bench/run.py
+
+clean: ## remove what builds made; .venv and downloads stay
+	rm -rf .pio build/sitl build/logs build/fatfs-*
