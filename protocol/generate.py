@@ -1,6 +1,6 @@
-"""Write protocol/generated/ from frames.toml, or with --check prove that it is current.
+"""Write protocol/generated/ from frames.toml and cases.toml; --check proves that it is current.
 
-Exit codes: 0 ok, 1 a generated file is not current, 2 frames.toml cannot be used.
+Exit codes: 0 ok, 1 a generated file is not current, 2 an input cannot be used.
 """
 
 import argparse
@@ -9,18 +9,18 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from protocol.generator import cpp, markdown, model, schema_text
+from protocol.generator import cases, cpp, markdown, model, schema_text
 
 PROTOCOL = Path(__file__).resolve().parent
 
 
-def generate(schema: model.Schema) -> dict[str, str]:
+def generate(schema: model.Schema, cases_path: Path) -> dict[str, str]:
     """Return the content of every generated file by its name.
 
     Raises
     ------
     protocol.generator.model.SchemaError
-        If the schema text does not fit its blocks.
+        If the schema text does not fit its blocks, or a case cannot be used.
     """
     size = len(schema_text.text(schema))
     if size > schema_text.TEXT_LIMIT_BYTES:
@@ -32,6 +32,7 @@ def generate(schema: model.Schema) -> dict[str, str]:
         "schema_blob.h": cpp.blob_header(schema),
         "FRAMES.md": markdown.frames_page(schema),
         "schema.json": schema_text.json_file(schema),
+        "cases.h": cases.cases_header(cases_path),
     }
 
 
@@ -58,14 +59,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="protocol/generate.py", description=__doc__)
     parser.add_argument("--check", action="store_true", help="compare, write nothing")
     parser.add_argument("--frames", type=Path, default=PROTOCOL / "frames.toml")
+    parser.add_argument("--cases", type=Path, default=PROTOCOL / "cases.toml")
     parser.add_argument("--out", type=Path, default=PROTOCOL / "generated")
     options = parser.parse_args(arguments)
     frames: Path = options.frames
     out: Path = options.out
     try:
-        files = generate(model.load(frames))
+        files = generate(model.load(frames), options.cases)
     except model.SchemaError as error:
-        print(f"{frames.name}: {error}", file=sys.stderr)
+        print(error, file=sys.stderr)
         return 2
     if options.check:
         difference = first_difference(files, out) if out.is_dir() else "generated/ is missing"
@@ -76,7 +78,7 @@ def main(arguments: list[str] | None = None) -> int:
     out.mkdir(exist_ok=True)
     for name, content in files.items():
         (out / name).write_bytes(content.encode("utf-8"))
-    print(f"wrote {len(files)} files to {out.name}/, from {len(files['schema.json'])} bytes schema")
+    print(f"wrote {', '.join(files)} to {out.name}/")
     return 0
 
 

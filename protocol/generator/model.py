@@ -34,7 +34,7 @@ SUFFIXES = {
     "_byteps": "byte/s",
 }
 IDENT_LIMIT_BYTES = 68  # a ring of 4.45 kB then holds 500 ms at 100 Hz
-FRAME_LIMIT_BYTES = 255  # the telemetry envelope's length is one byte
+FRAME_LIMIT_BYTES = 128  # the longest a telemetry envelope carries
 VALUE_KEYS = ("name", "type", "unit", "scale", "axis", "invalid", "valid", "age", "delay_us")
 FIELD_KEYS = frozenset((*VALUE_KEYS, "enum", "bits", "always", "doc"))
 FRAME_KEYS = frozenset(("id", "name", "rate_hz", "doc", "field"))
@@ -123,12 +123,15 @@ def load(path: Path) -> Schema:
     try:
         data = tomllib.loads(path.read_text(encoding="ascii"))
     except OSError as error:
-        raise SchemaError(f"cannot be read: {error.strerror}") from error
+        raise SchemaError(f"{path.name} cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise SchemaError(f"byte {error.start} is not ASCII") from error
+        raise SchemaError(f"{path.name}: byte {error.start} is not ASCII") from error
     except tomllib.TOMLDecodeError as error:
-        raise SchemaError(f"is not TOML: {error}") from error
-    return parse(data)
+        raise SchemaError(f"{path.name} is not TOML: {error}") from error
+    try:
+        return parse(data)
+    except SchemaError as error:
+        raise SchemaError(f"{path.name}: {error}") from error
 
 
 def parse(data: Mapping[str, object]) -> Schema:
