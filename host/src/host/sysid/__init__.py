@@ -1,0 +1,13 @@
+"""System identification: from a maneuver to a model with honest uncertainties.
+
+The front door is `fit(method, model, maneuvers)`; a `LinearModel` says what is known and what is
+free, a `Maneuver` holds the samples, a `FitResult` is the answer of every method alike.
+"""
+
+from host.sysid.fit import fit as fit
+from host.sysid.fit import methods as methods
+from host.sysid.maneuver import Maneuver as Maneuver
+from host.sysid.model import LinearModel as LinearModel
+from host.sysid.model import Parameter as Parameter
+from host.sysid.model import Term as Term
+from host.sysid.result import FitResult as FitResult

@@ -1,0 +1,7 @@
+"""What can go wrong in a way a user can act on: one class, one clear line."""
+
+from __future__ import annotations
+
+
+class IdentificationError(Exception):
+    """Say what was found, what was expected and what to do, in one line."""

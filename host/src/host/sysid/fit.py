@@ -1,0 +1,105 @@
+"""One door to every method: `fit(method, model, maneuvers)`.
+
+Methods register here by name and are imported when first used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from host.sysid.errors import IdentificationError
+from host.sysid.maneuver import Maneuver
+from host.sysid.model import LinearModel
+from host.sysid.result import FitResult
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """Where a method lives and how it is called.
+
+    `options` are the settings that make this name out of a more general function.
+    """
+
+    module: str
+    function: str
+    about: str
+    options: tuple[tuple[str, object], ...] = ()
+
+
+METHODS: dict[str, Method] = {
+    "equation-error": Method("equation_error", "fit_equation_error", "ordinary least squares"),
+    "equation-error-weighted": Method(
+        "equation_error",
+        "fit_equation_error",
+        "least squares, equations weighted by their residuals",
+        (("variant", "weighted"),),
+    ),
+    "equation-error-robust": Method(
+        "equation_error", "fit_equation_error", "Huber M-estimate", (("variant", "robust"),)
+    ),
+    "equation-error-total": Method(
+        "equation_error", "fit_equation_error", "total least squares", (("variant", "total"),)
+    ),
+    "output-error": Method(
+        "output_error_fit",
+        "fit_output_error",
+        "maximum likelihood, memory of the noise estimated (default)",
+    ),
+    "output-error-white": Method(
+        "output_error_fit",
+        "fit_output_error",
+        "maximum likelihood for white noise, covariance corrected for colour",
+        (("memory", False),),
+    ),
+}
+
+
+def methods() -> dict[str, str]:
+    """Return the known methods and what each is in a few words."""
+    return {name: method.about for name, method in METHODS.items()}
+
+
+def fit(
+    method: str, model: LinearModel, maneuvers: Sequence[Maneuver], **options: object
+) -> FitResult:
+    """Fit a model to one or several maneuvers jointly.
+
+    Parameters
+    ----------
+    method : str
+        A key of `methods()`.
+    model : LinearModel
+        What is known and what is free.
+    maneuvers : sequence of Maneuver
+        Data in the columns of the model.
+    **options
+        Settings of the method; see its own function.
+
+    Returns
+    -------
+    FitResult
+        Estimate, covariance, residuals and diagnostics.
+
+    Raises
+    ------
+    IdentificationError
+        If the method is unknown, or the data cannot carry the fit.
+
+    Examples
+    --------
+    >>> from host.sysid import fit
+    >>> result = fit("output-error", model, [maneuver])  # doctest: +SKIP
+    """
+    if method not in METHODS:
+        raise IdentificationError(f"unknown method '{method}'; known: {', '.join(METHODS)}")
+    if not maneuvers:
+        raise IdentificationError("no maneuver to fit: give at least one")
+    entry = METHODS[method]
+    function: Callable[..., Any] = getattr(
+        import_module(f"host.sysid.{entry.module}"), entry.function
+    )
+    result: FitResult = function(model, maneuvers, **{**dict(entry.options), **options})
+    return result

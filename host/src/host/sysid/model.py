@@ -1,0 +1,304 @@
+"""A linear model in words: what it is made of, what is known, what is free.
+
+    x' = A x + B u + b,   y = C x + D u + c,   x(0) = x0
+
+Every entry of A, B, C, D is a known number plus a sum of parameters times known gains, so that an
+entry can be fixed, free or tied (an accelerometer row repeats the force row times the speed).
+Biases b and c and the start x0 belong to each maneuver alone; everything else is common.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from host.sysid.compiled import Array, IntArray
+from host.sysid.errors import IdentificationError
+
+MATRICES = ("A", "B", "C", "D")
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A free number of the model.
+
+    Parameters
+    ----------
+    name : str
+        Unique name, e.g. ``M_alpha``.
+    start : float
+        Where iteration starts unless a cheaper method says better; centre of the prior.
+    lower, upper : float
+        Bounds of the search.
+    prior_sd : float
+        Standard deviation of a Gaussian prior about `start`; infinite means none.
+    """
+
+    name: str
+    start: float = 0.0
+    lower: float = -np.inf
+    upper: float = np.inf
+    prior_sd: float = np.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One appearance of a parameter: `gain` times it is added to entry (row, column)."""
+
+    matrix: str
+    row: int
+    column: int
+    parameter: str
+    gain: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class DelayGroup:
+    """Outputs that lag the inputs by one common residual delay.
+
+    Parameters
+    ----------
+    name : str
+        Parameter name, e.g. ``delay_vanes_s``.
+    outputs : tuple of str
+        The outputs concerned.
+    prior_sd_s : float
+        Standard deviation of the prior about zero, s.
+    limit_s : float
+        Bound of the search, s.
+    """
+
+    name: str
+    outputs: tuple[str, ...]
+    prior_sd_s: float = 0.005
+    limit_s: float = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class EntryTable:
+    """Terms as index arrays for the compiled kernels: rows, columns, parameters, gains."""
+
+    row: IntArray
+    column: IntArray
+    parameter: IntArray
+    gain: Array
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """A linear state-space model with named signals.
+
+    Parameters
+    ----------
+    name : str
+        What reports call it.
+    states, inputs, outputs : tuple of str
+        Names ending in their unit. An output with the name of a state measures it.
+    A, B, C, D : Array
+        Known parts; shapes (n, n), (n, m), (p, n), (p, m).
+    terms : tuple of Term
+        Where parameters enter.
+    parameters : tuple of Parameter
+        Free numbers, in the order of every estimate.
+    state_biases, output_biases, initial_states : tuple of str
+        Which state equations, outputs and start values get a free constant in each maneuver.
+    delays : tuple of DelayGroup
+        Residual delays, common to all maneuvers.
+    hold : str
+        ``zoh`` or ``foh``: how the input runs between its samples.
+
+    Raises
+    ------
+    IdentificationError
+        If shapes, names or indices disagree.
+    """
+
+    name: str
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    terms: tuple[Term, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+    state_biases: tuple[str, ...] = ()
+    output_biases: tuple[str, ...] = ()
+    initial_states: tuple[str, ...] = ()
+    delays: tuple[DelayGroup, ...] = field(default=())
+    hold: str = "zoh"
+
+    def __post_init__(self) -> None:
+        n, m, p = len(self.states), len(self.inputs), len(self.outputs)
+        shapes = {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}
+        for label, shape in shapes.items():
+            array = np.array(getattr(self, label), dtype=np.float64)
+            if array.shape != shape:
+                raise IdentificationError(
+                    f"model {self.name}: {label} is {array.shape}, expected {shape}"
+                )
+            object.__setattr__(self, label, array)
+        names = [parameter.name for parameter in self.parameters]
+        for group in (self.states, self.inputs, self.outputs, names):
+            twice = sorted({x for x in group if list(group).count(x) > 1})
+            if twice:
+                raise IdentificationError(f"model {self.name}: {', '.join(twice)} named twice")
+        for term in self.terms:
+            if term.matrix not in shapes or term.parameter not in names:
+                raise IdentificationError(
+                    f"model {self.name}: entry {term.matrix}[{term.row},{term.column}] refers to"
+                    f" '{term.parameter}', which is no parameter of this model"
+                )
+            rows, columns = shapes[term.matrix]
+            if not (0 <= term.row < rows and 0 <= term.column < columns):
+                raise IdentificationError(
+                    f"model {self.name}: {term.matrix} has no entry [{term.row},{term.column}]"
+                )
+        unused = sorted(set(names) - {term.parameter for term in self.terms})
+        if unused:
+            raise IdentificationError(f"model {self.name}: {', '.join(unused)} enters no matrix")
+        for what, chosen, known in (
+            ("state bias", self.state_biases, self.states),
+            ("initial state", self.initial_states, self.states),
+            ("output bias", self.output_biases, self.outputs),
+            ("delay", tuple(y for d in self.delays for y in d.outputs), self.outputs),
+        ):
+            strangers = [x for x in chosen if x not in known]
+            if strangers:
+                raise IdentificationError(
+                    f"model {self.name}: {what} on {', '.join(strangers)}, known are"
+                    f" {', '.join(known)}"
+                )
+        if self.hold not in ("zoh", "foh"):
+            raise IdentificationError(f"model {self.name}: hold '{self.hold}', use zoh or foh")
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters common to all maneuvers, delays last."""
+        return tuple(p.name for p in self.parameters) + tuple(d.name for d in self.delays)
+
+    def local_names(self, maneuver: int) -> tuple[str, ...]:
+        """Names of the constants that belong to one maneuver (counted from 1)."""
+        return (
+            *(f"bias_rate.{s}@{maneuver}" for s in self.state_biases),
+            *(f"bias.{y}@{maneuver}" for y in self.output_biases),
+            *(f"initial.{s}@{maneuver}" for s in self.initial_states),
+        )
+
+    @property
+    def start(self) -> Array:
+        """Start values of the parameters (without delays)."""
+        return np.array([p.start for p in self.parameters], dtype=np.float64)
+
+    def with_start(self, values: Sequence[float] | Array) -> LinearModel:
+        """Return the same model with other start values."""
+        if len(values) != len(self.parameters):
+            raise IdentificationError(
+                f"model {self.name}: {len(values)} start values, {len(self.parameters)} parameters"
+            )
+        fresh = tuple(
+            replace(p, start=float(v)) for p, v in zip(self.parameters, values, strict=True)
+        )
+        return replace(self, parameters=fresh)
+
+    def entries(self, matrices: str) -> EntryTable:
+        """Return the terms of two neighbouring matrices, ``AB`` or ``CD``, as one wide matrix."""
+        index = {p.name: i for i, p in enumerate(self.parameters)}
+        chosen = [t for t in self.terms if t.matrix in matrices]
+        offset = {matrices[0]: 0, matrices[1]: len(self.states)}
+        return EntryTable(
+            row=np.array([t.row for t in chosen], dtype=np.int64),
+            column=np.array([t.column + offset[t.matrix] for t in chosen], dtype=np.int64),
+            parameter=np.array([index[t.parameter] for t in chosen], dtype=np.int64),
+            gain=np.array([t.gain for t in chosen], dtype=np.float64),
+        )
+
+    def matrices(self, theta: Array) -> tuple[Array, Array, Array, Array]:
+        """Return A, B, C, D at parameter values `theta` (only the common ones are read)."""
+        result = {label: np.array(getattr(self, label)) for label in MATRICES}
+        index = {p.name: i for i, p in enumerate(self.parameters)}
+        for term in self.terms:
+            result[term.matrix][term.row, term.column] += term.gain * theta[index[term.parameter]]
+        return result["A"], result["B"], result["C"], result["D"]
+
+    def gradient(self, matrix: str, parameter: str) -> Array:
+        """Return the derivative of one matrix by one parameter."""
+        slope: Array = np.zeros(np.shape(getattr(self, matrix)))
+        for term in self.terms:
+            if term.matrix == matrix and term.parameter == parameter:
+                slope[term.row, term.column] += term.gain
+        return slope
+
+    def measured_states(self) -> IntArray:
+        """Return, for each state, the output that measures it.
+
+        Raises
+        ------
+        IdentificationError
+            If a state has no output of its own name.
+        """
+        absent = [s for s in self.states if s not in self.outputs]
+        if absent:
+            raise IdentificationError(
+                f"model {self.name}: {', '.join(absent)} not among the outputs; this method needs"
+                " every state measured, output error does not"
+            )
+        return np.array([self.outputs.index(s) for s in self.states], dtype=np.int64)
+
+
+def free_model(
+    name: str,
+    states: Sequence[str],
+    inputs: Sequence[str],
+    *,
+    start_A: Array | None = None,
+    start_B: Array | None = None,
+    **options: tuple[str, ...] | str,
+) -> LinearModel:
+    """Build the model of the original program: every entry of A and B free, states measured.
+
+    Parameters
+    ----------
+    name : str
+        Model name.
+    states, inputs : sequence of str
+        Signal names.
+    start_A, start_B : Array, optional
+        Start values; zero without.
+    **options
+        `state_biases`, `initial_states`, `hold` ... of `LinearModel`.
+    """
+    n, m = len(states), len(inputs)
+    A0 = np.zeros((n, n)) if start_A is None else np.asarray(start_A, dtype=np.float64)
+    B0 = np.zeros((n, m)) if start_B is None else np.asarray(start_B, dtype=np.float64)
+    parameters, terms = [], []
+    for matrix, start, columns in (("A", A0, n), ("B", B0, m)):
+        for row in range(n):
+            for column in range(columns):
+                label = f"{matrix.lower()}{row + 1}{column + 1}"
+                parameters.append(Parameter(label, float(start[row, column])))
+                terms.append(Term(matrix, row, column, label))
+    settings: dict[str, tuple[str, ...] | str] = {"initial_states": tuple(states), **options}
+    return LinearModel(
+        name=name,
+        states=tuple(states),
+        inputs=tuple(inputs),
+        outputs=tuple(states),
+        A=np.zeros((n, n)),
+        B=np.zeros((n, m)),
+        C=np.eye(n),
+        D=np.zeros((n, m)),
+        terms=tuple(terms),
+        parameters=tuple(parameters),
+        state_biases=_names(settings.get("state_biases", ())),
+        output_biases=_names(settings.get("output_biases", ())),
+        initial_states=_names(settings["initial_states"]),
+        hold=str(settings.get("hold", "zoh")),
+    )
+
+
+def _names(value: tuple[str, ...] | str) -> tuple[str, ...]:
+    return (value,) if isinstance(value, str) else tuple(value)

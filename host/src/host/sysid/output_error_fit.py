@@ -1,0 +1,118 @@
+"""Output error as one of the methods: start values, search, intervals, one result."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import signal
+
+from host.sysid.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.intervals import HIGHEST_ORDER, Interval, fit_with_memory
+from host.sysid.maneuver import Maneuver
+from host.sysid.model import LinearModel
+from host.sysid.problem import OutputProblem
+from host.sysid.result import FitResult
+from host.sysid.start import start_values
+
+
+def fit_output_error(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    memory: bool = True,
+    start: Array | None = None,
+    highest_order: int = HIGHEST_ORDER,
+    criterion: str = "bic",
+) -> FitResult:
+    """Fit by output error.
+
+    Parameters
+    ----------
+    model, maneuvers
+        Model and data; the states need not be measured.
+    memory : bool
+        Model the memory of the noise, refit with it and let the intervals stand on it (default).
+        Without, noise is taken as white for the estimate and the covariance is corrected by the
+        residual autocorrelation (Morelli & Klein 1997), the standard that covers 87-90 %.
+    start : Array, optional
+        Whole start vector; equation error gives it without.
+    highest_order, criterion
+        See `fit_with_memory`.
+
+    Raises
+    ------
+    IdentificationError
+        If no start is finite or the information is singular.
+    """
+    problem = OutputProblem(model, maneuvers)
+    first = start_values(problem) if start is None else np.asarray(start, dtype=np.float64)
+    if len(first) != len(problem.names):
+        raise IdentificationError(
+            f"{len(first)} start values, {len(problem.names)} needed: {', '.join(problem.names)}"
+        )
+    fit = fit_with_memory(
+        problem, first, highest_order=highest_order if memory else 0, criterion=criterion
+    )
+    covariance = fit.covariance if memory else coloured_output_covariance(problem, fit)
+    return FitResult(
+        method="output error" if memory else "output error (white)",
+        model=model,
+        names=problem.names,
+        estimate=fit.optimum.theta,
+        covariance=covariance,
+        covariance_white=fit.covariance_white,
+        degrees_of_freedom=fit.degrees_of_freedom,
+        residuals=tuple(r.T.copy() for r in fit.optimum.residuals),
+        fitted=tuple(r.y.T.copy() for r in fit.optimum.responses),
+        residual_kind="output",
+        noise_covariance=np.atleast_2d(np.cov(np.hstack(fit.optimum.residuals))),
+        iterations=fit.optimum.iterations,
+        converged=fit.optimum.converged,
+        warnings=_warnings(problem, fit),
+        details={
+            "cost": fit.optimum.cost,
+            "refits": float(fit.refits),
+            "noise_orders": np.array([float(n.order) for n in fit.noise]),
+            "innovation_variance": fit.innovation_variance,
+        },
+    )
+
+
+def _warnings(problem: OutputProblem, fit: Interval) -> tuple[str, ...]:
+    found = []
+    if not fit.optimum.converged:
+        found.append(
+            f"no convergence: the last step was {fit.optimum.step:.3g} Cramer-Rao bounds long"
+        )
+    held = [n for n, free in zip(problem.names, fit.optimum.free, strict=True) if not free]
+    if held:
+        found.append(f"on a bound, so without an interval: {', '.join(held)}")
+    return tuple(found)
+
+
+def coloured_output_covariance(problem: OutputProblem, fit: Interval) -> Array:
+    """Return the white covariance corrected by residual autocorrelations (the usual sandwich).
+
+    Morelli & Klein, Accuracy of aerodynamic model parameters estimated from flight test data,
+    Journal of Guidance, Control and Dynamics 20 (1997).
+    """
+    white = fit.covariance_white
+    middle = np.zeros_like(white)
+    for number, response in enumerate(fit.optimum.responses):
+        columns = problem.columns(number)
+        samples = response.y.shape[1]
+        lags = samples // 5
+        for j, variance in enumerate(fit.optimum.variance):
+            residual = fit.optimum.residuals[number][j]
+            full = signal.correlate(residual, residual, mode="full", method="fft") / samples
+            window = full[samples - 1 - lags : samples + lags]
+            slope = response.slopes[j]
+            spread = signal.fftconvolve(slope, window[:, None], mode="same", axes=0)
+            middle[np.ix_(columns, columns)] += slope.T @ spread / variance**2
+    result = white @ middle @ white
+    result = 0.5 * (result + result.T)
+    low = np.diag(result) <= 0.0
+    result[low], result[:, low] = white[low], white[:, low]
+    return np.asarray(result, dtype=np.float64)

@@ -1,0 +1,1 @@
+"""Studies that prove the estimators: each writes a table from fixed seeds."""

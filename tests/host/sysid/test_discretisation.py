@@ -1,0 +1,147 @@
+"""Transition, response, delay and their slopes against scipy and finite differences."""
+
+import numpy as np
+import pytest
+from host.sysid.kernels import ar_filter, delayed
+from host.sysid.maneuver import Maneuver
+from host.sysid.model import DelayGroup, LinearModel, Parameter, Term
+from host.sysid.noise import OutputNoise, autocovariance
+from host.sysid.problem import OutputProblem
+from scipy import signal
+
+STATES = ("alpha_rad", "q_radps")
+
+
+def tied_model(hold: str = "zoh", delays: tuple[DelayGroup, ...] = ()) -> LinearModel:
+    """Two states, an accelerometer row tied to the force row, biases and a delay."""
+    return LinearModel(
+        name="tied",
+        states=STATES,
+        inputs=("elevator_rad", "flap_rad"),
+        outputs=("alpha_rad", "q_radps", "az_mps2"),
+        A=np.array([[0.0, 1.0], [0.0, 0.0]]),
+        B=np.zeros((2, 2)),
+        C=np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]),
+        D=np.zeros((3, 2)),
+        terms=(
+            Term("A", 0, 0, "Z_alpha"),
+            Term("C", 2, 0, "Z_alpha", 17.0),
+            Term("A", 1, 0, "M_alpha"),
+            Term("A", 1, 1, "M_q"),
+            Term("B", 0, 0, "Z_de"),
+            Term("D", 2, 0, "Z_de", 17.0),
+            Term("B", 1, 0, "M_de"),
+            Term("B", 1, 1, "M_flap"),
+        ),
+        parameters=tuple(
+            Parameter(name, value)
+            for name, value in (
+                ("Z_alpha", -4.0),
+                ("M_alpha", -60.0),
+                ("M_q", -8.0),
+                ("Z_de", -0.5),
+                ("M_de", -90.0),
+                ("M_flap", 3.0),
+            )
+        ),
+        state_biases=("q_radps",),
+        output_biases=("az_mps2",),
+        initial_states=STATES,
+        delays=delays,
+        hold=hold,
+    )
+
+
+def drive(samples: int = 160) -> np.ndarray:
+    rng = np.random.default_rng(7)
+    return np.cumsum(rng.standard_normal((samples, 2)), axis=0) * 0.02
+
+
+def respond(problem: OutputProblem, theta: np.ndarray) -> np.ndarray:
+    response = problem.respond(theta)
+    assert response is not None
+    return np.concatenate([r.y.ravel() for r in response])
+
+
+@pytest.mark.parametrize("dt_s", [0.01, 0.05, 0.9])
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
+def test_response_agrees_with_scipy(hold: str, dt_s: float) -> None:
+    model = tied_model(hold)
+    u = drive()
+    problem = OutputProblem(model, [Maneuver(dt_s, u, np.zeros((len(u), 3)))])
+    theta = np.concatenate([model.start, [0.4, -0.2, 0.03, -0.5]])
+    A, B, C, D = model.matrices(theta)
+    wide = np.column_stack([B, [0.0, 0.4]])
+    constant = np.column_stack([u, np.ones(len(u))])
+    time_s = np.arange(len(u)) * dt_s
+    expected = signal.lsim(
+        (A, wide, C, np.column_stack([D, np.zeros(3)])),
+        constant,
+        time_s,
+        X0=theta[-2:],
+        interp=hold == "foh",
+    )[1]
+    expected[:, 2] += -0.2
+    response = problem.respond(theta)
+    assert response is not None
+    np.testing.assert_allclose(response[0].y.T, expected, rtol=1e-9, atol=1e-10)
+
+
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
+def test_slopes_agree_with_finite_differences(hold: str) -> None:
+    delays = (DelayGroup("delay_vane_s", ("alpha_rad",)), DelayGroup("delay_imu_s", ("az_mps2",)))
+    model = tied_model(hold, delays)
+    u = drive()
+    blank = np.zeros((len(u), 3))
+    problem = OutputProblem(model, [Maneuver(0.02, u, blank), Maneuver(0.02, u[::-1], blank)])
+    theta = np.concatenate(
+        [model.start, [0.013, -0.027], [0.4, -0.2, 0.03, -0.5], [0.1, 0.3, -0.02, 0.2]]
+    )
+    response = problem.respond(theta)
+    assert response is not None
+    analytic = np.zeros((2 * 3 * len(u), len(theta)))
+    for number in range(2):
+        block = response[number].slopes.reshape(3 * len(u), -1)
+        analytic[number * 3 * len(u) : (number + 1) * 3 * len(u), problem.columns(number)] = block
+    for k in range(len(theta)):
+        step = 1e-6 * max(1.0, abs(theta[k]))
+        up, down = theta.copy(), theta.copy()
+        up[k] += step
+        down[k] -= step
+        numeric = (respond(problem, up) - respond(problem, down)) / (2.0 * step)
+        np.testing.assert_allclose(analytic[:, k], numeric, rtol=2e-5, atol=2e-6)
+
+
+def test_delay_of_a_cubic_is_exact_and_its_slope_too() -> None:
+    time = np.arange(40.0)
+    cubic = (0.1 * time**3 - time**2 + 3.0)[:, None]
+    for shift in (0.0, 0.3, 1.7, -2.4):
+        late, slope = delayed(cubic, shift)
+        t = time - shift
+        np.testing.assert_allclose(late[:, 0], 0.1 * t**3 - t**2 + 3.0, rtol=1e-10, atol=1e-9)
+        np.testing.assert_allclose(slope[:, 0], -(0.3 * t**2 - 2.0 * t), rtol=1e-9, atol=1e-8)
+
+
+def test_whitening_turns_the_ar_covariance_into_the_identity() -> None:
+    coefficient = np.array([1.2, -0.6, 0.1])
+    memory = OutputNoise.from_coefficient(coefficient)
+    samples = 12
+    covariance = np.array(
+        [
+            [autocovariance(coefficient, samples)[abs(i - j)] for j in range(samples)]
+            for i in range(samples)
+        ]
+    )
+    whitener = ar_filter(np.eye(samples), coefficient, memory.head)
+    np.testing.assert_allclose(whitener @ covariance @ whitener.T, np.eye(samples), atol=1e-10)
+    sign, log_determinant = np.linalg.slogdet(covariance)
+    assert sign > 0
+    assert memory.log_determinant() == pytest.approx(log_determinant, abs=1e-9)
+
+
+def test_a_diverging_response_is_reported_not_returned() -> None:
+    model = tied_model()
+    u = drive(600)
+    problem = OutputProblem(model, [Maneuver(0.05, u, np.zeros((600, 3)))])
+    theta = np.concatenate([[9.0, 60.0, 8.0, 0.0, -90.0, 0.0], np.zeros(4)])
+    assert problem.respond(theta) is None

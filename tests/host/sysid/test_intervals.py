@@ -1,0 +1,90 @@
+"""Noise models and the intervals that stand on them."""
+
+import numpy as np
+import pytest
+from host.sysid import fit
+from host.sysid.noise import choose_order, lagged_moments, regress, stabilised
+from host.sysid.study.aircraft import navion_structured
+from host.sysid.study.coverage import NOISES, coloured_noise, run_case
+from host.sysid.study.data import noisy
+from scipy import signal
+
+
+def test_regression_finds_the_coefficients_of_a_long_record() -> None:
+    rng = np.random.default_rng(1)
+    for coefficient in NOISES.values():
+        series = coloured_noise(rng, coefficient, 40000, np.ones(1))[:, 0]
+        moments = lagged_moments([series], [np.zeros((len(series), 1))], 6)
+        assert choose_order(moments, len(series)) == len(coefficient)
+        found, _ = regress(moments, len(coefficient))
+        np.testing.assert_allclose(found, coefficient, atol=0.02)
+
+
+def test_noise_has_the_power_and_memory_it_claims() -> None:
+    rng = np.random.default_rng(2)
+    noise = coloured_noise(rng, NOISES["AR(1) 0.9"], 200_000, np.array([2.0]))[:, 0]
+    assert noise.std() == pytest.approx(2.0, rel=0.03)
+    assert np.corrcoef(noise[1:], noise[:-1])[0, 1] == pytest.approx(0.9, abs=0.01)
+
+
+def test_given_back_moments_remove_the_bias_of_residuals() -> None:
+    rng = np.random.default_rng(3)
+    regressors = np.vander(np.linspace(-1.0, 1.0, 120), 9)
+    Q, _ = np.linalg.qr(regressors)
+    raw, corrected = [], []
+    for _ in range(400):
+        noise = coloured_noise(rng, np.array([0.8]), 120, np.ones(1))[:, 0]
+        residual = noise - Q @ (Q.T @ noise)
+        none = np.zeros((120, 1))
+        raw.append(regress(lagged_moments([residual], [none], 1), 1)[0][0])
+        a = raw[-1]
+        for _ in range(8):
+            white_Q = Q[1:] - a * Q[:-1]
+            white_r = residual[1:] - a * residual[:-1]
+            covariance = np.linalg.inv(white_Q.T @ white_Q)
+            shift = covariance @ white_Q.T @ white_r
+            variance = np.mean((white_r - white_Q @ shift) ** 2)
+            share = Q @ np.linalg.cholesky(variance * covariance)
+            a = regress(lagged_moments([residual - Q @ shift], [share], 1), 1)[0][0]
+        corrected.append(a)
+    assert np.mean(raw) < 0.70
+    assert np.mean(corrected) > 0.74  # what remains is the bias of 120 samples: (1 + 3a)/N = 0.03
+
+
+def test_poles_are_kept_inside_the_circle() -> None:
+    inside = stabilised(np.array([2.5, -1.4]))
+    assert np.max(np.abs(np.roots(np.concatenate([[1.0], -inside])))) < 1.0
+
+
+def test_white_records_mostly_get_no_memory() -> None:
+    orders = [
+        fit("output-error", navion_structured(), [noisy(500 + seed)]).details["noise_orders"]
+        for seed in range(20)
+    ]
+    assert np.mean(np.asarray(orders) == 0.0) > 0.9
+
+
+def test_default_intervals_cover_coloured_noise_and_the_white_ones_do_not() -> None:
+    case = run_case("AR(1) 0.9", 20.0, 120)
+    assert case.failed == 0
+    # 1200 correlated outcomes: two standard deviations are about 2.5 points.
+    assert 0.915 < case.pooled < 0.98
+    assert np.median(case.width_ratio) < 1.15
+    # The deliberate fault: intervals that take coloured residuals for white ones.
+    assert float(np.mean(case.white_covered[:10])) < 0.75
+
+
+def test_the_standard_correction_stays_short_of_the_default() -> None:
+    rng = np.random.default_rng(6)
+    maneuver = noisy(600)
+    colour = signal.lfilter([1.0], [1.0, -0.9], rng.standard_normal(maneuver.outputs.shape), axis=0)
+    coloured = type(maneuver)(
+        maneuver.dt_s,
+        maneuver.inputs,
+        maneuver.outputs + colour * maneuver.outputs.std(axis=0) * 0.1,
+    )
+    default = fit("output-error", navion_structured(), [coloured])
+    standard = fit("output-error-white", navion_structured(), [coloured])
+    white = np.sqrt(np.diag(standard.covariance_white))
+    assert np.median(standard.standard_error / white) > 1.3
+    assert np.median(default.half_width() / standard.half_width()) < 1.3

@@ -1,0 +1,130 @@
+"""Output error: the optimum of an independent solver, the bound, invariances, refusals."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from host.sysid import Maneuver, Parameter, fit
+from host.sysid.errors import IdentificationError
+from host.sysid.output_error import covariance_of, minimise
+from host.sysid.problem import OutputProblem
+from host.sysid.start import start_values
+from host.sysid.study.aircraft import navion_free, navion_structured
+from host.sysid.study.data import TRUTH, clean, noisy
+from scipy import optimize
+
+
+def test_optimum_equals_scipy_least_squares() -> None:
+    problem = OutputProblem(navion_free(), [noisy(11)])
+    ours = minimise(problem, start_values(problem))
+    assert ours.converged
+    bound = np.sqrt(np.diag(covariance_of(ours.information, ours.free)))
+    weight = 1.0 / np.sqrt(ours.variance)[:, None]
+
+    def residual(theta: np.ndarray) -> np.ndarray:
+        response = problem.respond(theta)
+        assert response is not None
+        return np.asarray(((response[0].y - problem.measured(0)) * weight).ravel())
+
+    peer = optimize.least_squares(residual, ours.theta + 0.3 * bound, method="lm", x_scale=bound)
+    assert np.max(np.abs(peer.x - ours.theta) / bound) < 0.05
+
+
+def test_errors_reach_the_bound_and_a_wrong_bound_shows() -> None:
+    model = navion_structured()
+    ratios = []
+    for seed in range(120):
+        problem = OutputProblem(model, [noisy(1000 + seed)])
+        found = minimise(problem, start_values(problem))
+        bound = np.sqrt(np.diag(covariance_of(found.information, found.free)))
+        ratios.append((found.theta - np.concatenate([TRUTH, np.zeros(4)])) / bound)
+    rms = np.sqrt(np.mean(np.square(ratios), axis=0))
+    # 120 runs scatter by 1/sqrt(240) = 6.5 %; four of those for the worst of fourteen.
+    assert np.all(np.abs(rms - 1.0) < 0.26)
+    assert abs(rms.mean() - 1.0) < 0.06
+    halved = 2.0 * rms  # the fault: a bound half as long
+    assert not np.all(np.abs(halved - 1.0) < 0.26)
+
+
+def test_several_maneuvers_share_the_parameters_and_keep_their_own_constants() -> None:
+    model = dataclasses.replace(
+        navion_structured(), output_biases=("u_mps",), initial_states=("u_mps", "alpha_rad")
+    )
+    u, y = clean()
+    rng = np.random.default_rng(5)
+    maneuvers = []
+    for bias, sign in ((3.0, 1.0), (-2.0, -1.0)):
+        data = sign * y + 1e-3 * y.std(axis=0) * rng.standard_normal(y.shape)
+        maneuvers.append(Maneuver(0.05, sign * u, data + np.array([bias, 0.0, 0.0, 0.0])))
+    result = fit("output-error", model, maneuvers)
+    assert result.value("bias.u_mps@1") == pytest.approx(3.0, abs=0.02)
+    assert result.value("bias.u_mps@2") == pytest.approx(-2.0, abs=0.02)
+    assert result.value("M_q") == pytest.approx(TRUTH[6], rel=0.01)
+    alone = fit("output-error", model, maneuvers[:1])
+    ratio = result.standard_error[6] / alone.standard_error[6]
+    assert ratio == pytest.approx(np.sqrt(0.5), abs=0.1)
+
+
+def test_time_shift_and_units_do_not_matter() -> None:
+    maneuver = noisy(21)
+    plain = fit("output-error", navion_free(), [maneuver])
+    turn = np.diag([3.6, 57.3, 57.3, 57.3])
+    scaled = Maneuver(maneuver.dt_s, maneuver.inputs * 57.3, maneuver.outputs @ turn)
+    other = fit("output-error", navion_free(), [scaled])
+    A, B, _, _ = other.matrices()
+    back = np.concatenate(
+        [(np.linalg.inv(turn) @ A @ turn).ravel(), (np.linalg.inv(turn) @ B * 57.3).ravel()]
+    )
+    assert np.max(np.abs(back - plain.estimate[:20]) / plain.standard_error[:20]) < 0.02
+    # Time in half seconds: every rate doubles, nothing else changes.
+    slow = Maneuver(2.0 * maneuver.dt_s, maneuver.inputs, maneuver.outputs)
+    third = fit("output-error", navion_free(), [slow])
+    assert (
+        np.max(np.abs(2.0 * third.estimate - plain.estimate)[:20] / plain.standard_error[:20])
+        < 0.02
+    )
+
+
+def test_a_bound_holds_and_says_so() -> None:
+    model = navion_structured()
+    limited = tuple(
+        Parameter(p.name, p.start, lower=-2.0 if p.name == "M_q" else -np.inf)
+        for p in model.parameters
+    )
+    result = fit("output-error", dataclasses.replace(model, parameters=limited), [noisy(31)])
+    assert result.value("M_q") == -2.0
+    assert result.standard_error[result.index("M_q")] == 0.0
+    assert any("M_q" in w for w in result.warnings)
+
+
+def test_an_unstable_aircraft_is_identified_and_a_wild_start_survives() -> None:
+    u, _ = clean(0.02, 6.0)
+    model = navion_structured()
+    unstable = TRUTH.copy()
+    unstable[5] = 2.0  # M_alpha: statically unstable
+    problem = OutputProblem(model, [Maneuver(0.02, u, np.zeros((len(u), 4)))])
+    response = problem.respond(np.concatenate([unstable, np.zeros(4)]))
+    assert response is not None
+    y = response[0].y.T
+    rng = np.random.default_rng(9)
+    noise = 0.01 * y.std(axis=0) * rng.standard_normal(y.shape)
+    wild = model.with_start(TRUTH * 3.0 + 1.0)
+    result = fit("output-error", wild, [Maneuver(0.02, u, y + noise)])
+    assert result.converged
+    assert result.value("M_alpha") == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_start_that_diverges_is_a_clear_line() -> None:
+    maneuver = noisy(41)
+    problem = OutputProblem(navion_free(), [maneuver])
+    start = np.concatenate([(30.0 * np.eye(4)).ravel(), np.ones(4), np.ones(4)])
+    with pytest.raises(IdentificationError, match="diverges at its start"):
+        minimise(problem, start)
+
+
+def test_unidentifiable_pair_is_refused_as_singular() -> None:
+    model = navion_structured()
+    both = dataclasses.replace(model, state_biases=("q_radps",), output_biases=model.outputs)
+    stuck = Maneuver(0.05, np.zeros((200, 1)), np.ones((200, 4)))
+    with pytest.raises(IdentificationError, match=r"singular information|not act|told apart"):
+        fit("output-error", both, [stuck])
