@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from SCons.Script import DefaultEnvironment
 
@@ -47,6 +48,12 @@ def sanitizers_work(compiler: str) -> bool:
     return works
 
 
+def without_sanitizers(build_env: Any, node: Any) -> Any:
+    """Compile doctest's own code plainly: 2 s; with sanitizers and -O1 it takes 16 s."""
+    flags = [f for f in build_env["CCFLAGS"] if f not in SANITIZERS and not str(f).startswith("-O")]
+    return build_env.Object(node, CCFLAGS=[*flags, "-O0"])
+
+
 if env["PIOENV"] != "arduimu":
     sys.path.insert(0, env.subst("$PROJECT_DIR/firmware/toolchain"))
     fatfs = importlib.import_module("fatfs")
@@ -59,6 +66,7 @@ if env["PIOENV"] != "arduimu":
 if env["PIOENV"] == "native":
     if sanitizers_work(env.subst("$CXX")):
         env.Append(CCFLAGS=SANITIZERS, LINKFLAGS=SANITIZERS)
+        env.AddBuildMiddleware(without_sanitizers, "*check_main.cpp")
     elif os.environ.get("CI"):
         sys.stderr.write(
             f"{env.subst('$CXX')} has no address and undefined sanitizers; CI needs them\n"

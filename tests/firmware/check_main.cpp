@@ -25,6 +25,7 @@ namespace check {
 namespace {
 
 Case* first = nullptr;
+Case** end = &first;
 bool failed = false;
 
 void put(char letter) {
@@ -62,8 +63,9 @@ void put_failure(const char* text_flash, uint16_t line) {
 }  // namespace
 
 Case::Case(const char* name_in_flash, void (*body_of_case)())
-    : name_flash(name_in_flash), body(body_of_case), next(first) {
-  first = this;
+    : name_flash(name_in_flash), body(body_of_case), next(nullptr) {
+  *end = this;
+  end = &next;
 }
 
 void fail(const char* text_flash, uint16_t line) {

@@ -1,0 +1,205 @@
+"""Who may know whom: the table of rooms, held against every include and import.
+
+The same functions run on the clone and on small trees with one planted breach
+each, so that a rule that never bites is found out.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+STANDARD = {"<stdint.h>", "<stddef.h>", "<string.h>"}
+FATFS = {'"ff.h"', '"diskio.h"', '"ffconf.h"'}
+
+# Folders below firmware/ (and protocol/generated) each room may include from, and single headers.
+ROOMS: dict[str, tuple[set[str], set[str]]] = {
+    "core": ({"core", "generated"}, STANDARD),
+    "hal": (set(), STANDARD - {"<string.h>"}),
+    "drivers": ({"core", "generated", "hal", "drivers"}, STANDARD),
+    "storage": ({"core", "generated", "hal", "drivers", "storage"}, STANDARD | FATFS),
+    "app": ({"core", "generated", "hal", "drivers", "storage", "app"}, STANDARD),
+}
+CPP_SUFFIXES = {".h", ".cpp", ".c"}
+INCLUDE = re.compile(r'^\s*#\s*include\s*(<[^>]+>|"[^"]+"|\S+)', re.MULTILINE)
+
+# What the recording path does without: heap, virtual calls, exceptions, floats, the C++ library.
+BANNED = re.compile(r"\b(virtual|new|malloc|calloc|realloc|throw|float|double)\b|\bstd::")
+COMMENT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
+
+# Python packages of this tree; a room names those it must not import.
+FORBIDDEN_IMPORTS = {
+    "host/src": {"tests", "protocol", "firmware", "hw", "simavr", "pytest", "hypothesis"},
+    "protocol": {"host", "tests", "firmware", "hw"},
+    "hw": {"host", "tests", "firmware"},
+    "firmware": {"host", "tests", "hw"},
+}
+
+
+def include_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every include of a firmware room that the table does not allow."""
+    for room, (folders, headers) in ROOMS.items():
+        for path in _files(root / "firmware" / room, CPP_SUFFIXES):
+            for name in INCLUDE.findall(path.read_text(encoding="utf-8")):
+                folder = name.strip('"').split("/")[0] if "/" in name else None
+                if name in headers or (name.startswith('"') and folder in folders):
+                    continue
+                if path.name == "ffconf.h":
+                    continue
+                yield f"{path.relative_to(root)}: {room} may not include {name}"
+
+
+def board_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every board that includes another board."""
+    for board in _folders(root / "firmware" / "boards"):
+        for path in _files(board, CPP_SUFFIXES):
+            for name in INCLUDE.findall(path.read_text(encoding="utf-8")):
+                other = re.match(r'"boards/(\w+)/', name)
+                if other and other[1] != board.name:
+                    yield f"{path.relative_to(root)}: {board.name} may not include {name}"
+
+
+def word_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every word the recording path does without."""
+    for room in ROOMS:
+        for path in _files(root / "firmware" / room, CPP_SUFFIXES):
+            for number, line in enumerate(_code(path).splitlines(), start=1):
+                found = BANNED.search(line)
+                if found:
+                    yield f"{path.relative_to(root)}:{number}: no {found[0]} in {room}"
+
+
+def suite_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every suite that uses more of doctest than check.h offers the AVR."""
+    more = re.compile(
+        r"\b(SUBCASE|TEST_SUITE\w*|TEST_CASE_\w+|CHECK_(?!EQ\b)[A-Z]\w*|REQUIRE_\w+|"
+        r"WARN(_\w+)?|INFO|CAPTURE|FAIL(_CHECK)?|MESSAGE)\s*\(|\bdoctest\b"
+    )
+    for suite in _folders(root / "tests" / "firmware"):
+        if suite.name.startswith("test_native_"):
+            continue  # never built for the AVR
+        for path in _files(suite, CPP_SUFFIXES):
+            for number, line in enumerate(_code(path, keep_strings=True).splitlines(), start=1):
+                found = more.search(line)
+                if found:
+                    yield f"{path.relative_to(root)}:{number}: {found[0]} is not in check.h"
+
+
+def import_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every Python import that crosses the table."""
+    for folder, forbidden in FORBIDDEN_IMPORTS.items():
+        for path in _files(root / folder, {".py"}):
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            for number, module in _imports(tree):
+                if module.split(".")[0] in forbidden:
+                    yield f"{path.relative_to(root)}:{number}: may not import {module}"
+
+
+def link_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every host file that names the chip simulator's library (GPL)."""
+    for path in _files(root / "host" / "src", {".py"}):
+        if "libsimavr" in path.read_text(encoding="utf-8"):
+            yield f"{path.relative_to(root)}: the simulator is a program of its own, never linked"
+
+
+RULES = (
+    include_breaches,
+    board_breaches,
+    word_breaches,
+    suite_breaches,
+    import_breaches,
+    link_breaches,
+)
+
+
+def _files(folder: Path, suffixes: set[str]) -> list[Path]:
+    return sorted(p for p in folder.rglob("*") if p.suffix in suffixes and p.is_file())
+
+
+def _folders(folder: Path) -> list[Path]:
+    return sorted(p for p in folder.iterdir() if p.is_dir()) if folder.is_dir() else []
+
+
+def _code(path: Path, *, keep_strings: bool = False) -> str:
+    """Blank out comments and strings, keeping the line numbers."""
+
+    def blank(found: re.Match[str]) -> str:
+        if keep_strings and found[0].startswith('"'):
+            return found[0]
+        return "\n" * found[0].count("\n")
+
+    return COMMENT.sub(blank, path.read_text(encoding="utf-8"))
+
+
+def _imports(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, name.name) for name in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            yield node.lineno, node.module
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
+def test_clone_keeps_the_table(rule: object) -> None:
+    assert callable(rule)
+    assert "\n".join(rule(ROOT)) == ""
+
+
+PLANTED = [
+    (include_breaches, "firmware/core/relay.h", '#include "hal/relay.h"'),
+    (include_breaches, "firmware/core/relay.h", "#include <avr/io.h>"),
+    (include_breaches, "firmware/core/relay.h", '#include "failsafe.h"'),
+    (include_breaches, "firmware/core/deep/relay.cpp", "  #  include <vector>"),
+    (include_breaches, "firmware/core/relay.h", "#include SOME_MACRO"),
+    (include_breaches, "firmware/hal/clock.h", '#include "core/time.h"'),
+    (include_breaches, "firmware/drivers/bmp085.h", '#include "app/recorder.h"'),
+    (include_breaches, "firmware/drivers/sd_card.h", '#include "ff.h"'),
+    (include_breaches, "firmware/storage/volume.cpp", '#include "app/recorder.h"'),
+    (include_breaches, "firmware/app/recorder.cpp", '#include "ff.h"'),
+    (include_breaches, "firmware/app/recorder.cpp", '#include "boards/mega2560/pins.h"'),
+    (board_breaches, "firmware/boards/sitl/clock.cpp", '#include "boards/mega2560/pins.h"'),
+    (word_breaches, "firmware/core/relay.h", "virtual void tick();"),
+    (word_breaches, "firmware/app/recorder.cpp", "uint8_t* ring = new uint8_t[512];"),
+    (word_breaches, "firmware/app/recorder.cpp", "const float alpha_rad = 0;"),
+    (suite_breaches, "tests/firmware/test_relay/test_relay.cpp", 'SUBCASE("late") {}'),
+    (suite_breaches, "tests/firmware/test_relay/test_relay.cpp", "CHECK_FALSE(late);"),
+    (suite_breaches, "tests/firmware/test_relay/test_relay.cpp", "#include <doctest/doctest.h>"),
+    (import_breaches, "host/src/host/decode.py", "from tests.sitl import demo"),
+    (import_breaches, "host/src/host/decode.py", "def f():\n    import protocol.generate"),
+    (import_breaches, "protocol/generate.py", "import host.schema"),
+    (link_breaches, "host/src/host/twin/mega.py", 'LIBRARY = "libsimavr.so"'),
+]
+
+
+@pytest.mark.parametrize(("rule", "name", "text"), PLANTED)
+def test_planted_breach_is_found(tmp_path: Path, rule: object, name: str, text: str) -> None:
+    assert callable(rule)
+    (tmp_path / name).parent.mkdir(parents=True)
+    (tmp_path / name).write_text(f"{text}\n", encoding="utf-8")
+    found = list(rule(tmp_path))
+    assert len(found) == 1
+    assert found[0].startswith(name)
+
+
+ALLOWED = [
+    ("firmware/core/relay.h", '#include <stdint.h>\n#include "core/time.h"  // no virtual, no new'),
+    ("firmware/core/framing.h", '#include "generated/frames.h"\n/* float and\n double */'),
+    ("firmware/storage/volume.cpp", '#include "ff.h"\n#include "drivers/sd_card.h"'),
+    ("firmware/app/recorder.cpp", '#include "storage/volume.h"\nconst char* kText = "new";'),
+    ("firmware/boards/sitl/clock.cpp", '#include <vector>\n#include "boards/sitl/clock.h"'),
+    ("tests/firmware/test_a/test_a.cpp", 'TEST_CASE("INFO") { CHECK_EQ(1, 1); REQUIRE(true); }'),
+    ("host/src/host/decode.py", "import numpy\nfrom host.schema import load"),
+]
+
+
+@pytest.mark.parametrize(("name", "text"), ALLOWED)
+def test_what_the_table_allows_is_not_reported(tmp_path: Path, name: str, text: str) -> None:
+    (tmp_path / name).parent.mkdir(parents=True)
+    (tmp_path / name).write_text(f"{text}\n", encoding="utf-8")
+    assert [line for rule in RULES for line in rule(tmp_path)] == []
