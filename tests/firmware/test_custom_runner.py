@@ -45,6 +45,7 @@ class CustomTestRunner(DoctestTestRunner):
             self._dying = self._dying or SANITIZER.search(line) is not None
             if self._dying:
                 click.echo(line, nl=False)
+                return
             super().on_testing_line_output(line)
             return
         found = RESULT.search(COLOUR.sub("", line))
