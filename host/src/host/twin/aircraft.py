@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from host.errors import UsageError
 from host.twin.airframe import COEFFICIENTS, GRAVITY_MPS2, Airframe, Array
 
 FOLDER = Path(__file__).parent / "airframes"
@@ -43,7 +44,7 @@ _VECTORS: Mapping[str, tuple[str, ...]] = {
 }
 
 
-class AircraftError(ValueError):
+class AircraftError(UsageError):
     """An aircraft file that cannot be used: what was found, what was expected."""
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq, least_squares
 
+from host.errors import UsageError
 from host.twin.airframe import (
     AILERON,
     COMMAND_COUNT,
@@ -27,7 +28,7 @@ from host.twin.attitude import quaternion
 from host.twin.motion import derivative, motor_torque, propeller
 
 
-class TrimError(ValueError):
+class TrimError(UsageError):
     """No steady flight at the asked condition."""
 
 

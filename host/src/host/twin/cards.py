@@ -1,0 +1,307 @@
+"""Flight cards: what is flown, by whom, in which air, with which faults."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from host.errors import UsageError
+from host.twin.maneuvers import KINDS, STEPS
+
+FOLDER = Path(__file__).parent / "cards"
+AXES = ("elevator", "aileron", "rudder", "throttle")
+FAULTS = {
+    "motor_cut": "the motor stops",
+    "card_busy": "the card is busy for `value` ms at one write",
+    "card_removed": "the card is gone",
+    "imu_off": "the IMU is silent for `duration_s`",
+    "imu_reset": "the IMU restarts",
+    "imu_garbage": "a share `value` of the IMU packets is damaged for `duration_s`",
+    "baro_off": "the barometer does not answer for `duration_s`",
+    "receiver_lost": "no receiver pulses for `duration_s`",
+    "vane_stuck": "the left alpha vane stands still for `duration_s`",
+    "vane_open": "the left alpha vane's wire is open: 1023 counts for `duration_s`",
+    "pitot_blocked": "the left pitot keeps its pressure for `duration_s`",
+    "pitot_swapped": "the ports of the left pitot are swapped for `duration_s`",
+    "gps_off": "the GPS is silent for `duration_s`",
+    "power_cut": "the battery is pulled",
+}
+
+
+class CardError(UsageError):
+    """A flight card that cannot be flown: what was found, what was expected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """Where and how the flight starts."""
+
+    airspeed_mps: float = 0.0  # 0: the aircraft file's
+    height_m: float = 100.0
+    rate_hz: float = 100.0
+    ground_s: float = 5.0  # at rest before the launch, for the zero of the pitot
+    heading_deg: float = 0.0
+    field_pressure_pa: float = 101325.0
+    field_temperature_degc: float = 15.0
+    latitude_deg: float = 30.0  # the thesis flew near Cairo
+    longitude_deg: float = 31.0
+
+
+@dataclass(frozen=True, slots=True)
+class Air:
+    """Steady wind and Dryden turbulence (MIL-F-8785C 3.7.2, low-altitude form unless lengths are
+    given)."""
+
+    wind_north_mps: float = 0.0
+    wind_east_mps: float = 0.0
+    turbulence_mps: float = 0.0  # standard deviation of the vertical gust
+    length_w_m: float = 0.0  # 0: height
+    length_u_m: float = 0.0  # 0: MIL-F-8785C for the height; also for v
+    ratio_u: float = 0.0  # sigma_u / sigma_w; 0: MIL-F-8785C for the height
+
+
+@dataclass(frozen=True, slots=True)
+class Pilot:
+    """A person with a transmitter; 0 for a machine."""
+
+    timing_s: float = 0.03  # standard deviation of each edge
+    amplitude: float = 0.08  # relative standard deviation of each level
+    drift: float = 0.05  # of the level, per second of holding it
+    hand_s: float = 0.08  # duration of a stick edge
+    remnant: float = 0.002  # rms of the stick's wander, of full throw
+    delay_s: float = 0.25  # from seeing to moving
+    gain: float = 1.0  # of the corrections, 1: crossover at 1.2 rad/s
+    early: float = 0.1  # share of maneuvers corrected before they end
+    hands_off_s: float = 2.5  # after the last input
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """One switch per error; false makes that part of the chain ideal."""
+
+    tolerances: bool = True  # per-flight draws
+    noise: bool = True
+    imu_filter: bool = True
+    vane_dynamics: bool = True
+    vane_friction: bool = True
+    position: bool = True  # lever arms, local flow and upwash
+    quantisation: bool = True
+    pitot_drift: bool = True
+    attitude_filter: bool = True  # false: true angles
+    gps_latency: bool = True
+    receiver_jitter: bool = True
+    clock_error: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """One line of the card; angles in degrees, throttle as a share."""
+
+    kind: str
+    duration_s: float = 0.0
+    bank_deg: float = 0.0
+    axes: tuple[str, ...] = ()
+    amplitudes: tuple[float, ...] = ()
+    width_s: float = 0.0
+    low_hz: float = 0.0
+    high_hz: float = 0.0
+    before_s: float = 3.0
+    airspeed_mps: float = 0.0
+    attention: float = -1.0  # of the pilot during the input; -1: 0 for steps, 0.25 for long inputs
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Something breaks at `at_s` after power-on."""
+
+    kind: str
+    at_s: float
+    duration_s: float = 1e9
+    value: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """A flight card.
+
+    Attributes
+    ----------
+    name, title, aircraft : str
+    logger : str
+        ``recorder`` or ``thesis``: whose rate and rows the card speaks of.
+    flight, air, pilot, sensors : dataclasses
+    segments : tuple of Segment
+    faults : tuple of Fault
+    """
+
+    name: str
+    title: str
+    aircraft: str
+    segments: tuple[Segment, ...]
+    flight: Flight = field(default_factory=Flight)
+    air: Air = field(default_factory=Air)
+    pilot: Pilot = field(default_factory=Pilot)
+    sensors: Sensors = field(default_factory=Sensors)
+    faults: tuple[Fault, ...] = ()
+
+
+Section = TypeVar("Section", Flight, Air, Pilot, Sensors)
+
+
+def names() -> list[str]:
+    """Return the names of the cards that come with the package, sorted."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def load(source: str | Path) -> Card:
+    """Load a flight card.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a packaged card, or path of a file.
+
+    Returns
+    -------
+    Card
+
+    Raises
+    ------
+    CardError
+        What was found and what was expected, in one line.
+    """
+    path = Path(source)
+    if path.suffix != ".toml":
+        path = FOLDER / f"{source}.toml"
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        known = ", ".join(names())
+        raise CardError(
+            f"no flight card {str(source)!r}: expected a file or one of {known}"
+        ) from None
+    except tomllib.TOMLDecodeError as error:
+        raise CardError(f"{path.name}: not TOML: {error}") from None
+    return parse(document, path.stem)
+
+
+def parse(document: Mapping[str, object], name: str) -> Card:
+    """Make a card of a parsed document; raises CardError."""
+    if document.get("format") != 1:
+        raise CardError(f"{name}: format is {document.get('format')!r}, expected 1")
+    known = {"format", "title", "aircraft", "flight", "air", "pilot", "sensors", "segment", "fault"}
+    for key in document:
+        if key not in known:
+            raise CardError(
+                f"{name}: unknown key {key!r}, expected one of {', '.join(sorted(known))}"
+            )
+    aircraft = document.get("aircraft")
+    if not isinstance(aircraft, str):
+        raise CardError(f"{name}: aircraft is {aircraft!r}, expected a name")
+    listed = document.get("segment")
+    if not isinstance(listed, list) or not listed:
+        raise CardError(f"{name}: no [[segment]], expected at least one")
+    faults = document.get("fault", [])
+    if not isinstance(faults, list):
+        raise CardError(f"{name}: fault is not a list of tables")
+    segments: list[Segment] = []
+    for i, table in enumerate(listed):
+        segments += _segments(f"{name}: segment {i + 1}", table)
+    return Card(
+        name=name,
+        title=str(document.get("title", name)),
+        aircraft=aircraft,
+        segments=tuple(segments),
+        flight=_section(name, document, "flight", Flight),
+        air=_section(name, document, "air", Air),
+        pilot=_section(name, document, "pilot", Pilot),
+        sensors=_section(name, document, "sensors", Sensors),
+        faults=tuple(_fault(f"{name}: fault {i + 1}", table) for i, table in enumerate(faults)),
+    )
+
+
+def _table(where: str, value: object) -> dict[str, object]:
+    if not isinstance(value, dict):
+        raise CardError(f"{where}: {value!r} is not a table")
+    return value
+
+
+def _number(where: str, key: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise CardError(f"{where}: {key} is {value!r}, expected a number")
+    return float(value)
+
+
+def _section(name: str, document: Mapping[str, object], key: str, kind: type[Section]) -> Section:
+    table = _table(f"{name}: [{key}]", document.get(key, {}))
+    allowed = {f.name: f.type for f in fields(kind)}
+    values: dict[str, Any] = {}  # numbers and switches, checked below
+    for entry, value in table.items():
+        if entry not in allowed:
+            raise CardError(
+                f"{name}: unknown {key}.{entry}, expected one of {', '.join(sorted(allowed))}"
+            )
+        if allowed[entry] == "bool":
+            if not isinstance(value, bool):
+                raise CardError(f"{name}: {key}.{entry} is {value!r}, expected true or false")
+            values[entry] = value
+        else:
+            values[entry] = _number(f"{name}: [{key}]", entry, value)
+    return kind(**values)
+
+
+def _segments(where: str, value: object) -> list[Segment]:
+    table = dict(_table(where, value))
+    kind = table.pop("kind", None)
+    if kind not in ("trim", "turn", *KINDS):
+        raise CardError(f"{where}: kind is {kind!r}, expected trim, turn, {', '.join(KINDS)}")
+    repeat = table.pop("repeat", 1)
+    if not isinstance(repeat, int) or not 1 <= repeat <= 100:
+        raise CardError(f"{where}: repeat is {repeat!r}, expected 1 to 100")
+    axis = table.pop("axis", [])
+    axes = [axis] if isinstance(axis, str) else axis
+    if not isinstance(axes, list) or any(name not in AXES for name in axes):
+        raise CardError(f"{where}: axis is {axis!r}, expected of {', '.join(AXES)}")
+    amplitude = table.pop("amplitude", [])
+    listed = amplitude if isinstance(amplitude, list) else [amplitude]
+    amplitudes = tuple(_number(where, "amplitude", x) for x in listed)
+    numbers: dict[str, float] = {}
+    allowed = ("duration_s", "bank_deg", "width_s", "low_hz", "high_hz", "before_s",
+               "airspeed_mps", "attention")  # fmt: skip
+    for key, x in table.items():
+        if key not in allowed:
+            raise CardError(f"{where}: unknown key {key!r}, expected one of {', '.join(allowed)}")
+        numbers[key] = _number(where, key, x)
+    if kind in KINDS and (not axes or len(axes) != len(amplitudes)):
+        raise CardError(
+            f"{where}: {len(axes)} axes and {len(amplitudes)} amplitudes, expected one each"
+        )
+    if kind in STEPS:
+        needed: tuple[str, ...] = ("width_s",)
+    elif kind in KINDS:
+        needed = ("duration_s", "low_hz", "high_hz")
+    else:
+        needed = ("duration_s",)
+    for key in needed:
+        if numbers.get(key, 0.0) <= 0.0:
+            raise CardError(f"{where}: {kind} needs {key} above 0, found {numbers.get(key)!r}")
+    if kind in KINDS and kind not in STEPS and numbers["high_hz"] <= numbers["low_hz"]:
+        raise CardError(f"{where}: high_hz is {numbers['high_hz']!r}, expected above low_hz")
+    return [Segment(kind=str(kind), axes=tuple(axes), amplitudes=amplitudes, **numbers)] * repeat
+
+
+def _fault(where: str, value: object) -> Fault:
+    table = dict(_table(where, value))
+    kind = table.pop("kind", None)
+    if kind not in FAULTS:
+        raise CardError(f"{where}: kind is {kind!r}, expected one of {', '.join(FAULTS)}")
+    for key in table:
+        if key not in ("at_s", "duration_s", "value"):
+            raise CardError(f"{where}: unknown key {key!r}, expected at_s, duration_s or value")
+    if "at_s" not in table:
+        raise CardError(f"{where}: {kind} needs at_s")
+    return Fault(kind=str(kind), **{key: _number(where, key, x) for key, x in table.items()})
