@@ -1,0 +1,339 @@
+"""An independent decoder of logs and telemetry, made with construct from protocol/README.md alone.
+
+Slow and plain on purpose: one block, one frame, one byte after the other. It shares no code with
+the host package, so that where both agree, both read the page the same way.
+"""
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import construct as c
+
+MAGIC = b"FLT1"
+BLOCK = 512
+PAYLOAD = 480
+SYNC = b"\xa5\x5a"
+NUMBERS = {
+    "u8": c.Int8ul,
+    "i8": c.Int8sl,
+    "u16": c.Int16ul,
+    "i16": c.Int16sl,
+    "u32": c.Int32ul,
+    "i32": c.Int32sl,
+    "f32": c.Float32l,
+}
+
+BLOCK_FORMAT = c.Struct(
+    "body"
+    / c.RawCopy(
+        c.Struct(
+            "magic" / c.Bytes(4),
+            "file_id" / c.Int32ul,
+            "session" / c.Int32ul,
+            "sequence" / c.Int32ul,
+            "schema_hash" / c.Int32ul,
+            "dropped" / c.Int32ul,
+            "used" / c.Int16ul,
+            "kind" / c.Int8ul,
+            "reserved" / c.Int8ul,
+            "payload" / c.Bytes(PAYLOAD),
+        )
+    ),
+    "crc" / c.Int32ul,
+)
+PIECE_FORMAT = c.Struct("offset" / c.Int16ul, "total" / c.Int16ul, "text" / c.GreedyBytes)
+ENVELOPE_FORMAT = c.Struct(
+    "sync" / c.Const(SYNC),
+    "covered" / c.RawCopy(c.Prefixed(c.Int8ul, c.GreedyBytes)),
+    "crc" / c.Int16ul,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One block as it stands in the file; `verdict` is "ok" or the first check that failed."""
+
+    position: int
+    verdict: str
+    file_id: int
+    session: int
+    sequence: int
+    schema_hash: int
+    dropped: int
+    used: int
+    kind: int
+    payload: bytes
+
+
+@dataclass(slots=True)
+class Decoded:
+    """What a log holds.
+
+    Parameters
+    ----------
+    file_id : int
+        Id of the log: that of the first valid block.
+    frames : dict of str to list
+        Every frame by name: its values by field and the sequence of its block.
+    missing : list of (int, int)
+        First and last sequence of each run of blocks that are not there, up to the last one.
+    foreign : list of int
+        Positions of valid blocks of other logs.
+    unread : int
+        Payload bytes that could not be read as frames.
+    complete : str
+        complete, truncated or damaged.
+    """
+
+    file_id: int
+    frames: dict[str, list[tuple[Mapping[str, Any], int]]] = field(default_factory=dict)
+    missing: list[tuple[int, int]] = field(default_factory=list)
+    foreign: list[int] = field(default_factory=list)
+    sessions: list[int] = field(default_factory=list)
+    unread: int = 0
+    complete: str = "complete"
+
+
+@dataclass(slots=True)
+class Stream:
+    """What a telemetry stream holds; counts as in README.md, "Cases"."""
+
+    frames: list[bytes] = field(default_factory=list)
+    failed: int = 0
+    skipped: int = 0
+    pending: int = 0
+
+
+def parse_block(data: bytes, position: int = 0) -> Block:
+    """Read one block of 512 bytes at `position` and judge it."""
+    parsed = BLOCK_FORMAT.parse(data[position : position + BLOCK])
+    head = parsed.body.value
+    verdict = "ok"
+    if head.magic != MAGIC:
+        verdict = "magic"
+    elif zlib.crc32(parsed.body.data) != parsed.crc:
+        verdict = "crc"
+    elif head.used > PAYLOAD:
+        verdict = "used"
+    elif head.kind not in (0, 1):
+        verdict = "kind"
+    return Block(
+        position,
+        verdict,
+        head.file_id,
+        head.session,
+        head.sequence,
+        head.schema_hash,
+        head.dropped,
+        head.used,
+        head.kind,
+        bytes(head.payload),
+    )
+
+
+def find_blocks(data: bytes) -> list[Block]:
+    """Return every valid block of a file: on the grid, and off it where the grid fails."""
+    on_grid = {
+        at: parsed
+        for at in range(0, len(data) - BLOCK + 1, BLOCK)
+        if (parsed := parse_block(data, at)).verdict == "ok"
+    }
+    found = []
+    at = 0
+    while at + BLOCK <= len(data):
+        block: Block | None = on_grid.get(at)
+        if block is None and data[at : at + 4] == MAGIC:
+            candidate = parse_block(data, at)
+            covered = any(at < other < at + BLOCK for other in on_grid)
+            block = candidate if candidate.verdict == "ok" and not covered else None
+        if block is not None:
+            found.append(block)
+            at += BLOCK
+            continue
+        following = data.find(MAGIC, at + 1)
+        grid = min((other for other in on_grid if other > at), default=len(data))
+        at = min(following if following >= 0 else len(data), grid)
+    return found
+
+
+def decode(data: bytes, *, known_schemas: Sequence[bytes] = ()) -> Decoded | None:
+    """Decode a whole log; None if it holds no valid block.
+
+    Parameters
+    ----------
+    data : bytes
+    known_schemas : sequence of bytes
+        Schema texts from elsewhere, for logs that lost theirs.
+    """
+    valid = find_blocks(data)
+    if not valid:
+        return None
+    result = Decoded(file_id=valid[0].file_id)
+    own = [block for block in valid if block.file_id == result.file_id]
+    result.foreign = [block.position for block in valid if block.file_id != result.file_id]
+    ordered = _one_per_sequence(own)
+    schemas = {zlib.crc32(text): frame_formats(text) for text in known_schemas}
+    schemas |= {key: frame_formats(text) for key, text in schema_texts(own).items()}
+    expected = 0
+    for block in ordered:
+        if block.sequence > expected:
+            result.missing.append((expected, block.sequence - 1))
+        expected = block.sequence + 1
+        if block.session not in result.sessions:
+            result.sessions.append(block.session)
+        if block.kind == 1 or block.schema_hash not in schemas:
+            continue
+        frames, unread = read_frames(block.payload[: block.used], schemas[block.schema_hash])
+        result.unread += unread
+        for name, values in frames:
+            result.frames.setdefault(name, []).append((values, block.sequence))
+    result.complete = _completeness(data, valid, ordered, result)
+    return result
+
+
+def schema_texts(blocks: Sequence[Block]) -> dict[int, bytes]:
+    """Return the whole schema texts that the blocks' pieces make, by their hash."""
+    pieces: dict[tuple[int, int], dict[int, bytes]] = {}
+    for block in blocks:
+        if block.kind == 1 and block.used >= 4:
+            piece = PIECE_FORMAT.parse(block.payload[: block.used])
+            pieces.setdefault((block.schema_hash, piece.total), {})[piece.offset] = piece.text
+    texts = {}
+    for (schema_hash, total), parts in pieces.items():
+        text = b""
+        while len(text) < total and parts.get(len(text)):
+            text += parts[len(text)]
+        if len(text) == total and zlib.crc32(text) == schema_hash:
+            texts[schema_hash] = text
+    return texts
+
+
+def frame_formats(text: bytes) -> dict[int, tuple[str, Any]]:
+    """Return name and construct of every frame of a schema text, by id."""
+    schema = json.loads(text)
+    column = {name: number for number, name in enumerate(schema["columns"])}
+    return {
+        frame["id"]: (
+            frame["name"],
+            c.Struct(
+                *(
+                    row[column["name"]] / _field_format(row[column["type"]])
+                    for row in frame["fields"]
+                )
+            ),
+        )
+        for frame in schema["frames"]
+    }
+
+
+def read_frames(
+    payload: bytes, formats: Mapping[int, tuple[str, Any]]
+) -> tuple[list[tuple[str, Mapping[str, Any]]], int]:
+    """Read whole frames one after the other; return them and the bytes left unread."""
+    frames = []
+    at = 0
+    while at < len(payload):
+        if payload[at] not in formats:
+            break
+        name, layout = formats[payload[at]]
+        size = layout.sizeof()
+        if at + 1 + size > len(payload):
+            break
+        frames.append((name, layout.parse(payload[at + 1 : at + 1 + size])))
+        at += 1 + size
+    return frames, len(payload) - at
+
+
+def decode_stream(data: bytes) -> Stream:
+    """Find the frames of a telemetry stream that ends where `data` ends."""
+    result = Stream()
+    at = 0
+    while at < len(data):
+        rest = data[at:]
+        if not SYNC.startswith(rest[:2]):
+            result.skipped += 1
+            at += 1
+            continue
+        if len(rest) >= 3 and not 1 <= rest[2] <= 128:
+            result.failed += 1
+            result.skipped += 1
+            at += 1
+            continue
+        if len(rest) < 3 or len(rest) < rest[2] + 5:
+            result.pending = len(rest)
+            break
+        parsed = ENVELOPE_FORMAT.parse(rest)
+        if _crc16(parsed.covered.data) != parsed.crc:
+            result.failed += 1
+            result.skipped += 1
+            at += 1
+            continue
+        result.frames.append(bytes(parsed.covered.value))
+        at += len(parsed.covered.value) + 5
+    return result
+
+
+def _one_per_sequence(blocks: Sequence[Block]) -> list[Block]:
+    chosen: dict[int, Block] = {}
+    for block in blocks:
+        held = chosen.get(block.sequence)
+        at_its_place = block.position == BLOCK * block.sequence
+        if held is None or (at_its_place and held.position != BLOCK * held.sequence):
+            chosen[block.sequence] = block
+    return [chosen[sequence] for sequence in sorted(chosen)]
+
+
+def _completeness(
+    data: bytes, valid: Sequence[Block], ordered: Sequence[Block], result: Decoded
+) -> str:
+    last = ordered[-1]
+    own_end = max(b.position for b in valid if b.file_id == result.file_id) + BLOCK
+    if result.missing or result.unread or _bad_bytes(data[:own_end], valid):
+        return "damaged"
+    owner = result.file_id.to_bytes(4, "little")
+    taken = {b.position for b in valid}
+    at = data.find(MAGIC + owner, own_end)
+    while at >= 0:
+        if at + BLOCK <= len(data) and at not in taken:
+            return "damaged"
+        at = data.find(MAGIC + owner, at + 1)
+    ended = any(
+        values["code"] == 2
+        for values, sequence in result.frames.get("event", [])
+        if sequence == last.sequence
+    )
+    if ended or len(data) >= own_end + BLOCK:
+        return "complete"
+    return "truncated"
+
+
+def _bad_bytes(data: bytes, valid: Sequence[Block]) -> bool:
+    at = 0
+    for block in valid:
+        if block.position >= len(data):
+            break
+        if data[at : block.position].strip(b"\0"):
+            return True
+        at = block.position + BLOCK
+    return False
+
+
+def _field_format(kind: str) -> Any:
+    base, _, length = kind.rstrip("]").partition("[")
+    if base == "char":
+        return c.Bytes(int(length or 1))
+    return c.Array(int(length), NUMBERS[base]) if length else NUMBERS[base]
+
+
+def _crc16(data: bytes) -> int:
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte << 8
+        for _ in range(8):
+            crc <<= 1
+            if crc & 0x10000:
+                crc ^= 0x11021
+    return crc

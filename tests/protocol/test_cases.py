@@ -1,0 +1,58 @@
+"""protocol/cases.toml against the independent decoder, and against the host's where it has one."""
+
+import json
+import tomllib
+from typing import Any
+
+import pytest
+
+from tests.protocol import log_writer, oracle
+
+TABLE = tomllib.loads((log_writer.ROOT / "protocol/cases.toml").read_text())
+FORMATS = oracle.frame_formats(log_writer.schema_text())
+
+
+def unhex(value: str) -> bytes:
+    return bytes.fromhex("".join(value.split()))
+
+
+def block_bytes(case: dict[str, Any]) -> bytes:
+    return unhex(case["head"]).ljust(508, b"\0") + unhex(case["crc"])
+
+
+@pytest.mark.parametrize("case", TABLE["telemetry"], ids=lambda case: case["name"])
+def test_stream(case: dict[str, Any]) -> None:
+    found = oracle.decode_stream(unhex(case["bytes"]))
+    expected = oracle.Stream(
+        [unhex(frame) for frame in case["frames"]], case["failed"], case["skipped"], case["pending"]
+    )
+    assert found == expected
+
+
+@pytest.mark.parametrize("case", TABLE["block"], ids=lambda case: case["name"])
+def test_block(case: dict[str, Any]) -> None:
+    block = oracle.parse_block(block_bytes(case))
+    assert block.verdict == case["verdict"]
+    if case["verdict"] != "ok":
+        return
+    for key in ("file_id", "session", "sequence", "schema_hash", "dropped", "used", "kind"):
+        assert getattr(block, key) == case[key], key
+    if case["kind"] == 1:
+        piece = oracle.PIECE_FORMAT.parse(block.payload[: block.used])
+        assert (piece.offset, piece.total) == (case["offset"], case["total"])
+        assert piece.text == case["text"].encode()
+        return
+    frames, unread = oracle.read_frames(block.payload[: block.used], FORMATS)
+    assert unread == case["unread"]
+    again = []
+    for name, values in frames:
+        number, layout = next((i, f) for i, (n, f) in FORMATS.items() if n == name)
+        again.append(bytes([number]) + layout.build(values))
+    assert again == [unhex(frame) for frame in case["frames"]]
+
+
+def test_schema_of_the_cases_is_the_committed_one() -> None:
+    # A new schema may give the frames of the table other lengths: the table is then made anew.
+    hashes = {case["schema_hash"] for case in TABLE["block"] if case["verdict"] == "ok"}
+    committed = json.loads((log_writer.ROOT / "protocol/generated/schema.json").read_text())
+    assert hashes == {committed["crc32"]}
