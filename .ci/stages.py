@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import subprocess
 import sys
 import time
@@ -30,6 +31,7 @@ PYTHON = sys.executable
 # Two at a time: most stages keep one core busy, and a small machine has two.
 WORKERS = min(2, os.cpu_count() or 1)
 TAIL_LINES = 40
+GENERATOR = re.compile(r"/generate(_\w+)?\.py$")
 
 PYTHON_FOLDERS = ("host/src", "protocol", "tests", "hw", "firmware", ".ci")
 CPP_FOLDERS = ("firmware", "tests", "protocol")
@@ -79,7 +81,7 @@ def stages() -> list[Stage]:
     python = sources(PYTHON_FOLDERS, (".py",))
     pio = str(BIN / "pio")
     ruff = str(BIN / "ruff")
-    generators = [f for f in python if f.endswith("/generate.py")]
+    generators = sorted({"protocol/generate.py", *(f for f in python if GENERATOR.search(f))})
     native = (pio, "test", "-e", "native", "--junit-output-path", str(report_path("native")))
     found = [
         Stage(
@@ -228,7 +230,9 @@ def main() -> int:
     say("\n" + table(outcomes, time.monotonic() - start_s))
     passed = sum(outcome.passed for outcome in outcomes)
     failed = sum(outcome.failed for outcome in outcomes)
-    say(f"tests: {passed} passed, {failed} failed")
+    last = f"tests: {passed} passed, {failed} failed"
+    (LOGS / "result.txt").write_text(last + "\n", encoding="utf-8")
+    say(last)
     return 0 if all(outcome.state == "ok" for outcome in outcomes) else 6
 
 

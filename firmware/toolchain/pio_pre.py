@@ -54,8 +54,9 @@ def without_sanitizers(build_env: Any, node: Any) -> Any:
     return build_env.Object(node, CCFLAGS=[*flags, "-O0"])
 
 
+sys.path.insert(0, env.subst("$PROJECT_DIR/firmware/toolchain"))
+
 if env["PIOENV"] != "arduimu":
-    sys.path.insert(0, env.subst("$PROJECT_DIR/firmware/toolchain"))
     fatfs = importlib.import_module("fatfs")
     try:
         env.Append(CPPPATH=[str(fatfs.ensure(python=env.subst("$PYTHONEXE")))])
