@@ -1,0 +1,72 @@
+"""The runner of `make test`: what it counts, what it runs after a failure, its exit code."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from concurrent.futures import Future
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+RUNNER = ROOT / ".ci" / "stages.py"
+
+
+@pytest.fixture
+def runner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Load the runner by its path and send its logs elsewhere."""
+    spec = importlib.util.spec_from_file_location("stages", RUNNER)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "stages", module)
+    spec.loader.exec_module(module)
+    monkeypatch.setattr(module, "LOGS", tmp_path)
+    monkeypatch.setattr(module, "ROOT", tmp_path)
+    return module
+
+
+def python(code: str) -> tuple[str, ...]:
+    return (sys.executable, "-c", code)
+
+
+def test_cases_are_counted_and_a_skip_is_no_pass(runner: ModuleType, tmp_path: Path) -> None:
+    report = tmp_path / "a.xml"
+    report.write_text(
+        "<testsuites><testsuite><testcase/><testcase><failure/></testcase>"
+        "<testcase><error/></testcase><testcase><skipped/></testcase></testsuite></testsuites>"
+    )
+    assert runner.count_cases(report) == (1, 2)
+
+
+def test_every_command_of_a_failed_stage_runs(runner: ModuleType, tmp_path: Path) -> None:
+    commands = (python("raise SystemExit(3)"), python("print('second')"))
+    outcome = runner.run(runner.Stage("a", "two commands", commands), {})
+    assert (outcome.state, outcome.passed, outcome.failed) == ("FAILED", 0, 1)
+    assert "second" in (tmp_path / "a.log").read_text()
+
+
+def test_a_stage_without_its_report_has_failed(runner: ModuleType) -> None:
+    stage = runner.Stage("a", "no cases", (python("pass"),), report=True)
+    outcome = runner.run(stage, {})
+    assert (outcome.state, outcome.failed) == ("FAILED", 1)
+
+
+@pytest.mark.parametrize(("link", "state"), [("needs", "not run"), ("after", "ok")])
+def test_what_follows_a_failed_stage(runner: ModuleType, link: str, state: str) -> None:
+    first = runner.Stage("first", "fails", ())
+    failed: Future[object] = Future()
+    failed.set_result(runner.Outcome(first, "FAILED", 0.0, 0, 1))
+    second = runner.Stage("second", "follows", (python("pass"),), **{link: ("first",)})
+    assert runner.run(second, {"first": failed}).state == state
+
+
+def test_an_unknown_stage_is_a_usage_error() -> None:
+    done = subprocess.run(
+        [sys.executable, str(RUNNER), "nonsense"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert "no stage nonsense" in done.stderr
