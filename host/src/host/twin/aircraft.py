@@ -30,7 +30,8 @@ _SCALARS: Mapping[str, tuple[str, ...]] = {
     ),
     "servo": ("bandwidth_hz", "rate_limit_radps"),
     "surfaces": ("elevator_limit_rad", "aileron_limit_rad", "rudder_limit_rad"),
-    "sensors": ("position_tolerance_m", "upwash", "upwash_tolerance"),
+    "sensors": ("position_tolerance_m", "upwash", "upwash_tolerance",
+        "vane_frequency_hz_per_mps", "vane_damping", "vane_friction_rad", "pitot_lag_s"),
 }  # fmt: skip
 _VECTORS: Mapping[str, tuple[str, ...]] = {
     "mass": ("cg_m",),

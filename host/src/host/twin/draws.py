@@ -91,6 +91,7 @@ def draw(aircraft: Aircraft, rng: np.random.Generator, *, tolerances: bool) -> D
         "vane_delay_s": within(DELAY_LEAST_S, 4),
         "pitot_delay_s": within(DELAY_LEAST_S, 2),
         "gps_delay_share": within(DELAY_SHARE),
+        "field_m": within(5.0, 3),  # slow position error of the GPS at power-on
         "vane_scale_share": within(VANE_SCALE, 4),  # alpha a, alpha b, beta a, beta b
         "vane_zero_rad": within(float(VANE_ZERO_RAD), 4),
         "pitot_scale_share": within(PITOT_SCALE, 2),

@@ -300,7 +300,7 @@ def fly(
     launch[0:3] += rotate_to_body(launch, wind[0], wind[1], wind[2])
     launch[DOWN] = -card.flight.height_m
     rest = np.zeros(STATE_COUNT)
-    rest[Q0 : Q3 + 1] = turn
+    rest[Q0 : Q3 + 1] = launch[Q0 : Q3 + 1]  # held at its flight attitude until it is let go
     rest[ROTOR - 3 : ROTOR] = trim.command[:3]
 
     states, air = np.empty((n, STATE_COUNT)), np.empty((n, 9))

@@ -1,0 +1,161 @@
+"""Vanes, pitots and pots as voltages on the converter's inputs.
+
+Counts of a 10-bit ratiometric converter, not yet rounded: the converter rounds when it converts.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.resources import resource
+from host.twin.airdata import AirData, local_velocity
+from host.twin.airframe import AILERON, ELEVATOR, RUDDER, Array
+from host.twin.cards import Fault
+from host.twin.draws import delay_s
+from host.twin.filters import delayed, first_order, vane
+from host.twin.flight import STEP_S, FlightRecord
+
+CHANNELS = (
+    "alpha_a", "alpha_b", "beta_a", "beta_b", "dp_a", "dp_b",
+    "pot_elevator", "pot_aileron_left", "pot_aileron_right", "pot_rudder",
+)  # fmt: skip
+# Noise before the converter, counts rms: MA3 analogue 0.12 deg (hardware facts 2.8) = 0.34 counts;
+# MPXV7002 and pots: 2 mV of broadband noise on a 4.9 mV count.
+NOISE_COUNT = {"alpha": 0.34, "beta": 0.34, "dp": 0.4, "pot": 0.4}
+DRIFT_TAU_S = 60.0  # warm-up of the pressure sensor
+
+
+@dataclass(frozen=True, slots=True)
+class Analog:
+    """Converter inputs on the 1 kHz grid.
+
+    Attributes
+    ----------
+    counts : (n, 10) array
+        `CHANNELS`, without the converter's noise and rounding.
+    noise_count : (10,) array
+        Standard deviation of each conversion.
+    """
+
+    counts: Array
+    noise_count: Array
+
+
+def nominal() -> dict[str, tuple[float, float]]:
+    """Return zero (counts) and slope (SI per count) of each channel from the default
+    calibration."""
+    table = tomllib.loads(resource("default.toml").read_text(encoding="utf-8"))["channel"]
+    return {name: (float(table[name]["zero"]), float(table[name]["slope"])) for name in CHANNELS}
+
+
+def analog(record: FlightRecord, data: AirData) -> Analog:
+    """Compute what the analogue sensors put out.
+
+    Parameters
+    ----------
+    record : FlightRecord
+    data : AirData
+
+    Returns
+    -------
+    Analog
+    """
+    switches, draws, plane = record.card.sensors, record.draws, record.aircraft
+    scale = nominal()
+    t = record.t_s
+    counts = np.empty((len(t), len(CHANNELS)))
+    cg = record.frame.cg_m
+
+    def place(name: str) -> Array:
+        if not switches.position:
+            return np.zeros(3)
+        return plane.vector(f"sensors.{name}_m") + draws.vector(f"{name}_m") - cg
+
+    frequency = plane.scalar("sensors.vane_frequency_hz_per_mps")
+    damping = plane.scalar("sensors.vane_damping")
+    friction = plane.scalar("sensors.vane_friction_rad") if switches.vane_friction else 0.0
+    reference = plane.scalar("trim.airspeed_mps")
+    upwash = plane.scalar("sensors.upwash") if switches.position else 0.0
+    for side in (0, 1):
+        flow = local_velocity(data, place(f"vane_{'ab'[side]}"))
+        speed = np.linalg.norm(flow, axis=1)
+        lift = 1.0 + upwash * (1.0 + draws.vector("upwash_share")[side])
+        moving = speed > 0.5
+        alpha = np.where(moving, np.arctan2(lift * flow[:, 2], flow[:, 0]), 0.0)
+        # A fin on an upright axis sees the flank angle atan(v/u), not asin(v/V).
+        flank = np.where(moving, np.arctan2(flow[:, 1], flow[:, 0]), 0.0)
+        for angle, k in ((alpha, side), (flank, 2 + side)):
+            if switches.vane_dynamics:
+                # Delay of the vane: 2 zeta / omega; a slower vane is one of lower frequency.
+                nominal_s = 2.0 * damping / (2.0 * np.pi * frequency * reference)
+                late = delay_s(
+                    nominal_s,
+                    float(draws.vector("vane_delay_share")[k]),
+                    float(draws.vector("vane_delay_s")[k]),
+                )
+                angle = vane(
+                    angle, speed, frequency * nominal_s / late, damping, friction, reference, STEP_S
+                )
+            zero, slope = scale[CHANNELS[k]]
+            share = 1.0 + float(draws.vector("vane_scale_share")[k])
+            counts[:, k] = zero + (share * angle + draws.vector("vane_zero_rad")[k]) / slope
+        lag = plane.scalar("sensors.pitot_lag_s")
+        late = delay_s(
+            lag,
+            float(draws.vector("pitot_delay_share")[side]),
+            float(draws.vector("pitot_delay_s")[side]),
+        )
+        flow = local_velocity(data, place(f"pitot_{'ab'[side]}"))
+        pressure = 0.5 * data.density_kgpm3 * (flow**2).sum(axis=1)
+        pressure = first_order(pressure, late, STEP_S)
+        zero, slope = scale[CHANNELS[4 + side]]
+        share = 1.0 + float(draws.vector("pitot_scale_share")[side])
+        drift = draws.vector("pitot_drift_count")[side] * (1.0 - np.exp(-t / DRIFT_TAU_S))
+        counts[:, 4 + side] = zero + share * pressure / slope
+        if switches.pitot_drift:
+            counts[:, 4 + side] += drift
+    aileron = record.states[:, AILERON]
+    surfaces = (record.states[:, ELEVATOR], aileron, -aileron, record.states[:, RUDDER])
+    for i, angle in enumerate(surfaces):
+        zero, slope = scale[CHANNELS[6 + i]]
+        share = 1.0 + float(draws.vector("pot_scale_share")[i])
+        counts[:, 6 + i] = zero + (share * angle + draws.vector("pot_zero_rad")[i]) / slope
+    noise = np.array([NOISE_COUNT[name.split("_")[0]] for name in CHANNELS])
+    for fault in record.card.faults:
+        _break(fault, t, counts, scale)
+    return Analog(counts, noise if switches.noise else np.zeros_like(noise))
+
+
+def _break(fault: Fault, t: Array, counts: Array, scale: dict[str, tuple[float, float]]) -> None:
+    inside = (t >= fault.at_s) & (t < fault.at_s + fault.duration_s)
+    if not inside.any():
+        return
+    first = int(np.argmax(inside))
+    if fault.kind == "vane_stuck":
+        counts[inside, 0] = counts[first, 0]
+    elif fault.kind == "vane_open":
+        counts[inside, 0] = 1023.0
+    elif fault.kind == "pitot_blocked":
+        counts[inside, 4] = counts[first, 4]
+    elif fault.kind == "pitot_swapped":
+        zero = scale["dp_a"][0]
+        counts[inside, 4] = 2.0 * zero - counts[inside, 4]
+
+
+def convert(source: Analog, t_s: Array, at_s: Array, rng: np.random.Generator) -> Array:
+    """Convert all channels at the times `at_s` (m,): rounded and clipped counts (m, 10).
+
+    Parameters
+    ----------
+    source : Analog
+    t_s : (n,) array
+        Its time grid.
+    at_s : (m,) array
+    rng : numpy Generator
+    """
+    volts = delayed(t_s, source.counts, 0.0, at_s)
+    volts = volts + rng.standard_normal(volts.shape) * source.noise_count
+    return np.clip(np.floor(volts + 0.5), 0.0, 1023.0)

@@ -1,0 +1,234 @@
+"""MPU-6000 on the ArduIMU, and the attitude filter that runs beside it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.twin.airdata import AirData
+from host.twin.airframe import DOWN, GRAVITY_MPS2, NORTH, Q0, Q3, Array, P, R
+from host.twin.attitude import euler, to_body
+from host.twin.compiled import compiled
+from host.twin.draws import delay_s
+from host.twin.filters import delayed, first_order
+from host.twin.flight import STEP_S, FlightRecord
+
+# DLPF_CFG: bandwidth Hz and delay ms of gyro and accelerometer (register map; hardware facts 2.3).
+FILTERS = {
+    2: ((98.0, 2.8e-3), (94.0, 3.0e-3)),
+    3: ((42.0, 4.8e-3), (44.0, 4.9e-3)),
+    4: ((20.0, 8.3e-3), (21.0, 8.5e-3)),
+}
+GYRO_NOISE_RADPS_RTHZ = math.radians(0.005)  # PS-MPU-6000A: 0.005 deg/s/sqrt(Hz)
+ACCEL_NOISE_MPS2_RTHZ = 400e-6 * GRAVITY_MPS2  # 400 ug/sqrt(Hz)
+GYRO_LSB_RADPS = math.radians(1.0 / 65.5)
+ACCEL_LSB_MPS2 = GRAVITY_MPS2 / 8192.0
+ANGLE_LSB_RAD = math.radians(0.01)
+# Complementary filter of the direction-cosine kind: Mahony, Hamel & Pflimlin, IEEE TAC 53 (2008),
+# explicit form; gains of the order of those of small autopilots.
+TILT_GAIN_PERS = 0.2
+HEADING_GAIN_PERS = 0.3
+BIAS_GAIN_PERS2 = 0.005
+FIELD_NED_T = np.array([30.0e-6, 2.2e-6, 32.0e-6])  # near Cairo, declination 4.1 deg (thesis)
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """IMU samples.
+
+    Attributes
+    ----------
+    t_s : (m,) array
+        True time of each sample (what its registers held then is late by the filter's delay).
+    dlpf : int
+        DLPF_CFG.
+    rates_radps, force_mps2 : (m, 3) arrays
+        Measured, quantised if that switch is on.
+    attitude_rad : (m, 3) array
+        phi, theta, psi of the attitude filter, psi within +-pi.
+    bias_radps : (m, 3) array
+        What the filter believes the gyro bias to be.
+    magnetic_t : (m, 3) array
+        Magnetometer.
+    raw : (m, 9) int16 array
+        p q r ax ay az phi theta psi in steps of the packet, saturated.
+    """
+
+    t_s: Array
+    dlpf: int
+    rates_radps: Array
+    force_mps2: Array
+    attitude_rad: Array
+    bias_radps: Array
+    magnetic_t: Array
+    raw: np.ndarray[tuple[int, int], np.dtype[np.int16]]
+
+
+@compiled
+def complementary(
+    rates: Array, force: Array, heading: Array, speed: Array, start: Array, step_s: float
+) -> tuple[Array, Array]:
+    """Run the attitude filter; return phi, theta, psi (m, 3) and the bias estimate (m, 3).
+
+    `rates` (m, 3) rad/s, `force` (m, 3) m/s2, `heading` (m,) rad from the magnetometer, `speed`
+    (m,) m/s for the centripetal correction, `start` (3,) first angles.
+    """
+    m = rates.shape[0]
+    angles, biases = np.empty((m, 3)), np.empty((m, 3))
+    c = np.empty((3, 3))  # body to north-east-down
+    sp, cp = math.sin(start[0]), math.cos(start[0])
+    st, ct = math.sin(start[1]), math.cos(start[1])
+    ss, cs = math.sin(start[2]), math.cos(start[2])
+    c[0, 0], c[0, 1], c[0, 2] = ct * cs, sp * st * cs - cp * ss, cp * st * cs + sp * ss
+    c[1, 0], c[1, 1], c[1, 2] = ct * ss, sp * st * ss + cp * cs, cp * st * ss - sp * cs
+    c[2, 0], c[2, 1], c[2, 2] = -st, sp * ct, cp * ct
+    bias = np.zeros(3)
+    for i in range(m):
+        angles[i, 0] = math.atan2(c[2, 1], c[2, 2])
+        angles[i, 1] = -math.asin(min(max(c[2, 0], -1.0), 1.0))
+        angles[i, 2] = math.atan2(c[1, 0], c[0, 0])
+        biases[i] = bias
+        p, q, r = rates[i, 0] - bias[0], rates[i, 1] - bias[1], rates[i, 2] - bias[2]
+        # Gravity as felt: minus specific force, with the turn's own acceleration omega x V taken
+        # out.
+        gx = -force[i, 0]
+        gy = -(force[i, 1] - r * speed[i])
+        gz = -(force[i, 2] + q * speed[i])
+        size = math.sqrt(gx * gx + gy * gy + gz * gz)
+        weight = max(0.0, 1.0 - abs(size / 9.80665 - 1.0) * 2.0)
+        size = max(size, 1e-6)
+        gx, gy, gz = gx / size, gy / size, gz / size
+        # Error: measured x expected direction of gravity (third row of c), body axes.
+        ex = (gy * c[2, 2] - gz * c[2, 1]) * weight * TILT_GAIN_PERS
+        ey = (gz * c[2, 0] - gx * c[2, 2]) * weight * TILT_GAIN_PERS
+        ez = (gx * c[2, 1] - gy * c[2, 0]) * weight * TILT_GAIN_PERS
+        turn = math.sin(heading[i] - angles[i, 2]) * HEADING_GAIN_PERS
+        ex += turn * c[2, 0]
+        ey += turn * c[2, 1]
+        ez += turn * c[2, 2]
+        ratio = BIAS_GAIN_PERS2 / TILT_GAIN_PERS
+        bias[0] -= ratio * ex * step_s
+        bias[1] -= ratio * ey * step_s
+        bias[2] -= ratio * ez * step_s
+        wx, wy, wz = (p + ex) * step_s, (q + ey) * step_s, (r + ez) * step_s
+        for k in range(3):
+            a, b, d = c[k, 0], c[k, 1], c[k, 2]
+            c[k, 0] = a + b * wz - d * wy
+            c[k, 1] = b + d * wx - a * wz
+            c[k, 2] = d + a * wy - b * wx
+        # Keep the rows orthogonal and of unit length.
+        dot = 0.5 * (c[0, 0] * c[1, 0] + c[0, 1] * c[1, 1] + c[0, 2] * c[1, 2])
+        for k in range(3):
+            a, b = c[0, k], c[1, k]
+            c[0, k], c[1, k] = a - dot * b, b - dot * a
+        for k in range(2):
+            length = math.sqrt(c[k, 0] ** 2 + c[k, 1] ** 2 + c[k, 2] ** 2)
+            for j in range(3):
+                c[k, j] /= length
+        c[2, 0] = c[0, 1] * c[1, 2] - c[0, 2] * c[1, 1]
+        c[2, 1] = c[0, 2] * c[1, 0] - c[0, 0] * c[1, 2]
+        c[2, 2] = c[0, 0] * c[1, 1] - c[0, 1] * c[1, 0]
+    return angles, biases
+
+
+def imu(
+    record: FlightRecord, data: AirData, at_s: Array, dlpf: int, rng: np.random.Generator
+) -> Imu:
+    """Compute what the IMU sends.
+
+    Parameters
+    ----------
+    record : FlightRecord
+    data : AirData
+    at_s : (m,) array
+        Sampling times.
+    dlpf : int
+        DLPF_CFG, a key of `FILTERS`.
+    rng : numpy Generator
+
+    Returns
+    -------
+    Imu
+    """
+    switches, draws = record.card.sensors, record.draws
+    t, n = record.t_s, len(record.t_s)
+    omega = record.states[:, P : R + 1]
+    place = np.zeros(3)
+    if switches.position:
+        place = record.aircraft.vector("sensors.imu_m") + draws.vector("imu_m") - record.frame.cg_m
+    force = (
+        record.specific_force_mps2
+        + np.cross(record.angular_acceleration_radps2, place)
+        + np.cross(omega, np.cross(omega, place))
+    )
+    tilt = _rotation(draws.vector("misalignment_rad"))
+    rates = (omega @ tilt.T) * (1.0 + draws.vector("gyro_scale_share"))
+    rates = rates + draws.vector("gyro_bias_radps")
+    force = (force @ tilt.T) * (1.0 + draws.vector("accel_scale_share"))
+    force = force + draws.vector("accel_bias_mps2")
+    noise = rng.standard_normal((n, 6))
+    if switches.noise:
+        band = math.sqrt(0.5 / STEP_S)  # white up to half the sampling rate
+        rates = rates + noise[:, :3] * GYRO_NOISE_RADPS_RTHZ * band
+        force = force + noise[:, 3:] * ACCEL_NOISE_MPS2_RTHZ * band
+    if switches.imu_filter:
+        rates, force = (
+            _low_pass(
+                signal, t, at_s, *FILTERS[dlpf][i],
+                share=draws.scalar("imu_delay_share"), least_s=draws.scalar("imu_delay_s"),
+            )
+            for i, signal in enumerate((rates, force))
+        )  # fmt: skip
+    else:
+        rates, force = delayed(t, rates, 0.0, at_s), delayed(t, force, 0.0, at_s)
+
+    attitudes = record.states[:, Q0 : Q3 + 1]
+    true_angles = np.column_stack([np.unwrap(a) for a in euler(attitudes)])
+    magnetic = delayed(t, to_body(attitudes) @ FIELD_NED_T, 0.0, at_s)
+    magnetic = magnetic + rng.standard_normal(magnetic.shape) * (2e-7 if switches.noise else 0.0)
+    angles = delayed(t, true_angles, 0.0, at_s)
+    bias = np.zeros_like(rates)
+    if switches.attitude_filter:
+        # The compass is read late and has a slow error of its own: 2 deg.
+        heading = angles[:, 2] + np.deg2rad(2.0) * np.sin(angles[:, 2])
+        ground = np.linalg.norm(
+            np.gradient(record.states[:, NORTH : DOWN + 1], STEP_S, axis=0), axis=1
+        )
+        ground[record.t_s < record.card.flight.ground_s + 2 * STEP_S] = 0.0
+        speed = delayed(t, ground, 0.3, at_s)
+        step = float(np.median(np.diff(at_s)))
+        estimate, bias = complementary(rates, force, heading, speed, angles[0], step)
+        angles = np.column_stack([estimate[:, 0], estimate[:, 1], estimate[:, 2]])
+    angles[:, 2] = np.mod(angles[:, 2] + np.pi, 2.0 * np.pi) - np.pi
+    raw = np.column_stack([rates / GYRO_LSB_RADPS, force / ACCEL_LSB_MPS2, angles / ANGLE_LSB_RAD])
+    raw = np.clip(np.round(raw), -32767, 32767)
+    if switches.quantisation:
+        rates, force = raw[:, :3] * GYRO_LSB_RADPS, raw[:, 3:6] * ACCEL_LSB_MPS2
+    return Imu(at_s, dlpf, rates, force, angles, bias, magnetic, raw.astype(np.int16))
+
+
+def _low_pass(
+    x: Array,
+    t: Array,
+    at_s: Array,
+    bandwidth_hz: float,
+    nominal_s: float,
+    *,
+    share: float,
+    least_s: float,
+) -> Array:
+    """Lag of the filter's bandwidth, and a pure delay for the rest of its drawn delay."""
+    tau = 1.0 / (2.0 * math.pi * bandwidth_hz)
+    late = delay_s(nominal_s, share, least_s)
+    slow = np.column_stack(
+        [first_order(x[:, k], min(tau, late), STEP_S) for k in range(x.shape[1])]
+    )
+    return delayed(t, slow, max(late - tau, 0.0), at_s)
+
+
+def _rotation(small_rad: Array) -> Array:
+    """Return the matrix that turns a vector into axes tilted by small angles about x, y, z."""
+    a, b, c = small_rad
+    return np.array([[1.0, c, -b], [-c, 1.0, a], [b, -a, 1.0]])
