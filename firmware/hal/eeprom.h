@@ -1,0 +1,18 @@
+// EEPROM: read at once, written in the background.
+#pragma once
+
+#include <stdint.h>
+
+namespace hal {
+
+constexpr uint16_t kEepromBytes = 4096;
+
+uint8_t read_eeprom(uint16_t address);
+
+// False while the last byte is still being written (3.4 ms). Main loop only.
+bool eeprom_ready();
+
+// Starts writing one byte; only when ready. A byte that has this value already is left alone.
+void write_eeprom(uint16_t address, uint8_t value);
+
+}  // namespace hal

@@ -1,0 +1,27 @@
+// Receiver inputs: edges of five lines, stamped when they happen.
+#pragma once
+
+#include <stdint.h>
+
+namespace hal {
+
+constexpr uint8_t kReceiverInputs = 5;
+
+struct Edge {
+  uint16_t at_ticks;  // as now_ticks() at the edge, 0.5 us
+  uint8_t levels;     // lines after the edge, bit 0 is input 0 (A8)
+  bool late;          // the stamp may be late: the interrupt was held up; not to be measured with
+};
+
+// Arms the inputs. Once, at boot.
+void start_pulse_capture();
+
+// Takes the oldest edge; false if there is none. Main loop only, at least every 30 ms, else stamps
+// become ambiguous.
+bool take_edge(Edge* edge);
+
+// Edges that found the buffer full, and times the bank was masked because of a storm, since boot.
+// Main loop only.
+uint16_t lost_edges();
+
+}  // namespace hal

@@ -1,0 +1,24 @@
+// Serial ports, each with a buffer in both directions filled and emptied by interrupts.
+#pragma once
+
+#include <stdint.h>
+
+namespace hal {
+
+enum class Port : uint8_t { kUsb, kGps, kTelemetry };
+
+void open_port(Port port, uint32_t baud);
+
+// Takes the oldest received byte; false if there is none. Main loop only.
+bool take_byte(Port port, uint8_t* byte);
+
+// Room for bytes to send; the peer's "stop" (CTS) shows as room that does not grow.
+uint16_t send_room(Port port);
+
+// Queues a byte; only when there is room. Main loop only.
+void send_byte(Port port, uint8_t byte);
+
+// Bytes lost because nobody took them, since boot.
+uint16_t lost_bytes(Port port);
+
+}  // namespace hal

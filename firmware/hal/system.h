@@ -1,0 +1,32 @@
+// Reset, watchdog, sleep: what concerns the whole chip.
+#pragma once
+
+#include <stdint.h>
+
+namespace hal {
+
+// As frames.toml numbers them.
+enum class ResetSource : uint8_t { kUnknown, kPowerOn, kExternal, kBrownOut, kWatchdog, kCrash };
+ResetSource reset_source();
+
+// Address of the instruction at which the last run crashed; 0: it did not.
+uint32_t crash_address();
+
+// A mark in memory that a reset keeps and a power cut loses: set while recording in flight.
+void set_flight_mark(bool flying);
+bool flight_mark();
+
+// From here the chip resets itself 250 ms after the last feed_watchdog().
+void start_watchdog();
+void feed_watchdog();
+
+// Sleeps until the next interrupt, 1 ms at most. Main loop only.
+void sleep_until_interrupt();
+
+// Stack never touched since boot; 65535: unknown.
+uint16_t stack_free_bytes();
+
+// What the image calls itself, at most 11 characters (frames.toml, identity.board).
+const char* board_name();
+
+}  // namespace hal
