@@ -1,0 +1,58 @@
+"""Builds the simulator before its tests; without libsimavr or avr-gcc they fail, they do not skip."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+if str(HERE) not in sys.path:
+    sys.path.insert(0, str(HERE))  # the package lies beside its tests, not in the host's wheel
+
+if TYPE_CHECKING:
+    from simavr_bench import Chip
+
+
+def _build_script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("simavr_bench_build", HERE / "build.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def build() -> ModuleType:
+    """The build script, after it made the library."""
+    module = _build_script()
+    module.build_library()
+    return module
+
+
+MakeChip = Callable[..., "Chip"]
+
+
+@pytest.fixture
+def make_chip(build: ModuleType) -> Iterator[MakeChip]:
+    """A maker of powered chips that run a program of ``programs/``; closes them afterwards."""
+    from simavr_bench import Chip
+
+    chips: list[Chip] = []
+
+    def make(program: str, *, power: bool = True, seed: int = 1, startup_s: float = 0.0) -> Chip:
+        chip = Chip(seed=seed, startup_s=startup_s)
+        chips.append(chip)
+        chip.load(build.build_program(program))
+        if power:
+            chip.power_on()
+        return chip
+
+    yield make
+    for chip in chips:
+        chip.close()
