@@ -161,7 +161,7 @@ class LogWriter:
         self.text = schema_text() if text is None else text
         self.schema_hash = zlib.crc32(self.text)
         self.layouts = layouts(self.text)
-        self._ids = ids(self.text)
+        self.ids = ids(self.text)
         self._card_id = card_id
         self.session = session
         self.file_id = file_id(card_id, session, first_block_before)
@@ -218,13 +218,14 @@ class LogWriter:
     def put(self, name: str, **values: object) -> None:
         """Write one frame; fields not named are 0."""
         row = np.zeros(1, self.layouts[name])
-        row["id"] = self._ids[name]
+        row["id"] = self.ids[name]
         for column, value in values.items():
             row[column] = value
         self.extend([Timed(row, np.zeros(1, np.int64))])
 
     def extend(self, streams: Sequence[Timed]) -> None:
         """Write all rows of `streams`, merged by the time at which they were finished."""
+        streams = [stream for stream in streams if len(stream.rows)]
         count = sum(len(stream.rows) for stream in streams)
         if count == 0:
             return
@@ -248,7 +249,8 @@ class LogWriter:
             content = np.ascontiguousarray(stream.rows).view(np.uint8).reshape(-1, size)
             start = block_of[at] * ROOM + position[at]
             image.reshape(-1)[start[:, None] + np.arange(size)] = content
-            self._remember(stream.rows, self.sequence + block_of[at])
+            in_log = np.argsort(at)
+            self._remember(stream.rows[in_log], self.sequence + block_of[at[in_log]])
         finished = image.tobytes()
         for number in range(block_count - 1):
             start_byte = number * ROOM
@@ -315,7 +317,7 @@ class LogWriter:
     def _remember(self, written: Rows, blocks: NDArray[np.int64]) -> None:
         if self._truth is None:
             return
-        name = next(n for n, number in self._ids.items() if number == int(written["id"][0]))
+        name = next(n for n, number in self.ids.items() if number == int(written["id"][0]))
         self._truth[name].rows.append(written.copy())
         self._truth[name].blocks.append(blocks)
 
