@@ -22,7 +22,8 @@ def test_ordinary_least_squares_equals_lstsq() -> None:
     maneuver = with_rates(2, snr=10.0)
     result = fit("equation-error", navion_free(), [maneuver])
     z = np.hstack([maneuver.outputs, maneuver.inputs])
-    expected = np.linalg.lstsq(z, maneuver.rates, rcond=None)[0].T
+    rates = np.asarray(maneuver.rates, dtype=np.float64)
+    expected = np.linalg.lstsq(np.asarray(z, dtype=np.float64), rates, rcond=None)[0].T
     A, B, _, _ = result.matrices()
     np.testing.assert_allclose(np.hstack([A, B]), expected, rtol=1e-8)
 
@@ -49,9 +50,11 @@ def test_robust_fit_equals_scipy_huber_and_shrugs_off_outliers() -> None:
     z = np.hstack([maneuver.outputs, maneuver.inputs])
     theta = np.array([robust.value(f"a3{k}") for k in (1, 2, 3, 4)] + [robust.value("b31")])
     scale = 1.4826 * np.median(np.abs(rates[:, 2] - z @ theta))
-    peer = optimize.least_squares(
-        lambda t: (z @ t - rates[:, 2]) / (1.345 * scale), theta * 1.1, loss="huber", xtol=1e-14
-    )
+
+    def miss(t: np.ndarray) -> np.ndarray:
+        return np.asarray((z @ t - rates[:, 2]) / (1.345 * scale))
+
+    peer = optimize.least_squares(miss, theta * 1.1, loss="huber", xtol=1e-14)
     np.testing.assert_allclose(theta, peer.x, rtol=2e-4, atol=1e-4)
     truth = np.concatenate([navion()[0][2], navion()[1][2]])
     plain_row = [plain.value(f"a3{k}") for k in (1, 2, 3, 4)] + [plain.value("b31")]

@@ -54,6 +54,13 @@ METHODS: dict[str, Method] = {
         "maximum likelihood for white noise, covariance corrected for colour",
         (("memory", False),),
     ),
+    "hopfield": Method("hopfield", "fit_hopfield", "the printed network iteration"),
+    "hopfield-line-search": Method(
+        "hopfield", "fit_hopfield", "the original program", (("variant", "line-search"),)
+    ),
+    "hopfield-whitened": Method(
+        "hopfield", "fit_hopfield", "the network, preconditioned", (("variant", "whitened"),)
+    ),
 }
 
 

@@ -188,8 +188,8 @@ class OutputProblem:
             slope = propagate(step, push, C, self._start_slopes)
             for j in np.flatnonzero(self._bias_parameter >= 0):
                 slope[j, :, self._bias_parameter[j]] += 1.0
-            for j, output_slope in enumerate(self._CD_slopes):
-                slope[j] += z[:, : n + m] @ output_slope
+            for row, output_slope in enumerate(self._CD_slopes):
+                slope[row] += z[:, : n + m] @ output_slope
             self._delay(y, slope, local, part.dt_s)
             result.append(Response(y, slope))
         return result

@@ -51,7 +51,10 @@ def navion() -> tuple[Array, Array]:
 
 
 def navion_structured() -> LinearModel:
-    """Return the model with ten physical derivatives free and kinematics and gravity known."""
+    """Return the model with nine physical derivatives free.
+
+    Kinematics, gravity, and the zeros Nelson states (no X_de, no Z_q) are known.
+    """
     A, B = navion()
     free = {
         "X_u": ("A", 0, 0),
@@ -61,7 +64,6 @@ def navion_structured() -> LinearModel:
         "M_u": ("A", 2, 0),
         "M_alpha": ("A", 2, 1),
         "M_q": ("A", 2, 2),
-        "X_de": ("B", 0, 0),
         "Z_de": ("B", 1, 0),
         "M_de": ("B", 2, 0),
     }

@@ -30,7 +30,9 @@ def noisy(
     """Return a maneuver with white noise on the states."""
     u, y = clean(dt_s, duration_s)
     rng = np.random.default_rng(seed)
-    return Maneuver(dt_s, u, y + np.sqrt(y.var(axis=0) / snr) * rng.standard_normal(y.shape))
+    return Maneuver(
+        dt_s, u, y + np.sqrt(np.mean(y**2, axis=0) / snr) * rng.standard_normal(y.shape)
+    )
 
 
 def with_rates(
@@ -41,7 +43,7 @@ def with_rates(
     A, B = navion()
     rates = y @ A.T + u @ B.T
     rng = np.random.default_rng(seed)
-    deviation = [np.sqrt(x.var(axis=0) / snr) for x in (y, rates)]
+    deviation = [np.sqrt(np.mean(x**2, axis=0) / snr) for x in (y, rates)]
     return Maneuver(
         dt_s,
         u,

@@ -1,0 +1,228 @@
+"""What a fit is worth: figures of fit, whiteness, collinearity, refusals.
+
+The thesis's two error figures are kept under their own names beside honest ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from host.sysid.compiled import Array
+from host.sysid.maneuver import Maneuver
+from host.sysid.model import LinearModel
+from host.sysid.result import FitResult
+
+CORRELATED = 0.9
+CONDITION_LIMIT = 1e5  # of the scaled information: correlations beyond all digits of a sensor
+SMALL_SHARE = 0.05  # of the row's largest contribution: below it errors are relative to this share
+REFUSAL_LIMIT = 1.0  # standard error over the reference value: 100 %
+
+
+@dataclass(frozen=True, slots=True)
+class SignalFit:
+    """Figures of one output: all of free simulation or one step, as the result says."""
+
+    name: str
+    r_squared: float
+    nrmse: float
+    theil: float
+    autocorrelation_outside: float
+    ljung_box_p: float
+
+
+def signal_fits(
+    names: Sequence[str], measured: Sequence[Array], residuals: Sequence[Array]
+) -> tuple[SignalFit, ...]:
+    """Return figures of fit per signal, maneuvers pooled.
+
+    Parameters
+    ----------
+    names : sequence of str
+        One per column.
+    measured, residuals : sequence of Array
+        Per maneuver (samples, columns).
+    """
+    result = []
+    for column, name in enumerate(names):
+        y = np.concatenate([m[:, column] - m[:, column].mean() for m in measured])
+        raw = np.concatenate([m[:, column] for m in measured])
+        e = np.concatenate([r[:, column] for r in residuals])
+        power = float(y @ y)
+        rms = float(np.sqrt(np.mean(e**2)))
+        model = raw - e
+        theil = rms / max(float(np.sqrt(np.mean(raw**2)) + np.sqrt(np.mean(model**2))), 1e-300)
+        outside, p_value = whiteness([r[:, column] for r in residuals])
+        result.append(
+            SignalFit(
+                name=name,
+                r_squared=1.0 - float(e @ e) / power if power > 0.0 else float("nan"),
+                nrmse=rms / float(np.sqrt(power / len(y))) if power > 0.0 else float("nan"),
+                theil=theil,
+                autocorrelation_outside=outside,
+                ljung_box_p=p_value,
+            )
+        )
+    return tuple(result)
+
+
+def whiteness(residuals: Sequence[Array], lags: int = 25) -> tuple[float, float]:
+    """Return the share of autocorrelations outside 95 % limits and the Ljung-Box p value.
+
+    Ljung & Box, Biometrika 65 (1978). White residuals leave 5 % outside and p above 0.05 in 95 of
+    100 cases.
+    """
+    total = sum(len(e) for e in residuals)
+    lags = min(lags, min(len(e) for e in residuals) // 4)
+    power = sum(float(e @ e) for e in residuals)
+    if power == 0.0 or lags < 1:
+        return 0.0, 1.0
+    correlation = np.array(
+        [sum(float(e[k:] @ e[:-k]) for e in residuals) / power for k in range(1, lags + 1)]
+    )
+    outside = float(np.mean(np.abs(correlation) > 1.96 / np.sqrt(total)))
+    statistic = (
+        total * (total + 2.0) * float(np.sum(correlation**2 / (total - np.arange(1, lags + 1))))
+    )
+    return outside, float(stats.chi2.sf(statistic, lags))
+
+
+def references(model: LinearModel, maneuvers: Sequence[Maneuver], theta: Array) -> Array:
+    """Return the value each parameter's error is compared with.
+
+    |parameter|, or, where its contribution (|parameter| times rms of its regressor) is below 5 % of
+    its row's largest, the value that would contribute 5 %. Of a tied parameter the row where it
+    counts most decides. Regressors are taken about their mean: the trim tells nothing.
+    """
+    spread = regressor_rms(model, maneuvers)
+    A, B, _, _ = model.matrices(theta)
+    wide = np.abs(np.hstack([A, B])) * spread
+    n = len(model.states)
+    result = np.abs(np.array(theta[: len(model.parameters)], dtype=np.float64))
+    for k, parameter in enumerate(model.parameters):
+        floors = []
+        for term in model.terms:
+            if term.parameter != parameter.name or term.matrix not in "AB":
+                continue
+            column = term.column + (n if term.matrix == "B" else 0)
+            scale = abs(term.gain) * spread[column]
+            if scale > 0.0:
+                floors.append(SMALL_SHARE * float(wide[term.row].max()) / scale)
+        if floors:
+            result[k] = max(result[k], min(floors))
+    return result
+
+
+def regressor_rms(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:
+    """Return the rms about the mean of every state (where measured) and input."""
+    columns = []
+    for source, names in (("outputs", model.states), ("inputs", model.inputs)):
+        for position, name in enumerate(names):
+            if source == "outputs" and name not in model.outputs:
+                columns.append(1.0)
+                continue
+            index = model.outputs.index(name) if source == "outputs" else position
+            power = np.concatenate(
+                [
+                    getattr(m, source)[:, index] - getattr(m, source)[:, index].mean()
+                    for m in maneuvers
+                ]
+            )
+            columns.append(float(np.sqrt(np.mean(power**2))))
+    return np.array(columns)
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A parameter that these data cannot tell, and why."""
+
+    name: str
+    relative_bound: float
+    reason: str
+
+
+def refusals(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Refusal, ...]:
+    """Name every common parameter whose standard error exceeds its reference value."""
+    count = len(result.model.parameters)
+    reference = references(result.model, maneuvers, result.estimate)
+    relative = result.standard_error[:count] / np.maximum(reference, 1e-300)
+    correlation = np.abs(result.correlation[:count, :count] - np.eye(count))
+    found = []
+    for k in np.flatnonzero(relative > REFUSAL_LIMIT):
+        partner = int(np.argmax(correlation[k]))
+        reason = f"its bound is {100.0 * relative[k]:.0f} % of its value"
+        if correlation[k, partner] > CORRELATED:
+            reason += (
+                f"; it moves together with {result.names[partner]}"
+                f" (correlation {correlation[k, partner]:.3f})"
+            )
+        else:
+            reason += "; the maneuver excites it too little for this noise"
+        found.append(Refusal(result.names[int(k)], float(relative[k]), reason))
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Collinearity:
+    """Condition number of the scaled information and strongly correlated pairs."""
+
+    condition: float
+    pairs: tuple[tuple[str, str, float], ...]
+
+    @property
+    def severe(self) -> bool:
+        """Whether the information is close to singular."""
+        return self.condition > CONDITION_LIMIT
+
+
+def collinearity(result: FitResult) -> Collinearity:
+    """Return what the parameters have in common."""
+    live = np.flatnonzero(result.standard_error > 0.0)
+    correlation = result.correlation[np.ix_(live, live)]
+    values = np.linalg.eigvalsh(correlation)
+    condition = float(values[-1] / max(values[0], 1e-300))
+    pairs = []
+    count = len(result.model.parameters)
+    for i in range(len(live)):
+        for j in range(i):
+            if live[i] < count and abs(correlation[i, j]) > CORRELATED:
+                pairs.append(
+                    (result.names[live[j]], result.names[live[i]], float(correlation[i, j]))
+                )
+    pairs.sort(key=lambda pair: -abs(pair[2]))
+    return Collinearity(condition, tuple(pairs))
+
+
+def constant_inputs(model: LinearModel, maneuvers: Sequence[Maneuver]) -> tuple[str, ...]:
+    """Name inputs that never move: they are the bias under another name."""
+    still = []
+    for k, name in enumerate(model.inputs):
+        if all(float(np.ptp(m.inputs[:, k])) == 0.0 for m in maneuvers):
+            still.append(name)
+    return tuple(still)
+
+
+def relative_errors(
+    model: LinearModel, maneuvers: Sequence[Maneuver], estimate: Array, truth: Array
+) -> Array:
+    """Return |estimate - truth| over the reference value of the truth, common parameters."""
+    count = len(model.parameters)
+    reference = references(model, maneuvers, truth)
+    return np.asarray(np.abs(estimate[:count] - truth[:count]) / reference, dtype=np.float64)
+
+
+def thesis_sum_of_mean_errors(measured: Array, simulated: Array) -> float:
+    """Return the thesis's equation 5.3: sum over states of mean |error|, units mixed."""
+    return float(np.sum(np.mean(np.abs(measured - simulated), axis=0)))
+
+
+def thesis_program_error_percent(measured: Array, simulated: Array) -> float:
+    """Return the figure its program prints: relative L1 error divided once more by the samples.
+
+    Multiply by the number of samples for the sum over states of honest relative errors in percent.
+    """
+    shares = np.sum(np.abs(measured - simulated), axis=0) / np.sum(np.abs(measured), axis=0)
+    return float(np.sum(shares) * 100.0 / len(measured))

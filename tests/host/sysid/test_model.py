@@ -1,0 +1,158 @@
+"""Model descriptions: templates against a non-linear truth, TOML there and back, refusals."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from host.sysid import LinearModel, Maneuver, Parameter, Term
+from host.sysid.errors import IdentificationError
+from host.sysid.model_file import model_from, model_text, parse_entry, read_model
+from host.sysid.templates import GRAVITY_MPS2, TEMPLATES, Trim, longitudinal, template
+
+TRIM = Trim(airspeed_mps=17.0, alpha_rad=0.1, theta_rad=0.16)
+
+
+def test_longitudinal_template_is_the_slope_of_the_equations_of_motion() -> None:
+    """Wind-axis equations with made-up forces, linearised numerically at a trim."""
+    V0, alpha0, theta0, g = 17.0, 0.1, 0.16, GRAVITY_MPS2
+    gamma0 = theta0 - alpha0
+
+    def motion(x: np.ndarray, de: float) -> np.ndarray:
+        V, alpha, q, theta = x
+        along = g * np.sin(gamma0) - 0.3 * (V - V0) - 4.0 * (alpha - alpha0) - 0.2 * de
+        normal = -g * np.cos(gamma0) - 1.1 * (V - V0) - 80.0 * (alpha - alpha0) - 9.0 * de
+        gamma = theta - alpha
+        rates = [
+            along - g * np.sin(gamma),
+            q + (normal + g * np.cos(gamma)) / V,
+            0.2 * (V - V0) - 60.0 * (alpha - alpha0) - 7.0 * q - 90.0 * de,
+            q,
+        ]
+        ax = along * np.cos(alpha) - normal * np.sin(alpha)
+        az = along * np.sin(alpha) + normal * np.cos(alpha)
+        return np.array([*rates, ax, az])
+
+    x0 = np.array([V0, alpha0, 0.0, theta0])
+    step = 1e-6
+    slope = np.column_stack(
+        [
+            (motion(x0 + step * e, 0.0) - motion(x0 - step * e, 0.0)) / (2.0 * step)
+            for e in np.eye(4)
+        ]
+    )
+    by_input = (motion(x0, step) - motion(x0, -step)) / (2.0 * step)
+    model = longitudinal(TRIM)
+    values = {
+        "D_V": -0.3, "D_alpha": -4.0, "D_de": -0.2,
+        "Z_V": -1.1 / V0, "Z_alpha": -80.0 / V0, "Z_de": -9.0 / V0,
+        "M_V": 0.2, "M_alpha": -60.0, "M_q": -7.0, "M_de": -90.0,
+    }  # fmt: skip
+    theta = np.array([values[p.name] for p in model.parameters])
+    A, B, C, D = model.matrices(theta)
+    np.testing.assert_allclose(A, slope[:4], atol=1e-6)
+    np.testing.assert_allclose(B[:, 0], by_input[:4], atol=1e-6)
+    np.testing.assert_allclose(C[4:], slope[4:], atol=1e-6)
+    np.testing.assert_allclose(D[4:, 0], by_input[4:], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", list(TEMPLATES))
+def test_templates_leave_kinematics_and_gravity_alone(name: str) -> None:
+    model = template(name, TRIM)
+    kinematic = [s for s in model.states if s in ("theta_rad", "phi_rad")]
+    for state in kinematic:
+        if name == "phugoid":
+            continue
+        row = model.states.index(state)
+        assert not [t for t in model.terms if t.matrix in "AB" and t.row == row]
+    assert set(model.initial_states) == set(model.states)
+
+
+@pytest.mark.parametrize("name", list(TEMPLATES))
+def test_templates_survive_a_file(name: str, tmp_path: Path) -> None:
+    model = template(name, TRIM)
+    path = tmp_path / "model.toml"
+    path.write_text(model_text(model))
+    back = read_model(path)
+    theta = np.linspace(-1.0, 2.0, len(model.parameters))
+    position = [model.parameter_names.index(p.name) for p in back.parameters]
+    for ours, theirs in zip(model.matrices(theta), back.matrices(theta[position]), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    assert back.state_biases == model.state_biases
+    assert back.output_biases == model.output_biases
+
+
+def test_entries_are_parsed() -> None:
+    assert parse_entry("17.0*Z_alpha - 9.81 + x", "here") == (
+        -9.81,
+        [("Z_alpha", 17.0), ("x", 1.0)],
+    )
+    assert parse_entry("-1e-3*k", "here") == (0.0, [("k", -1e-3)])
+    for wrong in ("a b", "3 *", "", "2*3*x", "a,b", True):
+        if wrong == "":
+            assert parse_entry(wrong, "here") == (0.0, [])
+            continue
+        with pytest.raises(IdentificationError, match="here"):
+            parse_entry(wrong, "here")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"states": "x"}, "list of signal names"),
+        ({"A": [[1.0]]}, "rows of 2"),
+        ({"speed": 3}, "unknown key speed"),
+        ({"parameters": {"k": {"begin": 1}}}, "parameter k"),
+        ({"hold": "cubic"}, "use zoh or foh"),
+        ({"state_biases": ["zeta"]}, "state bias on zeta"),
+    ],
+)
+def test_a_wrong_file_is_one_clear_line(change: dict[str, object], message: str) -> None:
+    document: dict[str, object] = {
+        "states": ["a", "b"],
+        "inputs": ["u"],
+        "outputs": ["a", "b"],
+        "A": [["k", 1], [0, 0]],
+        "B": [[0], [1]],
+    }
+    assert model_from(document).parameter_names == ("k",)
+    with pytest.raises(IdentificationError, match=message) as caught:
+        model_from({**document, **change}, "file.toml")
+    assert "\n" not in str(caught.value)
+
+
+def test_model_refuses_contradictions() -> None:
+    def build(**change: Any) -> LinearModel:
+        settings: dict[str, Any] = {
+            "name": "m", "states": ("a",), "inputs": ("u",), "outputs": ("a",),
+            "A": np.zeros((1, 1)), "B": np.zeros((1, 1)), "C": np.eye(1), "D": np.zeros((1, 1)),
+            "terms": (Term("A", 0, 0, "k"),), "parameters": (Parameter("k"),),
+        }  # fmt: skip
+        return LinearModel(**{**settings, **change})
+
+    assert build().parameter_names == ("k",)
+    cases: list[tuple[dict[str, Any], str]] = [
+        ({"A": np.zeros((2, 2))}, "expected"),
+        ({"terms": (Term("A", 1, 0, "k"),)}, "no entry"),
+        ({"terms": (Term("A", 0, 0, "other"),)}, "no parameter"),
+        ({"terms": ()}, "enters no matrix"),
+        ({"parameters": (Parameter("k"), Parameter("k"))}, "named twice"),
+    ]
+    for change, message in cases:
+        with pytest.raises(IdentificationError, match=message):
+            build(**change)
+
+
+def test_garbage_samples_are_named() -> None:
+    good = np.zeros((20, 1))
+    bad = good.copy()
+    bad[7, 0] = np.nan
+    for inputs, outputs, dt_s, message in (
+        (bad, good, 0.1, "sample 7"),
+        (good[:5], good, 0.1, "5 samples"),
+        (good, good, 0.0, "not positive"),
+        (good[:3], good[:3], 0.1, "at least 8"),
+        (good[:, 0], good, 0.1, "dimensions"),
+    ):
+        with pytest.raises(IdentificationError, match=message):
+            Maneuver(dt_s, inputs, outputs)
