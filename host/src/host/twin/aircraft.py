@@ -121,7 +121,7 @@ class Aircraft:
 
 
 def names() -> list[str]:
-    """Return the names of the aircraft that come with the package, sorted."""
+    """Return the names of the aircraft that come with the package, linear ones too, sorted."""
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from host.twin.aircraft import AircraftError, read_document
 from host.twin.airframe import ELEVATOR, Q0, STATE_COUNT, Airframe, Array
 from host.twin.attitude import euler, quaternion
 from host.twin.motion import derivative
@@ -99,6 +101,43 @@ def linearise(frame: Airframe, trim: Trim, width: float = 1e-5) -> Linear:
             max(np.abs(slopes[np.ix_(lon, lat)]).max(), np.abs(slopes[np.ix_(lat, lon)]).max())
         ),
     )
+
+
+def load_linear(source: str | Path) -> Linear:
+    """Load an aircraft that is published as matrices only.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a packaged aircraft of kind ``linear``, or path of a file.
+
+    Returns
+    -------
+    Linear
+
+    Raises
+    ------
+    AircraftError
+        Not such a file, or matrices of the wrong size.
+    """
+    document = read_document(source)
+    if document.get("kind") != "linear":
+        raise AircraftError(f"{source}: kind is {document.get('kind')!r}, expected 'linear'")
+    matrices = {}
+    for name, shape in (
+        ("longitudinal_a", (4, 4)),
+        ("longitudinal_b", (4, 1)),
+        ("lateral_a", (4, 4)),
+        ("lateral_b", (4, 2)),
+    ):
+        try:
+            matrix = np.array(document.get(name), dtype=np.float64)
+        except (TypeError, ValueError):
+            matrix = np.empty(0)
+        if matrix.shape != shape:
+            raise AircraftError(f"{source}: {name} has shape {matrix.shape}, expected {shape}")
+        matrices[name] = matrix
+    return Linear(**matrices, coupling=0.0)
 
 
 def modes(linear: Linear) -> list[Mode]:
