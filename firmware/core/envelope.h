@@ -1,0 +1,41 @@
+// Telemetry envelope of protocol/README.md: A5 5A, length, frame, CRC-16 over length and frame.
+#pragma once
+
+#include <stdint.h>
+
+namespace core {
+
+constexpr uint8_t kEnvelopeOverhead = 5;
+constexpr uint8_t kEnvelopeMaxFrame = 128;
+constexpr uint8_t kEnvelopeSync0 = 0xA5;
+constexpr uint8_t kEnvelopeSync1 = 0x5A;
+
+// Writes the envelope of a frame (`id` and its fields) and returns its size; 0 if the frame is
+// longer than 128 bytes. `to` holds size + 6 bytes.
+uint8_t put_envelope(uint8_t* to, uint8_t id, const void* fields, uint8_t size);
+
+// Feed it every received byte; `frame` is good until the next call of `byte`.
+class EnvelopeDecoder {
+ public:
+  // True when this byte made a frame known. Several frames may come out of one byte, after a
+  // failed envelope: call `next` until it is false.
+  bool byte(uint8_t value);
+  bool next();
+
+  const uint8_t* frame() const { return buffer_ + 3; }  // id and fields
+  uint8_t frame_size() const { return buffer_[2]; }
+  uint16_t failed() const { return failed_; }    // syncs followed by a bad length or CRC
+  uint32_t skipped() const { return skipped_; }  // bytes in no good envelope
+  uint8_t pending() const;                       // bytes that may still become an envelope
+
+ private:
+  void drop(uint8_t count);
+
+  uint8_t buffer_[kEnvelopeMaxFrame + kEnvelopeOverhead] = {};
+  uint8_t filled_ = 0;
+  uint8_t done_ = 0;  // size of the envelope that `frame` shows, to be dropped
+  uint16_t failed_ = 0;
+  uint32_t skipped_ = 0;
+};
+
+}  // namespace core

@@ -1,0 +1,40 @@
+// Bytes of a u-blox receiver in, one frame `gps` per navigation epoch out: POSLLH, SOL and VELNED
+// of the same time of week (u-blox 6), or NAV-PVT alone (7 and later). STATUS is heard only.
+#pragma once
+
+#include <stdint.h>
+
+#include "core/ubx.h"
+#include "generated/frames.h"
+
+namespace core {
+
+class GpsReceiver {
+ public:
+  // True: `frame` holds a whole epoch, until the next byte.
+  bool byte(uint8_t value, uint32_t now_us);
+
+  const frames::GpsFrame& frame() const { return frame_; }
+  uint16_t errors() const { return errors_; }
+  uint16_t messages() const { return messages_; }  // good ones of any kind: the baud is right
+
+ private:
+  bool message();
+  void begin_epoch(uint32_t itow_ms);
+  bool pvt(const uint8_t* payload);
+  void finish();
+
+  UbxParser parser_;
+  frames::GpsFrame frame_ = {};
+  uint16_t errors_ = 0;
+  uint16_t messages_ = 0;
+  uint8_t parts_ = 0;  // bit 0 POSLLH, 1 SOL, 2 VELNED
+};
+
+// Everything of a frame that has an invalid value gets it; the rest is 0.
+void clear_gps(frames::GpsFrame& frame);
+
+// Date and time as FatFs wants them (two-second steps, UTC by 18 leap seconds); 0 if not known.
+uint32_t fat_time(uint16_t week, uint32_t itow_ms);
+
+}  // namespace core

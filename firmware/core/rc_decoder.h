@@ -1,0 +1,76 @@
+// Receiver edges in, pulse widths out. One tick is 0.5 us. Main loop only; the interrupt stores
+// {16-bit stamp, levels, late?} and the loop extends the stamp with `extend_ticks`.
+//
+// A pulse is accepted when both edges were stamped in time, its width is 800 to 2200 us, the line
+// was low for 2 ms before and 300 us after it (a dropout inside a pulse would else leave two short
+// ones), and 9 ms passed since the last accepted pulse rose. Frame times from 14 to 22.5 ms and
+// receivers that send channels one after the other or all at once pass without being told.
+#pragma once
+
+#include <stdint.h>
+
+namespace core {
+
+constexpr uint8_t kRcInputs = 5;
+constexpr uint16_t kTicksPerUs = 2;
+
+// The 32-bit time of a 16-bit stamp at most 32 ms old.
+inline uint32_t extend_ticks(uint32_t now_ticks, uint16_t stamp) {
+  return now_ticks - static_cast<uint16_t>(static_cast<uint16_t>(now_ticks) - stamp);
+}
+
+class RcDecoder {
+ public:
+  static constexpr uint32_t kMinWidthTicks = 800UL * kTicksPerUs;
+  static constexpr uint32_t kMaxWidthTicks = 2200UL * kTicksPerUs;
+  static constexpr uint32_t kLowBeforeTicks = 2000UL * kTicksPerUs;
+  static constexpr uint32_t kLowAfterTicks = 300UL * kTicksPerUs;
+  static constexpr uint32_t kMinPeriodTicks = 9000UL * kTicksPerUs;
+  static constexpr uint32_t kMaxPeriodTicks = 25000UL * kTicksPerUs;
+  static constexpr uint32_t kFreshTicks = 45000UL * kTicksPerUs;  // one frame missed, not two
+  static constexpr uint32_t kLostTicks = 60000UL * kTicksPerUs;
+  static constexpr uint8_t kSteadyPulses = 3;
+
+  // Levels of all inputs (bit 0 to 4) behind an edge. `late`: the stamp cannot be trusted.
+  void edge(uint32_t t_ticks, uint8_t levels, bool late);
+  // Edges were lost or the bank was masked: whatever is half seen is forgotten.
+  void gap();
+  // Edge storm: every channel is lost at once.
+  void storm();
+  // At least every 10 ms, after the edges: accepts confirmed pulses, forgets old ones.
+  void poll(uint32_t now_ticks);
+
+  // 0: no pulse accepted within 60 ms.
+  uint16_t width_ticks(uint8_t input) const { return inputs_[input].width; }
+  uint8_t valid() const { return valid_; }         // bit per input: width is not 0
+  uint8_t fresh() const { return fresh_; }         // bit per input: last pulse at most 45 ms old
+  uint8_t steady() const { return steady_; }       // bit per input: three accepted in a row
+  uint16_t frame_us() const { return frame_us_; }  // 0: not known
+  uint16_t glitches() const { return glitches_; }  // pulses rejected
+
+ private:
+  struct Input {
+    uint32_t rise = 0;       // of the pulse being received
+    uint32_t fall = 0;       // last falling edge
+    uint32_t accepted = 0;   // rise of the last accepted pulse
+    uint16_t width = 0;      // last accepted
+    uint16_t candidate = 0;  // waits for its low time
+    uint8_t streak = 0;
+  };
+
+  void accept(uint8_t input, uint32_t now_ticks);
+  void reject(uint8_t input);
+
+  Input inputs_[kRcInputs];
+  uint16_t frame_us_ = 0;
+  uint16_t glitches_ = 0;
+  uint8_t levels_ = 0;
+  uint8_t trusted_ = 0;    // bit per input: the rise was stamped in time after a long enough low
+  uint8_t low_known_ = 0;  // bit per input: `fall` is a real edge or long ago
+  uint8_t valid_ = 0;
+  uint8_t fresh_ = 0;
+  uint8_t steady_ = 0;
+  bool started_ = false;
+};
+
+}  // namespace core
