@@ -99,10 +99,16 @@ python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
 
 # --- Python packages -------------------------------------------------------------------------
 
-if [ ! -x .venv/bin/python ]; then
+# A clone that was moved, or a Python that was upgraded, leaves a .venv of dead paths.
+made_for="$PWD $(python3 --version)"
+if [ -f .venv/made-for ] && [ "$(cat .venv/made-for)" != "$made_for" ]; then
+  say "making .venv again: it was made for $(cat .venv/made-for)"
+  quietly venv.log python3 -m venv --clear .venv
+elif [ ! -x .venv/bin/python ]; then
   say "making .venv"
   quietly venv.log python3 -m venv .venv
 fi
+printf '%s\n' "$made_for" >.venv/made-for
 python=.venv/bin/python
 
 requirements=(-r .ci/requirements.txt)
@@ -133,4 +139,6 @@ if [ "$purpose" != demo ]; then
     printf '%s\n' "$inputs" >.cache/pio-done
   fi
 fi
-say "done"
+if [ "$purpose" != demo ]; then
+  say "done; next: make demo, make test"
+fi
