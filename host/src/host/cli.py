@@ -1,0 +1,105 @@
+"""The command line: which verb, and what its end means; no work here and no heavy imports."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from host.errors import ExitCode, HostError
+
+# name -> one line of help. A verb is listed when its module is in the tree.
+VERBS = {
+    "ports": "list the serial ports with a logger plugged in",
+    "status": "show what the logger says of itself, live over USB",
+    "simulate": "fly a virtual test and write the log it would leave",
+    "plan": "judge planned maneuvers before they are flown",
+    "decode": "turn a log into a table in SI and say how good it is",
+    "info": "say what a log is, from its head",
+    "maneuvers": "find the test points of a log",
+    "identify": "estimate the aircraft's derivatives with their uncertainty",
+}
+_EPILOG = """\
+exit codes: 0 ok, 1 internal error, 2 usage, 3 decoded with losses, 4 not a log,
+5 device missing or silent, 6 a check failed, 130 interrupted
+
+host VERB --help says more. Results go to stdout, progress and warnings to stderr.
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one verb and return its exit code.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments without the program's name; those of the process without it.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    try:
+        return _run(arguments)
+    except HostError as error:
+        print(f"host: {error}", file=sys.stderr)
+        return int(error.exit_code)
+    except KeyboardInterrupt:
+        print("\nhost: interrupted", file=sys.stderr)
+        return int(ExitCode.INTERRUPTED)
+    except BrokenPipeError:
+        # The reader (`head`, a pager) left: nothing more to say, and nothing to flush at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return int(ExitCode.OK)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"host: {where}{error.strerror or error}", file=sys.stderr)
+        return int(ExitCode.USAGE)
+    except MemoryError:
+        print("host: out of memory; try --to parquet, which works in pieces", file=sys.stderr)
+        return int(ExitCode.INTERNAL)
+    except Exception as error:
+        if os.environ.get("HOST_TRACEBACK"):
+            raise
+        print(
+            f"host: internal error: {type(error).__name__}: {error}"
+            " (HOST_TRACEBACK=1 shows where; please report it)",
+            file=sys.stderr,
+        )
+        return int(ExitCode.INTERNAL)
+
+
+def verbs() -> dict[str, str]:
+    """Return the verbs whose module is in the tree, with their line of help."""
+    folder = Path(__file__).parent / "verbs"
+    return {name: text for name, text in VERBS.items() if (folder / f"{name}.py").is_file()}
+
+
+def _run(arguments: list[str]) -> int:
+    known = verbs()
+    parser = argparse.ArgumentParser(
+        prog="host",
+        description="Flight-test logs of RC aircraft: decode, look, simulate, identify.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="store_true", help="print the version and stop")
+    subparsers = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs")
+    chosen = next((one for one in arguments if not one.startswith("-")), None)
+    module = None
+    for name, text in known.items():
+        if name == chosen:
+            module = importlib.import_module(f"host.verbs.{name}")
+            module.add_parser(subparsers)
+        else:
+            subparsers.add_parser(name, help=text)
+    parsed = parser.parse_args(arguments)
+    if parsed.version:
+        from host import __version__
+
+        print(f"host {__version__}")
+        return int(ExitCode.OK)
+    if module is None:
+        parser.print_help()
+        return int(ExitCode.USAGE)
+    return int(module.run(parsed))

@@ -1,0 +1,67 @@
+"""MAT (version 5) and NPZ: whole columns, so the table is held in memory until it is closed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from host.errors import UsageError
+from host.export.writer import Columns, Meta
+
+_MAT_LIMIT_BYTES = (1 << 31) - 1  # of one variable in MAT version 5
+_MAT_NAME = 31  # characters of a field name that MATLAB keeps in version 5 files
+
+
+class _Collected:
+    def __init__(self, path: Path, meta: Meta) -> None:
+        self._path = path
+        self._meta = meta
+        self._parts: dict[str, list[NDArray[Any]]] = {}
+
+    def write(self, columns: Columns) -> None:
+        """Append rows."""
+        for name, value in columns.items():
+            self._parts.setdefault(name, []).append(value)
+
+    def _whole(self) -> dict[str, NDArray[Any]]:
+        return {name: np.concatenate(parts) for name, parts in self._parts.items()}
+
+
+class MatWriter(_Collected):
+    """MATLAB file: one column vector per column, structs `units`, `meaning` and `notes`."""
+
+    def close(self) -> None:
+        """Finish the file."""
+        from scipy.io import savemat
+
+        columns = self._whole()
+        for name, value in columns.items():
+            if value.nbytes > _MAT_LIMIT_BYTES:
+                raise UsageError(
+                    f"column {name} has {value.nbytes} bytes; MAT version 5 holds"
+                    f" {_MAT_LIMIT_BYTES}: use --to parquet, or one --session"
+                )
+        content: dict[str, Any] = {name[:_MAT_NAME]: value for name, value in columns.items()}
+        content["units"] = {name[:_MAT_NAME]: self._meta.units.get(name, "") for name in columns}
+        content["meaning"] = {name[:_MAT_NAME]: self._meta.texts.get(name, "") for name in columns}
+        content["notes"] = dict(self._meta.notes)
+        savemat(self._path, content, oned_as="column")
+
+
+class NpzWriter(_Collected):
+    """NumPy archive: one array per column, `units` and `notes` as pairs of text."""
+
+    def close(self) -> None:
+        """Finish the file."""
+        columns = self._whole()
+        pairs = [(name, self._meta.units.get(name, "")) for name in columns]
+        notes = list(self._meta.notes.items())
+        np.savez(
+            self._path,
+            **columns,
+            units=np.array(pairs, dtype=str).reshape(-1, 2),
+            notes=np.array(notes, dtype=str).reshape(-1, 2),
+        )

@@ -1,0 +1,78 @@
+"""What the head of a log says, without reading the rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from host.log import read_log
+from host.source import find_flights
+
+HEAD_BYTES = 256 << 10
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """Return identity, settings and schema of a log from its first 256 KiB.
+
+    Raises
+    ------
+    NotALogError
+        If no intact block is there.
+    """
+    log = read_log(path, limit_bytes=HEAD_BYTES)
+    out: dict[str, Any] = {
+        "file": str(path),
+        "size_bytes": path.stat().st_size,
+        "file_id": f"{log.selection.file_id:08x}",
+        "session": log.selection.sessions[0],
+        "schema": f"{log.schema.hash:08x}",
+        "kinds_of_frames": len(log.schema.frames),
+    }
+    for name in ("identity", "config"):
+        frame = log.head(name)
+        out[name] = {} if frame is None else _plain(frame)
+    coefficients = log.head("baro_coefficients")
+    out["baro"] = (
+        "unknown"
+        if coefficients is None
+        else log.schema.word("baro_sensor", int(coefficients["sensor"]))
+    )
+    return out
+
+
+def describe_folder(folder: Path) -> list[dict[str, Any]]:
+    """Return the logs of a folder, oldest first."""
+    return [
+        {"file": str(flight.path), "session": flight.session, "size_bytes": flight.size_bytes}
+        for flight in find_flights(folder)
+    ]
+
+
+def head_lines(head: dict[str, Any]) -> list[str]:
+    """Return the head in words."""
+    lines = [
+        f"log          {head['file']}, {head['size_bytes']} bytes",
+        f"file id      {head['file_id']}, first session {head['session']}",
+        f"schema       {head['schema']}, {head['kinds_of_frames']} kinds of frames",
+        f"barometer    {head['baro']}",
+    ]
+    for name in ("identity", "config"):
+        values = ", ".join(f"{key} {value}" for key, value in head[name].items())
+        lines.append(f"{name:<13}{values or 'not in the first 256 KiB'}")
+    lines.append(f"next         host decode {head['file']}")
+    return lines
+
+
+def _plain(frame: Any) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for name in frame.dtype.names:
+        value = frame[name]
+        if name in ("id", "t_us"):
+            continue
+        if value.dtype.kind == "S":
+            out[name] = bytes(value).rstrip(b"\0").decode("ascii", "replace")
+        elif value.ndim:
+            out[name] = bytes(value).hex()
+        else:
+            out[name] = int(value)
+    return out

@@ -1,0 +1,275 @@
+"""A flight log: raw frames, the synchronous table in SI, the ledger of losses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from host.blocks import Progress, Scan, scan
+from host.calibration import Calibration, load_calibration
+from host.columns import COLUMNS
+from host.errors import LogError
+from host.frames import find_schemas
+from host.ledger import Ledger, make_ledger
+from host.schema import Schema
+from host.selection import Selection, select
+from host.session import Session, surface_sources
+from host.store import FAST, Frames, FrameStore
+from host.table import Columns, SessionTable
+from host.timebase import ClockFit, block_times_us, fit_gps, gps_times_ms, session_slices
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+GAP_BETWEEN_SESSIONS_S = 2.0  # by convention, where no GPS says how long a reset took
+
+
+class FlightLog:
+    """One log of a file.
+
+    Parameters
+    ----------
+    path : Path
+    scan : Scan
+    selection : Selection
+    schema : Schema
+    calibration : Calibration
+    session : int, optional
+        Keep this session only.
+    progress : callable, optional
+        Called with work done and work in all.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        scan: Scan,
+        selection: Selection,
+        schema: Schema,
+        calibration: Calibration,
+        *,
+        session: int | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        self.path = path
+        self.scan = scan
+        self.selection = selection
+        self.schema = schema
+        self.calibration = calibration
+        if session is not None and session not in selection.sessions:
+            known = ", ".join(str(number) for number in selection.sessions)
+            raise LogError(f"{path}: no session {session}; this log holds {known}")
+        self._only = session
+        blocks = selection.blocks
+        if session is not None:
+            blocks = blocks.take(blocks.session == session)
+        self.blocks = blocks
+        self.store = FrameStore(path, blocks, schema, progress)
+
+    @cached_property
+    def frames(self) -> Frames:
+        """Raw frames by name: structured arrays with the fields of protocol/frames.toml."""
+        return Frames(self.store)
+
+    @cached_property
+    def inputs(self) -> dict[str, str]:
+        """For each surface, whether its column is ``measured`` or ``commanded``."""
+        return surface_sources(self.store)
+
+    @cached_property
+    def sessions(self) -> list[Session]:
+        """The recording sessions in order, placed in time."""
+        clock = self.clock
+        scale = 1.0 + clock.scale_error if clock is not None and clock.applied else 1.0
+        previous: Session | None = None
+        for session in self._unplaced:
+            session.clock_scale = scale
+            if previous is not None:
+                gap_s = _gps_gap_s(previous, session) or GAP_BETWEEN_SESSIONS_S
+                session.offset_s = previous.offset_s + previous.duration_s + gap_s
+            if session.rows:
+                previous = session
+        return self._unplaced
+
+    @cached_property
+    def clock(self) -> ClockFit | None:
+        """The Mega's clock against GPS, None without enough GPS solutions."""
+        return fit_gps([_gps_pairs(session) for session in self._unplaced])
+
+    @cached_property
+    def _unplaced(self) -> list[Session]:
+        block_us = block_times_us(self.blocks, self.store["system"])
+        return [
+            Session(
+                number=int(self.blocks.session[first]),
+                span=(first, last),
+                store=self.store,
+                block_us=block_us,
+                calibration=self.calibration,
+                inputs=self.inputs,
+            )
+            for first, last in session_slices(self.blocks)
+        ]
+
+    @cached_property
+    def loss(self) -> Ledger:
+        """What is missing: every lost range with its place, length, seconds, frames and cause."""
+        return make_ledger(self.scan, self.selection, self.store, self.sessions, only=self._only)
+
+    @property
+    def complete(self) -> str:
+        """``complete``, ``truncated`` or ``damaged`` (protocol/README.md, "End")."""
+        return self.loss.complete
+
+    def table(self, *, aligned: bool = True) -> pd.DataFrame:
+        """Return the synchronous table in SI at the identification rate.
+
+        Parameters
+        ----------
+        aligned : bool
+            True brings every channel to the instant ``t_s`` of its row: linearly between the two
+            samples around it, with the delays of the schema removed. A value is NaN where one of
+            the two is invalid or a sample between them is missing. False leaves each value as it
+            was sampled, ``host.channels.constant_delay_us`` plus its age before ``t_s``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row per identification frame, columns of `host.columns.COLUMNS`; units, sources of
+            the inputs and calibration in ``attrs``.
+        """
+        import pandas as pd
+
+        table = pd.DataFrame(self.columns(aligned=aligned), copy=False)
+        table.attrs["units"] = {column.name: column.unit for column in COLUMNS}
+        table.attrs["inputs"] = dict(self.inputs)
+        table.attrs["calibration"] = self.calibration.name
+        return table
+
+    def columns(self, *, aligned: bool = True) -> Columns:
+        """Return the columns of `table` as arrays, without pandas."""
+        count = sum(session.rows for session in self.sessions)
+        out: Columns = {}
+        at = 0
+        for piece in self.pieces(aligned=aligned):
+            if not out:
+                out = {name: np.empty(count, value.dtype) for name, value in piece.items()}
+            rows = len(piece["t_s"])
+            for name, value in piece.items():
+                out[name][at : at + rows] = value
+            at += rows
+        return out or {column.name: np.empty(0) for column in COLUMNS}
+
+    def pieces(self, *, aligned: bool = True) -> Iterator[Columns]:
+        """Yield the columns some ten thousand rows at a time: for logs larger than memory."""
+        for session in self.sessions:
+            if session.rows:
+                yield from SessionTable(session, aligned=aligned).pieces()
+
+    def head(self, name: str) -> Any | None:
+        """Return the last frame of a kind, or None without one."""
+        if name not in self.schema.by_name:
+            return None
+        data = self.frames[name]
+        return data[-1] if len(data) else None
+
+
+def read_log(
+    path: Path | str,
+    *,
+    session: int | None = None,
+    file_id: int | None = None,
+    calibration: Path | str | Calibration | None = None,
+    progress: Progress | None = None,
+    limit_bytes: int | None = None,
+) -> FlightLog:
+    """Read a flight log.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file the logger wrote.
+    session : int, optional
+        Keep one recording session; all of the file's log without it.
+    file_id : int, optional
+        Take the blocks with this file id instead of those of the file's first block: an older
+        flight behind the end, or a second log glued on.
+    calibration : Path, str or Calibration, optional
+        Counts to SI; the default calibration without it.
+    progress : callable, optional
+        Called with bytes or blocks done and in all.
+    limit_bytes : int, optional
+        Look at the head of the file only.
+
+    Returns
+    -------
+    FlightLog
+
+    Raises
+    ------
+    NotALogError
+        If the file holds not one intact block.
+    LogError
+        If the session, the file id or the schema is not known.
+    CalibrationError
+        If the calibration file cannot be used.
+    OSError
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> import host
+    >>> log = host.read_log("flight.bin")  # doctest: +SKIP
+    >>> log.table()[["t_s", "alpha_rad", "q_radps"]]  # doctest: +SKIP
+    """
+    path = Path(path)
+    if not isinstance(calibration, Calibration):
+        calibration = load_calibration(calibration)
+    found = scan(path, progress, limit_bytes=limit_bytes)
+    selection = select(found, str(path), file_id)
+    schema = _main_schema(path, selection)
+    return FlightLog(
+        path, found, selection, schema, calibration, session=session, progress=progress
+    )
+
+
+def _main_schema(path: Path, selection: Selection) -> Schema:
+    blocks = selection.blocks
+    known = find_schemas(path, blocks)
+    values, counts = np.unique(blocks.schema_hash, return_counts=True)
+    for value in values[np.argsort(-counts)].tolist():
+        if value in known and FAST in known[value].by_name:
+            return known[value]
+    raise LogError(
+        f"{path}: schema {int(values[np.argmax(counts)]):08x} is neither whole in the log nor known"
+        " to this program: the frames cannot be read; install the host tool of that firmware"
+    )
+
+
+def _gps_pairs(session: Session) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    data, t_us = session.slow("gps")
+    if not len(data):
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    schema = session.store.schema
+    fixes = (schema.number("gps_fix", "fix_2d"), schema.number("gps_fix", "fix_3d"))
+    gps_ms = gps_times_ms(data, fixes)
+    good = gps_ms >= 0
+    return t_us[good].astype(np.int64), gps_ms[good]
+
+
+def _gps_gap_s(previous: Session, later: Session) -> float | None:
+    """Return the time from the last row of a session to the first of the next, if GPS knows it."""
+    t_before, gps_before = _gps_pairs(previous)
+    t_after, gps_after = _gps_pairs(later)
+    if not len(t_before) or not len(t_after):
+        return None
+    scale = previous.clock_scale * 1e-6
+    tail_s = (previous.end_us - previous.start_us - t_before[-1]) * scale
+    head_s = t_after[0] * scale
+    gap_s = float(gps_after[0] - gps_before[-1]) * 1e-3 - tail_s - head_s
+    return gap_s if gap_s > 0.0 else None

@@ -1,0 +1,133 @@
+"""How good a log is for identification: timing, stuck and saturated channels, vane pairs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from host.channels import _END_OF_RANGE as IMU_END
+from host.columns import ANALOGUE, INERTIAL
+from host.session import Session
+
+STUCK_S = 10.0  # an ADC sum of four that does not move one count for so long reads no sensor
+_ADC_END = 4 * 1023
+_JITTER_BINS_US = 1_000_000
+
+
+@dataclass(slots=True)
+class ChannelHealth:
+    """One raw channel over a session."""
+
+    rows: int = 0
+    valid: int = 0
+    at_end: int = 0
+    longest_still_rows: int = 0
+    _still_rows: int = 0
+    _last: int | None = None
+
+    def add(self, raw: np.ndarray, valid: np.ndarray, at_end: np.ndarray) -> None:
+        """Take more samples into account."""
+        self.rows += len(raw)
+        self.valid += int(np.count_nonzero(valid))
+        self.at_end += int(np.count_nonzero(at_end & valid))
+        if not len(raw):
+            return
+        moved = np.flatnonzero(np.diff(raw)) + 1
+        if self._last is not None and raw[0] != self._last:
+            self._still_rows = 0
+        edges = np.r_[-self._still_rows, moved, len(raw)]
+        self.longest_still_rows = max(self.longest_still_rows, int(np.diff(edges).max()))
+        self._still_rows = len(raw) - int(edges[-2])
+        self._last = int(raw[-1])
+
+
+@dataclass(slots=True)
+class Quality:
+    """Figures of one session.
+
+    Parameters
+    ----------
+    jitter_us : dict of str to float
+        Deviation of the time between two rows from the usual interval: p50, p99, max.
+    channels : dict of str to ChannelHealth
+        Raw channels of the identification frame by field.
+    stuck, saturated, absent : dict of str to float
+        Channels that did not move (longest time, s), stood at an end of their range (share of
+        rows), or were hardly ever valid (share of rows valid).
+    imu_saturated : float
+        Share of rows the IMU itself marked as saturated.
+    """
+
+    jitter_us: dict[str, float] = field(default_factory=dict)
+    channels: dict[str, ChannelHealth] = field(default_factory=dict)
+    stuck: dict[str, float] = field(default_factory=dict)
+    saturated: dict[str, float] = field(default_factory=dict)
+    absent: dict[str, float] = field(default_factory=dict)
+    imu_saturated: float = 0.0
+
+
+def judge(session: Session) -> Quality:
+    """Walk a session's identification frames once and return its figures."""
+    schema = session.store.schema
+    frame = schema.by_name["ident"]
+    unsaturated = schema.bit("valid", "imu_unsaturated")
+    fresh_bit = schema.bit("valid", "imu_fresh")
+    quality = Quality(channels={name: ChannelHealth() for name in (*ANALOGUE, *INERTIAL)})
+    jitter = np.zeros(_JITTER_BINS_US + 1, np.int64)
+    clipped = fresh = 0
+    before: tuple[float, int] | None = None
+    for part in session.store.fast_pieces(session.span):
+        if not len(part.data):
+            continue
+        t_us, count = session.since_start_us(part), part.data["count"].astype(np.int64)
+        if before is not None:
+            t_us, count = np.r_[before[0], t_us], np.r_[before[1], count]
+        before = (float(t_us[-1]), int(count[-1]))
+        step = np.diff(t_us)[np.diff(count) & 0xFFFF == 1]
+        off = np.abs(step - session.interval_us).astype(np.int64)
+        jitter += np.bincount(np.minimum(off, _JITTER_BINS_US), minlength=len(jitter))
+        bits = part.data["valid"]
+        is_fresh = (bits & fresh_bit) != 0
+        fresh += int(np.count_nonzero(is_fresh))
+        clipped += int(np.count_nonzero(is_fresh & ((bits & unsaturated) == 0)))
+        for name, health in quality.channels.items():
+            raw = part.data[name].astype(np.int32)
+            bit = frame.field(name).valid
+            valid = (bits >> bit & 1) != 0 if bit is not None else np.ones(len(raw), bool)
+            if name in ANALOGUE:
+                health.add(raw, valid, (raw <= 0) | (raw >= _ADC_END))
+            else:
+                keep = raw[is_fresh]
+                health.add(keep, np.ones(len(keep), bool), np.abs(keep) >= IMU_END)
+    quality.imu_saturated = clipped / fresh if fresh else 0.0
+    quality.jitter_us = _percentiles(jitter)
+    _find_faults(quality, session)
+    return quality
+
+
+def _percentiles(histogram: np.ndarray) -> dict[str, float]:
+    total = int(histogram.sum())
+    if not total:
+        return {}
+    passed = np.cumsum(histogram)
+    at = {
+        name: float(np.searchsorted(passed, share * total))
+        for name, share in (("p50", 0.5), ("p99", 0.99))
+    }
+    return at | {"max": float(np.flatnonzero(histogram)[-1])}
+
+
+def _find_faults(quality: Quality, session: Session) -> None:
+    for name, health in quality.channels.items():
+        if not health.rows:
+            continue
+        share = health.valid / health.rows
+        if share < 0.5:
+            quality.absent[name] = share
+            continue
+        still_s = health.longest_still_rows / session.rate_hz
+        if still_s >= STUCK_S and health.longest_still_rows > 0.2 * health.rows:
+            quality.stuck[name] = still_s
+        if health.at_end:
+            quality.saturated[name] = health.at_end / health.rows

@@ -1,0 +1,113 @@
+"""The summary of a log in words, for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+_SHOWN_LOSSES = 12
+_WIDTH = 13
+
+
+def lines(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the lines of a summary made by `host.summary.summarise`."""
+    yield _row("log", f"{summary['file']}  file id {summary['file_id']}, {summary['complete']}")
+    yield _row("duration", f"{summary['duration_s']:.2f} s, {summary['rows']} rows")
+    frames = summary["frames"]
+    yield _row("frames", ", ".join(f"{name} {count}" for name, count in frames.items() if count))
+    for session in summary["sessions"]:
+        yield from _session(session)
+    yield _row("clock", _clock(summary["clock"]))
+    yield _row("GPS", _gps(summary["gps"]))
+    inputs = [f"{surface} {source}" for surface, source in summary["inputs"].items()]
+    yield _row("inputs", ", ".join(inputs) + ", throttle commanded")
+    yield from _losses(summary["losses"])
+    for other in summary["older_data"]:
+        sessions = ", ".join(str(number) for number in other["sessions"])
+        yield _row(
+            "older data",
+            f"{other['blocks']} blocks of file id {other['file_id']} (session {sessions}) from byte"
+            f" {other['offset']}: not part of this log; --file-id {other['file_id']} decodes them",
+        )
+    for key, text in (
+        ("duplicate_blocks", "blocks stand in the file twice: used once"),
+        ("displaced_blocks", "blocks stand out of order: put back in order"),
+    ):
+        if summary[key]:
+            yield _row("order", f"{summary[key]} {text}")
+    yield from _calibration(summary["calibration"])
+
+
+def _session(session: Mapping[str, Any]) -> Iterator[str]:
+    who = ", ".join(filter(None, (session["board"], session["firmware"], session["aircraft"])))
+    yield _row(
+        f"session {session['number']}",
+        f"{session['duration_s']:.2f} s at {session['rate_hz']:g} Hz from t ="
+        f" {session['starts_at_t_s']:.2f} s; ended: {session['ended']}"
+        + (f" ({who})" if who else ""),
+    )
+    jitter = session["jitter_us"]
+    if jitter:
+        yield _row(
+            "  jitter",
+            f"p50 {jitter['p50']:.0f} us, p99 {jitter['p99']:.0f} us, max {jitter['max']:.0f} us",
+        )
+    yield _row("  sensors", ", ".join(session["sensors"]) or "none heard of")
+    for name, seconds in session["stuck"].items():
+        yield _row("  STUCK", f"{name} did not move for {seconds:.1f} s")
+    for name, share in session["saturated"].items():
+        yield _row("  SATURATED", f"{name} at an end of its range in {share:.2%} of rows")
+    if session["imu_saturated_share"]:
+        yield _row("  SATURATED", f"IMU says so in {session['imu_saturated_share']:.2%} of samples")
+    if session["absent"]:
+        yield _row("  not valid", ", ".join(session["absent"]))
+
+
+def _clock(clock: Mapping[str, Any] | None) -> str:
+    if clock is None:
+        return "not checked: too few GPS solutions; the Mega's resonator is good to about 0.5 %"
+    applied = "t_s corrected" if clock["applied"] else "too uncertain, t_s not corrected"
+    return (
+        f"scale error {clock['scale_error_ppm']:+.1f} ppm +- {clock['half_width_95_ppm']:.1f} ppm"
+        f" (95 %) against GPS, {clock['fixes']} solutions; {applied}"
+    )
+
+
+def _gps(gps: Mapping[str, Any] | None) -> str:
+    if gps is None:
+        return "no fix"
+    return (
+        f"{gps['with_fix']} of {gps['solutions']} solutions with a fix; spans"
+        f" {gps['north_span_m']:.0f} m north, {gps['east_span_m']:.0f} m east,"
+        f" {gps['height_span_m']:.0f} m height; {gps['satellites']} satellites"
+    )
+
+
+def _losses(losses: Mapping[str, Any]) -> Iterator[str]:
+    ranges = losses["ranges"]
+    if not ranges:
+        yield _row("losses", "none")
+        return
+    yield _row(
+        "losses",
+        f"{len(ranges)} ranges: {losses['bytes']} bytes, {losses['seconds']:.3f} s,"
+        f" {losses['frames']} identification frames known lost;"
+        f" {losses['dropped_frames']} frames dropped in flight",
+    )
+    for loss in ranges[:_SHOWN_LOSSES]:
+        yield _row("", loss["text"])
+    if len(ranges) > _SHOWN_LOSSES:
+        yield _row("", f"... and {len(ranges) - _SHOWN_LOSSES} more: --json lists all")
+
+
+def _calibration(note: Mapping[str, Any]) -> Iterator[str]:
+    yield _row("calibration", f"{note['name']} {note['date']}".strip())
+    if note["default_columns"]:
+        yield _row("", "DEFAULT numbers, not measured on this instrument, in: ")
+        names = note["default_columns"]
+        for at in range(0, len(names), 6):
+            yield _row("", "  " + ", ".join(names[at : at + 6]))
+
+
+def _row(label: str, text: str) -> str:
+    return f"{label:<{_WIDTH}}{text}".rstrip()

@@ -1,0 +1,122 @@
+"""Values known at their own sampling instants -> values at the instant of the row.
+
+Linear between the two samples around the instant; no value where one of the two is invalid, or
+where they lie further apart than 1.5 times the usual interval (a sample between them is missing).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+GAP_FACTOR = 1.5
+
+
+class Interpolator:
+    """Weights that bring samples of one group of channels to the instants of the rows.
+
+    Parameters
+    ----------
+    sampled_us : Array, shape (n,)
+        Sampling instants, not falling.
+    rows_us : Array, shape (m,)
+        Instants wanted, not falling.
+    interval_us : float
+        Usual time between two samples.
+
+    Notes
+    -----
+    Where each row has its sample (n = m, a constant delay below one interval) no search is made:
+    the neighbours are row i and row i - 1 or i + 1.
+    """
+
+    def __init__(self, sampled_us: Array, rows_us: Array, interval_us: float) -> None:
+        self._shift: int | None = None
+        self._rows = len(rows_us)
+        self._index: NDArray[np.intp] | None = None
+        self._exact = False
+        limit_us = GAP_FACTOR * interval_us
+        if len(sampled_us) < 2:
+            self._weight = np.full(self._rows, np.nan)
+            self._index = np.zeros(self._rows, np.intp)
+            self._few = True
+            return
+        self._few = False
+        self._exact = len(sampled_us) == self._rows and bool((sampled_us == rows_us).all())
+        if self._exact:
+            return
+        step = np.diff(sampled_us)
+        if len(sampled_us) == self._rows:
+            shift = self._fixed_shift(sampled_us, rows_us)
+            if shift is not None:
+                self._shift = shift
+                # rows i whose earlier neighbour is sample i + shift (shift 0 or -1)
+                first, last = (0, self._rows - 1) if shift == 0 else (1, self._rows)
+                weight = np.full(self._rows, np.nan)
+                span = weight[first:last]
+                np.subtract(rows_us[first:last], sampled_us[: self._rows - 1], out=span)
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    span /= step
+                span[step > limit_us] = np.nan
+                self._weight = weight
+                return
+        index = np.searchsorted(sampled_us, rows_us, side="right") - 1
+        inside = (index >= 0) & (index < len(sampled_us) - 1)
+        at_last = rows_us == sampled_us[-1]
+        inside |= at_last
+        index = np.clip(index, 0, len(sampled_us) - 2)
+        gap = step[index]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            weight = (rows_us - sampled_us[index]) / gap
+        weight[~inside | (gap > limit_us)] = np.nan
+        self._weight, self._index = weight, index
+
+    def __call__(self, values: Array) -> Array:
+        """Return `values` at the rows.
+
+        Parameters
+        ----------
+        values : Array, shape (n,)
+
+        Returns
+        -------
+        Array, shape (m,)
+            NaN where there is no value.
+        """
+        if self._few:
+            return np.full(self._rows, np.nan)
+        if self._exact:
+            return values
+        out = np.empty(self._rows)
+        if self._shift is not None:
+            first, last = (0, self._rows - 1) if self._shift == 0 else (1, self._rows)
+            core = out[first:last]
+            np.subtract(values[1:], values[:-1], out=core)
+            core *= self._weight[first:last]
+            core += values[:-1]
+            out[:first] = np.nan
+            out[last:] = np.nan
+            return out
+        assert self._index is not None
+        low = values[self._index]
+        np.subtract(values[self._index + 1], low, out=out)
+        out *= self._weight
+        out += low
+        return out
+
+    @staticmethod
+    def _fixed_shift(sampled_us: Array, rows_us: Array) -> int | None:
+        if bool((sampled_us <= rows_us).all()) and bool((sampled_us[1:] > rows_us[:-1]).all()):
+            return 0
+        if bool((sampled_us >= rows_us).all()) and bool((sampled_us[:-1] <= rows_us[1:]).all()):
+            return -1
+        return None
+
+
+def usual_interval_us(sampled_us: Array) -> float:
+    """Return the median time between samples, microseconds; infinity without two of them."""
+    if len(sampled_us) < 2:
+        return float("inf")
+    return float(np.median(np.diff(sampled_us)))
