@@ -1,0 +1,130 @@
+// Reset cause, watchdog with a crash record, sleep, stack high-water.
+#include "hal/system.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+#include <avr/wdt.h>
+
+#include "boards/mega2560/board.h"
+#include "boards/mega2560/interrupts.h"
+
+namespace {
+
+constexpr uint8_t kPaint = 0xC5;
+constexpr uint32_t kFlightMark = 0x464C5921;  // a power cut does not leave this
+constexpr uint32_t kCrashMark = 0x43525348;
+
+// Kept over a reset, lost with the supply; the marks tell which.
+__attribute__((section(".noinit"))) uint32_t g_flight_mark;
+__attribute__((section(".noinit"))) uint32_t g_crash_mark;
+__attribute__((section(".noinit"))) uint32_t g_crash_address;
+__attribute__((section(".noinit"))) uint8_t g_mcusr;
+
+uint32_t g_last_crash;
+
+}  // namespace
+
+extern "C" {
+
+extern uint8_t _end;
+extern uint8_t __stack;
+
+// Before anything else: the watchdog that reset us still runs, with its shortest time-out. Then
+// paint what will be stack. No stack, no zero register yet: plain instructions only.
+void mega_init3(void) __attribute__((naked, used, section(".init3")));
+void mega_init3(void) {
+  g_mcusr = MCUSR;
+  MCUSR = 0;
+  WDTCSR = _BV(WDCE) | _BV(WDE);
+  WDTCSR = 0;
+  for (uint8_t* at = &_end; at <= &__stack; ++at) {
+    *at = kPaint;
+  }
+}
+
+// The watchdog's first time-out. The return address is on top of the stack, high byte first: note
+// it, then wait for the reset. Nothing here may rely on the state of the program.
+void mega_watchdog(const uint8_t* stack) __attribute__((used, noreturn));
+void mega_watchdog(const uint8_t* const stack) {
+  const uint32_t words = (uint32_t(stack[1]) << 16) | (uint32_t(stack[2]) << 8) | stack[3];
+  g_crash_address = words << 1;
+  g_crash_mark = kCrashMark;
+  wdt_enable(WDTO_15MS);
+  for (;;) {
+  }
+}
+
+}  // extern "C"
+
+ISR(WDT_vect, ISR_NAKED) {
+  __asm__ __volatile__(
+      "clr __zero_reg__ \n\t"
+      "in r24, __SP_L__ \n\t"
+      "in r25, __SP_H__ \n\t"
+      "jmp mega_watchdog \n\t");
+}
+
+namespace hal {
+
+ResetSource reset_source() {
+  if (g_crash_mark == kCrashMark) {
+    g_crash_mark = 0;
+    g_last_crash = g_crash_address;
+    return ResetSource::kCrash;
+  }
+  // A bootloader may have cleared the register: then the cause is unknown.
+  if ((g_mcusr & _BV(PORF)) != 0) {
+    return ResetSource::kPowerOn;
+  }
+  if ((g_mcusr & _BV(BORF)) != 0) {
+    return ResetSource::kBrownOut;
+  }
+  if ((g_mcusr & _BV(WDRF)) != 0) {
+    return ResetSource::kWatchdog;
+  }
+  return (g_mcusr & _BV(EXTRF)) != 0 ? ResetSource::kExternal : ResetSource::kUnknown;
+}
+
+uint32_t crash_address() {
+  return g_last_crash;
+}
+
+void set_flight_mark(const bool flying) {
+  g_flight_mark = flying ? kFlightMark : 0;
+}
+
+bool flight_mark() {
+  return g_flight_mark == kFlightMark;
+}
+
+void start_watchdog() {
+  const mega::InterruptsOff guard;
+  wdt_reset();
+  WDTCSR = _BV(WDCE) | _BV(WDE);
+  WDTCSR = _BV(WDE) | _BV(WDIE) | _BV(WDP2);  // 0.25 s to the interrupt, then the reset
+}
+
+void feed_watchdog() {
+  wdt_reset();
+}
+
+void sleep_until_interrupt() {
+  SMCR = _BV(SE);  // idle
+  sleep_cpu();
+  SMCR = 0;
+}
+
+uint16_t stack_free_bytes() {
+  uint16_t free_bytes = 0;
+  for (const uint8_t* at = &_end; at < &__stack && *at == kPaint; ++at) {
+    ++free_bytes;
+  }
+  return free_bytes;
+}
+
+const char* board_name() {
+  return mega::kBenchOnly ? "mega2560 bm" : "mega2560";
+}
+
+}  // namespace hal
