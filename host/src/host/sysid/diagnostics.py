@@ -144,10 +144,49 @@ class Refusal:
     reason: str
 
 
+def plausible(result: FitResult, maneuvers: Sequence[Maneuver]) -> Array:
+    """Return the estimate drawn towards zero where only cancellation holds it up.
+
+    Where the data cannot tell entries of a row apart, estimates of either sign and any size cancel
+    each other, and comparing a bound with such a value hides that it is worthless. Each entry gets
+    a prior about zero under which it alone would make up the whole state rate; entries that the
+    data determine do not move.
+    """
+    model = result.model
+    count = len(model.parameters)
+    spread = regressor_rms(model, maneuvers)
+    A, B, _, _ = model.matrices(result.estimate)
+    z = [np.hstack([m.outputs[:, measured_columns(model)], m.inputs]) for m in maneuvers]
+    wide = np.hstack([A, B])
+    rates = np.concatenate([(block - block.mean(axis=0)) @ wide.T for block in z])
+    rate_rms = np.sqrt(np.mean(rates**2, axis=0))
+    n = len(model.states)
+    prior = np.full(count, np.inf)
+    for k, parameter in enumerate(model.parameters):
+        for term in model.terms:
+            if term.parameter == parameter.name and term.matrix in "AB":
+                column = term.column + (n if term.matrix == "B" else 0)
+                scale = abs(term.gain) * spread[column]
+                if scale > 0.0:
+                    prior[k] = min(prior[k], rate_rms[term.row] / scale)
+    covariance = result.covariance[:count, :count]
+    drawn = np.linalg.solve(
+        covariance + np.diag(np.minimum(prior, 1e100) ** 2) + 1e-300 * np.eye(count),
+        result.estimate[:count],
+    )
+    moved = result.estimate[:count] - covariance @ drawn
+    return np.where(np.isfinite(prior), moved, result.estimate[:count])
+
+
+def measured_columns(model: LinearModel) -> list[int]:
+    """Return the output that measures each state, the first output where none does."""
+    return [model.outputs.index(s) if s in model.outputs else 0 for s in model.states]
+
+
 def refusals(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Refusal, ...]:
     """Name every common parameter whose standard error exceeds its reference value."""
     count = len(result.model.parameters)
-    reference = references(result.model, maneuvers, result.estimate)
+    reference = references(result.model, maneuvers, plausible(result, maneuvers))
     relative = result.standard_error[:count] / np.maximum(reference, 1e-300)
     correlation = np.abs(result.correlation[:count, :count] - np.eye(count))
     found = []

@@ -21,6 +21,7 @@ from host.sysid.problem import OutputProblem, Response
 STEP_LIMIT = 0.01  # in Cramer-Rao bounds: below it an iteration is not worth another
 MAX_ITERATIONS = 60
 MAX_DAMPING = 1e8
+SINGULAR = 1e-15  # of the largest eigenvalue of the scaled information
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,20 +159,17 @@ def covariance_of(information: Array, free: BoolArray) -> Array:
     Raises
     ------
     IdentificationError
-        If the information is singular to working precision.
+        If a parameter acts on no output at all.
     """
     covariance = np.zeros_like(information)
     block = information[np.ix_(free, free)]
     scale = np.sqrt(np.maximum(np.diag(block), 0.0))
     if np.any(scale == 0.0):
         raise IdentificationError("singular information: a parameter does not act on any output")
-    try:
-        factor = linalg.cho_factor(block / np.outer(scale, scale), lower=True)
-    except linalg.LinAlgError as error:
-        raise IdentificationError(
-            "singular information: some parameters cannot be told apart from these data"
-        ) from error
-    inverse = linalg.cho_solve(factor, np.eye(len(block))) / np.outer(scale, scale)
+    value, vector = np.linalg.eigh(block / np.outer(scale, scale))
+    # Directions the data do not see get a huge variance, not an exception: they will be named.
+    value = np.maximum(value, SINGULAR * value[-1])
+    inverse = (vector / value) @ vector.T / np.outer(scale, scale)
     covariance[np.ix_(free, free)] = 0.5 * (inverse + inverse.T)
     return covariance
 
