@@ -100,15 +100,13 @@ python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
 # --- Python packages -------------------------------------------------------------------------
 
 # A clone that was moved, or a Python that was upgraded, leaves a .venv of dead paths.
-made_for="$PWD $(python3 --version)"
-if [ -f .venv/made-for ] && [ "$(cat .venv/made-for)" != "$made_for" ]; then
-  say "making .venv again: it was made for $(cat .venv/made-for)"
-  quietly venv.log python3 -m venv --clear .venv
-elif [ ! -x .venv/bin/python ]; then
+venv_works() {
+  .venv/bin/python -c 'import pip' 2>/dev/null && grep -qsF "$PWD/.venv/bin" .venv/bin/pip
+}
+if ! venv_works; then
   say "making .venv"
-  quietly venv.log python3 -m venv .venv
+  quietly venv.log python3 -m venv --clear .venv
 fi
-printf '%s\n' "$made_for" >.venv/made-for
 python=.venv/bin/python
 
 requirements=(-r .ci/requirements.txt)
