@@ -33,9 +33,12 @@ CardStatus write_card(uint32_t lba, const uint8_t* block);
 CardStatus begin_stream(uint32_t lba);
 // kOk: takes a block now. kBusy: still writing. Else the stream has ended.
 CardStatus poll_stream();
-// Hands over the next block; only after poll_stream() said kOk. kOk: accepted, the card is busy
-// with it until poll_stream() says otherwise. kRejected: nothing of it was written.
-CardStatus write_stream(const uint8_t* block);
+// The next block, in any portions: only after poll_stream() said kOk. 1.6 us a byte.
+void open_block();
+void put_block(const uint8_t* bytes, uint16_t size);  // 512 bytes in all
+// kOk: accepted, the card is busy with it until poll_stream() says otherwise. Else nothing of it
+// was written, and the stream has ended.
+CardStatus close_block();
 // Ends the stream; poll_stream() says kBusy until the card has finished.
 void end_stream();
 

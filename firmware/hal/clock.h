@@ -8,8 +8,7 @@ namespace hal {
 // Microseconds since the clock was started; wraps after 71.6 min. Compare by subtraction only.
 uint32_t now_us();
 
-// The same clock in 0.5 us steps, low 16 bits: twice now_us() and its half step. Wraps after
-// 32.768 ms, so a receiver frame of 22.5 ms still fits.
-uint16_t now_ticks();
+// The same clock in 0.5 us steps; wraps after 35.8 min.
+uint32_t now_ticks();
 
 }  // namespace hal

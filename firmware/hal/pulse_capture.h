@@ -8,7 +8,7 @@ namespace hal {
 constexpr uint8_t kReceiverInputs = 5;
 
 struct Edge {
-  uint16_t at_ticks;  // as now_ticks() at the edge, 0.5 us
+  uint16_t at_ticks;  // low half of now_ticks() at the edge
   uint8_t levels;     // lines after the edge, bit 0 is input 0 (A8)
   bool late;          // the stamp may be late: the interrupt was held up; not to be measured with
 };
@@ -20,8 +20,11 @@ void start_pulse_capture();
 // become ambiguous.
 bool take_edge(Edge* edge);
 
-// Edges that found the buffer full, and times the bank was masked because of a storm, since boot.
-// Main loop only.
+// Edges that found the buffer full since boot. Main loop only.
 uint16_t lost_edges();
+
+// Edges in the millisecond in which the bank was masked because of a storm; 0: it is not masked.
+// Main loop only.
+uint8_t edge_storm();
 
 }  // namespace hal
