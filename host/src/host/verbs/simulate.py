@@ -1,0 +1,120 @@
+"""`host simulate`: fly a card in the digital twin and record it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from host.errors import ExitCode, UsageError
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "simulate",
+        help="fly a virtual flight test and record it",
+        description="Fly a flight card with a simulated aircraft, air, pilot and sensors. Writes"
+        " the log, the truth beside it, the calibration that belongs to it, and a picture."
+        " Without a card it lists the cards.",
+    )
+    parser.add_argument("card", nargs="?", help="name of a card, or a TOML file")
+    parser.add_argument("-o", "--output", type=Path, default=Path("flight"), metavar="DIR",
+                        help="folder for the files (default: flight)")  # fmt: skip
+    parser.add_argument("--seed", type=int, default=1, help="fixes every random number (default 1)")
+    parser.add_argument(
+        "--firmware",
+        choices=("sitl", "avr", "none", "thesis"),
+        default="sitl",
+        help="who records: the firmware on this computer (default), its Mega image in the chip"
+        " simulator, nobody (ideal table), or the thesis's logger",
+    )
+    parser.add_argument("--both", action="store_true",
+                        help="the thesis's logger flies along, into the same picture")  # fmt: skip
+    parser.add_argument("--no-picture", action="store_true", help="draw nothing")
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fly, and print what was written; return an exit code."""
+    try:
+        from host.twin import cards, report
+    except ImportError as error:
+        raise UsageError(
+            f"the virtual flight needs {error.name}:"
+            " install the extra, pip install './host[compiled]'"
+        ) from None
+    if args.card is None:
+        return _list(as_json=args.json)
+    card = cards.load(args.card)
+    bar = _Bar(enabled=sys.stderr.isatty())
+    outcome = report.simulate(
+        card,
+        args.output,
+        seed=args.seed,
+        firmware=args.firmware,
+        pictures=not args.no_picture,
+        both=args.both,
+        progress=bar.show,
+    )
+    bar.clear()
+    record = outcome.record
+    duration = float(record.t_s[-1])
+    busy = sum(seconds for stage, seconds in outcome.wall_s.items() if stage != "picture")
+    flown = [w for w in record.schedule.windows if w.end_s <= duration]
+    if args.json:
+        print(
+            json.dumps(
+                {
+                    "card": card.name,
+                    "aircraft": record.aircraft.name,
+                    "seed": args.seed,
+                    "firmware": args.firmware,
+                    "duration_s": duration,
+                    "maneuvers": len(flown),
+                    "files": [str(path) for path in outcome.files],
+                    "wall_s": outcome.wall_s,
+                    "times_real_time": duration / busy,
+                }
+            )
+        )
+        return ExitCode.OK
+    print(f"{card.title}\n  {record.aircraft.title}, {duration:.1f} s, {len(flown)} maneuvers,"
+          f" seed {args.seed}, simulated")  # fmt: skip
+    stages = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.wall_s.items())
+    print(f"  {duration / busy:.0f} times real time without the picture ({stages})")
+    for path in outcome.files:
+        print(f"  wrote {path}")
+    return ExitCode.OK
+
+
+def _list(*, as_json: bool) -> int:
+    from host.twin import cards
+
+    known = [cards.load(name) for name in cards.names()]
+    if as_json:
+        print(json.dumps([{"name": c.name, "title": c.title} for c in known]))
+        return ExitCode.OK
+    print("Cards (host simulate NAME):")
+    for card in known:
+        print(f"  {card.name:16s} {card.title}")
+    return ExitCode.OK
+
+
+class _Bar:
+    """A progress bar on standard error, only where somebody watches."""
+
+    def __init__(self, *, enabled: bool) -> None:
+        self._enabled = enabled
+
+    def show(self, stage: str, share: float) -> None:
+        if self._enabled:
+            filled = round(30 * share)
+            sys.stderr.write(f"\r{stage:8s} [{'#' * filled}{'.' * (30 - filled)}] {share:4.0%}")
+            sys.stderr.flush()
+
+    def clear(self) -> None:
+        if self._enabled:
+            sys.stderr.write("\r" + " " * 50 + "\r")
