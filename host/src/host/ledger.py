@@ -404,11 +404,14 @@ def _end(
 
 
 def _damaged_end(scan: Scan, blocks: Blocks, path: Path, start: int) -> int:
-    """Count the slots from `start` on that still look like blocks of this log."""
+    """Count the slots from `start` on that look like blocks of this log and are not valid."""
     last = len(blocks) - 1
     lost = 0
+    # Valid blocks of an older flight have the magic and the schema of this one.
+    behind = scan.blocks.position[scan.blocks.position >= start]
+    end = int(behind.min()) if len(behind) else scan.size_bytes
     with path.open("rb", buffering=0) as file:
-        while start + (lost + 1) * BLOCK_BYTES <= scan.size_bytes:
+        while start + (lost + 1) * BLOCK_BYTES <= end:
             looked = bytes(read_at(file, start + lost * BLOCK_BYTES, 28))
             if not _resembles(looked, blocks, last):
                 break
