@@ -138,10 +138,15 @@ def write_flight(
 
 
 def simple_log(
-    duration_s: float = 3.0, *, rate_hz: int = 100, seed: int = 1, start_us: int = 2_000_000
+    duration_s: float = 3.0,
+    *,
+    rate_hz: int = 100,
+    seed: int = 1,
+    start_us: int = 2_000_000,
+    session: int = 1,
 ) -> LogWriter:
     """Return the writer of a complete log: one session, properly ended."""
-    writer = LogWriter()
+    writer = LogWriter(session=session)
     writer.begin(rate_hz=rate_hz, t_us=wrapped_int(start_us - 1000))
     _coefficients(writer, start_us)
     end_us = write_flight(writer, duration_s, rate_hz=rate_hz, seed=seed, start_us=start_us)

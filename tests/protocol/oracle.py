@@ -84,6 +84,8 @@ class Decoded:
         Positions of valid blocks of other logs.
     unread : int
         Payload bytes that could not be read as frames.
+    unreadable : int
+        Blocks whose schema is not known.
     complete : str
         complete, truncated or damaged.
     """
@@ -94,6 +96,7 @@ class Decoded:
     foreign: list[int] = field(default_factory=list)
     sessions: list[int] = field(default_factory=list)
     unread: int = 0
+    unreadable: int = 0
     complete: str = "complete"
 
 
@@ -184,7 +187,10 @@ def decode(data: bytes, *, known_schemas: Sequence[bytes] = ()) -> Decoded | Non
         expected = block.sequence + 1
         if block.session not in result.sessions:
             result.sessions.append(block.session)
-        if block.kind == 1 or block.schema_hash not in schemas:
+        if block.kind == 1:
+            continue
+        if block.schema_hash not in schemas:
+            result.unreadable += 1
             continue
         frames, unread = read_frames(block.payload[: block.used], schemas[block.schema_hash])
         result.unread += unread
@@ -290,35 +296,37 @@ def _completeness(
     data: bytes, valid: Sequence[Block], ordered: Sequence[Block], result: Decoded
 ) -> str:
     last = ordered[-1]
-    own_end = max(b.position for b in valid if b.file_id == result.file_id) + BLOCK
-    if result.missing or result.unread or _bad_bytes(data[:own_end], valid):
+    if result.missing or result.unread or result.unreadable:
         return "damaged"
-    owner = result.file_id.to_bytes(4, "little")
-    taken = {b.position for b in valid}
-    at = data.find(MAGIC + owner, own_end)
-    while at >= 0:
-        if at + BLOCK <= len(data) and at not in taken:
-            return "damaged"
-        at = data.find(MAGIC + owner, at + 1)
-    ended = any(
+    if any(
         values["code"] == 2
         for values, sequence in result.frames.get("event", [])
         if sequence == last.sequence
-    )
-    if ended or len(data) >= own_end + BLOCK:
+    ):
         return "complete"
-    return "truncated"
+    end = max(block.position for block in ordered) + BLOCK
+    room = len(data) - end
+    behind = [block.position for block in valid if block.position >= end]
+    if room < BLOCK or (behind and (min(behind) - end) % BLOCK):
+        return "truncated"
+    if room <= 8 * BLOCK and not behind:
+        return "damaged"
+    if end not in behind and _like_a_block(data, end, last):
+        return "damaged"
+    return "complete"
 
 
-def _bad_bytes(data: bytes, valid: Sequence[Block]) -> bool:
-    at = 0
-    for block in valid:
-        if block.position >= len(data):
-            break
-        if data[at : block.position].strip(b"\0"):
-            return True
-        at = block.position + BLOCK
-    return False
+def _like_a_block(data: bytes, at: int, last: Block) -> bool:
+    head = c.Struct(
+        "magic" / c.Bytes(4),
+        "file_id" / c.Int32ul,
+        "session" / c.Int32ul,
+        "sequence" / c.Int32ul,
+        "schema_hash" / c.Int32ul,
+    ).parse(data[at : at + 20])
+    alike = [head.magic == MAGIC, head.file_id == last.file_id]
+    alike += [head.session == last.session, head.schema_hash == last.schema_hash]
+    return alike.count(True) >= 2
 
 
 def _field_format(kind: str) -> Any:

@@ -1,4 +1,4 @@
-"""protocol/cases.toml against the independent decoder, and against the host's where it has one."""
+"""protocol/cases.toml against the independent decoder and against the host's."""
 
 import json
 import tomllib
@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from tests.protocol import log_writer, oracle
+from tests.protocol.agreement import decoded
 
 TABLE = tomllib.loads((log_writer.ROOT / "protocol/cases.toml").read_text())
 FORMATS = oracle.frame_formats(log_writer.schema_text())
@@ -49,6 +50,23 @@ def test_block(case: dict[str, Any]) -> None:
         number, layout = next((i, f) for i, (n, f) in FORMATS.items() if n == name)
         again.append(bytes([number]) + layout.build(values))
     assert again == [unhex(frame) for frame in case["frames"]]
+
+
+@pytest.mark.parametrize("case", TABLE["block"], ids=lambda case: case["name"])
+def test_block_as_the_host_reads_it(case: dict[str, Any]) -> None:
+    with decoded(block_bytes(case)) as log:
+        if case["verdict"] != "ok":
+            assert log is None
+            return
+        assert log is not None
+        for key in ("file_id", "session", "sequence", "schema_hash", "dropped", "used", "kind"):
+            assert int(getattr(log.blocks, key)[0]) == case[key], key
+        wanted: dict[int, bytes] = {}
+        for frame in case.get("frames", []):
+            wanted[unhex(frame)[0]] = wanted.get(unhex(frame)[0], b"") + unhex(frame)
+        for number, (name, _) in FORMATS.items():
+            assert log.frames[name].tobytes() == wanted.get(number, b""), name
+        assert log.store.unread_bytes == case.get("unread", 0)
 
 
 def test_schema_of_the_cases_is_the_committed_one() -> None:
