@@ -31,7 +31,7 @@ lint: setup ## format, lint and types, nothing else
 	@$(PYTHON) .ci/stages.py format lint types
 
 format: setup ## rewrite C++ and Python in the house format
-	@find firmware tests protocol -name '*.[hc]' -o -name '*.cpp' | grep -v /generated/ | xargs clang-format -i
+	@find firmware tests protocol -name '*.[hc]' -o -name '*.cpp' | grep -v /generated/ | xargs .venv/bin/clang-format -i
 	@.venv/bin/ruff format --quiet .
 
 bench: setup ## damage table and speed beside pyulog and pymavlink

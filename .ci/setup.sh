@@ -27,11 +27,10 @@ quietly() {
 }
 
 # One line each why: compiler and Python of the PC; compiler, library and uploader of the Mega;
-# unit tests; C++ format; the chip simulator; looking into card images as a PC would.
+# unit tests; the chip simulator; looking into card images as a PC would.
 packages=(git make python3 python3-venv g++
   gcc-avr avr-libc avrdude
   doctest-dev
-  clang-format
   simavr libsimavr-dev
   dosfstools mtools)
 
@@ -91,7 +90,7 @@ elif [ "$purpose" = demo ]; then
   require_tools python3 c++
 else
   say "no apt here; expecting what Debian calls ${packages[*]}"
-  require_tools python3 c++ avr-g++ avrdude clang-format
+  require_tools python3 c++ avr-g++ avrdude
 fi
 
 python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||

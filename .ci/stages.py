@@ -88,7 +88,7 @@ def stages() -> list[Stage]:
             "format",
             "clang-format and ruff format",
             (
-                ("clang-format", "--dry-run", "-Werror", *cpp),
+                (str(BIN / "clang-format"), "--dry-run", "-Werror", *cpp),
                 (ruff, "format", "--check", "--no-cache", *python),
             ),
         ),
