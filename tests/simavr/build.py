@@ -1,7 +1,7 @@
 """Build the chip simulator's shared library and the AVR programs of its own tests.
 
-Needs gcc and libsimavr-dev; for the programs gcc-avr and avr-libc (Debian packages). Everything goes
-to ``build/simavr`` in the root of the repository.
+Needs gcc and libsimavr-dev; for the programs gcc-avr and avr-libc (Debian packages). Everything
+goes to ``build/simavr`` in the root of the repository.
 """
 
 from __future__ import annotations
@@ -97,7 +97,9 @@ def build_program(name: str) -> Path:
         If avr-gcc is missing or refuses the source.
     """
     if shutil.which("avr-gcc") is None:
-        raise BuildError("avr-gcc is missing, expected it on the PATH; run: apt install gcc-avr avr-libc")
+        raise BuildError(
+            "avr-gcc is missing, expected it on the PATH; run: apt install gcc-avr avr-libc"
+        )
     source = HERE / "programs" / f"{name}.c"
     target = OUT / "programs" / f"{name}.elf"
     headers = list((HERE / "programs").glob("*.h"))

@@ -1,10 +1,10 @@
-"""Builds the simulator before its tests; without libsimavr or avr-gcc they fail, they do not skip."""
+"""Builds the simulator before its tests; without libsimavr they fail, they do not skip."""
 
 from __future__ import annotations
 
 import importlib.util
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ if str(HERE) not in sys.path:
 
 if TYPE_CHECKING:
     from simavr_bench import Chip
+    from simavr_bench.testing import MakeChip
 
 
 def _build_script() -> ModuleType:
@@ -33,9 +34,6 @@ def build() -> ModuleType:
     module = _build_script()
     module.build_library()
     return module
-
-
-MakeChip = Callable[..., "Chip"]
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import MakeChip
 from simavr_bench import Chip, ResetCause, cycles
 from simavr_bench.log import LogKind, select
+from simavr_bench.testing import MakeChip
 
 PCINT0, INT0, INT1, INT2 = 9, 1, 2, 3
 

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import MakeChip
 from simavr_bench import Chip, cycles
 from simavr_bench.log import LogKind, pulses, select
+from simavr_bench.testing import MakeChip, run_until_value
 
 UDRE0, RX1, TIMER1_OVF = 26, 36, 20
 
 
-def run_to(chip: Chip, value: int = 1, limit_s: float = 1.0) -> None:
-    """Run until the program's ``finished`` has a value."""
-    end = chip.cycle + cycles(limit_s)
-    while chip.read("finished") != value:
-        assert chip.cycle < end, f"program did not reach {value}: pc {chip.pc:#x}"
-        chip.run_s(1e-4)
+def run_to(chip: Chip, value: int = 1) -> None:
+    run_until_value(chip, "finished", value)
 
 
 @pytest.mark.parametrize(("pin", "bank"), [("PK0", 1), ("PK2", 1), ("PB0", 0)])
@@ -102,8 +98,8 @@ def test_spi_byte_takes_eight_bits(make_chip: MakeChip) -> None:
     run_to(chip)
     seen = chip.read_array("byte_cycles", "<u2").astype(int)
     # 8 x 2, 4, 16, 128 cycles and what the polling loop adds (about 20, in steps of 5)
-    assert np.all((seen - 8 * np.array([2, 4, 16, 128]) >= 0))
-    assert np.all((seen - 8 * np.array([2, 4, 16, 128]) <= 30))
+    assert np.all(seen - 8 * np.array([2, 4, 16, 128]) >= 0)
+    assert np.all(seen - 8 * np.array([2, 4, 16, 128]) <= 30)
     assert chip.read("read_back") == 0xFF
 
 

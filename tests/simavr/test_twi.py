@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from conftest import MakeChip
 from simavr_bench import Chip, cycles
 from simavr_bench.log import LogKind, TwiNote, select
+from simavr_bench.testing import MakeChip
 
 PACKET = bytes(range(32))
 
@@ -41,7 +41,8 @@ def test_packet_takes_its_bits_and_the_stretch(make_chip: MakeChip) -> None:
 
 
 @pytest.mark.parametrize(
-    ("address", "answers"), [(42, True), (27, True), (43, True), (10, True), (0x77, False), (0x1E, False)]
+    ("address", "answers"),
+    [(42, True), (27, True), (43, True), (10, True), (0x77, False), (0x1E, False)],
 )
 def test_address_mask_answers_two_addresses(
     make_chip: MakeChip, address: int, answers: bool

@@ -91,7 +91,9 @@ void watchdog_feed(chip* c) {
 static void watchdog_due(chip* c, void* param, uint64_t argument) {
   (void)param, (void)argument;
   const uint8_t r = c->avr->data[REG_WDTCSR];
-  if (r & 0x40) {
+  // In interrupt and reset mode an interrupt not served before the next time-out resets (DS 12.4).
+  const bool unserved = (r & 0xC8) == 0xC8;
+  if ((r & 0x40) && !unserved) {
     interrupt_flag(c, kVectorWdt, chip_now(c));
     watchdog_feed(c);
   } else if (r & 0x08) {

@@ -4,18 +4,35 @@ The instruction core is Debian's unmodified libsimavr; everything around it is m
 ``tests/simavr/shim``. Simulation only: nothing here was measured on a board.
 """
 
+from simavr_bench.barometer import Bmp085, Bmp280
 from simavr_bench.chip import CYCLES_PER_S, Chip, ResetCause, cycles
 from simavr_bench.firmware import Image, read_image
+from simavr_bench.gps import GpsUart
+from simavr_bench.imu import ArduImu, MasterDeath
 from simavr_bench.log import Fault, LogKind
 from simavr_bench.pins import arduino_pin, pin_name, pin_number
+from simavr_bench.receiver import Receiver
+from simavr_bench.relay import ChargePumpRelay
+from simavr_bench.sd_card import CardKind, SdCard
+from simavr_bench.supply import Supply
 
 __all__ = [
     "CYCLES_PER_S",
+    "ArduImu",
+    "Bmp085",
+    "Bmp280",
+    "CardKind",
+    "ChargePumpRelay",
     "Chip",
     "Fault",
+    "GpsUart",
     "Image",
     "LogKind",
+    "MasterDeath",
+    "Receiver",
     "ResetCause",
+    "SdCard",
+    "Supply",
     "arduino_pin",
     "cycles",
     "pin_name",

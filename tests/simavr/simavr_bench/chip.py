@@ -456,9 +456,7 @@ class Chip:
 
     def uart_send(self, port: int, data: bytes, *, baud: float, at_cycle: int = 0) -> None:
         """Put bytes on a receive line (8N1), after those already on their way."""
-        self._lib.bench_uart_send(
-            self.handle, port, data, len(data), CYCLES_PER_S / baud, at_cycle
-        )
+        self._lib.bench_uart_send(self.handle, port, data, len(data), CYCLES_PER_S / baud, at_cycle)
 
     def uart_sent(self, port: int) -> bytes:
         """All bytes the chip has sent, whole ones only."""

@@ -39,7 +39,9 @@ def _read_elf(data: bytes, path: Path) -> Image:
     flash: dict[int, bytes] = {}
     eeprom: dict[int, bytes] = {}
     for i in range(ph_count):
-        kind, offset, _, physical, size = struct.unpack_from("<IIIII", data, ph_offset + i * ph_size)
+        kind, offset, _, physical, size = struct.unpack_from(
+            "<IIIII", data, ph_offset + i * ph_size
+        )
         if kind != 1 or size == 0:
             continue
         piece = data[offset : offset + size]
@@ -48,12 +50,12 @@ def _read_elf(data: bytes, path: Path) -> Image:
         elif physical >= _EEPROM_BASE and physical < _EEPROM_BASE + 4096:
             eeprom[physical - _EEPROM_BASE] = piece
     symbols: dict[str, tuple[int, int]] = {}
-    headers = [struct.unpack_from("<10I", data, sh_offset + i * sh_size) for i in range(sh_count)]
-    for header in headers:
-        if header[1] != 2:  # SHT_SYMTAB
+    sections = [struct.unpack_from("<10I", data, sh_offset + i * sh_size) for i in range(sh_count)]
+    for section in sections:
+        if section[1] != 2:  # SHT_SYMTAB
             continue
-        strings = headers[header[6]][4]
-        for at in range(header[4], header[4] + header[5], 16):
+        strings = sections[section[6]][4]
+        for at in range(section[4], section[4] + section[5], 16):
             name, value, size = struct.unpack_from("<III", data, at)
             end = data.index(b"\0", strings + name)
             text = data[strings + name : end].decode()

@@ -5,12 +5,12 @@ from __future__ import annotations
 PORTS = "ABCDEFGHJKL"
 
 # Digital pins 0..53, then A0..A15: Debian arduino-core-avr, variants/mega/pins_arduino.h.
-_MEGA = (
-    "PE0 PE1 PE4 PE5 PG5 PE3 PH3 PH4 PH5 PH6 PB4 PB5 PB6 PB7 PJ1 PJ0 PH1 PH0 PD3 PD2 PD1 PD0 "
-    "PA0 PA1 PA2 PA3 PA4 PA5 PA6 PA7 PC7 PC6 PC5 PC4 PC3 PC2 PC1 PC0 PD7 PG2 PG1 PG0 "
-    "PL7 PL6 PL5 PL4 PL3 PL2 PL1 PL0 PB3 PB2 PB1 PB0 "
-    "PF0 PF1 PF2 PF3 PF4 PF5 PF6 PF7 PK0 PK1 PK2 PK3 PK4 PK5 PK6 PK7"
-).split()
+_MEGA_PORTS = (
+    ("E", "0145"), ("G", "5"), ("E", "3"), ("H", "3456"), ("B", "4567"), ("J", "10"), ("H", "10"),
+    ("D", "3210"), ("A", "01234567"), ("C", "76543210"), ("D", "7"), ("G", "210"),
+    ("L", "76543210"), ("B", "3210"), ("F", "01234567"), ("K", "01234567"),
+)  # fmt: skip
+_MEGA = tuple(f"P{port}{bit}" for port, bits in _MEGA_PORTS for bit in bits)
 
 
 def pin_number(name: str) -> int:

@@ -1,0 +1,179 @@
+"""An SD card on the SPI bus, its blocks in memory or in an image file."""
+
+from __future__ import annotations
+
+import ctypes as ct
+import mmap
+import subprocess
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from simavr_bench.chip import Chip, cycles
+from simavr_bench.library import SdCounters, SdSettings
+from simavr_bench.pins import pin_number
+
+BLOCK = 512
+
+
+class CardKind(Enum):
+    """Standard (byte addresses, with or without CMD8) or high capacity (block addresses)."""
+
+    SDSC_V1 = "SDSC v1"
+    SDSC = "SDSC v2"
+    SDHC = "SDHC"
+
+
+@dataclass(frozen=True, slots=True)
+class CardCount:
+    """What the card has done; ``lost`` are blocks left as garbage by a power cut."""
+
+    commands: int
+    written: int
+    read: int
+    rejected: int
+    lost: int
+    bytes_ignored: int
+    erased: int
+
+
+class SdCard:
+    """A card in SPI mode.
+
+    Parameters
+    ----------
+    chip : Chip
+        The host; must outlive the card's use.
+    cs : str
+        Its chip select.
+    image : Path or None
+        File of whole blocks, changed in place; else an empty card of ``blocks`` in memory.
+    blocks : int
+        Size without an image; a multiple of 1024.
+    kind : CardKind
+        How it is addressed.
+    busy_s, read_s, init_s : float
+        Busy after a block, delay before read data, time until ACMD41 reports ready.
+    seed : int
+        For the garbage of a cut.
+    """
+
+    CRC_REJECT, WRITE_ERROR = 0x0B, 0x0D
+
+    def __init__(
+        self,
+        chip: Chip,
+        cs: str,
+        *,
+        image: Path | None = None,
+        blocks: int = 65_536,
+        kind: CardKind = CardKind.SDHC,
+        busy_s: float = 0.001,
+        read_s: float = 0.0002,
+        init_s: float = 0.05,
+        seed: int = 1,
+    ) -> None:
+        self._chip = chip
+        if image is None:
+            self._memory = mmap.mmap(-1, blocks * BLOCK)
+        else:
+            blocks = image.stat().st_size // BLOCK
+            with image.open("r+b") as file:
+                self._memory = mmap.mmap(file.fileno(), blocks * BLOCK)
+        if blocks % 1024 or blocks == 0:
+            raise ValueError(f"card of {blocks} blocks, expected a multiple of 1024")
+        self.blocks = blocks
+        settings = SdSettings(
+            blocks=blocks,
+            high_capacity=kind is CardKind.SDHC,
+            version_1=kind is CardKind.SDSC_V1,
+            busy_cycles=cycles(busy_s),
+            read_cycles=cycles(read_s),
+            init_cycles=cycles(init_s),
+            erase_cycles=cycles(0.01),
+            response_bytes=1,
+        )
+        self._buffer = (ct.c_uint8 * (blocks * BLOCK)).from_buffer(self._memory)
+        self._lib = chip.library
+        self._card = self._lib.bench_sd_card(
+            chip.handle, pin_number(cs), ct.addressof(self._buffer), ct.byref(settings), seed
+        )
+        chip.on_power(self._power)
+
+    def _power(self, on: bool) -> None:
+        if not on:
+            self._lib.bench_sd_power_cut(self._card)
+
+    def remove(self) -> None:
+        """Pull the card out."""
+        self._lib.bench_sd_insert(self._card, False)
+
+    def insert(self) -> None:
+        """Put it back, not initialised."""
+        self._lib.bench_sd_insert(self._card, True)
+
+    def stall(self, time_s: float, *, at_cycle: int | None = None) -> None:
+        """Make the first block after a cycle busy for this long (several may be planned)."""
+        at = self._chip.cycle if at_cycle is None else at_cycle
+        self._lib.bench_sd_stall(self._card, at, cycles(time_s))
+
+    def stall_at(self, at_cycles: Iterable[int], time_s: float) -> None:
+        """Plan stalls of one length at rising cycles."""
+        for at in at_cycles:
+            self.stall(time_s, at_cycle=at)
+
+    def reject(self, count: int = 1, *, token: int = CRC_REJECT, at_cycle: int = 0) -> None:
+        """Answer the next blocks after a cycle with an error token."""
+        self._lib.bench_sd_reject(self._card, at_cycle, count, token)
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is programming now."""
+        return bool(self._lib.bench_sd_busy(self._card))
+
+    def count(self) -> CardCount:
+        """Counters since the card was made."""
+        raw = SdCounters()
+        self._lib.bench_sd_counters(self._card, ct.byref(raw))
+        return CardCount(
+            commands=raw.commands, written=raw.written, read=raw.read, rejected=raw.rejected,
+            lost=raw.lost, bytes_ignored=raw.bytes_ignored, erased=raw.erased,
+        )  # fmt: skip
+
+    def block(self, number: int, count: int = 1) -> bytes:
+        """Content of blocks."""
+        return self._memory[number * BLOCK : (number + count) * BLOCK]
+
+    def save(self, path: Path) -> None:
+        """Copy the whole card to a file, as a reader would see it now."""
+        path.write_bytes(self._memory[:])
+
+
+def make_fat32(path: Path, mebibytes: int = 256) -> Path:
+    """Make an empty FAT32 image (sparse) with Debian's mkfs.vfat.
+
+    Parameters
+    ----------
+    path : Path
+        File to make.
+    mebibytes : int
+        Size; FAT32 needs 33 or more with small clusters.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        If mkfs.vfat (package dosfstools) refuses.
+    """
+    with path.open("wb") as file:
+        file.truncate(mebibytes << 20)
+    subprocess.run(
+        ["/usr/sbin/mkfs.vfat", "-F", "32", "-s", "1", "--invariant", str(path)],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    return path
