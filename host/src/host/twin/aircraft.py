@@ -26,7 +26,7 @@ _SCALARS: Mapping[str, tuple[str, ...]] = {
     "aerodynamics": ("cd_0", "induced_factor", "stall_lift_perrad2", "stall_drag_perrad2"),
     "propulsion": (
         "diameter_m", "advance_ratio_max", "rotor_inertia_kgm2", "motor_torque_max_nm",
-        "friction_torque_nm", "stopped_drag_area_m2", "thrust_pitch_rad",
+        "friction_torque_nm", "brake_torque_nm", "stopped_drag_area_m2", "thrust_pitch_rad",
     ),
     "servo": ("bandwidth_hz", "rate_limit_radps"),
     "surfaces": ("elevator_limit_rad", "aileron_limit_rad", "rudder_limit_rad"),
@@ -107,6 +107,7 @@ class Aircraft:
             motor_power_polynomial_w=v["propulsion.motor_power_polynomial_w"].copy(),
             motor_torque_max_nm=s["propulsion.motor_torque_max_nm"],
             friction_torque_nm=s["propulsion.friction_torque_nm"],
+            brake_torque_nm=s["propulsion.brake_torque_nm"],
             stopped_drag_area_m2=s["propulsion.stopped_drag_area_m2"],
             thrust_axis=np.array([math.cos(pitch), 0.0, -math.sin(pitch)]),
             hub_m=v["propulsion.hub_m"].copy(),

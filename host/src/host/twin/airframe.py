@@ -77,6 +77,7 @@ class Airframe(NamedTuple):
     motor_power_polynomial_w: Array
     motor_torque_max_nm: float
     friction_torque_nm: float
+    brake_torque_nm: float
     stopped_drag_area_m2: float
     thrust_axis: Array  # unit vector of positive thrust, body axes
     hub_m: Array  # from the nominal CG

@@ -245,6 +245,7 @@ def document(d: Mapping[str, object]) -> dict[str, object]:
             "motor_power_polynomial_w": power,
             "motor_torque_max_nm": 1.2,
             "friction_torque_nm": 0.02,
+            "brake_torque_nm": 0.1,
             "stopped_drag_area_m2": 0.006,
             "thrust_pitch_rad": -0.0349066,
             "hub_m": [n("hub_ahead_m"), 0.0, 0.0],

@@ -179,14 +179,16 @@ def propeller(
 
 @compiled
 def motor_torque(frame: Airframe, throttle: float, rotor_radps: float) -> float:
-    """Return the torque of motor and friction on the rotor (N m): shaft power over speed,
+    """Return the torque of motor, friction and brake on the rotor (N m): shaft power over speed,
     current-limited."""
     power = max(polynomial(frame.motor_power_polynomial_w, min(max(throttle, 0.0), 1.0)), 0.0)
     if throttle <= 0.0:
         power = 0.0
     drive = min(power / max(rotor_radps, 1.0), frame.motor_torque_max_nm)
-    # Friction fades out at standstill so that it never turns the rotor backwards.
-    friction = frame.friction_torque_nm * min(max(rotor_radps, 0.0) / 5.0, 1.0)
+    # A controller brakes at zero throttle. Friction fades out at standstill: it never turns it
+    # back.
+    hold = frame.brake_torque_nm if throttle <= 0.0 else frame.friction_torque_nm
+    friction = hold * min(max(rotor_radps, 0.0) / 5.0, 1.0)
     return drive - friction
 
 

@@ -11,6 +11,7 @@ import pandas as pd
 from host.twin.airframe import Array
 
 COLOURS = {"elevator": "#1f77b4", "aileron": "#ff7f0e", "rudder": "#2ca02c", "throttle": "#9467bd"}
+SETTLED_S = 6.5  # what comes before is the ground and the launch
 # Rows: label, (column, legend, factor) ...
 ROWS: tuple[tuple[str, tuple[tuple[str, str, float], ...]], ...] = (
     ("airspeed\nm/s", (("airspeed_mps", "V", 1.0),)),
@@ -88,18 +89,19 @@ def draw(
             if truth is not None and column in truth:
                 axis.plot(truth["t_s"], truth[column] * factor, color="0.72", lw=1.6, zorder=1)
             axis.plot(t, values, color=colour, lw=0.8, label=name, zorder=2)
-            seen.append(values[t > t[0] + 6.0])
+            seen.append(values[t > t[0] + SETTLED_S])
             if second is not None and column in second.columns:
-                axis.step(
-                    second["t_s"], second[column] * factor, where="post", color="k", lw=0.6,
-                    zorder=3, label=f"{name}, {second_name}",
-                )  # fmt: skip
+                other = second[column].to_numpy() * factor
+                late = second["t_s"].to_numpy()
+                word = second_name if i == 0 else None
+                axis.step(late, other, where="post", color="k", lw=0.6, zorder=3, label=word)
+                seen.append(other[late > t[0] + SETTLED_S])
         # The jump at the launch would flatten everything: the scale follows the flight.
         flown = np.concatenate(seen) if seen else np.array([])
         flown = flown[np.isfinite(flown)]
         if len(flown):
-            low, high = np.percentile(flown, [0.1, 99.9])
-            margin = 0.12 * max(high - low, 1e-3)
+            low, high = flown.min(), flown.max()
+            margin = 0.06 * max(high - low, 1e-3)
             axis.set_ylim(low - margin, high + margin)
         for window in windows:
             kinds = window["axes"]
@@ -115,8 +117,8 @@ def draw(
         names = ", ".join(str(k) for k in kinds) if isinstance(kinds, Sequence) else ""
         middle = 0.5 * (float(str(window["start_s"])) + float(str(window["end_s"])))
         top.annotate(
-            f"{window['kind']}\n{names}", (middle, 1.02), xycoords=("data", "axes fraction"),
-            ha="center", va="bottom", fontsize=7,
+            f"{window['kind']} {names}", (middle, 1.04), xycoords=("data", "axes fraction"),
+            ha="center", va="bottom", fontsize=7, rotation=90,
         )  # fmt: skip
     figure.suptitle(title, fontsize=11)
     np.atleast_1d(axes)[-1].set_xlabel("time since power-on, s")

@@ -1,0 +1,247 @@
+"""Cards, pilot, faults and the truth file."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from host.twin import cards, handbook, thesis
+from host.twin.airdata import air_data
+from host.twin.attitude import euler
+from host.twin.flight import NEUTRAL_US, THROW_US, fly
+from host.twin.linear import load_linear, modes
+from host.twin.local import local_derivatives
+from host.twin.maneuvers import multisine, multisine_signal, sweep_signal
+from host.twin.pilot import duration_s, schedule
+from host.twin.truth import maneuvers, series, write
+
+MINIMAL = {"format": 1, "aircraft": "ultrastick25e", "segment": [{"kind": "trim", "duration_s": 2}]}
+
+
+@pytest.mark.parametrize("name", cards.names())
+def test_every_packaged_card_flies_and_stays_in_the_air(name: str) -> None:
+    card = cards.load(name)
+    record = fly(card, seed=2)
+    cut = any(fault.kind == "motor_cut" for fault in card.faults)
+    flying = record.t_s > card.flight.ground_s + 1.0
+    assert len(record.t_s) == round(duration_s(card) * 1000) or cut
+    phi, theta, _ = euler(record.states[:, 6:10])
+    assert np.abs(phi[flying]).max() < np.deg2rad(75)
+    assert np.abs(theta[flying]).max() < np.deg2rad(50)
+    speed = air_data(record).airspeed_mps[flying]
+    assert speed.min() > 0.6 * record.trim.airspeed_mps
+    assert speed.max() < 1.6 * record.trim.airspeed_mps
+    assert len(maneuvers(record, air_data(record))) >= 2
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"format": 2}, "format is 2, expected 1"),
+        ({"segment": []}, r"no \[\[segment\]\]"),
+        ({"segment": [{"kind": "loop"}]}, "kind is 'loop', expected trim, turn"),
+        ({"segment": [{"kind": "trim"}]}, "trim needs duration_s above 0"),
+        ({"segment": [{"kind": "trim", "duration_s": "long"}]}, "is 'long', expected a number"),
+        ({"segment": [{"kind": "pulse", "axis": "flap", "amplitude": 1}]}, "axis is 'flap'"),
+        (
+            {"segment": [{"kind": "doublet", "axis": "rudder", "amplitude": [1, 2], "width_s": 1}]},
+            "1 axes and 2 amplitudes",
+        ),
+        ({"wind": 3}, "unknown key 'wind'"),
+        ({"air": {"gust": 3}}, "unknown air.gust"),
+        ({"sensors": {"noise": 1}}, "expected true or false"),
+        ({"fault": [{"kind": "bird"}]}, "kind is 'bird'"),
+        ({"fault": [{"kind": "imu_off"}]}, "imu_off needs at_s"),
+    ],
+)
+def test_broken_cards_say_what_is_wrong(change: dict[str, object], message: str) -> None:
+    with pytest.raises(cards.CardError, match=message):
+        cards.parse({**MINIMAL, **change}, "card")
+
+
+def test_human_hand_scatters_as_stated_and_a_machine_does_not() -> None:
+    document = {
+        **MINIMAL,
+        "pilot": {"early": 0.0, "drift": 0.0},
+        "segment": [
+            {"kind": "doublet", "axis": "rudder", "amplitude": 6.0, "width_s": 0.5, "repeat": 100}
+        ],
+    }
+    card = cards.parse(document, "card")
+    plan = schedule(card, 17.0, 1e-3, np.random.default_rng(1))
+    widths = np.array([w.input_end_s - w.start_s for w in plan.windows]) - card.pilot.hand_s
+    assert widths.mean() == pytest.approx(1.0, abs=0.02)
+    # Two edges of 0.03 s each.
+    assert widths.std() == pytest.approx(0.03 * 2**0.5, rel=0.3)
+    peaks = [
+        np.degrees(plan.program[round(w.start_s * 1000) : round(w.input_end_s * 1000), 2].max())
+        for w in plan.windows
+    ]
+    assert np.std(peaks) / np.mean(peaks) == pytest.approx(0.08, rel=0.35)
+    exact = replace(card, pilot=replace(card.pilot, timing_s=0.0, amplitude=0.0, hand_s=0.0))
+    plan = schedule(exact, 17.0, 1e-3, np.random.default_rng(1))
+    assert {round(w.input_end_s - w.start_s, 6) for w in plan.windows} == {1.0}
+
+
+def test_pilot_keeps_off_during_an_input_unless_he_corrects_early() -> None:
+    card = cards.load("calm")
+    quiet = schedule(card, 17.0, 1e-3, np.random.default_rng(1))
+    for w in quiet.windows:
+        inside = slice(round(w.start_s * 1000), round(w.input_end_s * 1000))
+        assert quiet.attention[inside].max() == 0.0
+    eager = replace(card, pilot=replace(card.pilot, early=1.0))
+    early = schedule(eager, 17.0, 1e-3, np.random.default_rng(1))
+    assert all(w.attention_s < w.input_end_s for w in early.windows)
+
+
+def test_multisines_are_orthogonal_flat_and_start_at_zero() -> None:
+    t = np.arange(0.0, 20.0, 1e-3)
+    waves = [
+        multisine_signal(t, 20.0, f, phase)
+        for f, phase in zip(*multisine(20.0, 0.1, 3.5, 2), strict=True)
+    ]
+    assert abs(waves[0] @ waves[1]) / (waves[0] @ waves[0]) < 1e-9
+    for wave in waves:
+        # Relative peak factor: peak to peak over 2 sqrt(2) rms; 1 is a sine, random phases give 2.
+        assert np.ptp(wave) / (2 * 2**0.5 * wave.std()) < 1.35
+        assert abs(wave[0]) < 0.05
+
+
+def test_sweep_passes_its_frequencies_in_order() -> None:
+    t = np.arange(0.0, 30.0, 1e-3)
+    wave = sweep_signal(t, 30.0, 0.2, 4.0)
+    crossings = t[1:][(wave[:-1] <= 0) & (wave[1:] > 0)]
+    rates = 1.0 / np.diff(crossings)
+    assert np.all(np.diff(rates) > 0)
+    assert rates[0] == pytest.approx(0.2 * 20 ** (0.08), rel=0.15)
+    assert rates[-1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_motor_cut_stops_the_propeller_and_the_pilot_glides() -> None:
+    record = fly(cards.load("thesis_flight2"), seed=1)
+    cut = next(f.at_s for f in record.card.faults if f.kind == "motor_cut")
+    after = record.t_s > cut + 5.0
+    assert record.states[after, 16].max() < 0.2 * record.trim.state[16]
+    assert record.thrust_n[after].max() < 0.0
+    height = -record.states[:, 12]
+    assert height[-1] < height[record.t_s < cut][-1] - 15.0
+    assert air_data(record).airspeed_mps[after].min() > 14.0
+
+
+def test_truth_windows_hold_the_input_and_nothing_of_the_next(tmp_path: Path) -> None:
+    record = fly(cards.load("demo"), seed=5)
+    data = air_data(record)
+    found = write(record, data, tmp_path / "flight")
+    arrays = np.load(found[0])
+    text = tomllib.loads(found[1].read_text())
+    assert text["seed"] == 5
+    assert text["flown"]["mass_kg"] == record.frame.mass_kg
+    assert text["drawn"]["mass_share"] * 1.793 + 1.793 == pytest.approx(record.frame.mass_kg)
+    listed = text["maneuver"]
+    assert len(listed) == len(record.schedule.windows)
+    for one, following in zip(listed, [*listed[1:], None], strict=True):
+        assert (
+            one["start_s"] < one["input_end_s"] <= one["end_s"] <= one["input_end_s"] + 3.0 + 1e-9
+        )
+        if following:
+            assert one["end_s"] <= following["start_s"]
+        axis = {"elevator": 0, "aileron": 1, "rudder": 2, "throttle": 3}[one["axes"][0]]
+        program = record.schedule.program[:, axis]
+        before = (record.t_s > one["start_s"] - 1.0) & (record.t_s < one["start_s"] - 2e-3)
+        assert np.abs(program[before]).max() < 1e-12
+        inside = (record.t_s > one["start_s"]) & (record.t_s < one["input_end_s"])
+        assert np.abs(program[inside]).max() > 0.0
+    columns = series(record, data)
+    assert set(arrays.files) == set(columns)
+    assert np.array_equal(arrays["alpha_rad"], columns["alpha_rad"])
+
+
+def test_local_derivatives_explain_the_flown_moment() -> None:
+    """Cm built from the truth file's derivatives is the Cm that turned the aircraft."""
+    record = fly(cards.load("calm"), seed=6)
+    data = air_data(record)
+    one = next(m for m in maneuvers(record, data) if m["axes"] == ["elevator"])
+    d, frame = one["derivatives"], record.frame
+    assert isinstance(d, dict)
+    start, end = float(str(one["start_s"])), float(str(one["end_s"]))
+    inside = (record.t_s > start) & (record.t_s < end)
+    speed = data.airspeed_mps[inside]
+    q_hat = record.states[inside, 4] * frame.chord_m / (2 * speed)
+    cm = (
+        d["Cm_0"]
+        + d["Cm_alpha"] * data.alpha_rad[inside]
+        + d["Cm_q"] * q_hat
+        + d["Cm_de"] * record.states[inside, 13]
+    )
+    p, r = record.states[inside, 3], record.states[inside, 5]
+    acceleration = record.angular_acceleration_radps2[inside, 1]
+    spin = frame.rotor_inertia_kgm2 * record.states[inside, 16]
+    moment = (
+        frame.iyy_kgm2 * acceleration
+        + (frame.ixx_kgm2 - frame.izz_kgm2) * p * r
+        + frame.ixz_kgm2 * (p**2 - r**2)
+        + spin * (r * frame.thrust_axis[0] - p * frame.thrust_axis[2])
+    )
+    lever = (frame.hub_m[2] - frame.cg_m[2]) * frame.thrust_axis[0]
+    lever -= (frame.hub_m[0] - frame.cg_m[0]) * frame.thrust_axis[2]
+    moment -= lever * record.thrust_n[inside]
+    flown = moment / (data.qbar_pa[inside] * frame.wing_area_m2 * frame.chord_m)
+    assert np.abs(flown - cm).max() < 0.03 * np.abs(flown - flown[0]).max()
+    nominal = local_derivatives(record.aircraft.airframe(), np.zeros(8))
+    wrong = cm + (nominal["Cm_alpha"] * 0.8 - d["Cm_alpha"]) * data.alpha_rad[inside]
+    assert np.abs(flown - wrong).max() > 0.05 * np.abs(flown - flown[0]).max()
+
+
+def test_thesis_rows_have_its_faults() -> None:
+    card = cards.load("thesis_flight2")
+    record = fly(card, seed=1)
+    printed = thesis.rows(record, air_data(record))
+    assert np.diff(printed["t_s"]).mean() == pytest.approx(0.05, rel=0.02)
+    # Each half of an IMU sample comes every other row.
+    same = (np.diff(printed["AN1"]) == 0.0).mean()
+    assert same == pytest.approx(0.5, abs=0.05)
+    assert (np.diff(printed["AN1"])[1::2] == 0.0).mean() > 0.98 or (
+        np.diff(printed["AN1"])[0::2] == 0.0
+    ).mean() > 0.98
+    assert set((printed["altitude"] % 1).tolist()) == {0.0}
+    assert printed["velocity"].min() >= 0.0
+    # Surfaces are commands: the map's slope, not the linkage's.
+    assert printed["rdrs"].std() > 0.0
+
+
+def test_vane_expression_overflows_as_the_printed_row_shows() -> None:
+    # ADC 507, 514, 521, 523 are -737, -713, -690, -683 in the thesis's own sample row.
+    printed = thesis._overflowed(np.array([507.0, 514.0, 521.0, 523.0]))
+    assert printed.tolist() == [-737.0, -713.0, -690.0, -683.0]
+    assert thesis._overflowed(np.array([364.0, 365.0])).tolist() == [1213.0, -1210.0]
+
+
+def test_pulses_carry_the_sticks(tmp_path: Path) -> None:
+    record = fly(cards.load("calm"), seed=1)
+    limit = record.frame.surface_limit_rad[0]
+    asked = (record.pulses_us[:, 1] - NEUTRAL_US) / THROW_US * limit
+    row = np.searchsorted(record.pulse_starts_s, record.t_s - 0.03) - 1
+    surface = record.states[:, 13]
+    settled = (record.t_s > 6.0) & (record.t_s < 8.0)
+    assert np.abs(asked[row][settled] - surface[settled]).max() < 0.01
+
+
+def test_generated_aircraft_are_current() -> None:
+    assert handbook.main(["--check"]) == 0
+
+
+def test_handbook_comes_near_the_vortex_lattice_of_the_ultra_stick() -> None:
+    # From the dimensions of its wing alone: the slopes that hardly need the tail.
+    aspect = 1.26365**2 / 0.3093671232
+    assert -handbook.rolling_slope(aspect) / 8.0 == pytest.approx(-0.392, rel=0.15)
+    assert handbook.lift_slope(aspect) == pytest.approx(3.93, rel=0.10)
+
+
+def test_published_linear_aircraft_has_its_modes_and_doubled_aileron() -> None:
+    linear = load_linear("ultrastick25e_linear17")
+    found = {m.name: m for m in modes(linear)}
+    assert found["short period"].frequency_radps == pytest.approx(15.7, abs=1.5)
+    assert linear.lateral_b[1, 0] == pytest.approx(2 * 78.2349394)
