@@ -25,6 +25,8 @@ ROOMS = ("core", "drivers", "storage", "app", "boards/sitl")
 
 INCLUDES = ("-Ifirmware", "-Iprotocol", "-Ifirmware/storage")
 COMMON = ("-O2", "-g1", "-fPIC")
+# A name nobody defines must fail here, not when the library is loaded; macOS does so by itself.
+LINK = ("-shared", "-Wl,--no-undefined") if sys.platform == "linux" else ("-shared",)
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Wshadow", "-Wundef")
 
 
@@ -89,7 +91,7 @@ def build(*, library: Path = LIBRARY, extra_flags: tuple[str, ...] = ()) -> Path
     cxx = os.environ.get("CXX", "c++")
     cc = os.environ.get("CC", "clang" if "clang" in cxx else "cc")
     units = list(_units(library.parent, sources, cxx, cc, extra_flags))
-    link = [cxx, "-shared", *extra_flags, *(str(unit.target) for unit in units)]
+    link = [cxx, *LINK, *extra_flags, *(str(unit.target) for unit in units)]
 
     # A change of compiler or flags is a change of every object.
     memory = library.parent / "commands.txt"

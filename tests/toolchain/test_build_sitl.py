@@ -72,6 +72,13 @@ def test_a_removed_source_leaves_the_library(tree: Path) -> None:
     assert not hasattr(ctypes.CDLL(str(tree / "second.so")), "extra")
 
 
+def test_a_name_nobody_defines_stops_the_link(tree: Path) -> None:
+    source = "int missing();\nint f();\nint f() { return missing(); }\n"
+    (tree / "firmware/core/bad.cpp").write_text(source)
+    with pytest.raises(build_sitl.BuildError, match="missing"):
+        build(tree)
+
+
 @pytest.mark.parametrize(
     "line",
     ["int f(long x) { return x; }", "int f(int x) { return g(x); }", "#if SETTING\n#endif"],
