@@ -20,7 +20,7 @@ class BlockWriter {
       : ring_(ring), schema_(schema), schema_size_(schema_size), schema_hash_(hash) {}
 
   // `first_sequence`: 0 in a new file, else the number behind the last block of the file.
-  // Clears the ring; push config and identity frames next.
+  // Clears the ring; `take_identities_due` is true at once, before any other frame is pushed.
   void start(uint32_t file_id, uint32_t session, uint32_t first_sequence, uint32_t now_us);
   // What is in the ring goes out, the last block partly filled; then `drained` is true.
   void finish() { finishing_ = true; }
@@ -42,11 +42,12 @@ class BlockWriter {
     }
     return position_ >= kBlockSize;
   }
-  void accepted(uint32_t now_us);
+  void accepted();
   void rejected() { position_ = 0; }  // the same content again, at the same place
   void skip();                        // the same content again, one place further
 
-  // True once when config, identity and coefficients are to be pushed again.
+  // True once when config, identity and coefficients are to be pushed: at the start and behind
+  // every return of the schema.
   bool take_identities_due();
 
   uint32_t sequence() const { return sequence_; }  // of the block due now or next
@@ -78,6 +79,7 @@ class BlockWriter {
   bool due_ = false;
   bool finishing_ = true;
   bool identities_due_ = false;
+  bool head_ = false;  // the schema's first pass of this session
 };
 
 }  // namespace core

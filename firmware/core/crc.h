@@ -8,7 +8,6 @@ namespace core {
 // "123456789" gives 0xCBF43926.
 class Crc32 {
  public:
-  void add(uint8_t byte);
   void add(const void* data, uint16_t size);
   uint32_t value() const { return ~state_; }
 

@@ -51,14 +51,21 @@ class DriveControl {
   enum class Switch : uint8_t { kMissing, kFailsafe, kDirect, kBetween, kMega };
 
   static Switch read_switch(const RcChannels& rc, const frames::ConfigFrame& config);
+  void keep_or_release(const RcChannels& rc,
+                       const frames::ConfigFrame& config,
+                       bool self_test_passed,
+                       uint32_t now_us);
+  void engage_or_explain(const RcChannels& rc, bool self_test_passed, uint32_t now_us);
   void release(frames::Drive why);
 
-  uint32_t since_us_ = 0;  // the switch is where it is, or the hold began
+  uint32_t since_us_ = 0;  // the switch came where it is
+  uint32_t hold_us_ = 0;   // the hold began
   uint16_t servo_ticks_[kServos] = {};
   frames::Drive drive_ = frames::Drive::kDirectBoot;
   Switch switch_ = Switch::kMissing;
   uint8_t missing_ = (1U << kChannels) - 1;
   bool seen_direct_ = false;
+  bool heard_ = false;  // all channels were steady once
 };
 
 }  // namespace core

@@ -28,7 +28,10 @@ class GpsReceiver {
   frames::GpsFrame frame_ = {};
   uint16_t errors_ = 0;
   uint16_t messages_ = 0;
-  uint8_t parts_ = 0;  // bit 0 POSLLH, 1 SOL, 2 VELNED
+  uint32_t epoch_ms_ = 0;
+  uint8_t parts_ = 0;  // messages of this epoch
+  bool time_known_ = false;
+  bool sends_pvt_ = false;
 };
 
 // Everything of a frame that has an invalid value gets it; the rest is 0.

@@ -31,8 +31,8 @@ enum class ImuResult : uint8_t {
 
 class ImuReceiver {
  public:
-  static constexpr uint32_t kPairUs = 10000;     // second original packet after the first
-  static constexpr uint32_t kSilentUs = 200000;  // then a sequence gap is a restart, not a loss
+  static constexpr uint32_t kPairUs = 10000;      // second original packet after the first
+  static constexpr uint32_t kSilentUs = 1000000;  // then a gap in 8 bits of sequence says nothing
 
   ImuResult packet(uint8_t address, const uint8_t* bytes, uint8_t size, uint32_t start_us);
 
@@ -79,6 +79,7 @@ class ImuReceiver {
   bool restarted_ = false;
   // The second packet's bytes are parsed when a position is taken, at 5 Hz, not at 50.
   uint8_t position_[28] = {};
+  uint32_t position_us_ = 0;
   bool position_waits_ = false;
 };
 

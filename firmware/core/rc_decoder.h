@@ -3,7 +3,8 @@
 //
 // A pulse is accepted when both edges were stamped in time, its width is 800 to 2200 us, the line
 // was low for 2 ms before and 300 us after it (a dropout inside a pulse would else leave two short
-// ones), and 9 ms passed since the last accepted pulse rose. Frame times from 14 to 22.5 ms and
+// ones), and since the last accepted pulse rose the measured frame time less 4.5 ms passed (9 ms
+// while it is not known). Frame times from 14 to 22.5 ms and
 // receivers that send channels one after the other or all at once pass without being told.
 #pragma once
 
@@ -50,26 +51,30 @@ class RcDecoder {
 
  private:
   struct Input {
-    uint32_t rise = 0;       // of the pulse being received
+    uint32_t rise = 0;       // last rising edge
     uint32_t fall = 0;       // last falling edge
     uint32_t accepted = 0;   // rise of the last accepted pulse
-    uint16_t width = 0;      // last accepted
+    uint16_t width = 0;      // last accepted; 0 when lost
     uint16_t candidate = 0;  // waits for its low time
     uint8_t streak = 0;
   };
 
-  void accept(uint8_t input, uint32_t now_ticks);
-  void reject(uint8_t input);
+  void rise(uint8_t index, uint32_t t_ticks, bool late);
+  void fall(uint8_t index, uint32_t t_ticks, bool late);
+  void settle(uint8_t index, uint32_t low_ticks);
+  void measure_frame(uint16_t period_us);
+  void reject(uint8_t index);
+  void lose(uint8_t index);
 
   Input inputs_[kRcInputs];
   uint16_t frame_us_ = 0;
   uint16_t glitches_ = 0;
   uint8_t levels_ = 0;
-  uint8_t trusted_ = 0;    // bit per input: the rise was stamped in time after a long enough low
-  uint8_t low_known_ = 0;  // bit per input: `fall` is a real edge or long ago
+  uint8_t trusted_ = 0;  // bit per input: the rise was stamped in time, after a long enough low
   uint8_t valid_ = 0;
   uint8_t fresh_ = 0;
   uint8_t steady_ = 0;
+  bool locked_ = false;  // frame_us_ bounds how early the next pulse may come
   bool started_ = false;
 };
 

@@ -23,8 +23,9 @@ class RecordControl {
   uint16_t take_press_ms();
 
  private:
-  RecordAction button(bool recording, bool may_stop, uint32_t now_us);
-  RecordAction button_edge(bool down, bool recording, uint32_t now_us);
+  RecordAction button(bool raw_down, bool recording, bool may_stop, uint32_t now_us);
+  RecordAction press(bool recording, uint32_t now_us);
+  RecordAction let_go(bool recording, uint32_t now_us);
 
   uint32_t changed_us_ = 0;  // the raw button moved
   uint32_t pressed_us_ = 0;
@@ -32,7 +33,8 @@ class RecordControl {
   uint16_t press_ms_ = 0;
   bool raw_down_ = true;
   bool down_ = true;
-  bool spent_ = true;  // this press has had its effect
+  bool spent_ = true;     // this press has had its effect
+  bool pressed_ = false;  // a press since boot
   bool throttle_high_ = false;
   bool throttle_seen_ = false;
 };

@@ -25,6 +25,7 @@ class UbxParser {
   static constexpr uint16_t kMaxLength = 512;
 
   void sum(uint8_t value);
+  UbxEvent fail(uint8_t value, uint32_t now_us);
 
   uint32_t first_byte_us_ = 0;
   uint16_t length_ = 0;

@@ -1,0 +1,75 @@
+#include "core/ident_trigger.h"
+
+namespace core {
+namespace {
+
+constexpr uint16_t kLateUs = 1000;
+
+void count(uint16_t& counter) {
+  if (counter != 0xFFFF) {
+    ++counter;
+  }
+}
+
+}  // namespace
+
+void IdentTrigger::start(uint16_t rate_hz, uint32_t now_us) {
+  period_us_ = 1000000UL / rate_hz;
+  last_us_ = now_us;
+  imu_leads_ = false;
+  packet_waits_ = false;
+}
+
+void IdentTrigger::imu_packet(uint8_t seq, uint32_t arrived_us) {
+  const uint32_t since_us = arrived_us - last_packet_us_;
+  if (seq == static_cast<uint8_t>(last_seq_ + 1) && since_us >= 1000 && since_us <= 30000) {
+    const int16_t change_us = static_cast<int16_t>(static_cast<int16_t>(since_us) -
+                                                   static_cast<int16_t>(packet_period_us_));
+    packet_period_us_ = static_cast<uint16_t>(packet_period_us_ + change_us / 8);
+  }
+  last_packet_us_ = arrived_us;
+  last_seq_ = seq;
+  packet_waits_ = true;
+}
+
+IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
+  if (packet_waits_) {
+    packet_waits_ = false;
+    const uint32_t since_us = last_packet_us_ - last_imu_us_;
+    if (!imu_leads_ || since_us + packet_period_us_ / 2 >= period_us_) {
+      // Even a packet left out sets the phase: the timer stays 1.5 periods behind it, else both
+      // would go on meeting each other's unfinished frames at 200 Hz.
+      imu_leads_ = true;
+      last_imu_us_ = last_packet_us_;
+      last_us_ = last_packet_us_;
+      if (!ready) {
+        count(overruns_);
+        return Source::kNone;
+      }
+      if (now_us - last_packet_us_ > kLateUs) {
+        count(late_);
+      }
+      return Source::kImu;
+    }
+  }
+  const uint32_t wait_us = imu_leads_ ? period_us_ + period_us_ / 2 : period_us_;
+  const uint32_t since_us = now_us - last_us_;
+  if (static_cast<int32_t>(since_us) < 0 || since_us < wait_us) {
+    return Source::kNone;
+  }
+  imu_leads_ = false;
+  last_us_ += wait_us;
+  if (now_us - last_us_ >= period_us_) {
+    last_us_ = now_us;
+  }
+  if (!ready) {
+    count(overruns_);
+    return Source::kNone;
+  }
+  if (since_us - wait_us > kLateUs) {
+    count(late_);
+  }
+  return Source::kTimer;
+}
+
+}  // namespace core

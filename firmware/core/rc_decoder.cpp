@@ -1,0 +1,167 @@
+#include "core/rc_decoder.h"
+
+namespace core {
+namespace {
+
+// The last channel of a sequential receiver shifts by this much when four sticks move at once.
+constexpr uint32_t kShiftTicks = 4500UL * kTicksPerUs;
+
+uint8_t bit_of(uint8_t input) {
+  return static_cast<uint8_t>(1U << input);
+}
+
+void set(uint8_t& mask, uint8_t bit, bool on) {
+  mask = static_cast<uint8_t>(on ? mask | bit : mask & ~bit);
+}
+
+}  // namespace
+
+void RcDecoder::edge(uint32_t t_ticks, uint8_t levels, bool late) {
+  if (!started_) {
+    // Which lines moved is not known: each counts as having just fallen.
+    started_ = true;
+    levels_ = levels;
+    for (Input& input : inputs_) {
+      input.fall = t_ticks;
+    }
+    return;
+  }
+  const uint8_t changed = levels ^ levels_;
+  levels_ = levels;
+  for (uint8_t i = 0; i < kRcInputs; ++i) {
+    if ((changed & bit_of(i)) == 0) {
+      continue;
+    }
+    if ((levels & bit_of(i)) != 0) {
+      rise(i, t_ticks, late);
+    } else {
+      fall(i, t_ticks, late);
+    }
+  }
+}
+
+void RcDecoder::rise(uint8_t index, uint32_t t_ticks, bool late) {
+  Input& input = inputs_[index];
+  const uint32_t low_ticks = t_ticks - input.fall;
+  if (input.candidate != 0) {
+    settle(index, low_ticks);
+  }
+  input.rise = t_ticks;
+  set(trusted_, bit_of(index), !late && low_ticks >= kLowBeforeTicks);
+}
+
+void RcDecoder::fall(uint8_t index, uint32_t t_ticks, bool late) {
+  Input& input = inputs_[index];
+  const uint32_t width_ticks = t_ticks - input.rise;
+  const bool trusted = (trusted_ & bit_of(index)) != 0 && !late;
+  set(trusted_, bit_of(index), false);
+  input.fall = t_ticks;
+  if (!trusted || width_ticks < kMinWidthTicks || width_ticks > kMaxWidthTicks) {
+    reject(index);
+    return;
+  }
+  if (input.width != 0) {
+    const uint32_t locked_ticks = static_cast<uint32_t>(frame_us_) * kTicksPerUs;
+    const uint32_t least_ticks = locked_ && locked_ticks > kMinPeriodTicks + kShiftTicks
+                                     ? locked_ticks - kShiftTicks
+                                     : kMinPeriodTicks;
+    if (input.rise - input.accepted < least_ticks) {
+      // Perhaps the receiver has become faster: measure its frame time anew.
+      locked_ = false;
+      reject(index);
+      return;
+    }
+  }
+  input.candidate = static_cast<uint16_t>(width_ticks);
+}
+
+void RcDecoder::settle(uint8_t index, uint32_t low_ticks) {
+  if (low_ticks < kLowAfterTicks) {
+    reject(index);
+    return;
+  }
+  Input& input = inputs_[index];
+  const uint8_t bit = bit_of(index);
+  const uint32_t period_ticks = input.rise - input.accepted;
+  const bool first_of_frame = (valid_ & static_cast<uint8_t>(bit - 1)) == 0;
+  if (input.width != 0 && first_of_frame && period_ticks >= kMinPeriodTicks &&
+      period_ticks <= kMaxPeriodTicks) {
+    measure_frame(static_cast<uint16_t>(period_ticks / kTicksPerUs));
+  }
+  input.accepted = input.rise;
+  input.width = input.candidate;
+  input.candidate = 0;
+  if (input.streak < kSteadyPulses) {
+    ++input.streak;
+  }
+  set(valid_, bit, true);
+  set(fresh_, bit, true);
+  set(steady_, bit, input.streak >= kSteadyPulses);
+}
+
+void RcDecoder::measure_frame(uint16_t period_us) {
+  if (!locked_) {
+    locked_ = true;
+    frame_us_ = period_us;
+    return;
+  }
+  const int16_t change_us = static_cast<int16_t>(period_us - frame_us_);
+  frame_us_ = static_cast<uint16_t>(frame_us_ + change_us / 8);
+}
+
+void RcDecoder::reject(uint8_t index) {
+  inputs_[index].candidate = 0;
+  if (glitches_ != 0xFFFF) {
+    ++glitches_;
+  }
+}
+
+void RcDecoder::gap() {
+  started_ = false;
+  trusted_ = 0;
+  for (Input& input : inputs_) {
+    input.candidate = 0;
+  }
+}
+
+void RcDecoder::storm() {
+  gap();
+  for (uint8_t i = 0; i < kRcInputs; ++i) {
+    lose(i);
+  }
+}
+
+void RcDecoder::lose(uint8_t index) {
+  const uint8_t bit = bit_of(index);
+  inputs_[index].width = 0;
+  inputs_[index].streak = 0;
+  set(valid_, bit, false);
+  set(fresh_, bit, false);
+  set(steady_, bit, false);
+  if (valid_ == 0) {
+    frame_us_ = 0;
+    locked_ = false;
+  }
+}
+
+void RcDecoder::poll(uint32_t now_ticks) {
+  for (uint8_t i = 0; i < kRcInputs; ++i) {
+    Input& input = inputs_[i];
+    // An edge in the ring that is younger than now_ticks settles its pulse itself, next turn.
+    const uint32_t low_ticks = now_ticks - input.fall;
+    if (input.candidate != 0 && low_ticks >= kLowAfterTicks && (levels_ & bit_of(i)) == 0) {
+      settle(i, low_ticks);
+    }
+    if (input.width == 0) {
+      continue;
+    }
+    const uint32_t age_ticks = now_ticks - input.accepted;
+    if (age_ticks > kLostTicks) {
+      lose(i);
+    } else if (age_ticks > kFreshTicks) {
+      set(fresh_, bit_of(i), false);
+    }
+  }
+}
+
+}  // namespace core

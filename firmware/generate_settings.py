@@ -1,0 +1,211 @@
+"""Make generated/settings.h, the pilot's defaults and their limits, from settings.toml.
+
+    python firmware/generate_settings.py            # write it
+    python firmware/generate_settings.py --check    # prove that what is committed is current
+
+Names and types come from frame ``config`` of protocol/frames.toml. Exit codes: 0 good,
+2 a mistake in settings.toml, 6 the committed header is not current.
+"""
+
+import argparse
+import sys
+import tomllib
+from pathlib import Path
+from typing import TypeAlias
+
+FIRMWARE = Path(__file__).resolve().parent
+SETTINGS = FIRMWARE / "settings.toml"
+FRAMES = FIRMWARE.parent / "protocol" / "frames.toml"
+HEADER = FIRMWARE / "generated" / "settings.h"
+RANGES = {"u8": 0xFF, "u16": 0xFFFF, "u32": 0xFFFFFFFF}
+KEYS = {"value", "min", "max", "any_of", "why"}
+
+Setting: TypeAlias = "dict[str, int | str | list[int]]"
+
+
+class SettingsError(Exception):
+    """A mistake in settings.toml, in one line."""
+
+
+def config_fields(frames_path: Path = FRAMES) -> dict[str, str]:
+    """Return name and type of every field of frame ``config`` behind ``t_us``.
+
+    Parameters
+    ----------
+    frames_path : Path
+        The schema.
+
+    Returns
+    -------
+    dict[str, str]
+        Type by name, in wire order.
+    """
+    schema = tomllib.loads(frames_path.read_text(encoding="utf-8"))
+    config = next(frame for frame in schema["frame"] if frame["name"] == "config")
+    return {f["name"]: f["type"] for f in config["field"] if f["name"] != "t_us"}
+
+
+def checked(settings: dict[str, Setting], fields: dict[str, str]) -> dict[str, Setting]:
+    """Return the settings in wire order.
+
+    Parameters
+    ----------
+    settings : dict[str, Setting]
+        Tables of settings.toml.
+    fields : dict[str, str]
+        Type by name, as `config_fields` returns it.
+
+    Returns
+    -------
+    dict[str, Setting]
+        The same tables, ordered as on the wire.
+
+    Raises
+    ------
+    SettingsError
+        A name too many or missing, a key that is not known, a value outside its limits or its type.
+    """
+    if set(settings) != set(fields):
+        odd = ", ".join(sorted(set(settings) ^ set(fields)))
+        raise SettingsError(f"names differ from frame config of frames.toml: {odd}")
+    for name, kind in fields.items():
+        setting = settings[name]
+        if odd_keys := set(setting) - KEYS:
+            raise SettingsError(f"[{name}] has the unknown key {min(odd_keys)}")
+        if not setting.get("why"):
+            raise SettingsError(f"[{name}] does not say why")
+        _check_value(name, kind, setting)
+    return {name: settings[name] for name in fields}
+
+
+def _check_value(name: str, kind: str, setting: Setting) -> None:
+    value = setting.get("value")
+    if kind.startswith("char["):
+        room = int(kind[5:-1])
+        if not (isinstance(value, str) and value.isascii() and 0 < len(value) < room):
+            raise SettingsError(
+                f"[{name}] value is {value!r}, expected 1 to {room - 1} ASCII letters"
+            )
+        return
+    allowed = _allowed(name, setting)
+    if not isinstance(value, int) or value not in allowed:
+        raise SettingsError(f"[{name}] value is {value!r}, expected one of {_text(allowed)}")
+    if min(allowed) < 0 or max(allowed) > RANGES[kind]:
+        raise SettingsError(f"[{name}] limits do not fit {kind}: {_text(allowed)}")
+
+
+def _allowed(name: str, setting: Setting) -> range | list[int]:
+    any_of = setting.get("any_of")
+    if isinstance(any_of, list):
+        return any_of
+    low, high = setting.get("min"), setting.get("max")
+    if isinstance(low, int) and isinstance(high, int) and low <= high:
+        return range(low, high + 1)
+    raise SettingsError(f"[{name}] needs min and max, or any_of")
+
+
+def _text(allowed: range | list[int]) -> str:
+    if isinstance(allowed, range):
+        return f"{allowed[0]} to {allowed[-1]}"
+    return ", ".join(map(str, allowed))
+
+
+def _condition(name: str, setting: Setting) -> str:
+    allowed = _allowed(name, setting)
+    if isinstance(allowed, range):
+        low = [f"config.{name} >= {allowed[0]}U"] if allowed[0] > 0 else []
+        return " && ".join([*low, f"config.{name} <= {allowed[-1]}U"])
+    return "(" + " || ".join(f"config.{name} == {value}U" for value in allowed) + ")"
+
+
+def render(settings: dict[str, Setting], fields: dict[str, str]) -> str:
+    """Return the text of generated/settings.h.
+
+    Parameters
+    ----------
+    settings : dict[str, Setting]
+        As `checked` returns it.
+    fields : dict[str, str]
+        Type by name.
+
+    Returns
+    -------
+    str
+        C++14 with a function for the defaults and one for the limits.
+    """
+    assign = []
+    conditions = []
+    for name, kind in fields.items():
+        value = settings[name]["value"]
+        if kind.startswith("char["):
+            letters = ", ".join(f"'{letter}'" for letter in str(value))
+            assign.append(f"  constexpr char {name}[] CORE_FLASH = {{{letters}}};")
+            assign.append(f"  core::flash_copy(config.{name}, {name}, sizeof({name}));")
+        else:
+            assign.append(f"  config.{name} = {value}U;")
+            conditions.append(_condition(name, settings[name]))
+    return "\n".join(
+        [
+            "// Generated by firmware/generate_settings.py from firmware/settings.toml.",
+            "// clang-format off",
+            "#pragma once",
+            "",
+            '#include "core/progmem.h"',
+            '#include "generated/frames.h"',
+            "",
+            "namespace settings {",
+            "",
+            "inline void put_defaults(frames::ConfigFrame& config) {",
+            "  config = frames::ConfigFrame();",
+            *[line.replace("  constexpr char", "  static constexpr char") for line in assign],
+            "}",
+            "",
+            "// Each value by itself.",
+            "inline bool in_range(const frames::ConfigFrame& config) {",
+            "  return " + " &&\n         ".join(conditions) + ";",
+            "}",
+            "",
+            "}  // namespace settings",
+            "",
+        ]
+    )
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write or check the header.
+
+    Parameters
+    ----------
+    arguments : list[str] or None
+        Command line without the program's name; None takes the real one.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--check", action="store_true", help="compare with what is committed")
+    check = parser.parse_args(arguments).check
+    try:
+        fields = config_fields()
+        settings = checked(tomllib.loads(SETTINGS.read_text(encoding="utf-8")), fields)
+    except (SettingsError, tomllib.TOMLDecodeError) as error:
+        print(f"firmware/settings.toml: {error}", file=sys.stderr)
+        return 2
+    text = render(settings, fields)
+    if not check:
+        HEADER.parent.mkdir(exist_ok=True)
+        HEADER.write_text(text, encoding="utf-8")
+        return 0
+    if not HEADER.is_file() or HEADER.read_text(encoding="utf-8") != text:
+        print(
+            "firmware/generated/settings.h is old: run python firmware/generate_settings.py",
+            file=sys.stderr,
+        )
+        return 6
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
