@@ -23,7 +23,7 @@ HEADER_BYTES = 28
 PAYLOAD_BYTES = 480
 KIND_FRAMES = 0
 KIND_SCHEMA = 1
-WINDOW_BYTES = 8 << 20  # read at once: larger gained nothing, smaller costs a call per window
+WINDOW_BYTES = 1 << 20  # read at once: what the CRC brought into the cache serves the headers
 _CRC_RESIDUE = 0x2144DF1C  # CRC-32 of any bytes followed by their own CRC-32
 
 Progress = Callable[[int, int], None]
@@ -100,9 +100,7 @@ class Scan:
     size_bytes: int
 
 
-def scan(
-    path: Path, progress: Progress | None = None, *, limit_bytes: int | None = None
-) -> Scan:
+def scan(path: Path, progress: Progress | None = None, *, limit_bytes: int | None = None) -> Scan:
     """Find every valid block of a file.
 
     Parameters
@@ -137,10 +135,19 @@ def scan(
     return Scan(blocks.take(np.argsort(blocks.position, kind="stable")), bad, size_bytes)
 
 
-def read_at(file: FileIO, start: int, length: int) -> bytearray:
-    """Return up to `length` bytes from `start` on."""
-    buffer = bytearray(length)
-    view = memoryview(buffer)
+def read_at(
+    file: FileIO, start: int, length: int, buffer: bytearray | memoryview | None = None
+) -> memoryview:
+    """Return up to `length` bytes from `start` on.
+
+    Parameters
+    ----------
+    file : FileIO
+    start, length : int
+    buffer : bytearray, optional
+        Memory to use, at least `length` long: a loop then needs no new pages from the system.
+    """
+    view = memoryview(bytearray(length) if buffer is None else buffer)[:length]
     file.seek(start)
     done = 0
     while done < length:
@@ -148,9 +155,7 @@ def read_at(file: FileIO, start: int, length: int) -> bytearray:
         if not count:
             break
         done += count
-    view.release()
-    del buffer[done:]
-    return buffer
+    return view[:done]
 
 
 def _scan_aligned(
@@ -161,8 +166,9 @@ def _scan_aligned(
     found: list[Blocks],
     progress: Progress | None,
 ) -> Iterator[tuple[int, int]]:
+    memory = bytearray(WINDOW_BYTES)
     for at in range(start, end, WINDOW_BYTES):
-        buffer = read_at(file, at, min(WINDOW_BYTES, end - at))
+        buffer = read_at(file, at, min(WINDOW_BYTES, end - at), memory)
         whole = len(buffer) // BLOCK_BYTES
         good = _good_blocks(buffer, 0, whole)
         if good.any():
@@ -177,14 +183,12 @@ def _scan_aligned(
             yield at + whole * BLOCK_BYTES, at + len(buffer)
 
 
-def _search(
-    file: FileIO, start: int, end: int, found: list[Blocks]
-) -> Iterator[tuple[int, int]]:
+def _search(file: FileIO, start: int, end: int, found: list[Blocks]) -> Iterator[tuple[int, int]]:
     """Look for blocks at every byte of a run; yield what stays bad."""
     window_start = start
     bad_from = start
     while window_start < end:
-        buffer = read_at(file, window_start, min(WINDOW_BYTES, end - window_start))
+        buffer = bytes(read_at(file, window_start, min(WINDOW_BYTES, end - window_start)))
         last_window = window_start + len(buffer) >= end or not buffer
         at = 0
         while True:
@@ -207,7 +211,7 @@ def _search(
     yield from _nonzero(file, bad_from, end)
 
 
-def _good_prefix(buffer: bytearray, at: int, count: int) -> int:
+def _good_prefix(buffer: memoryview | bytes, at: int, count: int) -> int:
     """Return how many valid blocks follow each other from byte `at` on."""
     done = 0
     step = 1  # grows, so that a lone block costs one check and a long shifted run is vectorised
@@ -220,10 +224,12 @@ def _good_prefix(buffer: bytearray, at: int, count: int) -> int:
     return done
 
 
-def _good_blocks(buffer: bytearray, at: int, count: int) -> NDArray[np.bool_]:
+def _good_blocks(buffer: memoryview | bytes, at: int, count: int) -> NDArray[np.bool_]:
     """Return which of `count` blocks from byte `at` on are valid."""
     head = np.frombuffer(buffer, HEADER, count, at)
-    good = (head["magic"] == _MAGIC_NUMBER) & (head["used"] <= PAYLOAD_BYTES) & (head["kind"] <= 1)
+    good: NDArray[np.bool_] = (
+        (head["magic"] == _MAGIC_NUMBER) & (head["used"] <= PAYLOAD_BYTES) & (head["kind"] <= 1)
+    )
     which = np.flatnonzero(good)
     crc32 = zlib.crc32
     with memoryview(buffer) as view:
@@ -233,7 +239,9 @@ def _good_blocks(buffer: bytearray, at: int, count: int) -> NDArray[np.bool_]:
     return good
 
 
-def _headers(buffer: bytearray, at: int, good: NDArray[np.bool_], window_start: int) -> Blocks:
+def _headers(
+    buffer: memoryview | bytes, at: int, good: NDArray[np.bool_], window_start: int
+) -> Blocks:
     head = np.frombuffer(buffer, HEADER, len(good), at)[good]
     position = window_start + at + np.flatnonzero(good) * BLOCK_BYTES
     return Blocks(
@@ -264,7 +272,7 @@ def _nonzero(file: FileIO, start: int, end: int) -> Iterator[tuple[int, int]]:
     """Yield the range without the zeros at its end, if anything is left."""
     while end > start:
         begin = max(start, end - WINDOW_BYTES)
-        kept = read_at(file, begin, end - begin).rstrip(b"\0")
+        kept = bytes(read_at(file, begin, end - begin)).rstrip(b"\0")
         if kept:
             yield start, begin + len(kept)
             return

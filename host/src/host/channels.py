@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from host.calibration import Calibration, Line
 from host.columns import ANALOGUE, ATTITUDE, INERTIAL, PULSES
-from host.sampling import Interpolator, usual_interval_us
+from host.sampling import ConstantDelay, Interpolator, usual_interval_us
 from host.schema import Field, Schema
 
 Array = NDArray[np.float64]
@@ -68,12 +68,14 @@ class ChannelMaker:
         self._unsaturated = schema.bit("valid", "imu_unsaturated")
         self._original = schema.bit("valid", "imu_original")
 
-    def columns(self, rows: Rows) -> dict[str, Array]:
+    def columns(self, rows: Rows, into: Mapping[str, Array] | None = None) -> dict[str, Array]:
         """Return the channels of `rows`: every analogue, inertial, attitude and pulse column.
 
         Parameters
         ----------
         rows : Rows
+        into : mapping of str to Array, optional
+            Memory for columns that are not interpolated; new arrays without it.
 
         Returns
         -------
@@ -85,21 +87,29 @@ class ChannelMaker:
         bits = data["valid"].astype(np.uint16)
         always = int(np.bitwise_and.reduce(bits)) if len(bits) else 0xFFFF
         out: dict[str, Array] = {}
+        late = ConstantDelay(rows.t_us, self._interval_us) if self._aligned else None
         for name, (column, line) in ANALOGUE.items():
             field = self._frame.field(name)
-            value = _calibrated(data[name], field.scale, self._lines[line])
+            value = _floats(data[name], column, into)
+            _calibrate(value, field.scale, self._lines[line])
             self._mask(value, bits, always, field.valid)
-            out[column] = self._at_rows(rows, field, value, None)
-        out |= self._inertial(rows, bits, always)
+            out[column] = self._at_rows(rows, field, value, late)
+        out |= self._inertial(rows, bits, always, into)
         for name, column in PULSES.items():
             field = self._frame.field(name)
-            value = data[name].astype(np.float64)
+            value = _floats(data[name], column, into)
             _erase(value, value == field.invalid)
             value *= field.scale
             out[column] = value
         return out
 
-    def _inertial(self, rows: Rows, bits: NDArray[np.uint16], always: int) -> dict[str, Array]:
+    def _inertial(
+        self,
+        rows: Rows,
+        bits: NDArray[np.uint16],
+        always: int,
+        into: Mapping[str, Array] | None,
+    ) -> dict[str, Array]:
         age_us = self._age_us(rows)
         fresh: NDArray[np.bool_] | None = np.isfinite(age_us)
         if not always & self._fresh:
@@ -112,21 +122,23 @@ class ChannelMaker:
         out: dict[str, Array] = {}
         for name, (column, kind, axis) in INERTIAL.items():
             field = self._frame.field(name)
-            raw = rows.data[name].astype(np.float64)
-            lost = raw == field.invalid
+            value = _floats(rows.data[name], column, into)
+            lost = value == field.invalid
             if clipped:
-                lost |= (np.abs(raw) >= _END_OF_RANGE) & ((bits & self._unsaturated) == 0)
-            value = _axis(raw * field.scale, self._lines[f"imu.{kind}"], axis)
+                lost |= (np.abs(value) >= _END_OF_RANGE) & ((bits & self._unsaturated) == 0)
+            raw = value.copy() if any_original else value
+            value *= field.scale
+            _axis(value, self._lines[f"imu.{kind}"], axis)
             if any_original:
-                own = _axis(raw, self._lines[f"imu_original.{kind}"], axis)
-                np.copyto(value, own, where=original)
+                _axis(raw, self._lines[f"imu_original.{kind}"], axis)
+                np.copyto(value, raw, where=original)
             _erase(value, lost)
             if kind not in groups:
                 groups[kind] = self._interpolator(rows, field, age_us, fresh)
             out[column] = self._apply(groups[kind], value, fresh)
         for name, column in ATTITUDE.items():
             field = self._frame.field(name)
-            value = rows.data[name].astype(np.float64)
+            value = _floats(rows.data[name], column, into)
             lost = value == field.invalid
             value *= field.scale
             _erase(value, lost)
@@ -157,7 +169,9 @@ class ChannelMaker:
             sampled = sampled[fresh]
         # Instants must not fall; an age is a few us uncertain.
         np.maximum.accumulate(sampled, out=sampled)
-        interval = max(self._interval_us, usual_interval_us(sampled))
+        interval = self._interval_us
+        if fresh is not None:
+            interval = max(interval, usual_interval_us(sampled))
         return Interpolator(sampled, rows.t_us, interval)
 
     def _apply(
@@ -169,12 +183,12 @@ class ChannelMaker:
             return value
         return group(value if fresh is None else value[fresh])
 
-    def _at_rows(
-        self, rows: Rows, field: Field, value: Array, fresh: NDArray[np.bool_] | None
-    ) -> Array:
+    def _at_rows(self, rows: Rows, field: Field, value: Array, late: ConstantDelay | None) -> Array:
         delay = self.delay_us(field)
-        if not self._aligned or delay == 0.0:
+        if late is None or delay == 0.0:
             return value
+        if 0.0 < -delay <= late.shortest_us:
+            return late(value, -delay)
         return Interpolator(rows.t_us - delay, rows.t_us, self._interval_us)(value)
 
     @staticmethod
@@ -201,10 +215,7 @@ def unwrapped(angle: Array) -> Array:
         rad.
     """
     known = np.isfinite(angle)
-    if known.all():
-        kept = angle
-    else:
-        kept = angle[known]
+    kept = angle if known.all() else angle[known]
     if len(kept) < 2:
         return angle
     step = np.diff(kept)
@@ -216,22 +227,27 @@ def unwrapped(angle: Array) -> Array:
     return out
 
 
-def _calibrated(raw: NDArray[Any], scale: float, line: Line) -> Array:
-    slope = line.slope[0]
-    value = raw.astype(np.float64)
-    value *= scale * slope
-    value -= line.zero[0] * slope
+def _floats(raw: NDArray[Any], column: str, into: Mapping[str, Array] | None) -> Array:
+    if into is None:
+        return raw.astype(np.float64)
+    value = into[column]
+    np.copyto(value, raw)
     return value
 
 
-def _axis(value: Array, line: Line, axis: int) -> Array:
-    zero, slope = line.zero[axis], line.slope[axis]
-    if zero:
-        value = value - zero
-    return value * slope if slope != 1.0 else value
+def _calibrate(value: Array, scale: float, line: Line) -> None:
+    slope = line.slope[0]
+    value *= scale * slope
+    value -= line.zero[0] * slope
+
+
+def _axis(value: Array, line: Line, axis: int) -> None:
+    if line.zero[axis]:
+        value -= line.zero[axis]
+    if line.slope[axis] != 1.0:
+        value *= line.slope[axis]
 
 
 def _erase(value: Array, lost: NDArray[np.bool_]) -> None:
     if lost.any():
         value[lost] = np.nan
-

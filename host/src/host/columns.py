@@ -106,6 +106,14 @@ PULSES = {
         "rc_switch",
     )
 }
+# What a log holds without deriving anything: every measured column of the identification frame.
+CHANNELS = (
+    "t_s",
+    *(column for column, _ in ANALOGUE.values()),
+    *(column for column, _, _ in INERTIAL.values()),
+    *ATTITUDE.values(),
+    *PULSES.values(),
+)
 # Columns made of others: which lines of the calibration they rest on.
 RESTS_ON = {
     "alpha_rad": ("channel.alpha_a", "channel.alpha_b"),

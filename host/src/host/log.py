@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from host.blocks import Progress, Scan, scan
 from host.calibration import Calibration, load_calibration
-from host.columns import COLUMNS
+from host.columns import CHANNELS, COLUMNS
 from host.errors import LogError
 from host.frames import find_schemas
 from host.ledger import Ledger, make_ledger
@@ -153,17 +153,46 @@ class FlightLog:
 
     def columns(self, *, aligned: bool = True) -> Columns:
         """Return the columns of `table` as arrays, without pandas."""
+        return self._collected(self.pieces(aligned=aligned)) or {
+            column.name: np.empty(0) for column in COLUMNS
+        }
+
+    def channels(self) -> Columns:
+        """Return the calibrated channels of the identification frames, nothing derived from them.
+
+        Returns
+        -------
+        dict of str to NDArray[np.float64], shape (rows,)
+            ``t_s`` and every measured column in SI, each value where it was sampled (see `table`),
+            NaN where it is not valid.
+        """
+        # One allocation: numpy asks for huge pages, single columns cost twice the time.
         count = sum(session.rows for session in self.sessions)
+        out = dict(zip(CHANNELS, np.empty((len(CHANNELS), count)), strict=True))
+        at = 0
+        for session in self.sessions:
+            if session.rows:
+                part = {name: value[at : at + session.rows] for name, value in out.items()}
+                SessionTable(session, aligned=False).channels(part)
+                at += session.rows
+        return dict(out)
+
+    def _collected(self, pieces: Iterator[Columns]) -> Columns:
+        count = sum(session.rows for session in self.sessions)
+        floats: Iterator[Any] | None = None
         out: Columns = {}
         at = 0
-        for piece in self.pieces(aligned=aligned):
-            if not out:
-                out = {name: np.empty(count, value.dtype) for name, value in piece.items()}
+        for piece in pieces:
+            if floats is None:
+                floats = iter(np.empty((len(piece), count)))
             rows = len(piece["t_s"])
             for name, value in piece.items():
+                if name not in out:
+                    plain = value.dtype == np.float64
+                    out[name] = next(floats) if plain else np.empty(count, value.dtype)
                 out[name][at : at + rows] = value
             at += rows
-        return out or {column.name: np.empty(0) for column in COLUMNS}
+        return out
 
     def pieces(self, *, aligned: bool = True) -> Iterator[Columns]:
         """Yield the columns some ten thousand rows at a time: for logs larger than memory."""

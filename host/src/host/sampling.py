@@ -115,6 +115,46 @@ class Interpolator:
         return None
 
 
+class ConstantDelay:
+    """Brings channels sampled a little after each row to the row's instant.
+
+    The analogue channels are converted 1.7 to 2.7 ms after the trigger: the sample before and the
+    one behind the instant belong to the row before and to the row itself.
+
+    Parameters
+    ----------
+    rows_us : Array, shape (n,)
+        Instants of the rows, not falling.
+    interval_us : float
+        Usual time between two rows.
+    """
+
+    def __init__(self, rows_us: Array, interval_us: float) -> None:
+        step = np.diff(rows_us)
+        self.shortest_us = float(step.min()) if len(step) else 0.0
+        with np.errstate(divide="ignore"):
+            self._inverse = 1.0 / step
+        self._inverse[step > GAP_FACTOR * interval_us] = np.nan
+
+    def __call__(self, values: Array, late_us: float) -> Array:
+        """Return `values`, sampled `late_us` behind each row, at the rows.
+
+        Parameters
+        ----------
+        values : Array, shape (n,)
+        late_us : float
+            At most `shortest_us`.
+        """
+        out = np.empty_like(values)
+        core = out[1:]
+        np.subtract(values[1:], values[:-1], out=core)
+        core *= self._inverse
+        core *= late_us
+        np.subtract(values[1:], core, out=core)
+        out[:1] = np.nan
+        return out
+
+
 def usual_interval_us(sampled_us: Array) -> float:
     """Return the median time between samples, microseconds; infinity without two of them."""
     if len(sampled_us) < 2:

@@ -16,6 +16,7 @@ from host.store import FrameStore
 from host.timebase import frame_times_us
 
 Array = NDArray[np.float64]
+_RATE_ROWS = 10_000  # enough for a median interval
 _POTS = {
     "elevator": ("pot_elevator",),
     "aileron": ("pot_aileron_left", "pot_aileron_right"),
@@ -67,9 +68,9 @@ class Session:
                 last = part
                 self.rows += len(part.data)
         if first is not None and last is not None:
-            self.start_us = int(self._times(first)[0])
-            self.end_us = int(self._times(last)[-1])
-            self.rate_hz = self._rate_hz(first)
+            self.start_us = int(self._times(_cut(first, 0, 1))[0])
+            self.end_us = int(self._times(_cut(last, -1, None))[0])
+            self.rate_hz = self._rate_hz(_cut(first, 0, _RATE_ROWS))
         elif self.span[1] > self.span[0]:
             self.start_us = int(self.block_us[self.span[0]])
             self.end_us = int(self.block_us[self.span[1] - 1])
@@ -112,7 +113,8 @@ class Session:
     def _rate_hz(self, first: FrameSet) -> float:
         # The settings say what was asked for; the frames show it, whatever a setting says.
         t_us = self._times(first)
-        one = np.diff(first.data["count"].astype(np.int64)) & 0xFFFF == 1
+        count: NDArray[np.int64] = first.data["count"].astype(np.int64)
+        one = (count[1:] - count[:-1]) & 0xFFFF == 1
         steps = np.diff(t_us)[one]
         config, _ = self.slow("config")
         asked = float(config["rate_hz"][0]) if len(config) else 0.0
@@ -133,6 +135,10 @@ class Session:
         return 2 if self.rate_hz > 150.0 else 3
 
 
+def _cut(frames: FrameSet, first: int, last: int | None) -> FrameSet:
+    return FrameSet(frames.data[first:last], frames.block[first:last])
+
+
 def surface_sources(store: FrameStore) -> dict[str, str]:
     """Return for each surface whether the table holds its measured position or the command.
 
@@ -150,4 +156,3 @@ def surface_sources(store: FrameStore) -> dict[str, str]:
 def _mostly(schema: Schema, sample: NDArray[Any], bit: str) -> bool:
     mask = schema.bit("valid", bit)
     return bool(len(sample)) and bool(np.mean((sample["valid"] & mask) != 0) >= 0.5)
-

@@ -40,34 +40,35 @@ class FrameStore:
         self.schema = schema
         self.unread_bytes = 0
         self._progress = progress
-        self._slow_names = [frame.name for frame in schema.frames if frame.name != FAST]
-        self._slow: dict[str, FrameSet] | None = None
-        self._fast: list[FrameSet] | None = None
-        self._joined: FrameSet | None = None
+        self._frames: dict[str, FrameSet] | None = None
+
+    @property
+    def kept(self) -> bool:
+        """True if the identification frames are held in memory."""
+        return len(self.blocks) <= KEEP_BLOCKS
 
     def __getitem__(self, name: str) -> FrameSet:
         """Return all frames of one kind."""
-        if name != FAST:
-            return self._loaded()[name]
-        if self._joined is None:
-            self._joined = join(self.schema, FAST, list(self.fast_pieces()))
-            if self._fast is not None:
-                self._fast = [self._joined]
-        return self._joined
+        frames = self._loaded()
+        if name == FAST and FAST not in frames:
+            return join(self.schema, FAST, list(self.fast_pieces()))
+        return frames[name]
 
     def fast_pieces(self, span: tuple[int, int] | None = None) -> Iterator[FrameSet]:
-        """Yield identification frames in order, of all blocks or of a span of them."""
+        """Yield identification frames in order, of all blocks or of a span of them.
+
+        One set where they are held in memory, else one per 2 MiB of log.
+        """
         first, last = span or (0, len(self.blocks))
-        self._loaded()
-        if self._fast is None:
-            for piece in frame_pieces(self.path, self.blocks, self.schema, [FAST], (first, last)):
-                self._report(piece)
-                yield piece.frames[FAST]
+        frames = self._loaded()
+        if FAST in frames:
+            whole = frames[FAST]
+            low, high = np.searchsorted(whole.block, (first, last))
+            yield FrameSet(whole.data[low:high], whole.block[low:high])
             return
-        for part in self._fast:
-            if len(part.data) and part.block[0] < last and part.block[-1] >= first:
-                low, high = np.searchsorted(part.block, (first, last))
-                yield FrameSet(part.data[low:high], part.block[low:high])
+        for piece in frame_pieces(self.path, self.blocks, self.schema, [FAST], (first, last)):
+            self._report(piece)
+            yield piece.frames[FAST]
 
     def sample(self, blocks: int = 64, places: int = 16) -> NDArray[Any]:
         """Return identification frames from evenly spread places, for decisions on a whole log."""
@@ -81,19 +82,33 @@ class FrameStore:
         return np.concatenate(parts) if parts else empty
 
     def _loaded(self) -> dict[str, FrameSet]:
-        if self._slow is None:
-            keep = len(self.blocks) <= KEEP_BLOCKS and FAST in self.schema.by_name
-            names = [*self._slow_names, FAST] if keep else self._slow_names
-            parts: dict[str, list[FrameSet]] = {name: [] for name in names}
-            for piece in frame_pieces(self.path, self.blocks, self.schema, names):
-                self.unread_bytes += piece.unread_bytes
-                for name, frames in piece.frames.items():
-                    parts[name].append(frames)
-                self._report(piece)
-            if keep:
-                self._fast = parts.pop(FAST)
-            self._slow = {name: join(self.schema, name, part) for name, part in parts.items()}
-        return self._slow
+        if self._frames is None:
+            slow: dict[str, list[FrameSet]] = {
+                name: [] for name in self.schema.by_name if name != FAST
+            }
+            if self.kept and FAST in self.schema.by_name:
+                size = self.schema.by_name[FAST].size_bytes
+                most = int(self.blocks.used.sum(dtype=np.int64)) // size + 1
+                fast = join(self.schema, FAST, self._sorted_out([*slow, FAST], slow), most)
+                self._frames = {FAST: fast}
+            else:
+                for _ in self._sorted_out(list(slow), slow):
+                    pass
+                self._frames = {}
+            for name, parts in slow.items():
+                self._frames[name] = join(self.schema, name, parts)
+        return self._frames
+
+    def _sorted_out(self, names: list[str], slow: dict[str, list[FrameSet]]) -> Iterator[FrameSet]:
+        """Read the log once; collect slower frames in `slow`, yield identification frames."""
+        for piece in frame_pieces(self.path, self.blocks, self.schema, names):
+            self.unread_bytes += piece.unread_bytes
+            self._report(piece)
+            for name, frames in piece.frames.items():
+                if name == FAST:
+                    yield frames
+                else:
+                    slow[name].append(frames)
 
     def _report(self, piece: Piece) -> None:
         if self._progress is not None:

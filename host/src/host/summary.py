@@ -35,7 +35,9 @@ def summarise(log: FlightLog) -> Json:
         "complete": log.complete,
         "duration_s": sum(session.duration_s for session in log.sessions),
         "rows": sum(session.rows for session in log.sessions),
-        "frames": {name: len(log.store[name].data) for name in log.schema.by_name if name != "ident"}
+        "frames": {
+            name: len(log.store[name].data) for name in log.schema.by_name if name != "ident"
+        }
         | {"ident": sum(session.rows for session in log.sessions)},
         "sessions": sessions,
         "clock": _clock(log),
@@ -137,7 +139,9 @@ def _identity(session: Session) -> Json:
     for name, fields in (("identity", ("board", "firmware")), ("config", ("aircraft",))):
         data, _ = session.slow(name)
         for field in fields:
-            text = bytes(data[field][-1]).rstrip(b"\0").decode("ascii", "replace") if len(data) else ""
+            text = (
+                bytes(data[field][-1]).rstrip(b"\0").decode("ascii", "replace") if len(data) else ""
+            )
             out[field] = text
     return out
 

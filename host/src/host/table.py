@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from host import airdata
 from host.channels import TURN_RAD, ChannelMaker, Rows
 from host.columns import COLUMNS
+from host.frames import FrameSet, join
 from host.sampling import Interpolator, usual_interval_us
 from host.session import Session
 
@@ -21,6 +22,8 @@ Columns = dict[str, NDArray[Any]]
 # Rows of the neighbouring piece kept on either side, so that interpolation and slow IMUs see
 # beyond the edge: 1.5 samples of a 5 Hz IMU at 200 rows per second are 60 rows.
 HALO_ROWS = 256
+ROWS_AT_ONCE = 8_192
+_NONE = np.empty(0, np.int64)
 _GPS = {
     "latitude": "latitude_deg",
     "longitude": "longitude_deg",
@@ -30,13 +33,16 @@ _GPS = {
     "v_down": "v_down_mps",
     "ground_speed": "ground_speed_mps",
 }
+# What the BMP085 can measure (its datasheet, table 1); anything else is a fault, not air.
+_STATIC_PA = (30_000.0, 110_000.0)
+_TEMPERATURE_K = (233.15, 358.15)
 # surface -> (its pot column, its pulse channel); aileron is made of two pots
 _SURFACES = {
     "elevator": ("elevator_pot_rad",),
     "aileron": ("aileron_left_rad", "aileron_right_rad"),
     "rudder": ("rudder_pot_rad",),
 }
-_UNWRAPPED = ("phi_rad", "psi_rad")
+ANGLES = ("phi_rad", "theta_rad", "psi_rad")  # unwrapped
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,33 +90,48 @@ class SessionTable:
 
     def pieces(self) -> Iterator[Columns]:
         """Yield the columns of `COLUMNS`, some ten thousand rows at a time."""
-        held: list[NDArray[Any]] = []
-        held_us: list[Array] = []
+        for data, t_us, first, last in self._windows():
+            yield self._rows(data, t_us, first, last)
+
+    def channels(self, into: Mapping[str, Array]) -> None:
+        """Fill ``t_s`` and the channels of the session, as they were sampled, into `into`."""
+        at = 0
+        for data, t_us, first, last in self._windows():
+            end = at + last - first
+            part = {name: value[at:end] for name, value in into.items()}
+            rows = Rows(data[first:last], t_us[first:last])
+            made = self._maker.columns(rows, part)
+            for name in ANGLES:  # made anew where they jump by a turn
+                whole = self._continued(name, made[name])
+                if whole is not part[name]:
+                    np.copyto(part[name], whole)
+            part["t_s"][:] = self._session.seconds(rows.t_us)
+            at = end
+
+    def _windows(self) -> Iterator[tuple[NDArray[Any], Array, int, int]]:
+        """Yield frames, their times and which of them are the rows: the rest is halo."""
+        held = FrameSet(np.empty(0, self._session.store.schema.by_name["ident"].dtype), _NONE)
         skip = 0
         for part in self._session.store.fast_pieces(self._session.span):
-            if not len(part.data):
-                continue
-            held.append(part.data)
-            held_us.append(self._session.since_start_us(part))
-            data, t_us = np.concatenate(held), np.concatenate(held_us)
-            if len(data) - skip <= 2 * HALO_ROWS:
-                held, held_us = [data], [t_us]
-                continue
-            stop = len(data) - HALO_ROWS
-            yield self._rows(data, t_us, skip, stop)
-            keep = stop - HALO_ROWS
-            held, held_us, skip = [data[keep:]], [t_us[keep:]], HALO_ROWS
-        if held:
-            data, t_us = np.concatenate(held), np.concatenate(held_us)
-            if len(data) > skip:
-                yield self._rows(data, t_us, skip, len(data))
+            held = join(self._session.store.schema, "ident", [held, part])
+            t_us = self._session.since_start_us(held)
+            at = skip
+            while len(held.data) - at > ROWS_AT_ONCE + HALO_ROWS:
+                low, high = max(0, at - HALO_ROWS), at + ROWS_AT_ONCE + HALO_ROWS
+                yield held.data[low:high], t_us[low:high], at - low, at - low + ROWS_AT_ONCE
+                at += ROWS_AT_ONCE
+            keep = max(0, at - HALO_ROWS)
+            held = FrameSet(held.data[keep:], held.block[keep:])
+            skip = at - keep
+        if len(held.data) > skip:
+            yield held.data, self._session.since_start_us(held), skip, len(held.data)
 
     def _rows(self, data: NDArray[Any], t_us: Array, first: int, last: int) -> Columns:
         channels = self._maker.columns(Rows(data, t_us))
         out: Columns = {name: value[first:last] for name, value in channels.items()}
         rows_us = t_us[first:last]
         out["t_s"] = self._session.seconds(rows_us)
-        for name in _UNWRAPPED:
+        for name in ANGLES:
             out[name] = self._continued(name, out[name])
         out |= self._baro.at(rows_us)
         out |= self._gps.at(rows_us)
@@ -176,15 +197,16 @@ def _baro(session: Session) -> SlowGroup:
     data, t_us = session.slow("baro")
     frame = session.store.schema.by_name["baro"]
     values: dict[str, Array] = {}
-    for name, column, offset in (
-        ("static_pressure", "static_pa", 0.0),
-        ("temperature", "temperature_k", airdata.KELVIN),
+    for name, column, offset, (lowest, highest) in (
+        ("static_pressure", "static_pa", 0.0, _STATIC_PA),
+        ("temperature", "temperature_k", airdata.KELVIN, _TEMPERATURE_K),
     ):
         field = frame.field(name)
         value = data[name].astype(np.float64)
         lost = value == field.invalid
         value *= field.scale
         value += offset
+        lost |= (value < lowest) | (value > highest)
         value[lost] = np.nan
         values[column] = value
     return SlowGroup(t_us, values, usual_interval_us(t_us))
@@ -205,4 +227,3 @@ def _gps(session: Session) -> SlowGroup:
         value[lost] = np.nan
         values[column] = value
     return SlowGroup(t_us, values, usual_interval_us(t_us))
-

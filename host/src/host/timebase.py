@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,7 @@ _SCALE_LIMIT = 0.02  # a ceramic resonator is good to 0.5 %; more than 2 % is no
 _MIN_FIXES = 20
 _MIN_SPAN_S = 20.0
 _MAX_HALF_WIDTH = 500e-6  # wider than this a correction says less than the resonator's own 0.5 %
+_CONVERGED = 1e-9  # of the scale: a thousandth of a ppm
 _T_95 = 1.96
 
 
@@ -86,7 +88,7 @@ def session_slices(blocks: Blocks) -> list[tuple[int, int]]:
     """Return first and last + 1 block of each run of one session."""
     edges = np.flatnonzero(np.diff(blocks.session.astype(np.int64))) + 1
     bounds = [0, *edges.tolist(), len(blocks)]
-    return [(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True) if b > a]
+    return [(a, b) for a, b in itertools.pairwise(bounds) if b > a]
 
 
 def frame_times_us(
@@ -144,11 +146,13 @@ def fit_gps(parts: list[tuple[NDArray[np.int64], NDArray[np.int64]]]) -> ClockFi
         spread = float(np.sum(weight * xc * xc))
         if spread <= 0.0:
             return None
-        slope = float(np.sum(weight * xc * yc)) / spread
+        before, slope = slope, float(np.sum(weight * xc * yc)) / spread
         residual = yc - slope * xc
         sigma = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
         sigma = max(sigma, 1e-4)  # GPS times of week are whole milliseconds
         weight = np.minimum(1.0, 1.345 * sigma / np.maximum(np.abs(residual), 1e-12))
+        if abs(slope - before) < _CONVERGED:
+            break
     # Latency wanders slowly: first-order correlation r leaves n (1 - r)/(1 + r) independent fixes.
     lagged = float(np.clip(np.corrcoef(residual[1:], residual[:-1])[0, 1], 0.0, 0.95))
     half_width = _T_95 * sigma / np.sqrt(spread) * np.sqrt((1 + lagged) / (1 - lagged))

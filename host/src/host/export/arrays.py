@@ -59,9 +59,7 @@ class NpzWriter(_Collected):
         columns = self._whole()
         pairs = [(name, self._meta.units.get(name, "")) for name in columns]
         notes = list(self._meta.notes.items())
-        np.savez(
-            self._path,
-            **columns,
-            units=np.array(pairs, dtype=str).reshape(-1, 2),
-            notes=np.array(notes, dtype=str).reshape(-1, 2),
-        )
+        content: dict[str, Any] = dict(columns)
+        content["units"] = np.array(pairs, dtype=str).reshape(-1, 2)
+        content["notes"] = np.array(notes, dtype=str).reshape(-1, 2)
+        np.savez(self._path, **content)
