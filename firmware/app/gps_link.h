@@ -1,0 +1,21 @@
+// The port that drivers/ublox.h asks for, on hal/serial.h.
+#pragma once
+
+#include <stdint.h>
+
+#include "hal/serial.h"
+
+namespace app {
+
+class GpsLink {
+ public:
+  void set_baud(uint32_t baud) { hal::open_port(hal::Port::kGps, baud); }
+
+  bool send(const uint8_t* bytes, uint8_t size) {
+    if (hal::send_room(hal::Port::kGps) < size) return false;
+    for (uint8_t i = 0; i < size; ++i) hal::send_byte(hal::Port::kGps, bytes[i]);
+    return true;
+  }
+};
+
+}  // namespace app

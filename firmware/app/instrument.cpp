@@ -1,0 +1,135 @@
+#include "app/instrument.h"
+
+#include "app/text_out.h"
+#include "app/version.h"
+#include "core/progmem.h"
+#include "hal/analog_input.h"
+#include "hal/block_device.h"
+#include "hal/clock.h"
+#include "hal/serial.h"
+#include "hal/system.h"
+
+namespace app {
+
+namespace {
+
+constexpr uint32_t kUsbBaud = 115200UL;
+constexpr uint32_t kSecondUs = 1000000UL;
+constexpr uint16_t kLeastAvccMv = 4500;  // 16 MHz wants 4.5 V (ATmega2560 datasheet, 31.4)
+
+constexpr char kLineEnd[] CORE_FLASH = "\r\n";
+
+}  // namespace
+
+void Instrument::boot() {
+  const uint32_t now_us = hal::now_us();
+  const core::SettingsStatus settings = store_.load(&config_);
+  hal::open_port(hal::Port::kUsb, kUsbBaud);
+  TextOut usb(hal::Port::kUsb);
+  usb.ram(hal::board_name());
+  usb.letter(' ');
+  usb.ram(kVersion);
+  usb.flash(kLineEnd);
+  outlet_.event(frames::Event::kReset, static_cast<uint32_t>(hal::reset_source()), now_us);
+  if (hal::crash_address() != 0) {
+    outlet_.event(frames::Event::kCrash, hal::crash_address(), now_us);
+  }
+  if (settings != core::SettingsStatus::kOk) {
+    outlet_.event(frames::Event::kSettingsDefault, static_cast<uint32_t>(settings), now_us);
+  }
+  telemetry_.start(config_, now_us);
+  pilot_.start();
+  sensors_.start(config_, now_us);
+  status_.start(now_us);
+  second_.start(now_us);
+  turn_us_ = now_us;
+  system_us_ = now_us;
+  hal::set_card_wait(&Instrument::while_waiting, this);
+  hal::start_watchdog();
+}
+
+void Instrument::while_waiting(void* context) {
+  // A call of the card that waits is bounded by itself: sensors and recorder count as running.
+  Instrument& self = *static_cast<Instrument*>(context);
+  self.pilot_.step(self.config_, self.self_test_passed(), self.outlet_);
+  self.pilot_.ran(kTaskSensors);
+  self.pilot_.ran(kTaskRecorder);
+  self.pilot_.beat(hal::now_us());
+}
+
+void Instrument::step() {
+  const uint32_t now_us = hal::now_us();
+  const uint32_t last_turn_us = now_us - turn_us_;
+  turn_us_ = now_us;
+  uptime_us_ += last_turn_us;
+  while (uptime_us_ >= kSecondUs) {
+    uptime_us_ -= kSecondUs;
+    ++uptime_s_;
+  }
+
+  pilot_.step(config_, self_test_passed(), outlet_);
+  sensors_.step(config_, pilot_, outlet_);
+  pilot_.ran(kTaskSensors);
+  recorder_.step(pilot_.inputs(config_), config_, hal::now_us());
+  pilot_.ran(kTaskRecorder);
+  store_.poll();
+  panel_.step(recorder_, now_us);
+  status_.step(recorder_, sensors_, pilot_, now_us);
+  if (telemetry_.poll(now_us)) put_telemetry_heads(now_us);
+  if (second_.due(now_us, kSecondUs)) put_system(now_us);
+  pilot_.beat(hal::now_us());
+
+  const uint32_t end_us = hal::now_us();
+  const uint32_t loop_us = end_us - now_us;
+  if (loop_us > loop_max_us_) {
+    loop_max_us_ = static_cast<uint16_t>(loop_us > 65535U ? 65535U : loop_us);
+  }
+  hal::sleep_until_interrupt();
+  asleep_us_ += hal::now_us() - end_us;
+}
+
+bool Instrument::self_test_passed() const {
+  const uint16_t avcc_mv = hal::avcc_mv();
+  return avcc_mv == 0 || avcc_mv >= kLeastAvccMv;
+}
+
+void Instrument::put_system(uint32_t now_us) {
+  const uint32_t elapsed_us = now_us - system_us_;
+  frames::SystemFrame frame = {};
+  frame.t_us = now_us;
+  frame.uptime_s = uptime_s_;
+  frame.loop_max_us = loop_max_us_;
+  frame.cpu_load = frames::kSystemCpuLoadInvalid;
+  if (elapsed_us >= 1000U && asleep_us_ <= elapsed_us) {
+    frame.cpu_load = static_cast<uint16_t>((elapsed_us - asleep_us_) / (elapsed_us / 1000U));
+  }
+  recorder_.put_health(&frame);
+  sensors_.put_health(&frame);
+  const core::RcDecoder& receiver = pilot_.decoder();
+  frame.rc_glitches = receiver.glitches();
+  frame.rc_frame_us = receiver.frame_us();
+  if (receiver.valid() != 0) {
+    frame.sensors = static_cast<uint8_t>(frame.sensors | frames::kSensorsReceiver);
+  }
+  if (telemetry_.mode() != frames::Telemetry::kOff) {
+    frame.sensors = static_cast<uint8_t>(frame.sensors | frames::kSensorsTelemetry);
+  }
+  frame.telemetry_dropped = telemetry_.dropped();
+  frame.stack_free_min = hal::stack_free_bytes();
+  frame.drive = static_cast<uint8_t>(pilot_.drive());
+  outlet_.put(frame);
+  loop_max_us_ = 0;
+  asleep_us_ = 0;
+  system_us_ = now_us;
+}
+
+void Instrument::put_telemetry_heads(uint32_t now_us) {
+  frames::ConfigFrame config = config_;
+  config.t_us = now_us;
+  telemetry_.offer(frames::ConfigFrame::id(), &config, sizeof config, now_us);
+  frames::IdentityFrame who;
+  recorder_.identity(&who, now_us);
+  telemetry_.offer(frames::IdentityFrame::id(), &who, sizeof who, now_us);
+}
+
+}  // namespace app

@@ -1,0 +1,62 @@
+// The whole instrument. A board owns one, calls boot() once and step() for ever.
+#pragma once
+
+#include <stdint.h>
+
+#include "app/outlet.h"
+#include "app/panel.h"
+#include "app/pilot_link.h"
+#include "app/recorder.h"
+#include "app/sensors.h"
+#include "app/status.h"
+#include "app/store.h"
+#include "app/telemetry.h"
+#include "core/byte_ring.h"
+
+namespace app {
+
+class Instrument {
+ public:
+  // 500 ms of frames at 100 Hz, 250 ms at 200 Hz.
+  static constexpr uint16_t kRingBytes = 4450;
+
+  Instrument() = default;
+  Instrument(const Instrument&) = delete;
+  Instrument& operator=(const Instrument&) = delete;
+
+  void boot();
+  // One turn of the main loop, the sleep at its end included.
+  void step();
+
+  Recorder& recorder() { return recorder_; }
+  const PilotLink& pilot() const { return pilot_; }
+  const frames::ConfigFrame& config() const { return config_; }
+
+ private:
+  static void while_waiting(void* context);
+
+  bool self_test_passed() const;
+  void put_system(uint32_t now_us);
+  void put_telemetry_heads(uint32_t now_us);
+
+  uint8_t ring_bytes_[kRingBytes] = {};
+  core::ByteRing ring_{ring_bytes_, kRingBytes};
+  frames::ConfigFrame config_ = {};
+  Telemetry telemetry_;
+  Outlet outlet_{ring_, telemetry_};
+  Store store_;
+  PilotLink pilot_;
+  Sensors sensors_;
+  Recorder recorder_{ring_, outlet_, store_, sensors_};
+  Panel panel_;
+  Status status_;
+  core::Every second_;
+  uint32_t turn_us_ = 0;    // when this turn of the loop began
+  uint32_t uptime_us_ = 0;  // part of a second
+  uint32_t uptime_s_ = 0;
+  uint32_t asleep_us_ = 0;  // since the last frame `system`
+  uint32_t system_us_ = 0;  // when that was made
+  uint16_t loop_max_us_ = 0;
+};
+
+}  // namespace app

@@ -1,0 +1,61 @@
+// Where every frame goes: into the log while a session runs, and to the radio as its budget allows.
+#pragma once
+
+#include <stdint.h>
+
+#include "app/telemetry.h"
+#include "core/byte_ring.h"
+#include "generated/frames.h"
+
+namespace app {
+
+class Outlet {
+ public:
+  Outlet(core::ByteRing& ring, Telemetry& telemetry) : ring_(ring), telemetry_(telemetry) {}
+
+  // Frames that find no room are counted by the ring.
+  template <typename Frame>
+  void put(const Frame& frame) {
+    if (logging_) (void)ring_.push(frame);
+    telemetry_.offer(Frame::id(), &frame, sizeof frame, frame.t_us);
+  }
+
+  // Events of the time before a session wait for it; the oldest of more than six are given up.
+  void event(frames::Event code, uint32_t arg, uint32_t t_us) {
+    frames::EventFrame frame;
+    frame.t_us = t_us;
+    frame.code = static_cast<uint8_t>(code);
+    frame.arg = arg;
+    telemetry_.offer(frames::EventFrame::id(), &frame, sizeof frame, t_us);
+    if (logging_) {
+      (void)ring_.push_event(code, arg, t_us);
+      return;
+    }
+    if (waiting_count_ == kWaiting) {
+      for (uint8_t i = 1; i < kWaiting; ++i) waiting_[i - 1] = waiting_[i];
+      --waiting_count_;
+    }
+    waiting_[waiting_count_++] = frame;
+  }
+
+  void open() { logging_ = true; }
+  void release_waiting() {
+    for (uint8_t i = 0; i < waiting_count_; ++i) {
+      const frames::EventFrame& frame = waiting_[i];
+      (void)ring_.push_event(static_cast<frames::Event>(frame.code), frame.arg, frame.t_us);
+    }
+    waiting_count_ = 0;
+  }
+  void close() { logging_ = false; }
+
+ private:
+  static constexpr uint8_t kWaiting = 6;
+
+  core::ByteRing& ring_;
+  Telemetry& telemetry_;
+  frames::EventFrame waiting_[kWaiting] = {};
+  uint8_t waiting_count_ = 0;
+  bool logging_ = false;
+};
+
+}  // namespace app

@@ -1,0 +1,80 @@
+#include "app/panel.h"
+
+#include "hal/panel.h"
+
+namespace app {
+
+namespace {
+
+constexpr uint32_t kHalfFlashUs = 200000UL;
+constexpr uint32_t kHalfSlowUs = 500000UL;
+constexpr uint32_t kHalfFastUs = 100000UL;
+constexpr uint8_t kPauseHalves = 10;
+
+}  // namespace
+
+uint8_t trouble_flashes(Recorder::State state, storage::VolumeStatus status) {
+  if (state == Recorder::State::kFailed) return 7;
+  if (state == Recorder::State::kFileFull) return 5;
+  if (state != Recorder::State::kNoFile) return 0;
+  switch (status) {
+    case storage::VolumeStatus::kReady:
+      return 0;
+    case storage::VolumeStatus::kNoCard:
+      return 2;
+    case storage::VolumeStatus::kNoFat:
+      return 3;
+    case storage::VolumeStatus::kUnreadable:
+      return 4;
+    case storage::VolumeStatus::kFull:
+      return 5;
+    case storage::VolumeStatus::kFragmented:
+      return 6;
+  }
+  return 0;
+}
+
+void Panel::step(const Recorder& recorder, uint32_t now_us) {
+  const Recorder::State state = recorder.state();
+  if (state != shown_) {
+    if (state == Recorder::State::kRecording) tones_ = 2;
+    if (shown_ == Recorder::State::kRecording) tones_ = 4;
+    shown_ = state;
+    flash_ = 0;
+    turned_us_ = now_us;
+    tone_us_ = now_us;
+  }
+  const uint8_t flashes = trouble_flashes(state, recorder.volume_status());
+  const uint32_t since_us = now_us - turned_us_;
+  if (flashes > 0) {
+    if (since_us >= kHalfFlashUs) {
+      turned_us_ = now_us;
+      flash_ = static_cast<uint8_t>(flash_ + 1 >= 2 * flashes + kPauseHalves ? 0 : flash_ + 1);
+    }
+    const bool on = flash_ < 2 * flashes && flash_ % 2 == 0;
+    hal::set_led(on);
+    hal::set_buzzer(on);
+    return;
+  }
+  if (state == Recorder::State::kReady) {
+    hal::set_led(true);
+  } else {
+    const uint32_t half_us = state == Recorder::State::kRecording ? kHalfSlowUs : kHalfFastUs;
+    if (since_us >= half_us) {
+      turned_us_ = now_us;
+      flash_ ^= 1U;
+    }
+    hal::set_led(flash_ == 0);
+  }
+  sound(state, now_us);
+}
+
+void Panel::sound(Recorder::State, uint32_t now_us) {
+  if (tones_ > 0 && now_us - tone_us_ >= kHalfSlowUs) {
+    tone_us_ = now_us;
+    --tones_;
+  }
+  hal::set_buzzer(tones_ > 0 && tones_ % 2 == 0);
+}
+
+}  // namespace app

@@ -1,0 +1,30 @@
+// What the pilot at the field sees and hears. LED: on while ready, slow blinks while recording,
+// fast blinks while an open file waits for the throttle, else groups of flashes that say what is
+// wrong. Buzzer: one long tone at the start, two at the end, groups of beeps with the flashes.
+#pragma once
+
+#include <stdint.h>
+
+#include "app/recorder.h"
+
+namespace app {
+
+class Panel {
+ public:
+  void step(const Recorder& recorder, uint32_t now_us);
+
+ private:
+  void sound(Recorder::State state, uint32_t now_us);
+
+  uint32_t turned_us_ = 0;
+  uint32_t tone_us_ = 0;
+  uint8_t flash_ = 0;  // half periods since the group began
+  uint8_t tones_ = 0;  // half periods of the tone still to come
+  Recorder::State shown_ = Recorder::State::kNoFile;
+};
+
+// Flashes of a group: 2 no card, 3 no FAT32, 4 unreadable, 5 full, 6 no room in one piece,
+// 7 card lost while recording. 0: nothing is wrong.
+uint8_t trouble_flashes(Recorder::State state, storage::VolumeStatus status);
+
+}  // namespace app

@@ -1,0 +1,77 @@
+#include "app/pilot_link.h"
+
+#include "hal/clock.h"
+#include "hal/panel.h"
+#include "hal/pulse_capture.h"
+#include "hal/relay.h"
+#include "hal/servo_output.h"
+#include "hal/system.h"
+
+namespace app {
+
+void PilotLink::start() {
+  hal::start_pulse_capture();
+  lost_edges_ = hal::lost_edges();
+}
+
+void PilotLink::step(const frames::ConfigFrame& config, bool self_test_passed, Outlet& outlet) {
+  hal::Edge edge;
+  while (hal::take_edge(&edge)) {
+    decoder_.edge(core::extend_ticks(hal::now_ticks(), edge.at_ticks), edge.levels, edge.late);
+  }
+  if (hal::lost_edges() != lost_edges_) {
+    lost_edges_ = hal::lost_edges();
+    decoder_.gap();
+  }
+  const uint32_t now_us = hal::now_us();
+  const uint8_t storm = hal::edge_storm();
+  if (storm != 0) {
+    decoder_.storm();
+    if (!stormy_) outlet.event(frames::Event::kReceiverStorm, storm, now_us);
+  }
+  stormy_ = storm != 0;
+  decoder_.poll(hal::now_ticks());
+  channels_ = core::map_channels(decoder_, config);
+  drive_.update(channels_, config, self_test_passed, now_us);
+  for (uint8_t servo = 0; servo < core::kServos; ++servo) {
+    const uint16_t ticks = drive_.servo_ticks(servo);
+    if (ticks == sent_ticks_[servo]) continue;
+    sent_ticks_[servo] = ticks;
+    hal::set_servo_pulse(servo, ticks);
+  }
+  report(outlet, now_us);
+  ran(kTaskPilot);
+}
+
+void PilotLink::beat(uint32_t now_us) {
+  if (!health_.beat(now_us)) return;
+  hal::feed_watchdog();
+  if (drive_.relay()) hal::toggle_heartbeat();
+}
+
+void PilotLink::report(Outlet& outlet, uint32_t now_us) {
+  const uint8_t missing = drive_.missing();
+  if (missing != told_missing_) {
+    if (missing == 0) {
+      outlet.event(frames::Event::kReceiverFound, decoder_.frame_us(), now_us);
+    } else if ((missing & ~told_missing_) != 0) {
+      outlet.event(frames::Event::kReceiverLost, missing, now_us);
+    }
+    told_missing_ = missing;
+  }
+  if (drive_.drive() != told_drive_) {
+    told_drive_ = drive_.drive();
+    outlet.event(frames::Event::kDriveChanged, static_cast<uint32_t>(told_drive_), now_us);
+  }
+}
+
+core::PilotInputs PilotLink::inputs(const frames::ConfigFrame& config) const {
+  core::PilotInputs in;
+  in.button_down = hal::button_pressed();
+  in.throttle_valid = (channels_.steady & (1U << core::kThrottle)) != 0;
+  in.throttle_idle = channels_.width_ticks[core::kThrottle] <=
+                     static_cast<uint32_t>(config.throttle_idle_max_us) * core::kTicksPerUs;
+  return in;
+}
+
+}  // namespace app

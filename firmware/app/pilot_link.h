@@ -1,0 +1,46 @@
+// From receiver pulses to servo pulses, and the proof of life that holds the relay.
+#pragma once
+
+#include <stdint.h>
+
+#include "app/outlet.h"
+#include "core/drive.h"
+#include "core/health.h"
+#include "core/rc_decoder.h"
+#include "core/recording.h"
+
+namespace app {
+
+// Parts of the main loop that must all have run before the heartbeat turns over.
+enum Task : uint8_t { kTaskPilot, kTaskSensors, kTaskRecorder, kTaskCount };
+
+class PilotLink {
+ public:
+  void start();
+  // Every turn of the main loop, and while the card makes a call wait.
+  void step(const frames::ConfigFrame& config, bool self_test_passed, Outlet& outlet);
+  // Turns the heartbeat over and feeds the watchdog once every task has run.
+  void ran(Task task) { health_.ran(static_cast<uint8_t>(task)); }
+  void beat(uint32_t now_us);
+
+  core::PilotInputs inputs(const frames::ConfigFrame& config) const;
+  const core::RcChannels& channels() const { return channels_; }
+  const core::RcDecoder& decoder() const { return decoder_; }
+  frames::Drive drive() const { return drive_.drive(); }
+  uint16_t servo_ticks(uint8_t servo) const { return drive_.servo_ticks(servo); }
+
+ private:
+  void report(Outlet& outlet, uint32_t now_us);
+
+  core::RcDecoder decoder_;
+  core::DriveControl drive_;
+  core::HealthGate health_{kTaskCount};
+  core::RcChannels channels_ = {};
+  uint16_t sent_ticks_[core::kServos] = {};
+  uint16_t lost_edges_ = 0;
+  frames::Drive told_drive_ = frames::Drive::kDirectBoot;
+  uint8_t told_missing_ = (1U << core::kChannels) - 1;
+  bool stormy_ = false;
+};
+
+}  // namespace app

@@ -1,0 +1,336 @@
+#include "app/recorder.h"
+
+#include <string.h>
+
+#include "app/version.h"
+#include "hal/clock.h"
+#include "hal/system.h"
+#include "storage/block_build.h"
+
+namespace app {
+
+using hal::CardStatus;
+using storage::VolumeStatus;
+
+namespace {
+
+constexpr uint32_t kRetryUs = 2000000UL;
+constexpr uint32_t kDeadUs = 2000000UL;  // no card is busy that long
+constexpr uint32_t kStallUs = 100000UL;  // worth an event
+constexpr uint16_t kPortion = 128;       // bytes of a block per turn: 0.2 ms on SPI
+constexpr uint32_t kLowSeconds = 60;
+constexpr uint32_t kOtherBytesPerS = 1000;  // frames beside the identification frame
+
+// Blocks the end of a session may need: the ring, and a return of the schema under way.
+constexpr uint32_t kEndBlocks = 32;
+
+void copy_text(char* to, const char* from, uint8_t size) {
+  memset(to, 0, size);
+  for (uint8_t i = 0; i + 1 < size && from[i] != '\0'; ++i) to[i] = from[i];
+}
+
+}  // namespace
+
+Recorder::Recorder(core::ByteRing& ring, Outlet& outlet, Store& store, Sensors& sensors)
+    : ring_(ring),
+      outlet_(outlet),
+      store_(store),
+      sensors_(sensors),
+      writer_(ring, storage::schema_text(), storage::schema_size(), storage::schema_hash()) {}
+
+void Recorder::step(const core::PilotInputs& in, frames::ConfigFrame& config, uint32_t now_us) {
+  config_ = &config;
+  const core::RecordAction action =
+      control_.update(in, recording(), config.auto_start != 0, now_us);
+  const uint16_t press_ms = control_.take_press_ms();
+  if (press_ms > 0) outlet_.event(frames::Event::kButton, press_ms, now_us);
+  const bool start_button = action == core::RecordAction::kStartButton;
+  const bool flying = in.throttle_valid && !in.throttle_idle;
+  switch (state_) {
+    case State::kNoFile:
+    case State::kFailed:
+      if (!looked_ || now_us - retry_us_ >= kRetryUs) open_volume();
+      break;
+    case State::kUndecided:
+      decide(in, start_button, now_us);
+      break;
+    case State::kReady:
+      if (start_button) begin(0, prepared_, now_us);
+      if (action == core::RecordAction::kStartThrottle) begin(1, prepared_, now_us);
+      break;
+    case State::kRecording:
+      record(action, now_us);
+      break;
+    case State::kEnding:
+      stream(now_us);
+      if (state_ == State::kEnding && writer_.drained() && !block_open_ && !programming_) {
+        finish(now_us);
+      }
+      break;
+    case State::kFileFull:
+      if (!flying) finish(now_us);
+      break;
+  }
+}
+
+void Recorder::open_volume() {
+  const bool after_failure = state_ == State::kFailed;
+  looked_ = true;
+  prepared_ = false;
+  volume_status_ = volume_.mount();
+  storage::FileState found = storage::FileState::kNone;
+  if (volume_status_ == VolumeStatus::kReady) volume_status_ = volume_.find_latest(&found);
+  if (volume_status_ == VolumeStatus::kReady) {
+    switch (found) {
+      case storage::FileState::kNone:
+      case storage::FileState::kClosed:
+        prepare_next();
+        break;
+      case storage::FileState::kBlank:
+        state_ = State::kReady;
+        break;
+      case storage::FileState::kOpen:
+        boot_.start(hal::flight_mark() || after_failure);
+        state_ = State::kUndecided;
+        break;
+    }
+  }
+  retry_us_ = hal::now_us();
+}
+
+void Recorder::decide(const core::PilotInputs& in, bool start_pressed, uint32_t now_us) {
+  switch (boot_.update(in, start_pressed, now_us)) {
+    case core::BootAction::kWait:
+      return;
+    case core::BootAction::kResume:
+      begin(2, false, now_us);
+      return;
+    case core::BootAction::kClose:
+      storage::Volume::set_date(sensors_.fat_date());
+      volume_status_ =
+          volume_.close(volume_.file().next_block, !volume_.file().ended, hal::now_us());
+      state_ = State::kNoFile;
+      if (volume_status_ == VolumeStatus::kReady) prepare_next();
+      return;
+  }
+}
+
+void Recorder::prepare_next() {
+  const uint32_t session = next_session();
+  storage::Volume::set_date(sensors_.fat_date());
+  volume_status_ = volume_.prepare(session);
+  prepared_ = volume_status_ == VolumeStatus::kReady;
+  state_ = prepared_ ? State::kReady : State::kNoFile;
+  retry_us_ = hal::now_us();
+}
+
+uint32_t Recorder::next_session() {
+  const uint32_t in_file = volume_.file().last_session;
+  const uint32_t largest = in_file > store_.session() ? in_file : store_.session();
+  store_.set_session(largest + 1);
+  return largest + 1;
+}
+
+void Recorder::begin(uint32_t why, bool same_session, uint32_t now_us) {
+  const storage::FlightFile& file = volume_.file();
+  const uint32_t session = same_session ? file.last_session : next_session();
+  prepared_ = false;
+  resumed_ = why == 2;
+  writer_.start(file.file_id, session, file.next_block, now_us);
+  outlet_.open();
+  heads_told_ = false;
+  put_heads(now_us);
+  outlet_.event(frames::Event::kSessionStart, why, now_us);
+  outlet_.release_waiting();
+  file_low_told_ = false;
+  rejects_ = 0;
+  marks_ = 0;
+  stream_open_ = false;
+  block_open_ = false;
+  programming_ = false;
+  state_ = State::kRecording;
+  hal::set_flight_mark(true);
+}
+
+void Recorder::put_heads(uint32_t now_us) {
+  frames::ConfigFrame config = *config_;
+  config.t_us = now_us;
+  outlet_.put(config);
+  frames::IdentityFrame who;
+  identity(&who, now_us);
+  outlet_.put(who);
+  frames::BaroCoefficientsFrame words;
+  if (sensors_.coefficients(&words, now_us)) outlet_.put(words);
+}
+
+void Recorder::identity(frames::IdentityFrame* out, uint32_t now_us) const {
+  memset(out, 0, sizeof *out);
+  out->t_us = now_us;
+  out->session = writer_.session();
+  memcpy(out->card_id, volume_.card_id(), sizeof out->card_id);
+  out->boots = store_.boots();
+  out->reset_cause = static_cast<uint8_t>(hal::reset_source());
+  out->resumed = resumed_ ? 1 : 0;
+  copy_text(out->board, hal::board_name(), sizeof out->board);
+  copy_text(out->firmware, kVersion, sizeof out->firmware);
+}
+
+void Recorder::record(core::RecordAction action, uint32_t now_us) {
+  if (writer_.take_identities_due()) {
+    // The first pass of the schema comes with the heads that begin() has put already.
+    if (heads_told_) put_heads(now_us);
+    heads_told_ = true;
+  }
+  if (action == core::RecordAction::kMark) outlet_.event(frames::Event::kMark, ++marks_, now_us);
+  watch_room(now_us);
+  if (action == core::RecordAction::kStop) end(0, now_us);
+  stream(now_us);
+}
+
+void Recorder::watch_room(uint32_t now_us) {
+  const uint32_t blocks = volume_.file().blocks;
+  const uint32_t next = writer_.sequence();
+  if (next + kEndBlocks >= blocks) {
+    end(1, now_us);
+    return;
+  }
+  const uint32_t bytes_per_s =
+      static_cast<uint32_t>(config_->rate_hz) * frames::kIdentWireSize + kOtherBytesPerS;
+  const uint32_t low_blocks = bytes_per_s * kLowSeconds / core::kBlockPayloadSize;
+  if (file_low_told_ || blocks - next > low_blocks + kEndBlocks) return;
+  file_low_told_ = true;
+  outlet_.event(frames::Event::kFileLow, kLowSeconds, now_us);
+}
+
+void Recorder::end(uint32_t why, uint32_t now_us) {
+  if (state_ != State::kRecording) return;
+  outlet_.event(frames::Event::kSessionEnd, why, now_us);
+  outlet_.close();
+  writer_.finish();
+  hal::set_flight_mark(false);
+  state_ = State::kEnding;
+  full_ = why == 1;
+}
+
+void Recorder::finish(uint32_t now_us) {
+  if (stream_open_) {
+    hal::end_stream();
+    stream_open_ = false;
+  }
+  if (state_ == State::kEnding && full_) {
+    state_ = State::kFileFull;
+    return;
+  }
+  volume_status_ = volume_.close(writer_.sequence(), false, now_us);
+  state_ = State::kNoFile;
+  if (volume_status_ == VolumeStatus::kReady) prepare_next();
+}
+
+void Recorder::fail(frames::Event code, uint32_t arg, uint32_t now_us) {
+  outlet_.close();
+  outlet_.event(code, arg, now_us);
+  if (card_errors_ != 0xFFFFU) ++card_errors_;
+  stream_open_ = false;
+  block_open_ = false;
+  programming_ = false;
+  state_ = State::kFailed;
+  volume_status_ = VolumeStatus::kNoCard;
+  retry_us_ = now_us;
+}
+
+void Recorder::stream(uint32_t now_us) {
+  if (block_open_) {
+    next_block(now_us);
+    return;
+  }
+  if (!stream_open_) {
+    if (writer_.due(now_us)) open_stream(now_us);
+    return;
+  }
+  switch (hal::poll_stream()) {
+    case CardStatus::kBusy:
+      if (programming_ && now_us - accepted_us_ >= kDeadUs) {
+        fail(frames::Event::kCardError, static_cast<uint32_t>(CardStatus::kBusy), now_us);
+      }
+      return;
+    case CardStatus::kOk:
+      note_busy(now_us);
+      if (!writer_.due(now_us)) return;
+      hal::open_block();
+      block_open_ = true;
+      next_block(now_us);
+      return;
+    case CardStatus::kAbsent:
+      fail(frames::Event::kCardRemoved, 0, now_us);
+      return;
+    case CardStatus::kRejected:
+    case CardStatus::kError:
+      fail(frames::Event::kCardError, static_cast<uint32_t>(CardStatus::kError), now_us);
+      return;
+  }
+}
+
+void Recorder::open_stream(uint32_t now_us) {
+  const CardStatus status = hal::begin_stream(volume_.file().first_lba + writer_.sequence());
+  if (status == CardStatus::kOk) {
+    stream_open_ = true;
+  } else if (status == CardStatus::kAbsent) {
+    fail(frames::Event::kCardRemoved, 0, now_us);
+  } else if (status != CardStatus::kBusy) {
+    fail(frames::Event::kCardError, static_cast<uint32_t>(status), now_us);
+  }
+}
+
+void Recorder::next_block(uint32_t now_us) {
+  Sink sink;
+  if (!writer_.stream(sink, kPortion)) return;
+  block_open_ = false;
+  close_block(now_us);
+}
+
+void Recorder::close_block(uint32_t now_us) {
+  const CardStatus status = hal::close_block();
+  if (status == CardStatus::kOk) {
+    writer_.accepted();
+    rejects_ = 0;
+    programming_ = true;
+    accepted_us_ = hal::now_us();
+    return;
+  }
+  stream_open_ = false;
+  if (status == CardStatus::kAbsent) {
+    fail(frames::Event::kCardRemoved, 0, now_us);
+    return;
+  }
+  if (card_errors_ != 0xFFFFU) ++card_errors_;
+  if (++rejects_ == 1) {
+    writer_.rejected();
+  } else if (rejects_ <= 4) {
+    outlet_.event(frames::Event::kBlockSkipped, writer_.sequence(), now_us);
+    writer_.skip();
+  } else {
+    fail(frames::Event::kCardError, static_cast<uint32_t>(status), now_us);
+  }
+}
+
+void Recorder::note_busy(uint32_t now_us) {
+  if (!programming_) return;
+  programming_ = false;
+  const uint32_t busy_us = now_us - accepted_us_;
+  const uint32_t busy_ms = busy_us / 1000U;
+  if (busy_ms > busy_max_ms_) busy_max_ms_ = static_cast<uint16_t>(busy_ms);
+  if (busy_us >= kStallUs) outlet_.event(frames::Event::kCardStall, busy_ms, now_us);
+}
+
+void Recorder::put_health(frames::SystemFrame* out) {
+  out->frames_dropped = ring_.dropped();
+  out->blocks_written = writer_.blocks_written();
+  out->card_busy_max_ms = busy_max_ms_;
+  out->ring_free_min = ring_.take_free_min();
+  out->card_errors = card_errors_;
+  const bool card = state_ != State::kNoFile && state_ != State::kFailed;
+  if (card) out->sensors = static_cast<uint8_t>(out->sensors | frames::kSensorsCard);
+  busy_max_ms_ = 0;
+}
+
+}  // namespace app

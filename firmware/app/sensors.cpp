@@ -1,0 +1,233 @@
+#include "app/sensors.h"
+
+#include "hal/analog_input.h"
+#include "hal/clock.h"
+#include "hal/imu_bus.h"
+#include "hal/relay.h"
+#include "hal/serial.h"
+
+namespace app {
+
+namespace {
+
+constexpr uint32_t kBaroUs = 40000UL;
+constexpr uint32_t kMagUs = 1000000UL / 15U;
+constexpr uint32_t kAttitudeUs = 100000UL;
+constexpr uint32_t kImuSilentUs = 100000UL;
+constexpr uint32_t kGpsSilentUs = 2000000UL;
+
+// An open or shorted sensor sits within two counts of a rail (sums of four conversions).
+constexpr uint16_t kRailCounts = 2U * hal::kAnalogRounds;
+constexpr uint16_t kFullSum = 1023U * hal::kAnalogRounds;
+
+bool usable(uint16_t sum) {
+  return sum >= kRailCounts && sum <= kFullSum - kRailCounts;
+}
+
+}  // namespace
+
+void Sensors::start(const frames::ConfigFrame& config, uint32_t now_us) {
+  hal::start_imu_bus();
+  hal::start_baro_bus();
+  hal::start_analog();
+  trigger_.start(config.rate_hz, now_us);
+  baro_turn_.start(now_us);
+  mag_turn_.start(now_us);
+  attitude_turn_.start(now_us);
+  imu_heard_us_ = now_us;
+  gps_heard_us_ = now_us;
+}
+
+void Sensors::step(const frames::ConfigFrame& config, const PilotLink& pilot, Outlet& outlet) {
+  const uint32_t now_us = hal::now_us();
+  step_imu(outlet, now_us);
+  step_ident(pilot, outlet);
+  step_baro(outlet, now_us);
+  step_gps(config, outlet, now_us);
+}
+
+void Sensors::step_imu(Outlet& outlet, uint32_t now_us) {
+  for (const hal::ImuPacket* packet = hal::imu_packet(); packet != nullptr;
+       packet = hal::imu_packet()) {
+    const core::ImuResult result =
+        imu_.packet(packet->address, packet->bytes, packet->length, packet->start_us);
+    const uint32_t start_us = packet->start_us;
+    hal::release_imu_packet();
+    if (result == core::ImuResult::kBad) continue;
+    imu_heard_us_ = start_us;
+    if (result != core::ImuResult::kSample) continue;
+    imu_fresh_ = true;
+    const core::ImuSample& sample = imu_.sample();
+    hear(sample.original ? frames::kSensorsImuOriginal : frames::kSensorsImu);
+    if (!sample.original) trigger_.imu_packet(sample.seq, start_us);
+    if (!imu_present_) outlet.event(frames::Event::kImuFound, sample.original ? 1U : 0U, now_us);
+    imu_present_ = true;
+    if (imu_.take_restarted()) outlet.event(frames::Event::kImuRestarted, 0, now_us);
+  }
+  frames::MagFrame mag;
+  if (imu_.take_mag(mag) && mag_turn_.due(now_us, kMagUs)) outlet.put(mag);
+  frames::AttitudeFrame attitude;
+  if (imu_.take_attitude(attitude) && attitude_turn_.due(now_us, kAttitudeUs)) {
+    outlet.put(attitude);
+  }
+  const uint32_t silent_us = now_us - imu_heard_us_;
+  if (static_cast<int32_t>(silent_us) < static_cast<int32_t>(kImuSilentUs)) return;
+  if (imu_present_) {
+    imu_present_ = false;
+    outlet.event(frames::Event::kImuLost, silent_us / 1000U, now_us);
+  }
+  hal::restart_imu_bus();
+  imu_heard_us_ = now_us;
+}
+
+void Sensors::step_ident(const PilotLink& pilot, Outlet& outlet) {
+  if (scanning_ && hal::scan_done()) finish_ident(outlet);
+  switch (trigger_.poll(hal::now_us(), !scanning_)) {
+    case core::IdentTrigger::Source::kNone:
+      return;
+    case core::IdentTrigger::Source::kImu:
+      begin_ident(pilot, true);
+      return;
+    case core::IdentTrigger::Source::kTimer:
+      begin_ident(pilot, false);
+      return;
+  }
+}
+
+void Sensors::begin_ident(const PilotLink& pilot, bool imu_triggered) {
+  const uint32_t t_us = hal::start_scan();
+  scanning_ = true;
+  const core::ImuSample& sample = imu_.sample();
+  ident_.t_us = t_us;
+  ident_.count = static_cast<uint16_t>(ident_.count + 1U);
+  ident_.imu_age = imu_.age_4us(t_us);
+  ident_.imu_seq = sample.seq;
+  ident_.p = sample.p;
+  ident_.q = sample.q;
+  ident_.r = sample.r;
+  ident_.ax = sample.ax;
+  ident_.ay = sample.ay;
+  ident_.az = sample.az;
+  ident_.phi = sample.phi;
+  ident_.theta = sample.theta;
+  ident_.psi = sample.psi;
+  ident_.servo_aileron = pilot.servo_ticks(core::kAileron);
+  ident_.servo_elevator = pilot.servo_ticks(core::kElevator);
+  ident_.servo_rudder = pilot.servo_ticks(core::kRudder);
+  ident_.servo_throttle = pilot.servo_ticks(core::kThrottle);
+  const core::RcChannels& rc = pilot.channels();
+  ident_.rc_aileron = rc.width_ticks[core::kAileron];
+  ident_.rc_elevator = rc.width_ticks[core::kElevator];
+  ident_.rc_rudder = rc.width_ticks[core::kRudder];
+  ident_.rc_throttle = rc.width_ticks[core::kThrottle];
+  ident_.rc_switch = rc.width_ticks[core::kSwitch];
+  uint16_t valid = 0;
+  const bool attitude = sample.original ? sample.phi != frames::kIdentPhiInvalid
+                                        : (sample.flags & frames::kImuFlagsAttitudeValid) != 0;
+  if (imu_fresh_) valid |= frames::kValidImuFresh;
+  if (sample.unsaturated) valid |= frames::kValidImuUnsaturated;
+  if (attitude) valid |= frames::kValidAttitude;
+  if (imu_triggered) valid |= frames::kValidImuTriggered;
+  if (sample.original) valid |= frames::kValidImuOriginal;
+  if (hal::relay_engaged()) valid |= frames::kValidMegaDrives;
+  ident_.valid = valid;
+  imu_fresh_ = false;
+}
+
+void Sensors::finish_ident(Outlet& outlet) {
+  scanning_ = false;
+  uint16_t sums[hal::kAnalogRail];
+  uint16_t valid = ident_.valid;
+  for (uint8_t slot = 0; slot < hal::kAnalogRail; ++slot) {
+    sums[slot] = hal::scan_sum(slot);
+    // The first ten bits of `valid` are the slots in their order.
+    if (usable(sums[slot])) valid = static_cast<uint16_t>(valid | (1U << slot));
+  }
+  static_assert(frames::kValidPotRudder == 1U << (hal::kAnalogRail - 1), "slots and bits agree");
+  ident_.alpha_a = sums[0];
+  ident_.alpha_b = sums[1];
+  ident_.beta_a = sums[2];
+  ident_.beta_b = sums[3];
+  ident_.dp_a = sums[4];
+  ident_.dp_b = sums[5];
+  ident_.pot_elevator = sums[6];
+  ident_.pot_aileron_left = sums[7];
+  ident_.pot_aileron_right = sums[8];
+  ident_.pot_rudder = sums[9];
+  ident_.valid = valid;
+  rail_ = hal::scan_sum(hal::kAnalogRail);
+  outlet.put(ident_);
+}
+
+void Sensors::step_baro(Outlet& outlet, uint32_t now_us) {
+  if (baro_turn_.due(now_us, kBaroUs)) barometer_.measure();
+  switch (barometer_.poll(now_us)) {
+    case drivers::BaroEvent::kNone:
+      return;
+    case drivers::BaroEvent::kFound: {
+      outlet.event(frames::Event::kBaroFound, barometer_.chip_id(), now_us);
+      frames::BaroCoefficientsFrame words;
+      if (coefficients(&words, now_us)) outlet.put(words);
+      return;
+    }
+    case drivers::BaroEvent::kLost:
+      outlet.event(frames::Event::kBaroLost, static_cast<uint32_t>(barometer_.status()), now_us);
+      return;
+    case drivers::BaroEvent::kValue:
+      hear(frames::kSensorsBaro);
+      outlet.put(barometer_.frame());
+      return;
+  }
+}
+
+void Sensors::step_gps(const frames::ConfigFrame& config, Outlet& outlet, uint32_t now_us) {
+  if (config.gps_source == static_cast<uint8_t>(frames::GpsSource::kUbx)) {
+    ublox_.poll(gps_.messages(), now_us);
+    uint8_t byte = 0;
+    while (hal::take_byte(hal::Port::kGps, &byte)) {
+      if (gps_.byte(byte, now_us)) gps_heard(gps_.frame(), outlet, now_us);
+    }
+  } else if (config.gps_source == static_cast<uint8_t>(frames::GpsSource::kOriginalImu)) {
+    frames::GpsFrame frame;
+    if (imu_.take_position(frame)) gps_heard(frame, outlet, now_us);
+  }
+  const uint32_t silent_us = now_us - gps_heard_us_;
+  if (gps_present_ && static_cast<int32_t>(silent_us) >= static_cast<int32_t>(kGpsSilentUs)) {
+    gps_present_ = false;
+    outlet.event(frames::Event::kGpsLost, 0, now_us);
+  }
+}
+
+void Sensors::gps_heard(const frames::GpsFrame& frame, Outlet& outlet, uint32_t now_us) {
+  gps_heard_us_ = now_us;
+  hear(frames::kSensorsGps);
+  if (!gps_present_) outlet.event(frames::Event::kGpsFound, 0, now_us);
+  gps_present_ = true;
+  if (frame.week != frames::kGpsWeekInvalid && frame.fix >= 2) {
+    fat_date_ = core::fat_time(frame.week, frame.itow_ms);
+  }
+  outlet.put(frame);
+}
+
+bool Sensors::coefficients(frames::BaroCoefficientsFrame* out, uint32_t now_us) const {
+  if (!barometer_.present()) return false;
+  barometer_.coefficients(*out);
+  out->t_us = now_us;
+  return true;
+}
+
+void Sensors::put_health(frames::SystemFrame* out) {
+  heard_ = hearing_;
+  hearing_ = 0;
+  out->imu_packets = imu_.good();
+  out->imu_bad_packets = static_cast<uint16_t>(imu_.bad() + hal::lost_imu_packets());
+  out->imu_lost = imu_.lost();
+  out->baro_errors = barometer_.errors();
+  out->gps_errors = gps_.errors();
+  out->ticks_late = trigger_.late();
+  out->avcc_mv = hal::avcc_mv();
+  out->rail = rail_;
+  out->sensors = static_cast<uint8_t>(out->sensors | heard_);
+}
+
+}  // namespace app

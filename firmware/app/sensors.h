@@ -1,0 +1,68 @@
+// Everything that is measured, made into frames at the rates of frames.toml.
+#pragma once
+
+#include <stdint.h>
+
+#include "app/baro_link.h"
+#include "app/gps_link.h"
+#include "app/outlet.h"
+#include "app/pilot_link.h"
+#include "core/every.h"
+#include "core/gps_receiver.h"
+#include "core/ident_trigger.h"
+#include "core/imu_receiver.h"
+#include "drivers/barometer.h"
+#include "drivers/ublox.h"
+
+namespace app {
+
+class Sensors {
+ public:
+  void start(const frames::ConfigFrame& config, uint32_t now_us);
+  void step(const frames::ConfigFrame& config, const PilotLink& pilot, Outlet& outlet);
+
+  // False while there is no pressure sensor.
+  bool coefficients(frames::BaroCoefficientsFrame* out, uint32_t now_us) const;
+  void put_health(frames::SystemFrame* out);
+  // Bits of frames.toml, `sensors`: heard of during the last second.
+  uint8_t heard() const { return heard_; }
+  uint32_t fat_date() const { return fat_date_; }
+  const frames::BaroFrame& baro() const { return barometer_.frame(); }
+  const frames::GpsFrame& gps() const { return gps_.frame(); }
+  const frames::IdentFrame& ident() const { return ident_; }
+  uint16_t rail() const { return rail_; }
+
+ private:
+  void step_imu(Outlet& outlet, uint32_t now_us);
+  void step_ident(const PilotLink& pilot, Outlet& outlet);
+  void begin_ident(const PilotLink& pilot, bool imu_triggered);
+  void finish_ident(Outlet& outlet);
+  void step_baro(Outlet& outlet, uint32_t now_us);
+  void step_gps(const frames::ConfigFrame& config, Outlet& outlet, uint32_t now_us);
+  void gps_heard(const frames::GpsFrame& frame, Outlet& outlet, uint32_t now_us);
+  void hear(uint8_t bit) { hearing_ = static_cast<uint8_t>(hearing_ | bit); }
+
+  core::ImuReceiver imu_;
+  core::IdentTrigger trigger_;
+  core::GpsReceiver gps_;
+  BaroLink baro_link_;
+  drivers::Barometer<BaroLink> barometer_{baro_link_};
+  GpsLink gps_link_;
+  drivers::Ublox<GpsLink> ublox_{gps_link_};
+  core::Every baro_turn_;
+  core::Every mag_turn_;
+  core::Every attitude_turn_;
+  frames::IdentFrame ident_ = {};
+  uint32_t imu_heard_us_ = 0;
+  uint32_t gps_heard_us_ = 0;
+  uint32_t fat_date_ = 0;
+  uint16_t rail_ = 0;
+  uint8_t hearing_ = 0;
+  uint8_t heard_ = 0;
+  bool scanning_ = false;
+  bool imu_fresh_ = false;
+  bool imu_present_ = false;
+  bool gps_present_ = false;
+};
+
+}  // namespace app

@@ -1,0 +1,35 @@
+// The radio: frames in envelopes within the budget of the settings, each kind at a rate of its own.
+#pragma once
+
+#include <stdint.h>
+
+#include "core/byte_budget.h"
+#include "core/every.h"
+#include "generated/frames.h"
+
+namespace app {
+
+class Telemetry {
+ public:
+  void start(const frames::ConfigFrame& config, uint32_t now_us);
+
+  // Sends the frame if it is its turn, else counts it as dropped. `size` is without the id.
+  void offer(uint8_t id, const void* fields, uint8_t size, uint32_t now_us);
+  // The hash of the schema; true every 5 s, when config and identity are to be offered too.
+  bool poll(uint32_t now_us);
+
+  frames::Telemetry mode() const { return mode_; }
+  uint16_t dropped() const { return dropped_; }
+  bool send_text(const char* text, uint8_t size, uint32_t now_us);
+
+ private:
+  bool send(uint8_t id, const void* fields, uint8_t size, uint32_t now_us);
+
+  core::ByteBudget budget_;
+  core::Every heads_;
+  uint32_t last_us_[frames::kBaroCoefficientsId + 1] = {};
+  uint16_t dropped_ = 0;
+  frames::Telemetry mode_ = frames::Telemetry::kOff;
+};
+
+}  // namespace app

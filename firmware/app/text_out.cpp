@@ -1,0 +1,38 @@
+#include "app/text_out.h"
+
+#include "core/progmem.h"
+
+namespace app {
+
+void TextOut::flash(const char* flash) {
+  for (;; ++flash) {
+    const char next = static_cast<char>(core::flash_u8(flash));
+    if (next == '\0') return;
+    letter(next);
+  }
+}
+
+void TextOut::ram(const char* text) {
+  while (*text != '\0') letter(*text++);
+}
+
+void TextOut::number(int32_t value) {
+  fixed(value, 0);
+}
+
+void TextOut::fixed(int32_t value, uint8_t places) {
+  char digits[12];
+  uint8_t count = 0;
+  uint32_t left = value < 0 ? 0U - static_cast<uint32_t>(value) : static_cast<uint32_t>(value);
+  do {
+    digits[count++] = static_cast<char>('0' + left % 10U);
+    left /= 10U;
+  } while (left > 0 || count <= places);
+  if (value < 0) letter('-');
+  while (count > 0) {
+    letter(digits[--count]);
+    if (count == places && places > 0) letter('.');
+  }
+}
+
+}  // namespace app
