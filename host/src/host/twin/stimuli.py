@@ -7,7 +7,6 @@ of the Mega's clock: true time times one plus the clock's error.
 from __future__ import annotations
 
 import binascii
-import struct
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +34,11 @@ GPS_BYTE_S = 10.0 / 38_400.0
 RAIL_COUNT = 614.0  # 5.0 V servo rail through a divider of 1.67 on a 5 V reference
 SAMPLE_STEP_TICKS = 2_000  # analogue grid: 1 ms
 OVERSAMPLING = 3
+# Packet "imu" of protocol/frames.toml, without its CRC.
+PACKET = np.dtype(
+    [("kind", "u1"), ("seq", "u1"), ("flags", "u1"), ("aux_kind", "u1"), ("t_us", "<u4"),
+     ("age", "<u2"), ("raw", "<i2", 9), ("aux", "<i2", 3)]
+)  # fmt: skip
 EDGE = np.dtype([("at", np.int64), ("levels", np.uint8)])
 
 
@@ -211,17 +215,18 @@ def _imu_packets(
     gyro_full = np.abs(sample.raw[:, :3]).max(axis=1) >= 32767
     accel_full = np.abs(sample.raw[:, 3:6]).max(axis=1) >= 32767
     flags = gyro_full.astype(np.int64) + 2 * accel_full + 4 + 8 + 16
+    rows = np.zeros(len(at), dtype=PACKET)
+    rows["kind"] = 0xA6
+    rows["seq"] = np.arange(len(at)) & 0xFF
+    rows["flags"], rows["aux_kind"] = flags, aux_kind
+    rows["t_us"], rows["age"] = imu_us, age_steps
+    rows["raw"], rows["aux"] = sample.raw, aux
+    body = rows.tobytes()
     packets = []
-    pack = struct.Struct("<BBBBIH9h3h").pack
-    for i in range(len(at)):
-        body = pack(
-            0xA6, i & 0xFF, int(flags[i]), int(aux_kind[i]), int(imu_us[i]), int(age_steps[i]),
-            *sample.raw[i].tolist(), *aux[i].tolist(),
-        )  # fmt: skip
-        crc = binascii.crc_hqx(body, 0xFFFF)
-        packets.append(
-            ImuPacket(int(start[i]), int(end[i]), IMU_ADDRESS, body + struct.pack("<H", crc))
-        )
+    for i, (first, last) in enumerate(zip(start.tolist(), end.tolist(), strict=True)):
+        one = body[i * PACKET.itemsize : (i + 1) * PACKET.itemsize]
+        crc = binascii.crc_hqx(one, 0xFFFF)
+        packets.append(ImuPacket(first, last, IMU_ADDRESS, one + crc.to_bytes(2, "little")))
     return sample, _damage(record, at, packets, rng)
 
 
