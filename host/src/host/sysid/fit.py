@@ -54,6 +54,28 @@ METHODS: dict[str, Method] = {
         "maximum likelihood for white noise, covariance corrected for colour",
         (("memory", False),),
     ),
+    "filter-error": Method(
+        "filter_error", "fit_filter_error", "maximum likelihood with process noise"
+    ),
+    "frequency-equation-error": Method(
+        "frequency", "fit_frequency_equation_error", "least squares on chirp-z transforms"
+    ),
+    "frequency-output-error": Method(
+        "frequency", "fit_frequency_output_error", "maximum likelihood on chirp-z transforms"
+    ),
+    "stepwise": Method("stepwise", "fit_stepwise", "terms chosen by partial F"),
+    "recursive": Method(
+        "recursive", "fit_recursive_least_squares", "recursive least squares, real time"
+    ),
+    "recursive-fourier": Method(
+        "recursive", "fit_recursive_fourier", "regression on running transforms, real time"
+    ),
+    "extended-kalman": Method("kalman", "fit_extended", "joint states and parameters"),
+    "unscented-kalman": Method(
+        "kalman", "fit_unscented", "joint states and parameters, sigma points"
+    ),
+    "genetic": Method("genetic", "fit_genetic", "differential evolution, polished"),
+    "neural-delta": Method("neural", "fit_neural", "derivatives of a trained network"),
     "hopfield": Method("hopfield", "fit_hopfield", "the printed network iteration"),
     "hopfield-line-search": Method(
         "hopfield", "fit_hopfield", "the original program", (("variant", "line-search"),)

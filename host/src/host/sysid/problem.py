@@ -194,15 +194,44 @@ class OutputProblem:
             result.append(Response(y, slope))
         return result
 
+    def outputs(self, theta: Array) -> list[Array] | None:
+        """Simulate without sensitivities: outputs (p, samples) per maneuver, None if divergent."""
+        model = self.model
+        n, m = len(model.states), len(model.inputs)
+        A, B, C, D = model.matrices(theta)
+        AB = np.zeros((n, n + m + 1))
+        AB[:, :n], AB[:, n : n + m] = A, B
+        none = np.zeros(0, dtype=np.int64)
+        result: list[Array] = []
+        for part in self._parts:
+            local = theta[part.index]
+            AB[:, -1] = 0.0
+            for k, state in enumerate(model.state_biases):
+                AB[model.states.index(state), -1] = local[self.n_common + k]
+            step, _ = transition(
+                AB, n, m, model.hold == "foh", part.dt_s, none, none, none, np.zeros(0), 0
+            )
+            start = np.where(self._start_parameter >= 0, local[self._start_parameter], 0.0)
+            finite, z = simulate(step, part.drive, start)
+            if not finite:
+                return None
+            y = np.hstack([C, D]) @ z[:, : n + m].T
+            y += np.where(self._bias_parameter >= 0, local[self._bias_parameter], 0.0)[:, None]
+            self._delay(y, np.zeros((len(y), 0, 0)), local, part.dt_s)
+            result.append(y)
+        return result
+
     def _delay(self, y: Array, slope: Array, local: Array, dt_s: float) -> None:
         for k, delay in enumerate(self.model.delays, start=len(self.model.parameters)):
             shift = local[k] / dt_s
             for output in delay.outputs:
                 j = self.model.outputs.index(output)
                 late, by_shift = delayed(np.ascontiguousarray(y[j][:, None]), shift)
+                y[j] = late[:, 0]
+                if slope.shape[1] == 0:
+                    continue
                 if shift != 0.0:
                     slope[j] = delayed(slope[j], shift)[0]
-                y[j] = late[:, 0]
                 slope[j][:, k] += by_shift[:, 0] / dt_s
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from host.sysid.compiled import Array
 from host.sysid.equation_error import regression_rows, solve_rows
 from host.sysid.errors import IdentificationError
+from host.sysid.maneuver import Maneuver
+from host.sysid.model import LinearModel
 from host.sysid.problem import OutputProblem
 
 
@@ -30,3 +34,8 @@ def start_values(problem: OutputProblem) -> Array:
     if problem.respond(regressed) is None:
         return theta
     return regressed
+
+
+def start_values_of(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:
+    """Return `start_values` of a model and its maneuvers."""
+    return start_values(OutputProblem(model, maneuvers))

@@ -1,0 +1,301 @@
+"""Filter error: maximum likelihood with process noise (turbulence) and measurement noise.
+
+Innovations of a steady-state Kalman filter are the residuals. Unknown are the model, biases, start
+states, the intensity of the process noise of chosen states and the deviation of the noise of every
+output; the search is Fisher scoring on the exact Gaussian likelihood of the innovations.
+Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5; Klein & Morelli, ch. 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from host.sysid.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.kernels import transition
+from host.sysid.maneuver import Maneuver
+from host.sysid.model import LinearModel
+from host.sysid.output_error import minimise
+from host.sysid.problem import OutputProblem
+from host.sysid.result import FitResult
+from host.sysid.riccati import innovations, predicted_covariance
+from host.sysid.start import start_values
+
+STEP_LIMIT = 0.01
+MAX_ITERATIONS = 60
+DIFFERENCE = 1e-5  # of a standard error (or of the size): step of the numeric slopes
+NOISE_SHARE = (0.3, 0.7)  # first guess: process noise explains the first part of residual power
+
+
+@dataclass(slots=True)
+class _Likelihood:
+    """Innovations (maneuvers, samples, p) and their covariance per maneuver's sample period."""
+
+    e: list[Array]
+    S: list[Array]
+    cost: float
+
+
+class FilterProblem:
+    """Innovations as a function of parameters, log process and log measurement deviations."""
+
+    def __init__(
+        self, model: LinearModel, maneuvers: Sequence[Maneuver], process: tuple[str, ...]
+    ) -> None:
+        if model.delays:
+            raise IdentificationError(
+                "filter error has no delays: estimate them by output error and shift the data"
+            )
+        strangers = [s for s in process if s not in model.states]
+        if strangers:
+            raise IdentificationError(
+                f"process noise on {', '.join(strangers)}; states are {', '.join(model.states)}"
+            )
+        self.inner = OutputProblem(model, maneuvers)
+        self.model = model
+        self.maneuvers = tuple(maneuvers)
+        self.process = process
+        self.process_index = [model.states.index(s) for s in process]
+        self.n_model = len(self.inner.names)
+        self.names = (
+            *self.inner.names,
+            *(f"log_process.{s}" for s in process),
+            *(f"log_noise.{y}" for y in model.outputs),
+        )
+        self._drives = []
+        for maneuver in maneuvers:
+            columns = [maneuver.inputs, np.ones((maneuver.samples, 1))]
+            if model.hold == "foh":
+                columns.append(np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:]))
+            self._drives.append(np.ascontiguousarray(np.hstack(columns)))
+
+    def evaluate(self, theta: Array) -> _Likelihood | None:
+        """Return innovations and cost; None where the filter or the model fails."""
+        model = self.model
+        n, m = len(model.states), len(model.inputs)
+        A, B, C, D = model.matrices(theta)
+        AB = np.zeros((n, n + m + 1))
+        AB[:, :n], AB[:, n : n + m] = A, B
+        CD = np.ascontiguousarray(np.hstack([C, D]))
+        split = self.n_model + len(self.process)
+        with np.errstate(over="ignore"):
+            intensity = np.zeros(n)
+            intensity[self.process_index] = np.exp(2.0 * theta[self.n_model : split])
+            R = np.diag(np.exp(2.0 * theta[split:]))
+        if not (np.isfinite(intensity).all() and np.isfinite(R).all()):
+            return None
+        none = np.zeros(0, dtype=np.int64)
+        cost = 0.0
+        all_e: list[Array] = []
+        all_S: list[Array] = []
+        n_common = self.inner.n_common
+        for number, maneuver in enumerate(self.maneuvers):
+            local = theta[self.inner.columns(number)]
+            AB[:, -1] = 0.0
+            position = n_common
+            for state in model.state_biases:
+                AB[model.states.index(state), -1] = local[position]
+                position += 1
+            bias = np.zeros(len(model.outputs))
+            for output in model.output_biases:
+                bias[model.outputs.index(output)] = local[position]
+                position += 1
+            start = np.zeros(n)
+            for state in model.initial_states:
+                start[model.states.index(state)] = local[position]
+                position += 1
+            step, _ = transition(
+                AB, n, m, model.hold == "foh", maneuver.dt_s, none, none, none, np.zeros(0), 0
+            )
+            F = np.ascontiguousarray(step[:, :n])
+            if not np.isfinite(F).all() or np.max(np.abs(F)) > 1e6:
+                return None
+            Q = np.diag(intensity)
+            Qd = 0.5 * maneuver.dt_s * (Q + F @ Q @ F.T)  # trapezoid of the exact integral
+            solved, P = predicted_covariance(F, np.ascontiguousarray(C), Qd, R)
+            if not solved:
+                return None
+            S = C @ P @ C.T + R
+            try:
+                factor = np.linalg.cholesky(S)
+            except np.linalg.LinAlgError:
+                return None
+            K = np.ascontiguousarray(np.linalg.solve(S, C @ P).T)
+            finite, e = innovations(
+                step, CD, K, self._drives[number], maneuver.outputs, start, bias
+            )
+            if not finite:
+                return None
+            white = linalg.solve_triangular(factor, e.T, lower=True)
+            cost += 0.5 * float(np.sum(white**2))
+            cost += len(e) * float(np.sum(np.log(np.diag(factor))))
+            all_e.append(e)
+            all_S.append(S)
+        prior = self.inner.prior_precision
+        miss = theta[: self.n_model] - self.inner.prior_mean
+        cost += 0.5 * float(np.sum(prior * miss**2))
+        return _Likelihood(all_e, all_S, cost) if np.isfinite(cost) else None
+
+
+def fit_filter_error(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    process: tuple[str, ...] | None = None,
+    start: Array | None = None,
+) -> FitResult:
+    """Fit by filter error.
+
+    Parameters
+    ----------
+    model, maneuvers
+        Model and data. A gust can be a state of its own, its entries tied to those of alpha.
+    process : tuple of str, optional
+        States driven by white process noise; without, all whose rate has a free entry.
+    start : Array, optional
+        Start of the model's own vector; output error gives it without.
+
+    Raises
+    ------
+    IdentificationError
+        If no start is finite.
+    """
+    if process is None:
+        rows = {t.row for t in model.terms if t.matrix == "A"}
+        process = tuple(model.states[i] for i in sorted(rows))
+    problem = FilterProblem(model, maneuvers, process)
+    first = start_values(problem.inner) if start is None else np.asarray(start, dtype=np.float64)
+    theta, scale = _first_guess(problem, first, fit_first=start is None)
+    point = problem.evaluate(theta)
+    if point is None:
+        raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
+    damping, converged, iterations, size = 0.0, False, 0, np.inf
+    information, gradient = _scoring(problem, theta, point, scale)
+    while iterations < MAX_ITERATIONS:
+        step, size, bound = _step(information, gradient, damping)
+        limited = step.copy()
+        limited[problem.n_model :] = np.clip(limited[problem.n_model :], -1.5, 1.5)
+        trial_theta = theta + limited
+        trial_theta[: problem.n_model] = np.clip(
+            trial_theta[: problem.n_model], problem.inner.lower, problem.inner.upper
+        )
+        trial = problem.evaluate(trial_theta)
+        if trial is None or trial.cost > point.cost + 1e-9 * abs(point.cost):
+            if size < STEP_LIMIT:
+                converged = True
+                break
+            damping = max(4.0 * damping, 1e-3)
+            if damping > 1e8:
+                break
+            continue
+        theta, point = trial_theta, trial
+        iterations += 1
+        if size < STEP_LIMIT and damping < 1e-2:
+            converged = True
+            break
+        damping = 0.0 if damping < 1e-3 else damping / 8.0
+        scale = np.minimum(np.maximum(bound, 1e-8 * (1.0 + np.abs(theta))), 1.0 + np.abs(theta))
+        information, gradient = _scoring(problem, theta, point, scale)
+    covariance = np.linalg.pinv(information, hermitian=True)
+    kept = problem.n_model
+    warnings = [] if converged else [f"no convergence: last step {size:.3g} bounds long"]
+    return FitResult(
+        method="filter error",
+        model=model,
+        names=problem.names,
+        estimate=theta,
+        covariance=covariance,
+        covariance_white=covariance,
+        degrees_of_freedom=np.full(len(theta), float(problem.inner.samples - kept)),
+        residuals=tuple(point.e),
+        fitted=tuple(m.outputs - e for m, e in zip(maneuvers, point.e, strict=True)),
+        residual_kind="innovation",
+        noise_covariance=np.atleast_2d(np.cov(np.vstack(point.e).T)),
+        iterations=iterations,
+        converged=converged,
+        warnings=tuple(warnings),
+        details={
+            "cost": point.cost,
+            "process_deviation": np.exp(theta[kept : kept + len(process)]),
+            "noise_deviation": np.exp(theta[kept + len(process) :]),
+        },
+    )
+
+
+def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> tuple[Array, Array]:
+    """Start from output error; split its residual power between both kinds of noise."""
+    inner = problem.inner
+    optimum = minimise(inner, first, max_iterations=15 if fit_first else 0)
+    residual = np.hstack(optimum.residuals)
+    deviation = np.maximum(np.std(residual, axis=1), 1e-12)
+    differences = np.std(np.diff(residual, axis=1), axis=1) / np.sqrt(2.0)
+    noise = np.clip(differences, 0.05 * deviation, np.sqrt(NOISE_SHARE[1]) * deviation)
+    model = problem.model
+    process = []
+    for state in problem.process:
+        size = deviation[model.outputs.index(state)] if state in model.outputs else 0.1
+        # Over the one second a disturbance is guessed to last, so the number is per root second.
+        process.append(np.log(np.sqrt(NOISE_SHARE[0]) * size))
+    theta = np.concatenate([optimum.theta, process, np.log(noise)])
+    bound = 1.0 / np.sqrt(np.maximum(np.diag(optimum.information), 1e-300))
+    scale = np.concatenate([np.minimum(bound, 1e6), np.full(len(theta) - problem.n_model, 0.1)])
+    return theta, scale
+
+
+def _scoring(
+    problem: FilterProblem, theta: Array, point: _Likelihood, scale: Array
+) -> tuple[Array, Array]:
+    """Return Fisher information and minus the cost's gradient, from central differences."""
+    size = len(theta)
+    slopes_e: list[list[Array]] = []
+    slopes_S: list[list[Array]] = []
+    for k in range(size):
+        width = max(DIFFERENCE * scale[k], 1e-9 * (1.0 + abs(theta[k])))
+        moved = []
+        for sign in (1.0, -1.0):
+            other = theta.copy()
+            other[k] += sign * width
+            moved.append(problem.evaluate(other))
+        up, down = moved
+        if up is None or down is None:
+            raise IdentificationError("filter error: the likelihood is not smooth at the estimate")
+        slopes_e.append([(a - b) / (2.0 * width) for a, b in zip(up.e, down.e, strict=True)])
+        slopes_S.append([(a - b) / (2.0 * width) for a, b in zip(up.S, down.S, strict=True)])
+    information = np.zeros((size, size))
+    gradient = np.zeros(size)
+    n = problem.n_model
+    information[:n, :n] += np.diag(problem.inner.prior_precision)
+    gradient[:n] -= problem.inner.prior_precision * (theta[:n] - problem.inner.prior_mean)
+    for number, (e, S) in enumerate(zip(point.e, point.S, strict=True)):
+        factor = np.linalg.cholesky(S)
+        white = linalg.solve_triangular(factor, e.T, lower=True)
+        J = np.stack(
+            [linalg.solve_triangular(factor, s[number].T, lower=True).ravel() for s in slopes_e],
+            axis=1,
+        )
+        inverse = np.linalg.inv(S)
+        T = [inverse @ s[number] for s in slopes_S]
+        information += J.T @ J
+        gradient -= J.T @ white.ravel()
+        outer = white @ white.T
+        inner_factor = np.linalg.inv(factor)
+        for a in range(size):
+            whitened = inner_factor @ slopes_S[a][number] @ inner_factor.T
+            gradient[a] -= 0.5 * (len(e) * np.trace(whitened) - np.sum(whitened * outer))
+            for b in range(size):
+                information[a, b] += 0.5 * len(e) * np.sum(T[a] * T[b].T)
+    return information, gradient
+
+
+def _step(information: Array, gradient: Array, damping: float) -> tuple[Array, float, Array]:
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled = information / np.outer(scale, scale)
+    value, vector = np.linalg.eigh(scaled)
+    value = np.maximum(value, 1e-12 * value[-1])
+    bound = np.sqrt(np.einsum("ij,j,ij->i", vector, 1.0 / value, vector))
+    move = vector @ ((vector.T @ (gradient / scale)) / (value + damping))
+    return move / scale, float(np.max(np.abs(move) / bound)), bound / scale

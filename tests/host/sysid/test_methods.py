@@ -1,0 +1,207 @@
+"""Every method behind one door: truth recovered, peers agreed with, failures in one line."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from host.sysid import FitResult, Maneuver, fit, methods
+from host.sysid.errors import IdentificationError
+from host.sysid.filter_error import FilterProblem
+from host.sysid.frequency import transform
+from host.sysid.output_error import minimise
+from host.sysid.problem import OutputProblem
+from host.sysid.riccati import predicted_covariance
+from host.sysid.study.aircraft import navion, navion_free, navion_structured
+from host.sysid.study.data import TRUTH, clean, noisy
+from scipy import linalg
+
+CHEAP = [m for m in methods() if m not in ("hopfield-line-search", "hopfield")]
+
+
+def quiet(dt_s: float = 0.02, snr: float = 1e6) -> Maneuver:
+    return noisy(77, dt_s, snr=snr)
+
+
+@pytest.mark.parametrize("method", CHEAP)
+def test_every_method_recovers_the_strong_derivatives(method: str) -> None:
+    settings: dict[str, dict[str, object]] = {
+        "genetic": {"generations": 5},
+        "neural-delta": {"repeats": 3},
+        "recursive-fourier": {"limits_hz": (0.05, 1.5)},
+    }
+    options = settings.get(method, {})
+    start = navion_structured().with_start(TRUTH * 1.2)
+    result = fit(method, start, [quiet()], **options)
+    assert isinstance(result, FitResult)
+    assert len(result.names) == len(result.estimate) == len(result.covariance)
+    assert np.isfinite(result.estimate).all()
+    assert len(result.residuals) == 1
+    share = 0.15 if method in ("neural-delta", "recursive-fourier", "stepwise") else 0.06
+    for name in ("Z_alpha", "M_alpha", "M_q", "M_de"):
+        truth = TRUTH[[p.name for p in start.parameters].index(name)]
+        assert result.value(name) == pytest.approx(truth, rel=share), name
+
+
+def test_unknown_method_and_parameter_are_named() -> None:
+    with pytest.raises(IdentificationError, match="unknown method 'magic'"):
+        fit("magic", navion_structured(), [quiet()])
+    result = fit("equation-error", navion_structured(), [quiet()])
+    with pytest.raises(IdentificationError, match="no parameter 'Q_alpha'"):
+        result.value("Q_alpha")
+    with pytest.raises(IdentificationError, match="no maneuver"):
+        fit("output-error", navion_structured(), [])
+
+
+@pytest.mark.parametrize("method", CHEAP)
+def test_garbage_ends_in_a_clear_line(method: str) -> None:
+    """Numbers without any aircraft in them: an answer with finite numbers, or one clear error."""
+    rng = np.random.default_rng(5)
+    few: dict[str, dict[str, object]] = {
+        "genetic": {"generations": 2},
+        "neural-delta": {"repeats": 3},
+    }
+    options = few.get(method, {})
+    garbage = Maneuver(0.02, rng.standard_normal((300, 1)), 1e3 * rng.standard_normal((300, 4)))
+    try:
+        result = fit(method, navion_structured(), [garbage], **options)
+    except IdentificationError as error:
+        assert "\n" not in str(error)
+    else:
+        assert np.isfinite(result.estimate).all()
+
+
+def test_transform_equals_the_discrete_sum() -> None:
+    rng = np.random.default_rng(1)
+    values = rng.standard_normal((50, 2))
+    f = np.array([0.3, 0.8, 1.3, 1.8])
+    expected = np.exp(-2j * np.pi * np.outer(f, np.arange(50) * 0.1)) @ values
+    np.testing.assert_allclose(transform(values, 0.1, f), expected, rtol=1e-10)
+
+
+def test_frequency_output_error_is_exact_without_noise_and_reaches_the_bound_with() -> None:
+    u, y = clean(0.05)
+    exact = fit("frequency-output-error", navion_structured(), [Maneuver(0.05, u, y)])
+    np.testing.assert_allclose(exact.estimate, TRUTH, rtol=1e-6)
+    ratios = []
+    for seed in range(60):
+        result = fit("frequency-output-error", navion_structured(), [noisy(200 + seed)])
+        ratios.append((result.estimate - TRUTH) / result.standard_error)
+    rms = np.sqrt(np.mean(np.square(ratios), axis=0))
+    assert np.all(np.abs(rms - 1.0) < 0.37)  # four standard deviations of 60 runs
+    time_domain = fit("output-error", navion_structured(), [noisy(200)])
+    frequency = fit("frequency-output-error", navion_structured(), [noisy(200)])
+    assert np.median(frequency.standard_error / time_domain.standard_error[:9]) < 1.3
+
+
+def test_recursive_least_squares_ends_where_the_batch_does() -> None:
+    maneuver = noisy(9)
+    recursive = fit("recursive", navion_free(), [maneuver])
+    batch = fit("equation-error", navion_free(), [maneuver])
+    np.testing.assert_allclose(recursive.estimate, batch.estimate, rtol=1e-3, atol=1e-4)
+    history = np.asarray(recursive.details["history"])
+    assert history.shape == (maneuver.samples, 20)
+    with pytest.raises(IdentificationError, match="forgetting"):
+        fit("recursive", navion_free(), [maneuver], forgetting=1.5)
+
+
+def test_stepwise_drops_what_is_not_there() -> None:
+    u, y = clean(0.02)
+    A, B = navion()
+    rng = np.random.default_rng(2)
+    rates = y @ A.T + u @ B.T
+    rates += 0.01 * rates.std(axis=0) * rng.standard_normal(rates.shape)
+    maneuver = Maneuver(0.02, u, y, rates=rates)
+    result = fit("stepwise", navion_free(), [maneuver])
+    kept = {n for n, v in zip(result.names, result.estimate, strict=True) if v != 0.0}
+    assert {"a14", "a22", "a23", "a32", "a33", "a43", "b31"} <= kept
+    assert not kept & {"a13", "a24", "a34", "a41", "a42", "a44", "b41"}
+    assert "set to zero" in result.warnings[0]
+
+
+def turbulent(seed: int, dt_s: float = 0.02) -> Maneuver:
+    """NAVION in white vertical and pitching disturbances, little sensor noise."""
+    u, y = clean(dt_s)
+    A, B = navion()
+    fine = 4
+    F = linalg.expm(A * dt_s / fine)
+    G = np.linalg.solve(A, F - np.eye(4)) @ B
+    rng = np.random.default_rng(seed)
+    q = np.array([0.0, 0.02, 0.1, 0.0]) * np.sqrt(dt_s / fine)
+    x, states = np.zeros(4), np.zeros_like(y)
+    for k in range(len(u)):
+        states[k] = x
+        for _ in range(fine):
+            x = F @ x + G @ u[k] + q * rng.standard_normal(4)
+    deviation = np.sqrt(np.mean(y**2, axis=0) / 400.0)
+    return Maneuver(dt_s, u, states + deviation * rng.standard_normal(y.shape))
+
+
+def test_riccati_equals_scipy() -> None:
+    rng = np.random.default_rng(3)
+    F = 0.9 * linalg.expm(0.1 * rng.standard_normal((4, 4)))
+    C = rng.standard_normal((3, 4))
+    Q, R = np.diag([0.0, 0.1, 0.2, 0.0]), np.diag([0.1, 0.2, 0.3])
+    solved, P = predicted_covariance(F, C, Q, R)
+    assert solved
+    np.testing.assert_allclose(P, linalg.solve_discrete_are(F.T, C.T, Q, R), rtol=1e-8, atol=1e-12)
+
+
+def test_filter_error_beats_output_error_in_turbulence_and_knows_its_error() -> None:
+    model = navion_structured()
+    ours, plain, ratios = [], [], []
+    for seed in range(12):
+        maneuver = turbulent(seed)
+        result = fit("filter-error", model, [maneuver], process=("alpha_rad", "q_radps"))
+        assert result.converged
+        ours.append(result.estimate[:9] - TRUTH)
+        ratios.append(ours[-1] / result.standard_error[:9])
+        problem = OutputProblem(model, [maneuver])
+        plain.append(minimise(problem, problem.first_guess()).theta[:9] - TRUTH)
+    rms = [np.sqrt(np.mean(np.square(e), axis=0)) for e in (ours, plain)]
+    gain = rms[0][[3, 5, 6]] / rms[1][[3, 5, 6]]  # Z_alpha, M_alpha, M_q
+    assert np.all(gain < 0.85)
+    assert np.exp(np.mean(np.log(gain))) < 0.6
+    assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, abs=0.25)
+    np.testing.assert_allclose(result.details["process_deviation"], [0.02, 0.1], rtol=0.25)
+
+
+def test_filter_error_without_process_noise_is_output_error() -> None:
+    maneuver = noisy(12)
+    model = navion_structured()
+    problem = FilterProblem(model, [maneuver], ("alpha_rad",))
+    inner = OutputProblem(model, [maneuver])
+    theta = np.concatenate([TRUTH, np.zeros(4), [-40.0], np.log([1.0, 0.1, 0.1, 0.1])])
+    point = problem.evaluate(theta)
+    response = inner.respond(theta[:13])
+    assert point is not None
+    assert response is not None
+    np.testing.assert_allclose(point.e[0].T, inner.measured(0) - response[0].y, atol=1e-8)
+
+
+def test_kalman_filters_agree_with_output_error() -> None:
+    maneuver = noisy(13, 0.02)
+    reference = fit("output-error", navion_structured(), [maneuver])
+    for method in ("extended-kalman", "unscented-kalman"):
+        result = fit(method, navion_structured(), [maneuver])
+        step = np.abs(result.estimate - reference.estimate[:9]) / reference.standard_error[:9]
+        assert np.median(step) < 1.0
+        assert np.median(result.standard_error / reference.standard_error[:9]) == pytest.approx(
+            1.0, abs=0.35
+        )
+
+
+def test_genetic_search_finds_the_valley_from_far_away() -> None:
+    far = navion_structured().with_start(np.array([0, 0, 0, -1, 0, -1, -1, 0, -1.0]))
+    bounded = dataclasses.replace(
+        far,
+        parameters=tuple(
+            dataclasses.replace(p, lower=-3.0 * abs(t) - 0.01, upper=3.0 * abs(t) + 0.01)
+            for p, t in zip(far.parameters, TRUTH, strict=True)
+        ),
+    )
+    result = fit("genetic", bounded, [noisy(14)], generations=60)
+    reference = fit("output-error", navion_structured(), [noisy(14)])
+    miss = np.abs(result.estimate - reference.estimate) / reference.standard_error
+    assert np.max(miss) < 0.05
+    search = np.asarray(result.details["search_best"])
+    assert search[6] == pytest.approx(TRUTH[6], rel=0.5)
