@@ -47,6 +47,13 @@ def test_lowest_vector_is_served_first(make_chip: MakeChip) -> None:
     assert list(chip.read_array("order", "u1")[:3]) == [INT0, INT1, PCINT0]
 
 
+def test_instruction_after_sei_comes_before_any_interrupt(make_chip: MakeChip) -> None:
+    chip = make_chip("interrupt_cost")
+    chip.run_s(1e-3)
+    assert chip.read_array("result", "<u2")[1] == 0
+    assert chip.interrupt(INT0).count == 1
+
+
 def test_latency_grows_with_what_stands_before(make_chip: MakeChip) -> None:
     chip = make_chip("interrupt_cost")
     chip.run_s(1e-3)
@@ -104,15 +111,15 @@ def test_watchdog_resets_after_its_time(make_chip: MakeChip) -> None:
 
 def test_reset_shows_output_edges_and_keeps_inputs(make_chip: MakeChip) -> None:
     chip = make_chip("reset")
-    chip.watch("PB7")
-    chip.pull("PB7", False)
+    chip.watch("PA5")
+    chip.pull("PA5", False)
     chip.drive("PK0", True)
     chip.drive("PK3", True)
     chip.run_s(1e-3)
     chip.reset()
     at = chip.cycle
     chip.run_s(1e-3)
-    when, level = chip.edges("PB7")
+    when, level = chip.edges("PA5")
     assert list(level) == [1, 0, 1]
     assert when[1] == at
     assert chip.read_array("result", "<u2")[0] == 0b1001
@@ -120,16 +127,16 @@ def test_reset_shows_output_edges_and_keeps_inputs(make_chip: MakeChip) -> None:
 
 def test_held_reset_and_startup_delay_take_time(make_chip: MakeChip) -> None:
     chip = make_chip("reset", startup_s=0.065)
-    chip.watch("PB7")
+    chip.watch("PA5")
     chip.run_s(0.1)
-    assert int(chip.edges("PB7")[0][0]) == pytest.approx(cycles(0.065), abs=1000)
+    assert int(chip.edges("PA5")[0][0]) == pytest.approx(cycles(0.065), abs=1000)
     chip.hold_reset(ResetCause.BROWN_OUT)
     chip.run_s(0.1)
     assert chip.state == "reset"
-    assert not chip.level("PB7")
+    assert not chip.level("PA5")
     chip.release_reset(ResetCause.BROWN_OUT)
     chip.run_s(0.1)
-    assert chip.level("PB7")
+    assert chip.level("PA5")
 
 
 def test_two_chips_in_one_process_do_not_touch_each_other(make_chip: MakeChip) -> None:

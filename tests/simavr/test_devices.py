@@ -56,6 +56,7 @@ def test_receiver_sends_its_frames(make_chip: MakeChip, sequential: bool, frame_
 
 def test_receiver_loses_channels_and_all(make_chip: MakeChip) -> None:
     chip = make_chip("pulses")
+    chip.run_s(1e-3)
     receiver = Receiver(chip, ["PK0", "PK2"], gap_us=100.0).start()
     chip.run_s(0.095)
     receiver.lost_channels.add(1)

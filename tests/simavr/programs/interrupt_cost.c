@@ -23,6 +23,10 @@ int main(void) {
   PORTB = _BV(PB0);
   PORTD = _BV(PD1);
   PORTD = _BV(PD1) | _BV(PD0);
+  // the instruction after sei runs first: here it turns interrupts off again
+  sei();
+  cli();
+  result[1] = order_count;
   sei();
   // each service lets one instruction of this program run: three, and the one after sei
   __asm__ __volatile__("nop\n nop\n nop\n nop\n");

@@ -1,4 +1,4 @@
-// Says on PB7 that it runs, keeps a counter in .noinit and the cause of the reset.
+// Says on PA5 (no timer's pin) that it runs, keeps a counter in .noinit and the cause of the reset.
 #include "common.h"
 
 volatile uint8_t cause;
@@ -11,8 +11,8 @@ int main(void) {
   wdt_disable();
   kept++;
   fresh++;
-  DDRB |= _BV(PB7);
-  PORTB |= _BV(PB7);
+  DDRA |= _BV(PA5);
+  PORTA |= _BV(PA5);
   DDRK = 0;
   finished = 1;
   if (!(PINK & _BV(PK0))) {

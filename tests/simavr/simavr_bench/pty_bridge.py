@@ -1,0 +1,122 @@
+"""A UART of the chip as a pseudo-terminal, for programs that want a serial port.
+
+The one place where the simulator meets the clock on the wall: programs such as avrdude time out in
+real seconds, so the chip may run ahead of them only while bytes are flowing.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import time
+import tty
+from collections.abc import Callable
+from types import TracebackType
+
+from simavr_bench.chip import Chip, ResetCause
+
+
+class PtyBridge:
+    """Connects one UART to a pseudo-terminal.
+
+    Parameters
+    ----------
+    chip : Chip
+        The chip, powered.
+    port : int
+        Its UART, 0 for USB.
+    baud : float
+        What the program outside speaks; a pseudo-terminal does not tell.
+    reset_on_open : bool
+        Reset the chip on the first byte after half a second of silence, in place of the DTR line a
+        pseudo-terminal lacks.
+
+    Attributes
+    ----------
+    path : str
+        Name of the terminal to open.
+    """
+
+    SLICE_S = 0.001
+    SILENCE_S = 0.5
+
+    def __init__(
+        self, chip: Chip, port: int = 0, *, baud: float = 115200.0, reset_on_open: bool = False
+    ) -> None:
+        self._chip = chip
+        self._port = port
+        self._baud = baud
+        self._reset = reset_on_open
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+        self._out = bytearray()
+        self._heard_s = -1.0
+        chip.on_uart(port, lambda byte, cycle: self._out.append(byte))
+
+    def close(self) -> None:
+        """Close both ends."""
+        os.close(self._master)
+        os.close(self._slave)
+
+    def __enter__(self) -> PtyBridge:
+        """Give the bridge itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close both ends."""
+        self.close()
+
+    def _exchange(self) -> bool:
+        if self._out:
+            try:
+                sent = os.write(self._master, self._out)
+            except BlockingIOError:
+                sent = 0
+            del self._out[:sent]
+        readable, _, _ = select.select([self._master], [], [], 0.0)
+        if not readable:
+            return False
+        data = os.read(self._master, 4096)
+        now_s = time.monotonic()
+        if self._reset and now_s - self._heard_s > self.SILENCE_S:
+            self._chip.reset(ResetCause.EXTERNAL)
+            self._chip.run_s(0.1)  # start-up delay and the bootloader's first instructions
+        self._heard_s = now_s
+        self._chip.uart_send(self._port, data, baud=self._baud)
+        return True
+
+    def serve(self, done: Callable[[], bool], *, limit_s: float = 60.0) -> None:
+        """Run the chip and carry bytes until ``done()``.
+
+        Parameters
+        ----------
+        done : callable
+            Looked at once per millisecond of simulated time.
+        limit_s : float
+            Real time after which to give up.
+
+        Raises
+        ------
+        TimeoutError
+            If ``done()`` stays false.
+        """
+        began_s, from_s = time.monotonic(), self._chip.time_s
+        while not done():
+            flowing = self._exchange() or bool(self._out)
+            self._chip.run_s(self.SLICE_S)
+            passed_s = time.monotonic() - began_s
+            if passed_s > limit_s:
+                raise TimeoutError(f"nothing came of it in {limit_s} s")
+            ahead_s = self._chip.time_s - from_s - passed_s
+            if flowing:
+                from_s = self._chip.time_s - passed_s  # time spent in bytes is no lead
+            elif ahead_s > 0:
+                time.sleep(min(ahead_s, 0.002))
+        self._exchange()

@@ -1,0 +1,72 @@
+"""Debian's real Mega bootloader takes an upload from avrdude over a pseudo-terminal."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from simavr_bench import Chip, read_image
+from simavr_bench.pty_bridge import PtyBridge
+
+BOOTLOADER = Path(
+    "/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex"
+)
+
+
+def bootloader_chip() -> Chip:
+    chip = Chip(bootloader=True)
+    chip.load(BOOTLOADER)
+    return chip
+
+
+def test_bootloader_starts_an_application_after_its_wait(build: ModuleType) -> None:
+    with bootloader_chip() as chip:
+        chip.load(build.build_program("reset"))
+        chip.watch("PA5")
+        chip.drive("PK0", True)
+        chip.power_on()
+        chip.run_s(0.06)
+        assert chip.pc >= 0x3E000
+        chip.run_s(3.0)
+        assert chip.read("finished") == 1
+        assert chip.pc < 0x3E000
+
+
+def test_blank_chip_stays_in_the_bootloader(build: ModuleType) -> None:
+    with bootloader_chip() as chip:
+        chip.power_on()
+        chip.run_s(3.0)
+        assert chip.pc >= 0x3E000
+        assert chip.flash(0, 256) == b"\xff" * 256
+
+
+@pytest.mark.parametrize("program", ["everything"])
+def test_avrdude_uploads_through_the_bootloader(
+    build: ModuleType, tmp_path: Path, program: str
+) -> None:
+    elf = build.build_program(program)
+    image = read_image(elf)
+    hex_file = tmp_path / "upload.hex"
+    subprocess.run(["avr-objcopy", "-O", "ihex", elf, hex_file], check=True)
+    with bootloader_chip() as chip:
+        chip.power_on()
+        chip.run_s(0.1)
+        with PtyBridge(chip, 0, reset_on_open=True) as bridge:
+            avrdude = subprocess.Popen(
+                ["avrdude", "-p", "atmega2560", "-c", "wiring", "-P", bridge.path,
+                 "-b", "115200", "-D", "-U", f"flash:w:{hex_file}:i"],
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            )  # fmt: skip
+            try:
+                bridge.serve(lambda: avrdude.poll() is not None, limit_s=60.0)
+            finally:
+                avrdude.kill()
+            text = avrdude.communicate()[0]
+        assert avrdude.returncode == 0, text
+        for address, piece in image.flash.items():
+            assert chip.flash(address, len(piece)) == piece
+        chip.symbols.update(image.symbols)
+        chip.run_s(2.0)
+        assert chip.read("ticks") > 100
