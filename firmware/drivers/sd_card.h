@@ -109,6 +109,7 @@ class SdCard {
   // ---- in flight: a multi-block write that never waits ----
   // After it, call `ready` until true, then begin_block, put 512 bytes, end_block.
   void open_stream(uint32_t sector) {
+    status_ = CardStatus::kOk;
     next_sector_ = sector;
     state_ = State::kReopening;
     spi_.select();
@@ -301,7 +302,7 @@ class SdCard {
 
   // Section 5.3: C_SIZE of CSD version 1 and 2.
   bool read_capacity(const uint8_t* csd) {
-    const uint8_t version = csd[0] >> 6;
+    const uint8_t version = static_cast<uint8_t>(csd[0] >> 6);
     if (version == 1) {
       const uint32_t size = core::get_be24(csd + 7) & 0x3FFFFFUL;
       sectors_ = (size + 1) << 10;

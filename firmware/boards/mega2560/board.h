@@ -6,9 +6,16 @@
 namespace mega {
 
 // Until the flight tests on the simulated chip have passed, servo, relay and heartbeat pins stay
-// inputs, and the boot line says so.
+// inputs, and the boot line says so. Those tests build with FLIGHT_IMAGE.
+#ifdef FLIGHT_IMAGE
+constexpr bool kBenchOnly = false;
+#else
 constexpr bool kBenchOnly = true;
+#endif
 
 void start_clock();
+
+// Every millisecond, in an interrupt: lets a receiver bank that stormed back in after its rest.
+void tick_pulse_capture();
 
 }  // namespace mega

@@ -62,7 +62,8 @@ constexpr uint8_t kOn = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0);
 
 }  // namespace
 
-// Bit positions are the same for all USARTs of this chip.
+// Bit positions are the same for all USARTs of this chip. Both serve until their flag is clear, so
+// that setting the enable bit again cannot enter them at once.
 #define PORT_INTERRUPTS(n, fifo_in, fifo_out, port)                                             \
   NESTING_ISR(USART##n##_RX_vect, UCSR##n##B, uint8_t(~_BV(RXCIE0))) {                          \
     while ((UCSR##n##A & _BV(RXC0)) != 0) {                                                     \
@@ -71,19 +72,17 @@ constexpr uint8_t kOn = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0);
         g_lost[static_cast<uint8_t>(port)] = uint16_t(g_lost[static_cast<uint8_t>(port)] + 1U); \
       }                                                                                         \
     }                                                                                           \
-    __asm__ __volatile__("cli" ::: "memory");                                                   \
     UCSR##n##B |= _BV(RXCIE0);                                                                  \
   }                                                                                             \
   NESTING_ISR(USART##n##_UDRE_vect, UCSR##n##B, uint8_t(~_BV(UDRIE0))) {                        \
     uint8_t byte;                                                                               \
-    const bool more = fifo_out.take(&byte);                                                     \
-    if (more) {                                                                                 \
+    while ((UCSR##n##A & _BV(UDRE0)) != 0) {                                                    \
+      if (!fifo_out.take(&byte)) {                                                              \
+        return;                                                                                 \
+      }                                                                                         \
       UDR##n = byte;                                                                            \
     }                                                                                           \
-    __asm__ __volatile__("cli" ::: "memory");                                                   \
-    if (more) {                                                                                 \
-      UCSR##n##B |= _BV(UDRIE0);                                                                \
-    }                                                                                           \
+    UCSR##n##B |= _BV(UDRIE0);                                                                  \
   }
 
 PORT_INTERRUPTS(0, g_usb_in, g_usb_out, hal::Port::kUsb)

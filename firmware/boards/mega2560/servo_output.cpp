@@ -36,13 +36,16 @@ Output output_of(const uint8_t output) {
   }
 }
 
+// The mode comes first: ICR cannot be written in a mode that does not use it as TOP.
 void start_timers() {
-  ICR3 = kTop;
-  ICR1 = kTop;
   TCCR3A = _BV(WGM31);
-  TCCR3B = _BV(WGM33) | _BV(WGM32) | _BV(CS31);  // mode 14, 16 MHz / 8
+  TCCR3B = _BV(WGM33) | _BV(WGM32);
+  ICR3 = kTop;
   TCCR1A = _BV(WGM11);
-  TCCR1B = _BV(WGM13) | _BV(WGM12) | _BV(CS11);
+  TCCR1B = _BV(WGM13) | _BV(WGM12);
+  ICR1 = kTop;
+  TCCR3B |= _BV(CS31);  // 16 MHz / 8
+  TCCR1B |= _BV(CS11);
 }
 
 void make_outputs() {

@@ -102,7 +102,8 @@ void start_watchdog() {
   const mega::InterruptsOff guard;
   wdt_reset();
   WDTCSR = _BV(WDCE) | _BV(WDE);
-  WDTCSR = _BV(WDE) | _BV(WDIE) | _BV(WDP2);  // 0.25 s to the interrupt, then the reset
+  // 0.125 s to the interrupt, which notes the address and resets; as much again if it cannot run.
+  WDTCSR = _BV(WDE) | _BV(WDIE) | _BV(WDP1) | _BV(WDP0);
 }
 
 void feed_watchdog() {
@@ -124,7 +125,7 @@ uint16_t stack_free_bytes() {
 }
 
 const char* board_name() {
-  return mega::kBenchOnly ? "mega2560 bm" : "mega2560";
+  return mega::kBenchOnly ? "BENCH ONLY" : "mega2560";
 }
 
 }  // namespace hal

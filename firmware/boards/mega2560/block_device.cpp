@@ -1,0 +1,178 @@
+// The card on the hardware SPI.
+#include "hal/block_device.h"
+
+#include <avr/io.h>
+#include <string.h>
+
+#include "boards/mega2560/generated/pins.h"
+#include "drivers/sd_card.h"
+#include "hal/clock.h"
+
+namespace {
+
+hal::CardWait g_wait = nullptr;
+void* g_wait_context = nullptr;
+
+class Spi {
+ public:
+  static uint8_t transfer(const uint8_t byte) {
+    finish();
+    SPDR = byte;
+    while ((SPSR & _BV(SPIF)) == 0) {
+    }
+    return SPDR;
+  }
+  // Returns while the byte is shifted out: 16 cycles at 8 MHz, in which a CRC step fits.
+  static void send(const uint8_t byte) {
+    finish();
+    SPDR = byte;
+    shifting_ = true;
+  }
+  static void select() {
+    start();
+    finish();
+    pins::CardCs::port() &= uint8_t(~pins::CardCs::kMask);
+  }
+  static void deselect() {
+    start();
+    finish();
+    pins::CardCs::port() |= pins::CardCs::kMask;
+  }
+  static void slow() {
+    start();
+    SPCR = _BV(SPE) | _BV(MSTR) | _BV(SPR1);  // 16 MHz / 64 = 250 kHz
+    SPSR = 0;
+  }
+  static void fast() {
+    SPCR = _BV(SPE) | _BV(MSTR);
+    SPSR = _BV(SPI2X);  // 16 MHz / 2
+  }
+  static uint32_t now_us() { return hal::now_us(); }
+  static void waiting() {
+    if (g_wait != nullptr) {
+      g_wait(g_wait_context);
+    }
+  }
+
+ private:
+  static void finish() {
+    if (shifting_) {
+      while ((SPSR & _BV(SPIF)) == 0) {
+      }
+      shifting_ = false;
+    }
+  }
+  // SS must be an output before the SPI is a master, else a low level makes it a slave.
+  static void start() {
+    if ((pins::CardCs::direction() & pins::CardCs::kMask) == 0) {
+      pins::CardCs::port() |= pins::CardCs::kMask;
+      pins::CardCs::direction() |= pins::CardCs::kMask;
+      pins::CardSck::direction() |= pins::CardSck::kMask;
+      pins::CardMosi::direction() |= pins::CardMosi::kMask;
+      pins::CardMiso::port() |= pins::CardMiso::kMask;  // no card reads as 0xFF
+    }
+  }
+
+  static bool shifting_;
+};
+
+bool Spi::shifting_ = false;
+
+Spi g_spi;
+drivers::SdCard<Spi> g_card(g_spi);
+bool g_closing = false;
+
+hal::CardStatus failure() {
+  switch (g_card.status()) {
+    case drivers::CardStatus::kNoCard:
+    case drivers::CardStatus::kNoResponse:
+      return hal::CardStatus::kAbsent;
+    default:
+      return hal::CardStatus::kError;
+  }
+}
+
+}  // namespace
+
+namespace hal {
+
+void set_card_wait(const CardWait wait, void* const context) {
+  g_wait = wait;
+  g_wait_context = context;
+}
+
+CardStatus start_card() {
+  g_closing = false;
+  g_card.start();
+  while (g_card.poll()) {
+    Spi::waiting();
+  }
+  return g_card.initialised() ? CardStatus::kOk : failure();
+}
+
+CardStatus read_card_id(uint8_t* const id) {
+  if (!g_card.initialised()) {
+    return CardStatus::kAbsent;
+  }
+  memcpy(id, g_card.cid(), kCardIdBytes);
+  return CardStatus::kOk;
+}
+
+uint32_t card_blocks() {
+  return g_card.initialised() ? g_card.sectors() : 0;
+}
+
+CardStatus read_card(const uint32_t lba, uint8_t* const block) {
+  return g_card.read(lba, block) ? CardStatus::kOk : failure();
+}
+
+CardStatus write_card(const uint32_t lba, const uint8_t* const block) {
+  return g_card.write(lba, block) ? CardStatus::kOk : failure();
+}
+
+CardStatus begin_stream(const uint32_t lba) {
+  if (!g_card.initialised()) {
+    return CardStatus::kAbsent;
+  }
+  g_closing = false;
+  g_card.open_stream(lba);
+  return CardStatus::kOk;
+}
+
+CardStatus poll_stream() {
+  if (g_closing) {
+    g_closing = g_card.closing();
+    return g_closing ? CardStatus::kBusy : CardStatus::kOk;
+  }
+  if (g_card.ready()) {
+    return CardStatus::kOk;
+  }
+  return g_card.status() == drivers::CardStatus::kOk ? CardStatus::kBusy : failure();
+}
+
+void open_block() {
+  g_card.begin_block();
+}
+
+void put_block(const uint8_t* const bytes, const uint16_t size) {
+  g_card.put(bytes, size);
+}
+
+CardStatus close_block() {
+  switch (g_card.end_block()) {
+    case drivers::CardWrite::kAccepted:
+      return CardStatus::kOk;
+    case drivers::CardWrite::kRejected:
+      return CardStatus::kRejected;
+    case drivers::CardWrite::kGone:
+      break;
+  }
+  return CardStatus::kAbsent;
+}
+
+void end_stream() {
+  g_card.close_stream();
+  g_closing = true;
+}
+
+}  // namespace hal
