@@ -83,6 +83,7 @@ def stages() -> list[Stage]:
     ruff = str(BIN / "ruff")
     generators = sorted({"protocol/generate.py", *(f for f in python if GENERATOR.search(f))})
     native = (pio, "test", "-e", "native", "--junit-output-path", str(report_path("native")))
+    avr = (pio, "test", "-e", "simavr", "--junit-output-path", str(report_path("avr")))
     found = [
         Stage(
             "format",
@@ -103,6 +104,13 @@ def stages() -> list[Stage]:
         # PlatformIO cleans its build folder when the project changed: never two at a time.
         Stage("mega", "image of the Mega", ((pio, "run"),), after=("native",)),
         Stage(
+            "avr",
+            "the same unit tests on a simulated ATmega2560",
+            (avr,),
+            after=("native", "mega"),
+            report=True,
+        ),
+        Stage(
             "library",
             "the firmware as a library for this computer",
             ((PYTHON, "firmware/toolchain/build_sitl.py"),),
@@ -115,7 +123,7 @@ def stages() -> list[Stage]:
 def pytest_stages() -> Iterator[Stage]:
     """Describe one stage per folder of tests/ that pytest can run."""
     needs = {"sitl": ("library",), "simavr": ("mega",)}
-    after = {"simavr": ("native", "mega"), "layering": ("mega",)}
+    after = {"simavr": ("native", "mega", "avr"), "layering": ("mega",)}
     order = {"layering": 0, "protocol": 1, "host": 2, "sitl": 3, "simavr": 4}
     folders = {path.relative_to(ROOT / "tests").parts[0] for path in _test_files()}
     for name in sorted(folders - {"firmware"}, key=lambda folder: (order.get(folder, 9), folder)):

@@ -33,8 +33,10 @@ class CustomTestRunner(DoctestTestRunner):
             self.options.without_uploading = True
 
     def stage_testing(self) -> None:
-        """Run the suite; on the AVR a suite that stops half-way is an error, not a shorter one."""
+        """Run the suite; an empty one is an error, and so is one that stops half-way on the AVR."""
         super().stage_testing()
+        if not self.test_suite.cases:
+            raise UnitTestError("no test case ran")
         if self.platform.is_embedded() and not self._done:
             raise UnitTestError("the suite did not reach its end: crash, reset or endless loop")
 
@@ -60,7 +62,10 @@ class CustomTestRunner(DoctestTestRunner):
             self._done = True
             self.test_suite.on_finish()
         else:
-            case = TestCase(name=text, status=STATUS[word], message="; ".join(self._notes) or None)
+            notes = "; ".join(self._notes)
+            case = TestCase(
+                name=text, status=STATUS[word], message=notes or None, stdout="\n".join(self._notes)
+            )
             self._notes = []
             self.test_suite.add_case(case)
             click.echo(case.humanize())
