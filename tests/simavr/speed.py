@@ -9,9 +9,6 @@ import sys
 import time
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
-
 from simavr_bench import ArduImu, ChargePumpRelay, Chip, GpsUart, Receiver, SdCard
 
 from build import build_program

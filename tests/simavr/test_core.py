@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from simavr_bench import Chip, ResetCause, cycles
+from simavr_bench import Chip, ForkError, ResetCause, cycles, in_fork
 from simavr_bench.log import LogKind, select
 from simavr_bench.testing import MakeChip
 
@@ -222,3 +222,35 @@ def test_stack_that_runs_into_the_registers_does_not_end_the_simulation(build: o
         chip.run_s(0.01)
         assert chip.faults()
         assert chip.state == "running"
+
+
+def test_marks_and_watched_functions_are_stamped(make_chip: MakeChip) -> None:
+    chip = make_chip("marks")
+    chip.log_marks()
+    number = chip.watch_pc("tick")
+    chip.run_s(0.01)
+    marks, calls = chip.records(LogKind.MARK, 1), chip.records(LogKind.PC, number)
+    assert list(marks["value"][:4]) == [1, 2, 3, 4]
+    assert abs(len(calls) - len(marks)) <= 1
+    assert set(np.diff(calls["cycle"])) == set(np.diff(marks["cycle"]))
+    assert calls["cycle"][0] < marks["cycle"][0] < calls["cycle"][0] + 10
+
+
+def test_fork_tries_an_ending_and_forgets_it(make_chip: MakeChip) -> None:
+    chip = make_chip("marks")
+    chip.run_s(0.001)
+
+    def ending() -> int:
+        chip.run_s(0.002)
+        return chip.read("calls")
+
+    first = in_fork(ending)
+    assert in_fork(ending) == first > chip.read("calls")
+    chip.run_s(0.002)
+    assert chip.read("calls") == first
+
+    def broken() -> None:
+        raise ValueError("in the child")
+
+    with pytest.raises(ForkError, match="in the child"):
+        in_fork(broken)

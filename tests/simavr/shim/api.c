@@ -59,6 +59,14 @@ void bench_clear_statistics(chip* c) {
 
 void bench_log_interrupts(chip* c, bool on) { c->log_interrupts = on; }
 
+void bench_log_marks(chip* c, bool on) { c->log_marks = on; }
+
+void bench_watch_pc(chip* c, uint32_t address, uint32_t number) {
+  if (!c->watched_pc) c->watched_pc = calloc((c->avr->flashend + 1) / 2, sizeof *c->watched_pc);
+  if (!c->watched_pc) abort();
+  c->watched_pc[(address & c->avr->flashend) >> 1] = (uint16_t)number;
+}
+
 size_t bench_log_count(const chip* c) { return c->log_count; }
 const log_record* bench_log(const chip* c) { return c->log; }
 void bench_clear_log(chip* c) { c->log_count = 0; }

@@ -38,6 +38,8 @@ BENCH_API void bench_load(const chip* c, uint64_t cycles[3]);  // running, sleep
 BENCH_API const vector_stats* bench_vector(const chip* c, uint32_t vector);
 BENCH_API void bench_clear_statistics(chip* c);
 BENCH_API void bench_log_interrupts(chip* c, bool on);
+BENCH_API void bench_log_marks(chip* c, bool on);
+BENCH_API void bench_watch_pc(chip* c, uint32_t address, uint32_t number);  // 0: no more
 
 BENCH_API size_t bench_log_count(const chip* c);
 BENCH_API const log_record* bench_log(const chip* c);
@@ -92,7 +94,6 @@ typedef struct sd_counters {
 } sd_counters;
 BENCH_API sd_card* bench_sd_card(chip* c, uint32_t cs_pin, uint8_t* memory,
                                  const sd_settings* settings, uint64_t seed);
-BENCH_API void bench_sd_free(sd_card* s);
 BENCH_API void bench_sd_insert(sd_card* s, bool present);
 BENCH_API void bench_sd_stall(sd_card* s, uint64_t from_cycle, uint32_t cycles);
 BENCH_API void bench_sd_reject(sd_card* s, uint64_t from_cycle, uint32_t count, uint32_t token);

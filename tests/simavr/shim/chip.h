@@ -52,6 +52,8 @@ enum log_kind {
   kLogPower = 8,       // source: 0, value: 1 on 0 off
   kLogInterrupt = 9,   // source: vector, value: 1 entry 0 return
   kLogOutOfReset = 10, // source: 0, value: cause: first instruction executes here
+  kLogMark = 11,       // source: GPIOR number, value: byte the program wrote
+  kLogPc = 12,         // source: number of the watched address: its instruction executes here
 };
 
 // Things the firmware did that the chip does not define or this model does not cover.
@@ -211,7 +213,9 @@ struct chip {
   uint32_t startup_cycles;
   uint32_t reset_pc;
   uint32_t halt_cycles;  // the CPU waits (EEPROM, flash)
-  bool log_interrupts;
+  bool log_interrupts, log_marks;
+  uint16_t* watched_pc;  // per flash word, 0 or a number; null until one is watched
+  struct owned* owned;
   uint64_t running_cycles, sleeping_cycles, held_cycles;
   uint16_t lowest_sp;
   uint64_t fault_count;
@@ -318,6 +322,9 @@ void log_add(chip* c, uint16_t kind, uint32_t source, uint32_t value);
 void log_add_at(chip* c, uint64_t cycle, uint16_t kind, uint32_t source, uint32_t value);
 void fault_add(chip* c, enum fault what, uint32_t detail);
 uint32_t chip_random(chip* c);
+// Memory of a device, zeroed, that goes with the chip.
+void* chip_allocate(chip* c, size_t size);
+void chip_free_owned(chip* c);
 
 // interrupts.c
 void interrupts_init(chip* c);

@@ -1,8 +1,6 @@
 // A chip with 256 registers on a bit-banged I2C bus: follows SDA and SCL edge by edge, acknowledges
 // its address, takes and gives bytes with automatic increment. What a register means is decided in
 // Python, which hears of every write.
-#include <stdlib.h>
-
 #include "bench.h"
 
 enum state { kIdle, kAddress, kRegister, kWrite, kRead, kIgnore };
@@ -142,8 +140,7 @@ static void line_changed(chip* c, void* param, uint8_t number, bool level) {
 
 i2c_device* bench_i2c_device(chip* c, uint32_t id, uint32_t address, uint32_t sda_pin,
                              uint32_t scl_pin) {
-  i2c_device* const d = calloc(1, sizeof *d);
-  if (!d) abort();
+  i2c_device* const d = chip_allocate(c, sizeof *d);
   d->c = c;
   d->id = id;
   d->address = (uint8_t)address;

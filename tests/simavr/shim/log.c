@@ -1,4 +1,4 @@
-// The log of everything observable, and the seeded random numbers of the chip.
+// The log of everything observable, the seeded random numbers and the device memory of the chip.
 #include <stdlib.h>
 
 #include "chip.h"
@@ -19,6 +19,27 @@ void log_add(chip* c, uint16_t kind, uint32_t source, uint32_t value) {
 void fault_add(chip* c, enum fault what, uint32_t detail) {
   // A runaway program raises thousands: the first hundred tell the story, the count tells the rest.
   if (c->fault_count++ < 100) log_add(c, kLogFault, (uint32_t)what, detail);
+}
+
+typedef struct owned {
+  struct owned* next;
+  max_align_t bytes[];
+} owned;
+
+void* chip_allocate(chip* c, size_t size) {
+  owned* const block = calloc(1, sizeof *block + size);
+  if (!block) abort();
+  block->next = c->owned;
+  c->owned = block;
+  return block->bytes;
+}
+
+void chip_free_owned(chip* c) {
+  while (c->owned) {
+    owned* const block = c->owned;
+    c->owned = block->next;
+    free(block);
+  }
 }
 
 uint32_t chip_random(chip* c) {

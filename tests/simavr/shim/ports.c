@@ -1,7 +1,5 @@
 // Ports A to L: level of every pin from chip, external drivers, open-drain devices and pull-ups;
 // pin change and external interrupts; edges to the log and to whoever listens.
-#include <stdlib.h>
-
 #include "chip.h"
 
 static uint16_t pin_register(uint8_t port) {
@@ -106,8 +104,7 @@ void pin_oc(chip* c, uint8_t number, bool connected, bool level) {
 }
 
 void pin_listen(chip* c, uint8_t number, pin_fn run, void* param) {
-  pin_listener* const l = calloc(1, sizeof *l);
-  if (!l) abort();
+  pin_listener* const l = chip_allocate(c, sizeof *l);
   l->run = run;
   l->param = param;
   l->next = c->pins[number].listeners;

@@ -8,6 +8,7 @@
 #define REG_PCIFR 0x3B
 #define REG_EIFR 0x3C
 #define REG_EIMSK 0x3D
+#define REG_GPIOR0 0x3E
 #define REG_EECR 0x3F
 #define REG_EEDR 0x40
 #define REG_EEARL 0x41
@@ -19,6 +20,8 @@
 #define REG_TCCR3A 0x90
 #define REG_TCCR4A 0xA0
 #define REG_TCCR5A 0x120
+#define REG_GPIOR1 0x4A
+#define REG_GPIOR2 0x4B
 #define REG_SPCR 0x4C
 #define REG_SPSR 0x4D
 #define REG_SPDR 0x4E

@@ -87,6 +87,12 @@ static int core_call(struct avr_io_t* io, uint32_t request, void* param) {
   return 0;
 }
 
+static void write_mark(chip* c, uint16_t address, uint8_t value, void* param) {
+  (void)param;
+  c->avr->data[address] = value;
+  if (c->log_marks) log_add(c, kLogMark, address == REG_GPIOR0 ? 0 : address - REG_GPIOR1 + 1u, value);
+}
+
 chip* bench_create(uint64_t seed) {
   avr_global_logger_set(core_message);
   avr_t* const avr = avr_make_mcu_by_name("atmega2560");
@@ -126,18 +132,16 @@ chip* bench_create(uint64_t seed) {
   eeprom_init(c);
   watchdog_init(c);
   flash_init(c);
+  hook_write(c, REG_GPIOR0, write_mark, NULL);
+  hook_write(c, REG_GPIOR1, write_mark, NULL);
+  hook_write(c, REG_GPIOR2, write_mark, NULL);
   for (uint8_t i = 0; i < kPinCount; i++) pin_refresh(c, i);
   return c;
 }
 
 void bench_destroy(chip* c) {
-  for (int i = 0; i < kPinCount; i++) {
-    while (c->pins[i].listeners) {
-      pin_listener* const l = c->pins[i].listeners;
-      c->pins[i].listeners = l->next;
-      free(l);
-    }
-  }
+  chip_free_owned(c);
+  free(c->watched_pc);
   for (int i = 0; i < 16; i++) free(c->adc.channel[i].point);
   uarts_free(c);
   twi_free(c);
@@ -157,6 +161,11 @@ static void advance_to(chip* c, uint64_t cycle, uint64_t* account) {
 
 static void execute(chip* c, uint64_t room) {
   avr_t* const avr = c->avr;
+  if (c->watched_pc) {  // one instruction at a time, about four times slower
+    room = 0;
+    const uint16_t number = c->watched_pc[(avr->pc & avr->flashend) >> 1];
+    if (number) log_add(c, kLogPc, number, avr->pc);
+  }
   avr->run_cycle_count = room;
   const uint64_t before = avr->cycle;
   avr->pc = avr_run_one(avr);

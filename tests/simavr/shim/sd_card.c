@@ -2,7 +2,6 @@
 // capacity, busy times and stalls, rejected blocks, removal. A block being programmed when power
 // goes is left as garbage. After a rejected block of a multiple write the card takes nothing but
 // CMD12 or the stop token, as the specification asks of the host.
-#include <stdlib.h>
 #include <string.h>
 
 #include "bench.h"
@@ -440,8 +439,7 @@ void bench_sd_counters(const sd_card* s, sd_counters* out) { *out = s->counters;
 sd_card* bench_sd_card(chip* c, uint32_t cs_pin, uint8_t* memory, const sd_settings* settings,
                        uint64_t seed) {
   if (c->spi.device_count == kSpiDeviceCount) return NULL;
-  sd_card* const s = calloc(1, sizeof *s);
-  if (!s) abort();
+  sd_card* const s = chip_allocate(c, sizeof *s);
   s->c = c;
   s->memory = memory;
   s->set = *settings;
@@ -458,5 +456,3 @@ sd_card* bench_sd_card(chip* c, uint32_t cs_pin, uint8_t* memory, const sd_setti
   pin_refresh(c, (uint8_t)cs_pin);
   return s;
 }
-
-void bench_sd_free(sd_card* s) { free(s); }

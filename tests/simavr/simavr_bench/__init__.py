@@ -7,6 +7,7 @@ The instruction core is Debian's unmodified libsimavr; everything around it is m
 from simavr_bench.barometer import Bmp085, Bmp280
 from simavr_bench.chip import CYCLES_PER_S, Chip, ResetCause, cycles
 from simavr_bench.firmware import Image, read_image
+from simavr_bench.fork import ForkError, in_fork
 from simavr_bench.gps import GpsUart
 from simavr_bench.imu import ArduImu, MasterDeath
 from simavr_bench.log import Fault, LogKind
@@ -25,6 +26,7 @@ __all__ = [
     "ChargePumpRelay",
     "Chip",
     "Fault",
+    "ForkError",
     "GpsUart",
     "Image",
     "LogKind",
@@ -35,6 +37,7 @@ __all__ = [
     "Supply",
     "arduino_pin",
     "cycles",
+    "in_fork",
     "pin_name",
     "pin_number",
     "read_image",

@@ -91,6 +91,7 @@ class Chip:
         self._start_listeners: list[Callable[[int], None]] = []
         self._error: BaseException | None = None
         self._next_packet = 1
+        self._pc_watches = 0
         self._callback = Callback(self._on_event)  # kept alive as long as the chip
         self._lib.bench_on_event(self._chip, self._callback)
         start = BOOTLOADER_START if bootloader else 0
@@ -306,19 +307,27 @@ class Chip:
         levels : NDArray[np.uint32], shape (n,)
             Level from then on.
         """
-        chosen = select(self.log(), LogKind.PIN, pin_number(name))
+        chosen = self.records(LogKind.PIN, pin_number(name))
         return chosen["cycle"], chosen["value"]
 
     # ---- log and statistics ---------------------------------------------------------------
 
-    def log(self) -> Records:
-        """Copy of all records since the chip was made or the log cleared."""
+    def _log_view(self) -> Records:
+        # Valid until the chip runs again: the log may move when it grows.
         count = self._lib.bench_log_count(self.handle)
         if count == 0:
             return np.empty(0, RECORD)
         address = self._lib.bench_log(self.handle)
         raw = (ct.c_uint8 * (count * RECORD.itemsize)).from_address(address)
-        return np.frombuffer(raw, RECORD).copy()
+        return np.frombuffer(raw, RECORD)
+
+    def log(self) -> Records:
+        """Copy of all records since the chip was made or the log cleared."""
+        return self._log_view().copy()
+
+    def records(self, kind: LogKind, source: int | None = None) -> Records:
+        """Copy of the records of one kind and, if given, of one source."""
+        return select(self._log_view(), kind, source)
 
     def clear_log(self) -> None:
         """Forget all records."""
@@ -326,12 +335,35 @@ class Chip:
 
     def faults(self) -> list[tuple[int, int, int]]:
         """Cycle, :class:`~simavr_bench.log.Fault` and detail of everything outside the model."""
-        chosen = select(self.log(), LogKind.FAULT)
+        chosen = self.records(LogKind.FAULT)
         return [(int(r["cycle"]), int(r["source"]), int(r["value"])) for r in chosen]
 
     def log_interrupts(self, on: bool = True) -> None:
         """Record every interrupt entry and return (many records)."""
         self._lib.bench_log_interrupts(self.handle, on)
+
+    def log_marks(self, on: bool = True) -> None:
+        """Record every byte the program writes to GPIOR0, 1 or 2 (one cycle of its time each)."""
+        self._lib.bench_log_marks(self.handle, on)
+
+    def watch_pc(self, symbol: str) -> int:
+        """Record every execution of the first instruction of a function.
+
+        The simulator then goes one instruction at a time, several times slower.
+
+        Parameters
+        ----------
+        symbol : str
+            Function in the ELF.
+
+        Returns
+        -------
+        int
+            Source of its :attr:`LogKind.PC` records.
+        """
+        self._pc_watches += 1
+        self._lib.bench_watch_pc(self.handle, self.symbols[symbol][0], self._pc_watches)
+        return self._pc_watches
 
     def load_now(self) -> CpuLoad:
         """CPU cycles by state since the start or :meth:`clear_statistics`."""
@@ -460,7 +492,7 @@ class Chip:
 
     def uart_sent(self, port: int) -> bytes:
         """All bytes the chip has sent, whole ones only."""
-        chosen = select(self.log(), LogKind.UART_TX, port)
+        chosen = self.records(LogKind.UART_TX, port)
         return bytes(chosen["value"].astype(np.uint8))
 
     def on_uart(self, port: int, listener: Callable[[int, int], None]) -> None:
@@ -519,13 +551,13 @@ class Chip:
 
     def twi_results(self) -> dict[int, int]:
         """Acknowledged data bytes by packet number, for packets that are over."""
-        chosen = select(self.log(), LogKind.TWI)
+        chosen = self.records(LogKind.TWI)
         over = chosen[(chosen["source"] == TwiNote.DONE) | (chosen["source"] == TwiNote.DIED)]
         return {int(v) >> 8: int(v) & 0xFF for v in over["value"]}
 
     def twi_stretch_cycles(self) -> NDArray[np.uint32]:
         """How long the chip held SCL low, one figure per packet that is over."""
-        chosen = select(self.log(), LogKind.TWI, TwiNote.STRETCH)
+        chosen = self.records(LogKind.TWI, TwiNote.STRETCH)
         stretch: NDArray[np.uint32] = chosen["value"]
         return stretch
 

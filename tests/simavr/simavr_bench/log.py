@@ -22,6 +22,8 @@ class LogKind(IntEnum):
     POWER = 8
     INTERRUPT = 9
     OUT_OF_RESET = 10
+    MARK = 11
+    PC = 12
 
 
 class Fault(IntEnum):

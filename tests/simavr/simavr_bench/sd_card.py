@@ -48,7 +48,9 @@ class SdCard:
     cs : str
         Its chip select.
     image : Path or None
-        File of whole blocks, changed in place; else an empty card of ``blocks`` in memory.
+        File of whole blocks; else an empty card of ``blocks`` in memory.
+    in_place : bool
+        The file changes as the card does; else it only is what the card starts with.
     blocks : int
         Size without an image; a multiple of 1024.
     kind : CardKind
@@ -68,6 +70,7 @@ class SdCard:
         *,
         image: Path | None = None,
         blocks: int = 65_536,
+        in_place: bool = True,
         kind: CardKind = CardKind.SDHC,
         busy_s: float = 0.001,
         read_s: float = 0.0002,
@@ -75,12 +78,16 @@ class SdCard:
         seed: int = 1,
     ) -> None:
         self._chip = chip
+        # Private pages: after a fork each process has its own card.
         if image is None:
-            self._memory = mmap.mmap(-1, blocks * BLOCK)
+            self._memory = mmap.mmap(
+                -1, blocks * BLOCK, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
+            )
         else:
             blocks = image.stat().st_size // BLOCK
+            flags = mmap.MAP_SHARED if in_place else mmap.MAP_PRIVATE
             with image.open("r+b") as file:
-                self._memory = mmap.mmap(file.fileno(), blocks * BLOCK)
+                self._memory = mmap.mmap(file.fileno(), blocks * BLOCK, flags=flags)
         if blocks % 1024 or blocks == 0:
             raise ValueError(f"card of {blocks} blocks, expected a multiple of 1024")
         self.blocks = blocks
