@@ -230,22 +230,25 @@ def _good_blocks(buffer: memoryview | bytes, at: int, count: int) -> NDArray[np.
     good: NDArray[np.bool_] = (
         (head["magic"] == _MAGIC_NUMBER) & (head["used"] <= PAYLOAD_BYTES) & (head["kind"] <= 1)
     )
-    which = np.flatnonzero(good)
-    crc32 = zlib.crc32
-    with memoryview(buffer) as view:
-        starts = (which * BLOCK_BYTES + at).tolist()
-        residues = [crc32(view[start : start + BLOCK_BYTES]) for start in starts]
-    good[which] = np.array(residues, np.uint32) == _CRC_RESIDUE
+    if not good.any():
+        return good
+    # `tolist` makes the bytes objects in C: 10 % faster than slices of a memoryview.
+    sealed = np.frombuffer(buffer, f"V{BLOCK_BYTES}", count, at)
+    whole = bool(good.all())
+    residues = list(map(zlib.crc32, (sealed if whole else sealed[good]).tolist()))
+    if residues.count(_CRC_RESIDUE) == count:
+        return good
+    good[good] = np.array(residues, np.uint32) == _CRC_RESIDUE
     return good
 
 
 def _headers(
     buffer: memoryview | bytes, at: int, good: NDArray[np.bool_], window_start: int
 ) -> Blocks:
-    head = np.frombuffer(buffer, HEADER, len(good), at)[good]
+    head = np.frombuffer(buffer, HEADER, len(good), at)
     position = window_start + at + np.flatnonzero(good) * BLOCK_BYTES
     return Blocks(
-        position.astype(np.int64), *(head[field.name].copy() for field in fields(Blocks)[1:])
+        position.astype(np.int64), *(head[field.name][good] for field in fields(Blocks)[1:])
     )
 
 

@@ -5,34 +5,25 @@ from __future__ import annotations
 import importlib.util
 import math
 import sys
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from host.calibration import load_calibration
 from host.columns import COLUMNS, UNITS
 from host.errors import ExitCode, UsageError
-from host.export import FORMATS, open_writer
-from host.export.csv import printable
-from host.export.writer import Columns, Meta
+from host.export.writer import Meta
 from host.log import FlightLog, read_log
+from host.original_rows import looks_like_rows, read_rows
+from host.original_table import make_table
 from host.progress import progress_bar
 from host.report import lines
+from host.row_summary import row_lines, row_meta, summarise_rows
 from host.source import check_source, find_flights
 from host.summary import summarise
+from host.writing import Request, destination, write_frames, write_table
 
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What to decode and where to; see ``host decode --help``."""
-
-    source: Path
-    output: str | None = None
-    format: str | None = None
-    frames: bool = False
-    session: int | None = None
-    file_id: int | None = None
-    calibration: Path | None = None
+_HEAD_BYTES = 4096
 
 
 @dataclass(slots=True)
@@ -76,6 +67,10 @@ def decode(request: Request) -> Decoded:
         See `host.read_log`.
     """
     path = pick(check_source(request.source))
+    with path.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+    if looks_like_rows(head):
+        return decode_rows(request, path)
     kind, target = destination(request, path)
     size = path.stat().st_size
     log = read_log(
@@ -102,6 +97,23 @@ def decode(request: Request) -> Decoded:
     return Decoded(summary, said)
 
 
+def decode_rows(request: Request, path: Path) -> Decoded:
+    """Decode a file of the original ASCII rows and write its table."""
+    for name, value in (("session", request.session), ("file-id", request.file_id)):
+        if value is not None:
+            raise UsageError(f"{path}: original ASCII rows have no --{name}")
+    if request.frames:
+        raise UsageError(f"{path}: original ASCII rows have no raw frames; leave --frames out")
+    kind, target = destination(request, path)
+    calibration = load_calibration(request.calibration)
+    rows = read_rows(path)
+    table = make_table(rows, calibration, request.row_rate_hz)
+    summary = finite(summarise_rows(path, rows, table, calibration))
+    write_table([table.columns], kind, target, row_meta(path, summary))
+    summary["files"] = [str(target)]
+    return Decoded(summary, [*row_lines(summary), f"{'wrote':<13}{target}"])
+
+
 def pick(source: Path) -> Path:
     """Return the file to decode; of a folder the newest flight, after listing all on stderr."""
     if not source.is_dir():
@@ -114,42 +126,6 @@ def pick(source: Path) -> Path:
             file=sys.stderr,
         )
     return flights[-1].path
-
-
-def destination(request: Request, source: Path) -> tuple[str, Path]:
-    """Return format and file of the table.
-
-    Raises
-    ------
-    UsageError
-        If ending and --to disagree, or the table would overwrite its source.
-    """
-    output = request.output
-    if output == "-":
-        if request.format not in (None, "csv"):
-            raise UsageError(f"--to {request.format} cannot go to stdout; name a file with -o")
-        return "csv", Path("/dev/stdout")
-    if output is None:
-        kind = request.format or "csv"
-        target = Path(f"{source.stem}.{kind}")
-    else:
-        named = Path(output)
-        ending = named.suffix.lower().removeprefix(".")
-        if named.is_dir() or output.endswith(("/", "\\")):
-            kind = request.format or "csv"
-            target = named / f"{source.stem}.{kind}"
-        elif ending in FORMATS:
-            if request.format not in (None, ending):
-                raise UsageError(f"-o {output} ends in .{ending} but --to says {request.format}")
-            kind, target = ending, named
-        else:
-            kind = request.format or "csv"
-            target = named.with_name(f"{named.name}.{kind}")
-    if target.exists() and target.samefile(source):
-        raise UsageError(f"{target} is the source itself; name another file with -o")
-    if not target.parent.exists():
-        target.parent.mkdir(parents=True)
-    return kind, target
 
 
 def table_meta(log: FlightLog, summary: dict[str, Any]) -> Meta:
@@ -171,44 +147,6 @@ def table_meta(log: FlightLog, summary: dict[str, Any]) -> Meta:
             "calibration": log.calibration.text,
         },
     )
-
-
-def write_table(pieces: Iterable[Columns], kind: str, target: Path, meta: Meta) -> None:
-    """Write a table piece by piece."""
-    writer = open_writer(kind, target, meta)
-    try:
-        for piece in pieces:
-            writer.write(piece)
-    finally:
-        writer.close()
-
-
-def write_frames(log: FlightLog, kind: str, target: Path) -> list[str]:
-    """Write every kind of raw frame to a file of its own; return the files."""
-    folder = target.with_suffix(".frames")
-    folder.mkdir(parents=True, exist_ok=True)
-    files = []
-    for name, frame in log.schema.by_name.items():
-        data = log.frames[name]
-        if not len(data):
-            continue
-        columns: dict[str, Any] = {}
-        units = {}
-        for part in frame.fields:
-            value = data[part.name]
-            scale = f"{part.scale:g} " if part.scale != 1.0 and part.unit else ""
-            if value.ndim == 1:
-                columns[part.name] = value
-                units[part.name] = scale + part.unit
-            else:
-                for at in range(value.shape[1]):
-                    columns[f"{part.name}_{at}"] = value[:, at]
-                    units[f"{part.name}_{at}"] = scale + part.unit
-        file = folder / f"{name}.{kind}"
-        notes = {"source": log.path.name, "frame": name, "content": "raw counts"}
-        write_table([printable(columns)], kind, file, Meta(units=units, notes=notes))
-        files.append(str(file))
-    return files
 
 
 def next_command(files: list[str], source: Path) -> str:

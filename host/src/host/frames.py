@@ -72,7 +72,7 @@ def find_schemas(path: Path, blocks: Blocks) -> dict[int, Schema]:
     """
     found: dict[int, Schema] = {}
     with path.open("rb", buffering=0) as file:
-        for value in dict.fromkeys(blocks.schema_hash.tolist()):
+        for value in np.unique(blocks.schema_hash).tolist():
             pieces = np.flatnonzero((blocks.schema_hash == value) & (blocks.kind == KIND_SCHEMA))
             text = _schema_text(file, blocks, pieces)
             if text is None and value == packed_schema().hash:

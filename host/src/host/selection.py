@@ -97,7 +97,7 @@ def select(scan: Scan, name: str, file_id: int | None = None) -> Selection:
     return Selection(
         blocks=ordered,
         file_id=own_id,
-        sessions=tuple(dict.fromkeys(ordered.session.tolist())),
+        sessions=_in_order(ordered.session),
         foreign=_foreign(blocks, own_id),
         duplicates=duplicates,
         displaced=int(np.count_nonzero(np.diff(ordered.position) <= 0)),
@@ -115,10 +115,16 @@ def _ordered(own: Blocks) -> tuple[Blocks, int]:
     return own.take(order[first]), int(len(first) - np.count_nonzero(first))
 
 
+def _in_order(values: NDArray[np.uint32]) -> tuple[int, ...]:
+    """Return each value once, in the order of first appearance."""
+    first = np.flatnonzero(np.r_[True, values[1:] != values[:-1]][: len(values)])
+    return tuple(dict.fromkeys(values[first].tolist()))
+
+
 def _foreign(blocks: Blocks, own_id: int) -> tuple[Foreign, ...]:
     others = blocks.take(blocks.file_id != own_id)
     found = []
-    for other in dict.fromkeys(others.file_id.tolist()):
+    for other in _in_order(others.file_id):
         its = others.take(others.file_id == other)
         sessions = tuple(np.unique(its.session).tolist())
         found.append(Foreign(int(other), sessions, len(its), int(its.position[0])))

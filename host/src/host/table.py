@@ -113,7 +113,8 @@ class SessionTable:
         held = FrameSet(np.empty(0, self._session.store.schema.by_name["ident"].dtype), _NONE)
         skip = 0
         for part in self._session.store.fast_pieces(self._session.span):
-            held = join(self._session.store.schema, "ident", [held, part])
+            parts = [held, part] if len(held.data) else [part]  # one set is not copied
+            held = join(self._session.store.schema, "ident", parts)
             t_us = self._session.since_start_us(held)
             at = skip
             while len(held.data) - at > ROWS_AT_ONCE + HALO_ROWS:

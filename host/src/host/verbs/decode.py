@@ -57,11 +57,18 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--calibration", type=Path, metavar="FILE", help="counts to SI; the default without it"
     )
+    parser.add_argument(
+        "--row-rate",
+        type=float,
+        metavar="HZ",
+        help="rate of original ASCII rows, which carry no time (10 or 20 by variant)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Decode, print, write; return the exit code."""
-    from host.decoding import Request, decode
+    from host.decoding import decode
+    from host.writing import Request
 
     request = Request(
         source=args.source,
@@ -71,6 +78,7 @@ def run(args: argparse.Namespace) -> int:
         session=args.session,
         file_id=args.file_id,
         calibration=args.calibration,
+        row_rate_hz=args.row_rate,
     )
     result = decode(request)
     out = sys.stderr if args.output == "-" else sys.stdout

@@ -1,0 +1,98 @@
+"""Telemetry envelopes: a stream of bytes -> frames (protocol/README.md, "Telemetry").
+
+The rate is a few kB/s: clarity before speed. The log has its own, vectorised way (blocks.py).
+"""
+
+from __future__ import annotations
+
+import binascii
+from dataclasses import dataclass, field
+
+SYNC = b"\xa5\x5a"
+LONGEST_FRAME = 128
+_OVERHEAD = 5  # sync, length, CRC-16
+
+
+def crc16(data: bytes) -> int:
+    """Return CRC-16/CCITT-FALSE; "123456789" gives 0x29B1."""
+    return binascii.crc_hqx(data, 0xFFFF)
+
+
+def envelope(frame: bytes) -> bytes:
+    """Return one frame, with its id, in its envelope.
+
+    Raises
+    ------
+    ValueError
+        If the frame is empty or longer than 128 bytes.
+    """
+    if not 1 <= len(frame) <= LONGEST_FRAME:
+        raise ValueError(f"a frame of {len(frame)} bytes; an envelope holds 1 to {LONGEST_FRAME}")
+    body = bytes([len(frame)]) + frame
+    return SYNC + body + crc16(body).to_bytes(2, "little")
+
+
+@dataclass(slots=True)
+class EnvelopeReader:
+    """Finds frames in a stream that comes in any portions.
+
+    Parameters
+    ----------
+    failed : int
+        Syncs followed by a bad length or a wrong CRC.
+    skipped : int
+        Bytes that belong to no good envelope.
+    """
+
+    failed: int = 0
+    skipped: int = 0
+    _held: bytearray = field(default_factory=bytearray)
+
+    @property
+    def pending(self) -> int:
+        """Bytes at the end of the stream that may still become an envelope."""
+        return len(self._held)
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Take more of the stream and return the frames that are now whole, each with its id.
+
+        Parameters
+        ----------
+        data : bytes
+
+        Returns
+        -------
+        list of bytes
+            Frames of unknown id too: what an id means is for the reader of frames.
+        """
+        self._held += data
+        frames: list[bytes] = []
+        while True:
+            self._skip_to_sync()
+            if len(self._held) < 3:
+                return frames
+            length = self._held[2]
+            if not 1 <= length <= LONGEST_FRAME:
+                self._fail()
+                continue
+            if len(self._held) < length + _OVERHEAD:
+                return frames
+            covered = bytes(self._held[2 : 3 + length])
+            if crc16(covered) != int.from_bytes(self._held[3 + length : 5 + length], "little"):
+                self._fail()
+                continue
+            frames.append(covered[1:])
+            del self._held[: length + _OVERHEAD]
+
+    def _skip_to_sync(self) -> None:
+        at = self._held.find(SYNC)
+        if at < 0:  # the last byte may be the first half of a sync
+            at = len(self._held) - (1 if self._held.endswith(SYNC[:1]) else 0)
+        self.skipped += at
+        del self._held[:at]
+
+    def _fail(self) -> None:
+        # Search on from the byte behind the first sync byte: an envelope may begin inside.
+        self.failed += 1
+        self.skipped += 1
+        del self._held[:1]

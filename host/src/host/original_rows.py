@@ -1,0 +1,200 @@
+"""The original logger's ASCII rows -> numbers; a damaged field is NaN, never a number.
+
+Three variants were printed (27, 23 and 26 readings), with separators as irregular as they come.
+No row carries a time, a number or a checksum.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from host.errors import NotALogError
+
+Array = NDArray[np.float64]
+
+_IMU = ("AN0", "AN1", "AN2", "AN3", "AN4", "AN5")
+_END = ("fix", "numsat", "elevs", "ails")
+VARIANTS: dict[str, tuple[str, ...]] = {
+    "27 readings": (
+        *("RLL", "PCH", "YAW", "altitude", "velocity", "elev", "ail", "rdr", "alpha", "beta"),
+        *_IMU,
+        *("lat", "lon", "gpsalt", "gpsgc", "gpsgs", *_END, "ruds", "throts"),
+    ),
+    "23 readings": (
+        *("RLL", "PCH", "YAW", "altitude", "velocity", "alpha", "beta", *_IMU),
+        *("lat", "lon", "gpsgc", "gpsgs", *_END, "rdrs", "throts"),
+    ),
+    "26 readings": (
+        *("RLL", "PCH", "YAW", "altitude", "velocitya", "velocityb"),
+        *("alphaa", "alphab", "betaa", "betab", *_IMU),
+        *("lat", "lon", "gpsgc", "gpsgs", *_END, "rdrs", "throts"),
+    ),
+}
+_LABELS = sorted({label for labels in VARIANTS.values() for label in labels}, key=len, reverse=True)
+# "gpsgc0.00" and "gpsalt:17.00 " are both as printed
+_FIELD = re.compile(rf"({'|'.join(_LABELS)})\s*:?\s*(-?\d{{1,7}}(?:\.(\d{{1,7}}))?)")
+_BARE_ROLL = re.compile(r"(-?\d{1,3}\.(\d\d))")  # variant 26: the station strips "RLL:"
+_SIGNATURE = re.compile(rb"PCH\s*:\s*-?\d+\.\d+\s*,\s*YAW\s*:")
+_RANGES = {
+    **dict.fromkeys(("RLL", "PCH", "YAW"), (-360.0, 360.0)),
+    **dict.fromkeys(_IMU, (-32768.0, 32768.0)),
+    **dict.fromkeys(("velocity", "velocitya", "velocityb"), (0.0, 210.0)),  # km/h at 2 kPa
+    **dict.fromkeys(("lat",), (-90.0, 90.0)),
+    **dict.fromkeys(("lon",), (-180.0, 180.0)),
+    "gpsgc": (-360.0, 360.0),
+    "gpsgs": (0.0, 200.0),
+    "numsat": (0.0, 40.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class OriginalRows:
+    """Rows as printed.
+
+    Parameters
+    ----------
+    variant : str
+        A key of `VARIANTS`.
+    values : dict of str to Array, shape (n,)
+        By label, in the printed unit; NaN where the field is missing or damaged.
+    offset, length : NDArray[np.int64], shape (n,)
+        Byte position and length of each row in the file.
+    damaged : NDArray[np.int64], shape (n,)
+        Fields of each row that are missing or damaged.
+    """
+
+    variant: str
+    values: dict[str, Array]
+    offset: NDArray[np.int64]
+    length: NDArray[np.int64]
+    damaged: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.offset)
+
+
+def looks_like_rows(head: bytes) -> bool:
+    """Tell whether the head of a file holds original ASCII rows."""
+    return _SIGNATURE.search(head) is not None
+
+
+def read_rows(path: Path) -> OriginalRows:
+    """Parse a file of original rows.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    OriginalRows
+
+    Raises
+    ------
+    NotALogError
+        If no row is found.
+    """
+    return parse_rows(path.read_bytes(), str(path))
+
+
+def parse_rows(data: bytes, name: str = "rows") -> OriginalRows:
+    """Parse original rows; see `read_rows`."""
+    found = [row for line in re.finditer(rb"[^\r\n]+", data) for row in _rows_of_line(line)]
+    if not found:
+        raise NotALogError(f"{name}: no row of the original logger (RLL:...,PCH:...,YAW:...)")
+    variant = _variant(found)
+    labels = VARIANTS[variant]
+    decimals = _usual_decimals(found)
+    values = {label: np.full(len(found), np.nan) for label in labels}
+    for at, row in enumerate(found):
+        for label, (text, digits) in row.fields.items():
+            if label in values and digits == decimals[label]:
+                values[label][at] = _in_range(label, float(text))
+    damaged = np.sum([np.isnan(column) for column in values.values()], axis=0)
+    return OriginalRows(
+        variant,
+        values,
+        np.array([row.offset for row in found], np.int64),
+        np.array([row.length for row in found], np.int64),
+        np.asarray(damaged, np.int64),
+    )
+
+
+@dataclass(slots=True)
+class _Row:
+    offset: int
+    length: int
+    fields: dict[str, tuple[str, int]]
+
+
+def _rows_of_line(line: re.Match[bytes]) -> list[_Row]:
+    """Split one line into rows: two of them where the end of the first was lost."""
+    rows: list[_Row] = []
+    order = -1
+    text = line.group().decode("ascii", "replace")
+    whole_labels = {label: at for at, label in enumerate(_ORDER)}
+    at_byte = line.start()
+    last: str | None = None
+    for token in text.split(","):
+        match = _FIELD.fullmatch(token.strip())
+        roll = _BARE_ROLL.fullmatch(token.strip()) if not rows and match is None else None
+        if match is not None or roll is not None:
+            label = match.group(1) if match is not None else "RLL"
+            if not rows or whole_labels[label] <= order:
+                _distrust_cut(rows, last)
+                rows.append(_Row(at_byte, 0, {}))
+            order = whole_labels[label]
+            number = match.group(2) if match is not None else token.strip()
+            rows[-1].fields[label] = (number, len(number.partition(".")[2]))
+            last = label
+        elif rows and token.strip("0 ."):
+            last = None  # what was cut is this token, not the field before it
+        at_byte += len(token) + 1
+        if rows:
+            rows[-1].length = min(at_byte, line.end()) - rows[-1].offset
+    _distrust_cut(rows, last)
+    return [row for row in rows if len(row.fields) >= 2]
+
+
+def _distrust_cut(rows: list[_Row], last: str | None) -> None:
+    """Drop the last field of a row that ends early: its number may be cut in the middle."""
+    if rows and last is not None and last != "throts":
+        rows[-1].fields.pop(last, None)
+
+
+# One order that all variants keep: a label that steps back in it begins a new row.
+_ORDER = (
+    *("RLL", "PCH", "YAW", "altitude", "velocity", "velocitya", "velocityb", "elev", "ail", "rdr"),
+    *("alpha", "alphaa", "alphab", "beta", "betaa", "betab"),
+    *_IMU,
+    *("lat", "lon", "gpsalt", "gpsgc", "gpsgs", *_END, "ruds", "rdrs", "throts"),
+)
+
+
+def _variant(rows: list[_Row]) -> str:
+    seen = Counter(label for row in rows for label in row.fields)
+    if seen["velocitya"] or seen["alphaa"] or seen["betab"]:
+        return "26 readings"
+    if seen["elev"] or seen["ail"] or seen["gpsalt"] or seen["ruds"]:
+        return "27 readings"
+    return "23 readings"
+
+
+def _usual_decimals(rows: list[_Row]) -> dict[str, int]:
+    """Return for each label how many decimals it has: fewer or more are a damaged number."""
+    counts: dict[str, Counter[int]] = {}
+    for row in rows:
+        for label, (_, digits) in row.fields.items():
+            counts.setdefault(label, Counter())[digits] += 1
+    return {label: counter.most_common(1)[0][0] for label, counter in counts.items()}
+
+
+def _in_range(label: str, value: float) -> float:
+    lowest, highest = _RANGES.get(label, (-1e5, 1e5))
+    return value if lowest <= value <= highest else float("nan")

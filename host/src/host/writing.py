@@ -1,0 +1,102 @@
+"""Where tables go and how they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from host.errors import UsageError
+from host.export import FORMATS, open_writer
+from host.export.csv import printable
+from host.export.writer import Columns, Meta
+from host.log import FlightLog
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What to decode and where to; see ``host decode --help``."""
+
+    source: Path
+    output: str | None = None
+    format: str | None = None
+    frames: bool = False
+    session: int | None = None
+    file_id: int | None = None
+    calibration: Path | None = None
+    row_rate_hz: float | None = None
+
+
+def destination(request: Request, source: Path) -> tuple[str, Path]:
+    """Return format and file of the table.
+
+    Raises
+    ------
+    UsageError
+        If ending and --to disagree, or the table would overwrite its source.
+    """
+    output = request.output
+    if output == "-":
+        if request.format not in (None, "csv"):
+            raise UsageError(f"--to {request.format} cannot go to stdout; name a file with -o")
+        return "csv", Path("/dev/stdout")
+    if output is None:
+        kind = request.format or "csv"
+        target = Path(f"{source.stem}.{kind}")
+    else:
+        named = Path(output)
+        ending = named.suffix.lower().removeprefix(".")
+        if named.is_dir() or output.endswith(("/", "\\")):
+            kind = request.format or "csv"
+            target = named / f"{source.stem}.{kind}"
+        elif ending in FORMATS:
+            if request.format not in (None, ending):
+                raise UsageError(f"-o {output} ends in .{ending} but --to says {request.format}")
+            kind, target = ending, named
+        else:
+            kind = request.format or "csv"
+            target = named.with_name(f"{named.name}.{kind}")
+    if target.exists() and target.samefile(source):
+        raise UsageError(f"{target} is the source itself; name another file with -o")
+    if not target.parent.exists():
+        target.parent.mkdir(parents=True)
+    return kind, target
+
+
+def write_table(pieces: Iterable[Columns], kind: str, target: Path, meta: Meta) -> None:
+    """Write a table piece by piece."""
+    writer = open_writer(kind, target, meta)
+    try:
+        for piece in pieces:
+            writer.write(piece)
+    finally:
+        writer.close()
+
+
+def write_frames(log: FlightLog, kind: str, target: Path) -> list[str]:
+    """Write every kind of raw frame to a file of its own; return the files."""
+    folder = target.with_suffix(".frames")
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    for name, frame in log.schema.by_name.items():
+        data = log.frames[name]
+        if not len(data):
+            continue
+        columns: dict[str, Any] = {}
+        units = {}
+        for part in frame.fields:
+            value = data[part.name]
+            scale = f"{part.scale:g} " if part.scale != 1.0 and part.unit else ""
+            if value.ndim == 1:
+                columns[part.name] = value
+                units[part.name] = scale + part.unit
+            else:
+                for at in range(value.shape[1]):
+                    columns[f"{part.name}_{at}"] = value[:, at]
+                    units[f"{part.name}_{at}"] = scale + part.unit
+        file = folder / f"{name}.{kind}"
+        notes = {"source": log.path.name, "frame": name, "content": "raw counts"}
+        write_table([printable(columns)], kind, file, Meta(units=units, notes=notes))
+        files.append(str(file))
+    return files

@@ -1,0 +1,49 @@
+"""protocol/cases.toml and random streams against the host's telemetry decoder."""
+
+import tomllib
+from typing import Any
+
+import pytest
+from host.framing import EnvelopeReader, crc16, envelope
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.host.logs import ROOT
+
+TABLE = tomllib.loads((ROOT / "protocol/cases.toml").read_text())
+
+
+def unhex(text: str) -> bytes:
+    return bytes.fromhex("".join(text.split()))
+
+
+@pytest.mark.parametrize("portion", [1, 7, 1000])
+@pytest.mark.parametrize("case", TABLE["telemetry"], ids=lambda case: case["name"])
+def test_case(case: dict[str, Any], portion: int) -> None:
+    stream = unhex(case["bytes"])
+    reader = EnvelopeReader()
+    frames = []
+    for at in range(0, len(stream), portion):
+        frames += reader.feed(stream[at : at + portion])
+    assert frames == [unhex(frame) for frame in case["frames"]]
+    counts = (reader.failed, reader.skipped, reader.pending)
+    assert counts == (case["failed"], case["skipped"], case["pending"])
+
+
+def test_crc_of_the_catalogue() -> None:
+    assert crc16(b"123456789") == 0x29B1
+
+
+@given(st.lists(st.tuples(st.binary(max_size=20), st.binary(min_size=1, max_size=128))))
+def test_every_frame_comes_back(parts: list[tuple[bytes, bytes]]) -> None:
+    # Noise without a sync byte cannot swallow a frame.
+    stream = b"".join(noise.replace(b"\xa5", b"") + envelope(frame) for noise, frame in parts)
+    reader = EnvelopeReader()
+    assert reader.feed(stream) == [frame for _, frame in parts]
+    assert (reader.failed, reader.pending) == (0, 0)
+
+
+@pytest.mark.parametrize("length", [0, 129])
+def test_frames_that_do_not_fit_are_refused(length: int) -> None:
+    with pytest.raises(ValueError, match=f"{length} bytes"):
+        envelope(bytes(length))
