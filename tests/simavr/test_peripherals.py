@@ -199,6 +199,7 @@ def test_pwm_gives_only_programmed_widths(make_chip: MakeChip) -> None:
     assert len(set(jumping)) == 4
     assert set(np.diff(pulses(*chip.edges("PE5")), axis=1).ravel()) == {4000 * 8}
     assert chip.read("read_back") == 2000
+    assert chip.read("icr_before") == 0  # ICR is writable only where it is TOP
 
 
 def test_pwm_top_changes_at_once(make_chip: MakeChip) -> None:

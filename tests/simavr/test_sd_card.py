@@ -91,6 +91,22 @@ def test_rejected_block_is_sent_again(make_chip: MakeChip, token: int) -> None:
         assert card.block(1000 + number)[0] == number & 0xFF
 
 
+def test_stream_is_dead_after_a_reject_until_it_is_ended(make_chip: MakeChip) -> None:
+    chip = make_chip("sd_stream", power=False)
+    card = SdCard(chip, "PB0")
+    chip.power_on()
+    chip.run_s(0.2)
+    chip.poke(chip.symbols["careless"][0], b"\1")
+    card.reject(1)
+    while chip.read("rejects") == 0:
+        chip.run_s(1e-3)
+    before = card.count().written
+    while chip.read("answers_missing") == 0:
+        chip.run_s(1e-3)
+    assert card.count().written == before
+    assert card.count().bytes_ignored >= 1
+
+
 def test_removed_card_is_silent_and_comes_back_uninitialised(make_chip: MakeChip) -> None:
     chip = make_chip("sd_stream", power=False)
     card = SdCard(chip, "PB0")

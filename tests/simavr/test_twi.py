@@ -121,11 +121,16 @@ def test_master_that_dies_in_a_packet(make_chip: MakeChip, dies: int) -> None:
 
 def test_slave_that_resets_lets_the_bus_go(make_chip: MakeChip) -> None:
     chip = make_chip("twi_slave")
+    chip.run_s(0.5e-3)
     chip.poke(chip.symbols["dawdle"][0], bytes([250]))
     chip.twi_send(42, PACKET, at_cycle=cycles(1e-3))
-    chip.twi_send(27, PACKET, at_cycle=cycles(6e-3))
-    chip.run_until(cycles(2e-3))
-    chip.reset()
+    chip.twi_send(27, PACKET, at_cycle=cycles(8e-3))
+    while chip.data(0xBC, 1)[0] & 0x80 == 0:  # until TWINT holds the clock
+        chip.run_until(chip.cycle + 10)
+    chip.hold_reset()
+    chip.run_s(0.006)
+    assert 1 in chip.twi_results()  # the master found nobody and went on
+    chip.release_reset()
     chip.run_s(0.015)
     assert list(chip.twi_results().values())[1] == 32
     assert chip.read("packets") == 1

@@ -12,6 +12,7 @@ int main(void) {
   TCCR4B = _BV(ICES4) | _BV(CS41);
   TCCR5B = _BV(ICES5) | _BV(CS51);
   TCNT4 = 0;
+  for (uint8_t i = 0; i < 40; i++) __asm__ __volatile__("nop");
   TCNT5 = 0;
   TIMSK4 = _BV(ICIE4);
   TIMSK5 = _BV(ICIE5);

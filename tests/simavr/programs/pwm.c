@@ -3,13 +3,14 @@
 #include "common.h"
 
 static const uint16_t kWidths[4] = {2000, 2500, 3000, 3999};
-volatile uint16_t read_back;
+volatile uint16_t read_back, icr_before;
 volatile uint8_t change_top;
 
 int main(void) {
   DDRE = _BV(PE3) | _BV(PE4) | _BV(PE5);
   DDRB = _BV(PB5);
   ICR3 = 9999;  // ignored: the mode does not yet use it
+  icr_before = ICR3;
   TCCR3A = _BV(COM3A1) | _BV(COM3B1) | _BV(COM3C1) | _BV(WGM31);
   TCCR3B = _BV(WGM33) | _BV(WGM32);
   ICR3 = 39999;
