@@ -49,7 +49,7 @@ def columns_ours(path: Path) -> int:
     """Our log to calibrated float64 columns, every CRC checked."""
     from host.log import read_log
 
-    return len(read_log(path).columns(aligned=False)["t_s"])
+    return len(read_log(path).channels()["t_s"])
 
 
 def table_ours(path: Path) -> int:
