@@ -32,7 +32,7 @@ bool BlockWriter::due(uint32_t now_us) {
   }
   // The head of a session comes before its frames unless these fill half of the ring; later a
   // piece of schema goes out only while no whole block of frames waits.
-  const uint16_t give_way = head_ ? ring_.capacity() / 2 : kBlockPayloadSize;
+  const uint16_t give_way = head_ ? static_cast<uint16_t>(ring_.capacity() / 2) : kBlockPayloadSize;
   const bool schema_goes_on = schema_pass() && (head_ || !finishing_);
   if (schema_goes_on && ring_.used() < give_way) {
     const uint16_t left = static_cast<uint16_t>(schema_size_ - schema_offset_);

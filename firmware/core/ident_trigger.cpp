@@ -14,7 +14,7 @@ void count(uint16_t& counter) {
 }  // namespace
 
 void IdentTrigger::start(uint16_t rate_hz, uint32_t now_us) {
-  period_us_ = 1000000UL / rate_hz;
+  period_us_ = 1000000U / rate_hz;
   last_us_ = now_us;
   imu_leads_ = false;
   packet_waits_ = false;
