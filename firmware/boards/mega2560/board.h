@@ -15,6 +15,10 @@ constexpr bool kBenchOnly = true;
 
 void start_clock();
 
+// Set by what the main loop has to look at: the millisecond, a packet of the IMU. Other interrupts
+// (10 000 a second) let it sleep on.
+extern volatile bool g_awake;
+
 // Every millisecond, in an interrupt: lets a receiver bank that stormed back in after its rest.
 void tick_pulse_capture();
 

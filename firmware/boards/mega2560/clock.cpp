@@ -57,6 +57,7 @@ ISR(TIMER5_OVF_vect, ISR_NAKED) {
 
 // 1 kHz: ends the sleep of the main loop, and the rest of a receiver bank that stormed.
 ISR(TIMER2_COMPA_vect, ISR_NOBLOCK) {
+  mega::g_awake = true;
   mega::tick_pulse_capture();
 }
 

@@ -6,6 +6,7 @@
 #include <avr/io.h>
 #include <util/twi.h>
 
+#include "boards/mega2560/board.h"
 #include "boards/mega2560/interrupts.h"
 #include "hal/clock.h"
 
@@ -55,6 +56,7 @@ void add_byte() {
 void end_packet() {
   if (g_filling != kNone) {
     g_filling = kNone;
+    mega::g_awake = true;
     const mega::InterruptsOff guard;
     ++g_full;
   }

@@ -65,6 +65,12 @@ ISR(WDT_vect, ISR_NAKED) {
       "jmp mega_watchdog \n\t");
 }
 
+namespace mega {
+
+volatile bool g_awake = false;
+
+}  // namespace mega
+
 namespace hal {
 
 ResetSource reset_source() {
@@ -112,7 +118,16 @@ void feed_watchdog() {
 
 void sleep_until_interrupt() {
   SMCR = _BV(SE);  // idle
-  sleep_cpu();
+  for (;;) {
+    cli();
+    if (mega::g_awake) {
+      break;
+    }
+    sei();  // takes effect behind the next instruction: no interrupt can slip in between
+    sleep_cpu();
+  }
+  mega::g_awake = false;
+  sei();
   SMCR = 0;
 }
 
