@@ -47,8 +47,8 @@ class Fifo {
 
 Fifo<16> g_usb_in;
 Fifo<64> g_usb_out;
-Fifo<128> g_gps_in;
-Fifo<32> g_gps_out;
+Fifo<64> g_gps_in;   // 16 ms at 38400 baud
+Fifo<64> g_gps_out;  // the longest message of drivers/ublox.h has 44 bytes
 Fifo<16> g_radio_in;
 Fifo<128> g_radio_out;
 volatile uint16_t g_lost[3];
