@@ -149,7 +149,7 @@ def test_power_cut_leaves_the_block_under_way_as_garbage(make_chip: MakeChip) ->
 
 
 def test_image_file_is_a_card_and_stays_one(make_chip: MakeChip, tmp_path: Path) -> None:
-    path = make_fat32(tmp_path / "card.img", 64)
+    path = make_fat32(tmp_path / "card.img", 64, cluster_blocks=1)
     chip = make_chip("sd_stream", power=False)
     card = SdCard(chip, "PB0", image=path)
     chip.power_on()
@@ -159,6 +159,6 @@ def test_image_file_is_a_card_and_stays_one(make_chip: MakeChip, tmp_path: Path)
     raw = path.read_bytes()
     assert raw[(1000 + 1) * 512 : (1000 + 1) * 512 + 3] == b"\x01\x02\x03"
     assert struct.unpack_from("<H", raw, 510)[0] == 0xAA55
-    other = make_fat32(tmp_path / "clean.img", 64)
+    other = make_fat32(tmp_path / "clean.img")
     check = subprocess.run(["/usr/sbin/fsck.vfat", "-n", other], capture_output=True, check=False)
     assert check.returncode == 0

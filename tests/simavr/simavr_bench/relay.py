@@ -1,8 +1,8 @@
 """The relay that gives the servos to the Mega, held by a charge pump on the heartbeat.
 
 Heartbeat, coupling capacitor, two diodes, reservoir with its bleed resistor, transistor, coil:
-every rising edge moves charge, a level that stands still moves none. Figures are those of a circuit
-proposal, not measurements.
+every rising edge moves charge, a level that stands still moves none. Figures are those of
+hw/relay.md with the threshold that holds longest, not measurements.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ class ChargePumpRelay:
     coupling_f: float = 1e-6
     reservoir_f: float = 1e-6
     bleed_ohm: float = 22_000.0
-    diode_volt: float = 0.35
-    on_volt: float = 2.0
-    off_volt: float = 1.3
-    coil_s: float = 0.001
+    diode_volt: float = 0.3
+    on_volt: float = 1.5
+    off_volt: float = 0.8
+    coil_s: float = 0.003
     transfer_s: float = 0.005
     bounce_s: float = 0.001
     seed: int = 1

@@ -157,7 +157,7 @@ class SdCard:
         path.write_bytes(self._memory[:])
 
 
-def make_fat32(path: Path, mebibytes: int = 256) -> Path:
+def make_fat32(path: Path, mebibytes: int = 4096, *, cluster_blocks: int = 64) -> Path:
     """Make an empty FAT32 image (sparse) with Debian's mkfs.vfat.
 
     Parameters
@@ -165,7 +165,10 @@ def make_fat32(path: Path, mebibytes: int = 256) -> Path:
     path : Path
         File to make.
     mebibytes : int
-        Size; FAT32 needs 33 or more with small clusters.
+        Size. Cards of 4 to 32 GB are delivered with clusters of 64 blocks; FAT32 then needs
+        2048 MiB. A small image with small clusters makes the host search a FAT that no card has.
+    cluster_blocks : int
+        Blocks per cluster.
 
     Returns
     -------
@@ -180,7 +183,7 @@ def make_fat32(path: Path, mebibytes: int = 256) -> Path:
     with path.open("wb") as file:
         file.truncate(mebibytes << 20)
     subprocess.run(
-        ["/usr/sbin/mkfs.vfat", "-F", "32", "-s", "1", "--invariant", str(path)],
+        ["/usr/sbin/mkfs.vfat", "-F", "32", "-s", str(cluster_blocks), "--invariant", str(path)],
         check=True, capture_output=True,
     )  # fmt: skip
     return path
