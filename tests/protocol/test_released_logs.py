@@ -1,0 +1,44 @@
+"""Logs of released formats decode for ever, to every value written beside them."""
+
+from pathlib import Path
+
+import pytest
+from host.log import read_log
+
+from tests.protocol.expected_text import text_of_host, text_of_oracle
+from tests.protocol.log_writer import ROOT
+from tests.protocol.oracle import decode
+
+LOGS = sorted((ROOT / "tests/data").glob("format-*.bin"))
+
+
+def test_each_released_format_is_there() -> None:
+    assert {path.name.split("-")[1] for path in LOGS} == {"1"}
+
+
+@pytest.mark.parametrize("path", LOGS, ids=lambda path: path.stem)
+def test_host_reads_what_was_recorded(path: Path) -> None:
+    expected = path.with_suffix(".txt").read_text(encoding="ascii")
+    assert text_of_host(read_log(path)) == expected
+
+
+@pytest.mark.parametrize("path", LOGS, ids=lambda path: path.stem)
+def test_independent_decoder_reads_what_was_recorded(path: Path) -> None:
+    # Without a schema from elsewhere: the log must stand for itself.
+    read = decode(path.read_bytes())
+    assert read is not None
+    order = [
+        line.split(":")[0]
+        for line in path.with_suffix(".txt").read_text(encoding="ascii").splitlines()
+        if line.endswith(" frames")
+    ]
+    assert text_of_oracle(read, order) == path.with_suffix(".txt").read_text(encoding="ascii")
+
+
+@pytest.mark.parametrize("path", LOGS, ids=lambda path: path.stem)
+def test_table_of_a_released_log(path: Path) -> None:
+    log = read_log(path)
+    table = log.table()
+    assert len(table) == len(log.frames["ident"])
+    assert table["t_s"].is_monotonic_increasing
+    assert set(table["session"]) == set(log.selection.sessions)
