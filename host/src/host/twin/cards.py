@@ -19,7 +19,6 @@ FAULTS = {
     "card_busy": "the card is busy for `value` ms at one write",
     "card_removed": "the card is gone",
     "imu_off": "the IMU is silent for `duration_s`",
-    "imu_reset": "the IMU restarts",
     "imu_garbage": "a share `value` of the IMU packets is damaged for `duration_s`",
     "baro_off": "the barometer does not answer for `duration_s`",
     "receiver_lost": "no receiver pulses for `duration_s`",

@@ -11,7 +11,8 @@ from pathlib import Path
 import pandas as pd
 
 from host.errors import UsageError
-from host.twin import ideal, picture, thesis, truth
+from host.log import read_log
+from host.twin import compare, ideal, picture, sitl, stimuli, thesis, truth
 from host.twin.airdata import AirData, air_data
 from host.twin.cards import Card
 from host.twin.flight import FlightRecord, fly
@@ -32,6 +33,12 @@ class Outcome:
     files : list of Path
     table : DataFrame or None
         What the picture shows: decoded, ideal or thesis rows.
+    recording : Recording or None
+        With the firmware on this computer.
+    deviations : list of Deviation
+        The decoded log against the truth.
+    first_row_s : float
+        True time since power-on of the log's first row.
     wall_s : dict
         Wall-clock seconds per stage.
     """
@@ -40,6 +47,9 @@ class Outcome:
     data: AirData
     files: list[Path] = field(default_factory=list)
     table: pd.DataFrame | None = None
+    recording: sitl.Recording | None = None
+    deviations: list[compare.Deviation] = field(default_factory=list)
+    first_row_s: float = 0.0
     wall_s: dict[str, float] = field(default_factory=dict)
 
 
@@ -88,11 +98,9 @@ def simulate(
     data = air_data(record)
     outcome = Outcome(record, data)
     stem = folder / "flight"
-    outcome.files += truth.write(record, data, stem)
     text = folder / "calibration.toml"
     text.write_text(calibration(record.aircraft), encoding="utf-8")
     outcome.files.append(text)
-    marks.append(("truth", time.perf_counter()))
     if firmware == "none":
         outcome.table = ideal.measured_table(record, data)
         outcome.files += _csv(outcome.table, stem.with_name("flight.csv"))
@@ -100,9 +108,18 @@ def simulate(
     elif firmware == "thesis":
         outcome.table, files = _thesis(record, data, folder)
         outcome.files += files
+    elif firmware == "sitl":
+        path = _recorded(outcome, folder, progress)
+        marks.append(("record", time.perf_counter()))
+        outcome.table = _decoded(outcome, path, folder)
     else:
-        raise UsageError(f"--firmware {firmware} is not built here")
-    marks.append((firmware, time.perf_counter()))
+        raise UsageError(
+            "--firmware avr needs the Mega image and the chip simulator,"
+            " which this version does not drive yet; use --firmware sitl"
+        )
+    marks.append(("decode" if firmware == "sitl" else firmware, time.perf_counter()))
+    outcome.files += truth.write(record, data, stem, first_row_s=outcome.first_row_s)
+    marks.append(("truth", time.perf_counter()))
     second = None
     if both and firmware != "thesis":
         second, files = _thesis(record, data, folder)
@@ -123,6 +140,35 @@ def simulate(
         marks.append(("picture", time.perf_counter()))
     outcome.wall_s = {name: now - before for (_, before), (name, now) in pairwise(marks)}
     return outcome
+
+
+def _recorded(outcome: Outcome, folder: Path, progress: Progress) -> Path:
+    """Record with the firmware on this computer; write flight.bin."""
+    record = outcome.record
+    given = stimuli.stimuli(record, outcome.data)
+    outcome.recording = sitl.record(
+        given,
+        rate_hz=sitl.recorder_rate_hz(record.card.flight.rate_hz),
+        aircraft=record.aircraft.name,
+        faults=record.card.faults,
+        seed=record.seed,
+        progress=lambda share: progress("record", share),
+    )
+    path = folder / "flight.bin"
+    path.write_bytes(outcome.recording.log)
+    outcome.files.insert(0, path)
+    return path
+
+
+def _decoded(outcome: Outcome, path: Path, folder: Path) -> pd.DataFrame:
+    """Decode the log as its owner would, and put its rows on true time for the picture."""
+    log = read_log(path, calibration=folder / "calibration.toml")
+    table = log.table()
+    first_us = int(log.frames["ident"]["t_us"][0])
+    table["t_s"] = compare.true_times(outcome.record, table, first_us)
+    outcome.deviations = compare.deviations(outcome.record, table, table["t_s"])
+    outcome.first_row_s = float(table["t_s"].iloc[0])
+    return table
 
 
 def _csv(table: pd.DataFrame, path: Path) -> list[Path]:

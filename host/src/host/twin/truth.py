@@ -133,7 +133,7 @@ def _modes(
     }
 
 
-def summary(record: FlightRecord, data: AirData) -> dict[str, object]:
+def summary(record: FlightRecord, data: AirData, first_row_s: float = 0.0) -> dict[str, object]:
     """Return everything of the truth that is not a time series, ready for TOML."""
     frame, card = record.frame, record.card
     return {
@@ -145,6 +145,7 @@ def summary(record: FlightRecord, data: AirData) -> dict[str, object]:
         "seed": record.seed,
         "duration_s": float(record.t_s[-1]) if len(record.t_s) else 0.0,
         "launch_s": card.flight.ground_s,
+        "first_row_s": first_row_s,
         "rate_hz": card.flight.rate_hz,
         "turbulence_mps": card.air.turbulence_mps,
         "flown": {
@@ -170,8 +171,18 @@ def summary(record: FlightRecord, data: AirData) -> dict[str, object]:
     }
 
 
-def write(record: FlightRecord, data: AirData, stem: Path) -> list[Path]:
+def write(
+    record: FlightRecord, data: AirData, stem: Path, *, first_row_s: float = 0.0
+) -> list[Path]:
     """Write `stem`.truth.npz and `stem`.truth.toml; return their paths.
+
+    Parameters
+    ----------
+    record : FlightRecord
+    data : AirData
+    stem : Path
+    first_row_s : float
+        True time since power-on of the log's first row: times here minus it are times of its table.
 
     Raises
     ------
@@ -183,6 +194,8 @@ def write(record: FlightRecord, data: AirData, stem: Path) -> list[Path]:
         stem.with_name(stem.name + ".truth.toml"),
     )
     np.savez(arrays, allow_pickle=False, **series(record, data))
-    document = {key: value for key, value in summary(record, data).items() if value != []}
+    document = {
+        key: value for key, value in summary(record, data, first_row_s).items() if value != []
+    }
     text.write_text(dumps(document), encoding="utf-8")
     return [arrays, text]

@@ -7,7 +7,10 @@ import json
 import sys
 from pathlib import Path
 
-from host.errors import ExitCode, UsageError
+from host.errors import CheckError, ExitCode, UsageError
+
+# Faults that leave every decoded value right.
+HARMLESS = ("motor_cut", "card_busy")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -77,6 +80,10 @@ def run(args: argparse.Namespace) -> int:
                     "files": [str(path) for path in outcome.files],
                     "wall_s": outcome.wall_s,
                     "times_real_time": duration / busy,
+                    "deviations": {
+                        d.column: [d.mean, d.spread, d.mean_limit, d.spread_limit]
+                        for d in outcome.deviations
+                    },
                 }
             )
         )
@@ -85,8 +92,18 @@ def run(args: argparse.Namespace) -> int:
           f" seed {args.seed}, simulated")  # fmt: skip
     stages = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.wall_s.items())
     print(f"  {duration / busy:.0f} times real time without the picture ({stages})")
+    if outcome.deviations:
+        print("  decoded log against the truth, in flight (mean and spread of the error, limits):")
+    for d in outcome.deviations:
+        verdict = "" if d.within else "  BEYOND ITS ERROR MODEL"
+        print(f"    {d.column:14s} {d.mean:+9.4f} {d.spread:8.4f}"
+              f"   {d.mean_limit:8.4f} {d.spread_limit:8.4f}{verdict}")  # fmt: skip
     for path in outcome.files:
         print(f"  wrote {path}")
+    broken = any(fault.kind not in HARMLESS for fault in card.faults)
+    beyond = [d.column for d in outcome.deviations if not d.within]
+    if beyond and not broken:
+        raise CheckError(f"{', '.join(beyond)}: decoded values are beyond what the sensors explain")
     return ExitCode.OK
 
 

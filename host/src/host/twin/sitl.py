@@ -1,0 +1,292 @@
+"""The recorder itself, as a shared library in simulated time.
+
+The library is loaded by path when a flight is recorded and reached through the C interface of
+`firmware/boards/sitl/sitl.h` only; nothing of it is imported or linked.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import mmap
+import os
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from host.errors import UsageError
+from host.resources import CLONE
+from host.twin.cards import Fault
+from host.twin.fat32 import CARD_BYTES, SECTOR, CardReader, format_card
+from host.twin.flight import IDLE_US, NEUTRAL_US
+from host.twin.stimuli import SAMPLE_STEP_TICKS, TICKS_PER_S, Stimuli
+
+LIBRARY = CLONE / "build" / "sitl" / "libsitl.so"
+RATES_HZ = (25, 50, 100, 200)
+PACKET_ROOM = 40
+PRESS_S, LET_GO_S = 2.0, 2.3  # start button, once the file is prepared
+CLOSE_S = 20.0  # the next power-on, throttle idle for 10 s: the recorder closes the file
+# Room on the card per second of flight at 100 Hz: about 18 blocks are used.
+BLOCKS_PER_S = 40
+CARD_EVENTS = {"card_busy": 0, "card_removed": 2}
+
+
+class _State(ctypes.Structure):
+    _fields_ = (
+        ("now", ctypes.c_int64),
+        ("clock_us", ctypes.c_uint32),
+        ("file_number", ctypes.c_uint32),
+        ("blocks_taken", ctypes.c_uint32),
+        ("ground_writes", ctypes.c_uint32),
+        ("conversions", ctypes.c_uint32),
+        ("lost_edges", ctypes.c_uint16),
+        ("lost_packets", ctypes.c_uint16),
+        ("lost_gps_bytes", ctypes.c_uint16),
+        ("recorder", ctypes.c_uint8),
+        ("volume", ctypes.c_uint8),
+        ("drive", ctypes.c_uint8),
+        ("relay", ctypes.c_uint8),
+        ("powered", ctypes.c_uint8),
+        ("programming", ctypes.c_uint8),
+        ("led", ctypes.c_uint8),
+        ("buzzer", ctypes.c_uint8),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What the recorder left on the card.
+
+    Attributes
+    ----------
+    log : bytes
+        The flight file, as long as the recorder's last boot made it.
+    name : str
+        Its name on the card.
+    lost_edges, lost_packets, lost_gps_bytes : int
+        Stimuli the hardware model had no room for.
+    """
+
+    log: bytes
+    name: str
+    lost_edges: int
+    lost_packets: int
+    lost_gps_bytes: int
+
+
+def library_path() -> Path:
+    """Return the library: HOST_SITL if set, else the one of the clone.
+
+    Raises
+    ------
+    UsageError
+        It is not there.
+    """
+    given = os.environ.get("HOST_SITL")
+    path = Path(given) if given else LIBRARY
+    if not path.is_file():
+        raise UsageError(
+            f"no recorder library at {path}: build it with"
+            " `python firmware/toolchain/build_sitl.py`, or use --firmware none"
+        )
+    return path
+
+
+def recorder_rate_hz(wanted_hz: float) -> int:
+    """Return the recorder's rate for a card: the card's if it knows it, else 100 Hz."""
+    return int(wanted_hz) if wanted_hz in RATES_HZ else 100
+
+
+def record(
+    given: Stimuli,
+    *,
+    rate_hz: int,
+    aircraft: str,
+    faults: Sequence[Fault] = (),
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Recording:
+    """Let the recorder live through a flight.
+
+    Parameters
+    ----------
+    given : Stimuli
+    rate_hz : int
+        One of `RATES_HZ`.
+    aircraft : str
+        Name for the log's configuration, at most 15 characters are kept.
+    faults : sequence of Fault
+        Those of card, barometer and power act here; the others are in the stimuli already.
+    seed : int
+        Of the garbage that a power cut leaves in a block being programmed.
+    progress : callable
+        Called with the share done.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    UsageError
+        No library, or the recorder did not make a file.
+    """
+    sitl = ctypes.CDLL(str(library_path()))
+    sitl.sitl_create()
+    image = format_card()
+    room = (ctypes.c_uint8 * CARD_BYTES).from_buffer(image)
+    try:
+        return _record(sitl, image, room, given, rate_hz, aircraft, faults, seed, progress)
+    finally:
+        sitl.sitl_create()  # lets go of the image
+        del room
+
+
+def _record(
+    sitl: ctypes.CDLL,
+    image: mmap.mmap,
+    room: ctypes.Array[ctypes.c_uint8],
+    given: Stimuli,
+    rate_hz: int,
+    aircraft: str,
+    faults: Sequence[Fault],
+    seed: int,
+    progress: Callable[[float], None],
+) -> Recording:
+    card_id = (ctypes.c_uint8 * 16)(*b"\x03VIRT\x15card\x10\x00\x00\x01\x00\xf0")
+    sitl.sitl_insert_card(room, ctypes.c_uint32(CARD_BYTES // SECTOR), card_id)
+    room_s = given.duration / TICKS_PER_S + 30.0
+    blocks = round(room_s * BLOCKS_PER_S * max(rate_hz / 100.0, 0.5))
+    sitl.sitl_set_file_blocks(ctypes.c_uint32(blocks))
+    _configure(sitl, rate_hz, aircraft)
+    _give(sitl, given)
+    end = given.duration
+    actions: list[tuple[int, str]] = []
+    for fault in faults:
+        at = round(fault.at_s * TICKS_PER_S)
+        if fault.kind in CARD_EVENTS:
+            value = round((fault.value or 500.0) * 1000.0)
+            sitl.sitl_add_card_events(
+                _int64([at]), _uint8([CARD_EVENTS[fault.kind]]), (ctypes.c_uint32 * 1)(value),
+                ctypes.c_size_t(1),
+            )  # fmt: skip
+        elif fault.kind == "baro_off":
+            actions.append((at, "baro_off"))
+            actions.append((round((fault.at_s + fault.duration_s) * TICKS_PER_S), "baro_on"))
+        elif fault.kind == "power_cut":
+            end = min(end, at)
+    sitl.sitl_power_on()
+    marks = sorted(
+        {*range(TICKS_PER_S, end, TICKS_PER_S), *(a for a, _ in actions if a < end), end}
+    )
+    for mark in marks:
+        sitl.sitl_run_until(ctypes.c_int64(mark))
+        for at, what in actions:
+            if at == mark and what == "baro_off":
+                sitl.sitl_remove_pressure()
+            elif at == mark:
+                _give_pressure(sitl, given)
+        progress(mark / end)
+    state = _State()
+    sitl.sitl_state(ctypes.byref(state))
+
+    # The pilot pulls the battery; at the bench the next power-on closes the file.
+    sitl.sitl_power_cut(ctypes.c_uint32(seed & 0xFFFFFFFF))
+    later = end + TICKS_PER_S
+    sitl.sitl_run_until(ctypes.c_int64(later))
+    times, levels = _idle_receiver(later, later + round(CLOSE_S * TICKS_PER_S))
+    sitl.sitl_add_edges(_int64(times), _uint8(levels), ctypes.c_size_t(len(times)))
+    sitl.sitl_power_on()
+    sitl.sitl_run_until(ctypes.c_int64(later + round(CLOSE_S * TICKS_PER_S)))
+
+    reader = CardReader(image)
+    flights = sorted((f for f in reader.files() if f.name.startswith("FLT")), key=lambda f: f.name)
+    if not flights:
+        raise UsageError("the recorder made no file on the card: was the flight shorter than 3 s?")
+    # The reboot may have prepared the next file already: the flight is the first one.
+    return Recording(
+        log=reader.read(flights[0]),
+        name=flights[0].name,
+        lost_edges=state.lost_edges,
+        lost_packets=state.lost_packets,
+        lost_gps_bytes=state.lost_gps_bytes,
+    )
+
+
+def _configure(sitl: ctypes.CDLL, rate_hz: int, aircraft: str) -> None:
+    """Change rate and aircraft in the default settings; both places are fixed by frame `config`."""
+    sitl.sitl_default_config.restype = ctypes.c_size_t
+    buffer = (ctypes.c_uint8 * 256)()
+    size = sitl.sitl_default_config(buffer, ctypes.c_size_t(len(buffer)))
+    config = bytearray(buffer[:size])
+    struct.pack_into("<H", config, 4, rate_hz)
+    config[-16:] = aircraft.encode("ascii", "replace")[:15].ljust(16, b"\0")
+    if not sitl.sitl_set_config((ctypes.c_uint8 * size)(*config), ctypes.c_size_t(size)):
+        raise UsageError(f"the recorder refuses {rate_hz} Hz, expected one of {RATES_HZ}")
+
+
+def _give(sitl: ctypes.CDLL, given: Stimuli) -> None:
+    edges, gps = given.edges, given.gps
+    sitl.sitl_add_edges(_int64(edges["at"]), _uint8(edges["levels"]), ctypes.c_size_t(len(edges)))
+    sitl.sitl_add_gps(_int64(gps["at"]), _uint8(gps["levels"]), ctypes.c_size_t(len(gps)))
+    packets = given.packets
+    if packets:
+        data = b"".join(p.data.ljust(PACKET_ROOM, b"\0") for p in packets)
+        byte_ticks = round((packets[0].end - packets[0].start) / (len(packets[0].data) + 1))
+        sitl.sitl_add_packets(
+            _int64([p.start for p in packets]),
+            _uint8([p.address for p in packets]),
+            _uint8([len(p.data) for p in packets]),
+            data,
+            ctypes.c_uint32(byte_ticks),
+            ctypes.c_size_t(len(packets)),
+        )
+    counts = np.ascontiguousarray(given.analog, dtype=np.float64)
+    sitl.sitl_set_analog(
+        ctypes.c_int64(0),
+        ctypes.c_int64(SAMPLE_STEP_TICKS),
+        counts.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
+        ctypes.c_size_t(len(counts)),
+    )
+    _give_pressure(sitl, given)
+    press = [round(PRESS_S * TICKS_PER_S), round(LET_GO_S * TICKS_PER_S)]
+    sitl.sitl_add_button(_int64(press), _uint8([1, 0]), ctypes.c_size_t(2))
+
+
+def _give_pressure(sitl: ctypes.CDLL, given: Stimuli) -> None:
+    raw = np.ascontiguousarray(given.pressure, dtype=np.float64)
+    words = (ctypes.c_uint16 * 11)(*(word & 0xFFFF for word in given.coefficients))
+    sitl.sitl_set_pressure(
+        words,
+        ctypes.c_int64(0),
+        ctypes.c_int64(SAMPLE_STEP_TICKS),
+        raw.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
+        ctypes.c_size_t(len(raw)),
+    )
+
+
+def _idle_receiver(first: int, last: int) -> tuple[list[int], list[int]]:
+    """Return edges of a receiver with neutral sticks and idle throttle."""
+    at, levels = [], []
+    widths = (NEUTRAL_US, NEUTRAL_US, NEUTRAL_US, IDLE_US, 1100.0)
+    for frame in range(first + 2000, last, TICKS_PER_S // 50):
+        rise = frame
+        for k, width in enumerate(widths):
+            fall = rise + round(width * 2)
+            at += [rise, fall]
+            levels += [1 << k, 0]
+            rise = fall + 600
+    return at, levels
+
+
+def _int64(values: npt.ArrayLike) -> object:
+    array = np.ascontiguousarray(values, dtype=np.int64)
+    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
+
+
+def _uint8(values: npt.ArrayLike) -> object:
+    array = np.ascontiguousarray(values, dtype=np.uint8)
+    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_uint8))
