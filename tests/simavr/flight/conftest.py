@@ -1,0 +1,46 @@
+"""Builds the flight image once and makes rigs around it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+if TYPE_CHECKING:
+    from rig import FlightRig
+
+MakeRig = Callable[..., "FlightRig"]
+
+
+@pytest.fixture(scope="session")
+def flight_elf() -> Path:
+    """The flight image."""
+    from rig import build_flight_image
+
+    return build_flight_image()
+
+
+@pytest.fixture
+def make_rig(flight_elf: Path, tmp_path: Path) -> Iterator[MakeRig]:
+    """A maker of rigs with a card of their own; frees their chips afterwards."""
+    from rig import FlightRig, make_card
+
+    rigs: list[FlightRig] = []
+
+    def make(
+        *, imu_hz: float = 100.0, frame_s: float = 0.020, sequential: bool = True
+    ) -> FlightRig:
+        card = make_card(tmp_path / f"card{len(rigs)}.img")
+        rig = FlightRig(flight_elf, card, imu_hz=imu_hz, frame_s=frame_s, sequential=sequential)
+        rigs.append(rig)
+        return rig
+
+    yield make
+    for rig in rigs:
+        rig.chip.close()

@@ -1,0 +1,193 @@
+"""The flight image on the simulated chip, with everything it flies with around it."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from simavr_bench import (
+    ArduImu,
+    Bmp085,
+    ChargePumpRelay,
+    Chip,
+    GpsUart,
+    Receiver,
+    SdCard,
+)
+from simavr_bench.imu import ImuSample
+
+ROOT = Path(__file__).resolve().parents[3]
+BUILD = ROOT / "build" / "simavr" / "flight"
+RECEIVER_PINS = ("PK0", "PK1", "PK2", "PK3", "PK4")
+SERVOS = {
+    "aileron": ("PK0", "PE4"),
+    "elevator": ("PK1", "PE5"),
+    "rudder": ("PK2", "PB5"),
+    "throttle": ("PK3", "PE3"),
+}
+# ADC channel of each scan slot, as hw/pin_map.toml gives them.
+ANALOG_CHANNELS = (1, 5, 2, 6, 3, 4, 7, 13, 0, 14, 15)
+CYCLES_PER_US = 16
+
+IDLE_US, CRUISE_US = 1000.0, 1500.0
+DIRECT_US, MEGA_US = 1000.0, 1900.0
+
+
+def build_flight_image() -> Path:
+    """Build the image with servo, relay and heartbeat pins enabled.
+
+    Returns
+    -------
+    Path
+        The ELF, from `pio run` with FLIGHT_IMAGE defined, in a build folder of its own.
+
+    Raises
+    ------
+    RuntimeError
+        If the build fails; the text is its last lines.
+    """
+    pio = Path(sys.executable).with_name("pio")
+    environment = dict(os.environ)
+    environment["PLATFORMIO_BUILD_DIR"] = str(BUILD / "pio")
+    environment["PLATFORMIO_BUILD_FLAGS"] = "-DFLIGHT_IMAGE"
+    done = subprocess.run(
+        [pio, "run", "-e", "mega2560"],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        raise RuntimeError(f"building the flight image failed:\n{done.stdout[-2000:]}{done.stderr}")
+    return BUILD / "pio" / "mega2560" / "firmware.elf"
+
+
+def make_card(path: Path, *, mebibytes: int = 300) -> Path:
+    """Format an empty FAT32 card image with room for two flight files."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.unlink(missing_ok=True)
+    subprocess.run(
+        ["mkfs.vfat", "-F", "32", "-s", "8", "-C", str(path), str(mebibytes * 1024)],
+        check=True,
+        capture_output=True,
+    )
+    return path
+
+
+def numbered(time_s: float) -> ImuSample:
+    """Give samples that differ from each other in every channel."""
+    step = round(time_s * 200)
+    return ImuSample(
+        (step % 16000, -(step % 15000), step % 14000),
+        (100 + step % 500, 200 - step % 300, -8192 + step % 200),
+        (step % 9000, -(step % 8000), step % 18000 - 9000),
+    )
+
+
+@dataclass
+class FlightRig:
+    """A powered-off instrument; `take_off` brings it to recording with the Mega driving.
+
+    Parameters
+    ----------
+    elf : Path
+        The flight image.
+    card_image : Path
+        FAT32 image; changed in place.
+    imu_hz : float
+        Rate of the IMU's packets.
+    frame_s, sequential : float, bool
+        The receiver.
+    busy_s : float
+        Card busy after every block.
+    """
+
+    elf: Path
+    card_image: Path
+    imu_hz: float = 100.0
+    frame_s: float = 0.020
+    sequential: bool = True
+    busy_s: float = 0.005
+    source: Callable[[float], ImuSample] = numbered
+    sticks: Callable[[float], Sequence[float]] | None = None
+    chip: Chip = field(init=False)
+    receiver: Receiver = field(init=False)
+    imu: ArduImu = field(init=False)
+    gps: GpsUart = field(init=False)
+    baro: Bmp085 = field(init=False)
+    card: SdCard = field(init=False)
+    relay: ChargePumpRelay = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Wire everything; nothing has power yet."""
+        self.chip = Chip(startup_s=0.0)
+        self.chip.load(self.elf)
+        self.card = SdCard(self.chip, "PB0", image=self.card_image, busy_s=self.busy_s)
+        self.receiver = Receiver(
+            self.chip, RECEIVER_PINS, frame_s=self.frame_s, sequential=self.sequential
+        )
+        self.receiver.width_us = [CRUISE_US, CRUISE_US, CRUISE_US, IDLE_US, DIRECT_US]
+        self.imu = ArduImu(
+            self.chip, rate_hz=self.imu_hz, scl_hz=400_000.0, source=self.source, flags=0x14
+        )
+        self.gps = GpsUart(self.chip, 2, knows_pvt=True)
+        self.baro = Bmp085(self.chip, "PA2", "PA3")
+        self.relay = ChargePumpRelay(self.chip, "PH5", SERVOS, sense="PH6")
+        for slot, channel in enumerate(ANALOG_CHANNELS):
+            self.chip.analog(channel, 0.8 + 0.33 * slot, noise_lsb=0.5)
+
+    def power_on(self) -> None:
+        """Give power to chip, receiver, IMU and GPS."""
+        self.chip.power_on()
+        self.receiver.start()
+        self.imu.start()
+        self.gps.start()
+
+    def take_off(self, *, ground_s: float = 12.0) -> None:
+        """Power on, wait on the ground, throttle up, switch to direct and then to Mega."""
+        self.power_on()
+        self.chip.run_s(ground_s)
+        self.receiver.width_us[3] = CRUISE_US
+        self.chip.run_s(1.5)
+        self.receiver.width_us[4] = MEGA_US
+        self.chip.run_s(0.5)
+
+    def status_lines(self) -> list[str]:
+        """Lines of the USB port so far."""
+        return self.chip.uart_sent(0).decode("ascii", "replace").splitlines()
+
+    def land(self) -> None:
+        """Pull the battery and free the chip."""
+        self.chip.power_off()
+        self.chip.close()
+
+
+def take_log(card_image: Path, target: Path, number: int = 1) -> Path:
+    """Copy FLTnnnnn.BIN out of the image as a PC would (mtools)."""
+    subprocess.run(
+        ["mcopy", "-o", "-i", str(card_image), f"::FLT{number:05d}.BIN", str(target)],
+        check=True,
+        capture_output=True,
+    )
+    return target
+
+
+def check_card(card_image: Path) -> None:
+    """Raise unless fsck.vfat finds the file system clean."""
+    done = subprocess.run(
+        ["fsck.vfat", "-n", str(card_image)], capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        raise AssertionError(f"fsck.vfat found:\n{done.stdout}")
+
+
+def sine(period_s: float, low_us: float, high_us: float) -> Callable[[float], float]:
+    """Give a stick that moves to and fro."""
+    middle_us, swing_us = (low_us + high_us) / 2, (high_us - low_us) / 2
+    return lambda time_s: middle_us + swing_us * math.sin(2 * math.pi * time_s / period_s)
