@@ -6,6 +6,7 @@ Bosch BST-BMP085-DS000 and BST-BMP280-DS001.
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 
 from simavr_bench.chip import Chip, cycles
 from simavr_bench.pins import pin_number
@@ -100,6 +101,8 @@ class Bmp085(RegisterDevice):
         Cycle at which each conversion began and its command.
     frozen : bool
         Conversions never end.
+    source : callable or None
+        Gives UT and UP (19 bits) for a cycle, in place of the two above.
     """
 
     TEMPERATURE, PRESSURE = 0x2E, 0x34
@@ -111,6 +114,7 @@ class Bmp085(RegisterDevice):
         self.raw_pressure = 23843 << 3
         self.conversions: list[tuple[int, int]] = []
         self.frozen = False
+        self.source: Callable[[int], tuple[int, int]] | None = None
         self.put(0xD0, b"\x55")
         self.calibrate(BMP085_CALIBRATION)
 
@@ -124,6 +128,8 @@ class Bmp085(RegisterDevice):
             return
         self.conversions.append((self._chip.cycle, value))
         oversampling = value >> 6
+        if self.source is not None:
+            self.raw_temperature, self.raw_pressure = self.source(self._chip.cycle)
         if value == self.TEMPERATURE:
             result = struct.pack(">HB", self.raw_temperature, 0)
             time_s = self.TIMES_S[0]

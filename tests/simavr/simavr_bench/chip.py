@@ -408,6 +408,18 @@ class Chip:
         """All 4096 bytes of EEPROM."""
         return ct.string_at(self._lib.bench_eeprom(self.handle), 4096)
 
+    def set_eeprom(self, content: bytes) -> None:
+        """Set all 4096 bytes of EEPROM.
+
+        Raises
+        ------
+        ValueError
+            If there are not 4096.
+        """
+        if len(content) != 4096:
+            raise ValueError(f"EEPROM of {len(content)} bytes, expected 4096")
+        ct.memmove(self._lib.bench_eeprom(self.handle), content, 4096)
+
     def flash(self, address: int, count: int) -> bytes:
         """Bytes of program memory."""
         return ct.string_at(self._lib.bench_flash(self.handle) + address, count)
