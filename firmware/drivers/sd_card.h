@@ -52,13 +52,15 @@ class SdCard {
     status_ = CardStatus::kNoCard;
     started_us_ = spi_.now_us();
   }
-  // One step, at most 0.6 ms at 400 kHz. True while it goes on.
+  // One step, at most 1.5 ms at 400 kHz. True while it goes on.
   bool poll() {
     switch (state_) {
       case State::kPowerUp:
         return step(power_up());
       case State::kNegotiate:
         return step(negotiate());
+      case State::kIdentify:
+        return step(identify());
       case State::kOff:
       case State::kIdle:
       case State::kStreaming:
@@ -68,7 +70,7 @@ class SdCard {
     }
     return false;
   }
-  bool initialised() const { return state_ != State::kOff && state_ > State::kNegotiate; }
+  bool initialised() const { return state_ != State::kOff && state_ > State::kIdentify; }
   CardStatus status() const { return status_; }  // of the last call that failed, or kOk
   const uint8_t* cid() const { return cid_; }    // 16 bytes
   uint32_t sectors() const { return sectors_; }
@@ -187,6 +189,7 @@ class SdCard {
     kOff,
     kPowerUp,
     kNegotiate,
+    kIdentify,
     kIdle,
     kStreaming,
     kStopping,
@@ -214,7 +217,6 @@ class SdCard {
     if (result == Step::kDone) {
       state_ = State::kIdle;
       status_ = CardStatus::kOk;
-      spi_.fast();
     } else {
       state_ = State::kOff;
     }
@@ -276,10 +278,17 @@ class SdCard {
       }
       return Step::kAgain;
     }
-    status_ = CardStatus::kCommand;
     if (r1 != 0) {
+      status_ = CardStatus::kCommand;
       return Step::kFailed;
     }
+    state_ = State::kIdentify;
+    spi_.fast();
+    return Step::kAgain;
+  }
+
+  Step identify() {
+    status_ = CardStatus::kCommand;
     high_capacity_ = false;
     if (version_2_) {
       uint8_t ocr[4];
