@@ -49,6 +49,12 @@ def test_log_cut_at_any_byte(size: int) -> None:
     check_rows(FLIGHT, FLIGHT.data()[:size])
 
 
+def test_log_cut_at_every_eighth_byte_of_a_block() -> None:
+    data = FLIGHT.data()
+    for size in range(20 * BLOCK, 21 * BLOCK + 1, 8):
+        check_rows(FLIGHT, data[:size])
+
+
 @settings(max_examples=60, deadline=None, derandomize=True, database=None)
 @given(seed=SEEDS, names=st.lists(st.sampled_from(sorted(DAMAGES)), max_size=3))
 def test_agrees_with_the_independent_decoder(seed: int, names: list[str]) -> None:
