@@ -45,7 +45,7 @@ def test_longitudinal_template_is_the_slope_of_the_equations_of_motion() -> None
     model = longitudinal(TRIM)
     values = {
         "D_V": -0.3, "D_alpha": -4.0, "D_de": -0.2,
-        "Z_V": -1.1 / V0, "Z_alpha": -80.0 / V0, "Z_de": -9.0 / V0,
+        "Z_V": -1.1 / V0, "Z_q": 0.0, "Z_alpha": -80.0 / V0, "Z_de": -9.0 / V0,
         "M_V": 0.2, "M_alpha": -60.0, "M_q": -7.0, "M_de": -90.0,
     }  # fmt: skip
     theta = np.array([values[p.name] for p in model.parameters])
@@ -70,7 +70,7 @@ def test_templates_leave_kinematics_and_gravity_alone(name: str) -> None:
 
 @pytest.mark.parametrize("name", list(TEMPLATES))
 def test_templates_survive_a_file(name: str, tmp_path: Path) -> None:
-    model = template(name, TRIM)
+    model = template(name, TRIM, imu_sd_m=0.01)
     path = tmp_path / "model.toml"
     path.write_text(model_text(model))
     back = read_model(path)
@@ -80,6 +80,7 @@ def test_templates_survive_a_file(name: str, tmp_path: Path) -> None:
         np.testing.assert_array_equal(ours, theirs)
     assert back.state_biases == model.state_biases
     assert back.output_biases == model.output_biases
+    assert back.levers == model.levers
 
 
 def test_entries_are_parsed() -> None:

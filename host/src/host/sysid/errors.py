@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from host.errors import UsageError
 
-class IdentificationError(Exception):
+
+class IdentificationError(UsageError):
     """Say what was found, what was expected and what to do, in one line."""

@@ -126,9 +126,9 @@ def fit_frequency_equation_error(
         right = sum(w * X.T @ y for w, X, y in zip(weights, X_rows, y_rows, strict=True))
         theta = solve_normal(np.asarray(normal), np.asarray(right))
         power = {key: [0.0, 0.0] for key in keys}
-        for key, X, y in zip(keys, X_rows, y_rows, strict=True):
-            miss = y - X @ theta
-            free = int(np.count_nonzero(X.any(axis=0)))
+        for key, block, y in zip(keys, X_rows, y_rows, strict=True):
+            miss = y - block @ theta
+            free = int(np.count_nonzero(block.any(axis=0)))
             power[key][0] += float(miss @ miss)
             power[key][1] += max(len(y) - free, 1)
         weights = np.array([power[key][1] / max(power[key][0], 1e-300) for key in keys])
@@ -192,8 +192,10 @@ def fit_frequency_output_error(
     start : Array, optional
         Common parameters; equation error gives them without.
     """
-    if model.delays:
-        raise IdentificationError("frequency output error has no delays: use output-error")
+    if model.delays or model.levers:
+        raise IdentificationError(
+            "frequency output error has no delays or levers: use output-error"
+        )
     n, m = len(model.states), len(model.inputs)
     count, p = len(model.parameters), len(model.outputs)
     foh = model.hold == "foh"

@@ -96,8 +96,10 @@ def _run(
     *,
     unscented: bool,
 ) -> FitResult:
-    if model.delays:
-        raise IdentificationError("Kalman filters have no delays: estimate them by output error")
+    if model.delays or model.levers:
+        raise IdentificationError(
+            "Kalman filters have no delays or levers: estimate those by output error"
+        )
     for maneuver in maneuvers:
         check_shapes(model, maneuver)
     n, q = len(model.states), len(model.parameters)

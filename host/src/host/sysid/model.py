@@ -77,6 +77,21 @@ class DelayGroup:
 
 
 @dataclass(frozen=True, slots=True)
+class Lever:
+    """An accelerometer off its assumed place: output += gain * parameter * rate of a state.
+
+    A wrong position of 1 cm turns angular acceleration into false side force; the offset is then a
+    parameter with a prior, and every derivative of the state's row enters the output through it.
+    The output should have a bias of its own, which takes the constant part.
+    """
+
+    output: str
+    state: str
+    parameter: str
+    gain: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
 class EntryTable:
     """Terms as index arrays for the compiled kernels: rows, columns, parameters, gains."""
 
@@ -108,6 +123,8 @@ class LinearModel:
         Residual delays, common to all maneuvers.
     hold : str
         ``zoh`` or ``foh``: how the input runs between its samples.
+    levers : tuple of Lever
+        Sensor offsets that mix state rates into outputs.
 
     Raises
     ------
@@ -130,6 +147,7 @@ class LinearModel:
     initial_states: tuple[str, ...] = ()
     delays: tuple[DelayGroup, ...] = field(default=())
     hold: str = "zoh"
+    levers: tuple[Lever, ...] = ()
 
     def __post_init__(self) -> None:
         n, m, p = len(self.states), len(self.inputs), len(self.outputs)
@@ -157,13 +175,20 @@ class LinearModel:
                 raise IdentificationError(
                     f"model {self.name}: {term.matrix} has no entry [{term.row},{term.column}]"
                 )
-        unused = sorted(set(names) - {term.parameter for term in self.terms})
+        unused = sorted(
+            set(names)
+            - {term.parameter for term in self.terms}
+            - {lever.parameter for lever in self.levers}
+        )
         if unused:
             raise IdentificationError(f"model {self.name}: {', '.join(unused)} enters no matrix")
         for what, chosen, known in (
             ("state bias", self.state_biases, self.states),
             ("initial state", self.initial_states, self.states),
             ("output bias", self.output_biases, self.outputs),
+            ("lever", tuple(x.output for x in self.levers), self.outputs),
+            ("lever", tuple(x.state for x in self.levers), self.states),
+            ("lever", tuple(x.parameter for x in self.levers), tuple(names)),
             ("delay", tuple(y for d in self.delays for y in d.outputs), self.outputs),
         ):
             strangers = [x for x in chosen if x not in known]
@@ -222,6 +247,11 @@ class LinearModel:
         index = {p.name: i for i, p in enumerate(self.parameters)}
         for term in self.terms:
             result[term.matrix][term.row, term.column] += term.gain * theta[index[term.parameter]]
+        for lever in self.levers:
+            row, state = self.outputs.index(lever.output), self.states.index(lever.state)
+            arm = lever.gain * float(theta[index[lever.parameter]])
+            result["C"][row] += arm * result["A"][state]
+            result["D"][row] += arm * result["B"][state]
         return result["A"], result["B"], result["C"], result["D"]
 
     def gradient(self, matrix: str, parameter: str) -> Array:

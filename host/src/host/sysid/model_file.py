@@ -18,6 +18,11 @@ Z_alpha = { start = -5.0, lower = -50.0, upper = 0.0 }
 [[delays]]
 name = "delay_vanes_s"
 outputs = ["alpha_rad"]
+[[levers]]
+output = "az_mps2"
+state = "q_radps"
+parameter = "imu_x_m"
+gain = -1.0
 ```
 
 An entry is a number, a parameter, ``gain*parameter`` or a sum of those; parameters without a line
@@ -36,7 +41,7 @@ import numpy as np
 
 from host.sysid.compiled import Array
 from host.sysid.errors import IdentificationError
-from host.sysid.model import MATRICES, DelayGroup, LinearModel, Parameter, Term
+from host.sysid.model import MATRICES, DelayGroup, Lever, LinearModel, Parameter, Term
 from host.sysid.result import FitResult
 
 _PIECE = re.compile(
@@ -54,6 +59,7 @@ KEYS = {
     "initial_states",
     "parameters",
     "delays",
+    "levers",
     "fit",
     *MATRICES,
 }
@@ -102,7 +108,8 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
     for label, shape in shapes.items():
         fixed[label], found = _matrix(document.get(label), label, shape, signals, source)
         terms += found
-    used = list(dict.fromkeys(term.parameter for term in terms))
+    levers = _levers(document.get("levers", []), source)
+    used = list(dict.fromkeys([t.parameter for t in terms] + [x.parameter for x in levers]))
     return LinearModel(
         name=str(document.get("name", Path(source).stem)),
         states=signals["states"],
@@ -119,6 +126,7 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         initial_states=signals["initial_states"],
         delays=_delays(document.get("delays", []), source),
         hold=str(document.get("hold", "foh")),
+        levers=levers,
     )
 
 
@@ -216,6 +224,19 @@ def _delays(value: object, source: str) -> tuple[DelayGroup, ...]:
     return tuple(result)
 
 
+def _levers(value: object, source: str) -> tuple[Lever, ...]:
+    needed = ("output", "state", "parameter")
+    if not isinstance(value, list) or any(
+        not isinstance(item, dict) or any(not isinstance(item.get(k), str) for k in needed)
+        for item in value
+    ):
+        raise IdentificationError(f"{source}: a lever needs output, state and parameter")
+    return tuple(
+        Lever(item["output"], item["state"], item["parameter"], float(item.get("gain", 1.0)))
+        for item in value
+    )
+
+
 def model_text(model: LinearModel, result: FitResult | None = None) -> str:
     """Return a model as TOML; with a result, estimates become the start values.
 
@@ -261,6 +282,14 @@ def model_text(model: LinearModel, result: FitResult | None = None) -> str:
             f"outputs = {_list(delay.outputs)}",
             f"prior_sd_s = {delay.prior_sd_s!r}",
             f"limit_s = {delay.limit_s!r}",
+        ]
+    for lever in model.levers:
+        lines += [
+            "[[levers]]",
+            f'output = "{lever.output}"',
+            f'state = "{lever.state}"',
+            f'parameter = "{lever.parameter}"',
+            f"gain = {lever.gain!r}",
         ]
     return "\n".join(lines) + "\n"
 

@@ -104,7 +104,16 @@ class OutputProblem:
         for i in np.flatnonzero(self._start_parameter >= 0):
             self._start_slopes[i, self._start_parameter[i]] = 1.0
         output_entries = model.entries("CD")
-        free_output = len(output_entries.row) > 0
+        free_output = len(output_entries.row) + len(model.levers) > 0
+        self._arms = [
+            (
+                model.outputs.index(lever.output),
+                model.states.index(lever.state),
+                [p.name for p in model.parameters].index(lever.parameter),
+                lever.gain,
+            )
+            for lever in model.levers
+        ]
         self._CD_slopes = np.zeros((len(model.outputs) if free_output else 0, n + m, width))
         for k in range(len(output_entries.row)):
             self._CD_slopes[
@@ -157,6 +166,7 @@ class OutputProblem:
         AB = np.zeros((n, n + m + 1))
         AB[:, :n], AB[:, n : n + m] = A, B
         CD = np.hstack([C, D])
+        CD_slopes = self._with_levers(AB[:, :-1], theta)
         result = []
         for part in self._parts:
             local = theta[part.index]
@@ -188,11 +198,26 @@ class OutputProblem:
             slope = propagate(step, push, C, self._start_slopes)
             for j in np.flatnonzero(self._bias_parameter >= 0):
                 slope[j, :, self._bias_parameter[j]] += 1.0
-            for row, output_slope in enumerate(self._CD_slopes):
+            for row, output_slope in enumerate(CD_slopes):
                 slope[row] += z[:, : n + m] @ output_slope
             self._delay(y, slope, local, part.dt_s)
             result.append(Response(y, slope))
         return result
+
+    def _with_levers(self, AB: Array, theta: Array) -> Array:
+        """Return the slopes of [C D]; an arm carries a whole state row into an output."""
+        if not self._arms:
+            return self._CD_slopes
+        slopes = self._CD_slopes.copy()
+        entries = self._entries
+        for output, state, parameter, gain in self._arms:
+            slopes[output, :, parameter] += gain * AB[state]
+            for t in np.flatnonzero(entries.row == state):
+                if entries.column[t] < AB.shape[1]:
+                    slopes[output, entries.column[t], entries.parameter[t]] += (
+                        gain * theta[parameter] * entries.gain[t]
+                    )
+        return slopes
 
     def outputs(self, theta: Array) -> list[Array] | None:
         """Simulate without sensitivities: outputs (p, samples) per maneuver, None if divergent."""

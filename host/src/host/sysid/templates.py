@@ -4,7 +4,8 @@ Longitudinal states are airspeed, alpha, q, theta; lateral ones beta, p, r, phi.
 as specific force along the velocity (D_) and normal to it (Z_, divided by the speed), so that
 accelerometer rows repeat the same parameters with known gains and help to find them. Kinematics and
 gravity are known numbers. Each state equation and each accelerometer has a bias per maneuver: the
-signals are total quantities, the trim lives in the biases.
+signals are total quantities, the trim lives in the biases. `imu_sd_m` makes the position of the
+accelerometers a parameter with that prior deviation.
 
 Etkin & Reid, Dynamics of Flight, ch. 4-5, linearised in wind axes; a_x = f cos(alpha) -
 n sin(alpha), a_z = f sin(alpha) + n cos(alpha) with f along and n normal to the velocity.
@@ -18,7 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from host.sysid.errors import IdentificationError
-from host.sysid.model import DelayGroup, LinearModel, Parameter, Term
+from host.sysid.model import DelayGroup, Lever, LinearModel, Parameter, Term
 
 GRAVITY_MPS2 = 9.80665
 
@@ -49,6 +50,7 @@ class _Builder:
     parameters: dict[str, Parameter] = field(default_factory=dict)
     terms: list[Term] = field(default_factory=list)
     known: dict[tuple[str, str, str], float] = field(default_factory=dict)
+    levers: list[Lever] = field(default_factory=list)
 
     def add(self, name: str, start: float, places: Iterable[tuple[str, str, float]]) -> None:
         """Make a parameter act on rows by columns with gains; unknown signals are left out."""
@@ -78,6 +80,14 @@ class _Builder:
         if column in self.inputs:
             return "B" if rate else "D", rows.index(label), self.inputs.index(column)
         return None
+
+    def lever(self, output: str, state: str, name: str, gain: float, sd_m: float) -> None:
+        """Let an accelerometer sit away from its assumed place, with a prior."""
+        if sd_m > 0.0 and output in self.outputs and state in self.states:
+            self.parameters[name] = Parameter(
+                name, 0.0, lower=-3.0 * sd_m, upper=3.0 * sd_m, prior_sd=sd_m
+            )
+            self.levers.append(Lever(output, state, name, gain))
 
     def build(self, *, delays: tuple[DelayGroup, ...], hold: str) -> LinearModel:
         """Return the model; outputs that carry a state's name measure it."""
@@ -115,6 +125,7 @@ class _Builder:
                 if (held := tuple(y for y in d.outputs if y in self.outputs))
             ),
             hold=hold,
+            levers=tuple(self.levers),
         )
 
 
@@ -123,6 +134,7 @@ def longitudinal(
     *,
     accelerometers: bool = True,
     throttle: bool = False,
+    imu_sd_m: float = 0.0,
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
@@ -138,6 +150,16 @@ def longitudinal(
         (*outputs, "ax_mps2", "az_mps2") if accelerometers else outputs,
     )
     sine, cosine = float(np.sin(trim.alpha_rad)), float(np.cos(trim.alpha_rad))
+    if accelerometers:  # without a_z it drowns in the known q
+        model.add(
+            "Z_q",
+            -0.1,
+            [
+                ("alpha_rad'", "q_radps", 1.0),
+                ("ax_mps2", "q_radps", -V * sine),
+                ("az_mps2", "q_radps", V * cosine),
+            ],
+        )
     for label, column, along, normal in (
         ("V", "airspeed_mps", -0.1, -2.0 * g / V**2),
         ("alpha", "alpha_rad", -5.0, -5.0),
@@ -177,6 +199,8 @@ def longitudinal(
     model.fix("alpha_rad'", "theta_rad", -g / V * float(np.sin(gamma)))
     model.fix("alpha_rad'", "alpha_rad", g / V * float(np.sin(gamma)))
     model.fix("theta_rad'", "q_radps", 1.0)
+    model.lever("ax_mps2", "q_radps", "imu_z_m", 1.0, imu_sd_m)
+    model.lever("az_mps2", "q_radps", "imu_x_m", -1.0, imu_sd_m)
     along, normal = g * float(np.sin(gamma)), -g * float(np.cos(gamma))  # of the trim
     model.fix("ax_mps2", "alpha_rad", -(along * sine + normal * cosine))
     model.fix("az_mps2", "alpha_rad", along * cosine - normal * sine)
@@ -187,6 +211,7 @@ def short_period(
     trim: Trim,
     *,
     accelerometers: bool = True,
+    imu_sd_m: float = 0.0,
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
@@ -200,7 +225,10 @@ def short_period(
         ("elevator_rad",),
         (*states, "az_mps2") if accelerometers else states,
     )
-    for label, column, start in (("alpha", "alpha_rad", -5.0), ("de", "elevator_rad", -0.5)):
+    forces = [("alpha", "alpha_rad", -5.0), ("de", "elevator_rad", -0.5)]
+    if accelerometers:
+        forces.append(("q", "q_radps", -0.1))
+    for label, column, start in forces:
         model.add(
             f"Z_{label}", start, [("alpha_rad'", column, 1.0), ("az_mps2", column, V * cosine)]
         )
@@ -212,6 +240,7 @@ def short_period(
         model.add(f"M_{label}", start, [("q_radps'", column, 1.0)])
     model.fix("alpha_rad'", "q_radps", 1.0)
     model.fix("az_mps2", "alpha_rad", GRAVITY_MPS2 * float(np.sin(trim.alpha_rad)))
+    model.lever("az_mps2", "q_radps", "imu_x_m", -1.0, imu_sd_m)
     return model.build(delays=delays, hold=hold)
 
 
@@ -219,11 +248,12 @@ def phugoid(
     trim: Trim,
     *,
     accelerometers: bool = False,
+    imu_sd_m: float = 0.0,
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
     """Return the two-state phugoid model (alpha follows at once)."""
-    del accelerometers  # slow motion: they see only gravity
+    del accelerometers, imu_sd_m  # slow motion: they see only gravity
     model = _Builder(
         "phugoid",
         ("airspeed_mps", "theta_rad"),
@@ -244,6 +274,7 @@ def lateral(
     *,
     accelerometers: bool = True,
     rudder: bool = True,
+    imu_sd_m: float = 0.0,
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
@@ -272,6 +303,8 @@ def lateral(
             model.add(f"{axis}_{label}", start, [(row, column, 1.0)])
     model.fix("phi_rad'", "p_radps", 1.0)
     model.fix("phi_rad'", "r_radps", float(np.tan(trim.theta_rad)))
+    model.lever("ay_mps2", "p_radps", "imu_z_m", -1.0, imu_sd_m)
+    model.lever("ay_mps2", "r_radps", "imu_x_m", 1.0, imu_sd_m)
     return model.build(delays=delays, hold=hold)
 
 
@@ -279,6 +312,7 @@ def dutch_roll(
     trim: Trim,
     *,
     accelerometers: bool = True,
+    imu_sd_m: float = 0.0,
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
@@ -297,6 +331,7 @@ def dutch_roll(
         ("dr", "rudder_rad", -20.0),
     ):
         model.add(f"N_{label}", start, [("r_radps'", column, 1.0)])
+    model.lever("ay_mps2", "r_radps", "imu_x_m", 1.0, imu_sd_m)
     return model.build(delays=delays, hold=hold)
 
 
@@ -304,11 +339,12 @@ def roll(
     trim: Trim,
     *,
     accelerometers: bool = False,
+    imu_sd_m: float = 0.0,
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
     """Return the one-state roll model, bank angle measured beside the rate."""
-    del trim, accelerometers
+    del trim, accelerometers, imu_sd_m
     states = ("p_radps", "phi_rad")
     model = _Builder("roll", states, ("aileron_rad",), states)
     model.add("L_p", -10.0, [("p_radps'", "p_radps", 1.0)])

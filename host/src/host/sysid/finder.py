@@ -1,0 +1,254 @@
+"""Find the maneuvers of a flight from its control inputs, name and grade them.
+
+A pilot's test input moves a surface far and fast; corrections move it little and slowly. Edges are
+changes over a short lag that stand out of the surface's own activity; edges of one axis that follow
+each other closely are one input. The window ends three seconds after the last edge, or where the
+next input begins.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.sysid.compiled import Array, BoolArray, IntArray
+
+LAG_S = 0.12  # a hand needs about this long for one edge
+LEAST_EDGE_RAD = 0.025  # 1.4 degrees: a pulse smaller than this excites nothing on a trainer
+LEAST_EDGE_THROTTLE = 0.12
+ACTIVITY = 6.0  # edges stand out by this many robust deviations of the surface's activity
+JOIN_S = 1.6  # between edges of one input; wider for a throttle pulse
+JOIN_THROTTLE_S = 3.0
+RESPONSE_S = 3.0  # the window reaches this long past the last edge
+TRIM_S = 1.0  # quiet time before the input, part of the window given to a fit
+FLYING_SHARE = 0.5  # of the median airspeed: slower is not flight
+AXES = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One test input and its response, times in the time of the table, s."""
+
+    axis: str
+    kind: str
+    start_s: float
+    input_end_s: float
+    end_s: float
+    amplitude: float
+    edges: int
+
+    def fit_window(self) -> tuple[float, float]:
+        """Return from and to with a moment of trim before the input."""
+        return self.start_s - 0.3, self.end_s
+
+
+def find(columns: Mapping[str, Array]) -> list[Found]:
+    """Return the maneuvers of a flight in order of time.
+
+    Parameters
+    ----------
+    columns : mapping
+        `t_s` and any of `elevator_rad`, `aileron_rad`, `rudder_rad`, `throttle`; `airspeed_mps`
+        keeps ground handling out.
+    """
+    t = np.asarray(columns["t_s"], dtype=np.float64)
+    if len(t) < 32:
+        return []
+    flying = np.ones(len(t), dtype=bool)
+    if "airspeed_mps" in columns:
+        speed = np.nan_to_num(np.asarray(columns["airspeed_mps"]))
+        flying = speed > FLYING_SHARE * float(np.median(speed))
+    found: list[Found] = []
+    for axis in AXES:
+        if axis in columns:
+            series = np.nan_to_num(np.asarray(columns[axis], dtype=np.float64))
+            found += _find_axis(axis, t, series, flying)
+    found.sort(key=lambda f: f.start_s)
+    return _bounded(found, float(t[-1]))
+
+
+def _find_axis(axis: str, t: Array, series: Array, flying: BoolArray) -> list[Found]:
+    dt_s = float(np.median(np.diff(t)))
+    lag = max(1, round(LAG_S / dt_s))
+    smooth = _median3(series)
+    change = np.zeros(len(t))
+    change[lag:] = smooth[lag:] - smooth[:-lag]
+    change[~flying] = 0.0
+    quiet = 1.4826 * float(np.median(np.abs(change[flying]))) if flying.any() else 0.0
+    least = LEAST_EDGE_THROTTLE if axis == "throttle" else LEAST_EDGE_RAD
+    limit = max(least, ACTIVITY * quiet)
+    hot = np.flatnonzero(np.abs(change) > limit)
+    if len(hot) == 0:
+        return []
+    join = JOIN_THROTTLE_S if axis == "throttle" else JOIN_S
+    groups = np.split(hot, np.flatnonzero(np.diff(t[hot]) > join) + 1)
+    result = []
+    for group in groups:
+        result += _describe(axis, t, smooth, group, lag)
+    return result
+
+
+def _describe(axis: str, t: Array, series: Array, group: IntArray, lag: int) -> list[Found]:
+    first, last = int(group[0]), int(group[-1])
+    before = series[max(0, first - lag - round(TRIM_S / float(t[1] - t[0]))) : max(1, first - lag)]
+    trim = float(np.median(before))
+    inside = series[first : last + 1] - trim
+    amplitude = float(np.max(np.abs(inside)))
+    # Walk back to the departure and forward to the return, a fifth of the edge at a time.
+    start = first
+    while start > 0 and first - start < 2 * lag and abs(series[start] - trim) > 0.15 * amplitude:
+        start -= 1
+    end = last
+    settle = float(np.median(series[last : last + 4 * lag + 1]))
+    while end > first and abs(series[end] - settle) < 0.15 * amplitude:
+        end -= 1
+    if abs(settle - trim) > 0.6 * amplitude:
+        return []  # a step that stays is a change of trim (a launch), not a test input
+    runs = _runs(inside / max(amplitude, 1e-12), t[first : last + 1])
+    if len(runs) == 0:
+        return []
+    return [
+        Found(
+            axis=axis,
+            kind=_kind(runs),
+            start_s=float(t[start]),
+            input_end_s=float(t[min(end + 1, len(t) - 1)]),
+            end_s=float(t[min(end + 1, len(t) - 1)]) + RESPONSE_S,
+            amplitude=amplitude,
+            edges=len(runs) + 1,
+        )
+    ]
+
+
+def _runs(level: Array, t: Array) -> list[tuple[int, float]]:
+    """Return (sign, duration) of successive stretches above half amplitude."""
+    sign = np.where(level > 0.4, 1, np.where(level < -0.4, -1, 0))
+    runs: list[tuple[int, float]] = []
+    start = 0
+    for k in range(1, len(sign) + 1):
+        if k == len(sign) or sign[k] != sign[start]:
+            length = float(t[k - 1] - t[start])
+            if sign[start] != 0 and length > 0.03:
+                runs.append((int(sign[start]), length))
+            start = k
+    return runs
+
+
+def _kind(runs: list[tuple[int, float]]) -> str:
+    signs = [s for s, _ in runs]
+    lengths = np.array([length for _, length in runs])
+    alternating = all(a != b for a, b in itertools.pairwise(signs))
+    if len(runs) == 1:
+        return "pulse"
+    if len(runs) == 2 and alternating:
+        return "doublet"
+    if len(runs) == 4 and alternating:
+        share = lengths / lengths.sum()
+        pattern = np.array([3.0, 2.0, 1.0, 1.0]) / 7.0
+        if float(np.max(np.abs(share - pattern))) < 0.12:
+            return "3-2-1-1"
+    if len(runs) >= 6:
+        steady = np.polyfit(np.arange(len(lengths)), np.log(np.maximum(lengths, 1e-3)), 1)[0]
+        return "sweep" if abs(steady) > 0.08 else "multisine"
+    return "multistep"
+
+
+def _median3(series: Array) -> Array:
+    padded = np.concatenate([series[:1], series, series[-1:]])
+    return np.asarray(np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0))
+
+
+def _bounded(found: list[Found], last_s: float) -> list[Found]:
+    """End each window where the next input begins, and drop echoes inside a stronger input."""
+    kept: list[Found] = []
+    for item in found:
+        overlaps = [
+            k for k in kept if item.start_s < k.input_end_s and k.start_s < item.input_end_s
+        ]
+        strength = item.amplitude * (0.3 if item.axis == "throttle" else 1.0)
+        weaker = [
+            k
+            for k in overlaps
+            if k.amplitude * (0.3 if k.axis == "throttle" else 1.0) < 0.5 * strength
+        ]
+        if len(overlaps) > len(weaker):
+            stronger = [k for k in overlaps if k not in weaker]
+            if any(k.amplitude > 2.0 * item.amplitude for k in stronger):
+                continue
+        kept = [k for k in kept if k not in weaker] + [item]
+    kept.sort(key=lambda f: f.start_s)
+    result = []
+    for k, item in enumerate(kept):
+        limit = kept[k + 1].start_s if k + 1 < len(kept) else last_s
+        end = min(item.end_s, max(limit, item.input_end_s), last_s)
+        result.append(
+            Found(
+                item.axis,
+                item.kind,
+                item.start_s,
+                item.input_end_s,
+                end,
+                item.amplitude,
+                item.edges,
+            )
+        )
+    return result
+
+
+@dataclass(frozen=True, slots=True)
+class Grade:
+    """What a test point is worth before anyone fits it.
+
+    `score` is 0 to 1; `remarks` name what is wrong in words.
+    """
+
+    score: float
+    response_over_noise: float
+    trim_quiet: float
+    feedback: float
+    remarks: tuple[str, ...]
+
+
+RESPONSE_OF = {
+    "elevator_rad": "q_radps",
+    "aileron_rad": "p_radps",
+    "rudder_rad": "r_radps",
+    "throttle": "airspeed_mps",
+}
+
+
+def grade(columns: Mapping[str, Array], item: Found) -> Grade:
+    """Grade one maneuver: amplitude, trim before, noise, pilot feedback."""
+    t = np.asarray(columns["t_s"], dtype=np.float64)
+    response = np.nan_to_num(np.asarray(columns[RESPONSE_OF[item.axis]], dtype=np.float64))
+    surface = np.nan_to_num(np.asarray(columns[item.axis], dtype=np.float64))
+    inside = (t >= item.start_s) & (t <= item.end_s)
+    before = (t >= item.start_s - TRIM_S) & (t < item.start_s)
+    after = (t > item.input_end_s + 0.3) & (t <= item.end_s)
+    noise = float(np.std(np.diff(response[inside], n=2))) / np.sqrt(6.0) if inside.sum() > 8 else 0
+    power = float(np.std(response[inside])) if inside.any() else 0.0
+    ratio = power / max(noise, 1e-12)
+    trim = float(np.std(response[before])) / max(power, 1e-12) if before.sum() > 4 else 1.0
+    feedback = (
+        float(np.std(surface[after])) / max(item.amplitude, 1e-12) if after.sum() > 4 else 1.0
+    )
+    remarks = []
+    if ratio < 5.0:
+        remarks.append(f"response only {ratio:.1f} times its noise: fly a larger input")
+    if trim > 0.25:
+        remarks.append(f"not trimmed before: {100.0 * trim:.0f} % of the response")
+    if feedback > 0.25:
+        remarks.append(
+            f"pilot corrects during the response ({100.0 * feedback:.0f} % of the input)"
+        )
+    if after.sum() < 4 or item.end_s - item.input_end_s < 1.0:
+        remarks.append("response cut short: wait before the next input")
+    score = float(
+        np.clip(ratio / 20.0, 0.0, 1.0)
+        * np.clip(1.25 - trim, 0.0, 1.0)
+        * np.clip(1.25 - feedback, 0.0, 1.0)
+    )
+    return Grade(score, ratio, trim, feedback, tuple(remarks))

@@ -1,0 +1,225 @@
+"""`host identify`: from a flight to a model, its uncertainty, and what to trust of it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from host.sysid.finder import Found
+    from host.sysid.flight import Answer
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "identify",
+        help="estimate the aircraft's derivatives with their uncertainty",
+        description="Find the maneuvers of a flight, fit a model to them jointly, check it on"
+        " maneuvers it has not seen, and say what of it can be trusted.",
+    )
+    parser.add_argument("source", type=Path, help="log, CSV, Parquet or MAT file")
+    parser.add_argument("--map", type=Path, metavar="TOML", help="foreign names, units and signs")
+    parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
+    parser.add_argument(
+        "--model",
+        action="append",
+        metavar="NAME",
+        help="longitudinal, lateral, short-period, phugoid, roll, dutch-roll or a TOML file;"
+        " repeatable (default: longitudinal and lateral)",
+    )
+    parser.add_argument(
+        "--method",
+        action="append",
+        metavar="NAME",
+        help="estimator, repeatable for a side-by-side table; 'list' shows them",
+    )
+    parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: sensor positions, mass;"
+                        " gives coefficients")  # fmt: skip
+    parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="start of the fit")
+    parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the fit")
+    parser.add_argument("--maneuver", type=int, action="append", metavar="N",
+                        help="use only maneuver N of `host maneuvers`; repeatable")  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--mat", type=Path, metavar="FILE", help="write a MAT file")
+    parser.add_argument("--plots", type=Path, metavar="DIR", help="write pictures")
+    parser.add_argument("--save-model", type=Path, metavar="FILE", help="write TOML (or .mat)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Identify and print the answer: words first, then numbers."""
+    from host.errors import ExitCode
+    from host.sysid.errors import IdentificationError
+    from host.sysid.fit import methods
+    from host.sysid.flight import DEFAULT_METHOD, identify
+    from host.sysid.tables import read_columns
+    from host.sysid.verdict import model_lines, words
+
+    chosen = args.method or [DEFAULT_METHOD]
+    if "list" in chosen:
+        print("\n".join(f"{name:26s} {about}" for name, about in methods().items()))
+        return int(ExitCode.OK)
+    unknown = [m for m in chosen if m not in methods()]
+    if unknown:
+        raise IdentificationError(
+            f"unknown method {', '.join(unknown)}; known: {', '.join(methods())}"
+        )
+    columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
+    airframe = None
+    if args.aircraft:
+        from host.sysid.aircraft_file import airframe_data
+
+        airframe = airframe_data(args.aircraft)
+    windows = _windows(args, columns)
+    answers: list[Answer] = []
+    for method in chosen:
+        for name, user_model in _models(args.model):
+            try:
+                answers += identify(
+                    columns,
+                    names=(name,),
+                    method=method,
+                    airframe=airframe,
+                    windows=windows,
+                    user_model=user_model,
+                )
+            except IdentificationError as error:
+                notes.append(f"{name}, {method}: {error}")
+    if not answers:
+        raise IdentificationError("; ".join(notes))
+    _write(args, answers)
+    if args.json:
+        from host.sysid.answer_json import answer_document
+
+        print(
+            json.dumps(
+                {
+                    "source": str(args.source),
+                    "notes": notes,
+                    "answers": [answer_document(a, words([a], [])) for a in answers],
+                },
+                indent=2,
+                allow_nan=True,
+            )
+        )
+        return int(ExitCode.OK)
+    lines = words(answers, notes)
+    if len(chosen) > 1:
+        lines += ["", *_side_by_side(answers)]
+    else:
+        for answer in answers:
+            lines += ["", *model_lines(answer)]
+    print("\n".join(lines))
+    return int(ExitCode.OK)
+
+
+def _models(names: list[str] | None) -> list[tuple[str, Any]]:
+    from host.sysid.model_file import read_model
+
+    result: list[tuple[str, Any]] = []
+    for name in names or ["longitudinal", "lateral"]:
+        if name.endswith(".toml"):
+            result.append((name, read_model(Path(name))))
+        else:
+            result.append((name, None))
+    return result
+
+
+def _windows(args: argparse.Namespace, columns: dict[str, Any]) -> list[Found] | None:
+    """Return the maneuvers the user asked for; None leaves the choice to identification."""
+    from host.sysid.errors import IdentificationError
+    from host.sysid.finder import Found, find
+
+    if args.from_s is not None or args.to_s is not None:
+        t = columns["t_s"]
+        first = float(t[0]) if args.from_s is None else args.from_s
+        last = float(t[-1]) if args.to_s is None else args.to_s
+        if not first < last:
+            raise IdentificationError(f"--from {first} is not before --to {last}")
+        import numpy as np
+
+        inside = (t >= first) & (t <= last)
+        moving = {
+            axis: float(np.ptp(columns[axis][inside])) if inside.any() else 0.0
+            for axis in ("elevator_rad", "aileron_rad", "rudder_rad")
+            if axis in columns
+        }
+        return [
+            Found(axis, "window", first + 0.3, last, last, size / 2.0, 0)
+            for axis, size in moving.items()
+            if size > 0.5 * max(moving.values())
+        ]
+    if args.maneuver:
+        found = find(columns)
+        wrong = [n for n in args.maneuver if not 1 <= n <= len(found)]
+        if wrong:
+            raise IdentificationError(f"no maneuver {wrong[0]}; there are {len(found)}")
+        return [found[n - 1] for n in args.maneuver]
+    return None
+
+
+def _side_by_side(answers: list[Answer]) -> list[str]:
+    lines = []
+    for template in dict.fromkeys(a.template for a in answers):
+        mine = [a for a in answers if a.template == template]
+        names = [p.name for p in mine[0].model.parameters]
+        lines.append(f"{template:16s}" + "".join(f"{a.method:>30s}" for a in mine))
+        for name in names:
+            line = f"  {name:14s}"
+            for answer in mine:
+                result = answer.result
+                if name in result.names:
+                    k = result.index(name)
+                    line += f"{result.estimate[k]:17.5g} +- {result.half_width()[k]:9.2g}"
+                else:
+                    line += f"{'-':>30s}"
+            lines.append(line)
+    return lines
+
+
+def _write(args: argparse.Namespace, answers: list[Answer]) -> None:
+    if args.plots:
+        from host.sysid.pictures import draw
+
+        for answer in answers:
+            draw(answer, args.plots)
+    if args.mat:
+        _write_mat(args.mat, answers)
+    if args.save_model:
+        from host.sysid.model_file import model_text
+
+        if args.save_model.suffix == ".mat":
+            _write_mat(args.save_model, answers)
+            return
+        for number, answer in enumerate(answers):
+            path = args.save_model
+            if number:
+                path = path.with_name(f"{path.stem}_{answer.template}{path.suffix}")
+            path.write_text(model_text(answer.model, answer.result))
+
+
+def _write_mat(path: Path, answers: list[Answer]) -> None:
+    import numpy as np
+    from scipy import io
+
+    content: dict[str, Any] = {}
+    for answer in answers:
+        A, B, C, D = answer.result.matrices()
+        label = answer.template.replace("-", "_")
+        content[label] = {
+            "A": A,
+            "B": B,
+            "C": C,
+            "D": D,
+            "names": np.array(answer.result.names, dtype=object),
+            "estimate": answer.result.estimate,
+            "covariance": answer.result.covariance,
+            "half_width": answer.result.half_width(),
+            "states": np.array(answer.model.states, dtype=object),
+            "inputs": np.array(answer.model.inputs, dtype=object),
+            "outputs": np.array(answer.model.outputs, dtype=object),
+            "method": answer.method,
+        }
+    io.savemat(path, content)

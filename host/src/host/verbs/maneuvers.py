@@ -1,0 +1,39 @@
+"""`host maneuvers`: find the test points of a log and grade them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "maneuvers",
+        help="find the test points of a log",
+        description="Find the maneuvers of a flight from its control inputs, name and grade them:"
+        " amplitude, trim before, noise, pilot feedback.",
+    )
+    parser.add_argument("source", type=Path, help="log, CSV, Parquet or MAT file")
+    parser.add_argument("--map", type=Path, metavar="TOML", help="foreign names, units and signs")
+    parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the maneuvers of a flight."""
+    from host.errors import ExitCode
+    from host.sysid.answer_json import maneuver_document
+    from host.sysid.flight import maneuvers_of
+    from host.sysid.tables import read_columns
+    from host.sysid.verdict import maneuver_lines
+
+    columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
+    graded = maneuvers_of(columns)
+    if args.json:
+        print(json.dumps({"notes": notes, "maneuvers": maneuver_document(graded)}, indent=2))
+    else:
+        print("\n".join([*(f"note: {n}" for n in notes), *maneuver_lines(graded)]))
+    return int(ExitCode.OK)

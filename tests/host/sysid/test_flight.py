@@ -1,0 +1,215 @@
+"""From a virtual flight to the answer: finding, grading, correcting, converting, saying so."""
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.cli import main
+from host.sysid import Maneuver, fit
+from host.sysid.aircraft_file import airframe_data
+from host.sysid.airframe import AirframeData, Condition, coefficients, corrected
+from host.sysid.errors import IdentificationError
+from host.sysid.finder import find, grade
+from host.sysid.flight import identify
+from host.sysid.model_file import read_model
+from host.sysid.problem import OutputProblem
+from host.sysid.tables import read_columns
+from host.sysid.templates import Trim, longitudinal
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """One simulated flight without a recorder, and its truth."""
+    folder = tmp_path_factory.mktemp("flown")
+    options = ["--seed", "3", "--firmware", "none", "--no-picture", "-o", str(folder)]
+    assert main(["simulate", "demo", *options]) == 0
+    with (folder / "flight.truth.toml").open("rb") as file:
+        return folder / "flight.csv", tomllib.load(file)
+
+
+def test_every_maneuver_is_found_and_nothing_else(flown: tuple[Path, dict[str, Any]]) -> None:
+    columns, _ = read_columns(flown[0])
+    found = find(columns)
+    truth = flown[1]["maneuver"]
+    assert isinstance(truth, list)
+    assert len(found) == len(truth)
+    clock = 1.0 + float(flown[1]["drawn"]["clock_share"])
+    for ours, theirs in zip(found, truth, strict=True):
+        assert ours.axis.startswith(theirs["axes"][0])
+        assert ours.kind.replace("-", "") == theirs["kind"].replace("-", "")
+        first, last = theirs["start_s"] * clock, theirs["end_s"] * clock
+        overlap = min(ours.end_s, last) - max(ours.start_s, first)
+        union = max(ours.end_s, last) - min(ours.start_s, first)
+        assert overlap / union > 0.85
+
+
+def test_a_bad_test_point_is_named_before_anyone_fits_it() -> None:
+    rng = np.random.default_rng(1)
+    t = np.arange(0.0, 20.0, 0.01)
+    elevator = np.where((t > 8.0) & (t < 8.5), 0.06, 0.0) - np.where((t > 8.5) & (t < 9.0), 0.06, 0)
+    elevator = elevator + 0.03 * np.sin(3.0 * t) * (t > 9.2)  # the pilot stirs afterwards
+    columns = {
+        "t_s": t,
+        "elevator_rad": elevator + 1e-4 * rng.standard_normal(len(t)),
+        "q_radps": 0.02 * rng.standard_normal(len(t)),
+    }
+    found = find(columns)
+    assert [f.kind for f in found] == ["doublet"]
+    remarks = " ".join(grade(columns, found[0]).remarks)
+    assert "larger input" in remarks
+    assert "pilot corrects" in remarks
+    quiet = {**columns, "elevator_rad": 1e-3 * rng.standard_normal(len(t))}
+    assert find(quiet) == []
+
+
+def test_main_derivatives_and_modes_are_near_the_truth(
+    flown: tuple[Path, dict[str, Any]],
+) -> None:
+    """Light turbulence, every tolerance drawn, nominal mass properties."""
+    columns, _ = read_columns(flown[0])
+    answers = {a.template: a for a in identify(columns, airframe=airframe_data("ultrastick25e"))}
+    truth = flown[1]["maneuver"]
+    assert isinstance(truth, list)
+    for template, axis, names in (
+        ("longitudinal", ("elevator",), ("CL_alpha", "Cm_alpha", "Cm_de")),
+        ("lateral", ("aileron", "rudder"), ("Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr")),
+    ):
+        flights = [m["derivatives"] for m in truth if m["axes"][0] in axis]
+        found = {c.name: c for c in answers[template].coefficients}
+        for name in names:
+            expected = float(np.mean([f[name] for f in flights]))
+            assert found[name].value == pytest.approx(expected, rel=0.25), name
+            assert found[name].half_width > 0.0
+    dutch = next(m for m in answers["lateral"].modes if m.name == "dutch roll")
+    assert dutch.frequency_radps == pytest.approx(truth[4]["modes"]["dutch_roll"][0], rel=0.05)
+    assert answers["lateral"].held_out
+
+
+def test_vane_and_accelerometer_are_moved_to_the_cg() -> None:
+    """A rigid body in made-up motion: sensors off the CG, corrected, give the CG again."""
+    t = np.arange(0.0, 4.0, 0.001)
+    p, q, r = 0.8 * np.sin(5.0 * t), 0.6 * np.cos(4.0 * t), 0.3 * np.sin(3.0 * t)
+    omega = np.column_stack([p, q, r])
+    arm = np.array([0.05, -0.02, 0.03])
+    rate = np.gradient(omega, t, axis=0)
+    extra = np.cross(rate, arm) + np.cross(omega, np.cross(omega, arm))
+    cg = np.column_stack([0.1 * t, np.sin(t), -9.8 + np.cos(t)])
+    sensed = cg + extra
+    vane = np.array([0.2, 0.0, 0.0])
+    speed = np.full(len(t), 17.0)
+    columns = {
+        "t_s": t, "airspeed_mps": speed, "p_radps": p, "q_radps": q, "r_radps": r,
+        "ax_mps2": sensed[:, 0], "ay_mps2": sensed[:, 1], "az_mps2": sensed[:, 2],
+        "alpha_rad": 1.1 * (0.1 - q * vane[0] / speed), "beta_rad": 0.05 + r * vane[0] / speed,
+    }  # fmt: skip
+    airframe = AirframeData(
+        "made up", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0,
+        imu_m=(0.05, -0.02, 0.03), vanes_m=((0.2, 0.0, 0.0),), upwash=0.1,
+    )  # fmt: skip
+    back = corrected(columns, airframe)
+    inner = slice(5, -5)
+    for axis, name in enumerate(("ax_mps2", "ay_mps2", "az_mps2")):
+        np.testing.assert_allclose(back[name][inner], cg[inner, axis], atol=1e-6)
+    np.testing.assert_allclose(back["alpha_rad"], 0.1, atol=1e-9)
+    np.testing.assert_allclose(back["beta_rad"], 0.05, atol=1e-9)
+
+
+def test_coefficients_invert_the_textbook_derivatives() -> None:
+    """Etkin's dimensional derivatives from known coefficients, and back."""
+    airframe = AirframeData("a", 2.0, 0.04, 0.08, 0.12, 0.0, 0.3, 1.2, 0.25, inertia_share=0.05)
+    V, qbar = 16.0, 0.5 * 1.2 * 16.0**2
+    model = longitudinal(Trim(V))
+    wanted = {"CL_alpha": 4.0, "Cm_alpha": -1.5, "Cm_q": -10.0, "Cm_de": -1.2, "CL_de": 0.5}
+    moment = qbar * 0.3 * 0.25 / 0.08
+    values = {
+        "Z_alpha": -qbar * 0.3 * 4.0 / (2.0 * V),
+        "Z_de": -qbar * 0.3 * 0.5 / (2.0 * V),
+        "M_alpha": moment * -1.5,
+        "M_q": moment * -10.0 * 0.25 / (2.0 * V),
+        "M_de": moment * -1.2,
+    }
+    theta = np.array([values.get(p.name, -0.1) for p in model.parameters])
+    u = np.zeros((300, 1))
+    u[50:80], u[80:110] = 0.05, -0.05
+    problem = OutputProblem(model, [Maneuver(0.02, u, np.zeros((300, 6)))])
+    response = problem.respond(np.concatenate([theta, np.zeros(10)]))
+    assert response is not None
+    y = response[0].y.T
+    noise = 1e-4 * y.std(axis=0) * np.random.default_rng(1).standard_normal(y.shape)
+    result = fit("output-error", model.with_start(theta), [Maneuver(0.02, u, y + noise)])
+    found = {c.name: c for c in coefficients(result, airframe, Condition(V, qbar))}
+    for name, value in wanted.items():
+        assert found[name].value == pytest.approx(value, rel=0.01), name
+    assert found["Cm_alpha"].half_width == pytest.approx(
+        1.96 * np.hypot(0.05, 0.02) * 1.5, rel=0.05
+    )
+
+
+def test_lever_is_found_and_leaves_the_derivatives_alone() -> None:
+    model = longitudinal(Trim(17.0), imu_sd_m=0.02)
+    names = [p.name for p in model.parameters]
+    theta = model.start.copy()
+    theta[names.index("imu_x_m")] = 0.03
+    u = np.zeros((400, 1))
+    u[30:60], u[60:80], u[80:90], u[90:100] = 0.05, -0.05, 0.05, -0.05
+    problem = OutputProblem(model, [Maneuver(0.01, u, np.zeros((400, 6)))])
+    response = problem.respond(np.concatenate([theta, np.zeros(10)]))
+    assert response is not None
+    y = response[0].y.T
+    noise = 1e-3 * y.std(axis=0) * np.random.default_rng(2).standard_normal(y.shape)
+    result = fit("output-error", model, [Maneuver(0.01, u, y + noise)])
+    assert result.value("imu_x_m") == pytest.approx(0.03, abs=0.002)
+    assert result.value("Z_de") == pytest.approx(-0.5, rel=0.05)
+
+
+def test_foreign_tables_come_in_through_a_map(tmp_path: Path) -> None:
+    t = np.arange(0.0, 2.0, 0.01)
+    frame = pd.DataFrame({"TimeUS": t * 1e6, "AOA": np.degrees(0.1 + 0 * t), "Nz": 1.0 + 0 * t})
+    frame.to_csv(tmp_path / "x.csv", index=False)
+    (tmp_path / "map.toml").write_text(
+        '[columns]\nt_s = { from = "TimeUS", unit = "us" }\n'
+        'alpha_rad = { from = "AOA", unit = "deg" }\n'
+        'az_mps2 = { from = "Nz", unit = "g", sign = -1 }\n'
+    )
+    columns, _ = read_columns(tmp_path / "x.csv", tmp_path / "map.toml")
+    np.testing.assert_allclose(columns["alpha_rad"], 0.1)
+    np.testing.assert_allclose(columns["az_mps2"], -9.80665)
+    with pytest.raises(IdentificationError, match="no column t_s"):
+        read_columns(tmp_path / "x.csv")
+    (tmp_path / "bad.toml").write_text('[columns]\nt_s = { from = "TimeUS", unit = "week" }\n')
+    with pytest.raises(IdentificationError, match="unit 'week' unknown"):
+        read_columns(tmp_path / "x.csv", tmp_path / "bad.toml")
+
+
+def test_verbs_answer_and_fail_in_one_line(
+    flown: tuple[Path, dict[str, Any]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    source = str(flown[0])
+    assert main(["maneuvers", source, "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["maneuvers"]) == 10
+    saved, mat = tmp_path / "model.toml", tmp_path / "model.mat"
+    options = ["--model", "short-period", "--save-model", str(saved), "--mat", str(mat), "--json"]
+    assert main(["identify", source, *options]) == 0
+    answer = json.loads(capsys.readouterr().out)["answers"][0]
+    assert answer["parameters"]["M_alpha"]["value"] == pytest.approx(-280.0, rel=0.25)
+    assert read_model(saved).name == "short-period"
+    assert mat.exists()
+    assert main(["identify", source, "--model", "roll"]) == 0
+    assert "trust" in capsys.readouterr().out
+    for wrong in (
+        ["identify", str(tmp_path / "nothing.bin")],
+        ["identify", source, "--method", "magic"],
+        ["identify", source, "--model", "hovercraft"],
+        ["identify", source, "--from", "1", "--to", "1.01"],
+        ["identify", source, "--maneuver", "99"],
+    ):
+        assert main(wrong) == 2
+        captured = capsys.readouterr()
+        assert captured.err.count("\n") == 1
+        assert "Traceback" not in captured.err
