@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import replay as program
 from simavr_bench import Chip
-from simavr_bench.barometer import BMP085_CALIBRATION
 from simavr_bench.log import pulses
 from simavr_bench.replay import ANALOG, Replay, Stimuli, read_stimuli, signal_pins
 from simavr_bench.sd_card import make_fat32

@@ -4,8 +4,12 @@
 volatile uint16_t captured[2][8];
 volatile uint8_t count[2];
 
-ISR(TIMER4_CAPT_vect) { captured[0][count[0]++ & 7] = ICR4; }
-ISR(TIMER5_CAPT_vect) { captured[1][count[1]++ & 7] = ICR5; }
+ISR(TIMER4_CAPT_vect) {
+  captured[0][count[0]++ & 7] = ICR4;
+}
+ISR(TIMER5_CAPT_vect) {
+  captured[1][count[1]++ & 7] = ICR5;
+}
 
 int main(void) {
   GTCCR = _BV(TSM) | _BV(PSRSYNC);

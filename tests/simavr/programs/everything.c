@@ -1,6 +1,6 @@
 // A worst case for the simulator's speed: every peripheral at the recorder's rates and a main loop
-// that never sleeps. Receiver on PORTK, servo PWM, TWI slave, 16 channels scanned, GPS in, telemetry
-// out, BMP085 bit-banged, the card written in a stream, heartbeat.
+// that never sleeps. Receiver on PORTK, servo PWM, TWI slave, 16 channels scanned, GPS in,
+// telemetry out, BMP085 bit-banged, the card written in a stream, heartbeat.
 #include <util/delay.h>
 
 #include "sd.h"
@@ -20,8 +20,10 @@ ISR(PCINT2_vect) {
   last_pins = pins;
   for (uint8_t i = 0; i < 5; i++) {
     if (!(changed & (1 << i))) continue;
-    if (pins & (1 << i)) stamp[i] = now;
-    else width[i] = (uint16_t)(now - stamp[i]);
+    if (pins & (1 << i))
+      stamp[i] = now;
+    else
+      width[i] = (uint16_t)(now - stamp[i]);
     edges++;
   }
 }
@@ -34,15 +36,19 @@ ISR(ADC_vect) {
   if (channel == 0) scans++;
 }
 ISR(TWI_vect) {
-  if ((TWSR & 0xF8) == 0xA0) packets++;
-  else (void)TWDR;
+  if ((TWSR & 0xF8) == 0xA0)
+    packets++;
+  else
+    (void)TWDR;
   TWCR = _BV(TWINT) | _BV(TWEN) | _BV(TWIE) | _BV(TWEA);
 }
 ISR(USART2_RX_vect) {
   (void)UDR2;
   gps_bytes++;
 }
-ISR(USART3_UDRE_vect) { UDR3 = (uint8_t)ticks; }
+ISR(USART3_UDRE_vect) {
+  UDR3 = (uint8_t)ticks;
+}
 ISR(TIMER4_COMPA_vect) {
   OCR4A += 2000;
   ticks++;

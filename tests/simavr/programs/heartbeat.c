@@ -6,8 +6,10 @@ volatile uint16_t rise;
 
 ISR(PCINT2_vect) {
   const uint16_t now = TCNT5;
-  if (PINK & _BV(PK0)) rise = now;
-  else OCR3B = (uint16_t)(now - rise) - 1;
+  if (PINK & _BV(PK0))
+    rise = now;
+  else
+    OCR3B = (uint16_t)(now - rise) - 1;
 }
 
 int main(void) {
@@ -34,8 +36,11 @@ int main(void) {
       for (;;) {
       }
     }
-    if (!(PINA & _BV(PA0))) PORTH |= _BV(PH5);
-    else if (!(PINA & _BV(PA1))) PORTH &= (uint8_t)~_BV(PH5);
-    else PINH = _BV(PH5);
+    if (!(PINA & _BV(PA0)))
+      PORTH |= _BV(PH5);
+    else if (!(PINA & _BV(PA1)))
+      PORTH &= (uint8_t)~_BV(PH5);
+    else
+      PINH = _BV(PH5);
   }
 }

@@ -5,10 +5,18 @@
 volatile uint8_t order[8];
 volatile uint8_t order_count;
 
-ISR(INT0_vect) { order[order_count++] = 1; }
-ISR(INT1_vect) { order[order_count++] = 2; }
-ISR(PCINT0_vect) { order[order_count++] = 9; }
-ISR(INT2_vect) { result[0]++; }
+ISR(INT0_vect) {
+  order[order_count++] = 1;
+}
+ISR(INT1_vect) {
+  order[order_count++] = 2;
+}
+ISR(PCINT0_vect) {
+  order[order_count++] = 9;
+}
+ISR(INT2_vect) {
+  result[0]++;
+}
 
 int main(void) {
   DDRD = 0;

@@ -11,8 +11,12 @@ volatile uint8_t wde_with_flag, wde_without;
 volatile uint16_t triggered;
 volatile uint8_t go;
 
-ISR(INT0_vect) { level_entries++; }
-ISR(ADC_vect) { triggered++; }
+ISR(INT0_vect) {
+  level_entries++;
+}
+ISR(ADC_vect) {
+  triggered++;
+}
 
 static void wait_for(uint8_t step) {
   while (go != step) {

@@ -12,8 +12,12 @@ static inline void take(uint8_t bank, uint8_t pins) {
   count[bank]++;
 }
 
-ISR(PCINT2_vect) { take(1, PINK); }
-ISR(PCINT0_vect) { take(0, PINB); }
+ISR(PCINT2_vect) {
+  take(1, PINK);
+}
+ISR(PCINT0_vect) {
+  take(0, PINB);
+}
 
 int main(void) {
   TCCR5B = _BV(CS51);

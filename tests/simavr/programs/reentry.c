@@ -1,5 +1,5 @@
-// UDRE, RXC and TWINT stay requested until they are served: interrupts enabled inside such a handler
-// enter it again. TXC does not.
+// UDRE, RXC and TWINT stay requested until they are served: interrupts enabled inside such a
+// handler enter it again. TXC does not.
 #include "common.h"
 
 volatile uint8_t depth, deepest, entries, nested_txc, kind;

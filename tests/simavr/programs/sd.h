@@ -14,8 +14,10 @@ static inline uint8_t spi(uint8_t out) {
 }
 
 static inline void select(uint8_t on) {
-  if (on) PORTB &= (uint8_t)~_BV(PB0);
-  else PORTB |= _BV(PB0);
+  if (on)
+    PORTB &= (uint8_t)~_BV(PB0);
+  else
+    PORTB |= _BV(PB0);
 }
 
 static inline uint8_t crc7(const uint8_t* bytes) {
@@ -48,8 +50,12 @@ static inline uint8_t wait_ready(uint16_t tries) {
 }
 
 static inline uint8_t command(uint8_t number, uint32_t argument) {
-  uint8_t frame[6] = {(uint8_t)(0x40 | number), (uint8_t)(argument >> 24), (uint8_t)(argument >> 16),
-                      (uint8_t)(argument >> 8), (uint8_t)argument, 0};
+  uint8_t frame[6] = {(uint8_t)(0x40 | number),
+                      (uint8_t)(argument >> 24),
+                      (uint8_t)(argument >> 16),
+                      (uint8_t)(argument >> 8),
+                      (uint8_t)argument,
+                      0};
   frame[5] = crc7(frame);
   spi(0xFF);
   for (uint8_t i = 0; i < 6; i++) spi(frame[i]);
@@ -95,7 +101,9 @@ static inline uint8_t sd_init(void) {
   return 0;
 }
 
-static inline uint32_t address(uint32_t block) { return high_capacity ? block : block * 512; }
+static inline uint32_t address(uint32_t block) {
+  return high_capacity ? block : block * 512;
+}
 
 static inline uint8_t receive(uint8_t* to, uint16_t count) {
   uint8_t token;

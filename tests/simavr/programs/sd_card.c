@@ -39,8 +39,10 @@ int main(void) {
   for (uint8_t i = 0; i < 4; i++) {
     fill((uint8_t)(10 + i));
     put(send(0xFC, block, crc16(block, 512)));
-    if (i == 3) busy_ticks[1] = busy();
-    else wait_ready(60000);
+    if (i == 3)
+      busy_ticks[1] = busy();
+    else
+      wait_ready(60000);
   }
   spi(0xFD);
   spi(0xFF);

@@ -12,25 +12,47 @@ volatile uint8_t missing;
 #define SDA _BV(PA2)
 #define SCL _BV(PA3)
 
-static void half(void) { _delay_us(2.5); }
+static void half(void) {
+  _delay_us(2.5);
+}
 static void sda(uint8_t high) {
-  if (high) DDRA &= (uint8_t)~SDA;
-  else DDRA |= SDA;
+  if (high)
+    DDRA &= (uint8_t)~SDA;
+  else
+    DDRA |= SDA;
 }
 static void scl(uint8_t high) {
-  if (high) DDRA &= (uint8_t)~SCL;
-  else DDRA |= SCL;
+  if (high)
+    DDRA &= (uint8_t)~SCL;
+  else
+    DDRA |= SCL;
 }
 static void start(void) {
-  sda(1); half(); scl(1); half(); sda(0); half(); scl(0); half();
+  sda(1);
+  half();
+  scl(1);
+  half();
+  sda(0);
+  half();
+  scl(0);
+  half();
 }
 static void stop(void) {
-  sda(0); half(); scl(1); half(); sda(1); half();
+  sda(0);
+  half();
+  scl(1);
+  half();
+  sda(1);
+  half();
 }
 static uint8_t bit(uint8_t out) {
-  sda(out); half(); scl(1); half();
+  sda(out);
+  half();
+  scl(1);
+  half();
   const uint8_t in = (PINA & SDA) != 0;
-  scl(0); half();
+  scl(0);
+  half();
   return in;
 }
 static uint8_t write(uint8_t byte) {

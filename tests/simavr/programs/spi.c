@@ -4,7 +4,9 @@
 volatile uint16_t byte_cycles[4];
 volatile uint8_t collision, after_clear, read_back, mode_fault, interrupts;
 
-ISR(SPI_STC_vect) { interrupts++; }
+ISR(SPI_STC_vect) {
+  interrupts++;
+}
 
 static uint16_t measure(void) {
   const uint16_t from = TCNT1;

@@ -22,8 +22,10 @@ int main(void) {
     const uint16_t from = TCNT1;
     const uint16_t to = TCNT1;
     if ((uint16_t)(to - from) > 250) {
-      if (use_other) torn_other++;
-      else torn_same++;
+      if (use_other)
+        torn_other++;
+      else
+        torn_same++;
     }
     reads++;
   }

@@ -15,10 +15,14 @@ static uint32_t divider(const chip* c) {
 
 static double reference_volt(const chip* c) {
   switch (c->adc.admux >> 6) {
-    case 1: return c->adc.avcc_volt;
-    case 2: return c->adc.bandgap_volt;
-    case 3: return 2.56;
-    default: return c->adc.aref_volt;
+    case 1:
+      return c->adc.avcc_volt;
+    case 2:
+      return c->adc.bandgap_volt;
+    case 3:
+      return 2.56;
+    default:
+      return c->adc.aref_volt;
   }
 }
 
@@ -81,8 +85,10 @@ static void done(chip* c, void* param, uint64_t sampled_at) {
   c->adc.busy = false;
   uint8_t* const a = &c->avr->data[REG_ADCSRA];
   const bool free_running = (*a & kAuto) && (c->avr->data[REG_ADCSRB] & 7) == 0;
-  if (free_running) begin(c, chip_now(c), false);
-  else *a &= (uint8_t)~kStart;
+  if (free_running)
+    begin(c, chip_now(c), false);
+  else
+    *a &= (uint8_t)~kStart;
   interrupt_flag(c, kVectorAdc, chip_now(c));
 }
 

@@ -5,21 +5,27 @@
 #include "bench.h"
 #include "twi.h"
 
-void bench_on_event(chip* c, bench_callback callback) { c->callback = callback; }
+void bench_on_event(chip* c, bench_callback callback) {
+  c->callback = callback;
+}
 
 void bench_set_startup(chip* c, uint32_t cycles, uint32_t reset_pc) {
   c->startup_cycles = cycles;
   c->reset_pc = reset_pc;
 }
 
-uint64_t bench_cycle(const chip* c) { return chip_now(c); }
+uint64_t bench_cycle(const chip* c) {
+  return chip_now(c);
+}
 
 static void timer_due(chip* c, void* param, uint64_t id) {
   (void)param;
   if (c->callback) c->callback(kCallbackTimer, (uint32_t)id, chip_now(c), 0);
 }
 
-void bench_timer(chip* c, uint64_t cycle, uint32_t id) { event_post(c, cycle, timer_due, NULL, id); }
+void bench_timer(chip* c, uint64_t cycle, uint32_t id) {
+  event_post(c, cycle, timer_due, NULL, id);
+}
 
 void bench_assert_reset(chip* c, uint32_t cause) {
   if (c->powered) chip_assert_reset(c, (uint8_t)cause);
@@ -35,13 +41,27 @@ int bench_state(const chip* c) {
   return c->avr->state == cpu_Sleeping ? 3 : 2;
 }
 
-uint8_t* bench_flash(chip* c) { return c->avr->flash; }
-uint8_t* bench_data(chip* c) { return c->avr->data; }
-uint8_t* bench_eeprom(chip* c) { return c->eeprom.memory; }
-uint32_t bench_pc(const chip* c) { return c->avr->pc; }
-uint32_t bench_sp(const chip* c) { return _avr_sp_get(c->avr); }
-uint32_t bench_lowest_sp(const chip* c) { return c->lowest_sp; }
-void bench_poke_pc(chip* c, uint32_t pc) { c->avr->pc = pc; }
+uint8_t* bench_flash(chip* c) {
+  return c->avr->flash;
+}
+uint8_t* bench_data(chip* c) {
+  return c->avr->data;
+}
+uint8_t* bench_eeprom(chip* c) {
+  return c->eeprom.memory;
+}
+uint32_t bench_pc(const chip* c) {
+  return c->avr->pc;
+}
+uint32_t bench_sp(const chip* c) {
+  return _avr_sp_get(c->avr);
+}
+uint32_t bench_lowest_sp(const chip* c) {
+  return c->lowest_sp;
+}
+void bench_poke_pc(chip* c, uint32_t pc) {
+  c->avr->pc = pc;
+}
 
 void bench_load(const chip* c, uint64_t cycles[3]) {
   cycles[0] = c->running_cycles;
@@ -49,7 +69,9 @@ void bench_load(const chip* c, uint64_t cycles[3]) {
   cycles[2] = c->held_cycles;
 }
 
-const vector_stats* bench_vector(const chip* c, uint32_t vector) { return &c->stats[vector]; }
+const vector_stats* bench_vector(const chip* c, uint32_t vector) {
+  return &c->stats[vector];
+}
 
 void bench_clear_statistics(chip* c) {
   memset(c->stats, 0, sizeof c->stats);
@@ -57,9 +79,13 @@ void bench_clear_statistics(chip* c) {
   c->lowest_sp = _avr_sp_get(c->avr);
 }
 
-void bench_log_interrupts(chip* c, bool on) { c->log_interrupts = on; }
+void bench_log_interrupts(chip* c, bool on) {
+  c->log_interrupts = on;
+}
 
-void bench_log_marks(chip* c, bool on) { c->log_marks = on; }
+void bench_log_marks(chip* c, bool on) {
+  c->log_marks = on;
+}
 
 void bench_watch_pc(chip* c, uint32_t address, uint32_t number) {
   if (!c->watched_pc) c->watched_pc = calloc((c->avr->flashend + 1) / 2, sizeof *c->watched_pc);
@@ -67,16 +93,24 @@ void bench_watch_pc(chip* c, uint32_t address, uint32_t number) {
   c->watched_pc[(address & c->avr->flashend) >> 1] = (uint16_t)number;
 }
 
-size_t bench_log_count(const chip* c) { return c->log_count; }
-const log_record* bench_log(const chip* c) { return c->log; }
-void bench_clear_log(chip* c) { c->log_count = 0; }
+size_t bench_log_count(const chip* c) {
+  return c->log_count;
+}
+const log_record* bench_log(const chip* c) {
+  return c->log;
+}
+void bench_clear_log(chip* c) {
+  c->log_count = 0;
+}
 
 void bench_pin_watch(chip* c, uint32_t number, bool log, bool notify) {
   c->pins[number].watched = log;
   c->pins[number].notify = notify;
 }
 
-bool bench_pin_level(const chip* c, uint32_t number) { return c->pins[number].level; }
+bool bench_pin_level(const chip* c, uint32_t number) {
+  return c->pins[number].level;
+}
 
 bool bench_pin_driven(const chip* c, uint32_t number) {
   const uint32_t port = number / 8;
@@ -106,8 +140,8 @@ void bench_pin_pull_low(chip* c, uint32_t number, bool low) {
   pin_pull_low(c, (uint8_t)number, low);
 }
 
-void bench_analog_set(chip* c, uint32_t channel, const double* cycles, const double* volts,
-                      uint32_t count) {
+void bench_analog_set(
+    chip* c, uint32_t channel, const double* cycles, const double* volts, uint32_t count) {
   adc_channel* const ch = &c->adc.channel[channel];
   ch->first = 0;
   if (count > ch->capacity) {
@@ -131,18 +165,34 @@ void bench_analog_supply(chip* c, double avcc, double aref, double bandgap) {
   c->adc.bandgap_volt = bandgap;
 }
 
-uint64_t bench_adc_conversions(const chip* c) { return c->adc.conversions; }
+uint64_t bench_adc_conversions(const chip* c) {
+  return c->adc.conversions;
+}
 
-void bench_uart_send(chip* c, uint32_t port, const uint8_t* bytes, uint32_t count,
-                     double bit_cycles, uint64_t from_cycle) {
+void bench_uart_send(chip* c,
+                     uint32_t port,
+                     const uint8_t* bytes,
+                     uint32_t count,
+                     double bit_cycles,
+                     uint64_t from_cycle) {
   uart_send(c, (uint8_t)port, bytes, count, (uint64_t)(bit_cycles * 256.0 + 0.5), from_cycle);
 }
 
-void bench_uart_notify(chip* c, uint32_t port, bool on) { c->uarts[port].notify = on; }
-uint64_t bench_uart_lost(const chip* c, uint32_t port) { return c->uarts[port].lost; }
+void bench_uart_notify(chip* c, uint32_t port, bool on) {
+  c->uarts[port].notify = on;
+}
+uint64_t bench_uart_lost(const chip* c, uint32_t port) {
+  return c->uarts[port].lost;
+}
 
-void bench_twi_send(chip* c, uint64_t start, uint32_t id, uint32_t address, const uint8_t* bytes,
-                    uint32_t count, uint32_t scl_cycles, uint32_t abort_kind,
+void bench_twi_send(chip* c,
+                    uint64_t start,
+                    uint32_t id,
+                    uint32_t address,
+                    const uint8_t* bytes,
+                    uint32_t count,
+                    uint32_t scl_cycles,
+                    uint32_t abort_kind,
                     uint32_t abort_after) {
   twi_packet p = {0};
   p.start = start;
@@ -156,4 +206,6 @@ void bench_twi_send(chip* c, uint64_t start, uint32_t id, uint32_t address, cons
   twi_queue(c, &p);
 }
 
-void bench_twi_hold(chip* c, bool sda, bool scl) { twi_hold(c, sda, scl); }
+void bench_twi_hold(chip* c, bool sda, bool scl) {
+  twi_hold(c, sda, scl);
+}

@@ -53,26 +53,36 @@ BENCH_API void bench_pin_weak(chip* c, uint32_t pin, uint32_t drive);
 BENCH_API void bench_pin_strong_at(chip* c, uint64_t cycle, uint32_t pin, uint32_t drive);
 BENCH_API void bench_pin_pull_low(chip* c, uint32_t pin, bool low);
 
-BENCH_API void bench_analog_set(chip* c, uint32_t channel, const double* cycles,
-                                const double* volts, uint32_t count);
+BENCH_API void bench_analog_set(
+    chip* c, uint32_t channel, const double* cycles, const double* volts, uint32_t count);
 BENCH_API void bench_analog_noise(chip* c, uint32_t channel, double lsb);
 BENCH_API void bench_analog_supply(chip* c, double avcc, double aref, double bandgap);
 BENCH_API uint64_t bench_adc_conversions(const chip* c);
 
-BENCH_API void bench_uart_send(chip* c, uint32_t port, const uint8_t* bytes, uint32_t count,
-                               double bit_cycles, uint64_t from_cycle);
+BENCH_API void bench_uart_send(chip* c,
+                               uint32_t port,
+                               const uint8_t* bytes,
+                               uint32_t count,
+                               double bit_cycles,
+                               uint64_t from_cycle);
 BENCH_API void bench_uart_notify(chip* c, uint32_t port, bool on);
 BENCH_API uint64_t bench_uart_lost(const chip* c, uint32_t port);
 
-BENCH_API void bench_twi_send(chip* c, uint64_t start, uint32_t id, uint32_t address,
-                              const uint8_t* bytes, uint32_t count, uint32_t scl_cycles,
-                              uint32_t abort_kind, uint32_t abort_after);
+BENCH_API void bench_twi_send(chip* c,
+                              uint64_t start,
+                              uint32_t id,
+                              uint32_t address,
+                              const uint8_t* bytes,
+                              uint32_t count,
+                              uint32_t scl_cycles,
+                              uint32_t abort_kind,
+                              uint32_t abort_after);
 BENCH_API void bench_twi_hold(chip* c, bool sda, bool scl);
 
 // Devices on bit-banged I2C: a file of 256 registers with automatic increment.
 typedef struct i2c_device i2c_device;
-BENCH_API i2c_device* bench_i2c_device(chip* c, uint32_t id, uint32_t address, uint32_t sda_pin,
-                                       uint32_t scl_pin);
+BENCH_API i2c_device* bench_i2c_device(
+    chip* c, uint32_t id, uint32_t address, uint32_t sda_pin, uint32_t scl_pin);
 BENCH_API uint8_t* bench_i2c_registers(i2c_device* d);
 BENCH_API void bench_i2c_present(i2c_device* d, bool present);
 BENCH_API uint32_t bench_i2c_fastest(const i2c_device* d);  // shortest SCL period seen, cycles
@@ -81,19 +91,19 @@ BENCH_API uint32_t bench_i2c_fastest(const i2c_device* d);  // shortest SCL peri
 typedef struct sd_card sd_card;
 typedef struct sd_settings {
   uint32_t blocks;
-  uint32_t high_capacity;      // block addresses
-  uint32_t version_1;          // knows no CMD8
-  uint32_t busy_cycles;        // after every block written
-  uint32_t read_cycles;        // before every block read
-  uint32_t init_cycles;        // ACMD41 answers idle for so long
+  uint32_t high_capacity;  // block addresses
+  uint32_t version_1;      // knows no CMD8
+  uint32_t busy_cycles;    // after every block written
+  uint32_t read_cycles;    // before every block read
+  uint32_t init_cycles;    // ACMD41 answers idle for so long
   uint32_t erase_cycles;
-  uint32_t response_bytes;     // 0xFF before R1, 1..8
+  uint32_t response_bytes;  // 0xFF before R1, 1..8
 } sd_settings;
 typedef struct sd_counters {
   uint64_t commands, written, read, rejected, lost, bytes_ignored, erased;
 } sd_counters;
-BENCH_API sd_card* bench_sd_card(chip* c, uint32_t cs_pin, uint8_t* memory,
-                                 const sd_settings* settings, uint64_t seed);
+BENCH_API sd_card* bench_sd_card(
+    chip* c, uint32_t cs_pin, uint8_t* memory, const sd_settings* settings, uint64_t seed);
 BENCH_API void bench_sd_insert(sd_card* s, bool present);
 BENCH_API void bench_sd_stall(sd_card* s, uint64_t from_cycle, uint32_t cycles);
 BENCH_API void bench_sd_reject(sd_card* s, uint64_t from_cycle, uint32_t count, uint32_t token);
@@ -103,7 +113,11 @@ BENCH_API void bench_sd_counters(const sd_card* s, sd_counters* out);
 
 // Module entries behind this interface.
 double adc_channel_volt(chip* c, uint8_t number, uint64_t cycle);
-void uart_send(chip* c, uint8_t number, const uint8_t* bytes, uint32_t count, uint64_t bit_256,
+void uart_send(chip* c,
+               uint8_t number,
+               const uint8_t* bytes,
+               uint32_t count,
+               uint64_t bit_256,
                uint64_t from_cycle);
 void interrupt_returned(struct avr_irq_t* irq, uint32_t value, void* param);
 

@@ -22,7 +22,7 @@ enum {
 };
 
 // Pins by port letter index (A 0 .. H 7, J 8, K 9, L 10) and bit.
-#define PIN(port_index, bit) ((uint8_t)((port_index) * 8 + (bit)))
+#define PIN(port_index, bit) ((uint8_t)((port_index)*8 + (bit)))
 
 typedef struct chip chip;
 typedef void (*event_fn)(chip* c, void* param, uint64_t argument);
@@ -41,32 +41,32 @@ typedef struct event {
 
 // What the log holds. The Python side names the same numbers.
 enum log_kind {
-  kLogPin = 0,         // source: pin, value: level
-  kLogUartTx = 1,      // source: port, value: byte
-  kLogReset = 2,       // source: 0 asserted / 1 running, value: cause
-  kLogTwi = 3,         // source: enum twi_note, value: count
-  kLogUartLost = 4,    // source: port, value: byte lost
-  kLogFault = 5,       // source: enum fault, value: detail
-  kLogSpi = 6,         // source: device, value: note
-  kLogCard = 7,        // source: enum card_note, value: block
-  kLogPower = 8,       // source: 0, value: 1 on 0 off
-  kLogInterrupt = 9,   // source: vector, value: 1 entry 0 return
-  kLogOutOfReset = 10, // source: 0, value: cause: first instruction executes here
-  kLogMark = 11,       // source: GPIOR number, value: byte the program wrote
-  kLogPc = 12,         // source: number of the watched address: its instruction executes here
+  kLogPin = 0,          // source: pin, value: level
+  kLogUartTx = 1,       // source: port, value: byte
+  kLogReset = 2,        // source: 0 asserted / 1 running, value: cause
+  kLogTwi = 3,          // source: enum twi_note, value: count
+  kLogUartLost = 4,     // source: port, value: byte lost
+  kLogFault = 5,        // source: enum fault, value: detail
+  kLogSpi = 6,          // source: device, value: note
+  kLogCard = 7,         // source: enum card_note, value: block
+  kLogPower = 8,        // source: 0, value: 1 on 0 off
+  kLogInterrupt = 9,    // source: vector, value: 1 entry 0 return
+  kLogOutOfReset = 10,  // source: 0, value: cause: first instruction executes here
+  kLogMark = 11,        // source: GPIOR number, value: byte the program wrote
+  kLogPc = 12,          // source: number of the watched address: its instruction executes here
 };
 
 // Things the firmware did that the chip does not define or this model does not cover.
 enum fault {
-  kFaultBadAddress = 1,      // access outside the data space, or a push over the registers
-  kFaultTimerMode = 2,       // waveform mode without a model (phase correct)
-  kFaultTimerClock = 3,      // external timer clock
-  kFaultTwiMaster = 4,       // START requested on the TWI
-  kFaultSleepMode = 5,       // a sleep mode deeper than idle
-  kFaultContention = 6,      // chip and a strong external driver disagree on a pin
-  kFaultSpiWithoutModel = 7, // SPI enabled as a slave
-  kFaultFlash = 8,           // SPM used in a way the model does not cover
-  kFaultAdc = 9,             // differential channel
+  kFaultBadAddress = 1,       // access outside the data space, or a push over the registers
+  kFaultTimerMode = 2,        // waveform mode without a model (phase correct)
+  kFaultTimerClock = 3,       // external timer clock
+  kFaultTwiMaster = 4,        // START requested on the TWI
+  kFaultSleepMode = 5,        // a sleep mode deeper than idle
+  kFaultContention = 6,       // chip and a strong external driver disagree on a pin
+  kFaultSpiWithoutModel = 7,  // SPI enabled as a slave
+  kFaultFlash = 8,            // SPM used in a way the model does not cover
+  kFaultAdc = 9,              // differential channel
 };
 
 typedef struct log_record {
@@ -122,9 +122,9 @@ typedef struct timer {
   bool wide;  // 16 bit
   uint16_t base;
   event due;
-  uint32_t divider;  // 0 while stopped
-  uint64_t epoch;    // cycle at which the counter was 0
-  uint32_t position; // every point up to and including this one is processed
+  uint32_t divider;   // 0 while stopped
+  uint64_t epoch;     // cycle at which the counter was 0
+  uint32_t position;  // every point up to and including this one is processed
   uint16_t top, max;
   uint8_t mode;  // enum timer_kind
   bool icr_is_top, ocra_is_top, buffered;
@@ -205,7 +205,7 @@ struct chip {
 
   // run loop
   bool stop_requested;
-  bool held;     // reset asserted or start-up delay running
+  bool held;  // reset asserted or start-up delay running
   bool powered;
   uint8_t reset_sources;  // causes that still hold the chip in reset
   uint8_t last_cause;

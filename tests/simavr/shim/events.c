@@ -1,5 +1,5 @@
-// The queue of everything that happens at a cycle: a binary heap ordered by cycle, then by the order
-// of scheduling, so that two runs serve equal events in the same order.
+// The queue of everything that happens at a cycle: a binary heap ordered by cycle, then by the
+// order of scheduling, so that two runs serve equal events in the same order.
 #include <stdlib.h>
 
 #include "chip.h"

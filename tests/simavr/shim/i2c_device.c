@@ -62,7 +62,8 @@ static bool take(i2c_device* d) {
       }
       return true;
     }
-    default: return false;
+    default:
+      return false;
   }
 }
 
@@ -86,8 +87,11 @@ static void clock_rises(i2c_device* d) {
 
 static void clock_falls(i2c_device* d) {
   switch ((enum state)d->state) {
-    case kIdle: return;
-    case kIgnore: pull(d, false); return;
+    case kIdle:
+      return;
+    case kIgnore:
+      pull(d, false);
+      return;
     case kRead:
       if (d->acknowledging || d->bits == 9) {  // address acknowledged, or the master wants more
         d->acknowledging = false;
@@ -102,7 +106,8 @@ static void clock_falls(i2c_device* d) {
         give_bit(d);
       }
       return;
-    default: break;
+    default:
+      break;
   }
   if (d->acknowledging) {
     d->acknowledging = false;
@@ -124,8 +129,10 @@ static void line_changed(chip* c, void* param, uint8_t number, bool level) {
   if (number == d->scl_pin) {
     if (level == d->scl) return;
     d->scl = level;
-    if (level) clock_rises(d);
-    else clock_falls(d);
+    if (level)
+      clock_rises(d);
+    else
+      clock_falls(d);
     return;
   }
   if (level == d->sda) return;
@@ -138,8 +145,8 @@ static void line_changed(chip* c, void* param, uint8_t number, bool level) {
   }
 }
 
-i2c_device* bench_i2c_device(chip* c, uint32_t id, uint32_t address, uint32_t sda_pin,
-                             uint32_t scl_pin) {
+i2c_device* bench_i2c_device(
+    chip* c, uint32_t id, uint32_t address, uint32_t sda_pin, uint32_t scl_pin) {
   i2c_device* const d = chip_allocate(c, sizeof *d);
   d->c = c;
   d->id = id;
@@ -158,7 +165,9 @@ i2c_device* bench_i2c_device(chip* c, uint32_t id, uint32_t address, uint32_t sd
   return d;
 }
 
-uint8_t* bench_i2c_registers(i2c_device* d) { return d->registers; }
+uint8_t* bench_i2c_registers(i2c_device* d) {
+  return d->registers;
+}
 
 void bench_i2c_present(i2c_device* d, bool present) {
   d->present = present;
@@ -168,4 +177,6 @@ void bench_i2c_present(i2c_device* d, bool present) {
   }
 }
 
-uint32_t bench_i2c_fastest(const i2c_device* d) { return d->fastest; }
+uint32_t bench_i2c_fastest(const i2c_device* d) {
+  return d->fastest;
+}

@@ -1,5 +1,6 @@
-// Interrupt controller: flags and enables per vector, lowest vector first, 5 cycles to enter (4 plus
-// one for the 22-bit program counter; datasheet 7.8.1), 4 more out of sleep, latency statistics.
+// Interrupt controller: flags and enables per vector, lowest vector first, 5 cycles to enter (4
+// plus one for the 22-bit program counter; datasheet 7.8.1), 4 more out of sleep, latency
+// statistics.
 #include <string.h>
 
 #include "chip.h"
@@ -28,9 +29,9 @@ static void timer_vectors(chip* c, uint8_t number, uint8_t first, bool wide) {
 
 static void uart_vectors(chip* c, uint16_t base, uint8_t first) {
   const uint16_t b = (uint16_t)(base + 1);
-  define(c, first, b, 7, base, 7, true);                          // RXC
-  define(c, (uint8_t)(first + 1), b, 5, base, 5, true);           // UDRE
-  define(c, (uint8_t)(first + 2), b, 6, base, 6, false);          // TXC
+  define(c, first, b, 7, base, 7, true);                  // RXC
+  define(c, (uint8_t)(first + 1), b, 5, base, 5, true);   // UDRE
+  define(c, (uint8_t)(first + 2), b, 6, base, 6, false);  // TXC
 }
 
 void interrupts_init(chip* c) {
@@ -85,7 +86,9 @@ static void refresh_at(chip* c, uint8_t vector, uint64_t cycle) {
   }
 }
 
-void interrupt_refresh(chip* c, uint8_t vector) { refresh_at(c, vector, chip_now(c)); }
+void interrupt_refresh(chip* c, uint8_t vector) {
+  refresh_at(c, vector, chip_now(c));
+}
 
 void interrupt_flag(chip* c, uint8_t vector, uint64_t cycle) {
   const vector_info* const v = &c->vectors[vector];
@@ -129,7 +132,7 @@ void interrupt_service(chip* c, bool from_sleep) {
     c->pending_since[vector] = avr->cycle;  // still asked for: a second entry counts from here
     return;
   }
-  avr->data[v->flag_reg] &= (uint8_t)~(1u << v->flag_bit);
+  avr->data[v->flag_reg] &= (uint8_t) ~(1u << v->flag_bit);
   if (vector == kVectorWdt && (avr->data[REG_WDTCSR] & 0x08)) {
     // Interrupt and system reset mode: the hardware clears WDIE, the next time-out resets.
     avr->data[REG_WDTCSR] &= (uint8_t)~0x40u;

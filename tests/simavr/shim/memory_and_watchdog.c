@@ -13,9 +13,12 @@ static void eeprom_done(chip* c, void* param, uint64_t argument) {
   c->eeprom.programming = false;
   c->avr->data[REG_EECR] &= (uint8_t)~kEepe;
   uint8_t* const cell = &c->eeprom.memory[c->eeprom.address];
-  if (c->eeprom.mode == 1) *cell = 0xFF;
-  else if (c->eeprom.mode == 2) *cell &= c->eeprom.value;
-  else *cell = c->eeprom.value;
+  if (c->eeprom.mode == 1)
+    *cell = 0xFF;
+  else if (c->eeprom.mode == 2)
+    *cell &= c->eeprom.value;
+  else
+    *cell = c->eeprom.value;
   interrupt_refresh(c, kVectorEeReady);
 }
 
@@ -27,7 +30,8 @@ static void eeprom_window_over(chip* c, void* param, uint64_t argument) {
 static void write_eecr(chip* c, uint16_t address, uint8_t value, void* param) {
   (void)param;
   uint8_t* const control = &c->avr->data[address];
-  const uint16_t cell = (uint16_t)((c->avr->data[REG_EEARL] | c->avr->data[REG_EEARH] << 8) & 0xFFF);
+  const uint16_t cell =
+      (uint16_t)((c->avr->data[REG_EEARL] | c->avr->data[REG_EEARH] << 8) & 0xFFF);
   const bool armed = (*control & kEempe) != 0;
   const bool busy = c->eeprom.programming;
   *control = (uint8_t)((*control & (kEempe | kEepe)) | (value & (busy ? 0x08 : 0x38)));
@@ -136,7 +140,8 @@ void watchdog_init(chip* c) {
   hook_write(c, REG_MCUSR, write_mcusr, NULL);
 }
 
-// After a watchdog reset WDE stays set with the shortest time-out: 16 ms to clear it or reset again.
+// After a watchdog reset WDE stays set with the shortest time-out: 16 ms to clear it or reset
+// again.
 void watchdog_reset_registers(chip* c) {
   c->watchdog.change_until = 0;
   c->avr->data[REG_WDTCSR] = c->avr->data[REG_MCUSR] & kWatchdog ? 0x08 : 0;
@@ -168,14 +173,18 @@ static void write_spmcsr(chip* c, uint16_t address, uint8_t value, void* param) 
 static void program(chip* c, uint32_t page, bool erase) {
   uint8_t* const flash = c->avr->flash + page;
   for (uint32_t i = 0; i < 256; i++) {
-    if (erase) flash[i] = 0xFF;
-    else if (c->flash.filled[i]) flash[i] &= c->flash.buffer[i];
+    if (erase)
+      flash[i] = 0xFF;
+    else if (c->flash.filled[i])
+      flash[i] &= c->flash.buffer[i];
   }
   if (!erase) memset(c->flash.filled, 0, sizeof c->flash.filled);
   c->flash.busy = true;
   event_at(c, &c->flash.due, chip_now(c) + 68000);  // 4.25 ms, between 3.7 and 4.5
-  if (page < 0x3E000) c->avr->data[REG_SPMCSR] |= kRwwsb;
-  else c->halt_cycles += 68000;  // the boot section itself: the CPU stops
+  if (page < 0x3E000)
+    c->avr->data[REG_SPMCSR] |= kRwwsb;
+  else
+    c->halt_cycles += 68000;  // the boot section itself: the CPU stops
 }
 
 // SPM, as the core reports it. Executed from the boot section only.
@@ -183,15 +192,16 @@ void flash_store(chip* c) {
   const uint8_t r = c->avr->data[REG_SPMCSR];
   if (!(r & kSpmen) || chip_now(c) > c->flash.armed_until || c->flash.busy) return;
   if (c->avr->pc < 0x3E000) return;
-  const uint32_t z = (uint32_t)(c->avr->data[R_ZL] | c->avr->data[R_ZH] << 8 |
-                                c->avr->data[REG_RAMPZ] << 16) & 0x3FFFF;
+  const uint32_t z =
+      (uint32_t)(c->avr->data[R_ZL] | c->avr->data[R_ZH] << 8 | c->avr->data[REG_RAMPZ] << 16) &
+      0x3FFFF;
   event_cancel(c, &c->flash.due);
   if (r & kPgers) {
     program(c, z & ~0xFFu, true);
   } else if (r & kPgwrt) {
     program(c, z & ~0xFFu, false);
   } else if (r & kRwwsre) {
-    c->avr->data[REG_SPMCSR] &= (uint8_t)~(kRwwsb | 0x3Fu);
+    c->avr->data[REG_SPMCSR] &= (uint8_t) ~(kRwwsb | 0x3Fu);
   } else if (r & 0x08) {
     fault_add(c, kFaultFlash, r);  // lock bits
     c->avr->data[REG_SPMCSR] &= (uint8_t)~0x3Fu;

@@ -47,7 +47,8 @@ static void pin_changed(chip* c, uint8_t number, bool level) {
   const int line = external_of(number);
   if (line >= 0) {
     const uint8_t mode = sense_mode(c, line);
-    if (mode == 0) external_level(c, line, level);
+    if (mode == 0)
+      external_level(c, line, level);
     else if (mode == 1 || (mode == 2 && !level) || (mode == 3 && level)) {
       interrupt_flag(c, (uint8_t)(kVectorInt0 + line), chip_now(c));
     }

@@ -1,5 +1,5 @@
-// Power, reset and start-up: registers cleared, pins let go (every edge is seen outside), MCUSR tells
-// the cause, SRAM survives all but a loss of power.
+// Power, reset and start-up: registers cleared, pins let go (every edge is seen outside), MCUSR
+// tells the cause, SRAM survives all but a loss of power.
 #include <string.h>
 
 #include "bench.h"
@@ -36,7 +36,8 @@ static void reset_everything(chip* c) {
 
 void chip_assert_reset(chip* c, uint8_t cause) {
   c->last_cause = cause;
-  c->avr->data[REG_MCUSR] = cause == kPowerOn ? kPowerOn : (uint8_t)(c->avr->data[REG_MCUSR] | cause);
+  c->avr->data[REG_MCUSR] =
+      cause == kPowerOn ? kPowerOn : (uint8_t)(c->avr->data[REG_MCUSR] | cause);
   c->reset_sources |= cause;
   c->held = true;
   event_cancel(c, &c->startup);

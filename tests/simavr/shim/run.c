@@ -64,13 +64,15 @@ uint8_t written_ones(const chip* c, uint8_t value) {
   const uint32_t pc = avr->pc & avr->flashend;
   const uint16_t opcode = (uint16_t)(avr->flash[pc] | avr->flash[pc + 1] << 8);
   if ((opcode & 0xFF00) == 0x9A00) return (uint8_t)(1u << (opcode & 7));  // SBI
-  if ((opcode & 0xFF00) == 0x9800) return 0;                             // CBI
+  if ((opcode & 0xFF00) == 0x9800) return 0;                              // CBI
   return value;
 }
 
 // ---- core -----------------------------------------------------------------------------------
 
-static void no_sleep(struct avr_t* avr, avr_cycle_count_t cycles) { (void)avr, (void)cycles; }
+static void no_sleep(struct avr_t* avr, avr_cycle_count_t cycles) {
+  (void)avr, (void)cycles;
+}
 
 static void core_message(struct avr_t* avr, const int level, const char* format, va_list list) {
   (void)format, (void)list;
@@ -81,16 +83,20 @@ static void core_message(struct avr_t* avr, const int level, const char* format,
 static int core_call(struct avr_io_t* io, uint32_t request, void* param) {
   (void)param;
   chip* const c = (chip*)(void*)((char*)io - offsetof(chip, hooks));
-  if (request == AVR_IOCTL_WATCHDOG_RESET) watchdog_feed(c);
-  else if (request == AVR_IOCTL_FLASH_SPM) flash_store(c);
-  else return -1;
+  if (request == AVR_IOCTL_WATCHDOG_RESET)
+    watchdog_feed(c);
+  else if (request == AVR_IOCTL_FLASH_SPM)
+    flash_store(c);
+  else
+    return -1;
   return 0;
 }
 
 static void write_mark(chip* c, uint16_t address, uint8_t value, void* param) {
   (void)param;
   c->avr->data[address] = value;
-  if (c->log_marks) log_add(c, kLogMark, address == REG_GPIOR0 ? 0 : address - REG_GPIOR1 + 1u, value);
+  if (c->log_marks)
+    log_add(c, kLogMark, address == REG_GPIOR0 ? 0 : address - REG_GPIOR1 + 1u, value);
 }
 
 chip* bench_create(uint64_t seed) {
@@ -180,8 +186,10 @@ static void execute(chip* c, uint64_t room) {
   }
   if (avr->state == cpu_Sleeping) {
     const uint8_t mode = avr->data[REG_SMCR];
-    if (!(mode & 1)) avr->state = cpu_Running;  // SE clear: SLEEP does nothing
-    else if (mode & 0x0E) fault_add(c, kFaultSleepMode, mode);
+    if (!(mode & 1))
+      avr->state = cpu_Running;  // SE clear: SLEEP does nothing
+    else if (mode & 0x0E)
+      fault_add(c, kFaultSleepMode, mode);
   }
   const uint16_t sp = (uint16_t)(avr->data[R_SPL] | avr->data[R_SPH] << 8);
   if (sp < c->lowest_sp) c->lowest_sp = sp;

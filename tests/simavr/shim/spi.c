@@ -1,6 +1,6 @@
-// SPI master (datasheet section 21): eight bits at the clock set in SPCR and SPSR, then SPIF; WCOL on
-// a write during a transfer; a low SS input takes the master role away. Bytes go to the device whose
-// chip select pin is low.
+// SPI master (datasheet section 21): eight bits at the clock set in SPCR and SPSR, then SPIF; WCOL
+// on a write during a transfer; a low SS input takes the master role away. Bytes go to the device
+// whose chip select pin is low.
 #include "chip.h"
 
 static uint32_t divider(const chip* c) {

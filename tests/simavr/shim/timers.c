@@ -3,28 +3,35 @@
 // clock after the match (so a pulse lasts OCR + 1 clocks), input capture on ICP1, 3, 4, 5.
 // Nothing is scheduled that nobody can see: flags without interrupt or output are worked out when
 // the program looks at them.
-#include "chip.h"
-
-enum timer_kind { kNormal, kClear, kFast, kUnmodelled };
+#include "timers.h"
 
 static const uint8_t kOutputPins[kTimerCount][3] = {
-    {PIN(1, 7), PIN(6, 5), 0xFF},       {PIN(1, 5), PIN(1, 6), PIN(1, 7)},
-    {PIN(1, 4), PIN(7, 6), 0xFF},       {PIN(4, 3), PIN(4, 4), PIN(4, 5)},
-    {PIN(7, 3), PIN(7, 4), PIN(7, 5)},  {PIN(10, 3), PIN(10, 4), PIN(10, 5)},
+    {PIN(1, 7), PIN(6, 5), 0xFF},
+    {PIN(1, 5), PIN(1, 6), PIN(1, 7)},
+    {PIN(1, 4), PIN(7, 6), 0xFF},
+    {PIN(4, 3), PIN(4, 4), PIN(4, 5)},
+    {PIN(7, 3), PIN(7, 4), PIN(7, 5)},
+    {PIN(10, 3), PIN(10, 4), PIN(10, 5)},
 };
 static const uint8_t kCapturePins[kTimerCount] = {
     0xFF, PIN(3, 4), 0xFF, PIN(4, 7), PIN(10, 0), PIN(10, 1)};
-static const uint16_t kBases[kTimerCount] = {
-    REG_TCCR0A, REG_TCCR1A, REG_TCCR2A, REG_TCCR3A, REG_TCCR4A, REG_TCCR5A};
 static const uint8_t kFirstVector[kTimerCount] = {21, 16, 13, 31, 41, 46};  // wide: the capture
 
-static uint8_t channels(const timer* t) { return t->wide ? 3 : 2; }
+uint8_t timer_first_vector(const timer* t) {
+  return kFirstVector[t->number];
+}
+
+static uint8_t channels(const timer* t) {
+  return t->wide ? 3 : 2;
+}
 static uint8_t compare_vector(const timer* t, uint8_t i) {
   return (uint8_t)(kFirstVector[t->number] + (t->wide ? 1 : 0) + i);
 }
-static uint8_t overflow_vector(const timer* t) { return compare_vector(t, channels(t)); }
+uint8_t timer_overflow_vector(const timer* t) {
+  return compare_vector(t, channels(t));
+}
 
-static uint64_t aligned(const chip* c, const timer* t, uint64_t cycle) {
+uint64_t timer_aligned(const chip* c, const timer* t, uint64_t cycle) {
   if (t->number == 2) return cycle - cycle % t->divider;  // own prescaler, never reset here
   return cycle - (cycle - c->prescaler_base) % t->divider;
 }
@@ -39,7 +46,7 @@ static uint32_t match_at(const timer* t, uint8_t i) {
   return t->ocr[i] <= t->top || t->position > t->top ? at : 0;
 }
 
-static void show_output(chip* c, timer* t, uint8_t i) {
+void timer_show_output(chip* c, timer* t, uint8_t i) {
   const uint8_t number = kOutputPins[t->number][i];
   if (number != 0xFF) pin_oc(c, number, t->com[i] != 0, t->oc[i]);
 }
@@ -57,22 +64,22 @@ static void match(chip* c, timer* t, uint8_t i, uint64_t cycle) {
   if (t->com[i] == 1 && toggles(t, i)) t->oc[i] = !t->oc[i];
   if (t->com[i] == 2) t->oc[i] = false;
   if (t->com[i] == 3) t->oc[i] = true;
-  if (t->oc[i] != before) show_output(c, t, i);
+  if (t->oc[i] != before) timer_show_output(c, t, i);
 }
 
 static void wrap(chip* c, timer* t, bool at_top, uint64_t cycle) {
   if (t->mode == kFast) {
-    interrupt_flag(c, overflow_vector(t), cycle);
+    interrupt_flag(c, timer_overflow_vector(t), cycle);
     for (uint8_t i = 0; i < channels(t); i++) {
       t->ocr[i] = t->ocr_buffer[i];
       const bool before = t->oc[i];
       if (t->com[i] == 2) t->oc[i] = true;
       if (t->com[i] == 3) t->oc[i] = false;
-      if (t->oc[i] != before) show_output(c, t, i);
+      if (t->oc[i] != before) timer_show_output(c, t, i);
     }
     if (t->ocra_is_top) t->top = t->ocr[0];
   } else if (t->mode == kNormal || !at_top || t->top == t->max) {
-    interrupt_flag(c, overflow_vector(t), cycle);
+    interrupt_flag(c, timer_overflow_vector(t), cycle);
   }
   if (t->icr_is_top && at_top) interrupt_flag(c, kFirstVector[t->number], cycle);
   if (t->number == 0) adc_trigger(c, 4);
@@ -80,7 +87,7 @@ static void wrap(chip* c, timer* t, bool at_top, uint64_t cycle) {
 }
 
 // Serves everything up to a cycle, in order.
-static void serve(chip* c, timer* t, uint64_t cycle) {
+void timer_serve(chip* c, timer* t, uint64_t cycle) {
   if (t->divider == 0) return;
   for (uint32_t turns = 0;; turns++) {
     const uint64_t ticks = (cycle - t->epoch) / t->divider;
@@ -116,7 +123,7 @@ static void serve(chip* c, timer* t, uint64_t cycle) {
   }
 }
 
-static void schedule(chip* c, timer* t) {
+void timer_schedule(chip* c, timer* t) {
   event_cancel(c, &t->due);
   if (t->divider == 0) return;
   const uint8_t mask = c->avr->data[REG_TIMSK0 + t->number];
@@ -135,21 +142,29 @@ static void schedule(chip* c, timer* t) {
   event_at(c, &t->due, t->epoch + (uint64_t)next * t->divider);
 }
 
-static void due(chip* c, void* param, uint64_t argument) {
+void timer_due(chip* c, void* param, uint64_t argument) {
   (void)argument;
   timer* const t = param;
-  serve(c, t, chip_now(c));
-  schedule(c, t);
+  timer_serve(c, t, chip_now(c));
+  timer_schedule(c, t);
 }
 
 static uint16_t wide_top(const timer* t, uint8_t wgm) {
   switch (wgm) {
-    case 5: return 0xFF;
-    case 6: return 0x1FF;
-    case 7: return 0x3FF;
-    case 4: case 15: return t->ocr[0];
-    case 12: case 14: return t->icr;
-    default: return 0xFFFF;
+    case 5:
+      return 0xFF;
+    case 6:
+      return 0x1FF;
+    case 7:
+      return 0x3FF;
+    case 4:
+    case 15:
+      return t->ocr[0];
+    case 12:
+    case 14:
+      return t->icr;
+    default:
+      return 0xFFFF;
   }
 }
 
@@ -162,15 +177,28 @@ static uint32_t clock_of(chip* c, const timer* t, uint8_t select) {
 }
 
 // Reads mode, TOP, outputs and clock from the control registers again.
-static void configure(chip* c, timer* t) {
+void timer_configure(chip* c, timer* t) {
   const uint8_t a = c->avr->data[t->base], b = c->avr->data[t->base + 1];
   for (uint8_t i = 0; i < channels(t); i++) t->com[i] = (a >> (6 - 2 * i)) & 3;
   t->icr_is_top = false;
   if (t->wide) {
     const uint8_t wgm = (uint8_t)((a & 3) | ((b >> 1) & 0x0C));
-    static const uint8_t kKinds[16] = {
-        kNormal, kUnmodelled, kUnmodelled, kUnmodelled, kClear, kFast, kFast, kFast,
-        kUnmodelled, kUnmodelled, kUnmodelled, kUnmodelled, kClear, kUnmodelled, kFast, kFast};
+    static const uint8_t kKinds[16] = {kNormal,
+                                       kUnmodelled,
+                                       kUnmodelled,
+                                       kUnmodelled,
+                                       kClear,
+                                       kFast,
+                                       kFast,
+                                       kFast,
+                                       kUnmodelled,
+                                       kUnmodelled,
+                                       kUnmodelled,
+                                       kUnmodelled,
+                                       kClear,
+                                       kUnmodelled,
+                                       kFast,
+                                       kFast};
     t->mode = kKinds[wgm];
     t->icr_is_top = wgm == 12 || wgm == 14;
     t->ocra_is_top = wgm == 4 || wgm == 15;
@@ -192,127 +220,21 @@ static void configure(chip* c, timer* t) {
     const uint32_t position = t->position;
     t->divider = divider;
     if (divider) {
-      t->epoch = aligned(c, t, chip_now(c)) - (uint64_t)position * divider;
+      t->epoch = timer_aligned(c, t, chip_now(c)) - (uint64_t)position * divider;
     }
   }
   for (uint8_t i = 0; i < channels(t); i++) {
     if (!t->buffered) t->ocr[i] = t->ocr_buffer[i];
-    show_output(c, t, i);
+    timer_show_output(c, t, i);
   }
   if (!t->buffered && t->ocra_is_top) t->top = t->ocr[0];
-  schedule(c, t);
-}
-
-static void write_control(chip* c, uint16_t address, uint8_t value, void* param) {
-  timer* const t = param;
-  serve(c, t, chip_now(c));
-  c->avr->data[address] = value;
-  configure(c, t);
-}
-
-static void write_force(chip* c, uint16_t address, uint8_t value, void* param) {
-  timer* const t = param;
-  (void)address;
-  if (t->mode == kFast) return;
-  for (uint8_t i = 0; i < 3; i++) {
-    if (!((value >> (7 - i)) & 1)) continue;
-    if (t->com[i] == 1) t->oc[i] = !t->oc[i];
-    if (t->com[i] == 2) t->oc[i] = false;
-    if (t->com[i] == 3) t->oc[i] = true;
-    show_output(c, t, i);
-  }
-}
-
-static void write_mask(chip* c, uint16_t address, uint8_t value, void* param) {
-  timer* const t = param;
-  serve(c, t, chip_now(c));
-  c->avr->data[address] = value;
-  const uint8_t first = kFirstVector[t->number];
-  for (uint8_t v = first; v <= overflow_vector(t); v++) interrupt_refresh(c, v);
-  schedule(c, t);
-}
-
-static uint8_t read_flags(chip* c, uint16_t address, void* param) {
-  serve(c, param, chip_now(c));
-  return c->avr->data[address];
-}
-
-static void write_flags(chip* c, uint16_t address, uint8_t value, void* param) {
-  timer* const t = param;
-  serve(c, t, chip_now(c));
-  c->avr->data[address] &= (uint8_t)~written_ones(c, value);
-  for (uint8_t v = kFirstVector[t->number]; v <= overflow_vector(t); v++) interrupt_refresh(c, v);
-}
-
-static void set_count(chip* c, timer* t, uint16_t value) {
-  serve(c, t, chip_now(c));
-  t->position = value;
-  if (t->divider) t->epoch = aligned(c, t, chip_now(c)) - (uint64_t)value * t->divider;
-  schedule(c, t);
-}
-
-static void set_compare(chip* c, timer* t, uint8_t i, uint16_t value) {
-  serve(c, t, chip_now(c));
-  t->ocr_buffer[i] = value;
-  if (!t->buffered) configure(c, t);
-}
-
-static uint16_t count_now(chip* c, timer* t) {
-  serve(c, t, chip_now(c));
-  return (uint16_t)t->position;
-}
-
-// 8-bit registers: TCNT at base + 2, OCRA + 3, OCRB + 4.
-static uint8_t read_narrow(chip* c, uint16_t address, void* param) {
-  timer* const t = param;
-  return address == t->base + 2 ? (uint8_t)count_now(c, t)
-                                : (uint8_t)t->ocr_buffer[address - t->base - 3];
-}
-
-static void write_narrow(chip* c, uint16_t address, uint8_t value, void* param) {
-  timer* const t = param;
-  if (address == t->base + 2) set_count(c, t, value);
-  else set_compare(c, t, (uint8_t)(address - t->base - 3), value);
-}
-
-// 16-bit registers: TCNT at base + 4, ICR + 6, OCRA + 8, OCRB + 10, OCRC + 12; low byte first.
-static uint8_t read_wide(chip* c, uint16_t address, void* param) {
-  timer* const t = param;
-  const uint16_t offset = (uint16_t)(address - t->base);
-  if (offset >= 8) {  // compare registers are read without TEMP (datasheet 17.3)
-    const uint16_t value = t->ocr_buffer[(offset - 8) / 2];
-    return (uint8_t)(offset & 1 ? value >> 8 : value);
-  }
-  if (offset & 1) return t->temp;
-  const uint16_t value = offset == 4 ? count_now(c, t) : t->icr;
-  t->temp = (uint8_t)(value >> 8);
-  return (uint8_t)value;
-}
-
-static void write_wide(chip* c, uint16_t address, uint8_t value, void* param) {
-  timer* const t = param;
-  const uint16_t offset = (uint16_t)(address - t->base);
-  if (offset & 1) {
-    t->temp = value;
-    return;
-  }
-  const uint16_t both = (uint16_t)(t->temp << 8 | value);
-  if (offset == 4) {
-    set_count(c, t, both);
-  } else if (offset == 6) {
-    serve(c, t, chip_now(c));
-    if (!t->icr_is_top) return;  // writable only where it defines TOP
-    t->icr = both;
-    configure(c, t);
-  } else {
-    set_compare(c, t, (uint8_t)((offset - 8) / 2), both);
-  }
+  timer_schedule(c, t);
 }
 
 static void captured(chip* c, void* param, uint64_t argument) {
   (void)argument;
   timer* const t = param;
-  serve(c, t, chip_now(c));
+  timer_serve(c, t, chip_now(c));
   t->icr = (uint16_t)t->position;
   interrupt_flag(c, kFirstVector[t->number], chip_now(c));
 }
@@ -324,48 +246,11 @@ void timer_capture(chip* c, uint8_t number, bool level) {
     const uint8_t b = c->avr->data[t->base + 1];
     if (((b & 0x40) != 0) != level) continue;
     // The noise canceler delays by four system clocks (datasheet 17.6.2).
-    if (b & 0x80) event_post(c, chip_now(c) + 4, captured, t, 0);
-    else captured(c, t, 0);
+    if (b & 0x80)
+      event_post(c, chip_now(c) + 4, captured, t, 0);
+    else
+      captured(c, t, 0);
   }
-}
-
-static void write_prescaler(chip* c, uint16_t address, uint8_t value, void* param) {
-  (void)param;
-  for (uint8_t i = 0; i < kTimerCount; i++) serve(c, &c->timers[i], chip_now(c));
-  c->prescaler_held = (value & 0x81) == 0x81;
-  if (value & 1) c->prescaler_base = chip_now(c);
-  c->avr->data[address] = value & 0x80 ? value & 0x83 : 0;
-  for (uint8_t i = 0; i < kTimerCount; i++) {
-    timer* const t = &c->timers[i];
-    if (i == 2) continue;
-    if (t->divider && (value & 1)) {
-      t->epoch = chip_now(c) - (uint64_t)t->position * t->divider;
-    }
-    configure(c, t);
-  }
-}
-
-void timers_init(chip* c) {
-  for (uint8_t n = 0; n < kTimerCount; n++) {
-    timer* const t = &c->timers[n];
-    t->number = n;
-    t->wide = n != 0 && n != 2;
-    t->base = kBases[n];
-    t->due.run = due;
-    t->due.param = t;
-    hook_write(c, t->base, write_control, t);
-    hook_write(c, (uint16_t)(t->base + 1), write_control, t);
-    hook_write(c, (uint16_t)(REG_TIMSK0 + n), write_mask, t);
-    hook_read(c, (uint16_t)(REG_TIFR0 + n), read_flags, t);
-    hook_write(c, (uint16_t)(REG_TIFR0 + n), write_flags, t);
-    if (t->wide) hook_write(c, (uint16_t)(t->base + 2), write_force, t);
-    const uint16_t first = t->wide ? 4 : 2, last = t->wide ? 13 : 4;
-    for (uint16_t offset = first; offset <= last; offset++) {
-      hook_read(c, (uint16_t)(t->base + offset), t->wide ? read_wide : read_narrow, t);
-      hook_write(c, (uint16_t)(t->base + offset), t->wide ? write_wide : write_narrow, t);
-    }
-  }
-  hook_write(c, REG_GTCCR, write_prescaler, NULL);
 }
 
 void timers_reset(chip* c) {
@@ -383,6 +268,6 @@ void timers_reset(chip* c) {
       t->oc[i] = false;
       t->com[i] = 0;
     }
-    configure(c, t);
+    timer_configure(c, t);
   }
 }

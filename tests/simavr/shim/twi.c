@@ -1,6 +1,6 @@
-// TWI as a slave receiver (datasheet section 24) with an external master on the bus. TWINT holds SCL
-// low until the program clears it; the stretch is measured. The master's packets queue up, wait for
-// a free bus, and may die in the middle of a byte with the lines released or one of them held.
+// TWI as a slave receiver (datasheet section 24) with an external master on the bus. TWINT holds
+// SCL low until the program clears it; the stretch is measured. The master's packets queue up, wait
+// for a free bus, and may die in the middle of a byte with the lines released or one of them held.
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,13 +8,24 @@
 
 enum { kTwint = 0x80, kTwea = 0x40, kTwsta = 0x20, kTwsto = 0x10, kTwen = 0x04 };
 enum phase {
-  kBusIdle, kBusStart, kBusAddress, kBusHeldAfterAddress, kBusByte, kBusHeldAfterByte, kBusStop,
-  kBusWaitStart, kBusDie,
+  kBusIdle,
+  kBusStart,
+  kBusAddress,
+  kBusHeldAfterAddress,
+  kBusByte,
+  kBusHeldAfterByte,
+  kBusStop,
+  kBusWaitStart,
+  kBusDie,
 };
 enum { kSclPin = PIN(3, 0), kSdaPin = PIN(3, 1) };
 
-static uint8_t control(const chip* c) { return c->avr->data[REG_TWCR]; }
-static bool line_stuck(const chip* c) { return c->twi.sda_held || c->twi.scl_held; }
+static uint8_t control(const chip* c) {
+  return c->avr->data[REG_TWCR];
+}
+static bool line_stuck(const chip* c) {
+  return c->twi.sda_held || c->twi.scl_held;
+}
 
 static void raise(chip* c, uint8_t status) {
   uint8_t* const s = &c->avr->data[REG_TWSR];
@@ -69,7 +80,8 @@ static void begin_byte(chip* c) {
 static void after_address(chip* c) {
   const twi_packet* const p = c->twi.queue;
   const bool general = p->address == 0 && (c->avr->data[REG_TWAR] & 1);
-  if ((control(c) & (kTwen | kTwea)) == (kTwen | kTwea) && (general || addressed_by(c, p->address))) {
+  if ((control(c) & (kTwen | kTwea)) == (kTwen | kTwea) &&
+      (general || addressed_by(c, p->address))) {
     c->twi.addressed = true;
     c->twi.general_call = general;
     c->twi.acked = 0;
@@ -131,9 +143,15 @@ static void bus_event(chip* c, void* param, uint64_t argument) {
       }
       go(c, kBusAddress, 10u * c->twi.queue->scl_cycles);
       return;
-    case kBusAddress: after_address(c); return;
-    case kBusByte: after_byte(c); return;
-    case kBusDie: master_dies(c); return;
+    case kBusAddress:
+      after_address(c);
+      return;
+    case kBusByte:
+      after_byte(c);
+      return;
+    case kBusDie:
+      master_dies(c);
+      return;
     case kBusStop: {
       const bool tell = c->twi.addressed && (control(c) & kTwen);
       c->twi.addressed = false;
@@ -142,7 +160,8 @@ static void bus_event(chip* c, void* param, uint64_t argument) {
       finish(c, false);
       return;
     }
-    default: return;
+    default:
+      return;
   }
 }
 
@@ -157,13 +176,16 @@ static void continue_bus(chip* c) {
     case kBusHeldAfterByte:
       released(c);
       if (!c->twi.addressed || c->twi.index >= p->length) {
-        if (p->abort_kind != kTwiLives && c->twi.addressed) begin_byte(c);
-        else go(c, kBusStop, p->scl_cycles);
+        if (p->abort_kind != kTwiLives && c->twi.addressed)
+          begin_byte(c);
+        else
+          go(c, kBusStop, p->scl_cycles);
       } else {
         begin_byte(c);
       }
       return;
-    default: return;
+    default:
+      return;
   }
 }
 
@@ -218,8 +240,10 @@ void twi_queue(chip* c, const twi_packet* packet) {
   if (!p) abort();
   *p = *packet;
   p->next = NULL;
-  if (c->twi.queue_end) c->twi.queue_end->next = p;
-  else c->twi.queue = p;
+  if (c->twi.queue_end)
+    c->twi.queue_end->next = p;
+  else
+    c->twi.queue = p;
   c->twi.queue_end = p;
   if (c->twi.queue != p) return;
   go(c, kBusStart, p->start > chip_now(c) ? p->start - chip_now(c) : 0);

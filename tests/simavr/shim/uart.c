@@ -1,6 +1,6 @@
-// USART 0 to 3, asynchronous (datasheet section 22). The receive line is a line: the sender's bits lie
-// on it in the sender's bit time and are sampled in the chip's, so a wrong baud rate gives what it
-// gives on the bench. Two bytes of buffer and the shift register; the next start bit overruns.
+// USART 0 to 3, asynchronous (datasheet section 22). The receive line is a line: the sender's bits
+// lie on it in the sender's bit time and are sampled in the chip's, so a wrong baud rate gives what
+// it gives on the bench. Two bytes of buffer and the shift register; the next start bit overruns.
 #include <stdlib.h>
 #include <string.h>
 
@@ -124,7 +124,7 @@ static void look_for_start(chip* c, uart* u) {
 
 static void show_front(chip* c, uart* u) {
   uint8_t* const a = reg(c, u, kA);
-  *a &= (uint8_t)~(kRxc | kFe | kDor | kUpe);
+  *a &= (uint8_t) ~(kRxc | kFe | kDor | kUpe);
   if (u->fifo_count) *a |= (uint8_t)(kRxc | u->fifo[0].flags);
   refresh(c, u);
 }
@@ -220,12 +220,16 @@ static void write_b(chip* c, uint16_t address, uint8_t value, void* param) {
   refresh(c, u);
 }
 
-void uart_send(chip* c, uint8_t number, const uint8_t* bytes, uint32_t count, uint64_t bit_256,
+void uart_send(chip* c,
+               uint8_t number,
+               const uint8_t* bytes,
+               uint32_t count,
+               uint64_t bit_256,
                uint64_t from_cycle) {
   uart* const u = &c->uarts[number];
   const uint64_t earliest = (from_cycle > chip_now(c) ? from_cycle : chip_now(c)) * 256;
-  while (u->line_count && !u->rx_busy && line_byte(u, 0)->start + 10 * line_byte(u, 0)->bit <
-                                             chip_now(c) * 256) {
+  while (u->line_count && !u->rx_busy &&
+         line_byte(u, 0)->start + 10 * line_byte(u, 0)->bit < chip_now(c) * 256) {
     u->line_head = (u->line_head + 1) % u->line_capacity;  // nobody listened
     u->line_count--;
   }
