@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from host import airdata
 from host.calibration import load_calibration
+
+from host import airdata
 
 
 @pytest.mark.parametrize(

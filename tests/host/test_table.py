@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.columns import ANALOGUE, COLUMNS
+from numpy.typing import NDArray
 
 from tests.host.logs import even, flight, read, written
+from tests.protocol.log_writer import Timed
 
 COUNT_PER_S = 150.0  # slope of the ramps: 1.5 raw steps per row, within every channel's range
-FRAME = {f"{name}": slot for slot, name in enumerate(ANALOGUE)}
-DLPF_3_US = {"gyro": 4800.0, "accel": 4900.0}
 
 
-def ramps(seconds: float = 6.0, age_us: int = 260) -> tuple[list, np.ndarray]:
+def ramps(seconds: float = 6.0, age_us: int = 260) -> tuple[list[Timed], NDArray[np.int64]]:
     """Return streams whose channels are ramps in time, sampled where the schema says."""
     streams = flight(seconds)
     t_us = even(streams[0])
@@ -144,7 +144,8 @@ def test_inputs_are_positions_where_measured_else_commands(
     assert log.inputs == dict.fromkeys(("elevator", "aileron", "rudder"), source)
     assert table.attrs["inputs"]["aileron"] == source
     if source == "measured":
-        expected = 0.5 * (table["aileron_left_rad"] - table["aileron_right_rad"])
+        left, right = (table[f"aileron_{side}_rad"].to_numpy() for side in ("left", "right"))
+        expected = 0.5 * (left - right)
     else:
         line = log.calibration.lines["pulse.aileron"]
         pulse = np.where(rows["valid"] >> 15, rows["servo_aileron"], rows["rc_aileron"]) * 0.5

@@ -28,12 +28,12 @@ class FrameSet:
     ----------
     data : NDArray, shape (n,)
         Structured, packed, raw, with the frame's id in field ``id``.
-    block : NDArray[np.int64], shape (n,)
+    block : NDArray[np.int32], shape (n,)
         Which of the log's blocks each frame stood in.
     """
 
     data: NDArray[Any]
-    block: NDArray[np.int64]
+    block: NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +211,7 @@ def _gather(
     size = frame.size_bytes
     # Every byte of the buffer seen as the start of a frame: one copy per frame, no index per byte.
     starts = np.ndarray((len(buffer) - size + 1,), np.dtype(f"V{size}"), buffer, strides=(1,))
-    return FrameSet(starts[where].view(frame.dtype), chosen[where // BLOCK_BYTES].astype(np.int64))
+    return FrameSet(starts[where].view(frame.dtype), chosen[where // BLOCK_BYTES].astype(np.int32))
 
 
 def join(schema: Schema, name: str, parts: Iterable[FrameSet], most: int = 0) -> FrameSet:
@@ -235,12 +235,12 @@ def join(schema: Schema, name: str, parts: Iterable[FrameSet], most: int = 0) ->
         if len(held) == 1:
             return held[0]
         if not held:
-            return FrameSet(np.empty(0, layout), np.empty(0, np.int64))
+            return FrameSet(np.empty(0, layout), np.empty(0, np.int32))
         return FrameSet(
             np.concatenate([part.data.view(plain) for part in held]).view(layout),
             np.concatenate([part.block for part in held]),
         )
-    data, block, count = np.empty(most, plain), np.empty(most, np.int64), 0
+    data, block, count = np.empty(most, plain), np.empty(most, np.int32), 0
     for part in parts:
         end = count + len(part.data)
         data[count:end] = part.data.view(plain)

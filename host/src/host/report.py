@@ -66,7 +66,7 @@ def _session(session: Mapping[str, Any]) -> Iterator[str]:
 def _clock(clock: Mapping[str, Any] | None) -> str:
     if clock is None:
         return "not checked: too few GPS solutions; the Mega's resonator is good to about 0.5 %"
-    applied = "t_s corrected" if clock["applied"] else "too uncertain, t_s not corrected"
+    applied = "t_s corrected" if clock["applied"] else "t_s not corrected: needs 20 s of GPS"
     return (
         f"scale error {clock['scale_error_ppm']:+.1f} ppm +- {clock['half_width_95_ppm']:.1f} ppm"
         f" (95 %) against GPS, {clock['fixes']} solutions; {applied}"

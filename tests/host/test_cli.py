@@ -1,0 +1,251 @@
+"""The command line: exit codes, one clear line per error, results on stdout."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from host.cli import main, verbs
+
+from tests.host.logs import flight, written
+from tests.host.test_original_rows import APPENDIX
+from tests.protocol.flights import simple_log
+from tests.protocol.log_writer import BLOCK, LogWriter
+
+GOOD = simple_log(3.0).data()
+HURT = GOOD[: 30 * BLOCK] + bytes(BLOCK) + GOOD[31 * BLOCK :]
+ENVIRONMENT = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def put(name: str, data: bytes) -> Path:
+    path = Path(name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data)
+    return path
+
+
+def test_decode_needs_no_options(capsys: pytest.CaptureFixture[str]) -> None:
+    put("flight.bin", GOOD)
+    assert main(["decode", "flight.bin"]) == 0
+    out, err = capsys.readouterr()
+    for word in ("duration", "100 Hz", "jitter", "clock", "sensors", "GPS", "losses", "default"):
+        assert word in out
+    assert "next         host " in out
+    assert err == ""
+    assert Path("flight.csv").read_text().startswith("t_s,airspeed_mps,alpha_rad")
+    assert main(["decode", "flight.bin"]) == 0  # again, over its own output
+
+
+def test_losses_are_named_in_text_json_and_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
+    put("hurt.bin", HURT)
+    assert main(["decode", "hurt.bin"]) == 3
+    text = capsys.readouterr().out
+    assert f"byte {30 * BLOCK}, {BLOCK} bytes" in text
+    assert "overwritten with zeros" in text
+    assert main(["decode", "hurt.bin", "--json"]) == 3
+    summary = json.loads(capsys.readouterr().out)
+    (loss,) = summary["losses"]["ranges"]
+    assert (loss["cause"], loss["offset"], loss["length"]) == ("zeroed", 30 * BLOCK, BLOCK)
+    assert 3 <= loss["frames"] <= 6
+    assert loss["seconds"] == pytest.approx(loss["frames"] / 100, abs=1e-4)
+    assert summary["complete"] == "damaged"
+
+
+@pytest.mark.parametrize(
+    ("data", "said"), [(b"", "0 bytes"), (b"no log", "6 bytes"), (bytes(5000), "intact block")]
+)
+def test_other_files_end_in_4(data: bytes, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    put("other.bin", data)
+    for verb in ("decode", "info"):
+        assert main([verb, "other.bin"]) == 4
+        err = capsys.readouterr().err
+        assert said in err
+        assert err.count("\n") == 1
+        assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["decode", "nowhere.bin"], "nowhere.bin: no such file"),
+        (["decode", "flight.bin", "--session", "9"], "no session 9"),
+        (["decode", "flight.bin", "--file-id", "1"], "no block has file id 00000001"),
+        (["decode", "flight.bin", "--calibration", "no.toml"], "no.toml"),
+        (["decode", "flight.bin", "-o", "x.mat", "--to", "csv"], "x.mat ends in .mat"),
+        (["decode", "flight.bin", "-o", "-", "--to", "mat"], "stdout"),
+        (["decode", "flight.csv", "-o", "flight.csv"], "source itself"),
+    ],
+)
+def test_wrong_arguments_end_in_2(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    put("flight.bin", GOOD)
+    put("flight.csv", GOOD)
+    assert main(arguments) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_unknown_option_and_verb_end_in_2() -> None:
+    for arguments in (["decode"], ["decode", "x", "--nonsense"], ["fly"]):
+        with pytest.raises(SystemExit) as caught:
+            main(arguments)
+        assert caught.value.code == 2
+    assert main([]) == 2
+
+
+def test_folder_lists_its_flights_and_takes_the_newest(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    put("card/FLT00001.BIN", GOOD)
+    newer = LogWriter(session=7)
+    put("card/FLT00002.BIN", written(*flight(1.0), writer=newer))
+    put("card/picture.bin", b"not one of ours")
+    assert main(["decode", "card", "-o", "out/"]) == 0
+    out, err = capsys.readouterr()
+    assert "FLT00001.BIN" in err
+    assert "-> card" in err
+    assert "FLT00002.BIN" in out
+    assert Path("out/FLT00002.csv").exists()
+    assert main(["info", "card"]) == 0
+    assert capsys.readouterr().out.count(".BIN") == 2
+    Path("empty").mkdir()
+    assert main(["decode", "empty"]) == 4
+
+
+def test_strict_ends_in_6(capsys: pytest.CaptureFixture[str]) -> None:
+    put("flight.bin", GOOD)
+    put("hurt.bin", HURT)
+    assert main(["decode", "flight.bin", "--strict"]) == 0
+    assert main(["decode", "hurt.bin", "--strict"]) == 6
+    streams = flight(15.0)
+    streams[0].rows["beta_b"] = 2000
+    put("stuck.bin", written(*streams))
+    assert main(["decode", "stuck.bin", "--strict"]) == 6
+    assert "beta_b did not move for 15" in capsys.readouterr().out
+
+
+def test_stuck_saturated_and_absent_channels_are_named(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    streams = flight(20.0)
+    rows = streams[0].rows
+    rows["alpha_a"][300:] = 1234
+    rows["dp_b"][:200] = 4092
+    rows["valid"] &= ~np.uint16(1 << 9)
+    rows["q"][100:120] = 32767
+    rows["valid"][100:120] &= ~np.uint16(1 << 11)
+    put("flight.bin", written(*streams))
+    assert main(["decode", "flight.bin", "--json"]) == 0
+    (session,) = json.loads(capsys.readouterr().out)["sessions"]
+    assert session["stuck"] == {"alpha_a": pytest.approx(17.0, abs=0.1)}
+    assert session["saturated"] == {"dp_b": pytest.approx(0.1), "q": pytest.approx(0.01)}
+    assert session["absent"] == {"pot_rudder": 0.0}
+    assert session["imu_saturated_share"] == pytest.approx(0.01)
+    assert "pot_rudder" not in session["sensors"]
+    assert {"imu", "gps", "alpha_a"} <= set(session["sensors"])
+
+
+def test_original_rows(capsys: pytest.CaptureFixture[str]) -> None:
+    put("rows.txt", (APPENDIX.format(1.0) * 10).encode())
+    assert main(["decode", "rows.txt"]) == 0
+    assert "reconstructed" in capsys.readouterr().out
+    assert len(Path("rows.csv").read_text().splitlines()) == 11
+    put("rows.txt", (APPENDIX.format(1.0) * 10 + "RLL:1.00,PCH:1.").encode())
+    assert main(["decode", "rows.txt", "--frames"]) == 2
+    capsys.readouterr()
+    put("rows.txt", (APPENDIX.format(1.0) * 10 + APPENDIX.format(1.0)[:90]).encode())
+    assert main(["decode", "rows.txt", "--json"]) == 3
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["times"] == "reconstructed"
+    assert summary["losses"]["ranges"][0]["cause"] == "damaged_row"
+
+
+def test_table_on_stdout(capfd: pytest.CaptureFixture[str]) -> None:
+    put("flight.bin", GOOD)
+    assert main(["decode", "flight.bin", "-o", "-"]) == 0
+    out, err = capfd.readouterr()
+    assert len(out.splitlines()) == 301
+    assert "duration" in err
+
+
+def test_info_reads_the_head_only(capsys: pytest.CaptureFixture[str]) -> None:
+    path = put("flight.bin", simple_log(60.0).data())
+    with path.open("r+b") as file:
+        file.truncate(10 * 1024**3)
+    assert main(["info", "flight.bin", "--json"]) == 0
+    head = json.loads(capsys.readouterr().out)
+    assert head["identity"]["firmware"] == "synthetic"
+    assert head["config"]["rate_hz"] == 100
+    assert head["size_bytes"] == 10 * 1024**3
+    assert main(["info", "flight.bin"]) == 0
+    assert "next         host decode flight.bin" in capsys.readouterr().out
+
+
+def test_missing_extra_is_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put("flight.bin", GOOD)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.delitem(sys.modules, "host.export.parquet", raising=False)
+    assert main(["decode", "flight.bin", "--to", "parquet"]) == 2
+    err = capsys.readouterr().err
+    assert "pip install" in err
+    assert err.count("\n") == 1
+
+
+def test_internal_errors_are_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put("flight.bin", GOOD)
+    monkeypatch.setattr("host.decoding.summarise", lambda log: 1 // 0)
+    monkeypatch.delenv("HOST_TRACEBACK", raising=False)
+    assert main(["decode", "flight.bin"]) == 1
+    assert "internal error: ZeroDivisionError" in capsys.readouterr().err
+    monkeypatch.setattr("host.decoding.summarise", interrupted)
+    assert main(["decode", "flight.bin"]) == 130
+    assert capsys.readouterr().err.strip() == "host: interrupted"
+
+
+def interrupted(log: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_help_lists_what_is_there_and_imports_little() -> None:
+    code = (
+        "import sys; from host.cli import main\n"
+        "try: main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "print(sorted({m.split('.')[0] for m in sys.modules} & "
+        "{'numpy', 'pandas', 'scipy', 'pyarrow', 'construct', 'numba'}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=ENVIRONMENT
+    )
+    assert done.stdout.strip().endswith("[]")
+    for name, text in verbs().items():
+        assert name in done.stdout
+        assert text in done.stdout
+    assert "3 decoded with losses" in done.stdout
+
+
+def test_python_m_host() -> None:
+    put("flight.bin", GOOD)
+    done = subprocess.run(
+        [sys.executable, "-m", "host", "info", "flight.bin"],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=ENVIRONMENT,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "file id" in done.stdout

@@ -1,0 +1,77 @@
+"""The wheel of ./host, alone in an empty environment outside the clone, decodes a log.
+
+Only the wheel is installed there (`--no-deps`); the dependencies are lent by the interpreter of the
+tests through a path file, so that the test needs no 60 MB of downloads. Of the clone nothing is
+reachable: the environment, the log and the working folder are elsewhere.
+"""
+
+import re
+import subprocess
+import sys
+import sysconfig
+import venv
+from email import message_from_string
+from pathlib import Path
+from zipfile import ZipFile
+
+from tests.host.logs import ROOT
+from tests.protocol.flights import simple_log
+
+
+def run(*command: str | Path, cwd: Path) -> str:
+    done = subprocess.run(
+        [str(part) for part in command],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={"PATH": "/usr/bin:/bin", "HOME": str(cwd), "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
+        | pip_settings(),
+    )
+    assert done.returncode == 0, done.stderr + done.stdout
+    return done.stdout
+
+
+def pip_settings() -> dict[str, str]:
+    """Keep what tells pip where packages come from, and its cache."""
+    import os
+
+    cache = Path.home() / ".cache/pip"
+    kept = {name: value for name, value in os.environ.items() if name.startswith("PIP_")}
+    return {"PIP_CACHE_DIR": str(cache)} | kept
+
+
+def test_wheel_decodes_a_log_outside_the_clone(tmp_path: Path) -> None:
+    run(
+        *(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", "dist"),
+        ROOT / "host",
+        cwd=tmp_path,
+    )
+    (wheel,) = (tmp_path / "dist").glob("*.whl")
+    with ZipFile(wheel) as packed:
+        names = packed.namelist()
+        (metadata,) = (name for name in names if name.endswith("METADATA"))
+        needs = message_from_string(packed.read(metadata).decode()).get_all("Requires-Dist", [])
+        for name, place in (
+            ("host/data/schema.json", "protocol/generated/schema.json"),
+            ("host/data/default.toml", "hw/calibration/default.toml"),
+        ):
+            assert packed.read(name) == (ROOT / place).read_bytes()
+    assert {"numpy", "pandas", "scipy"} <= {re.split(r"[<>=]", need)[0] for need in needs}
+    env = tmp_path / "env"
+    venv.create(env, with_pip=False)
+    scripts = env / ("Scripts" if sys.platform == "win32" else "bin")
+    run(
+        *(sys.executable, "-m", "pip", "--python", scripts / "python", "install", "--quiet"),
+        *("--no-deps", "--no-index", wheel),
+        cwd=tmp_path,
+    )
+    place = "import sysconfig; print(sysconfig.get_paths()['purelib'])"
+    site = run(scripts / "python", "-c", place, cwd=tmp_path).strip()
+    (Path(site) / "lent.pth").write_text(sysconfig.get_paths()["purelib"])
+    (tmp_path / "flight.bin").write_bytes(simple_log(2.0).data())
+    where = run(scripts / "python", "-c", "import host; print(host.__file__)", cwd=tmp_path)
+    assert Path(where.strip()).is_relative_to(env)
+    said = run(scripts / "host", "decode", "flight.bin", cwd=tmp_path)
+    assert "losses       none" in said
+    assert len((tmp_path / "flight.csv").read_text().splitlines()) == 201
