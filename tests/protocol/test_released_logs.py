@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from host.log import read_log
 
+from tests.protocol.agreement import check_oracle
+from tests.protocol.damage import DAMAGES
 from tests.protocol.expected_text import text_of_host, text_of_oracle
 from tests.protocol.log_writer import ROOT
 from tests.protocol.oracle import decode
@@ -42,3 +45,10 @@ def test_table_of_a_released_log(path: Path) -> None:
     assert len(table) == len(log.frames["ident"])
     assert table["t_s"].is_monotonic_increasing
     assert set(table["session"]) == set(log.selection.sessions)
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+@pytest.mark.parametrize("path", LOGS, ids=lambda path: path.stem)
+def test_damaged_released_log_reads_alike(path: Path, name: str) -> None:
+    for seed in range(2):
+        check_oracle(DAMAGES[name](path.read_bytes(), np.random.default_rng(seed)))

@@ -1,0 +1,44 @@
+"""Record format-1-sitl.bin: the firmware in simulated time, its button, a reset, its card.
+
+Kept for the record, never run by a test: a released log is never made anew. Needs `make sitl`.
+
+    python tests/data/make_sitl.py FOLDER
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "host/src"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from tests.protocol.expected_text import text_of_oracle
+from tests.protocol.log_writer import LogWriter
+from tests.protocol.oracle import decode
+from tests.sitl.bench import Bench, flight
+from tests.sitl.card_image import read_file
+
+BROWN_OUT = 3
+
+
+def main() -> int:
+    """Record, reset in flight, record on until the throttle is idle, stop; write log and text."""
+    folder = Path(sys.argv[1])
+    bench = Bench()
+    flight(17.8).give(bench.sitl)
+    bench.sitl.power_on()
+    bench.sitl.run_for(0.5)
+    bench.record(0.8)
+    bench.sitl.reset(BROWN_OUT)
+    bench.sitl.run_for(1.7)
+    bench.stop()
+    data = read_file(bytes(bench.image), "FLT00001.BIN")
+    read = decode(data)
+    assert read is not None
+    (folder / "format-1-sitl.bin").write_bytes(data)
+    text = text_of_oracle(read, list(LogWriter().layouts))
+    (folder / "format-1-sitl.txt").write_text(text, encoding="ascii")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
