@@ -1,0 +1,38 @@
+"""What host/README.md promises: its example runs, its codes and options are those of the code."""
+
+import re
+from pathlib import Path
+
+import pytest
+from host.cli import main
+from host.errors import ExitCode
+
+from tests.host.logs import ROOT
+from tests.protocol.flights import simple_log
+
+TEXT = (ROOT / "host/README.md").read_text()
+
+
+def test_example_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("flight.bin").write_bytes(simple_log(25.0).data())
+    (code,) = re.findall(r"```python\n(.*?)```", TEXT, re.S)
+    exec(compile(code, "README.md", "exec"), {})
+    said = capsys.readouterr().out
+    assert "Pa measured" in said
+    assert "complete" in said
+
+
+def test_exit_codes() -> None:
+    table = TEXT.partition("## Exit codes")[2].partition("##")[0]
+    assert {int(code) for code in re.findall(r"^\| (\d+) \|", table, re.M)} == set(ExitCode)
+
+
+def test_every_option_of_decode_is_documented(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["decode", "--help"])
+    assert caught.value.code == 0
+    helped = set(re.findall(r"--[a-z-]+", capsys.readouterr().out)) - {"--help", "--output"}
+    assert helped <= set(re.findall(r"--[a-z-]+", TEXT))
