@@ -123,6 +123,11 @@ def identify(
     IdentificationError
         If no maneuver is there for any model.
     """
+    strangers = [n for n in names if user_model is None and n not in AXIS_OF]
+    if strangers:
+        raise IdentificationError(
+            f"no template '{strangers[0]}'; there are {', '.join(AXIS_OF)}, or give a TOML file"
+        )
     if airframe is not None:
         columns = corrected(columns, airframe)
     found = list(windows) if windows is not None else find(columns)
