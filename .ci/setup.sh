@@ -27,11 +27,11 @@ quietly() {
 }
 
 # One line each why: compiler and Python of the PC; compiler, library and uploader of the Mega;
-# unit tests; the chip simulator; looking into card images as a PC would.
+# unit tests; the chip simulator and the board's bootloader for it; looking into card images as a PC would.
 packages=(git make python3 python3-venv g++
   gcc-avr avr-libc avrdude
   doctest-dev
-  simavr libsimavr-dev
+  simavr libsimavr-dev arduino-core-avr
   dosfstools mtools)
 
 missing_packages() {

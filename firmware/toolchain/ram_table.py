@@ -25,28 +25,32 @@ def symbols(elf: Path, *, environment: Mapping[str, str] = os.environ) -> list[t
     elf : Path
         The linked image.
     environment : mapping
-        Variables for avr-nm; PATH must find it.
+        Variables for avr-nm and avr-c++filt; PATH must find them.
 
     Returns
     -------
     list of (name, size)
-        Demangled names, sizes in bytes.
+        Names as in the source, sizes in bytes.
 
     Raises
     ------
     OSError, subprocess.CalledProcessError
-        If avr-nm cannot be run or does not understand the file.
+        If one of them cannot be run or does not understand the file.
     """
-    command = ["avr-nm", "--print-size", "--size-sort", "--reverse-sort", "--demangle", str(elf)]
-    listing = subprocess.run(
-        command, capture_output=True, text=True, check=True, env=dict(environment)
-    ).stdout
-    found = []
-    for line in listing.splitlines():
-        _, size, kind, name = line.split(maxsplit=3)
-        if kind in "bBdD":
-            found.append((name, int(size, 16)))
-    return found
+    nm = ["avr-nm", "--print-size", "--size-sort", "--reverse-sort", str(elf)]
+    lines = [line.split(maxsplit=3) for line in _output(nm, "", environment).splitlines()]
+    sizes = [int(size, 16) for _, size, kind, _ in lines if kind in "bBdD"]
+    # Link-time optimisation appends a number, with which a name is no longer a C++ name.
+    names = [name.partition(".lto_priv")[0] for _, _, kind, name in lines if kind in "bBdD"]
+    readable = _output(["avr-c++filt"], "".join(f"{name}\n" for name in names), environment)
+    return list(zip(readable.splitlines(), sizes, strict=True))
+
+
+def _output(command: list[str], text: str, environment: Mapping[str, str]) -> str:
+    done = subprocess.run(
+        command, input=text, capture_output=True, text=True, check=True, env=dict(environment)
+    )
+    return done.stdout
 
 
 def print_table(
