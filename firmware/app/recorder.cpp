@@ -194,10 +194,12 @@ void Recorder::watch_room(uint32_t now_us) {
     end(1, now_us);
     return;
   }
+  if (file_low_told_) return;
+  // Compared in bytes: a division costs 640 cycles, every turn of the loop.
   const uint32_t bytes_per_s =
       static_cast<uint32_t>(config_->rate_hz) * frames::kIdentWireSize + kOtherBytesPerS;
-  const uint32_t low_blocks = bytes_per_s * kLowSeconds / core::kBlockPayloadSize;
-  if (file_low_told_ || blocks - next > low_blocks + kEndBlocks) return;
+  const uint32_t left_bytes = (blocks - next - kEndBlocks) * core::kBlockPayloadSize;
+  if (left_bytes > bytes_per_s * kLowSeconds) return;
   file_low_told_ = true;
   outlet_.event(frames::Event::kFileLow, kLowSeconds, now_us);
 }

@@ -79,7 +79,10 @@ namespace hal {
 
 uint32_t now_us() {
   const Now at = now();
-  return (at.turns << 15) | (at.ticks >> 1);
+  // turns * 32768 + ticks / 2 in whole bytes and one shift: a shift by 15 is a loop of 75 cycles.
+  const uint32_t ticks = (at.turns << 16) | at.ticks;
+  const uint32_t top = (at.turns & 0x10000UL) != 0 ? 0x80000000UL : 0;
+  return (ticks >> 1) | top;
 }
 
 uint32_t now_ticks() {
