@@ -14,11 +14,7 @@ uint32_t asr(uint32_t value, uint8_t by) {
 }
 
 uint32_t divide(uint32_t value, uint32_t by) {
-  const int32_t divisor = static_cast<int32_t>(by);
-  if (divisor == -1) {
-    return 0U - value;
-  }
-  return static_cast<uint32_t>(static_cast<int32_t>(value) / divisor);
+  return static_cast<uint32_t>(static_cast<int32_t>(value) / static_cast<int32_t>(by));
 }
 
 BaroValue judged(int32_t pressure_pa, int32_t temperature_cdegc) {

@@ -6,6 +6,9 @@ namespace {
 // The last channel of a sequential receiver shifts by this much when four sticks move at once.
 constexpr uint32_t kShiftTicks = 4500UL * kTicksPerUs;
 
+// Early pulses in a row, of all channels, without one frame of a known length between them.
+constexpr uint8_t kMaxEarly = 12;
+
 uint8_t bit_of(uint8_t input) {
   return static_cast<uint8_t>(1U << input);
 }
@@ -67,7 +70,9 @@ void RcDecoder::fall(uint8_t index, uint32_t t_ticks, bool late) {
                                      : kMinPeriodTicks;
     if (input.rise - input.accepted < least_ticks) {
       // Perhaps the receiver has become faster: measure its frame time anew.
-      locked_ = false;
+      if (++early_ > kMaxEarly) {
+        locked_ = false;
+      }
       reject(index);
       return;
     }
@@ -100,6 +105,7 @@ void RcDecoder::settle(uint8_t index, uint32_t low_ticks) {
 }
 
 void RcDecoder::measure_frame(uint16_t period_us) {
+  early_ = 0;
   if (!locked_) {
     locked_ = true;
     frame_us_ = period_us;

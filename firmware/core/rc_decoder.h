@@ -74,6 +74,7 @@ class RcDecoder {
   uint8_t valid_ = 0;
   uint8_t fresh_ = 0;
   uint8_t steady_ = 0;
+  uint8_t early_ = 0;    // pulses refused for coming early
   bool locked_ = false;  // frame_us_ bounds how early the next pulse may come
   bool started_ = false;
 };

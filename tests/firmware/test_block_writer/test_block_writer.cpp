@@ -221,6 +221,38 @@ TEST_CASE("the end: what waits goes out in a block partly filled") {
   CHECK(!log.writer.due(kMinuteUs * 2));
 }
 
+TEST_CASE("a last block that is rejected keeps its content, though an event came behind it") {
+  Log log;
+  log.start(0);
+  log.push(10);
+  log.writer.finish();
+  REQUIRE(log.writer.due(1));
+  log.send(512);
+  log.writer.rejected();
+  log.push(1);
+  REQUIRE(log.writer.due(2));
+  CHECK_EQ(log.send(512).used, 110);
+  log.writer.accepted();
+  REQUIRE(log.writer.due(3));
+  CHECK_EQ(log.send(512).used, 11);
+}
+
+TEST_CASE("the end does not wait for a schema that was just returning") {
+  Log log;
+  log.start(0);
+  log.push(10);
+  REQUIRE(log.writer.due(kMinuteUs));
+  log.send(512);
+  log.writer.accepted();
+  REQUIRE(log.writer.schema_pass());
+  log.writer.finish();
+  REQUIRE(log.writer.due(kMinuteUs + 1));
+  CHECK_EQ(static_cast<uint8_t>(log.send(512).kind), 0);
+  log.writer.accepted();
+  CHECK(log.writer.drained());
+  CHECK(!log.writer.due(kMinuteUs + 2));
+}
+
 TEST_CASE("before any session nothing is due") {
   Log log;
   CHECK(!log.writer.due(kMinuteUs * 2));

@@ -178,6 +178,16 @@ TEST_CASE("receiver lost: released, silent, and armed again only through direct"
   CHECK(bench.drive.relay());
 }
 
+TEST_CASE("a direct seen before the receiver was lost does not count behind it") {
+  Bench bench;
+  bench.run_ms(300);
+  bench.lose(kAll);
+  bench.run_ms(50);
+  bench.rc = {{3000, 2900, 3100, 2000, 2 * kMegaUs}, kAll, kAll};
+  bench.run_ms(500);
+  CHECK(!bench.drive.relay());
+}
+
 TEST_CASE("the switch alone lost counts as direct, hold or not") {
   const uint16_t holds_ms[] = {0, 1000};
   for (const uint16_t hold_ms : holds_ms) {

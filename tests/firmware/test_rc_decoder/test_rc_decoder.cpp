@@ -240,6 +240,23 @@ TEST_CASE("a dropout inside a pulse leaves none of its halves") {
   CHECK_EQ(receiver.decoder.width_ticks(0), 3000);
 }
 
+TEST_CASE("a false pulse of a good width between true ones is refused by its time") {
+  Receiver receiver;
+  receiver.sequential = false;
+  receiver.frames(10);
+  uint8_t wrong = 0;
+  for (uint8_t round = 0; round < 20; ++round) {
+    const uint32_t end = receiver.now + 20 * kMs;
+    receiver.simultaneous();
+    receiver.wait_until(receiver.now + 4 * kMs + round * 400U);
+    receiver.pulse(kAll, 2600);
+    receiver.wait_until(end);
+    wrong = static_cast<uint8_t>(wrong + !receiver.all_right());
+  }
+  CHECK_EQ(wrong, 0);
+  CHECK_EQ(receiver.decoder.glitches(), 100);
+}
+
 TEST_CASE("noise of 50 us to 10 ms between true pulses moves no width") {
   Random random(4);
   Receiver receiver;

@@ -288,11 +288,9 @@ class ModelCard {
       crc_ = core::kCrc16StartCard;
       return;
     }
-    if ((out & 0xC0) == 0x40) {  // a command in place of a block: CMD12, CMD0
+    if (out == (0x40 | 12)) {  // the only command that a card takes between blocks
       take_command(out);
-      if (at_ != 0) {
-        receiving_ = Receiving::kCommand;
-      }
+      receiving_ = Receiving::kCommand;
     }
   }
 

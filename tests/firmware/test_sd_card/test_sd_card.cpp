@@ -195,6 +195,8 @@ TEST_CASE("a bit flipped on the wire: rejected, sent again to the same sector, n
   CHECK(bench.holds(1, 0x22));
   CHECK(bench.holds(2, 0x33));
   CHECK_EQ(bench.model.opened, 2);
+  CHECK_EQ(bench.model.stopped, 1);
+  CHECK_EQ(bench.model.bad_commands, 0);
 }
 
 TEST_CASE("a write error, then a sector further") {
