@@ -4,6 +4,7 @@ A program to be started by path; what it needs and leaves are files::
 
     python tests/simavr/replay.py firmware.elf stimuli.npz card.img [--eeprom eeprom.bin]
         [--close-s 20] [--busy-ms 1] [--servos servos.npz]
+        [--fault card_busy:12.5:500] [--fault power_cut:30]
 
 The card's image is changed in place. One JSON object on stdout tells what happened; a line per ten
 per cent goes to stderr. Exit 0, or 2 when a file is missing or not what it should be.
@@ -25,6 +26,7 @@ from simavr_bench.replay import Replay, read_stimuli, signal_pins
 
 ROOT = Path(__file__).resolve().parents[2]
 SERVOS = ("servo_aileron", "servo_elevator", "servo_rudder", "servo_throttle")
+TICKS_PER_S = 2_000_000
 _IDLE_US = (1500, 1500, 1500, 1000, 1000)
 
 
@@ -37,8 +39,28 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--close-s", type=float, default=0.0, help="second power-on of this length")
     parser.add_argument("--busy-ms", type=float, default=1.0, help="card busy after each block")
     parser.add_argument("--servos", type=Path, help="write the output pulses here (.npz)")
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="KIND:AT_S[:VALUE]",
+        help="card_busy (ms), card_reject (blocks), card_removed, card_inserted, baro_off, "
+        "baro_on, power_cut; may be given several times",
+    )
     parser.add_argument("--seed", type=int, default=1)
     return parser.parse_args(argv)
+
+
+def _plan_faults(flight: Replay, faults: list[str], end: int) -> int:
+    """Plan all faults; gives the tick at which power goes."""
+    for fault in faults:
+        kind, at_s, *value = fault.split(":")
+        at = round(float(at_s) * TICKS_PER_S)
+        if kind == "power_cut":
+            end = min(end, at)
+        else:
+            flight.plan(kind, at, float(value[0]) if value else 0.0)
+    return end
 
 
 def _report_progress() -> Callable[[float], None]:
@@ -77,6 +99,7 @@ def main(argv: list[str] | None = None) -> int:
         if options.eeprom is not None:
             chip.set_eeprom(options.eeprom.read_bytes())
         flight = Replay(chip, stimuli, pins, options.card, busy_s=options.busy_ms * 1e-3)
+        end = _plan_faults(flight, options.fault, stimuli.duration)
     except (OSError, ValueError) as error:
         print(f"replay: {error}", file=sys.stderr)
         return 2
@@ -84,7 +107,7 @@ def main(argv: list[str] | None = None) -> int:
         chip.watch(*(pins[name] for name in SERVOS))
         began_s = time.perf_counter()
         chip.power_on()
-        flight.run(progress=_report_progress())
+        flight.run(end, progress=_report_progress())
         wall_s = time.perf_counter() - began_s
         simulated_s = chip.time_s
         load = chip.load_now().busy_fraction

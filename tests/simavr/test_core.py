@@ -125,6 +125,23 @@ def test_reset_shows_output_edges_and_keeps_inputs(make_chip: MakeChip) -> None:
     assert chip.read_array("result", "<u2")[0] == 0b1001
 
 
+def test_reset_from_a_listener_waits_for_the_instruction(make_chip: MakeChip) -> None:
+    chip = make_chip("reset")
+    times: list[int] = []
+
+    def pull_the_plug(level: bool, cycle: int) -> None:
+        if level and len(times) < 3:
+            times.append(cycle)
+            chip.reset(ResetCause.BROWN_OUT)
+
+    chip.on_pin("PA5", pull_the_plug)
+    chip.run_s(0.01)
+    assert len(times) == 3
+    assert len(set(np.diff(times))) == 1
+    assert chip.read("finished") == 1
+    assert chip.read("cause") == ResetCause.BROWN_OUT
+
+
 def test_held_reset_and_startup_delay_take_time(make_chip: MakeChip) -> None:
     chip = make_chip("reset", startup_s=0.065)
     chip.watch("PA5")

@@ -93,6 +93,13 @@ def test_program_reads_files_and_tells_what_it_did(
     assert summary["resets"] == 1
     with np.load(tmp_path / "servos.npz") as servos:
         assert len(servos["servo_aileron"]) > 10
+    busy, cut = "card_busy:0.1:50", "power_cut:0.25"
+    assert program.main([*files, "--fault", busy, "--fault", cut]) == 0
+    captured = json.loads(capsys.readouterr().out)
+    assert captured["simulated_s"] == pytest.approx(0.25)
+    assert captured["blocks_written"] < summary["blocks_written"]
+    assert program.main([*files, "--fault", "meteor:0.1"]) == 2
+    assert "meteor" in capsys.readouterr().err
     assert program.main([files[0], str(tmp_path / "none.npz"), files[2]]) == 2
     assert "none.npz" in capsys.readouterr().err
     np.savez(tmp_path / "wrong.npz", allow_pickle=False, duration=1)

@@ -1,6 +1,7 @@
-// ATmega2560 data-space addresses, bits and vectors that the shim models (datasheet DS40002211A,
-// sections 14 and 33). Host code cannot include avr/io.h, so the few it needs are named here;
-// test_registers.py compares every one with avr-libc's header.
+// ATmega2560 data-space addresses, bits and vectors that the shim models
+// (datasheet DS40002211A, sections 14 and 33). Host code cannot include
+// avr/io.h, so the few it needs are named here; test_registers.py compares
+// every one with avr-libc's header.
 #ifndef SIMAVR_BENCH_REGISTERS_H_
 #define SIMAVR_BENCH_REGISTERS_H_
 
@@ -71,4 +72,4 @@ enum vector {
   kVectorCount = 57,
 };
 
-#endif  // SIMAVR_BENCH_REGISTERS_H_
+#endif // SIMAVR_BENCH_REGISTERS_H_

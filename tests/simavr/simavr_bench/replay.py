@@ -161,6 +161,37 @@ class Replay:
             volt = stimuli.analog[:, column] * (5.0 / 1024.0)
             chip.analog_profile(_adc_channel(pins[name]), grid, volt)
 
+    def plan(self, kind: str, at_tick: int, value: float = 0.0) -> None:
+        """Plan a fault.
+
+        Parameters
+        ----------
+        kind : str
+            ``card_busy`` (value: ms of the next block), ``card_reject`` (blocks refused),
+            ``card_removed``, ``card_inserted``, ``baro_off`` or ``baro_on``.
+        at_tick : int
+            When.
+        value : float
+            See kind.
+
+        Raises
+        ------
+        ValueError
+            If there is no such fault.
+        """
+        at = self._cycle(at_tick)
+        planned: dict[str, Callable[[], None]] = {
+            "card_busy": lambda: self.card.stall(value * 1e-3, at_cycle=at),
+            "card_reject": lambda: self.card.reject(int(value), at_cycle=at),
+            "card_removed": self.card.remove,
+            "card_inserted": self.card.insert,
+            "baro_off": lambda: setattr(self.baro, "present", False),
+            "baro_on": lambda: setattr(self.baro, "present", True),
+        }
+        if kind not in planned:
+            raise ValueError(f"no such fault: found {kind!r}, expected one of {sorted(planned)}")
+        self._chip.at(at, planned[kind])
+
     def _pressure(self, cycle: int) -> tuple[int, int]:
         grid = self._given.pressure
         place = min((cycle - self._start) / (self._given.step * CYCLES_PER_TICK), len(grid) - 1.0)
