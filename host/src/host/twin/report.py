@@ -14,7 +14,7 @@ from host.errors import UsageError
 from host.log import read_log
 from host.twin import compare, ideal, picture, sitl, stimuli, thesis, truth
 from host.twin.airdata import AirData, air_data
-from host.twin.cards import Card
+from host.twin.cards import Card, Segment
 from host.twin.flight import FlightRecord, fly
 from host.twin.instrument import calibration
 
@@ -51,6 +51,19 @@ class Outcome:
     deviations: list[compare.Deviation] = field(default_factory=list)
     first_row_s: float = 0.0
     wall_s: dict[str, float] = field(default_factory=dict)
+
+
+def load_kernels(card: Card) -> None:
+    """Load (the very first time: compile) every kernel by a flight of one second."""
+    short = replace(
+        card,
+        segments=(Segment("trim", duration_s=1.0),),
+        faults=(),
+        flight=replace(card.flight, ground_s=0.5),
+        air=replace(card.air, turbulence_mps=0.1),
+    )
+    record = fly(short)
+    stimuli.stimuli(record, air_data(record))
 
 
 def simulate(
@@ -93,6 +106,9 @@ def simulate(
     """
     folder.mkdir(parents=True, exist_ok=True)
     marks = [("start", time.perf_counter())]
+    progress("load", 0.0)
+    load_kernels(card)
+    marks.append(("load", time.perf_counter()))
     record = fly(card, seed=seed, progress=lambda share: progress("fly", share))
     marks.append(("fly", time.perf_counter()))
     data = air_data(record)

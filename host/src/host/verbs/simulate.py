@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     bar.clear()
     record = outcome.record
     duration = float(record.t_s[-1])
-    busy = sum(seconds for stage, seconds in outcome.wall_s.items() if stage != "picture")
+    busy = sum(s for stage, s in outcome.wall_s.items() if stage not in ("load", "picture"))
     flown = [w for w in record.schedule.windows if w.end_s <= duration]
     if args.json:
         print(
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"{card.title}\n  {record.aircraft.title}, {duration:.1f} s, {len(flown)} maneuvers,"
           f" seed {args.seed}, simulated")  # fmt: skip
     stages = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.wall_s.items())
-    print(f"  {duration / busy:.0f} times real time without the picture ({stages})")
+    print(f"  {duration / busy:.0f} times real time, loading and picture apart ({stages})")
     if outcome.deviations:
         print("  decoded log against the truth, in flight (mean and spread of the error, limits):")
     for d in outcome.deviations:
