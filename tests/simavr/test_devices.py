@@ -20,6 +20,7 @@ from simavr_bench import (
     Receiver,
     ResetCause,
     Supply,
+    XBee,
     cycles,
 )
 from simavr_bench.gps import POSLLH, PVT, SOL, VELNED, ubx
@@ -245,6 +246,23 @@ def test_gps_hears_only_its_baud(make_chip: MakeChip) -> None:
     assert near.configured == [(6, 8)]
     assert near.period_ms == 200
     assert far.configured == []
+
+
+def test_radio_lets_through_what_the_air_takes(make_chip: MakeChip) -> None:
+    chip = make_chip("everything", power=False)  # sends at 58.8 kbit/s without looking at CTS
+    radio = XBee(chip, 3, cts="PA7").start()
+    assert not chip.level("PA7")
+    chip.power_on()
+    chip.run_s(1.0)
+    sent = len(chip.uart_sent(3))
+    assert sent == pytest.approx(58824 / 10, rel=0.02)
+    assert len(radio.delivered) == pytest.approx(35_000 / 8, rel=0.01)
+    assert sent == len(radio.delivered) + radio.lost + len(radio._buffer)
+    assert chip.level("PA7")
+    radio.air_bps = 0.0
+    delivered = len(radio.delivered)
+    chip.run_s(0.2)
+    assert len(radio.delivered) <= delivered + 1
 
 
 # ---- relay and supply ---------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from simavr_bench.gps import GpsUart
 from simavr_bench.imu import ArduImu, MasterDeath
 from simavr_bench.log import Fault, LogKind
 from simavr_bench.pins import arduino_pin, pin_name, pin_number
+from simavr_bench.radio import XBee
 from simavr_bench.receiver import Receiver
 from simavr_bench.relay import ChargePumpRelay
 from simavr_bench.sd_card import CardKind, SdCard
@@ -35,6 +36,7 @@ __all__ = [
     "ResetCause",
     "SdCard",
     "Supply",
+    "XBee",
     "arduino_pin",
     "cycles",
     "in_fork",
