@@ -23,6 +23,18 @@ inline uint8_t flash_u8(const void* at) {
 #endif
 }
 
+inline uint16_t flash_u16(const void* at) {
+#ifdef __AVR__
+  uint16_t value;
+  __asm__("lpm %A0, Z+\n\tlpm %B0, Z" : "=r"(value), "+z"(at));
+  return value;
+#else
+  uint16_t value;
+  memcpy(&value, at, sizeof(value));
+  return value;
+#endif
+}
+
 inline uint32_t flash_u32(const void* at) {
 #ifdef __AVR__
   uint32_t value;
