@@ -55,6 +55,7 @@ void Instrument::while_waiting(void* context) {
   self.pilot_.ran(kTaskSensors);
   self.pilot_.ran(kTaskRecorder);
   self.pilot_.beat(hal::now_us());
+  self.panel_.step(self.recorder_, hal::now_us());
 }
 
 void Instrument::step() {

@@ -77,19 +77,24 @@ void Recorder::open_volume() {
   const bool after_failure = state_ == State::kFailed;
   looked_ = true;
   prepared_ = false;
-  volume_status_ = volume_.mount();
+  // What the panel shows stays until the answer is known.
+  VolumeStatus status = volume_.mount();
   storage::FileState found = storage::FileState::kNone;
-  if (volume_status_ == VolumeStatus::kReady) volume_status_ = volume_.find_latest(&found);
-  if (volume_status_ == VolumeStatus::kReady) {
+  if (status == VolumeStatus::kReady) status = volume_.find_latest(&found);
+  if (status != VolumeStatus::kReady) {
+    volume_status_ = status;
+  } else {
     switch (found) {
       case storage::FileState::kNone:
       case storage::FileState::kClosed:
         prepare_next();
         break;
       case storage::FileState::kBlank:
+        volume_status_ = status;
         state_ = State::kReady;
         break;
       case storage::FileState::kOpen:
+        volume_status_ = status;
         boot_.start(hal::flight_mark() || after_failure);
         state_ = State::kUndecided;
         break;

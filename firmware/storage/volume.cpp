@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/block.h"
+#include "core/bytes.h"
 #include "generated/frames.h"
 #include "storage/block_build.h"
 
@@ -53,6 +54,10 @@ VolumeStatus Volume::mount() {
   return from_result(f_mount(&fs_, "", 1));
 }
 
+void Volume::unmount() {
+  (void)f_mount(nullptr, "", 0);
+}
+
 VolumeStatus Volume::from_result(FRESULT result) const {
   if (result == FR_OK) return VolumeStatus::kReady;
   if (result == FR_NOT_READY || hal::card_blocks() == 0) return VolumeStatus::kNoCard;
@@ -99,6 +104,7 @@ VolumeStatus Volume::find_latest(FileState* state) {
   uint32_t number = 0;
   const VolumeStatus status = find_largest(&number);
   if (status != VolumeStatus::kReady || number == 0) return status;
+  file_.number = number;
   Name name;
   make_name(number, name);
   FIL fil;
@@ -225,9 +231,10 @@ VolumeStatus Volume::write_first_block(uint32_t session) {
   uint8_t* const block = window();
   CardStatus status = hal::read_card(file_.first_lba, block);
   if (status != CardStatus::kOk) return from_card(status);
-  // A valid block ends in its own CRC, which makes the CRC over it a constant: without its last
-  // bytes, two files that begin on the same block never get the same id.
-  memset(block + core::kBlockCrcOffset, 0, sizeof(uint32_t));
+  // A valid block ends in its own CRC, which makes the CRC over all of it a constant: two files
+  // that begin on the same block would get the same id. The place of the file stands in for it:
+  // it tells apart two files that begin on blocks never used.
+  core::put_le<uint32_t>(block + core::kBlockCrcOffset, file_.first_lba);
   file_.file_id = core::make_file_id(card_id_, session, block);
   build_schema_block(block, file_.file_id, session);
   status = hal::write_card(file_.first_lba, block);

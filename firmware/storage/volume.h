@@ -48,6 +48,8 @@ class Volume {
   static void set_date(uint32_t fat_time);
 
   VolumeStatus mount();
+  // FatFs forgets the volume: only where a volume ends before the program does.
+  static void unmount();
   // Looks at the file with the largest number: what it holds, and where its used part ends.
   VolumeStatus find_latest(FileState* state);
   // Makes the file with the next number: contiguous, with a first block of its own, so that its

@@ -30,12 +30,12 @@ def blocks_for(cluster_blocks: int, *, partitioned: bool = False) -> int:
 
 
 def format_fat32(image: memoryview, cluster_blocks: int, *, partitioned: bool = False) -> None:
-    """Write an empty FAT32 volume; only the blocks that must hold something are touched.
+    """Write an empty FAT32 volume as a quick format does: data clusters keep what they held.
 
     Parameters
     ----------
     image : memoryview of bytes
-        All zero where nothing is written.
+        The whole card.
     cluster_blocks : int
         Blocks in a cluster, a power of two.
     partitioned : bool
@@ -61,6 +61,8 @@ def format_fat32(image: memoryview, cluster_blocks: int, *, partitioned: bool = 
     info[510:512] = b"\x55\xaa"
     for place, block in ((0, boot), (1, info), (6, boot), (7, info)):
         _put(image, first + place, block)
+    tables = FATS * fat + cluster_blocks
+    _put(image, first + RESERVED, bytes(tables * BLOCK))  # and the root folder behind them
     head = struct.pack("<III", 0x0FFFFFF8, 0x0FFFFFFF, 0x0FFFFFFF).ljust(BLOCK, b"\0")
     for copy in range(FATS):
         _put(image, first + RESERVED + copy * fat, head)
@@ -104,15 +106,30 @@ def read_file(image: Image, name: str, *, partitioned: bool = False) -> bytes:
 
 def remove_files(image: bytearray) -> None:
     """Delete every file in the root folder, as a PC does: the content of its clusters stays."""
-    memory = io.BytesIO(image)
+    memory = _Memory(image)
     volume = PyFat()
     volume.set_fp(memory)
     for entry in _files(volume):
         volume.free_cluster_chain(entry.get_cluster())
         volume.root_dir.remove_dir_entry(entry.get_short_name())
     volume.update_directory_entry(volume.root_dir)
-    volume.flush_fat()
+    volume.close()
     image[:] = memory.getvalue()
+
+
+class _Memory(io.BytesIO):
+    """Stays open when pyfatfs closes it, so that the result can be fetched."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+class _ReadOnly(io.BytesIO):
+    """Tells pyfatfs not to mark the volume as in use."""
+
+    def writable(self) -> bool:
+        """Say no."""
+        return False
 
 
 @contextlib.contextmanager
@@ -121,10 +138,11 @@ def _opened(image: Image, partitioned: bool) -> Iterator[PyFat]:
     if isinstance(image, Path):
         volume.open(str(image), read_only=True)
     else:
-        volume.is_read_only = True
-        volume.set_fp(io.BytesIO(image))
-    yield volume
-    volume.close()
+        volume.set_fp(_ReadOnly(image))
+    try:
+        yield volume
+    finally:
+        volume.close()
 
 
 def _files(volume: PyFat) -> list[Any]:

@@ -15,6 +15,7 @@ from tests.sitl.script import Integers, Script
 
 Frames = Mapping[str, NDArray[np.void]]
 
+NAMES = ("ident", "mag", "attitude", "baro", "gps")
 CONVERSION_TICKS = 208
 HOLD_TICKS = 24
 ROUNDS, SLOTS = 4, 11
@@ -52,14 +53,30 @@ class Difference:
         return self.samples > 0 and self.largest <= self.allowed
 
 
-def compare(frames: Frames, script: Script) -> list[Difference]:
-    """Compare every channel of a log with its script, raw counts with raw counts."""
+def compare(recorded: Frames, script: Script, *, clock_us: int = 0) -> list[Difference]:
+    """Compare every channel of a log with its script, raw counts with raw counts.
+
+    Parameters
+    ----------
+    recorded : mapping of str to structured array
+        Frames of one session.
+    script : Script
+    clock_us : int
+        What the Mega's clock showed, or would have shown, at time zero of the script.
+    """
+    frames = {name: _shifted(recorded[name], clock_us) for name in NAMES}
     ident = frames["ident"]
     ticks = unwrap(ident["t_us"]) * 2
     out = [*_imu(ident, ticks, script), *_analog(ident, ticks, script)]
     out += [*_receiver(ident, ticks, script), *_servos(ident)]
     out += [*_mag(frames["mag"], script), *_attitude(frames["attitude"], script)]
     return [*out, *_baro(frames["baro"], script), *_gps(frames["gps"], script)]
+
+
+def _shifted(frame: NDArray[np.void], clock_us: int) -> NDArray[np.void]:
+    out = frame.copy()
+    out["t_us"] -= np.uint32(clock_us % 2**32)
+    return out
 
 
 def unwrap(t_us: NDArray[np.uint32]) -> Integers:

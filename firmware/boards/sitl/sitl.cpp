@@ -19,7 +19,14 @@ using sitl::world;
 std::unique_ptr<app::Instrument> instrument;
 uint32_t file_blocks = 0;
 
+// A chip loses its memory; here FatFs's pointer to it must go first.
+void switch_off() {
+  if (instrument != nullptr) storage::Volume::unmount();
+  instrument.reset();
+}
+
 void boot(uint8_t source) {
+  switch_off();
   World& w = world();
   w.skip_stimuli();
   w.booted_at = w.now;
@@ -53,7 +60,7 @@ void add_bytes(sitl::Script<sitl::ByteStimulus>* script,
 extern "C" {
 
 void sitl_create() {
-  instrument.reset();
+  switch_off();
   file_blocks = 0;
   world() = World();
 }
@@ -160,7 +167,7 @@ void sitl_power_on() {
 }
 
 void sitl_power_cut(uint32_t seed) {
-  instrument.reset();
+  switch_off();
   world().card.step(world().now);
   world().card.cut(seed);
   world().reset_chip();
