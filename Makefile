@@ -1,11 +1,11 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench clean
+.PHONY: help setup demo test native mega sitl lint format bench flight-bench clean
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 
 help: ## list the targets
-	@sed -nE 's/^([a-z]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 16
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 16
 
 setup: ## put everything needed into .venv and this clone
 	@.ci/setup.sh
@@ -36,6 +36,9 @@ format: setup ## rewrite C++ and Python in the house format
 
 bench: setup ## damage table and speed beside pyulog and pymavlink
 	@$(PYTHON) tests/bench/run.py
+
+flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
+	@cd tests/simavr && ../../$(PYTHON) -m flight.bench $(BENCH)
 
 clean: ## remove what builds made; .venv and downloads stay
 	rm -rf .pio build/sitl build/logs build/fatfs-*

@@ -26,10 +26,10 @@ class InterruptsOff {
 }  // namespace mega
 
 // An interrupt whose flag stays set until its cause is served (RXC, UDRE, TWINT) would enter itself
-// again as soon as interrupts are on, until the RAM is gone. So its own enable bit is cleared first,
-// and only then interrupts go on: an edge of the receiver waits 24 cycles at most, entry included.
-// The body sets the enable bit again as its last act, with its flag clear, and never turns
-// interrupts off: the compiler restores a dozen registers before it restores SREG.
+// again as soon as interrupts are on, until the RAM is gone. So its own enable bit is cleared
+// first, and only then interrupts go on: an edge of the receiver waits 24 cycles at most, entry
+// included. The body sets the enable bit again as its last act, with its flag clear, and never
+// turns interrupts off: the compiler restores a dozen registers before it restores SREG.
 //   keep: the value that the enable register is ANDed with
 #define NESTING_ISR(vector, enable_register, keep)                                          \
   extern "C" void __vector_nested_##vector(void)                                            \

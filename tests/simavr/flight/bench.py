@@ -1,6 +1,6 @@
-"""Measure the flight image on the simulated chip, every device at its real rate: `make flight-bench`.
+"""Measure the flight image on the simulated chip, every device at its real rate.
 
-    python tests/simavr/flight/bench.py [--minutes 10] [--rate 100 --rate 200]
+    make flight-bench          ten simulated minutes at 100 Hz and at 200 Hz
 
 Simulation only: cycles and bytes are those of the image, times those of the device models.
 """
@@ -14,10 +14,9 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from flight.rig import FlightRig, build_flight_image, check_card, make_card, sine, take_log
+from flight.settings import settings_image
 from numpy.typing import NDArray
-
-from rig import FlightRig, build_flight_image, check_card, make_card, sine, take_log
-from settings import settings_image
 from simavr_bench import Chip
 
 VECTORS = {
@@ -150,5 +149,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
     sys.exit(main())

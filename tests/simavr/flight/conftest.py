@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
-
 if TYPE_CHECKING:
-    from rig import FlightRig
+    from flight.rig import FlightRig
 
 MakeRig = Callable[..., "FlightRig"]
 
@@ -21,7 +17,7 @@ MakeRig = Callable[..., "FlightRig"]
 @pytest.fixture(scope="session")
 def flight_elf() -> Path:
     """The flight image."""
-    from rig import build_flight_image
+    from flight.rig import build_flight_image
 
     return build_flight_image()
 
@@ -29,7 +25,7 @@ def flight_elf() -> Path:
 @pytest.fixture
 def make_rig(flight_elf: Path, tmp_path: Path) -> Iterator[MakeRig]:
     """A maker of rigs with a card of their own; frees their chips afterwards."""
-    from rig import FlightRig, make_card
+    from flight.rig import FlightRig, make_card
 
     rigs: list[FlightRig] = []
 

@@ -1,4 +1,4 @@
-"""The settings record of the firmware's EEPROM (core/settings.h), made from firmware/settings.toml."""
+"""The settings record of the firmware's EEPROM (core/settings.h) from firmware/settings.toml."""
 
 from __future__ import annotations
 

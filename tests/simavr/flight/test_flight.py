@@ -12,7 +12,7 @@ import pytest
 import host
 
 if TYPE_CHECKING:
-    from rig import FlightRig
+    from flight.rig import FlightRig
 
 MakeRig = Callable[..., "FlightRig"]
 
@@ -32,7 +32,7 @@ def test_bare_board_boots_and_says_what_is_missing(flight_elf: Path) -> None:
 
 @pytest.mark.parametrize("imu_hz", [100.0, 200.0])
 def test_every_sample_is_in_the_log_once(make_rig: MakeRig, tmp_path: Path, imu_hz: float) -> None:
-    from rig import check_card, take_log
+    from flight.rig import check_card, take_log
 
     rig = make_rig(imu_hz=imu_hz)
     rig.take_off()
@@ -57,7 +57,7 @@ def test_every_sample_is_in_the_log_once(make_rig: MakeRig, tmp_path: Path, imu_
 
 
 def test_servos_repeat_the_sticks_through_the_relay(make_rig: MakeRig) -> None:
-    from rig import sine
+    from flight.rig import sine
 
     sticks = [sine(2.0, 1100, 1900), sine(3.0, 1200, 1800), sine(2.5, 1150, 1850)]
     rig = make_rig(sequential=False)

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
 
 if TYPE_CHECKING:
     from simavr_bench import Chip
@@ -21,7 +16,7 @@ MakeProbe = Callable[[], "Chip"]
 @pytest.fixture
 def make_probe() -> Iterator[MakeProbe]:
     """A maker of powered chips that run the probe; closes them afterwards."""
-    from build_probe import build_probe
+    from hal.build_probe import build_probe
     from simavr_bench import Chip
 
     chips: list[Chip] = []

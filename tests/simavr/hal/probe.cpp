@@ -1,4 +1,5 @@
-// Every peripheral of the board behind its hal, at work at once; the tests read and poke the variables.
+// Every peripheral of the board behind its hal, at work at once; the tests read and poke the
+// variables.
 #include <avr/interrupt.h>
 #include <stdint.h>
 #include <string.h>
