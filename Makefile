@@ -5,7 +5,7 @@ PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 
 help: ## list the targets
-	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 16
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 22
 
 setup: ## put everything needed into .venv and this clone
 	@.ci/setup.sh
