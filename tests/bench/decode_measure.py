@@ -1,6 +1,6 @@
 """One measurement in a process of its own: `python -m tests.bench.decode_measure WHAT FILE`.
 
-Prints one line of JSON: seconds without imports, rows (identification samples), peak memory.
+Prints one line of JSON: seconds without imports, rows (samples) and columns, peak memory.
 A cold process per run, because memory once touched makes every later run look faster.
 """
 
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from tests.bench.decode_logs import dataflash_messages
 
 Columns = dict[str, NDArray[np.float64]]
+Made = tuple[int, int]  # rows and columns
 
 # Zero and slope that stand for a calibration on the peers' and on numpy's side: two operations
 # per value, as for ours.
@@ -44,61 +45,72 @@ def scaled(raw: NDArray[np.generic]) -> NDArray[np.float64]:
     return value
 
 
-def columns_ours(path: Path) -> int:
+def columns_ours(path: Path) -> Made:
     """Our log to calibrated float64 columns, every CRC checked."""
     from host.log import read_log
 
-    return len(read_log(path).channels()["t_s"])
+    return _size(read_log(path).channels())
 
 
-def table_ours(path: Path) -> int:
+def table_ours(path: Path) -> Made:
     """Our log to the whole synchronous table: delays removed, air data, barometer, GPS."""
     from host.log import read_log
 
-    return len(read_log(path).table())
+    table = read_log(path).table()
+    return len(table), table.shape[1]
 
 
-def columns_numpy(path: Path) -> int:
+def columns_numpy(path: Path) -> Made:
     """The limit: bare identification frames, no blocks, no CRC, the same channels scaled."""
     from tests.protocol.log_writer import layouts, schema_text
 
     frames = np.fromfile(path, layouts(schema_text())["ident"])
     columns = {name: scaled(frames[name]) for name in CHANNELS}
     columns["t_s"] = frames["t_us"] * 1e-6
-    return len(columns["t_s"])
+    return _size(columns)
 
 
-def columns_pyulog(path: Path) -> int:
+def columns_pyulog(path: Path) -> Made:
     """ULog to the same columns."""
-    return len(_pyulog(path)["t_s"])
+    return _size(_pyulog(path))
 
 
-def columns_pymavlink(path: Path) -> int:
+def columns_pymavlink(path: Path) -> Made:
     """DataFlash to the same columns."""
-    return len(_pymavlink(path)["t_s"])
+    return _size(_pymavlink(path))
 
 
-def csv_ours(path: Path) -> int:
+def csv_ours(path: Path) -> Made:
     """`host decode --to csv`: the whole table."""
     return _decode(path, "csv")
 
 
-def parquet_ours(path: Path) -> int:
+def parquet_ours(path: Path) -> Made:
     """`host decode --to parquet`: the whole table."""
     return _decode(path, "parquet")
 
 
-def csv_pyulog(path: Path) -> int:
-    """ulog2csv of the identification topic, the barometer and GPS: raw numbers."""
+def csv_pyulog(path: Path) -> Made:
+    """ULog to the same columns, then pandas to CSV."""
+    return _write(_pyulog(path), "csv")
+
+
+def csv_pymavlink(path: Path) -> Made:
+    """DataFlash to the same columns, then pandas to CSV."""
+    return _write(_pymavlink(path), "csv")
+
+
+def csvtool_pyulog(path: Path) -> Made:
+    """ulog2csv of the identification topic, the barometer and GPS: raw counts."""
     from pyulog.ulog2csv import convert_ulog2csv
 
     with tempfile.TemporaryDirectory() as folder:
         convert_ulog2csv(str(path), "ident,baro,gps", folder, ",", None, None)
         (made,) = Path(folder).glob("*_ident_0.csv")
-        return _lines(made)
+        return _csv_size(made)
 
 
-def csv_pymavlink(path: Path) -> int:
+def csvtool_pymavlink(path: Path) -> Made:
     """Mavlogdump --format csv: it takes one type of message, so a third of the channels."""
     script = Path(sys.executable).parent / "mavlogdump.py"
     sys.argv = [str(script), "--format", "csv", "--types", "ID0", str(path)]
@@ -106,26 +118,27 @@ def csv_pymavlink(path: Path) -> int:
         made = Path(folder) / "ID0.csv"
         with made.open("w") as file, contextlib.redirect_stdout(file):
             runpy.run_path(str(script), run_name="__main__")
-        return _lines(made)
+        return _csv_size(made)
 
 
-def parquet_pyulog(path: Path) -> int:
+def parquet_pyulog(path: Path) -> Made:
     """ULog to the same columns, then pandas to Parquet."""
-    return _to_parquet(_pyulog(path))
+    return _write(_pyulog(path), "parquet")
 
 
-def parquet_pymavlink(path: Path) -> int:
+def parquet_pymavlink(path: Path) -> Made:
     """DataFlash to the same columns, then pandas to Parquet."""
-    return _to_parquet(_pymavlink(path))
+    return _write(_pymavlink(path), "parquet")
 
 
-def _decode(path: Path, kind: str) -> int:
+def _decode(path: Path, kind: str) -> Made:
+    from host.columns import COLUMNS
     from host.decoding import decode
     from host.writing import Request
 
     with tempfile.TemporaryDirectory() as folder:
         done = decode(Request(path, output=str(Path(folder) / f"table.{kind}")))
-        return int(done.summary["rows"])
+        return int(done.summary["rows"]), len(COLUMNS)
 
 
 def _pyulog(path: Path) -> Columns:
@@ -159,17 +172,27 @@ def _pymavlink(path: Path) -> Columns:
     return columns
 
 
-def _to_parquet(columns: Columns) -> int:
+def _write(columns: Columns, kind: str) -> Made:
     import pandas as pd
 
     with tempfile.TemporaryDirectory() as folder:
-        pd.DataFrame(columns).to_parquet(Path(folder) / "table.parquet")
-    return len(columns["t_s"])
+        target = Path(folder) / f"table.{kind}"
+        table = pd.DataFrame(columns)
+        if kind == "csv":
+            table.to_csv(target, index=False)
+        else:
+            table.to_parquet(target)
+    return _size(columns)
 
 
-def _lines(path: Path) -> int:
+def _size(columns: Columns) -> Made:
+    return len(columns["t_s"]), len(columns)
+
+
+def _csv_size(path: Path) -> Made:
     with path.open() as file:
-        return sum(1 for _ in file) - 1
+        columns = file.readline().count(",") + 1
+        return sum(1 for _ in file), columns
 
 
 # What is imported before the clock starts.
@@ -179,11 +202,11 @@ IMPORTS = {
     "pyulog": ("pyulog", "pyulog.ulog2csv", "pandas", "pyarrow.parquet"),
     "pymavlink": ("pymavlink.DFReader", "pymavlink.mavutil", "pandas", "pyarrow.parquet"),
 }
-COLUMNS = (columns_ours, table_ours, columns_numpy, columns_pyulog, columns_pymavlink)
-CSV = (csv_ours, csv_pyulog, csv_pymavlink)
-PARQUET = (parquet_ours, parquet_pyulog, parquet_pymavlink)
-MEASURES: dict[str, Callable[[Path], int]] = {
-    function.__name__: function for function in (*COLUMNS, *CSV, *PARQUET)
+IN_MEMORY = (columns_ours, table_ours, columns_numpy, columns_pyulog, columns_pymavlink)
+TO_CSV = (csv_ours, csv_pyulog, csv_pymavlink, csvtool_pyulog, csvtool_pymavlink)
+TO_PARQUET = (parquet_ours, parquet_pyulog, parquet_pymavlink)
+MEASURES: dict[str, Callable[[Path], Made]] = {
+    function.__name__: function for function in (*IN_MEMORY, *TO_CSV, *TO_PARQUET)
 }
 
 
@@ -202,7 +225,7 @@ def main() -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with contextlib.redirect_stdout(silent), contextlib.redirect_stderr(silent):
         cpu, wall = time.process_time(), time.perf_counter()
-        rows = MEASURES[options.what](options.file)
+        rows, columns = MEASURES[options.what](options.file)
         cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     print(
@@ -211,6 +234,7 @@ def main() -> None:
                 "wall_s": wall,
                 "cpu_s": cpu,
                 "rows": rows,
+                "columns": columns,
                 "peak_mb": peak / 1024,
                 "base_mb": before / 1024,
             }
