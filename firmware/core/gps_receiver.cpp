@@ -7,7 +7,6 @@ namespace {
 
 constexpr uint8_t kNavigation = 0x01;
 constexpr uint8_t kPosllh = 0x02;
-constexpr uint8_t kStatus = 0x03;
 constexpr uint8_t kSol = 0x06;
 constexpr uint8_t kPvt = 0x07;
 constexpr uint8_t kVelned = 0x12;
@@ -20,14 +19,6 @@ constexpr int32_t kMaxLatitude = 900000000L;
 constexpr int32_t kMaxLongitude = 1800000000L;
 constexpr uint32_t kDayMs = 86400000U;
 constexpr uint32_t kWeekMs = 7 * kDayMs;
-
-int32_t i32(const uint8_t* payload, uint8_t offset) {
-  return get_le<int32_t>(payload + offset);
-}
-
-uint32_t u32(const uint8_t* payload, uint8_t offset) {
-  return get_le<uint32_t>(payload + offset);
-}
 
 int32_t within(int32_t value, int32_t limit, int32_t none) {
   return value >= -limit && value <= limit ? value : none;
@@ -63,8 +54,11 @@ uint8_t month_days(uint8_t month, uint16_t year) {
   return month == 4 || month == 6 || month == 9 || month == 11 ? 30 : 31;
 }
 
-// Days from 1980-01-06 to a UTC date.
+// Days from 1980-01-06 to a UTC date; 0 if it is none.
 uint16_t gps_days(uint16_t year, uint8_t month, uint8_t day) {
+  if (year < 1980 || year > 2150 || month < 1 || month > 12) {
+    return 0;
+  }
   uint16_t days = 0;
   for (uint16_t y = 1980; y < year; ++y) {
     days = static_cast<uint16_t>(days + (leap(y) ? 366 : 365));
@@ -97,10 +91,16 @@ bool GpsReceiver::byte(uint8_t value, uint32_t now_us) {
   switch (parser_.byte(value, now_us)) {
     case UbxEvent::kNone:
       return false;
+    case UbxEvent::kWord:
+      if (parser_.message_class() == kNavigation && parser_.offset() < 72) {
+        word(static_cast<uint8_t>(parser_.offset()), parser_.word());
+      }
+      return false;
     case UbxEvent::kError:
       if (errors_ != 0xFFFF) {
         ++errors_;
       }
+      parts_ = 0;
       return false;
     case UbxEvent::kMessage:
       break;
@@ -109,51 +109,144 @@ bool GpsReceiver::byte(uint8_t value, uint32_t now_us) {
   return message();
 }
 
-bool GpsReceiver::message() {
-  if (parser_.message_class() != kNavigation || parser_.length() < 4) {
-    return false;
-  }
-  const uint8_t* payload = parser_.payload();
-  const uint8_t id = parser_.message_id();
+// A receiver that sends PVT says everything there.
+void GpsReceiver::word(uint8_t offset, uint32_t value) {
   const uint16_t length = parser_.length();
-  if (id == kPvt && length >= 84) {
-    sends_pvt_ = true;
-    return pvt(payload);
+  const bool old = !sends_pvt_;
+  switch (parser_.message_id()) {
+    case kPosllh:
+      if (old && length == 28) {
+        posllh(offset, value);
+      }
+      break;
+    case kSol:
+      if (old && length == 52) {
+        sol(offset, value);
+      }
+      break;
+    case kVelned:
+      if (old && length == 36) {
+        velned(offset, value);
+      }
+      break;
+    case kPvt:
+      if (length >= 84) {
+        pvt(offset, value);
+      }
+      break;
+    default:
+      break;
   }
-  if (sends_pvt_) {
-    return false;  // it says all the others do
+}
+
+void GpsReceiver::posllh(uint8_t offset, uint32_t value) {
+  const int32_t number = static_cast<int32_t>(value);
+  if (offset == 0) {
+    begin_epoch(value);
+  } else if (offset == 4) {
+    frame_.longitude = within(number, kMaxLongitude, frames::kGpsLongitudeInvalid);
+  } else if (offset == 8) {
+    frame_.latitude = within(number, kMaxLatitude, frames::kGpsLatitudeInvalid);
+  } else if (offset == 16) {
+    frame_.height = number;
+  } else if (offset == 20) {
+    frame_.h_accuracy = to_u16(value / 10);
+  } else if (offset == 24) {
+    frame_.v_accuracy = to_u16(value / 10);
   }
-  if (id == kPosllh && length == 28) {
-    begin_epoch(u32(payload, 0));
-    parts_ = static_cast<uint8_t>(parts_ | kHasPosllh);
-    frame_.longitude = within(i32(payload, 4), kMaxLongitude, frames::kGpsLongitudeInvalid);
-    frame_.latitude = within(i32(payload, 8), kMaxLatitude, frames::kGpsLatitudeInvalid);
-    frame_.height = i32(payload, 16);
-    frame_.h_accuracy = to_u16(u32(payload, 20) / 10);
-    frame_.v_accuracy = to_u16(u32(payload, 24) / 10);
-  } else if (id == kSol && length == 52) {
-    begin_epoch(u32(payload, 0));
-    parts_ = static_cast<uint8_t>(parts_ | kHasSol);
-    const uint8_t flags = payload[11];
+}
+
+void GpsReceiver::sol(uint8_t offset, uint32_t value) {
+  if (offset == 0) {
+    begin_epoch(value);
+  } else if (offset == 8) {
+    const uint8_t flags = static_cast<uint8_t>(value >> 24);
+    const bool week_known = (flags & 0b0100) != 0;
     time_known_ = (flags & 0b1000) != 0;
-    frame_.week = (flags & 0b0100) != 0 ? get_le<uint16_t>(payload + 8) : frames::kGpsWeekInvalid;
-    frame_.fix = to_fix(payload[10], (flags & 1) != 0);
-    frame_.satellites = payload[47];
-  } else if (id == kVelned && length == 36) {
-    begin_epoch(u32(payload, 0));
-    parts_ = static_cast<uint8_t>(parts_ | kHasVelned);
-    frame_.v_north = to_i16(i32(payload, 4));
-    frame_.v_east = to_i16(i32(payload, 8));
-    frame_.v_down = to_i16(i32(payload, 12));
-    frame_.ground_speed = to_u16(u32(payload, 20));
-    frame_.course = to_u16(u32(payload, 24) / 1000);
-    frame_.s_accuracy = to_u16(u32(payload, 28));
+    frame_.week = week_known ? static_cast<uint16_t>(value) : frames::kGpsWeekInvalid;
+    frame_.fix = to_fix(static_cast<uint8_t>(value >> 16), (flags & 1) != 0);
+  } else if (offset == 44) {
+    frame_.satellites = static_cast<uint8_t>(value >> 24);
   }
-  if (parts_ != (kHasPosllh | kHasSol | kHasVelned)) {
-    return false;
+}
+
+void GpsReceiver::velned(uint8_t offset, uint32_t value) {
+  const int32_t number = static_cast<int32_t>(value);
+  if (offset == 0) {
+    begin_epoch(value);
+  } else if (offset == 4) {
+    frame_.v_north = to_i16(number);
+  } else if (offset == 8) {
+    frame_.v_east = to_i16(number);
+  } else if (offset == 12) {
+    frame_.v_down = to_i16(number);
+  } else if (offset == 20) {
+    frame_.ground_speed = to_u16(value);
+  } else if (offset == 24) {
+    frame_.course = to_u16(value / 1000);
+  } else if (offset == 28) {
+    frame_.s_accuracy = to_u16(value);
   }
-  finish();
-  return true;
+}
+
+void GpsReceiver::pvt(uint8_t offset, uint32_t value) {
+  const int32_t number = static_cast<int32_t>(value);
+  const uint8_t last = static_cast<uint8_t>(value >> 24);
+  switch (offset) {
+    case 0:
+      parts_ = 0;
+      begin_epoch(value);
+      break;
+    case 4:
+      days_ = gps_days(static_cast<uint16_t>(value), static_cast<uint8_t>(value >> 16), last);
+      break;
+    case 8:
+      time_known_ = (last & 0b10) != 0;
+      if ((last & 0b11) == 0b11 && epoch_ms_ < kWeekMs) {
+        // The date is UTC, the time of week GPS: near midnight they differ by a day.
+        frame_.week = static_cast<uint16_t>((days_ + 3 - epoch_ms_ / kDayMs) / 7);
+      }
+      break;
+    case 20:
+      frame_.fix = to_fix(static_cast<uint8_t>(value), (value >> 8 & 1) != 0);
+      frame_.satellites = last;
+      break;
+    case 24:
+      frame_.longitude = within(number, kMaxLongitude, frames::kGpsLongitudeInvalid);
+      break;
+    case 28:
+      frame_.latitude = within(number, kMaxLatitude, frames::kGpsLatitudeInvalid);
+      break;
+    case 36:
+      frame_.height = number;
+      break;
+    case 40:
+      frame_.h_accuracy = to_u16(value / 10);
+      break;
+    case 44:
+      frame_.v_accuracy = to_u16(value / 10);
+      break;
+    case 48:
+      frame_.v_north = to_i16(number / 10);
+      break;
+    case 52:
+      frame_.v_east = to_i16(number / 10);
+      break;
+    case 56:
+      frame_.v_down = to_i16(number / 10);
+      break;
+    case 60:
+      frame_.ground_speed = number < 0 ? uint16_t{0} : to_u16(value / 10);
+      break;
+    case 64:
+      frame_.course = number < 0 ? frames::kGpsCourseInvalid : to_u16(value / 1000);
+      break;
+    case 68:
+      frame_.s_accuracy = to_u16(value / 10);
+      break;
+    default:
+      break;
+  }
 }
 
 void GpsReceiver::begin_epoch(uint32_t itow_ms) {
@@ -167,35 +260,32 @@ void GpsReceiver::begin_epoch(uint32_t itow_ms) {
   frame_.t_us = parser_.first_byte_us();
 }
 
-bool GpsReceiver::pvt(const uint8_t* payload) {
-  parts_ = 0;
-  begin_epoch(u32(payload, 0));
-  const uint8_t valid = payload[11];
-  time_known_ = (valid & 0b10) != 0;
-  const uint8_t month = payload[6];
-  if ((valid & 0b11) == 0b11 && epoch_ms_ < kWeekMs && month >= 1 && month <= 12) {
-    // The date is UTC, the time of week GPS: near midnight they differ by a day.
-    const uint16_t days = gps_days(get_le<uint16_t>(payload + 4), month, payload[7]);
-    frame_.week = static_cast<uint16_t>((days + 3 - epoch_ms_ / kDayMs) / 7);
+bool GpsReceiver::message() {
+  if (parser_.message_class() != kNavigation) {
+    return false;
   }
-  const uint8_t flags = payload[21];
-  frame_.fix = to_fix(payload[20], (flags & 1) != 0);
-  frame_.satellites = payload[23];
-  frame_.longitude = within(i32(payload, 24), kMaxLongitude, frames::kGpsLongitudeInvalid);
-  frame_.latitude = within(i32(payload, 28), kMaxLatitude, frames::kGpsLatitudeInvalid);
-  frame_.height = i32(payload, 36);
-  frame_.h_accuracy = to_u16(u32(payload, 40) / 10);
-  frame_.v_accuracy = to_u16(u32(payload, 44) / 10);
-  frame_.v_north = to_i16(i32(payload, 48) / 10);
-  frame_.v_east = to_i16(i32(payload, 52) / 10);
-  frame_.v_down = to_i16(i32(payload, 56) / 10);
-  const int32_t speed_mmps = i32(payload, 60);
-  frame_.ground_speed =
-      speed_mmps < 0 ? uint16_t{0} : to_u16(static_cast<uint32_t>(speed_mmps) / 10);
-  const int32_t course = i32(payload, 64);
-  frame_.course =
-      course < 0 ? frames::kGpsCourseInvalid : to_u16(static_cast<uint32_t>(course) / 1000);
-  frame_.s_accuracy = to_u16(u32(payload, 68) / 10);
+  const uint8_t id = parser_.message_id();
+  const uint16_t length = parser_.length();
+  if (id == kPvt && length >= 84) {
+    sends_pvt_ = true;
+    finish();
+    return true;
+  }
+  if (sends_pvt_) {
+    return false;
+  }
+  uint8_t part = 0;
+  if (id == kPosllh && length == 28) {
+    part = kHasPosllh;
+  } else if (id == kSol && length == 52) {
+    part = kHasSol;
+  } else if (id == kVelned && length == 36) {
+    part = kHasVelned;
+  }
+  parts_ = static_cast<uint8_t>(parts_ | part);
+  if (parts_ != (kHasPosllh | kHasSol | kHasVelned)) {
+    return false;
+  }
   finish();
   return true;
 }

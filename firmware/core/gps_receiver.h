@@ -19,16 +19,22 @@ class GpsReceiver {
   uint16_t messages() const { return messages_; }  // good ones of any kind: the baud is right
 
  private:
-  bool message();
+  void word(uint8_t offset, uint32_t value);
+  void posllh(uint8_t offset, uint32_t value);
+  void sol(uint8_t offset, uint32_t value);
+  void velned(uint8_t offset, uint32_t value);
+  void pvt(uint8_t offset, uint32_t value);
   void begin_epoch(uint32_t itow_ms);
-  bool pvt(const uint8_t* payload);
+  bool message();
   void finish();
 
+  // Fields go straight into the frame as they arrive; a message that fails ends its epoch.
   UbxParser parser_;
   frames::GpsFrame frame_ = {};
+  uint32_t epoch_ms_ = 0;
   uint16_t errors_ = 0;
   uint16_t messages_ = 0;
-  uint32_t epoch_ms_ = 0;
+  uint16_t days_ = 0;  // of NAV-PVT's date since 1980-01-06
   uint8_t parts_ = 0;  // messages of this epoch
   bool time_known_ = false;
   bool sends_pvt_ = false;

@@ -77,15 +77,13 @@ UbxEvent UbxParser::byte(uint8_t value, uint32_t now_us) {
       state_ = length_ == 0 ? kSumA : kPayload;
       break;
     case kPayload:
-      if (at_ < kKeep) {
-        payload_[at_] = value;
-      }
+      word_ = word_ >> 8 | static_cast<uint32_t>(value) << 24;
       sum(value);
       ++at_;
       if (at_ == length_) {
         state_ = kSumA;
       }
-      break;
+      return at_ % 4 == 0 ? UbxEvent::kWord : UbxEvent::kNone;
     case kSumA:
       if (value != sum_a_) {
         return fail(value, now_us);

@@ -5,20 +5,23 @@
 
 namespace core {
 
-enum class UbxEvent : uint8_t { kNone, kMessage, kError };
+enum class UbxEvent : uint8_t {
+  kNone,
+  kWord,     // four more bytes of payload: `word` and `offset`; not yet to be trusted
+  kMessage,  // the checksum is right
+  kError     // a checksum failed or a length was refused: forget the words
+};
 
+// Keeps no payload: every field of the messages that are used is a part of an aligned word.
 class UbxParser {
  public:
-  static constexpr uint8_t kKeep = 72;  // NAV-PVT up to sAcc; longer payloads are summed, not kept
-
-  // kMessage: a good message stands in the accessors until the next byte.
-  // kError: a checksum failed or a length was refused.
   UbxEvent byte(uint8_t value, uint32_t now_us);
 
   uint8_t message_class() const { return class_; }
   uint8_t message_id() const { return id_; }
   uint16_t length() const { return length_; }
-  const uint8_t* payload() const { return payload_; }
+  uint32_t word() const { return word_; }
+  uint16_t offset() const { return static_cast<uint16_t>(at_ - 4); }  // of `word`
   uint32_t first_byte_us() const { return first_byte_us_; }
 
  private:
@@ -28,6 +31,7 @@ class UbxParser {
   UbxEvent fail(uint8_t value, uint32_t now_us);
 
   uint32_t first_byte_us_ = 0;
+  uint32_t word_ = 0;
   uint16_t length_ = 0;
   uint16_t at_ = 0;
   uint8_t class_ = 0;
@@ -35,7 +39,6 @@ class UbxParser {
   uint8_t state_ = 0;
   uint8_t sum_a_ = 0;
   uint8_t sum_b_ = 0;
-  uint8_t payload_[kKeep] = {};
 };
 
 // Writes a whole message (payload + 8 bytes) and returns its size.

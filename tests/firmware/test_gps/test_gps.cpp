@@ -123,6 +123,24 @@ TEST_CASE("a message of another epoch starts over") {
   CHECK(feed(gps, wire.bytes, wire.sol(kItowMs + 200, 3, 0b1101)));
 }
 
+TEST_CASE("a damaged message takes its epoch with it, never mixes into the next") {
+  core::GpsReceiver gps;
+  Wire wire;
+  feed(gps, wire.bytes, wire.posllh(kItowMs, 300500000, 312500000));
+  feed(gps, wire.bytes, wire.sol(kItowMs, 3, 0b1101));
+  const uint8_t size = wire.velned(kItowMs);
+  wire.bytes[10] = static_cast<uint8_t>(wire.bytes[10] ^ 1);  // v_north
+  CHECK(!feed(gps, wire.bytes, size));
+  CHECK_EQ(gps.errors(), 1);
+  CHECK(!feed(gps, wire.bytes, wire.velned(kItowMs)));
+  CHECK(!feed(gps, wire.bytes, wire.sol(kItowMs + 200, 3, 0b1101)));
+  CHECK(!feed(gps, wire.bytes, wire.velned(kItowMs + 200)));
+  REQUIRE(feed(gps, wire.bytes, wire.posllh(kItowMs + 200, 1, 2)));
+  const int32_t latitude = gps.frame().latitude;
+  CHECK(latitude == 1);
+  CHECK_EQ(gps.frame().v_north, 1234);
+}
+
 TEST_CASE("NAV-PVT alone makes a frame, its week from the date") {
   core::GpsReceiver gps;
   Wire wire;

@@ -27,7 +27,12 @@ class ModelReceiver {
       return true;  // garbage on its line
     }
     for (uint8_t i = 0; i < size; ++i) {
-      if (parser_.byte(bytes[i], 0) == core::UbxEvent::kMessage) {
+      const core::UbxEvent event = parser_.byte(bytes[i], 0);
+      if (event == core::UbxEvent::kWord && parser_.offset() == 8) {
+        wanted_baud_ = parser_.word();
+      } else if (event == core::UbxEvent::kWord && parser_.offset() == 12) {
+        wanted_out_ = static_cast<uint8_t>(parser_.word() >> 16);
+      } else if (event == core::UbxEvent::kMessage) {
         obey();
       }
     }
@@ -51,14 +56,16 @@ class ModelReceiver {
       return;
     }
     if (parser_.message_id() == 0x00 && parser_.length() == 20) {
-      baud = core::get_le<uint32_t>(parser_.payload() + 8);
-      ubx_only_ = parser_.payload()[14] == 1;
+      baud = wanted_baud_;
+      ubx_only_ = wanted_out_ == 1;
       return;
     }
     ++set_up;
   }
 
   core::UbxParser parser_;
+  uint32_t wanted_baud_ = 0;
+  uint8_t wanted_out_ = 0;
   bool ubx_only_ = false;
 };
 
