@@ -8,7 +8,7 @@ import pytest
 from host.twin import aircraft
 
 
-@pytest.mark.parametrize("name", ["ultrastick25e"])
+@pytest.mark.parametrize("name", ["ultrastick25e", "kadetlt40", "lowsupertrainer"])
 def test_every_number_has_a_source(name: str) -> None:
     plane = aircraft.load(name)
     assert plane.name == name
@@ -16,7 +16,7 @@ def test_every_number_has_a_source(name: str) -> None:
     assert all(len(text) >= 8 for text in plane.sources.values())
 
 
-@pytest.mark.parametrize("name", ["ultrastick25e"])
+@pytest.mark.parametrize("name", ["ultrastick25e", "kadetlt40", "lowsupertrainer"])
 def test_signs_are_those_of_the_house(name: str) -> None:
     plane = aircraft.load(name)
 

@@ -16,6 +16,7 @@ from host.twin.bmp085 import compensate
 from host.twin.fat32 import SECTOR, CardImageError, CardReader, format_card
 from host.twin.flight import FlightRecord, fly
 from host.twin.stimuli import SAMPLE_STEP_TICKS, TICKS_PER_S, Stimuli, clock_share, stimuli
+from host.twin.virtual import virtual_flight
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).parents[3]
@@ -213,3 +214,20 @@ def test_what_is_no_card_is_refused() -> None:
         CardReader(bytes(4 * 1024 * 1024))
     with pytest.raises(CardImageError, match="expected 65525"):
         format_card(64 * 1024 * 1024)
+
+
+@pytest.mark.parametrize("chain", ["sitl", "none", "true", "thesis"])
+def test_a_study_gets_table_and_truth_on_one_clock(library: Path, chain: str) -> None:
+    flight = virtual_flight("calm", 4, chain=chain)
+    assert library.is_file()
+    assert len(flight.maneuvers) == 4
+    t, q = flight.table["t_s"].to_numpy(), flight.table["q_radps"].to_numpy()
+    true_q = np.interp(t, flight.record.t_s, flight.record.states[:, 4])
+    flying = (t > 7.0) & np.isfinite(q)  # the last row has no later IMU sample to align with
+    # Rows of the thesis are 1 to 2 rows old and come 30 ms late.
+    assert np.corrcoef(q[flying], true_q[flying])[0, 1] > (0.65 if chain == "thesis" else 0.99)
+
+
+def test_an_unknown_chain_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected one of sitl"):
+        virtual_flight("calm", 1, chain="avr")

@@ -1,0 +1,96 @@
+"""Virtual flights for studies: a card and a seed in, a table and its truth out, no files left."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from host.log import read_log
+from host.twin import compare, ideal, sitl, thesis, truth
+from host.twin.airdata import air_data
+from host.twin.cards import Card, load
+from host.twin.flight import FlightRecord, fly
+from host.twin.instrument import calibration
+from host.twin.stimuli import clock_share, stimuli
+
+CHAINS = ("sitl", "none", "true", "thesis")
+
+
+@dataclass(frozen=True, slots=True)
+class VirtualFlight:
+    """One flight as a study wants it.
+
+    Attributes
+    ----------
+    table : DataFrame
+        What the host gets, SI; ``t_s`` in true seconds since power-on, so that windows match.
+    maneuvers : list of dict
+        Windows, conditions, local derivatives and modes, as in the truth file.
+    record : FlightRecord
+        Everything else that is true.
+    """
+
+    table: pd.DataFrame
+    maneuvers: list[dict[str, object]]
+    record: FlightRecord
+
+
+def virtual_flight(card: str | Path | Card, seed: int, *, chain: str = "sitl") -> VirtualFlight:
+    """Fly a card once.
+
+    Parameters
+    ----------
+    card : str, Path or Card
+    seed : int
+    chain : str
+        ``sitl`` through the recorder, decoded with the calibration of the virtual instrument;
+        ``none`` the sensors without recorder; ``true`` the truth in the same columns; ``thesis``
+        its logger.
+
+    Returns
+    -------
+    VirtualFlight
+
+    Raises
+    ------
+    HostError
+        Unknown card or chain, or no recorder library.
+    ValueError
+        Unknown chain.
+
+    Examples
+    --------
+    >>> flight = virtual_flight("multisine", 3)  # doctest: +SKIP
+    >>> flight.maneuvers[0]["derivatives"]["Cm_alpha"]  # doctest: +SKIP
+    """
+    if chain not in CHAINS:
+        raise ValueError(f"chain is {chain!r}, expected one of {', '.join(CHAINS)}")
+    record = fly(card if isinstance(card, Card) else load(card), seed=seed)
+    data = air_data(record)
+    if chain == "true":
+        table = ideal.true_table(record, data)
+    elif chain == "none":
+        table = ideal.measured_table(record, data)
+        table["t_s"] /= 1.0 + clock_share(record)
+    elif chain == "thesis":
+        table = thesis.table(thesis.rows(record, data))
+    else:
+        recording = sitl.record(
+            stimuli(record, data),
+            rate_hz=sitl.recorder_rate_hz(record.card.flight.rate_hz),
+            aircraft=record.aircraft.name,
+            faults=record.card.faults,
+            seed=seed,
+        )
+        with tempfile.TemporaryDirectory() as folder:
+            log, text = Path(folder) / "flight.bin", Path(folder) / "calibration.toml"
+            log.write_bytes(recording.log)
+            text.write_text(calibration(record.aircraft), encoding="utf-8")
+            decoded = read_log(log, calibration=text)
+            table = decoded.table()
+            first_us = int(decoded.frames["ident"]["t_us"][0])
+        table["t_s"] = compare.true_times(record, table, first_us)
+    return VirtualFlight(table, truth.maneuvers(record, data), record)
