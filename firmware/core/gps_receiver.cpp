@@ -256,7 +256,12 @@ void GpsReceiver::begin_epoch(uint32_t itow_ms) {
   parts_ = 0;
   epoch_ms_ = itow_ms;
   time_known_ = true;
+  // Whoever looks between two epochs sees the last fix, not a hole.
+  const uint8_t fix = frame_.fix;
+  const uint8_t satellites = frame_.satellites;
   clear_gps(frame_);
+  frame_.fix = fix;
+  frame_.satellites = satellites;
   frame_.t_us = parser_.first_byte_us();
 }
 

@@ -11,7 +11,7 @@ namespace core {
 
 class GpsReceiver {
  public:
-  // True: `frame` holds a whole epoch, until the next byte.
+  // True: `frame` holds a whole epoch, until the next byte; `fix` and `satellites` for longer.
   bool byte(uint8_t value, uint32_t now_us);
 
   const frames::GpsFrame& frame() const { return frame_; }

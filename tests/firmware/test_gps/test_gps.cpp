@@ -111,6 +111,9 @@ TEST_CASE("POSLLH, SOL and VELNED of one time of week make a frame") {
   CHECK_EQ(frame.source, 1);
   CHECK_EQ(gps.messages(), 3);
   CHECK_EQ(gps.errors(), 0);
+  feed(gps, wire.bytes, wire.posllh(kItowMs + 200, 300500000, 312500000));
+  CHECK_EQ(gps.frame().fix, 3);
+  CHECK_EQ(gps.frame().satellites, 9);
 }
 
 TEST_CASE("a message of another epoch starts over") {

@@ -141,6 +141,18 @@ TEST_CASE("gaps and duplicates are counted exactly, over the wrap of the sequenc
   CHECK_EQ(receiver.lost(), 8);
 }
 
+TEST_CASE("behind a second of silence the sequence says nothing about losses") {
+  core::ImuReceiver receiver;
+  const OwnPacket before(10);
+  const OwnPacket soon(30);
+  const OwnPacket late(90);
+  receiver.packet(kOwn, before.bytes, 36, 0);
+  receiver.packet(kOwn, soon.bytes, 36, 100000);
+  CHECK_EQ(receiver.lost(), 19);
+  receiver.packet(kOwn, late.bytes, 36, 1200000);
+  CHECK_EQ(receiver.lost(), 19);
+}
+
 TEST_CASE("a restarted IMU is told once and is no gap") {
   core::ImuReceiver receiver;
   const OwnPacket before(200);
