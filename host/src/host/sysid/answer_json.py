@@ -54,6 +54,10 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
             name: {"value": float(result.estimate[k]), "half_width": float(half[k])}
             for k, name in enumerate(result.names)
         },
+        "delays_s": {
+            name: {"value": value, "half_width": width}
+            for name, (value, width) in answer.delays.items()
+        },
         "refused": [
             {"name": r.name, "relative_bound": r.relative_bound, "reason": r.reason}
             for r in answer.refused

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from host.sysid.compiled import Array
 from host.sysid.maneuver import Maneuver
@@ -87,7 +87,7 @@ def whiteness(residuals: Sequence[Array], lags: int = 25) -> tuple[float, float]
     statistic = (
         total * (total + 2.0) * float(np.sum(correlation**2 / (total - np.arange(1, lags + 1))))
     )
-    return outside, float(stats.chi2.sf(statistic, lags))
+    return outside, float(special.chdtrc(lags, statistic))
 
 
 def references(model: LinearModel, maneuvers: Sequence[Maneuver], theta: Array) -> Array:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from host.sysid.compiled import Array
+from host.sysid.compiled import Array, BoolArray
 from host.sysid.errors import IdentificationError
 from host.sysid.kernels import transition
 from host.sysid.maneuver import Maneuver
@@ -28,6 +28,7 @@ from host.sysid.start import start_values
 STEP_LIMIT = 0.01
 MAX_ITERATIONS = 60
 DIFFERENCE = 1e-5  # of a standard error (or of the size): step of the numeric slopes
+NOISE_FLOOR = 1e-3  # of an output's deviation: an attitude filter's smoothness is not exactness
 NOISE_SHARE = (0.3, 0.7)  # first guess: process noise explains the first part of residual power
 
 
@@ -73,8 +74,22 @@ class FilterProblem:
                 columns.append(np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:]))
             self._drives.append(np.ascontiguousarray(np.hstack(columns)))
 
-    def evaluate(self, theta: Array) -> _Likelihood | None:
-        """Return innovations and cost; None where the filter or the model fails."""
+    def owner(self, parameter: int) -> int | None:
+        """Return the only maneuver a parameter acts on, None if it acts on all."""
+        if self.inner.n_common <= parameter < self.n_model and self.inner.n_local:
+            return (parameter - self.inner.n_common) // self.inner.n_local
+        return None
+
+    def evaluate(self, theta: Array, only: int | None = None) -> _Likelihood | None:
+        """Return innovations and cost; None where the filter or the model fails.
+
+        Parameters
+        ----------
+        theta : Array
+            All unknowns.
+        only : int, optional
+            Run this maneuver alone; the others give empty arrays.
+        """
         model = self.model
         n, m = len(model.states), len(model.inputs)
         A, B, C, D = model.matrices(theta)
@@ -93,7 +108,12 @@ class FilterProblem:
         all_e: list[Array] = []
         all_S: list[Array] = []
         n_common = self.inner.n_common
+        solutions: dict[float, tuple[Array, Array, Array]] = {}
         for number, maneuver in enumerate(self.maneuvers):
+            if only is not None and number != only:
+                all_e.append(np.zeros((0, 0)))
+                all_S.append(np.zeros((0, 0)))
+                continue
             local = theta[self.inner.columns(number)]
             AB[:, -1] = 0.0
             position = n_common
@@ -111,20 +131,12 @@ class FilterProblem:
             step, _ = transition(
                 AB, n, m, model.hold == "foh", maneuver.dt_s, none, none, none, np.zeros(0), 0
             )
-            F = np.ascontiguousarray(step[:, :n])
-            if not np.isfinite(F).all() or np.max(np.abs(F)) > 1e6:
-                return None
-            Q = np.diag(intensity)
-            Qd = 0.5 * maneuver.dt_s * (Q + F @ Q @ F.T)  # trapezoid of the exact integral
-            solved, P = predicted_covariance(F, np.ascontiguousarray(C), Qd, R)
-            if not solved:
-                return None
-            S = C @ P @ C.T + R
-            try:
-                factor = np.linalg.cholesky(S)
-            except np.linalg.LinAlgError:
-                return None
-            K = np.ascontiguousarray(np.linalg.solve(S, C @ P).T)
+            if maneuver.dt_s not in solutions:
+                gain = self._gain(step[:, :n], C, intensity, R, maneuver.dt_s)
+                if gain is None:
+                    return None
+                solutions[maneuver.dt_s] = gain
+            S, factor, K = solutions[maneuver.dt_s]
             finite, e = innovations(
                 step, CD, K, self._drives[number], maneuver.outputs, start, bias
             )
@@ -139,6 +151,25 @@ class FilterProblem:
         miss = theta[: self.n_model] - self.inner.prior_mean
         cost += 0.5 * float(np.sum(prior * miss**2))
         return _Likelihood(all_e, all_S, cost) if np.isfinite(cost) else None
+
+    def _gain(
+        self, transition_: Array, C: Array, intensity: Array, R: Array, dt_s: float
+    ) -> tuple[Array, Array, Array] | None:
+        """Return innovation covariance, its Cholesky factor and the steady Kalman gain."""
+        F = np.ascontiguousarray(transition_)
+        if not np.isfinite(F).all() or np.max(np.abs(F)) > 1e6:
+            return None
+        Q = np.diag(intensity)
+        Qd = 0.5 * dt_s * (Q + F @ Q @ F.T)  # trapezoid of the exact integral
+        solved, P = predicted_covariance(F, np.ascontiguousarray(C), Qd, R)
+        if not solved:
+            return None
+        S = C @ P @ C.T + R
+        try:
+            factor = np.linalg.cholesky(S)
+        except np.linalg.LinAlgError:
+            return None
+        return S, factor, np.ascontiguousarray(np.linalg.solve(S, C @ P).T)
 
 
 def fit_filter_error(
@@ -173,16 +204,24 @@ def fit_filter_error(
     point = problem.evaluate(theta)
     if point is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
+    floor = np.log(
+        NOISE_FLOOR * np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
+    )
+    split = problem.n_model + len(process)
     damping, converged, iterations, size = 0.0, False, 0, np.inf
     information, gradient = _scoring(problem, theta, point, scale)
     while iterations < MAX_ITERATIONS:
-        step, size, bound = _step(information, gradient, damping)
+        held = np.zeros(len(theta), dtype=bool)
+        held[split:] = (theta[split:] <= floor) & (gradient[split:] < 0.0)
+        held[: problem.n_model] = ~_free(problem.inner, theta, gradient)
+        step, size, bound = _step(information, gradient, damping, ~held)
         limited = step.copy()
         limited[problem.n_model :] = np.clip(limited[problem.n_model :], -1.5, 1.5)
         trial_theta = theta + limited
         trial_theta[: problem.n_model] = np.clip(
             trial_theta[: problem.n_model], problem.inner.lower, problem.inner.upper
         )
+        trial_theta[split:] = np.maximum(trial_theta[split:], floor)
         trial = problem.evaluate(trial_theta)
         if trial is None or trial.cost > point.cost + 1e-9 * abs(point.cost):
             if size < STEP_LIMIT:
@@ -259,7 +298,7 @@ def _scoring(
         for sign in (1.0, -1.0):
             other = theta.copy()
             other[k] += sign * width
-            moved.append(problem.evaluate(other))
+            moved.append(problem.evaluate(other, problem.owner(k)))
         up, down = moved
         if up is None or down is None:
             raise IdentificationError("filter error: the likelihood is not smooth at the estimate")
@@ -271,31 +310,39 @@ def _scoring(
     information[:n, :n] += np.diag(problem.inner.prior_precision)
     gradient[:n] -= problem.inner.prior_precision * (theta[:n] - problem.inner.prior_mean)
     for number, (e, S) in enumerate(zip(point.e, point.S, strict=True)):
+        active = [k for k in range(size) if problem.owner(k) in (None, number)]
+        moving = [k for k in active if np.any(slopes_S[k][number])]
         factor = np.linalg.cholesky(S)
-        white = linalg.solve_triangular(factor, e.T, lower=True)
-        J = np.stack(
-            [linalg.solve_triangular(factor, s[number].T, lower=True).ravel() for s in slopes_e],
-            axis=1,
-        )
-        inverse = np.linalg.inv(S)
-        T = [inverse @ s[number] for s in slopes_S]
-        information += J.T @ J
-        gradient -= J.T @ white.ravel()
+        inner = np.linalg.inv(factor)
+        white = inner @ e.T
+        J = np.stack([(inner @ slopes_e[k][number].T).ravel() for k in active], axis=1)
+        information[np.ix_(active, active)] += J.T @ J
+        gradient[active] -= J.T @ white.ravel()
         outer = white @ white.T
-        inner_factor = np.linalg.inv(factor)
-        for a in range(size):
-            whitened = inner_factor @ slopes_S[a][number] @ inner_factor.T
-            gradient[a] -= 0.5 * (len(e) * np.trace(whitened) - np.sum(whitened * outer))
-            for b in range(size):
-                information[a, b] += 0.5 * len(e) * np.sum(T[a] * T[b].T)
+        spread = {k: inner @ slopes_S[k][number] @ inner.T for k in moving}
+        for a in moving:
+            gradient[a] -= 0.5 * (len(e) * np.trace(spread[a]) - np.sum(spread[a] * outer))
+            for b in moving:
+                information[a, b] += 0.5 * len(e) * np.sum(spread[a] * spread[b])
     return information, gradient
 
 
-def _step(information: Array, gradient: Array, damping: float) -> tuple[Array, float, Array]:
+def _free(inner: OutputProblem, theta: Array, gradient: Array) -> BoolArray:
+    own, slope = theta[: len(inner.names)], gradient[: len(inner.names)]
+    return ~(((own <= inner.lower) & (slope < 0.0)) | ((own >= inner.upper) & (slope > 0.0)))
+
+
+def _step(
+    information: Array, gradient: Array, damping: float, free: BoolArray
+) -> tuple[Array, float, Array]:
+    full, bounds = np.zeros(len(gradient)), np.ones(len(gradient))
+    information, gradient = information[np.ix_(free, free)], gradient[free]
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information / np.outer(scale, scale)
     value, vector = np.linalg.eigh(scaled)
     value = np.maximum(value, 1e-12 * value[-1])
     bound = np.sqrt(np.einsum("ij,j,ij->i", vector, 1.0 / value, vector))
     move = vector @ ((vector.T @ (gradient / scale)) / (value + damping))
-    return move / scale, float(np.max(np.abs(move) / bound)), bound / scale
+    full[free] = move / scale
+    bounds[free] = bound / scale
+    return full, float(np.max(np.abs(move) / bound, initial=0.0)), bounds

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from host.sysid.compiled import Array
 from host.sysid.errors import IdentificationError
@@ -90,7 +90,7 @@ class FitResult:
     def half_width(self, confidence: float = 0.95) -> Array:
         """Return half-widths of the two-sided intervals, shape (P,)."""
         dof = np.minimum(self.degrees_of_freedom, 1e9)
-        quantile = np.asarray(stats.t.ppf(0.5 + confidence / 2.0, dof), dtype=np.float64)
+        quantile = np.asarray(special.stdtrit(dof, 0.5 + confidence / 2.0), dtype=np.float64)
         return quantile * self.standard_error
 
     @property

@@ -101,6 +101,8 @@ def model_lines(answer: Answer) -> list[str]:
     for k, name in enumerate(answer.model.parameter_names):
         mark = "  refused" if name in refused else ""
         lines.append(f"  {name:16s} {result.estimate[k]:11.5g}  +- {half[k]:9.3g}{mark}")
+    for name, (value, width) in answer.delays.items():
+        lines.append(f"  {name:16s} {value:11.5g}  +- {width:9.3g}")
     if answer.coefficients:
         lines.append("  coefficients (mass, inertia, pressure and upwash in the half-width)")
         lines += [

@@ -1,0 +1,117 @@
+"""Fit a flight in turbulence: delays by output error first, then filter error with a gust state.
+
+A vertical (or side) gust is an angle of attack (sideslip) to vanes, forces and moments alike, so it
+is a state of its own whose entries are those of the angle; only its intensity is new. First-order
+Dryden form: MIL-F-8785C, sec. 3.7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from host.sysid.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.filter_error import fit_filter_error
+from host.sysid.fit import fit
+from host.sysid.maneuver import Maneuver
+from host.sysid.model import LinearModel, Term
+from host.sysid.result import FitResult
+
+SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, low altitude)
+VANES = ("alpha_rad", "beta_rad")
+# What else disturbs: thrust and longitudinal gusts; the drift of the attitude filter.
+ALSO = ("airspeed_mps", "phi_rad")
+
+
+@dataclass(frozen=True)
+class GustFit:
+    """Result on the model without the gust, its maneuvers with delays taken out, the delays."""
+
+    result: FitResult
+    model: LinearModel
+    maneuvers: tuple[Maneuver, ...]
+    delays: dict[str, tuple[float, float]]
+
+
+def gust_model(base: LinearModel, airspeed_mps: float, scale_m: float = SCALE_M) -> LinearModel:
+    """Return a model with the gust angle as an extra state.
+
+    Raises
+    ------
+    IdentificationError
+        If neither alpha nor beta is a measured state of it.
+    """
+    vanes = [v for v in VANES if v in base.states and v in base.outputs]
+    if not vanes:
+        raise IdentificationError(f"model {base.name}: no vane angle a gust could act on")
+    n, column = len(base.states), base.states.index(vanes[0])
+    A = np.zeros((n + 1, n + 1))
+    A[:n, :n] = base.A
+    A[n, n] = -airspeed_mps / scale_m
+    C = np.zeros((len(base.outputs), n + 1))
+    C[:, :n] = base.C
+    C[base.outputs.index(vanes[0]), n] = 1.0
+    extra = tuple(
+        Term(t.matrix, t.row, n, t.parameter, t.gain)
+        for t in base.terms
+        if t.matrix in "AC" and t.column == column
+    )
+    return replace(
+        base,
+        name=f"{base.name} with gust",
+        states=(*base.states, "gust_rad"),
+        A=A,
+        B=np.vstack([base.B, np.zeros((1, len(base.inputs)))]),
+        C=C,
+        terms=(*base.terms, *extra),
+        delays=(),
+    )
+
+
+def fit_with_gust(
+    model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float
+) -> GustFit:
+    """Fit a template in two stages.
+
+    Parameters
+    ----------
+    model : LinearModel
+        With delays and levers as wanted.
+    maneuvers : sequence of Maneuver
+        Data as measured.
+    airspeed_mps : float
+        Of the trim, for the gust's time scale.
+    """
+    first = fit("output-error-white", model, maneuvers)
+    half = first.half_width()
+    delays = {d.name: (first.value(d.name), float(half[first.index(d.name)])) for d in model.delays}
+    shifts = np.zeros(len(model.outputs))
+    for delay in model.delays:
+        for output in delay.outputs:
+            shifts[model.outputs.index(output)] = delays[delay.name][0]
+    shifted = [_advanced(m, shifts) for m in maneuvers]
+    count = len(model.parameters)
+    start = np.concatenate([first.estimate[:count], first.estimate[len(model.parameter_names) :]])
+    wide = gust_model(model, airspeed_mps)
+    process = ("gust_rad", *(s for s in ALSO if s in model.states))
+    result = fit_filter_error(wide, shifted, process=process, start=start)
+    plain = replace(model, delays=())
+    return GustFit(
+        result=replace(result, method="filter error with gust", model=plain),
+        model=plain,
+        maneuvers=tuple(shifted),
+        delays=delays,
+    )
+
+
+def _advanced(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
+    """Read each output later by its delay, so that all belong to one instant."""
+    t = maneuver.time_s
+    columns = [
+        np.interp(t + shift, t, column)
+        for shift, column in zip(shifts_s, maneuver.outputs.T, strict=True)
+    ]
+    return replace(maneuver, outputs=np.column_stack(columns))
