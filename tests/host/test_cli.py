@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.cli import main, verbs
+from host.progress import progress_bar
 
 from tests.host.logs import flight, written
 from tests.host.test_original_rows import APPENDIX
@@ -123,12 +124,15 @@ def test_folder_lists_its_flights_and_takes_the_newest(
 
 
 def test_strict_ends_in_6(capsys: pytest.CaptureFixture[str]) -> None:
-    put("flight.bin", GOOD)
+    streams = flight(15.0)
+    rows = streams[0].rows
+    for name in ("alpha", "beta", "dp"):  # both sides alike, as on an aircraft
+        rows[f"{name}_b"] = rows[f"{name}_a"]
+    put("flight.bin", written(*streams))
     put("hurt.bin", HURT)
     assert main(["decode", "flight.bin", "--strict"]) == 0
     assert main(["decode", "hurt.bin", "--strict"]) == 6
-    streams = flight(15.0)
-    streams[0].rows["beta_b"] = 2000
+    rows["beta_b"] = 2000
     put("stuck.bin", written(*streams))
     assert main(["decode", "stuck.bin", "--strict"]) == 6
     assert "beta_b did not move for 15" in capsys.readouterr().out
@@ -155,8 +159,39 @@ def test_stuck_saturated_and_absent_channels_are_named(
     assert {"imu", "gps", "alpha_a"} <= set(session["sensors"])
 
 
+def test_vanes_that_disagree_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+    streams = flight(15.0)
+    streams[0].rows["alpha_b"] = streams[0].rows["alpha_a"] - 400  # 100 counts, 35 deg
+    put("flight.bin", written(*streams))
+    assert main(["decode", "flight.bin", "--json"]) == 0
+    (session,) = json.loads(capsys.readouterr().out)["sessions"]
+    pair = session["pairs"]["alpha"]
+    assert pair["mean_difference"] == pytest.approx(100 * 2 * np.pi / 1024, rel=1e-6)
+    assert pair["deviation"] == pytest.approx(0.0, abs=1e-6)
+    assert {name for name, one in session["pairs"].items() if one["disagrees"]} == {"alpha"}
+    assert main(["decode", "flight.bin", "--strict"]) == 6
+
+
+def test_progress_is_drawn_on_a_terminal_only(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert progress_bar("reading", 10**9) is None
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    assert progress_bar("reading", 10**6) is None
+    draw = progress_bar("reading", 10**9)
+    assert draw is not None
+    draw(5 * 10**8, 10**9)
+    draw(10**9, 10**9)
+    out, err = capsys.readouterr()
+    assert " 50%" in err
+    assert "100%" in err
+    assert out == ""
+
+
 def test_original_rows(capsys: pytest.CaptureFixture[str]) -> None:
     put("rows.txt", (APPENDIX.format(1.0) * 10).encode())
+    assert main(["info", "rows.txt"]) == 0
+    assert "23 readings" in capsys.readouterr().out
     assert main(["decode", "rows.txt"]) == 0
     assert "reconstructed" in capsys.readouterr().out
     assert len(Path("rows.csv").read_text().splitlines()) == 11

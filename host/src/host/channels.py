@@ -16,7 +16,7 @@ from host.schema import Field, Schema
 
 Array = NDArray[np.float64]
 TURN_RAD = 2.0 * np.pi
-_END_OF_RANGE = 32_766.0  # raw rates and accelerations at or beyond it are clipped
+END_OF_RANGE = 32_766.0  # raw rates and accelerations at or beyond it are clipped
 
 
 @dataclass(slots=True)
@@ -125,7 +125,7 @@ class ChannelMaker:
             value = _floats(rows.data[name], column, into)
             lost = value == field.invalid
             if clipped:
-                lost |= (np.abs(value) >= _END_OF_RANGE) & ((bits & self._unsaturated) == 0)
+                lost |= (np.abs(value) >= END_OF_RANGE) & ((bits & self._unsaturated) == 0)
             raw = value.copy() if any_original else value
             value *= field.scale
             _axis(value, self._lines[f"imu.{kind}"], axis)

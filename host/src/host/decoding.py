@@ -55,6 +55,8 @@ class Decoded:
         for session in self.summary["sessions"]:
             for kind in ("stuck", "saturated", "absent"):
                 found += [f"{name} {kind}" for name in session[kind]]
+            pairs = session["pairs"].items()
+            found += [f"{name} pair disagrees" for name, pair in pairs if pair["disagrees"]]
         return found
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from host.log import read_log
+from host.original_rows import looks_like_rows, parse_rows
 from host.source import find_flights
 
 HEAD_BYTES = 256 << 10
@@ -19,6 +20,12 @@ def describe(path: Path) -> dict[str, Any]:
     NotALogError
         If no intact block is there.
     """
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    if looks_like_rows(head):
+        variant = parse_rows(head).variant
+        size = path.stat().st_size
+        return {"file": str(path), "size_bytes": size, "format": f"original rows, {variant}"}
     log = read_log(path, limit_bytes=HEAD_BYTES)
     out: dict[str, Any] = {
         "file": str(path),
@@ -50,6 +57,11 @@ def describe_folder(folder: Path) -> list[dict[str, Any]]:
 
 def head_lines(head: dict[str, Any]) -> list[str]:
     """Return the head in words."""
+    if "format" in head:
+        return [
+            f"rows         {head['file']}, {head['size_bytes']} bytes, {head['format']}",
+            f"next         host decode {head['file']}",
+        ]
     lines = [
         f"log          {head['file']}, {head['size_bytes']} bytes",
         f"file id      {head['file_id']}, first session {head['session']}",

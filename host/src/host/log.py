@@ -15,7 +15,8 @@ from host.calibration import Calibration, load_calibration
 from host.columns import CHANNELS, COLUMNS
 from host.errors import LogError
 from host.frames import find_schemas
-from host.ledger import Ledger, make_ledger
+from host.ledger import Ledger
+from host.losses import make_ledger
 from host.schema import Schema
 from host.selection import Selection, select
 from host.session import Session, surface_sources

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from host.channels import _END_OF_RANGE as IMU_END
+from host.calibration import Line
+from host.channels import END_OF_RANGE as IMU_END
 from host.columns import ANALOGUE, INERTIAL
+from host.schema import Frame
 from host.session import Session
+
+Array = NDArray[np.float64]
 
 STUCK_S = 10.0  # an ADC sum of four that does not move one count for so long reads no sensor
 _ADC_END = 4 * 1023
 _JITTER_BINS_US = 1_000_000
+_PAIRS = {"alpha": ("alpha_a", "alpha_b"), "beta": ("beta_a", "beta_b"), "pitot": ("dp_a", "dp_b")}
 
 
 @dataclass(slots=True)
@@ -26,7 +33,7 @@ class ChannelHealth:
     _still_rows: int = 0
     _last: int | None = None
 
-    def add(self, raw: np.ndarray, valid: np.ndarray, at_end: np.ndarray) -> None:
+    def add(self, raw: NDArray[Any], valid: NDArray[Any], at_end: NDArray[Any]) -> None:
         """Take more samples into account."""
         self.rows += len(raw)
         self.valid += int(np.count_nonzero(valid))
@@ -40,6 +47,44 @@ class ChannelHealth:
         self.longest_still_rows = max(self.longest_still_rows, int(np.diff(edges).max()))
         self._still_rows = len(raw) - int(edges[-2])
         self._last = int(raw[-1])
+
+
+@dataclass(slots=True)
+class PairHealth:
+    """Difference of two sensors of the same thing, first minus second, where both are valid.
+
+    Roll and yaw rates move the vanes of the two wing tips apart, so that single rows may differ;
+    the mean over a flight may not, beyond what the calibration allows.
+    """
+
+    unit: str
+    limit: float  # three standard deviations of both zeros
+    rows: int = 0
+    total: float = 0.0
+    squares: float = 0.0
+
+    def add(self, difference: Array) -> None:
+        """Take more rows into account."""
+        self.rows += len(difference)
+        self.total += float(difference.sum())
+        self.squares += float(np.square(difference).sum())
+
+    @property
+    def mean(self) -> float:
+        """Mean difference."""
+        return self.total / self.rows if self.rows else 0.0
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the difference."""
+        if not self.rows:
+            return 0.0
+        return float(np.sqrt(max(0.0, self.squares / self.rows - self.mean**2)))
+
+    @property
+    def disagrees(self) -> bool:
+        """True if the mean difference is more than the calibration allows."""
+        return abs(self.mean) > self.limit
 
 
 @dataclass(slots=True)
@@ -57,6 +102,8 @@ class Quality:
         rows), or were hardly ever valid (share of rows valid).
     imu_saturated : float
         Share of rows the IMU itself marked as saturated.
+    pairs : dict of str to PairHealth
+        Left against right vane and pitot.
     """
 
     jitter_us: dict[str, float] = field(default_factory=dict)
@@ -65,6 +112,7 @@ class Quality:
     saturated: dict[str, float] = field(default_factory=dict)
     absent: dict[str, float] = field(default_factory=dict)
     imu_saturated: float = 0.0
+    pairs: dict[str, PairHealth] = field(default_factory=dict)
 
 
 def judge(session: Session) -> Quality:
@@ -74,6 +122,11 @@ def judge(session: Session) -> Quality:
     unsaturated = schema.bit("valid", "imu_unsaturated")
     fresh_bit = schema.bit("valid", "imu_fresh")
     quality = Quality(channels={name: ChannelHealth() for name in (*ANALOGUE, *INERTIAL)})
+    lines = {name: session.calibration.lines[line] for name, (_, line) in ANALOGUE.items()}
+    quality.pairs = {
+        pair: PairHealth(lines[a].unit, 3.0 * float(np.hypot(_zero(lines[a]), _zero(lines[b]))))
+        for pair, (a, b) in _PAIRS.items()
+    }
     jitter = np.zeros(_JITTER_BINS_US + 1, np.int64)
     clipped = fresh = 0
     before: tuple[float, int] | None = None
@@ -93,20 +146,38 @@ def judge(session: Session) -> Quality:
         clipped += int(np.count_nonzero(is_fresh & ((bits & unsaturated) == 0)))
         for name, health in quality.channels.items():
             raw = part.data[name].astype(np.int32)
-            bit = frame.field(name).valid
-            valid = (bits >> bit & 1) != 0 if bit is not None else np.ones(len(raw), bool)
             if name in ANALOGUE:
+                valid = _is_valid(frame, bits, name)
                 health.add(raw, valid, (raw <= 0) | (raw >= _ADC_END))
             else:
                 keep = raw[is_fresh]
                 health.add(keep, np.ones(len(keep), bool), np.abs(keep) >= IMU_END)
+        for pair, (a, b) in _PAIRS.items():
+            both = _is_valid(frame, bits, a) & _is_valid(frame, bits, b)
+            sides = [
+                (part.data[name][both] * frame.field(name).scale - lines[name].zero[0])
+                * lines[name].slope[0]
+                for name in (a, b)
+            ]
+            quality.pairs[pair].add(sides[0] - sides[1])
     quality.imu_saturated = clipped / fresh if fresh else 0.0
     quality.jitter_us = _percentiles(jitter)
     _find_faults(quality, session)
     return quality
 
 
-def _percentiles(histogram: np.ndarray) -> dict[str, float]:
+def _zero(line: Line) -> float:
+    return line.zero_sigma * abs(line.slope[0])
+
+
+def _is_valid(frame: Frame, bits: NDArray[np.uint16], name: str) -> NDArray[np.bool_]:
+    bit = frame.field(name).valid
+    if bit is None:
+        return np.ones(len(bits), np.bool_)
+    return np.asarray((bits >> bit & 1) != 0)
+
+
+def _percentiles(histogram: NDArray[Any]) -> dict[str, float]:
     total = int(histogram.sum())
     if not total:
         return {}

@@ -59,6 +59,13 @@ def _session(session: Mapping[str, Any]) -> Iterator[str]:
         yield _row("  SATURATED", f"{name} at an end of its range in {share:.2%} of rows")
     if session["imu_saturated_share"]:
         yield _row("  SATURATED", f"IMU says so in {session['imu_saturated_share']:.2%} of samples")
+    for name, pair in session["pairs"].items():
+        label = "  DISAGREE" if pair["disagrees"] else "  pair"
+        yield _row(
+            label,
+            f"{name} left - right: mean {pair['mean_difference']:+.4g} {pair['unit']}, deviation"
+            f" {pair['deviation']:.4g} {pair['unit']}",
+        )
     if session["absent"]:
         yield _row("  not valid", ", ".join(session["absent"]))
 

@@ -118,6 +118,17 @@ def _session(log: FlightLog, session: Session) -> Json:
         "saturated": quality.saturated,
         "imu_saturated_share": quality.imu_saturated,
         "absent": quality.absent,
+        "pairs": {
+            name: {
+                "rows": pair.rows,
+                "mean_difference": pair.mean,
+                "deviation": pair.deviation,
+                "unit": pair.unit,
+                "disagrees": pair.disagrees,
+            }
+            for name, pair in quality.pairs.items()
+            if pair.rows
+        },
         "ended": _reason(log, session),
         **_identity(session),
     }

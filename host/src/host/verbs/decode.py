@@ -15,7 +15,7 @@ table in SI at the identification rate. SOURCE is a log, a folder or a mounted c
 """
 _EPILOG = """\
 exit codes: 0 ok, 2 usage, 3 decoded with losses (all named), 4 not a log,
-6 --strict and a channel is stuck, saturated or missing, or the log is damaged
+6 --strict and anything is lost, stuck, saturated, missing, or a pair of sensors disagrees
 """
 
 
