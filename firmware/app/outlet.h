@@ -20,7 +20,8 @@ class Outlet {
     telemetry_.offer(Frame::id(), &frame, sizeof frame, frame.t_us);
   }
 
-  // Events of the time before a session wait for it; the oldest of more than six are given up.
+  // Events of the time before a session wait for it. Of more than eight the first two stay, which
+  // tell of the boot, and the oldest behind them is given up.
   void event(frames::Event code, uint32_t arg, uint32_t t_us) {
     frames::EventFrame frame;
     frame.t_us = t_us;
@@ -32,7 +33,7 @@ class Outlet {
       return;
     }
     if (waiting_count_ == kWaiting) {
-      for (uint8_t i = 1; i < kWaiting; ++i) waiting_[i - 1] = waiting_[i];
+      for (uint8_t i = kBootEvents + 1; i < kWaiting; ++i) waiting_[i - 1] = waiting_[i];
       --waiting_count_;
     }
     waiting_[waiting_count_++] = frame;
@@ -49,7 +50,8 @@ class Outlet {
   void close() { logging_ = false; }
 
  private:
-  static constexpr uint8_t kWaiting = 6;
+  static constexpr uint8_t kWaiting = 8;
+  static constexpr uint8_t kBootEvents = 2;
 
   core::ByteRing& ring_;
   Telemetry& telemetry_;

@@ -16,8 +16,8 @@ enum class CardStatus : uint8_t {
   kAbsent,    // no answer
 };
 
-// Called about every 0.1 ms while one of the waiting calls below waits, so that the receiver, the
-// servos and the watchdog are served. It must not use the card. Null: nothing is called.
+// Called about every 0.1 ms while one of the waiting calls below waits, so that receiver, servos,
+// sensors and watchdog are served. It must not use the card. Null: nothing is called.
 using CardWait = void (*)(void* context);
 void set_card_wait(CardWait wait, void* context);
 

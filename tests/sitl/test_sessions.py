@@ -107,9 +107,6 @@ def test_reset_in_flight_resumes_within_two_seconds_without_metadata(tmp_path: P
     second = bench.log(tmp_path, session=2)
     clock_us = -(reset_at // 2)
     frames = {name: second.frames[name] for name in NAMES}
-    # While the card was mounted two packets waited: the first frame says how old its sample is.
-    assert frames["ident"]["imu_age"][0] > 50_000 / 4
-    frames["ident"] = frames["ident"][1:]
     assert [d for d in compare(frames, plan, clock_us=clock_us) if not d.good] == []
     assert missing(second.frames["ident"]["count"]) == 0
 

@@ -1,0 +1,125 @@
+"""The pilot's pulses: repeated exactly, released when they must be, never invented."""
+
+import numpy as np
+
+from tests.protocol import oracle
+from tests.sitl.bench import Bench, flight, idle_receiver
+from tests.sitl.instrument import TICKS_PER_S, Level, Port
+from tests.sitl.script import Receiver
+
+MEGA, DIRECT_LOST = 5, 3
+
+
+def ticks(seconds: float) -> int:
+    return round(seconds * TICKS_PER_S)
+
+
+def test_every_servo_pulse_repeats_an_accepted_width_of_its_channel() -> None:
+    bench = Bench()
+    plan = flight(34.0)
+    plan.give(bench.sitl)
+    bench.sitl.power_on()
+    bench.sitl.run_until(ticks(18.0))
+    start, output, width = bench.sitl.pulses()
+    assert len(start) > 4 * 800
+    for channel in range(4):
+        mine = output == channel
+        fall = plan.receiver.start[:, channel] + plan.receiver.width[:, channel]
+        for at, ticks_wide in zip(start[mine].tolist(), width[mine].tolist(), strict=True):
+            recent = (fall < at) & (fall > at - ticks(0.1))
+            assert ticks_wide in plan.receiver.width[recent, channel]
+    # From the end of the input to the start of the output: one servo frame and 2 ms at most.
+    fall = plan.receiver.start[:, 0] + plan.receiver.width[:, 0]
+    mine = start[output == 0]
+    for at, ticks_wide in zip(mine.tolist(), width[output == 0].tolist(), strict=True):
+        newest = np.searchsorted(fall, at - ticks(0.022)) - 1
+        if newest >= 3:
+            assert ticks_wide in plan.receiver.width[newest : newest + 3, 0]
+
+
+def test_relay_engages_only_after_direct_and_then_mega() -> None:
+    bench = Bench()
+    flight(34.0).give(bench.sitl)  # direct for two seconds, then Mega
+    bench.sitl.power_on()
+    bench.sitl.run_until(ticks(1.9))
+    assert not bench.sitl.state().relay
+    bench.sitl.run_until(ticks(5.0))
+    assert bench.sitl.state().relay
+    assert bench.sitl.state().drive == MEGA
+    at, level = bench.sitl.levels(Level.RELAY)
+    assert level.tolist() == [1]
+    assert ticks(2.1) < int(at[0]) < ticks(2.4)
+
+
+def test_switch_at_mega_from_the_start_stays_direct() -> None:
+    bench = Bench()
+    count = 500
+    width = np.tile(np.array([3000, 3000, 3000, 2200, 3800]), (count, 1))
+    start = (np.arange(count)[:, None] * 40_000) + np.arange(5) * 5000 + 2000
+    bench.sitl.add_edges(*Receiver(start, width).edges())
+    bench.sitl.power_on()
+    bench.sitl.run_until(ticks(9.0))
+    assert bench.sitl.levels(Level.RELAY)[0].size == 0
+
+
+def test_receiver_lost_releases_the_relay_within_100_ms() -> None:
+    bench = Bench()
+    plan = flight(34.0)
+    at, levels = plan.receiver.edges()
+    last = int(at[at < ticks(8.0)][-1])
+    bench.sitl.add_edges(at[at <= last], levels[at <= last])
+    bench.sitl.power_on()
+    bench.sitl.run_until(ticks(9.0))
+    when, level = bench.sitl.levels(Level.RELAY)
+    assert level.tolist() == [1, 0]
+    # The pump holds the relay 30 ms longer than the heartbeat.
+    assert int(when[1]) - last < ticks(0.1)
+    assert bench.sitl.state().drive == DIRECT_LOST
+    start, _, width = bench.sitl.pulses()
+    assert int(start[-1]) - last < ticks(0.1)
+    assert int(width.min()) >= 1800
+
+
+def test_hung_program_releases_the_relay() -> None:
+    """No turn of the main loop, no heartbeat: here the power of the chip alone goes."""
+    bench = Bench()
+    flight(34.0).give(bench.sitl)
+    bench.sitl.power_on()
+    bench.sitl.run_until(ticks(5.0))
+    bench.sitl.reset(4)
+    bench.sitl.run_for(0.5)
+    when, level = bench.sitl.levels(Level.RELAY)
+    assert level.tolist() == [1, 0]
+    assert int(when[1]) - ticks(5.0) < ticks(0.05)
+    bench.sitl.run_until(ticks(12.0))
+    assert not bench.sitl.state().relay  # the switch was not seen at direct since
+
+
+def test_telemetry_keeps_its_budget_and_decodes() -> None:
+    bench = Bench()
+    flight(34.0).give(bench.sitl)
+    bench.sitl.power_on()
+    bench.sitl.run_until(ticks(12.0))
+    sent = bench.sitl.sent(Port.TELEMETRY)
+    assert 12 * 1500 < len(sent) <= 12 * 2600 + 1300
+    stream = oracle.decode_stream(sent)
+    assert stream.failed == 0
+    assert stream.skipped == 0
+    kinds = {frame[0] for frame in stream.frames}
+    assert kinds >= {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}
+    hashes = [frame[1:] for frame in stream.frames if frame[0] == 0]
+    assert len(hashes) == 3
+
+
+def test_status_line_says_what_is_there() -> None:
+    bench = Bench()
+    idle_receiver(bench.sitl, 0.1, 6.0)
+    bench.sitl.power_on()
+    bench.sitl.run_until(ticks(5.5))
+    lines = bench.sitl.sent(Port.USB).decode("ascii").split("\r\n")
+    assert lines[0].startswith("sitl ")
+    assert lines[-2].startswith("sitl ")
+    assert "imu missing | baro missing | gps missing" in lines[-2]
+    assert "rc us 1500 1500 1500 1100 1100" in lines[-2]
+    assert "card ready 1" in lines[-2]
+    assert 4 <= len(lines) - 2 <= 7
