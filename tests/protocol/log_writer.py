@@ -76,9 +76,13 @@ def rows(name: str, length: int, /, **columns: object) -> Rows:
     return made
 
 
-def file_id(card_id: bytes, session: int, first_block_before: bytes) -> int:
-    """Return the id that every block of a file created so carries."""
-    return zlib.crc32(card_id + struct.pack("<I", session) + first_block_before)
+def file_id(card_id: bytes, session: int, first_block_before: bytes, card_block: int) -> int:
+    """Return the id that every block of a file created so carries.
+
+    `card_block` is the number of the file's first block on the card.
+    """
+    place = struct.pack("<I", card_block)
+    return zlib.crc32(card_id + struct.pack("<I", session) + first_block_before[:508] + place)
 
 
 def block(
@@ -139,7 +143,7 @@ class LogWriter:
     ----------
     sink
         Where blocks go; memory when not given.
-    card_id, session, first_block_before
+    card_id, session, first_block_before, card_block
         What the file id is made of. `session` is also the first session's number.
     text
         Schema text, the committed one when not given.
@@ -154,6 +158,7 @@ class LogWriter:
         card_id: bytes = CARD_ID,
         session: int = 1,
         first_block_before: bytes = bytes(BLOCK),
+        card_block: int = 40_960,
         text: bytes | None = None,
         keep_truth: bool = True,
     ) -> None:
@@ -164,7 +169,7 @@ class LogWriter:
         self.ids = ids(self.text)
         self._card_id = card_id
         self.session = session
-        self.file_id = file_id(card_id, session, first_block_before)
+        self.file_id = file_id(card_id, session, first_block_before, card_block)
         self.sequence = 0
         self.dropped = 0
         self._open = bytearray()

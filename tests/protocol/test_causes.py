@@ -129,3 +129,15 @@ def test_cut_file_is_truncated(keep: int) -> None:
         assert (loss.cause, loss.offset, loss.length) == ("truncated", 30 * BLOCK, keep % BLOCK)
         assert log.complete == "truncated"
     check_oracle(DATA[:keep])
+
+
+def test_file_id_depends_on_the_valid_block_that_stood_there() -> None:
+    # Over all 512 bytes it would not: behind its own CRC a block leaves no trace in a CRC.
+    ids = []
+    before = bytes(BLOCK)
+    for _ in range(4):
+        writer = LogWriter(session=1, first_block_before=before, card_block=8192)
+        writer.schema()
+        before = writer.data()[:BLOCK]
+        ids.append(writer.file_id)
+    assert len(set(ids)) == 4
