@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from simavr_bench import Chip, ForkError, ResetCause, cycles, in_fork
@@ -189,6 +191,11 @@ def test_callbacks_come_at_their_cycle_and_their_errors_come_out(make_chip: Make
         chip.at(at, lambda: seen.append(chip.cycle))
     chip.run_until(4000)
     assert seen == [1000, 3000]
+    order: list[int] = []
+    for k in range(20):
+        chip.at(4200, partial(order.append, k))
+    chip.run_until(4300)
+    assert order == list(range(20))
 
     def broken() -> None:
         raise ValueError("from the script")
