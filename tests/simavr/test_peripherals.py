@@ -168,6 +168,19 @@ def test_uart_hears_only_its_own_baud_rate(make_chip: MakeChip, baud: int, right
     assert (bytes(heard) == text) is right
 
 
+def test_uart_takes_no_spike_for_a_start_bit(make_chip: MakeChip) -> None:
+    chip = make_chip("uart")
+    run_to(chip)
+    chip.uart_send(1, b"\xff", baud=20 * 38461.5)  # low for a twentieth of a bit
+    chip.run_s(1e-3)
+    chip.uart_send(1, b"A", baud=38461.5)
+    chip.run_s(1e-3)
+    chip.poke(chip.symbols["go"][0], b"\1")
+    chip.run_s(1e-4)
+    assert chip.read("got_count") == 1
+    assert bytes(chip.read_array("got", "u1")[:1]) == b"A"
+
+
 def test_eeprom_write_takes_3_4_ms(make_chip: MakeChip) -> None:
     chip = make_chip("eeprom")
     run_to(chip)
