@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -97,7 +98,7 @@ def test_wrong_arguments_end_in_2(
 
 
 def test_unknown_option_and_verb_end_in_2() -> None:
-    for arguments in (["decode"], ["decode", "x", "--nonsense"], ["fly"]):
+    for arguments in (["decode", "x", "y"], ["decode", "x", "--nonsense"], ["fly"]):
         with pytest.raises(SystemExit) as caught:
             main(arguments)
         assert caught.value.code == 2
@@ -121,6 +122,16 @@ def test_folder_lists_its_flights_and_takes_the_newest(
     assert capsys.readouterr().out.count(".BIN") == 2
     Path("empty").mkdir()
     assert main(["decode", "empty"]) == 4
+
+
+def test_without_a_source_the_working_folder_is_meant(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["decode"]) == main(["info"]) == 4
+    assert "no flight log in this folder" in capsys.readouterr().err
+    put("FLT00003.BIN", GOOD)
+    assert main(["decode"]) == 0
+    assert Path("FLT00003.csv").exists()
 
 
 def test_strict_ends_in_6(capsys: pytest.CaptureFixture[str]) -> None:
@@ -249,6 +260,21 @@ def test_internal_errors_are_one_line(
     monkeypatch.setattr("host.decoding.summarise", interrupted)
     assert main(["decode", "flight.bin"]) == 130
     assert capsys.readouterr().err.strip() == "host: interrupted"
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_interrupted_decode_leaves_no_half_table(
+    kind: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    put("flight.bin", GOOD)
+    monkeypatch.setattr("host.log.SessionTable.pieces", half_a_table)
+    assert main(["decode", "flight.bin", "--to", kind]) == 130
+    assert [path.name for path in Path().iterdir()] == ["flight.bin"]
+
+
+def half_a_table(table: object) -> Iterator[dict[str, np.ndarray]]:
+    yield {"t_s": np.zeros(3)}
+    raise KeyboardInterrupt
 
 
 def interrupted(log: object) -> None:

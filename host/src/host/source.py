@@ -53,7 +53,8 @@ def find_flights(folder: Path) -> list[Flight]:
         flights.append(Flight(path, session, stat.st_size, stat.st_mtime))
     if not flights:
         raise NotALogError(
-            f"{folder}: no flight log in this folder; expected files such as FLT00001.BIN"
+            f"{folder.resolve()}: no flight log in this folder; expected files such as"
+            " FLT00001.BIN, or name a log"
         )
     return sorted(flights, key=lambda flight: (flight.session, flight.modified_s, flight.path.name))
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from host.errors import UsageError
 from host.export import FORMATS, open_writer
-from host.export.csv import printable
+from host.export.csv import STDOUT, printable
 from host.export.writer import Columns, Meta
 from host.log import FlightLog
 
@@ -40,7 +40,7 @@ def destination(request: Request, source: Path) -> tuple[str, Path]:
     if output == "-":
         if request.format not in (None, "csv"):
             raise UsageError(f"--to {request.format} cannot go to stdout; name a file with -o")
-        return "csv", Path("/dev/stdout")
+        return "csv", STDOUT
     if output is None:
         kind = request.format or "csv"
         target = Path(f"{source.stem}.{kind}")
@@ -65,13 +65,21 @@ def destination(request: Request, source: Path) -> tuple[str, Path]:
 
 
 def write_table(pieces: Iterable[Columns], kind: str, target: Path, meta: Meta) -> None:
-    """Write a table piece by piece."""
-    writer = open_writer(kind, target, meta)
+    """Write a table piece by piece; a file of that name appears only when it is whole."""
+    plain = target != STDOUT
+    part = target.with_name(f"{target.stem}.part{target.suffix}") if plain else target
     try:
-        for piece in pieces:
-            writer.write(piece)
+        writer = open_writer(kind, part, meta)
+        try:
+            for piece in pieces:
+                writer.write(piece)
+        finally:
+            writer.close()
+        if plain:
+            part.replace(target)
     finally:
-        writer.close()
+        if plain:
+            part.unlink(missing_ok=True)
 
 
 def write_frames(log: FlightLog, kind: str, target: Path) -> list[str]:

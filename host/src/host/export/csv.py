@@ -6,11 +6,24 @@ pyarrow wrote 9 MB/s of log where pandas wrote 2.6 MB/s (reference measurement, 
 from __future__ import annotations
 
 import importlib.util
+import io
+import os
+import sys
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from host.export.writer import Columns, Meta, TableWriter
+
+STDOUT = Path("-")
+
+
+def open_target(path: Path) -> BinaryIO:
+    """Open a file to write, or the process's stdout for `STDOUT`."""
+    if path == STDOUT:
+        return os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    return path.open("wb")
 
 
 def make_csv_writer(path: Path, meta: Meta) -> TableWriter:
@@ -25,7 +38,7 @@ class PandasCsvWriter:
 
     def __init__(self, path: Path, meta: Meta) -> None:
         del meta  # the format has no place for it
-        self._file = path.open("w", encoding="utf-8", newline="")
+        self._file = io.TextIOWrapper(open_target(path), encoding="utf-8", newline="")
         self._header = True
 
     def write(self, columns: Columns) -> None:
@@ -46,7 +59,7 @@ class ArrowCsvWriter:
 
     def __init__(self, path: Path, meta: Meta) -> None:
         del meta
-        self._file = path.open("wb")
+        self._file = open_target(path)
         self._header = True
 
     def write(self, columns: Columns) -> None:

@@ -28,7 +28,14 @@ def add_parser(subparsers: Any) -> None:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("source", type=Path, metavar="SOURCE", help="log, folder or mounted card")
+    parser.add_argument(
+        "source",
+        type=Path,
+        nargs="?",
+        default=Path(),
+        metavar="SOURCE",
+        help="log, folder or mounted card; the working folder without it",
+    )
     parser.add_argument(
         "-o",
         "--output",

@@ -15,7 +15,14 @@ def add_parser(subparsers: Any) -> None:
         help="say what a log is, from its head",
         description="Say what a log is, at once: only the first 256 KiB are read.",
     )
-    parser.add_argument("source", type=Path, help="log file, folder or mounted card")
+    parser.add_argument(
+        "source",
+        type=Path,
+        nargs="?",
+        default=Path(),
+        metavar="SOURCE",
+        help="log, folder or mounted card; the working folder without it",
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
