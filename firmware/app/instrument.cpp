@@ -41,6 +41,7 @@ void Instrument::boot() {
   pilot_.start();
   sensors_.start(config_, now_us);
   status_.start(now_us);
+  ascii_row_.start(now_us);
   second_.start(now_us);
   turn_us_ = now_us;
   system_us_ = now_us;
@@ -77,6 +78,7 @@ void Instrument::step() {
   store_.poll();
   panel_.step(recorder_, now_us);
   status_.step(recorder_, sensors_, pilot_, now_us);
+  ascii_row_.step(sensors_, pilot_.channels(), telemetry_, now_us);
   if (telemetry_.poll(now_us)) put_telemetry_heads(now_us);
   if (second_.due(now_us, kSecondUs)) put_system(now_us);
   pilot_.beat(hal::now_us());

@@ -3,6 +3,7 @@
 
 #include <stdint.h>
 
+#include "app/ascii_row.h"
 #include "app/outlet.h"
 #include "app/panel.h"
 #include "app/pilot_link.h"
@@ -43,6 +44,7 @@ class Instrument {
   core::ByteRing ring_{ring_bytes_, kRingBytes};
   frames::ConfigFrame config_ = {};
   Telemetry telemetry_;
+  AsciiRow ascii_row_;
   Outlet outlet_{ring_, telemetry_};
   Store store_;
   PilotLink pilot_;

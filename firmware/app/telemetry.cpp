@@ -55,12 +55,10 @@ bool Telemetry::send(uint8_t id, const void* fields, uint8_t size, uint32_t now_
   return true;
 }
 
-bool Telemetry::send_text(const char* text, uint8_t size, uint32_t now_us) {
-  if (hal::send_room(hal::Port::kTelemetry) < size || !budget_.take(size, now_us)) return false;
-  for (uint8_t i = 0; i < size; ++i) {
-    hal::send_byte(hal::Port::kTelemetry, static_cast<uint8_t>(text[i]));
-  }
-  return true;
+bool Telemetry::reserve(uint16_t size, uint32_t now_us) {
+  if (budget_.take(size, now_us)) return true;
+  if (dropped_ != 0xFFFFU) ++dropped_;
+  return false;
 }
 
 }  // namespace app

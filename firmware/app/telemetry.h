@@ -20,7 +20,8 @@ class Telemetry {
 
   frames::Telemetry mode() const { return mode_; }
   uint16_t dropped() const { return dropped_; }
-  bool send_text(const char* text, uint8_t size, uint32_t now_us);
+  // Takes the bytes of a whole row from the budget; false, and counted, if it does not allow them.
+  bool reserve(uint16_t size, uint32_t now_us);
 
  private:
   bool send(uint8_t id, const void* fields, uint8_t size, uint32_t now_us);

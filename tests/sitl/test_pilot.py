@@ -2,12 +2,14 @@
 
 import numpy as np
 
+from host import original_rows
 from tests.protocol import oracle
 from tests.sitl.bench import Bench, flight, idle_receiver
 from tests.sitl.instrument import TICKS_PER_S, Level, Port
 from tests.sitl.script import Receiver
 
 MEGA, DIRECT_LOST = 5, 3
+TELEMETRY_BYTE = 20  # in the fields of frame config
 
 
 def ticks(seconds: float) -> int:
@@ -109,6 +111,39 @@ def test_telemetry_keeps_its_budget_and_decodes() -> None:
     assert kinds >= {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}
     hashes = [frame[1:] for frame in stream.frames if frame[0] == 0]
     assert len(hashes) == 3
+
+
+def test_original_rows_for_the_original_station() -> None:
+    """Rows of the second flight's kind, five a second at most, read by the host's own parser."""
+    bench = Bench()
+    plan = flight(34.0)
+    plan.give(bench.sitl)
+    config = bench.sitl.default_config()
+    config[TELEMETRY_BYTE] = 2
+    bench.sitl.set_config(config)
+    bench.sitl.power_on()
+    bench.sitl.run_until(ticks(18.0))
+    sent = bench.sitl.sent(Port.TELEMETRY)
+    assert len(sent) <= 18 * 2600 + 1300
+    rows = sent.split(b"\r")
+    assert 80 <= len(rows) <= 18 * 5 + 1
+    assert all(row.startswith(b"RLL:") and row.endswith(b",000000000000000") for row in rows[:-1])
+    assert max(map(len, rows)) < 360
+    parsed = original_rows.parse_rows(sent)
+    assert parsed.variant == "26 readings"
+    live = slice(10, -1)
+    # Rows carry no time: every triple of rates was in one packet (65.5 to 16.4 counts per deg/s).
+    rates = np.stack([parsed.values[f"AN{axis}"] for axis in range(3)], axis=1)[live]
+    sent_rates = plan.imu.raw[:, :3] * 16.4 / 65.5
+    distance = np.abs(rates[:, None, :] - sent_rates[None, :, :]).max(axis=2).min(axis=1)
+    assert np.median(distance) < 5.0  # a row takes 60 ms at 57600 baud; the script moves meanwhile
+    force = np.stack([parsed.values[f"AN{axis + 3}"] for axis in range(3)], axis=1)[live]
+    away = np.abs(force[:, None, :] + plan.imu.raw[None, :, 3:6]).max(axis=2).min(axis=1)
+    assert float(away.max()) < 4000.0
+    speed = parsed.values["velocitya"][live]
+    assert 150.0 < float(np.nanmax(speed)) < 207.0  # 2 kPa are 57.1 m/s
+    altitude = parsed.values["altitude"][live]
+    assert float(np.nanmin(altitude)) < 200.0
 
 
 def test_status_line_says_what_is_there() -> None:
