@@ -99,7 +99,7 @@ def test_command_prints_the_card_and_its_json(
 
 
 def test_simulate_command_lists_flies_and_refuses(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert main(["simulate"]) == 0
     assert "thesis_flight2" in capsys.readouterr().out
@@ -113,5 +113,9 @@ def test_simulate_command_lists_flies_and_refuses(
     assert (tmp_path / "flight.png").read_bytes().startswith(b"\x89PNG")
     assert main(["simulate", "nowhere"]) == 2
     assert "expected a file or one of" in capsys.readouterr().err
+    monkeypatch.setenv("HOST_SITL", str(tmp_path / "no.so"))
+    assert main(["simulate", "calm", "-o", str(tmp_path)]) == 2
+    assert "build it with" in capsys.readouterr().err
+    monkeypatch.setenv("HOST_ELF", str(tmp_path / "no.elf"))
     assert main(["simulate", "calm", "--firmware", "avr", "-o", str(tmp_path)]) == 2
-    assert "use --firmware sitl" in capsys.readouterr().err
+    assert "--firmware avr needs `pio run`" in capsys.readouterr().err

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,8 +18,6 @@ from host.twin.stimuli import SAMPLE_STEP_TICKS, TICKS_PER_S, Stimuli, clock_sha
 from host.twin.virtual import virtual_flight
 from numpy.typing import NDArray
 
-ROOT = Path(__file__).parents[3]
-
 
 @dataclass(frozen=True)
 class Flown:
@@ -31,15 +28,6 @@ class Flown:
     given: Stimuli
     recording: sitl.Recording
     log: FlightLog
-
-
-@pytest.fixture(scope="session")
-def library() -> Path:
-    built = subprocess.run(
-        [sys.executable, str(ROOT / "firmware" / "toolchain" / "build_sitl.py")],
-        capture_output=True, text=True, check=True, timeout=600,
-    )  # fmt: skip
-    return Path(built.stdout.strip())
 
 
 @pytest.fixture(scope="module")

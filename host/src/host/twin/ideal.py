@@ -103,7 +103,8 @@ def measured_table(record: FlightRecord, data: AirData | None = None) -> pd.Data
     -------
     DataFrame
         As `true_table`, without thrust and rotor; vanes and pitots per side (``alpha_a_rad``
-        ...) and their mean. Rates and specific forces at the IMU; time is the recorder's.
+        ...) and their mean. Rates and specific forces at the IMU; time is true, as after a
+        correction by GPS.
     """
     data = data or air_data(record)
     at = times(record)
@@ -127,8 +128,7 @@ def measured_table(record: FlightRecord, data: AirData | None = None) -> pd.Data
     density = np.interp(at, record.t_s, data.density_kgpm3)
     qbar = 0.5 * (si["dp_a"] + si["dp_b"])
     columns: dict[str, Array] = {
-        "t_s": at
-        * (1.0 + (record.draws.scalar("clock_share") if record.card.sensors.clock_error else 0.0)),
+        "t_s": at,
         "airspeed_mps": np.sqrt(2.0 * np.maximum(on(vane_at, qbar), 0.0) / density),
         "alpha_rad": on(vane_at, 0.5 * (si["alpha_a"] + si["alpha_b"])),
         "beta_rad": on(vane_at, 0.5 * (si["beta_a"] + si["beta_b"])),

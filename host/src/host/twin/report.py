@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from host.errors import UsageError
 from host.log import read_log
-from host.twin import compare, ideal, picture, sitl, stimuli, thesis, truth
+from host.twin import avr, compare, ideal, picture, sitl, stimuli, thesis, truth
 from host.twin.airdata import AirData, air_data
 from host.twin.cards import Card, Segment
 from host.twin.flight import FlightRecord, fly
@@ -124,16 +123,12 @@ def simulate(
     elif firmware == "thesis":
         outcome.table, files = _thesis(record, data, folder)
         outcome.files += files
-    elif firmware == "sitl":
-        path = _recorded(outcome, folder, progress)
+    else:
+        recorder = sitl.record if firmware == "sitl" else avr.record
+        path = _recorded(outcome, folder, recorder, progress)
         marks.append(("record", time.perf_counter()))
         outcome.table = _decoded(outcome, path, folder)
-    else:
-        raise UsageError(
-            "--firmware avr needs the Mega image and the chip simulator,"
-            " which this version does not drive yet; use --firmware sitl"
-        )
-    marks.append(("decode" if firmware == "sitl" else firmware, time.perf_counter()))
+    marks.append(("decode" if outcome.recording else firmware, time.perf_counter()))
     outcome.files += truth.write(record, data, stem, first_row_s=outcome.first_row_s)
     marks.append(("truth", time.perf_counter()))
     second = None
@@ -158,11 +153,13 @@ def simulate(
     return outcome
 
 
-def _recorded(outcome: Outcome, folder: Path, progress: Progress) -> Path:
-    """Record with the firmware on this computer; write flight.bin."""
+def _recorded(
+    outcome: Outcome, folder: Path, recorder: Callable[..., sitl.Recording], progress: Progress
+) -> Path:
+    """Record with the firmware; write flight.bin."""
     record = outcome.record
     given = stimuli.stimuli(record, outcome.data)
-    outcome.recording = sitl.record(
+    outcome.recording = recorder(
         given,
         rate_hz=sitl.recorder_rate_hz(record.card.flight.rate_hz),
         aircraft=record.aircraft.name,

@@ -14,7 +14,7 @@ from host.twin.airdata import air_data
 from host.twin.cards import Card, load
 from host.twin.flight import FlightRecord, fly
 from host.twin.instrument import calibration
-from host.twin.stimuli import clock_share, stimuli
+from host.twin.stimuli import stimuli
 
 CHAINS = ("sitl", "none", "true", "thesis")
 
@@ -74,7 +74,6 @@ def virtual_flight(card: str | Path | Card, seed: int, *, chain: str = "sitl") -
         table = ideal.true_table(record, data)
     elif chain == "none":
         table = ideal.measured_table(record, data)
-        table["t_s"] /= 1.0 + clock_share(record)
     elif chain == "thesis":
         table = thesis.table(thesis.rows(record, data))
     else:

@@ -1,0 +1,133 @@
+"""The recorder as the real ELF in the chip simulator: a program of its own, started by path.
+
+The simulator is under the GPL; nothing of it is imported or linked. Stimuli go in as a file, the
+card's image comes back.
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from host.errors import UsageError
+from host.resources import CLONE
+from host.twin import sitl
+from host.twin.cards import Fault
+from host.twin.fat32 import CardReader, format_card
+from host.twin.sitl import CARD_EVENTS, CLOSE_S, LET_GO_S, PRESS_S, Recording
+from host.twin.stimuli import TICKS_PER_S, Stimuli
+
+REPLAY = CLONE / "tests" / "simavr" / "replay.py"
+ELF = CLONE / ".pio" / "build" / "mega2560" / "firmware.elf"
+PACKET_ROOM = 40
+DEFAULT_RATE_HZ = 100
+
+
+def record(
+    given: Stimuli,
+    *,
+    rate_hz: int,
+    aircraft: str,
+    faults: Sequence[Fault] = (),
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Recording:
+    """Let the Mega's image live through a flight in the chip simulator.
+
+    Parameters and return value are those of `sitl.record`.
+
+    Raises
+    ------
+    UsageError
+        Image or simulator are not built, or the simulator refused.
+    """
+    elf = Path(os.environ.get("HOST_ELF", ELF))
+    replay = Path(os.environ.get("HOST_REPLAY", REPLAY))
+    for path, how in ((elf, "`pio run`"), (replay, "a clone with tests/simavr")):
+        if not path.is_file():
+            raise UsageError(f"no {path}: --firmware avr needs {how}; --firmware sitl does not")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        _write(given, folder / "stimuli.npz")
+        _sparse(format_card(), folder / "card.img")
+        command = [sys.executable, str(replay), str(elf), str(folder / "stimuli.npz"),
+                   str(folder / "card.img"), "--close-s", str(CLOSE_S),
+                   "--seed", str(seed)]  # fmt: skip
+        if rate_hz != DEFAULT_RATE_HZ or sitl.LIBRARY.is_file():
+            (folder / "eeprom.bin").write_bytes(sitl.eeprom(rate_hz, aircraft))
+            command += ["--eeprom", str(folder / "eeprom.bin")]
+        for fault in faults:
+            if fault.kind in (*CARD_EVENTS, "power_cut", "baro_off"):
+                value = f":{fault.value:g}" if fault.value else ""
+                command += ["--fault", f"{fault.kind}:{fault.at_s:g}{value}"]
+            if fault.kind == "baro_off":
+                command += ["--fault", f"baro_on:{fault.at_s + fault.duration_s:g}"]
+        summary = _run(command, progress)
+        with (folder / "card.img").open("rb") as file:
+            image = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        reader = CardReader(image)
+        flights = sorted((f for f in reader.files() if f.name[:3] == "FLT"), key=lambda f: f.name)
+        if not flights:
+            raise UsageError(f"the recorder made no file on the card; the simulator says {summary}")
+        log = reader.read(flights[0])
+        image.close()
+    lost = summary.get("uart_bytes_lost", [0, 0, 0, 0])
+    return Recording(log, flights[0].name, 0, 0, int(lost[2]) if isinstance(lost, list) else 0)
+
+
+def _write(given: Stimuli, path: Path) -> None:
+    packets = given.packets
+    data = b"".join(p.data.ljust(PACKET_ROOM, b"\0") for p in packets)
+    press = np.array([PRESS_S, LET_GO_S]) * TICKS_PER_S
+    np.savez(
+        path,
+        allow_pickle=False,
+        duration=np.int64(given.duration),
+        edge_at=given.edges["at"],
+        edge_levels=given.edges["levels"],
+        packet_start=np.array([p.start for p in packets], dtype=np.int64),
+        packet_address=np.array([p.address for p in packets], dtype=np.uint8),
+        packet_size=np.array([len(p.data) for p in packets], dtype=np.uint8),
+        packet_data=np.frombuffer(data, dtype=np.uint8).reshape(-1, PACKET_ROOM),
+        analog=given.analog,
+        pressure=given.pressure,
+        coefficients=np.array(given.coefficients, dtype=np.int64),
+        gps_at=given.gps["at"],
+        gps_value=given.gps["levels"],
+        button_at=press.astype(np.int64),
+    )
+
+
+def _sparse(image: mmap.mmap, path: Path) -> None:
+    """Write an image without its zeros: a formatted card has less than 3 MB of anything else."""
+    with path.open("wb") as out:
+        out.write(image[: 4 * 1024 * 1024])
+        out.truncate(len(image))
+
+
+def _run(command: list[str], progress: Callable[[float], None]) -> dict[str, object]:
+    words = ""
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as running:
+        assert running.stderr is not None
+        assert running.stdout is not None
+        for line in running.stderr:
+            if line.strip().endswith(" %"):
+                progress(float(line.split()[0]) / 100.0)
+            else:
+                words += line
+        answer = running.stdout.read()
+    if running.returncode != 0:
+        last = words.strip().splitlines()[-1] if words.strip() else "no word"
+        raise UsageError(f"the chip simulator ended with {running.returncode}: {last}")
+    summary: dict[str, object] = json.loads(answer)
+    return summary
