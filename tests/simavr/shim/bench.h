@@ -8,114 +8,120 @@
 
 #define BENCH_API __attribute__((visibility("default")))
 
-typedef void (*bench_callback)(uint32_t kind, uint32_t source, uint64_t cycle,
-                               uint32_t value);
+typedef void (*bench_callback)(uint32_t kind, uint32_t source, uint64_t cycle, uint32_t value);
 
 enum { kCallbackTimer = 100, kCallbackI2c = 101 };
 
-BENCH_API chip *bench_create(uint64_t seed);
-BENCH_API void bench_destroy(chip *c);
-BENCH_API void bench_on_event(chip *c, bench_callback callback);
-BENCH_API void bench_set_startup(chip *c, uint32_t cycles, uint32_t reset_pc);
+BENCH_API chip* bench_create(uint64_t seed);
+BENCH_API void bench_destroy(chip* c);
+BENCH_API void bench_on_event(chip* c, bench_callback callback);
+BENCH_API void bench_set_startup(chip* c, uint32_t cycles, uint32_t reset_pc);
 
-BENCH_API void bench_run(chip *c, uint64_t until);
-BENCH_API void bench_stop(chip *c);
-BENCH_API uint64_t bench_cycle(const chip *c);
-BENCH_API void bench_timer(chip *c, uint64_t cycle, uint32_t id);
+BENCH_API void bench_run(chip* c, uint64_t until);
+BENCH_API void bench_stop(chip* c);
+BENCH_API uint64_t bench_cycle(const chip* c);
+BENCH_API void bench_timer(chip* c, uint64_t cycle, uint32_t id);
 
-BENCH_API void bench_power_on(chip *c);
-BENCH_API void bench_power_off(chip *c);
-BENCH_API void bench_assert_reset(chip *c, uint32_t cause);
-BENCH_API void bench_release_reset(chip *c, uint32_t cause);
-BENCH_API int
-bench_state(const chip *c); // 0 off, 1 held in reset, 2 running, 3 sleeping
+BENCH_API void bench_power_on(chip* c);
+BENCH_API void bench_power_off(chip* c);
+BENCH_API void bench_assert_reset(chip* c, uint32_t cause);
+BENCH_API void bench_release_reset(chip* c, uint32_t cause);
+BENCH_API int bench_state(const chip* c);  // 0 off, 1 held in reset, 2 running, 3 sleeping
 
-BENCH_API uint8_t *bench_flash(chip *c);
-BENCH_API uint8_t *bench_data(chip *c);
-BENCH_API uint8_t *bench_eeprom(chip *c);
-BENCH_API uint32_t bench_pc(const chip *c);
-BENCH_API uint32_t bench_sp(const chip *c);
-BENCH_API uint32_t bench_lowest_sp(const chip *c);
-BENCH_API void bench_poke_pc(chip *c, uint32_t pc);
-BENCH_API void bench_load(const chip *c,
-                          uint64_t cycles[3]); // running, sleeping, held
-BENCH_API const vector_stats *bench_vector(const chip *c, uint32_t vector);
-BENCH_API void bench_clear_statistics(chip *c);
-BENCH_API void bench_log_interrupts(chip *c, bool on);
-BENCH_API void bench_log_marks(chip *c, bool on);
-BENCH_API void bench_watch_pc(chip *c, uint32_t address,
-                              uint32_t number); // 0: no more
+BENCH_API uint8_t* bench_flash(chip* c);
+BENCH_API uint8_t* bench_data(chip* c);
+BENCH_API uint8_t* bench_eeprom(chip* c);
+BENCH_API uint32_t bench_pc(const chip* c);
+BENCH_API uint32_t bench_sp(const chip* c);
+BENCH_API uint32_t bench_lowest_sp(const chip* c);
+BENCH_API void bench_poke_pc(chip* c, uint32_t pc);
+BENCH_API void bench_load(const chip* c,
+                          uint64_t cycles[3]);  // running, sleeping, held
+BENCH_API const vector_stats* bench_vector(const chip* c, uint32_t vector);
+BENCH_API void bench_clear_statistics(chip* c);
+BENCH_API void bench_log_interrupts(chip* c, bool on);
+BENCH_API void bench_log_marks(chip* c, bool on);
+BENCH_API void bench_watch_pc(chip* c, uint32_t address,
+                              uint32_t number);  // 0: no more
 
-BENCH_API size_t bench_log_count(const chip *c);
-BENCH_API const log_record *bench_log(const chip *c);
-BENCH_API void bench_clear_log(chip *c);
+BENCH_API size_t bench_log_count(const chip* c);
+BENCH_API const log_record* bench_log(const chip* c);
+BENCH_API void bench_clear_log(chip* c);
 
-BENCH_API void bench_pin_watch(chip *c, uint32_t pin, bool log, bool notify);
-BENCH_API bool bench_pin_level(const chip *c, uint32_t pin);
-BENCH_API bool bench_pin_driven(const chip *c, uint32_t pin);
-BENCH_API void bench_pin_strong(chip *c, uint32_t pin, uint32_t drive);
-BENCH_API void bench_pin_weak(chip *c, uint32_t pin, uint32_t drive);
-BENCH_API void bench_pin_strong_at(chip *c, uint64_t cycle, uint32_t pin,
-                                   uint32_t drive);
-BENCH_API void bench_pin_pull_low(chip *c, uint32_t pin, bool low);
+BENCH_API void bench_pin_watch(chip* c, uint32_t pin, bool log, bool notify);
+BENCH_API bool bench_pin_level(const chip* c, uint32_t pin);
+BENCH_API bool bench_pin_driven(const chip* c, uint32_t pin);
+BENCH_API void bench_pin_strong(chip* c, uint32_t pin, uint32_t drive);
+BENCH_API void bench_pin_weak(chip* c, uint32_t pin, uint32_t drive);
+BENCH_API void bench_pin_strong_at(chip* c, uint64_t cycle, uint32_t pin, uint32_t drive);
+BENCH_API void bench_pin_pull_low(chip* c, uint32_t pin, bool low);
 
-BENCH_API void bench_analog_set(chip *c, uint32_t channel, const double *cycles,
-                                const double *volts, uint32_t count);
-BENCH_API void bench_analog_noise(chip *c, uint32_t channel, double lsb);
-BENCH_API void bench_analog_supply(chip *c, double avcc, double aref,
-                                   double bandgap);
-BENCH_API uint64_t bench_adc_conversions(const chip *c);
+BENCH_API void bench_analog_set(
+    chip* c, uint32_t channel, const double* cycles, const double* volts, uint32_t count);
+BENCH_API void bench_analog_noise(chip* c, uint32_t channel, double lsb);
+BENCH_API void bench_analog_supply(chip* c, double avcc, double aref, double bandgap);
+BENCH_API uint64_t bench_adc_conversions(const chip* c);
 
-BENCH_API void bench_uart_send(chip *c, uint32_t port, const uint8_t *bytes,
-                               uint32_t count, double bit_cycles,
+BENCH_API void bench_uart_send(chip* c,
+                               uint32_t port,
+                               const uint8_t* bytes,
+                               uint32_t count,
+                               double bit_cycles,
                                uint64_t from_cycle);
-BENCH_API void bench_uart_notify(chip *c, uint32_t port, bool on);
-BENCH_API uint64_t bench_uart_lost(const chip *c, uint32_t port);
+BENCH_API void bench_uart_notify(chip* c, uint32_t port, bool on);
+BENCH_API uint64_t bench_uart_lost(const chip* c, uint32_t port);
 
-BENCH_API void bench_twi_send(chip *c, uint64_t start, uint32_t id,
-                              uint32_t address, const uint8_t *bytes,
-                              uint32_t count, uint32_t scl_cycles,
-                              uint32_t abort_kind, uint32_t abort_after);
-BENCH_API void bench_twi_hold(chip *c, bool sda, bool scl);
+BENCH_API void bench_twi_send(chip* c,
+                              uint64_t start,
+                              uint32_t id,
+                              uint32_t address,
+                              const uint8_t* bytes,
+                              uint32_t count,
+                              uint32_t scl_cycles,
+                              uint32_t abort_kind,
+                              uint32_t abort_after);
+BENCH_API void bench_twi_hold(chip* c, bool sda, bool scl);
 
 // Devices on bit-banged I2C: a file of 256 registers with automatic increment.
 typedef struct i2c_device i2c_device;
-BENCH_API i2c_device *bench_i2c_device(chip *c, uint32_t id, uint32_t address,
-                                       uint32_t sda_pin, uint32_t scl_pin);
-BENCH_API uint8_t *bench_i2c_registers(i2c_device *d);
-BENCH_API void bench_i2c_present(i2c_device *d, bool present);
-BENCH_API uint32_t
-bench_i2c_fastest(const i2c_device *d); // shortest SCL period seen, cycles
+BENCH_API i2c_device* bench_i2c_device(
+    chip* c, uint32_t id, uint32_t address, uint32_t sda_pin, uint32_t scl_pin);
+BENCH_API uint8_t* bench_i2c_registers(i2c_device* d);
+BENCH_API void bench_i2c_present(i2c_device* d, bool present);
+BENCH_API uint32_t bench_i2c_fastest(const i2c_device* d);  // shortest SCL period seen, cycles
 
 // SD card in SPI mode on a memory the caller owns.
 typedef struct sd_card sd_card;
 typedef struct sd_settings {
   uint32_t blocks;
-  uint32_t high_capacity; // block addresses
-  uint32_t version_1;     // knows no CMD8
-  uint32_t busy_cycles;   // after every block written
-  uint32_t read_cycles;   // before every block read
-  uint32_t init_cycles;   // ACMD41 answers idle for so long
+  uint32_t high_capacity;  // block addresses
+  uint32_t version_1;      // knows no CMD8
+  uint32_t busy_cycles;    // after every block written
+  uint32_t read_cycles;    // before every block read
+  uint32_t init_cycles;    // ACMD41 answers idle for so long
   uint32_t erase_cycles;
-  uint32_t response_bytes; // 0xFF before R1, 1..8
+  uint32_t response_bytes;  // 0xFF before R1, 1..8
 } sd_settings;
 typedef struct sd_counters {
   uint64_t commands, written, read, rejected, lost, bytes_ignored, erased;
 } sd_counters;
-BENCH_API sd_card *bench_sd_card(chip *c, uint32_t cs_pin, uint8_t *memory,
-                                 const sd_settings *settings, uint64_t seed);
-BENCH_API void bench_sd_insert(sd_card *s, bool present);
-BENCH_API void bench_sd_stall(sd_card *s, uint64_t from_cycle, uint32_t cycles);
-BENCH_API void bench_sd_reject(sd_card *s, uint64_t from_cycle, uint32_t count,
-                               uint32_t token);
-BENCH_API void bench_sd_power_cut(sd_card *s);
-BENCH_API bool bench_sd_busy(const sd_card *s);
-BENCH_API void bench_sd_counters(const sd_card *s, sd_counters *out);
+BENCH_API sd_card* bench_sd_card(
+    chip* c, uint32_t cs_pin, uint8_t* memory, const sd_settings* settings, uint64_t seed);
+BENCH_API void bench_sd_insert(sd_card* s, bool present);
+BENCH_API void bench_sd_stall(sd_card* s, uint64_t from_cycle, uint32_t cycles);
+BENCH_API void bench_sd_reject(sd_card* s, uint64_t from_cycle, uint32_t count, uint32_t token);
+BENCH_API void bench_sd_power_cut(sd_card* s);
+BENCH_API bool bench_sd_busy(const sd_card* s);
+BENCH_API void bench_sd_counters(const sd_card* s, sd_counters* out);
 
 // Module entries behind this interface.
-double adc_channel_volt(chip *c, uint8_t number, uint64_t cycle);
-void uart_send(chip *c, uint8_t number, const uint8_t *bytes, uint32_t count,
-               uint64_t bit_256, uint64_t from_cycle);
-void interrupt_returned(struct avr_irq_t *irq, uint32_t value, void *param);
+double adc_channel_volt(chip* c, uint8_t number, uint64_t cycle);
+void uart_send(chip* c,
+               uint8_t number,
+               const uint8_t* bytes,
+               uint32_t count,
+               uint64_t bit_256,
+               uint64_t from_cycle);
+void interrupt_returned(struct avr_irq_t* irq, uint32_t value, void* param);
 
-#endif // SIMAVR_BENCH_BENCH_H_
+#endif  // SIMAVR_BENCH_BENCH_H_

@@ -7,13 +7,13 @@
 enum state { kIdle, kAddress, kRegister, kWrite, kRead, kIgnore };
 
 struct i2c_device {
-  chip *c;
+  chip* c;
   uint32_t id;
   uint8_t address, sda_pin, scl_pin;
   uint8_t registers[256];
   uint8_t pointer;
   bool present;
-  bool pulling; // this device holds SDA low
+  bool pulling;  // this device holds SDA low
   bool acknowledging;
   uint8_t state, bits, shift;
   bool sda, scl;
@@ -21,14 +21,13 @@ struct i2c_device {
   uint32_t fastest;
 };
 
-static void pull(i2c_device *d, bool low) {
-  if (d->pulling == low)
-    return;
+static void pull(i2c_device* d, bool low) {
+  if (d->pulling == low) return;
   d->pulling = low;
   pin_pull_low(d->c, d->sda_pin, low);
 }
 
-static void start(i2c_device *d) {
+static void start(i2c_device* d) {
   d->state = kAddress;
   d->bits = 0;
   d->shift = 0;
@@ -36,52 +35,49 @@ static void start(i2c_device *d) {
   pull(d, false);
 }
 
-static void give_bit(i2c_device *d) {
+static void give_bit(i2c_device* d) {
   const bool bit = (d->shift & 0x80) != 0;
   d->shift = (uint8_t)(d->shift << 1);
   pull(d, !bit);
 }
 
 // Takes the byte just shifted in; tells whether to acknowledge.
-static bool take(i2c_device *d) {
+static bool take(i2c_device* d) {
   switch ((enum state)d->state) {
-  case kAddress:
-    if (!d->present || d->shift >> 1 != d->address) {
-      d->state = kIgnore;
+    case kAddress:
+      if (!d->present || d->shift >> 1 != d->address) {
+        d->state = kIgnore;
+        return false;
+      }
+      d->state = d->shift & 1 ? kRead : kRegister;
+      return true;
+    case kRegister:
+      d->pointer = d->shift;
+      d->state = kWrite;
+      return true;
+    case kWrite: {
+      const uint8_t number = d->pointer++;
+      d->registers[number] = d->shift;
+      if (d->c->callback) {
+        d->c->callback(kCallbackI2c, d->id, chip_now(d->c), (uint32_t)(number << 8 | d->shift));
+      }
+      return true;
+    }
+    default:
       return false;
-    }
-    d->state = d->shift & 1 ? kRead : kRegister;
-    return true;
-  case kRegister:
-    d->pointer = d->shift;
-    d->state = kWrite;
-    return true;
-  case kWrite: {
-    const uint8_t number = d->pointer++;
-    d->registers[number] = d->shift;
-    if (d->c->callback) {
-      d->c->callback(kCallbackI2c, d->id, chip_now(d->c),
-                     (uint32_t)(number << 8 | d->shift));
-    }
-    return true;
-  }
-  default:
-    return false;
   }
 }
 
-static void clock_rises(i2c_device *d) {
+static void clock_rises(i2c_device* d) {
   const uint64_t now = chip_now(d->c);
   if (d->last_rise && d->state != kIdle && now - d->last_rise < d->fastest) {
     d->fastest = (uint32_t)(now - d->last_rise);
   }
   d->last_rise = now;
-  if (d->state == kIdle || d->state == kIgnore)
-    return;
+  if (d->state == kIdle || d->state == kIgnore) return;
   if (d->state == kRead) {
     // ninth bit: the master's acknowledge
-    if (d->bits == 9 && d->sda)
-      d->state = kIgnore;
+    if (d->bits == 9 && d->sda) d->state = kIgnore;
     return;
   }
   if (d->bits < 8) {
@@ -90,30 +86,29 @@ static void clock_rises(i2c_device *d) {
   }
 }
 
-static void clock_falls(i2c_device *d) {
+static void clock_falls(i2c_device* d) {
   switch ((enum state)d->state) {
-  case kIdle:
-    return;
-  case kIgnore:
-    pull(d, false);
-    return;
-  case kRead:
-    if (d->acknowledging ||
-        d->bits == 9) { // address acknowledged, or the master wants more
-      d->acknowledging = false;
-      d->shift = d->registers[d->pointer++];
-      d->bits = 1;
-      give_bit(d);
-    } else if (d->bits == 8) {
-      d->bits = 9;
+    case kIdle:
+      return;
+    case kIgnore:
       pull(d, false);
-    } else {
-      d->bits++;
-      give_bit(d);
-    }
-    return;
-  default:
-    break;
+      return;
+    case kRead:
+      if (d->acknowledging || d->bits == 9) {  // address acknowledged, or the master wants more
+        d->acknowledging = false;
+        d->shift = d->registers[d->pointer++];
+        d->bits = 1;
+        give_bit(d);
+      } else if (d->bits == 8) {
+        d->bits = 9;
+        pull(d, false);
+      } else {
+        d->bits++;
+        give_bit(d);
+      }
+      return;
+    default:
+      break;
   }
   if (d->acknowledging) {
     d->acknowledging = false;
@@ -129,12 +124,11 @@ static void clock_falls(i2c_device *d) {
   }
 }
 
-static void line_changed(chip *c, void *param, uint8_t number, bool level) {
+static void line_changed(chip* c, void* param, uint8_t number, bool level) {
   (void)c;
-  i2c_device *const d = param;
+  i2c_device* const d = param;
   if (number == d->scl_pin) {
-    if (level == d->scl)
-      return;
+    if (level == d->scl) return;
     d->scl = level;
     if (level)
       clock_rises(d);
@@ -142,11 +136,9 @@ static void line_changed(chip *c, void *param, uint8_t number, bool level) {
       clock_falls(d);
     return;
   }
-  if (level == d->sda)
-    return;
+  if (level == d->sda) return;
   d->sda = level;
-  if (!d->scl || d->pulling)
-    return;
+  if (!d->scl || d->pulling) return;
   if (!level) {
     start(d);
   } else {
@@ -154,9 +146,9 @@ static void line_changed(chip *c, void *param, uint8_t number, bool level) {
   }
 }
 
-i2c_device *bench_i2c_device(chip *c, uint32_t id, uint32_t address,
-                             uint32_t sda_pin, uint32_t scl_pin) {
-  i2c_device *const d = chip_allocate(c, sizeof *d);
+i2c_device* bench_i2c_device(
+    chip* c, uint32_t id, uint32_t address, uint32_t sda_pin, uint32_t scl_pin) {
+  i2c_device* const d = chip_allocate(c, sizeof *d);
   d->c = c;
   d->id = id;
   d->address = (uint8_t)address;
@@ -174,9 +166,11 @@ i2c_device *bench_i2c_device(chip *c, uint32_t id, uint32_t address,
   return d;
 }
 
-uint8_t *bench_i2c_registers(i2c_device *d) { return d->registers; }
+uint8_t* bench_i2c_registers(i2c_device* d) {
+  return d->registers;
+}
 
-void bench_i2c_present(i2c_device *d, bool present) {
+void bench_i2c_present(i2c_device* d, bool present) {
   d->present = present;
   if (!present) {
     pull(d, false);
@@ -184,4 +178,6 @@ void bench_i2c_present(i2c_device *d, bool present) {
   }
 }
 
-uint32_t bench_i2c_fastest(const i2c_device *d) { return d->fastest; }
+uint32_t bench_i2c_fastest(const i2c_device* d) {
+  return d->fastest;
+}

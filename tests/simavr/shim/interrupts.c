@@ -5,35 +5,36 @@
 
 #include "chip.h"
 
-static void define(chip *c, uint8_t vector, uint16_t enable_reg,
-                   uint8_t enable_bit, uint16_t flag_reg, uint8_t flag_bit,
+static void define(chip* c,
+                   uint8_t vector,
+                   uint16_t enable_reg,
+                   uint8_t enable_bit,
+                   uint16_t flag_reg,
+                   uint8_t flag_bit,
                    bool level) {
-  c->vectors[vector] =
-      (vector_info){enable_reg, flag_reg, enable_bit, flag_bit, level};
+  c->vectors[vector] = (vector_info){enable_reg, flag_reg, enable_bit, flag_bit, level};
 }
 
-static void timer_vectors(chip *c, uint8_t number, uint8_t first, bool wide) {
+static void timer_vectors(chip* c, uint8_t number, uint8_t first, bool wide) {
   const uint16_t enable = (uint16_t)(REG_TIMSK0 + number);
   const uint16_t flag = (uint16_t)(REG_TIFR0 + number);
   uint8_t vector = first;
-  if (wide)
-    define(c, vector++, enable, 5, flag, 5, false); // capture
+  if (wide) define(c, vector++, enable, 5, flag, 5, false);  // capture
   const uint8_t channels = wide ? 3 : 2;
   for (uint8_t i = 0; i < channels; i++) {
-    define(c, vector++, enable, (uint8_t)(i + 1), flag, (uint8_t)(i + 1),
-           false);
+    define(c, vector++, enable, (uint8_t)(i + 1), flag, (uint8_t)(i + 1), false);
   }
-  define(c, vector, enable, 0, flag, 0, false); // overflow
+  define(c, vector, enable, 0, flag, 0, false);  // overflow
 }
 
-static void uart_vectors(chip *c, uint16_t base, uint8_t first) {
+static void uart_vectors(chip* c, uint16_t base, uint8_t first) {
   const uint16_t b = (uint16_t)(base + 1);
-  define(c, first, b, 7, base, 7, true);                 // RXC
-  define(c, (uint8_t)(first + 1), b, 5, base, 5, true);  // UDRE
-  define(c, (uint8_t)(first + 2), b, 6, base, 6, false); // TXC
+  define(c, first, b, 7, base, 7, true);                  // RXC
+  define(c, (uint8_t)(first + 1), b, 5, base, 5, true);   // UDRE
+  define(c, (uint8_t)(first + 2), b, 6, base, 6, false);  // TXC
 }
 
-void interrupts_init(chip *c) {
+void interrupts_init(chip* c) {
   for (uint8_t i = 0; i < 8; i++) {
     define(c, (uint8_t)(kVectorInt0 + i), REG_EIMSK, i, REG_EIFR, i, false);
   }
@@ -48,100 +49,89 @@ void interrupts_init(chip *c) {
   uart_vectors(c, REG_UCSR0A, 25);
   define(c, kVectorAdc, REG_ADCSRA, 3, REG_ADCSRA, 4, false);
   define(c, kVectorEeReady, REG_EECR, 3, REG_EECR, 1,
-         true); // requests while EEPE is clear
+         true);  // requests while EEPE is clear
   timer_vectors(c, 3, 31, true);
   uart_vectors(c, REG_UCSR1A, 36);
   define(c, kVectorTwi, REG_TWCR, 0, REG_TWCR, 7, true);
   define(c, kVectorSpmReady, REG_SPMCSR, 7, REG_SPMCSR, 0,
-         true); // while SPMEN is clear
+         true);  // while SPMEN is clear
   timer_vectors(c, 4, 41, true);
   timer_vectors(c, 5, 46, true);
   uart_vectors(c, REG_UCSR2A, 51);
   uart_vectors(c, REG_UCSR3A, 54);
 }
 
-void interrupts_reset(chip *c) {
+void interrupts_reset(chip* c) {
   c->pending = 0;
   c->external_low = 0;
   c->active_count = 0;
 }
 
-static void refresh_at(chip *c, uint8_t vector, uint64_t cycle) {
-  const vector_info *const v = &c->vectors[vector];
-  if (v->enable_reg == 0)
-    return;
-  const uint8_t *const data = c->avr->data;
+static void refresh_at(chip* c, uint8_t vector, uint64_t cycle) {
+  const vector_info* const v = &c->vectors[vector];
+  if (v->enable_reg == 0) return;
+  const uint8_t* const data = c->avr->data;
   bool flag = (data[v->flag_reg] >> v->flag_bit) & 1;
-  if (vector == kVectorEeReady || vector == kVectorSpmReady)
-    flag = !flag;
+  if (vector == kVectorEeReady || vector == kVectorSpmReady) flag = !flag;
   if (vector >= kVectorInt0 && vector < kVectorInt0 + 8) {
     flag = flag || ((c->external_low >> (vector - kVectorInt0)) & 1);
   }
   const bool wanted = flag && ((data[v->enable_reg] >> v->enable_bit) & 1);
   const uint64_t bit = UINT64_C(1) << vector;
-  if (wanted == ((c->pending & bit) != 0))
-    return;
+  if (wanted == ((c->pending & bit) != 0)) return;
   if (wanted) {
     c->pending |= bit;
     c->pending_since[vector] = cycle;
-    c->avr->run_cycle_count = 0; // ends the burst after this instruction
+    c->avr->run_cycle_count = 0;  // ends the burst after this instruction
   } else {
     c->pending &= ~bit;
   }
 }
 
-void interrupt_refresh(chip *c, uint8_t vector) {
+void interrupt_refresh(chip* c, uint8_t vector) {
   refresh_at(c, vector, chip_now(c));
 }
 
-void interrupt_flag(chip *c, uint8_t vector, uint64_t cycle) {
-  const vector_info *const v = &c->vectors[vector];
+void interrupt_flag(chip* c, uint8_t vector, uint64_t cycle) {
+  const vector_info* const v = &c->vectors[vector];
   c->avr->data[v->flag_reg] |= (uint8_t)(1u << v->flag_bit);
   refresh_at(c, vector, cycle);
 }
 
-static void count(uint32_t *bins, uint64_t *sum, uint64_t *max,
-                  uint64_t cycles) {
+static void count(uint32_t* bins, uint64_t* sum, uint64_t* max, uint64_t cycles) {
   bins[cycles < kLatencyBins ? cycles : kLatencyBins - 1]++;
   *sum += cycles;
-  if (cycles > *max)
-    *max = cycles;
+  if (cycles > *max) *max = cycles;
 }
 
-void interrupt_service(chip *c, bool from_sleep) {
-  avr_t *const avr = c->avr;
+void interrupt_service(chip* c, bool from_sleep) {
+  avr_t* const avr = c->avr;
   const uint8_t vector = (uint8_t)__builtin_ctzll(c->pending);
   const uint64_t begun = avr->cycle;
   _avr_push_addr(avr, avr->pc);
   avr_sreg_set(avr, S_I, 0);
   avr->pc = (avr_flashaddr_t)vector * 4;
-  if (avr->data[REG_MCUCR] & 0x02)
-    avr->pc += 0x3E000; // IVSEL: vectors of the boot section
+  if (avr->data[REG_MCUCR] & 0x02) avr->pc += 0x3E000;  // IVSEL: vectors of the boot section
   avr->cycle += from_sleep ? 9 : 5;
   c->running_cycles += avr->cycle - begun;
 
-  vector_stats *const s = &c->stats[vector];
+  vector_stats* const s = &c->stats[vector];
   s->count++;
   const uint64_t since = c->pending_since[vector];
-  count(s->latency, &s->latency_sum, &s->latency_max,
-        avr->cycle > since ? avr->cycle - since : 0);
+  count(s->latency, &s->latency_sum, &s->latency_max, avr->cycle > since ? avr->cycle - since : 0);
   if (c->active_count < 128) {
     c->active[c->active_count].vector = vector;
     c->active[c->active_count].entered = avr->cycle;
     c->active_count++;
-    if (c->active_count > s->nested_max)
-      s->nested_max = c->active_count;
+    if (c->active_count > s->nested_max) s->nested_max = c->active_count;
   }
   const uint16_t sp = _avr_sp_get(avr);
-  if (sp < c->lowest_sp)
-    c->lowest_sp = sp;
-  if (c->log_interrupts)
-    log_add_at(c, avr->cycle, kLogInterrupt, vector, 1);
+  if (sp < c->lowest_sp) c->lowest_sp = sp;
+  if (c->log_interrupts) log_add_at(c, avr->cycle, kLogInterrupt, vector, 1);
 
-  const vector_info *const v = &c->vectors[vector];
+  const vector_info* const v = &c->vectors[vector];
   if (v->level) {
-    c->pending_since[vector] =
-        avr->cycle; // still asked for: a second entry counts from here
+    c->pending_since[vector] = avr->cycle;  // still asked for: a second entry counts from here
     return;
   }
   avr->data[v->flag_reg] &= (uint8_t) ~(1u << v->flag_bit);
@@ -155,18 +145,15 @@ void interrupt_service(chip *c, bool from_sleep) {
 
 // The core reports RETI through its own "running" line; the length runs to the
 // end of RETI (5).
-void interrupt_returned(struct avr_irq_t *irq, uint32_t value, void *param) {
+void interrupt_returned(struct avr_irq_t* irq, uint32_t value, void* param) {
   (void)irq;
   (void)value;
-  chip *const c = param;
-  if (c->active_count == 0)
-    return;
+  chip* const c = param;
+  if (c->active_count == 0) return;
   c->active_count--;
   const uint8_t vector = c->active[c->active_count].vector;
-  vector_stats *const s = &c->stats[vector];
-  const uint64_t cycles =
-      c->avr->cycle + 5 - c->active[c->active_count].entered;
+  vector_stats* const s = &c->stats[vector];
+  const uint64_t cycles = c->avr->cycle + 5 - c->active[c->active_count].entered;
   count(s->length, &s->length_sum, &s->length_max, cycles);
-  if (c->log_interrupts)
-    log_add_at(c, c->avr->cycle + 5, kLogInterrupt, vector, 0);
+  if (c->log_interrupts) log_add_at(c, c->avr->cycle + 5, kLogInterrupt, vector, 0);
 }

@@ -4,51 +4,47 @@
 
 #include "chip.h"
 
-void log_add_at(chip *c, uint64_t cycle, uint16_t kind, uint32_t source,
-                uint32_t value) {
+void log_add_at(chip* c, uint64_t cycle, uint16_t kind, uint32_t source, uint32_t value) {
   if (c->log_count == c->log_capacity) {
     c->log_capacity = c->log_capacity ? 2 * c->log_capacity : 4096;
     c->log = realloc(c->log, c->log_capacity * sizeof *c->log);
-    if (!c->log)
-      abort();
+    if (!c->log) abort();
   }
   c->log[c->log_count++] = (log_record){cycle, kind, (uint16_t)source, value};
 }
 
-void log_add(chip *c, uint16_t kind, uint32_t source, uint32_t value) {
+void log_add(chip* c, uint16_t kind, uint32_t source, uint32_t value) {
   log_add_at(c, chip_now(c), kind, source, value);
 }
 
-void fault_add(chip *c, enum fault what, uint32_t detail) {
+void fault_add(chip* c, enum fault what, uint32_t detail) {
   // A runaway program raises thousands: the first hundred tell the story, the
   // count tells the rest.
-  if (c->fault_count++ < 100)
-    log_add(c, kLogFault, (uint32_t)what, detail);
+  if (c->fault_count++ < 100) log_add(c, kLogFault, (uint32_t)what, detail);
 }
 
 typedef struct owned {
-  struct owned *next;
+  struct owned* next;
   max_align_t bytes[];
 } owned;
 
-void *chip_allocate(chip *c, size_t size) {
-  owned *const block = calloc(1, sizeof *block + size);
-  if (!block)
-    abort();
+void* chip_allocate(chip* c, size_t size) {
+  owned* const block = calloc(1, sizeof *block + size);
+  if (!block) abort();
   block->next = c->owned;
   c->owned = block;
   return block->bytes;
 }
 
-void chip_free_owned(chip *c) {
+void chip_free_owned(chip* c) {
   while (c->owned) {
-    owned *const block = c->owned;
+    owned* const block = c->owned;
     c->owned = block->next;
     free(block);
   }
 }
 
-uint32_t chip_random(chip *c) {
+uint32_t chip_random(chip* c) {
   // xorshift64*: Vigna, "An experimental exploration of Marsaglia's xorshift
   // generators", 2016
   c->random_state ^= c->random_state >> 12;

@@ -10,11 +10,11 @@ enum { kEempe = 0x04, kEepe = 0x02, kEere = 0x01 };
 // ---- EEPROM
 // ---------------------------------------------------------------------------------
 
-static void eeprom_done(chip *c, void *param, uint64_t argument) {
+static void eeprom_done(chip* c, void* param, uint64_t argument) {
   (void)param, (void)argument;
   c->eeprom.programming = false;
   c->avr->data[REG_EECR] &= (uint8_t)~kEepe;
-  uint8_t *const cell = &c->eeprom.memory[c->eeprom.address];
+  uint8_t* const cell = &c->eeprom.memory[c->eeprom.address];
   if (c->eeprom.mode == 1)
     *cell = 0xFF;
   else if (c->eeprom.mode == 2)
@@ -24,24 +24,21 @@ static void eeprom_done(chip *c, void *param, uint64_t argument) {
   interrupt_refresh(c, kVectorEeReady);
 }
 
-static void eeprom_window_over(chip *c, void *param, uint64_t argument) {
+static void eeprom_window_over(chip* c, void* param, uint64_t argument) {
   (void)param, (void)argument;
   c->avr->data[REG_EECR] &= (uint8_t)~kEempe;
 }
 
-static void write_eecr(chip *c, uint16_t address, uint8_t value, void *param) {
+static void write_eecr(chip* c, uint16_t address, uint8_t value, void* param) {
   (void)param;
-  uint8_t *const control = &c->avr->data[address];
+  uint8_t* const control = &c->avr->data[address];
   const uint16_t cell =
-      (uint16_t)((c->avr->data[REG_EEARL] | c->avr->data[REG_EEARH] << 8) &
-                 0xFFF);
+      (uint16_t)((c->avr->data[REG_EEARL] | c->avr->data[REG_EEARH] << 8) & 0xFFF);
   const bool armed = (*control & kEempe) != 0;
   const bool busy = c->eeprom.programming;
-  *control =
-      (uint8_t)((*control & (kEempe | kEepe)) | (value & (busy ? 0x08 : 0x38)));
+  *control = (uint8_t)((*control & (kEempe | kEepe)) | (value & (busy ? 0x08 : 0x38)));
   if ((value & kEepe) && armed && !busy) {
-    static const uint32_t kCycles[4] = {54400, 28800, 28800,
-                                        54400}; // 3.4, 1.8, 1.8 ms
+    static const uint32_t kCycles[4] = {54400, 28800, 28800, 54400};  // 3.4, 1.8, 1.8 ms
     c->eeprom.mode = (value >> 4) & 3;
     c->eeprom.programming = true;
     c->eeprom.address = cell;
@@ -53,7 +50,7 @@ static void write_eecr(chip *c, uint16_t address, uint8_t value, void *param) {
   } else if ((value & kEempe) && !armed) {
     *control |= kEempe;
     event_at(c, &c->eeprom.window,
-             chip_now(c) + 2 + 4); // SBI takes two, then four cycles
+             chip_now(c) + 2 + 4);  // SBI takes two, then four cycles
   }
   if ((value & kEere) && !busy) {
     c->avr->data[REG_EEDR] = c->eeprom.memory[cell];
@@ -62,23 +59,21 @@ static void write_eecr(chip *c, uint16_t address, uint8_t value, void *param) {
   interrupt_refresh(c, kVectorEeReady);
 }
 
-void eeprom_init(chip *c) {
+void eeprom_init(chip* c) {
   memset(c->eeprom.memory, 0xFF, sizeof c->eeprom.memory);
   c->eeprom.due.run = eeprom_done;
   c->eeprom.window.run = eeprom_window_over;
   hook_write(c, REG_EECR, write_eecr, NULL);
 }
 
-void eeprom_reset(chip *c) {
+void eeprom_reset(chip* c) {
   // A write that has begun finishes through a reset (datasheet 8.6.3).
-  if (c->eeprom.programming)
-    c->avr->data[REG_EECR] |= kEepe;
+  if (c->eeprom.programming) c->avr->data[REG_EECR] |= kEepe;
   event_cancel(c, &c->eeprom.window);
 }
 
-void eeprom_power_lost(chip *c) {
-  if (!c->eeprom.programming)
-    return;
+void eeprom_power_lost(chip* c) {
+  if (!c->eeprom.programming) return;
   c->eeprom.programming = false;
   event_cancel(c, &c->eeprom.due);
   c->eeprom.memory[c->eeprom.address] = (uint8_t)chip_random(c);
@@ -87,14 +82,13 @@ void eeprom_power_lost(chip *c) {
 // ---- Watchdog
 // -------------------------------------------------------------------------------
 
-static uint64_t watchdog_cycles(const chip *c) {
+static uint64_t watchdog_cycles(const chip* c) {
   const uint8_t r = c->avr->data[REG_WDTCSR];
   const uint8_t select = (uint8_t)((r & 7) | ((r >> 2) & 8));
-  return (UINT64_C(2048) << (select > 9 ? 9 : select)) *
-         125; // 128 kHz against 16 MHz
+  return (UINT64_C(2048) << (select > 9 ? 9 : select)) * 125;  // 128 kHz against 16 MHz
 }
 
-void watchdog_feed(chip *c) {
+void watchdog_feed(chip* c) {
   if (c->avr->data[REG_WDTCSR] & 0x48) {
     event_at(c, &c->watchdog.due, chip_now(c) + watchdog_cycles(c));
   } else {
@@ -102,7 +96,7 @@ void watchdog_feed(chip *c) {
   }
 }
 
-static void watchdog_due(chip *c, void *param, uint64_t argument) {
+static void watchdog_due(chip* c, void* param, uint64_t argument) {
   (void)param, (void)argument;
   const uint8_t r = c->avr->data[REG_WDTCSR];
   // In interrupt and reset mode an interrupt not served before the next
@@ -116,42 +110,37 @@ static void watchdog_due(chip *c, void *param, uint64_t argument) {
   }
 }
 
-static void write_wdtcsr(chip *c, uint16_t address, uint8_t value,
-                         void *param) {
+static void write_wdtcsr(chip* c, uint16_t address, uint8_t value, void* param) {
   (void)param;
   uint8_t r = c->avr->data[address];
   const bool open = chip_now(c) < c->watchdog.change_until;
-  if (written_ones(c, value) & 0x80)
-    r &= 0x7F; // WDIF
+  if (written_ones(c, value) & 0x80) r &= 0x7F;  // WDIF
   r = (uint8_t)((r & ~0x40) | (value & 0x40));
   if ((value & 0x18) == 0x18) {
-    c->watchdog.change_until =
-        chip_now(c) + 2 + 4; // STS takes two, then four cycles
+    c->watchdog.change_until = chip_now(c) + 2 + 4;  // STS takes two, then four cycles
     r |= 0x08;
   } else if (open) {
     r = (uint8_t)((r & 0xC0) | (value & 0x2F));
     c->watchdog.change_until = 0;
   } else if (value & 0x08) {
-    r |= 0x08; // setting WDE needs no sequence
+    r |= 0x08;  // setting WDE needs no sequence
   }
-  if (c->avr->data[REG_MCUSR] & kWatchdog)
-    r |= 0x08; // WDRF overrides WDE
+  if (c->avr->data[REG_MCUSR] & kWatchdog) r |= 0x08;  // WDRF overrides WDE
   const uint8_t before = c->avr->data[address];
   c->avr->data[address] = r;
   interrupt_refresh(c, kVectorWdt);
   // Only WDR and a new time-out start the count again; arming an interrupt does
   // not.
   const bool was_on = (before & 0x48) != 0, is_on = (r & 0x48) != 0;
-  if (was_on != is_on || ((before ^ r) & 0x27))
-    watchdog_feed(c);
+  if (was_on != is_on || ((before ^ r) & 0x27)) watchdog_feed(c);
 }
 
-static void write_mcusr(chip *c, uint16_t address, uint8_t value, void *param) {
+static void write_mcusr(chip* c, uint16_t address, uint8_t value, void* param) {
   (void)param;
-  c->avr->data[address] &= value; // flags are cleared by writing zero
+  c->avr->data[address] &= value;  // flags are cleared by writing zero
 }
 
-void watchdog_init(chip *c) {
+void watchdog_init(chip* c) {
   c->watchdog.due.run = watchdog_due;
   hook_write(c, REG_WDTCSR, write_wdtcsr, NULL);
   hook_write(c, REG_MCUSR, write_mcusr, NULL);
@@ -159,7 +148,7 @@ void watchdog_init(chip *c) {
 
 // After a watchdog reset WDE stays set with the shortest time-out: 16 ms to
 // clear it or reset again.
-void watchdog_reset_registers(chip *c) {
+void watchdog_reset_registers(chip* c) {
   c->watchdog.change_until = 0;
   c->avr->data[REG_WDTCSR] = c->avr->data[REG_MCUSR] & kWatchdog ? 0x08 : 0;
   event_cancel(c, &c->watchdog.due);
@@ -168,65 +157,53 @@ void watchdog_reset_registers(chip *c) {
 // ---- Flash
 // ----------------------------------------------------------------------------------
 
-enum {
-  kSpmen = 0x01,
-  kPgers = 0x02,
-  kPgwrt = 0x04,
-  kRwwsre = 0x10,
-  kRwwsb = 0x40
-};
+enum { kSpmen = 0x01, kPgers = 0x02, kPgwrt = 0x04, kRwwsre = 0x10, kRwwsb = 0x40 };
 
-static void flash_done(chip *c, void *param, uint64_t argument) {
+static void flash_done(chip* c, void* param, uint64_t argument) {
   (void)param, (void)argument;
   c->flash.busy = false;
   c->avr->data[REG_SPMCSR] &= (uint8_t)~0x2Fu;
   interrupt_refresh(c, kVectorSpmReady);
 }
 
-static void write_spmcsr(chip *c, uint16_t address, uint8_t value,
-                         void *param) {
+static void write_spmcsr(chip* c, uint16_t address, uint8_t value, void* param) {
   (void)param;
-  if (c->flash.busy)
-    return;
-  c->avr->data[address] =
-      (uint8_t)((c->avr->data[address] & kRwwsb) | (value & 0xBF));
+  if (c->flash.busy) return;
+  c->avr->data[address] = (uint8_t)((c->avr->data[address] & kRwwsb) | (value & 0xBF));
   if (value & kSpmen) {
     c->flash.armed_until = chip_now(c) + 2 + 4;
     event_at(c, &c->flash.due,
-             c->flash.armed_until); // the bits fall by themselves
+             c->flash.armed_until);  // the bits fall by themselves
   }
   interrupt_refresh(c, kVectorSpmReady);
 }
 
-static void program(chip *c, uint32_t page, bool erase) {
-  uint8_t *const flash = c->avr->flash + page;
+static void program(chip* c, uint32_t page, bool erase) {
+  uint8_t* const flash = c->avr->flash + page;
   for (uint32_t i = 0; i < 256; i++) {
     if (erase)
       flash[i] = 0xFF;
     else if (c->flash.filled[i])
       flash[i] &= c->flash.buffer[i];
   }
-  if (!erase)
-    memset(c->flash.filled, 0, sizeof c->flash.filled);
+  if (!erase) memset(c->flash.filled, 0, sizeof c->flash.filled);
   c->flash.busy = true;
   event_at(c, &c->flash.due,
-           chip_now(c) + 68000); // 4.25 ms, between 3.7 and 4.5
+           chip_now(c) + 68000);  // 4.25 ms, between 3.7 and 4.5
   if (page < 0x3E000)
     c->avr->data[REG_SPMCSR] |= kRwwsb;
   else
-    c->halt_cycles += 68000; // the boot section itself: the CPU stops
+    c->halt_cycles += 68000;  // the boot section itself: the CPU stops
 }
 
 // SPM, as the core reports it. Executed from the boot section only.
-void flash_store(chip *c) {
+void flash_store(chip* c) {
   const uint8_t r = c->avr->data[REG_SPMCSR];
-  if (!(r & kSpmen) || chip_now(c) > c->flash.armed_until || c->flash.busy)
-    return;
-  if (c->avr->pc < 0x3E000)
-    return;
-  const uint32_t z = (uint32_t)(c->avr->data[R_ZL] | c->avr->data[R_ZH] << 8 |
-                                c->avr->data[REG_RAMPZ] << 16) &
-                     0x3FFFF;
+  if (!(r & kSpmen) || chip_now(c) > c->flash.armed_until || c->flash.busy) return;
+  if (c->avr->pc < 0x3E000) return;
+  const uint32_t z =
+      (uint32_t)(c->avr->data[R_ZL] | c->avr->data[R_ZH] << 8 | c->avr->data[REG_RAMPZ] << 16) &
+      0x3FFFF;
   event_cancel(c, &c->flash.due);
   if (r & kPgers) {
     program(c, z & ~0xFFu, true);
@@ -235,7 +212,7 @@ void flash_store(chip *c) {
   } else if (r & kRwwsre) {
     c->avr->data[REG_SPMCSR] &= (uint8_t) ~(kRwwsb | 0x3Fu);
   } else if (r & 0x08) {
-    fault_add(c, kFaultFlash, r); // lock bits
+    fault_add(c, kFaultFlash, r);  // lock bits
     c->avr->data[REG_SPMCSR] &= (uint8_t)~0x3Fu;
   } else {
     const uint32_t at = z & 0xFE;
@@ -247,12 +224,12 @@ void flash_store(chip *c) {
   interrupt_refresh(c, kVectorSpmReady);
 }
 
-void flash_init(chip *c) {
+void flash_init(chip* c) {
   c->flash.due.run = flash_done;
   hook_write(c, REG_SPMCSR, write_spmcsr, NULL);
 }
 
-void flash_reset(chip *c) {
+void flash_reset(chip* c) {
   event_cancel(c, &c->flash.due);
   c->flash.busy = false;
   memset(c->flash.filled, 0, sizeof c->flash.filled);

@@ -72,4 +72,4 @@ enum vector {
   kVectorCount = 57,
 };
 
-#endif // SIMAVR_BENCH_REGISTERS_H_
+#endif  // SIMAVR_BENCH_REGISTERS_H_

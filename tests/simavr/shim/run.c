@@ -16,11 +16,11 @@
 // The core hands a hook one pointer; this table keeps what a module wants
 // behind it.
 typedef struct hook {
-  chip *c;
+  chip* c;
   read_fn read;
-  void *read_param;
+  void* read_param;
   write_fn write;
-  void *write_param;
+  void* write_param;
 } hook;
 
 typedef struct chip_with_hooks {
@@ -28,26 +28,24 @@ typedef struct chip_with_hooks {
   hook hooks[MAX_IOs];
 } chip_with_hooks;
 
-static hook *hook_of(chip *c, uint16_t address) {
-  return &((chip_with_hooks *)c)->hooks[AVR_DATA_TO_IO(address)];
+static hook* hook_of(chip* c, uint16_t address) {
+  return &((chip_with_hooks*)c)->hooks[AVR_DATA_TO_IO(address)];
 }
 
-static uint8_t call_read(struct avr_t *avr, avr_io_addr_t address,
-                         void *param) {
+static uint8_t call_read(struct avr_t* avr, avr_io_addr_t address, void* param) {
   (void)avr;
-  const hook *const h = param;
+  const hook* const h = param;
   return h->read(h->c, address, h->read_param);
 }
 
-static void call_write(struct avr_t *avr, avr_io_addr_t address, uint8_t value,
-                       void *param) {
+static void call_write(struct avr_t* avr, avr_io_addr_t address, uint8_t value, void* param) {
   (void)avr;
-  const hook *const h = param;
+  const hook* const h = param;
   h->write(h->c, address, value, h->write_param);
 }
 
-void hook_read(chip *c, uint16_t address, read_fn run, void *param) {
-  hook *const h = hook_of(c, address);
+void hook_read(chip* c, uint16_t address, read_fn run, void* param) {
+  hook* const h = hook_of(c, address);
   h->c = c;
   h->read = run;
   h->read_param = param;
@@ -55,8 +53,8 @@ void hook_read(chip *c, uint16_t address, read_fn run, void *param) {
   c->avr->io[AVR_DATA_TO_IO(address)].r.param = h;
 }
 
-void hook_write(chip *c, uint16_t address, write_fn run, void *param) {
-  hook *const h = hook_of(c, address);
+void hook_write(chip* c, uint16_t address, write_fn run, void* param) {
+  hook* const h = hook_of(c, address);
   h->c = c;
   h->write = run;
   h->write_param = param;
@@ -64,35 +62,31 @@ void hook_write(chip *c, uint16_t address, write_fn run, void *param) {
   c->avr->io[AVR_DATA_TO_IO(address)].w.param = h;
 }
 
-uint8_t written_ones(const chip *c, uint8_t value) {
-  const avr_t *const avr = c->avr;
+uint8_t written_ones(const chip* c, uint8_t value) {
+  const avr_t* const avr = c->avr;
   const uint32_t pc = avr->pc & avr->flashend;
   const uint16_t opcode = (uint16_t)(avr->flash[pc] | avr->flash[pc + 1] << 8);
-  if ((opcode & 0xFF00) == 0x9A00)
-    return (uint8_t)(1u << (opcode & 7)); // SBI
-  if ((opcode & 0xFF00) == 0x9800)
-    return 0; // CBI
+  if ((opcode & 0xFF00) == 0x9A00) return (uint8_t)(1u << (opcode & 7));  // SBI
+  if ((opcode & 0xFF00) == 0x9800) return 0;                              // CBI
   return value;
 }
 
 // ---- core
 // -----------------------------------------------------------------------------------
 
-static void no_sleep(struct avr_t *avr, avr_cycle_count_t cycles) {
+static void no_sleep(struct avr_t* avr, avr_cycle_count_t cycles) {
   (void)avr, (void)cycles;
 }
 
-static void core_message(struct avr_t *avr, const int level, const char *format,
-                         va_list list) {
+static void core_message(struct avr_t* avr, const int level, const char* format, va_list list) {
   (void)format, (void)list;
-  if (!avr || !avr->custom.data || level > LOG_WARNING)
-    return;
+  if (!avr || !avr->custom.data || level > LOG_WARNING) return;
   fault_add(avr->custom.data, kFaultBadAddress, avr->pc);
 }
 
-static int core_call(struct avr_io_t *io, uint32_t request, void *param) {
+static int core_call(struct avr_io_t* io, uint32_t request, void* param) {
   (void)param;
-  chip *const c = (chip *)(void *)((char *)io - offsetof(chip, hooks));
+  chip* const c = (chip*)(void*)((char*)io - offsetof(chip, hooks));
   if (request == AVR_IOCTL_WATCHDOG_RESET)
     watchdog_feed(c);
   else if (request == AVR_IOCTL_FLASH_SPM)
@@ -102,31 +96,28 @@ static int core_call(struct avr_io_t *io, uint32_t request, void *param) {
   return 0;
 }
 
-static void write_mark(chip *c, uint16_t address, uint8_t value, void *param) {
+static void write_mark(chip* c, uint16_t address, uint8_t value, void* param) {
   (void)param;
   c->avr->data[address] = value;
   if (c->log_marks)
-    log_add(c, kLogMark, address == REG_GPIOR0 ? 0 : address - REG_GPIOR1 + 1u,
-            value);
+    log_add(c, kLogMark, address == REG_GPIOR0 ? 0 : address - REG_GPIOR1 + 1u, value);
 }
 
-chip *bench_create(uint64_t seed) {
+chip* bench_create(uint64_t seed) {
   avr_global_logger_set(core_message);
-  avr_t *const avr = avr_make_mcu_by_name("atmega2560");
-  if (!avr)
-    return NULL;
-  chip_with_hooks *const whole = calloc(1, sizeof *whole);
-  if (!whole)
-    abort();
-  chip *const c = &whole->c;
+  avr_t* const avr = avr_make_mcu_by_name("atmega2560");
+  if (!avr) return NULL;
+  chip_with_hooks* const whole = calloc(1, sizeof *whole);
+  if (!whole) abort();
+  chip* const c = &whole->c;
   c->avr = avr;
   c->random_state = seed * 2 + 1;
   avr_init(avr);
   avr->custom.data = c;
   avr->frequency = 16000000;
   avr->sleep = no_sleep;
-  avr->ioend = REG_LAST_IO; // the core's own table ends here; beyond lie
-                            // reserved addresses
+  avr->ioend = REG_LAST_IO;  // the core's own table ends here; beyond lie
+                             // reserved addresses
   memset(avr->io, 0, sizeof avr->io);
   avr->io_port = NULL;
   avr->reset = NULL;
@@ -135,15 +126,13 @@ chip *bench_create(uint64_t seed) {
   c->hooks.kind = "simavr_bench";
   c->hooks.ioctl = core_call;
   avr_register_io(avr, &c->hooks);
-  avr_irq_register_notify(avr->interrupts.irq + AVR_INT_IRQ_RUNNING,
-                          interrupt_returned, c);
+  avr_irq_register_notify(avr->interrupts.irq + AVR_INT_IRQ_RUNNING, interrupt_returned, c);
   // The library writes where a wild stack pointer points: give it the whole 64
   // KiB to do so.
   free(avr->data);
   avr->data = calloc(1, 0x10000);
-  if (!avr->data)
-    abort();
-  c->startup_cycles = 16384 + 65 * 16000; // low fuse 0xFF: 16K clocks and 65 ms
+  if (!avr->data) abort();
+  c->startup_cycles = 16384 + 65 * 16000;  // low fuse 0xFF: 16K clocks and 65 ms
   c->held = true;
   interrupts_init(c);
   ports_init(c);
@@ -158,16 +147,14 @@ chip *bench_create(uint64_t seed) {
   hook_write(c, REG_GPIOR0, write_mark, NULL);
   hook_write(c, REG_GPIOR1, write_mark, NULL);
   hook_write(c, REG_GPIOR2, write_mark, NULL);
-  for (uint8_t i = 0; i < kPinCount; i++)
-    pin_refresh(c, i);
+  for (uint8_t i = 0; i < kPinCount; i++) pin_refresh(c, i);
   return c;
 }
 
-void bench_destroy(chip *c) {
+void bench_destroy(chip* c) {
   chip_free_owned(c);
   free(c->watched_pc);
-  for (int i = 0; i < 16; i++)
-    free(c->adc.channel[i].point);
+  for (int i = 0; i < 16; i++) free(c->adc.channel[i].point);
   uarts_free(c);
   twi_free(c);
   events_free(c);
@@ -179,26 +166,24 @@ void bench_destroy(chip *c) {
   free(c);
 }
 
-static void advance_to(chip *c, uint64_t cycle, uint64_t *account) {
+static void advance_to(chip* c, uint64_t cycle, uint64_t* account) {
   *account += cycle - c->avr->cycle;
   c->avr->cycle = cycle;
 }
 
-static void execute(chip *c, uint64_t room) {
-  avr_t *const avr = c->avr;
-  if (c->watched_pc) { // one instruction at a time, about four times slower
+static void execute(chip* c, uint64_t room) {
+  avr_t* const avr = c->avr;
+  if (c->watched_pc) {  // one instruction at a time, about four times slower
     room = 0;
     const uint16_t number = c->watched_pc[(avr->pc & avr->flashend) >> 1];
-    if (number)
-      log_add(c, kLogPc, number, avr->pc);
+    if (number) log_add(c, kLogPc, number, avr->pc);
   }
   avr->run_cycle_count = room;
   const uint64_t before = avr->cycle;
   c->executing = true;
   avr->pc = avr_run_one(avr);
   c->executing = false;
-  if (avr->cycle == before)
-    avr->cycle++; // ran off the end of the flash
+  if (avr->cycle == before) avr->cycle++;  // ran off the end of the flash
   avr->cycle += c->halt_cycles;
   c->halt_cycles = 0;
   c->running_cycles += avr->cycle - before;
@@ -211,17 +196,16 @@ static void execute(chip *c, uint64_t room) {
   if (avr->state == cpu_Sleeping) {
     const uint8_t mode = avr->data[REG_SMCR];
     if (!(mode & 1))
-      avr->state = cpu_Running; // SE clear: SLEEP does nothing
+      avr->state = cpu_Running;  // SE clear: SLEEP does nothing
     else if (mode & 0x0E)
       fault_add(c, kFaultSleepMode, mode);
   }
   const uint16_t sp = (uint16_t)(avr->data[R_SPL] | avr->data[R_SPH] << 8);
-  if (sp < c->lowest_sp)
-    c->lowest_sp = sp;
+  if (sp < c->lowest_sp) c->lowest_sp = sp;
 }
 
-void bench_run(chip *c, uint64_t until) {
-  avr_t *const avr = c->avr;
+void bench_run(chip* c, uint64_t until) {
+  avr_t* const avr = c->avr;
   c->stop_requested = false;
   while (avr->cycle < until && !c->stop_requested) {
     const uint64_t next = c->heap_count ? c->heap[0]->cycle : UINT64_MAX;
@@ -250,8 +234,7 @@ void bench_run(chip *c, uint64_t until) {
       // is taken.
       avr->interrupt_state = -1;
       execute(c, 0);
-      if (avr->interrupt_state == -1)
-        avr->interrupt_state = 0;
+      if (avr->interrupt_state == -1) avr->interrupt_state = 0;
       continue;
     }
     if (c->pending && enabled) {
@@ -262,11 +245,10 @@ void bench_run(chip *c, uint64_t until) {
     execute(c, horizon - avr->cycle);
   }
   // What is due exactly now belongs to the past of whoever looks next.
-  if (!c->stop_requested)
-    event_dispatch(c);
+  if (!c->stop_requested) event_dispatch(c);
 }
 
-void bench_stop(chip *c) {
+void bench_stop(chip* c) {
   c->stop_requested = true;
   c->avr->run_cycle_count = 0;
 }

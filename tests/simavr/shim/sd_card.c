@@ -8,90 +8,78 @@
 #include "sd_card.h"
 #include "sd_crc.h"
 
-static uint32_t card_random(sd_card *s) {
-  s->random =
-      s->random * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+static uint32_t card_random(sd_card* s) {
+  s->random = s->random * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
   return (uint32_t)(s->random >> 32);
 }
 
-void sd_put(sd_card *s, uint8_t byte) {
-  if (s->out_count == sizeof s->out)
-    return;
+void sd_put(sd_card* s, uint8_t byte) {
+  if (s->out_count == sizeof s->out) return;
   s->out[(s->out_head + s->out_count++) % sizeof s->out] = byte;
 }
 
-static uint8_t next_out(sd_card *s) {
-  if (s->out_count == 0)
-    return s->busy ? 0x00 : 0xFF;
+static uint8_t next_out(sd_card* s) {
+  if (s->out_count == 0) return s->busy ? 0x00 : 0xFF;
   const uint8_t byte = s->out[s->out_head];
   s->out_head = (s->out_head + 1) % (uint32_t)sizeof s->out;
   s->out_count--;
   return byte;
 }
 
-void sd_put_block(sd_card *s, const uint8_t *bytes, uint32_t count) {
+void sd_put_block(sd_card* s, const uint8_t* bytes, uint32_t count) {
   sd_put(s, 0xFF);
   sd_put(s, 0xFE);
-  for (uint32_t i = 0; i < count; i++)
-    sd_put(s, bytes[i]);
+  for (uint32_t i = 0; i < count; i++) sd_put(s, bytes[i]);
   const uint16_t crc = sd_crc16(bytes, count);
   sd_put(s, (uint8_t)(crc >> 8));
   sd_put(s, (uint8_t)crc);
 }
 
-static uint32_t stall_for_now(sd_card *s) {
+static uint32_t stall_for_now(sd_card* s) {
   uint32_t cycles = s->set.busy_cycles;
   const uint64_t now = chip_now(s->c);
   while (s->stall_count && s->stall[s->stall_head].from <= now) {
-    if (s->stall[s->stall_head].cycles > cycles)
-      cycles = s->stall[s->stall_head].cycles;
+    if (s->stall[s->stall_head].cycles > cycles) cycles = s->stall[s->stall_head].cycles;
     s->stall_head = (s->stall_head + 1) % kStallCount;
     s->stall_count--;
   }
   return cycles;
 }
 
-void sd_busy_for(sd_card *s, uint32_t cycles) {
+void sd_busy_for(sd_card* s, uint32_t cycles) {
   s->busy = cycles > 0;
-  if (cycles)
-    event_at(s->c, &s->done, chip_now(s->c) + cycles);
+  if (cycles) event_at(s->c, &s->done, chip_now(s->c) + cycles);
 }
 
-static void programmed(chip *c, void *param, uint64_t argument) {
+static void programmed(chip* c, void* param, uint64_t argument) {
   (void)argument;
-  sd_card *const s = param;
+  sd_card* const s = param;
   s->busy = false;
-  if (!s->programming)
-    return;
+  if (!s->programming) return;
   s->programming = false;
   memcpy(s->memory + (uint64_t)s->programming_block * 512, s->pending, 512);
   s->counters.written++;
   log_add(c, kLogCard, kCardWritten, s->programming_block);
 }
 
-static bool rejects(sd_card *s) {
-  if (s->reject_count == 0 || chip_now(s->c) < s->reject_from)
-    return false;
+static bool rejects(sd_card* s) {
+  if (s->reject_count == 0 || chip_now(s->c) < s->reject_from) return false;
   s->reject_count--;
   return true;
 }
 
-static void block_received(sd_card *s) {
+static void block_received(sd_card* s) {
   const uint16_t sent = (uint16_t)(s->data[512] << 8 | s->data[513]);
   uint8_t answer = 0x05;
-  if (s->crc_on && sent != sd_crc16(s->data, 512))
-    answer = 0x0B;
-  if (s->block >= s->set.blocks)
-    answer = 0x0D;
-  if (rejects(s))
-    answer = (uint8_t)s->reject_token;
+  if (s->crc_on && sent != sd_crc16(s->data, 512)) answer = 0x0B;
+  if (s->block >= s->set.blocks) answer = 0x0D;
+  if (rejects(s)) answer = (uint8_t)s->reject_token;
   s->state = s->multiple ? kWaitToken : kCommand;
   sd_put(s, (uint8_t)(0xE0 | answer));
   if (answer != 0x05) {
     s->counters.rejected++;
     log_add(s->c, kLogCard, kCardRejected, s->block);
-    if (s->multiple)
-      s->state = kRefused;
+    if (s->multiple) s->state = kRefused;
     return;
   }
   memcpy(s->pending, s->data, 512);
@@ -99,21 +87,19 @@ static void block_received(sd_card *s) {
   s->programming_block = s->block++;
   s->well_written++;
   sd_busy_for(s, stall_for_now(s));
-  if (!s->busy)
-    programmed(s->c, s, 0);
+  if (!s->busy) programmed(s->c, s, 0);
 }
 
-static void stop_writing(sd_card *s) {
+static void stop_writing(sd_card* s) {
   s->state = kCommand;
   sd_put(s, 0xFF);
   sd_busy_for(s, s->set.busy_cycles);
 }
 
-static void continue_read(sd_card *s) {
-  if (s->out_count || !s->read_waiting || chip_now(s->c) < s->read_ready)
-    return;
+static void continue_read(sd_card* s) {
+  if (s->out_count || !s->read_waiting || chip_now(s->c) < s->read_ready) return;
   if (s->block >= s->set.blocks) {
-    sd_put(s, 0x08); // out of range
+    sd_put(s, 0x08);  // out of range
     s->state = kCommand;
     return;
   }
@@ -127,17 +113,14 @@ static void continue_read(sd_card *s) {
 }
 
 // Returns whether the byte belongs to the data of a write.
-static bool write_byte(sd_card *s, uint8_t mosi) {
+static bool write_byte(sd_card* s, uint8_t mosi) {
   if (s->state == kReceiving) {
     s->data[s->data_count++] = mosi;
-    if (s->data_count == sizeof s->data)
-      block_received(s);
+    if (s->data_count == sizeof s->data) block_received(s);
     return true;
   }
-  if (s->state != kWaitToken && s->state != kRefused)
-    return false;
-  if (s->busy || s->out_count)
-    return mosi == 0xFF || !(mosi & 0x80);
+  if (s->state != kWaitToken && s->state != kRefused) return false;
+  if (s->busy || s->out_count) return mosi == 0xFF || !(mosi & 0x80);
   if (mosi == 0xFD && s->multiple) {
     stop_writing(s);
     return true;
@@ -155,11 +138,10 @@ static bool write_byte(sd_card *s, uint8_t mosi) {
   return false;
 }
 
-static uint8_t exchange(chip *c, void *param, uint8_t mosi, bool selected) {
+static uint8_t exchange(chip* c, void* param, uint8_t mosi, bool selected) {
   (void)c;
-  sd_card *const s = param;
-  if (!s->present)
-    return 0xFF;
+  sd_card* const s = param;
+  if (!s->present) return 0xFF;
   if (!selected) {
     s->clocks_deselected += 8;
     s->selected = false;
@@ -167,16 +149,12 @@ static uint8_t exchange(chip *c, void *param, uint8_t mosi, bool selected) {
     return 0xFF;
   }
   s->selected = true;
-  if (s->state == kReading)
-    continue_read(s);
+  if (s->state == kReading) continue_read(s);
   const uint8_t miso = next_out(s);
   if (s->frame_count == 0) {
-    if (write_byte(s, mosi))
-      return miso;
-    if ((mosi & 0xC0) != 0x40)
-      return miso;
-    if (s->busy && (mosi & 0x3F) != 13 && (mosi & 0x3F) != 0)
-      return miso;
+    if (write_byte(s, mosi)) return miso;
+    if ((mosi & 0xC0) != 0x40) return miso;
+    if (s->busy && (mosi & 0x3F) != 13 && (mosi & 0x3F) != 0) return miso;
   }
   s->frame[s->frame_count++] = mosi;
   if (s->frame_count == 6) {
@@ -187,7 +165,7 @@ static uint8_t exchange(chip *c, void *param, uint8_t mosi, bool selected) {
   return miso;
 }
 
-static void forget(sd_card *s) {
+static void forget(sd_card* s) {
   s->spi_mode = s->application = s->crc_on = s->busy = s->read_waiting = false;
   s->idle = true;
   s->init_until = 0;
@@ -197,11 +175,10 @@ static void forget(sd_card *s) {
 }
 
 // Power goes away, by battery or by hand: what was being programmed is garbage.
-void bench_sd_power_cut(sd_card *s) {
+void bench_sd_power_cut(sd_card* s) {
   if (s->programming) {
-    uint8_t *const block = s->memory + (uint64_t)s->programming_block * 512;
-    for (int i = 0; i < 512; i++)
-      block[i] = (uint8_t)card_random(s);
+    uint8_t* const block = s->memory + (uint64_t)s->programming_block * 512;
+    for (int i = 0; i < 512; i++) block[i] = (uint8_t)card_random(s);
     s->programming = false;
     s->counters.lost++;
     log_add(s->c, kLogCard, kCardLost, s->programming_block);
@@ -210,38 +187,36 @@ void bench_sd_power_cut(sd_card *s) {
   forget(s);
 }
 
-void bench_sd_insert(sd_card *s, bool present) {
-  if (present == s->present)
-    return;
+void bench_sd_insert(sd_card* s, bool present) {
+  if (present == s->present) return;
   bench_sd_power_cut(s);
   s->present = present;
 }
 
-void bench_sd_stall(sd_card *s, uint64_t from_cycle, uint32_t cycles) {
-  if (s->stall_count == kStallCount)
-    return;
+void bench_sd_stall(sd_card* s, uint64_t from_cycle, uint32_t cycles) {
+  if (s->stall_count == kStallCount) return;
   const uint32_t slot = (s->stall_head + s->stall_count++) % kStallCount;
   s->stall[slot].from = from_cycle;
   s->stall[slot].cycles = cycles;
 }
 
-void bench_sd_reject(sd_card *s, uint64_t from_cycle, uint32_t count,
-                     uint32_t token) {
+void bench_sd_reject(sd_card* s, uint64_t from_cycle, uint32_t count, uint32_t token) {
   s->reject_from = from_cycle;
   s->reject_count = count;
   s->reject_token = token;
 }
 
-bool bench_sd_busy(const sd_card *s) { return s->busy; }
-void bench_sd_counters(const sd_card *s, sd_counters *out) {
+bool bench_sd_busy(const sd_card* s) {
+  return s->busy;
+}
+void bench_sd_counters(const sd_card* s, sd_counters* out) {
   *out = s->counters;
 }
 
-sd_card *bench_sd_card(chip *c, uint32_t cs_pin, uint8_t *memory,
-                       const sd_settings *settings, uint64_t seed) {
-  if (c->spi.device_count == kSpiDeviceCount)
-    return NULL;
-  sd_card *const s = chip_allocate(c, sizeof *s);
+sd_card* bench_sd_card(
+    chip* c, uint32_t cs_pin, uint8_t* memory, const sd_settings* settings, uint64_t seed) {
+  if (c->spi.device_count == kSpiDeviceCount) return NULL;
+  sd_card* const s = chip_allocate(c, sizeof *s);
   s->c = c;
   s->memory = memory;
   s->set = *settings;
@@ -250,11 +225,11 @@ sd_card *bench_sd_card(chip *c, uint32_t cs_pin, uint8_t *memory,
   s->done.run = programmed;
   s->done.param = s;
   forget(s);
-  spi_device *const d = &c->spi.device[c->spi.device_count++];
+  spi_device* const d = &c->spi.device[c->spi.device_count++];
   d->cs_pin = (uint8_t)cs_pin;
   d->exchange = exchange;
   d->param = s;
-  c->pins[cs_pin].weak = kDriveHigh; // the card has a pull-up on DAT3/CS
+  c->pins[cs_pin].weak = kDriveHigh;  // the card has a pull-up on DAT3/CS
   pin_refresh(c, (uint8_t)cs_pin);
   return s;
 }

@@ -15,17 +15,12 @@ enum {
   kParameterError = 0x40
 };
 enum state { kCommand, kReading, kWaitToken, kReceiving, kRefused };
-enum card_note {
-  kCardWritten = 0,
-  kCardRejected = 1,
-  kCardLost = 2,
-  kCardIgnored = 3
-};
+enum card_note { kCardWritten = 0, kCardRejected = 1, kCardLost = 2, kCardIgnored = 3 };
 enum { kStallCount = 4096 };
 
 struct sd_card {
-  chip *c;
-  uint8_t *memory;
+  chip* c;
+  uint8_t* memory;
   sd_settings set;
   sd_counters counters;
   uint64_t random;
@@ -60,11 +55,11 @@ struct sd_card {
   uint32_t reject_count, reject_token;
 };
 
-void sd_put(sd_card *s, uint8_t byte);
-void sd_put_block(sd_card *s, const uint8_t *bytes, uint32_t count);
-void sd_busy_for(sd_card *s, uint32_t cycles);
+void sd_put(sd_card* s, uint8_t byte);
+void sd_put_block(sd_card* s, const uint8_t* bytes, uint32_t count);
+void sd_busy_for(sd_card* s, uint32_t cycles);
 
 // A command frame is complete: answer it.
-void sd_command(sd_card *s);
+void sd_command(sd_card* s);
 
-#endif // SIMAVR_BENCH_SD_CARD_H_
+#endif  // SIMAVR_BENCH_SD_CARD_H_
