@@ -66,6 +66,17 @@ def test_a_bad_test_point_is_named_before_anyone_fits_it() -> None:
     assert find(quiet) == []
 
 
+def test_a_sweep_is_found_from_its_first_slow_swing() -> None:
+    t = np.arange(0.0, 40.0, 0.01)
+    inside = (t > 8.0) & (t < 33.0)
+    phase = 2.0 * np.pi * (0.2 * (t - 8.0) + 0.076 * (t - 8.0) ** 2)
+    columns = {"t_s": t, "elevator_rad": np.where(inside, 0.06 * np.sin(phase), 0.0)}
+    found = find(columns)
+    assert [f.kind for f in found] == ["sweep"]
+    assert found[0].start_s == pytest.approx(8.0, abs=0.6)
+    assert found[0].input_end_s == pytest.approx(33.0, abs=0.3)
+
+
 def test_main_derivatives_and_modes_are_near_the_truth(
     flown: tuple[Path, dict[str, Any]],
 ) -> None:

@@ -22,6 +22,9 @@ LEAST_EDGE_THROTTLE = 0.12
 ACTIVITY = 6.0  # edges stand out by this many robust deviations of the surface's activity
 JOIN_S = 1.6  # between edges of one input; wider for a throttle pulse
 JOIN_THROTTLE_S = 3.0
+SWEEP_LEAD_S = 25.0  # slow swings of a sweep are looked for this far before its first edge
+STEADY_TREND = 0.6  # rank correlation of swing length with order: a sweep's swings shorten
+SWEEP_GAP_S = 1.2  # a 0.15 Hz sine is near its trim no longer than this
 RESPONSE_S = 3.0  # the window reaches this long past the last edge
 TRIM_S = 1.0  # quiet time before the input, part of the window given to a fit
 FLYING_SHARE = 0.5  # of the median airspeed: slower is not flight
@@ -77,7 +80,8 @@ def _find_axis(axis: str, t: Array, series: Array, flying: BoolArray) -> list[Fo
     change = np.zeros(len(t))
     change[lag:] = smooth[lag:] - smooth[:-lag]
     change[~flying] = 0.0
-    quiet = 1.4826 * float(np.median(np.abs(change[flying]))) if flying.any() else 0.0
+    # A low quantile, because a sweep can fill most of a record; of a normal one it is 0.253 sigma.
+    quiet = float(np.quantile(np.abs(change[flying]), 0.2)) / 0.253 if flying.any() else 0.0
     least = LEAST_EDGE_THROTTLE if axis == "throttle" else LEAST_EDGE_RAD
     limit = max(least, ACTIVITY * quiet)
     hot = np.flatnonzero(np.abs(change) > limit)
@@ -110,10 +114,13 @@ def _describe(axis: str, t: Array, series: Array, group: IntArray, lag: int) -> 
     runs = _runs(inside / max(amplitude, 1e-12), t[first : last + 1])
     if len(runs) == 0:
         return []
+    kind = _kind(runs)
+    if kind in ("sweep", "multisine"):
+        start = _slow_start(t, series, start, amplitude)
     return [
         Found(
             axis=axis,
-            kind=_kind(runs),
+            kind=kind,
             start_s=float(t[start]),
             input_end_s=float(t[min(end + 1, len(t) - 1)]),
             end_s=float(t[min(end + 1, len(t) - 1)]) + RESPONSE_S,
@@ -121,6 +128,18 @@ def _describe(axis: str, t: Array, series: Array, group: IntArray, lag: int) -> 
             edges=len(runs) + 1,
         )
     ]
+
+
+def _slow_start(t: Array, series: Array, start: int, amplitude: float) -> int:
+    """Return where a sweep begins: its first swings are too slow to be edges."""
+    first = int(np.searchsorted(t, t[start] - SWEEP_LEAD_S))
+    trim = float(np.median(series[first : start + 1]))
+    away = np.flatnonzero(np.abs(series[first : start + 1] - trim) > 0.35 * amplitude) + first
+    for k in away[::-1]:
+        if t[start] - t[k] > SWEEP_GAP_S:
+            break
+        start = int(k)
+    return start
 
 
 def _runs(level: Array, t: Array) -> list[tuple[int, float]]:
@@ -151,8 +170,9 @@ def _kind(runs: list[tuple[int, float]]) -> str:
         if float(np.max(np.abs(share - pattern))) < 0.12:
             return "3-2-1-1"
     if len(runs) >= 6:
-        steady = np.polyfit(np.arange(len(lengths)), np.log(np.maximum(lengths, 1e-3)), 1)[0]
-        return "sweep" if abs(steady) > 0.08 else "multisine"
+        rank = np.argsort(np.argsort(lengths))
+        trend = float(np.corrcoef(rank, np.arange(len(rank)))[0, 1])
+        return "sweep" if abs(trend) > STEADY_TREND else "multisine"
     return "multistep"
 
 

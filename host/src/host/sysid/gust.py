@@ -97,14 +97,44 @@ def fit_with_gust(
     start = np.concatenate([first.estimate[:count], first.estimate[len(model.parameter_names) :]])
     wide = gust_model(model, airspeed_mps)
     process = ("gust_rad", *(s for s in ALSO if s in model.states))
-    result = fit_filter_error(wide, shifted, process=process, start=start)
     plain = replace(model, delays=())
+    try:
+        result = fit_filter_error(wide, shifted, process=process, start=start)
+        failure = "" if result.converged else result.warnings[0]
+    except IdentificationError as error:
+        failure = str(error)
+    if failure:
+        # Better the plain answer with its wider intervals than a search that has not ended.
+        result = fit("output-error-white", plain, shifted, start=start)
+        result = replace(
+            result,
+            warnings=(*result.warnings, f"filter error: {failure}; output error stands instead"),
+        )
+        return GustFit(result, plain, tuple(shifted), delays)
+    covariance = result.covariance.copy()
+    covariance[:count, :count] += _from_delays(first, model)
     return GustFit(
-        result=replace(result, method="filter error with gust", model=plain),
+        result=replace(result, method="filter error with gust", model=plain, covariance=covariance),
         model=plain,
         maneuvers=tuple(shifted),
         delays=delays,
     )
+
+
+def _from_delays(first: FitResult, model: LinearModel) -> Array:
+    """Return what the uncertainty of the delays adds to the covariance of the parameters.
+
+    The second stage takes the delays for known; the first one says how the parameters move with
+    them: d theta / d tau = C_theta_tau C_tau_tau^-1.
+    """
+    count, names = len(model.parameters), len(model.parameter_names)
+    own = first.covariance[count:names, count:names]
+    cross = first.covariance[:count, count:names]
+    live = np.flatnonzero(np.diag(own) > 0.0)
+    if len(live) == 0:
+        return np.zeros((count, count))
+    part = cross[:, live] @ np.linalg.pinv(own[np.ix_(live, live)]) @ cross[:, live].T
+    return np.asarray(0.5 * (part + part.T), dtype=np.float64)
 
 
 def _advanced(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
