@@ -214,9 +214,9 @@ def test_thesis_rows_have_its_faults() -> None:
 
 def test_vane_expression_overflows_as_the_printed_row_shows() -> None:
     # ADC 507, 514, 521, 523 are -737, -713, -690, -683 in the thesis's own sample row.
-    printed = thesis._overflowed(np.array([507.0, 514.0, 521.0, 523.0]))
+    printed = thesis.overflowed_vane(np.array([507.0, 514.0, 521.0, 523.0]))
     assert printed.tolist() == [-737.0, -713.0, -690.0, -683.0]
-    assert thesis._overflowed(np.array([364.0, 365.0])).tolist() == [1213.0, -1210.0]
+    assert thesis.overflowed_vane(np.array([364.0, 365.0])).tolist() == [1213.0, -1210.0]
 
 
 def test_pulses_carry_the_sticks(tmp_path: Path) -> None:

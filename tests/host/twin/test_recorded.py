@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -219,3 +219,28 @@ def test_a_study_gets_table_and_truth_on_one_clock(library: Path, chain: str) ->
 def test_an_unknown_chain_is_refused() -> None:
     with pytest.raises(ValueError, match="expected one of sitl"):
         virtual_flight("calm", 1, chain="avr")
+
+
+@pytest.mark.parametrize("kind", ["card_removed", "power_cut", "baro_off"])
+def test_what_was_on_the_card_before_a_fault_stays(
+    library: Path, tmp_path: Path, kind: str
+) -> None:
+    card = cards.load("calm")
+    broken = replace(card, faults=(cards.Fault(kind, 15.0, duration_s=5.0),))
+    record = fly(broken, seed=3)
+    recording = sitl.record(
+        stimuli(record, air_data(record)), rate_hz=100, aircraft="x", faults=broken.faults
+    )
+    assert library.is_file()
+    path = tmp_path / "flight.bin"
+    path.write_bytes(recording.log)
+    log = read_log(path)
+    end_s = float(log.frames["ident"]["t_us"][-1]) * 1e-6
+    if kind == "baro_off":
+        assert end_s > 38.0
+        at = log.frames["baro"]["t_us"] * 1e-6
+        assert np.diff(at).max() == pytest.approx(5.0, abs=2.0)
+    else:
+        # At most a block (75 ms) and what waited in the ring are lost.
+        assert 14.0 < end_s < 15.2
+    assert gaps(log.frames["ident"]["count"]) == 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 
 import pandas as pd
@@ -38,8 +37,8 @@ class Outcome:
         The decoded log against the truth.
     first_row_s : float
         True time since power-on of the log's first row.
-    wall_s : dict
-        Wall-clock seconds per stage.
+    wall_s, processor_s : dict
+        Wall-clock seconds, and those of this process's processor time, per stage.
     """
 
     record: FlightRecord
@@ -50,6 +49,23 @@ class Outcome:
     deviations: list[compare.Deviation] = field(default_factory=list)
     first_row_s: float = 0.0
     wall_s: dict[str, float] = field(default_factory=dict)
+    processor_s: dict[str, float] = field(default_factory=dict)
+
+
+class _Clock:
+    """Times of stages: on the wall, and of this process (another one may hold the core)."""
+
+    def __init__(self) -> None:
+        self.wall_s: dict[str, float] = {}
+        self.processor_s: dict[str, float] = {}
+        self._last = time.perf_counter(), time.process_time()
+
+    def mark(self, stage: str) -> None:
+        """End a stage."""
+        now = time.perf_counter(), time.process_time()
+        self.wall_s[stage] = now[0] - self._last[0]
+        self.processor_s[stage] = now[1] - self._last[1]
+        self._last = now
 
 
 def load_kernels(card: Card) -> None:
@@ -104,12 +120,12 @@ def simulate(
         The folder cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    marks = [("start", time.perf_counter())]
+    clock = _Clock()
     progress("load", 0.0)
     load_kernels(card)
-    marks.append(("load", time.perf_counter()))
+    clock.mark("load")
     record = fly(card, seed=seed, progress=lambda share: progress("fly", share))
-    marks.append(("fly", time.perf_counter()))
+    clock.mark("fly")
     data = air_data(record)
     outcome = Outcome(record, data)
     stem = folder / "flight"
@@ -126,11 +142,11 @@ def simulate(
     else:
         recorder = sitl.record if firmware == "sitl" else avr.record
         path = _recorded(outcome, folder, recorder, progress)
-        marks.append(("record", time.perf_counter()))
+        clock.mark("record")
         outcome.table = _decoded(outcome, path, folder)
-    marks.append(("decode" if outcome.recording else firmware, time.perf_counter()))
+    clock.mark("decode" if outcome.recording else firmware)
     outcome.files += truth.write(record, data, stem, first_row_s=outcome.first_row_s)
-    marks.append(("truth", time.perf_counter()))
+    clock.mark("truth")
     second = None
     if both and firmware != "thesis":
         second, files = _thesis(record, data, folder)
@@ -148,8 +164,8 @@ def simulate(
             second_name="thesis logger",
         )
         outcome.files.append(image)
-        marks.append(("picture", time.perf_counter()))
-    outcome.wall_s = {name: now - before for (_, before), (name, now) in pairwise(marks)}
+        clock.mark("picture")
+    outcome.wall_s, outcome.processor_s = clock.wall_s, clock.processor_s
     return outcome
 
 

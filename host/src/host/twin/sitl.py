@@ -172,8 +172,9 @@ def _record(
     blocks = round(room_s * BLOCKS_PER_S * max(rate_hz / 100.0, 0.5))
     sitl.sitl_set_file_blocks(ctypes.c_uint32(blocks))
     _configure(sitl, rate_hz, aircraft)
-    _give(sitl, given)
-    end = given.duration
+    cuts = [round(f.at_s * TICKS_PER_S) for f in faults if f.kind == "power_cut"]
+    end = min([given.duration, *cuts])
+    _give(sitl, given, end)
     actions: list[tuple[int, str]] = []
     for fault in faults:
         at = round(fault.at_s * TICKS_PER_S)
@@ -186,8 +187,6 @@ def _record(
         elif fault.kind == "baro_off":
             actions.append((at, "baro_off"))
             actions.append((round((fault.at_s + fault.duration_s) * TICKS_PER_S), "baro_on"))
-        elif fault.kind == "power_cut":
-            end = min(end, at)
     sitl.sitl_power_on()
     marks = sorted(
         {*range(TICKS_PER_S, end, TICKS_PER_S), *(a for a, _ in actions if a < end), end}
@@ -238,11 +237,12 @@ def _configure(sitl: ctypes.CDLL, rate_hz: int, aircraft: str) -> None:
         raise UsageError(f"the recorder refuses {rate_hz} Hz, expected one of {RATES_HZ}")
 
 
-def _give(sitl: ctypes.CDLL, given: Stimuli) -> None:
-    edges, gps = given.edges, given.gps
+def _give(sitl: ctypes.CDLL, given: Stimuli, end: int) -> None:
+    """Hand over what reaches the pins before `end`: the next power-on is at the bench."""
+    edges, gps = given.edges[given.edges["at"] < end], given.gps[given.gps["at"] < end]
     sitl.sitl_add_edges(_int64(edges["at"]), _uint8(edges["levels"]), ctypes.c_size_t(len(edges)))
     sitl.sitl_add_gps(_int64(gps["at"]), _uint8(gps["levels"]), ctypes.c_size_t(len(gps)))
-    packets = given.packets
+    packets = [p for p in given.packets if p.start < end]
     if packets:
         data = b"".join(p.data.ljust(PACKET_ROOM, b"\0") for p in packets)
         byte_ticks = round((packets[0].end - packets[0].start) / (len(packets[0].data) + 1))

@@ -46,7 +46,7 @@ def _map_us(pulse_us: Array, channel: int) -> Array:
     return np.trunc((np.trunc(pulse_us) - low) * 1000 / (high - low)) + 1000
 
 
-def _overflowed(count: Array) -> Array:
+def overflowed_vane(count: Array) -> Array:
     """`analogRead * 90 / 27` in 16 bits: D1."""
     product = np.mod(count.astype(np.int64) * 90 + 32768, 65536) - 32768
     return np.trunc(product / 27)
@@ -112,8 +112,8 @@ def rows(record: FlightRecord, data: AirData) -> pd.DataFrame:
             "YAW": np.round(angles[first, 2], 2),
             "altitude": altitude,
             "velocity": np.round(speed_kmh, 2),
-            "alpha": _overflowed(counts[:, 0]) - _overflowed(start[:1])[0],
-            "beta": _overflowed(counts[:, 2]) - _overflowed(start[2:3])[0],
+            "alpha": overflowed_vane(counts[:, 0]) - overflowed_vane(start[:1])[0],
+            "beta": overflowed_vane(counts[:, 2]) - overflowed_vane(start[2:3])[0],
             "AN0": np.round(raw_rates[first, 0], 2),
             "AN1": np.round(raw_rates[first, 1], 2),
             "AN2": np.round(raw_rates[first, 2], 2),
