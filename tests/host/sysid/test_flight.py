@@ -213,7 +213,12 @@ def test_verbs_answer_and_fail_in_one_line(
     assert mat.exists()
     assert main(["identify", source, "--model", "roll"]) == 0
     assert "trust" in capsys.readouterr().out
+    truth = str(flown[0].with_name("flight.truth.toml"))
+    known = ["--aircraft", "ultrastick25e", "--truth", truth, "--model", "short-period"]
+    assert main(["identify", source, *known]) == 0
+    assert "intervals hold the truth" in capsys.readouterr().out
     for wrong in (
+        ["identify", source, "--truth", source],
         ["identify", str(tmp_path / "nothing.bin")],
         ["identify", source, "--method", "magic"],
         ["identify", source, "--model", "hovercraft"],

@@ -65,13 +65,13 @@ def test_white_records_mostly_get_no_memory() -> None:
 
 
 def test_default_intervals_cover_coloured_noise_and_the_white_ones_do_not() -> None:
-    case = run_case("AR(1) 0.9", 20.0, 120)
+    case = run_case("AR(1) 0.9", 20.0, 80)
     assert case.failed == 0
-    # 1200 correlated outcomes: two standard deviations are about 2.5 points.
-    assert 0.915 < case.pooled < 0.98
+    # 720 correlated outcomes: two standard deviations are about 3 points.
+    assert 0.91 < case.pooled < 0.98
     assert np.median(case.width_ratio) < 1.15
     # The deliberate fault: intervals that take coloured residuals for white ones.
-    assert float(np.mean(case.white_covered[:10])) < 0.75
+    assert float(np.mean(case.white_covered)) < 0.75
 
 
 def test_the_standard_correction_stays_short_of_the_default() -> None:

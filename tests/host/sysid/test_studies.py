@@ -42,21 +42,21 @@ def test_table_31_at_snr_10_is_refused_with_names() -> None:
 
 
 def test_refusal_agrees_where_the_bound_is_clear() -> None:
-    found = refusal_agreement(30)
+    found = refusal_agreement(20)
     assert found.clear_agree >= 0.9 * found.clear
     assert 0 < found.expected < found.systems
 
 
 def test_gusts_hurt_output_error_more_than_filter_error() -> None:
-    case = turbulence(0.5, 6, pilot=True)
+    case = turbulence(0.5, 4, pilot=True)
     assert case.failed == 0
     dynamic = [case.names.index(n) for n in ("M_alpha", "M_q")]
     assert np.all(case.filter_rms[dynamic] < case.output_rms[dynamic] / 3.0)
 
 
 def test_programs_write_their_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(tmp_path), "--only", "d_turbulence"]) == 0
-    assert "d_turbulence.txt" in capsys.readouterr().out
-    text = (tmp_path / "d_turbulence.txt").read_text()
+    assert main([str(tmp_path), "--only", "b_accuracy"]) == 0
+    assert "b_accuracy.txt" in capsys.readouterr().out
+    text = (tmp_path / "b_accuracy.txt").read_text()
     assert text.startswith("simulated data")
-    assert "coverage" in text
+    assert "rms(error/bound)" in text

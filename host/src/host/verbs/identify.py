@@ -39,6 +39,8 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: sensor positions, mass;"
                         " gives coefficients")  # fmt: skip
+    parser.add_argument("--truth", type=Path, metavar="TOML",
+                        help="truth of a simulated flight: compare with it")  # fmt: skip
     parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="start of the fit")
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the fit")
     parser.add_argument("--maneuver", type=int, action="append", metavar="N",
@@ -74,6 +76,11 @@ def run(args: argparse.Namespace) -> int:
         from host.sysid.aircraft_file import airframe_data
 
         airframe = airframe_data(args.aircraft)
+    truth = None
+    if args.truth:
+        from host.sysid.truth import read_truth
+
+        truth = read_truth(args.truth)
     windows = _windows(args, columns)
     answers: list[Answer] = []
     for method in chosen:
@@ -113,6 +120,10 @@ def run(args: argparse.Namespace) -> int:
     else:
         for answer in answers:
             lines += ["", *model_lines(answer)]
+    if truth is not None:
+        from host.sysid.truth import truth_lines
+
+        lines += ["", *truth_lines(answers, truth)]
     print("\n".join(lines))
     return int(ExitCode.OK)
 
