@@ -45,6 +45,7 @@ void Instrument::boot() {
   second_.start(now_us);
   turn_us_ = now_us;
   system_us_ = now_us;
+  self_test_ = self_test_passed();
   hal::set_card_wait(&Instrument::while_waiting, this);
   hal::start_watchdog();
 }
@@ -52,36 +53,26 @@ void Instrument::boot() {
 void Instrument::while_waiting(void* context) {
   // A call of the card that waits is bounded by itself: the recorder counts as running.
   Instrument& self = *static_cast<Instrument*>(context);
-  self.pilot_.step(self.config_, self.self_test_passed(), self.outlet_);
-  self.sensors_.step(self.config_, self.pilot_, self.outlet_);
+  const uint32_t now_us = hal::now_us();
+  self.pilot_.step(self.config_, self.self_test_, self.outlet_, now_us);
+  self.sensors_.step(self.config_, self.pilot_, self.outlet_, now_us);
   self.pilot_.ran(kTaskSensors);
   self.pilot_.ran(kTaskRecorder);
-  self.pilot_.beat(hal::now_us());
-  self.panel_.step(self.recorder_, hal::now_us());
+  self.pilot_.beat(now_us);
+  self.panel_.step(self.recorder_, now_us);
 }
 
 void Instrument::step() {
-  const uint32_t now_us = hal::now_us();
-  const uint32_t last_turn_us = now_us - turn_us_;
-  turn_us_ = now_us;
-  uptime_us_ += last_turn_us;
-  while (uptime_us_ >= kSecondUs) {
-    uptime_us_ -= kSecondUs;
-    ++uptime_s_;
-  }
-
-  pilot_.step(config_, self_test_passed(), outlet_);
-  sensors_.step(config_, pilot_, outlet_);
+  const uint32_t now_us = turn_us_;
+  pilot_.step(config_, self_test_, outlet_, now_us);
+  sensors_.step(config_, pilot_, outlet_, now_us);
   pilot_.ran(kTaskSensors);
-  recorder_.step(pilot_.inputs(config_), config_, hal::now_us());
+  recorder_.step(now_us);
   pilot_.ran(kTaskRecorder);
-  store_.poll();
-  panel_.step(recorder_, now_us);
-  status_.step(recorder_, sensors_, pilot_, now_us);
+  // A reading per turn: a row is 30 ms long, and no turn is.
   ascii_row_.step(sensors_, pilot_.channels(), telemetry_, now_us);
-  if (telemetry_.poll(now_us)) put_telemetry_heads(now_us);
-  if (second_.due(now_us, kSecondUs)) put_system(now_us);
-  pilot_.beat(hal::now_us());
+  step_slow(now_us);
+  pilot_.beat(now_us);
 
   const uint32_t end_us = hal::now_us();
   const uint32_t loop_us = end_us - now_us;
@@ -89,7 +80,38 @@ void Instrument::step() {
     loop_max_us_ = static_cast<uint16_t>(loop_us > 65535U ? 65535U : loop_us);
   }
   hal::sleep_until_interrupt();
-  asleep_us_ += hal::now_us() - end_us;
+  turn_us_ = hal::now_us();
+  asleep_us_ += turn_us_ - end_us;
+}
+
+// What need not be done every turn takes turns: each of it every eighth, some 8 ms.
+void Instrument::step_slow(uint32_t now_us) {
+  slot_ = static_cast<uint8_t>((slot_ + 1U) & 7U);
+  switch (slot_) {
+    case 0:
+      store_.poll();
+      return;
+    case 1:
+      panel_.step(recorder_, now_us);
+      return;
+    case 2:
+      status_.step(recorder_, sensors_, pilot_, now_us);
+      return;
+    case 3:
+      self_test_ = self_test_passed();
+      return;
+    case 4:
+      if (telemetry_.poll(now_us)) put_telemetry_heads(now_us);
+      return;
+    case 5:
+      if (second_.due(now_us, kSecondUs)) put_system(now_us);
+      return;
+    case 6:
+      recorder_.decide(pilot_.inputs(config_), config_, now_us);
+      return;
+    default:
+      return;
+  }
 }
 
 bool Instrument::self_test_passed() const {
@@ -99,6 +121,11 @@ bool Instrument::self_test_passed() const {
 
 void Instrument::put_system(uint32_t now_us) {
   const uint32_t elapsed_us = now_us - system_us_;
+  uptime_us_ += elapsed_us;
+  while (uptime_us_ >= kSecondUs) {
+    uptime_us_ -= kSecondUs;
+    ++uptime_s_;
+  }
   frames::SystemFrame frame = {};
   frame.t_us = now_us;
   frame.uptime_s = uptime_s_;

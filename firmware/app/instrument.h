@@ -36,6 +36,7 @@ class Instrument {
  private:
   static void while_waiting(void* context);
 
+  void step_slow(uint32_t now_us);
   bool self_test_passed() const;
   void put_system(uint32_t now_us);
   void put_telemetry_heads(uint32_t now_us);
@@ -59,6 +60,8 @@ class Instrument {
   uint32_t asleep_us_ = 0;  // since the last frame `system`
   uint32_t system_us_ = 0;  // when that was made
   uint16_t loop_max_us_ = 0;
+  uint8_t slot_ = 0;        // of step_slow()
+  bool self_test_ = false;  // as it was last found
 };
 
 }  // namespace app

@@ -14,16 +14,29 @@ void PilotLink::start() {
   lost_edges_ = hal::lost_edges();
 }
 
-void PilotLink::step(const frames::ConfigFrame& config, bool self_test_passed, Outlet& outlet) {
+void PilotLink::step(const frames::ConfigFrame& config,
+                     bool self_test_passed,
+                     Outlet& outlet,
+                     uint32_t now_us) {
+  ran(kTaskPilot);
   hal::Edge edge;
+  bool due = decoder_.waiting() || now_us - decided_us_ >= kRestUs;
   while (hal::take_edge(&edge)) {
     decoder_.edge(core::extend_ticks(hal::now_ticks(), edge.at_ticks), edge.levels, edge.late);
+    due = due || decoder_.waiting();
   }
+  if (due) decide(config, self_test_passed, outlet, now_us);
+}
+
+void PilotLink::decide(const frames::ConfigFrame& config,
+                       bool self_test_passed,
+                       Outlet& outlet,
+                       uint32_t now_us) {
+  decided_us_ = now_us;
   if (hal::lost_edges() != lost_edges_) {
     lost_edges_ = hal::lost_edges();
     decoder_.gap();
   }
-  const uint32_t now_us = hal::now_us();
   const uint8_t storm = hal::edge_storm();
   if (storm != 0) {
     decoder_.storm();
@@ -40,7 +53,6 @@ void PilotLink::step(const frames::ConfigFrame& config, bool self_test_passed, O
     hal::set_servo_pulse(servo, ticks);
   }
   report(outlet, now_us);
-  ran(kTaskPilot);
 }
 
 void PilotLink::beat(uint32_t now_us) {

@@ -15,9 +15,10 @@ using storage::VolumeStatus;
 namespace {
 
 constexpr uint32_t kRetryUs = 2000000UL;
-constexpr uint32_t kDeadUs = 2000000UL;  // no card is busy that long
-constexpr uint32_t kStallUs = 100000UL;  // worth an event
-constexpr uint16_t kPortion = 128;       // bytes of a block per turn: 0.2 ms on SPI
+constexpr uint32_t kReceiverUs = 150000UL;  // six frames of the slowest receiver
+constexpr uint32_t kDeadUs = 2000000UL;     // no card is busy that long
+constexpr uint32_t kStallUs = 100000UL;     // worth an event
+constexpr uint16_t kPortion = 128;          // bytes of a block per turn: 0.2 ms on SPI
 constexpr uint32_t kLowSeconds = 60;
 constexpr uint32_t kOtherBytesPerS = 1000;  // frames beside the identification frame
 
@@ -38,7 +39,11 @@ Recorder::Recorder(core::ByteRing& ring, Outlet& outlet, Store& store, Sensors& 
       sensors_(sensors),
       writer_(ring, storage::schema_text(), storage::schema_size(), storage::schema_hash()) {}
 
-void Recorder::step(const core::PilotInputs& in, frames::ConfigFrame& config, uint32_t now_us) {
+void Recorder::step(uint32_t now_us) {
+  if (state_ == State::kRecording || state_ == State::kEnding) stream(now_us);
+}
+
+void Recorder::decide(const core::PilotInputs& in, frames::ConfigFrame& config, uint32_t now_us) {
   config_ = &config;
   const core::RecordAction action =
       control_.update(in, recording(), config.auto_start != 0, now_us);
@@ -49,10 +54,15 @@ void Recorder::step(const core::PilotInputs& in, frames::ConfigFrame& config, ui
   switch (state_) {
     case State::kNoFile:
     case State::kFailed:
-      if (!looked_ || now_us - retry_us_ >= kRetryUs) open_volume();
+      if (file_wanted_) {
+        // Not in flight; a receiver has told by now, if there is one.
+        if (!flying && now_us - retry_us_ >= kReceiverUs) prepare_next();
+      } else if (!looked_ || now_us - retry_us_ >= kRetryUs) {
+        open_volume();
+      }
       break;
     case State::kUndecided:
-      decide(in, start_button, now_us);
+      decide_open_file(in, start_button, now_us);
       break;
     case State::kReady:
       if (start_button) begin(0, prepared_, now_us);
@@ -62,13 +72,12 @@ void Recorder::step(const core::PilotInputs& in, frames::ConfigFrame& config, ui
       record(action, now_us);
       break;
     case State::kEnding:
-      stream(now_us);
-      if (state_ == State::kEnding && writer_.drained() && !block_open_ && !programming_) {
+      if (writer_.drained() && !block_open_ && !programming_) {
         finish(now_us);
       }
       break;
     case State::kFileFull:
-      if (!flying) finish(now_us);
+      if (boot_.update(in, false, now_us) == core::BootAction::kClose) finish(now_us);
       break;
   }
 }
@@ -87,7 +96,7 @@ void Recorder::open_volume() {
     switch (found) {
       case storage::FileState::kNone:
       case storage::FileState::kClosed:
-        prepare_next();
+        file_wanted_ = true;
         break;
       case storage::FileState::kBlank:
         volume_status_ = status;
@@ -103,7 +112,7 @@ void Recorder::open_volume() {
   retry_us_ = hal::now_us();
 }
 
-void Recorder::decide(const core::PilotInputs& in, bool start_pressed, uint32_t now_us) {
+void Recorder::decide_open_file(const core::PilotInputs& in, bool start_pressed, uint32_t now_us) {
   switch (boot_.update(in, start_pressed, now_us)) {
     case core::BootAction::kWait:
       return;
@@ -121,6 +130,7 @@ void Recorder::decide(const core::PilotInputs& in, bool start_pressed, uint32_t 
 }
 
 void Recorder::prepare_next() {
+  file_wanted_ = false;
   const uint32_t session = next_session();
   storage::Volume::set_date(sensors_.fat_date());
   volume_status_ = volume_.prepare(session);
@@ -189,7 +199,6 @@ void Recorder::record(core::RecordAction action, uint32_t now_us) {
   if (action == core::RecordAction::kMark) outlet_.event(frames::Event::kMark, ++marks_, now_us);
   watch_room(now_us);
   if (action == core::RecordAction::kStop) end(0, now_us);
-  stream(now_us);
 }
 
 void Recorder::watch_room(uint32_t now_us) {
@@ -226,6 +235,7 @@ void Recorder::finish(uint32_t now_us) {
   }
   if (state_ == State::kEnding && full_) {
     state_ = State::kFileFull;
+    boot_.start(false);
     return;
   }
   volume_status_ = volume_.close(writer_.sequence(), false, now_us);

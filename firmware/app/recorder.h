@@ -28,8 +28,10 @@ class Recorder {
   Recorder(core::ByteRing& ring, Outlet& outlet, Store& store, Sensors& sensors);
 
   void set_file_blocks(uint32_t blocks) { volume_.set_file_blocks(blocks); }
-  // Once per turn of the main loop. Looks for the card at the first call.
-  void step(const core::PilotInputs& in, frames::ConfigFrame& config, uint32_t now_us);
+  // Once per turn of the main loop: carries the block under way on.
+  void step(uint32_t now_us);
+  // Every 10 ms or so: start, stop, resume. Looks for the card at the first call.
+  void decide(const core::PilotInputs& in, frames::ConfigFrame& config, uint32_t now_us);
 
   State state() const { return state_; }
   storage::VolumeStatus volume_status() const { return volume_status_; }
@@ -46,7 +48,7 @@ class Recorder {
   };
 
   void open_volume();
-  void decide(const core::PilotInputs& in, bool start_pressed, uint32_t now_us);
+  void decide_open_file(const core::PilotInputs& in, bool start_pressed, uint32_t now_us);
   void begin(uint32_t why, bool same_session, uint32_t now_us);
   void record(core::RecordAction action, uint32_t now_us);
   void end(uint32_t why, uint32_t now_us);
@@ -80,7 +82,8 @@ class Recorder {
   storage::VolumeStatus volume_status_ = storage::VolumeStatus::kNoCard;
   uint8_t rejects_ = 0;
   bool looked_ = false;
-  bool prepared_ = false;  // the file's first block carries this power-on's session
+  bool file_wanted_ = false;  // the card is good, a new file waits for the ground
+  bool prepared_ = false;     // the file's first block carries this power-on's session
   bool resumed_ = false;
   bool heads_told_ = false;
   bool file_low_told_ = false;

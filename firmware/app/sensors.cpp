@@ -38,15 +38,23 @@ void Sensors::start(const frames::ConfigFrame& config, uint32_t now_us) {
   gps_heard_us_ = now_us;
 }
 
-void Sensors::step(const frames::ConfigFrame& config, const PilotLink& pilot, Outlet& outlet) {
-  const uint32_t now_us = hal::now_us();
-  step_imu(outlet, now_us);
-  step_ident(pilot, outlet);
+void Sensors::step(const frames::ConfigFrame& config,
+                   const PilotLink& pilot,
+                   Outlet& outlet,
+                   uint32_t now_us) {
+  if (hal::imu_packet() != nullptr) {
+    step_imu(outlet);
+    now_us = hal::now_us();  // the packet may be younger than this turn
+  }
+  step_ident(pilot, outlet, now_us);
   step_baro(outlet, now_us);
-  step_gps(config, outlet, now_us);
+  slot_ = static_cast<uint8_t>((slot_ + 1U) & 3U);
+  if (slot_ == 0) step_gps(config, outlet, now_us);
+  if (slot_ == 2) watch_imu(outlet, now_us);
 }
 
-void Sensors::step_imu(Outlet& outlet, uint32_t now_us) {
+void Sensors::step_imu(Outlet& outlet) {
+  const uint32_t now_us = hal::now_us();
   for (const hal::ImuPacket* packet = hal::imu_packet(); packet != nullptr;
        packet = hal::imu_packet()) {
     const core::ImuResult result =
@@ -70,6 +78,9 @@ void Sensors::step_imu(Outlet& outlet, uint32_t now_us) {
   if (imu_.take_attitude(attitude) && attitude_turn_.due(now_us, kAttitudeUs)) {
     outlet.put(attitude);
   }
+}
+
+void Sensors::watch_imu(Outlet& outlet, uint32_t now_us) {
   const uint32_t silent_us = now_us - imu_heard_us_;
   if (static_cast<int32_t>(silent_us) < static_cast<int32_t>(kImuSilentUs)) return;
   if (imu_present_) {
@@ -80,9 +91,9 @@ void Sensors::step_imu(Outlet& outlet, uint32_t now_us) {
   imu_heard_us_ = now_us;
 }
 
-void Sensors::step_ident(const PilotLink& pilot, Outlet& outlet) {
+void Sensors::step_ident(const PilotLink& pilot, Outlet& outlet, uint32_t now_us) {
   if (scanning_ && hal::scan_done()) finish_ident(outlet);
-  switch (trigger_.poll(hal::now_us(), !scanning_)) {
+  switch (trigger_.poll(now_us, !scanning_)) {
     case core::IdentTrigger::Source::kNone:
       return;
     case core::IdentTrigger::Source::kImu:

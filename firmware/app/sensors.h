@@ -19,7 +19,10 @@ namespace app {
 class Sensors {
  public:
   void start(const frames::ConfigFrame& config, uint32_t now_us);
-  void step(const frames::ConfigFrame& config, const PilotLink& pilot, Outlet& outlet);
+  void step(const frames::ConfigFrame& config,
+            const PilotLink& pilot,
+            Outlet& outlet,
+            uint32_t now_us);
 
   // False while there is no pressure sensor.
   bool coefficients(frames::BaroCoefficientsFrame* out, uint32_t now_us) const;
@@ -33,8 +36,9 @@ class Sensors {
   uint16_t rail() const { return rail_; }
 
  private:
-  void step_imu(Outlet& outlet, uint32_t now_us);
-  void step_ident(const PilotLink& pilot, Outlet& outlet);
+  void step_imu(Outlet& outlet);
+  void watch_imu(Outlet& outlet, uint32_t now_us);
+  void step_ident(const PilotLink& pilot, Outlet& outlet, uint32_t now_us);
   void begin_ident(const PilotLink& pilot, bool imu_triggered);
   void finish_ident(Outlet& outlet);
   void step_baro(Outlet& outlet, uint32_t now_us);
@@ -57,6 +61,7 @@ class Sensors {
   uint32_t gps_heard_us_ = 0;
   uint32_t fat_date_ = 0;
   uint16_t rail_ = 0;
+  uint8_t slot_ = 0;
   uint8_t hearing_ = 0;
   uint8_t heard_ = 0;
   bool scanning_ = false;

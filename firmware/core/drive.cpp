@@ -26,11 +26,12 @@ RcChannels map_channels(const RcDecoder& decoder, const frames::ConfigFrame& con
       continue;
     }
     const uint8_t bit = static_cast<uint8_t>(1U << channel);
+    const uint8_t input_bit = static_cast<uint8_t>(1U << input);
     rc.width_ticks[channel] = decoder.width_ticks(input);
-    if ((decoder.fresh() >> input & 1) != 0) {
+    if ((decoder.fresh() & input_bit) != 0) {
       rc.fresh = static_cast<uint8_t>(rc.fresh | bit);
     }
-    if ((decoder.steady() >> input & 1) != 0) {
+    if ((decoder.steady() & input_bit) != 0) {
       rc.steady = static_cast<uint8_t>(rc.steady | bit);
     }
   }

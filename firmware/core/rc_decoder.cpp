@@ -78,6 +78,7 @@ void RcDecoder::fall(uint8_t index, uint32_t t_ticks, bool late) {
     }
   }
   input.candidate = static_cast<uint16_t>(width_ticks);
+  set(waiting_, bit_of(index), true);
 }
 
 void RcDecoder::settle(uint8_t index, uint32_t low_ticks) {
@@ -96,6 +97,7 @@ void RcDecoder::settle(uint8_t index, uint32_t low_ticks) {
   input.accepted = input.rise;
   input.width = input.candidate;
   input.candidate = 0;
+  set(waiting_, bit, false);
   if (input.streak < kSteadyPulses) {
     ++input.streak;
   }
@@ -117,6 +119,7 @@ void RcDecoder::measure_frame(uint16_t period_us) {
 
 void RcDecoder::reject(uint8_t index) {
   inputs_[index].candidate = 0;
+  set(waiting_, bit_of(index), false);
   if (glitches_ != 0xFFFF) {
     ++glitches_;
   }
@@ -125,6 +128,7 @@ void RcDecoder::reject(uint8_t index) {
 void RcDecoder::gap() {
   started_ = false;
   trusted_ = 0;
+  waiting_ = 0;
   for (Input& input : inputs_) {
     input.candidate = 0;
   }

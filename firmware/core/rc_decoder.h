@@ -40,6 +40,8 @@ class RcDecoder {
   void storm();
   // At least every 10 ms, after the edges: accepts confirmed pulses, forgets old ones.
   void poll(uint32_t now_ticks);
+  // A pulse waits for its low time: poll again within a millisecond.
+  bool waiting() const { return waiting_ != 0; }
 
   // 0: no pulse accepted within 60 ms.
   uint16_t width_ticks(uint8_t input) const { return inputs_[input].width; }
@@ -74,6 +76,7 @@ class RcDecoder {
   uint8_t valid_ = 0;
   uint8_t fresh_ = 0;
   uint8_t steady_ = 0;
+  uint8_t waiting_ = 0;  // bit per input: it has a candidate
   uint8_t early_ = 0;    // pulses refused for coming early
   bool locked_ = false;  // frame_us_ bounds how early the next pulse may come
   bool started_ = false;
