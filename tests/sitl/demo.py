@@ -84,7 +84,7 @@ def decode(flight: Path) -> None:
     """Run `host decode` as a user does; it prints duration, rates, frames, losses, files."""
     command = [sys.executable, "-m", "host", "decode", str(flight)]
     say("host decode flight.bin")
-    done = subprocess.run(command, cwd=DEMO, stdin=subprocess.DEVNULL, check=False)
+    done = subprocess.run(command, cwd=flight.parent, stdin=subprocess.DEVNULL, check=False)
     if done.returncode != 0:
         raise DemoError(f"host decode ended with {done.returncode}, expected 0")
 
@@ -118,9 +118,9 @@ def table(differences: Sequence[Difference]) -> str:
     return "\n".join(lines)
 
 
-def run() -> None:
+def run(folder: Path) -> None:
     """Fly, decode, compare; raises DemoError if anything is not as scripted."""
-    DEMO.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     say("building the firmware for this computer")
     built = subprocess.run(
         [sys.executable, "firmware/toolchain/build_sitl.py"],
@@ -132,7 +132,7 @@ def run() -> None:
         raise DemoError("the firmware does not build; the compiler's words stand above")
     say("writing the script of a flight")
     flight = script(END_S, idle_from_s=IDLE_S)
-    card = DEMO / "card.img"
+    card = folder / "card.img"
     new_card_file(card)
     say(f"flying {END_S:.0f} s in simulated time")
     begin_s = time.monotonic()
@@ -140,7 +140,7 @@ def run() -> None:
     speed = END_S / (time.monotonic() - begin_s)
     files = list_files(card, partitioned=True)
     say("taking flight.bin out of the card: " + ", ".join(f"{n} {s} B" for n, s in files.items()))
-    log_path = DEMO / "flight.bin"
+    log_path = folder / "flight.bin"
     log_path.write_bytes(read_file(card, NAME, partitioned=True))
     decode(log_path)
     log = read_log(log_path)
@@ -156,10 +156,11 @@ def run() -> None:
 
 def main() -> int:
     """Run the demo; 6 with one line if something is wrong."""
-    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
+    parser = argparse.ArgumentParser(description="Fly two scripted minutes and compare.")
+    parser.add_argument("-o", "--output", type=Path, default=DEMO, help="folder of the results")
     try:
-        run()
-    except DemoError as error:
+        run(parser.parse_args().output.resolve())
+    except (DemoError, OSError) as error:
         print(f"demo: {error}", file=sys.stderr)
         return 6
     return 0

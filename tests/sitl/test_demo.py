@@ -62,11 +62,10 @@ def test_damage_is_seen(recorded: Frames, damage: Damage, channel: int) -> None:
     assert CHANNELS[channel] in wrong
 
 
-def test_demo_ends_well_and_may_be_run_twice() -> None:
+def test_demo_ends_well_and_may_be_run_twice(tmp_path: Path) -> None:
+    command = [sys.executable, str(Path(demo.__file__)), "-o", str(tmp_path)]
     for _ in range(2):
-        done = subprocess.run(
-            [sys.executable, str(Path(demo.__file__))], capture_output=True, text=True, check=False
-        )
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         assert "losses       none" in done.stdout
         assert "all 71 channels as scripted" in done.stdout
@@ -82,8 +81,7 @@ def test_demo_fails_with_6_when_a_channel_is_not_as_scripted(
         give(plan, sitl)
         plan.analog[:, [0, 1]] = plan.analog[:, [1, 0]]
 
-    monkeypatch.setattr(demo, "DEMO", tmp_path)
     monkeypatch.setattr(scripted.Script, "give", crossed)
-    monkeypatch.setattr(sys, "argv", ["demo.py"])
+    monkeypatch.setattr(sys, "argv", ["demo.py", "-o", str(tmp_path)])
     assert demo.main() == 6
     assert "not as scripted: alpha_a" in capsys.readouterr().err

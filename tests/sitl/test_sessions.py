@@ -72,7 +72,8 @@ def test_pulled_battery_is_closed_when_throttle_has_been_idle_for_ten_seconds(
 
 def test_throttle_above_idle_resumes_an_open_file(tmp_path: Path) -> None:
     bench = Bench()
-    idle_receiver(bench.sitl, 0.1, 30.0, throttle_us=1700)
+    idle_receiver(bench.sitl, 0.1, 1.0)
+    idle_receiver(bench.sitl, 1.0, 30.0, throttle_us=1700)
     bench.sitl.power_on()
     bench.sitl.run_for(4.0)
     assert bench.state() == Recorder.RECORDING  # started by the throttle
@@ -216,17 +217,35 @@ def decoded_id(bench: Bench) -> bytes:
 
 def test_full_file_ends_the_session_and_the_ground_makes_a_new_one(tmp_path: Path) -> None:
     bench = Bench(file_blocks=300)
-    idle_receiver(bench.sitl, 0.1, 60.0, throttle_us=1700)
+    idle_receiver(bench.sitl, 0.1, 1.0)
+    idle_receiver(bench.sitl, 1.0, 40.0, throttle_us=1700)
+    idle_receiver(bench.sitl, 40.0, 60.0)
     bench.sitl.power_on()
     bench.sitl.run_for(30.0)
     assert bench.state() == Recorder.FILE_FULL
     log = bench.log(tmp_path)
     assert events(log, "session_end") == [1]
     assert len(bench.files()) == 1
-    bench.sitl.run_until(62 * TICKS_PER_S)  # the receiver is off
+    # Neither throttle nor a reset in flight brings metadata onto the card.
+    written = bench.sitl.state().ground_writes
+    bench.sitl.reset(BROWN_OUT)
+    bench.sitl.run_until(49 * TICKS_PER_S)
+    assert bench.sitl.state().ground_writes == written
+    bench.sitl.run_until(55 * TICKS_PER_S)
     assert bench.state() == Recorder.READY
     assert bench.log(tmp_path).complete == "complete"
     assert len(bench.files()) == 2
+
+
+def test_no_new_file_is_prepared_in_flight() -> None:
+    bench = Bench()
+    idle_receiver(bench.sitl, 0.1, 8.0, throttle_us=1700)
+    idle_receiver(bench.sitl, 8.0, 12.0)
+    bench.sitl.power_on()  # a card without a file, throttle above idle
+    bench.sitl.run_until(7 * TICKS_PER_S)
+    assert bench.sitl.state().ground_writes == 0
+    bench.sitl.run_until(10 * TICKS_PER_S)
+    assert bench.state() == Recorder.READY
 
 
 def test_identity_says_card_and_boots() -> None:

@@ -188,7 +188,8 @@ void sitl_run_until(int64_t at) {
 }
 
 void sitl_state(SitlState* state) {
-  const World& w = world();
+  World& w = world();
+  w.card.step(w.now);  // what it finished by itself
   memset(state, 0, sizeof *state);
   state->now = w.now;
   state->clock_us =
