@@ -58,6 +58,7 @@ class CardFault(IntEnum):
     REMOVE = 2
     INSERT = 3
     EVERY_BUSY = 4
+    UNREADABLE = 5
 
 
 class Level(IntEnum):

@@ -128,12 +128,14 @@ def test_card_removed_and_put_back(tmp_path: Path) -> None:
     assert bench.fsck(tmp_path) == ""
 
 
-def boot_with(image: bytearray | None, *, file_blocks: int = 4000) -> tuple[Volume, int]:
+def boot_with(image: bytearray | None, *, unreadable: bool = False) -> tuple[Volume, int]:
     """Boot with a card and return its state and the flashes of one group of the LED."""
     sitl = Sitl()
-    sitl.set_file_blocks(file_blocks)
+    sitl.set_file_blocks(4000)
     if image is not None:
         sitl.insert_card(image, b"\x01" * 16)
+    if unreadable:
+        sitl.add_card_fault(0, CardFault.UNREADABLE, 1)
     sitl.power_on()
     sitl.run_for(12.0)
     state = sitl.state()
@@ -173,6 +175,7 @@ def test_every_trouble_has_its_own_code() -> None:
         "none": boot_with(None),
         "exfat": boot_with(exfat_card()),
         "empty": boot_with(bytearray(1 << 20)),
+        "unreadable": boot_with(new_card(), unreadable=True),
         "full": boot_with(full_card(fragmented=False)),
         "fragmented": boot_with(full_card(fragmented=True)),
         "good": boot_with(new_card()),
@@ -181,6 +184,7 @@ def test_every_trouble_has_its_own_code() -> None:
         "none": (Volume.NO_CARD, 2),
         "exfat": (Volume.NO_FAT, 3),
         "empty": (Volume.NO_FAT, 3),
+        "unreadable": (Volume.UNREADABLE, 4),
         "full": (Volume.FULL, 5),
         "fragmented": (Volume.FRAGMENTED, 6),
         "good": (Volume.READY, 0),

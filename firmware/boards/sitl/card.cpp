@@ -43,6 +43,9 @@ void Card::step(int64_t now) {
       case CardFault::kEveryBusy:
         every_busy_us_ = event.value;
         break;
+      case CardFault::kUnreadable:
+        unreadable_ = event.value != 0;
+        break;
     }
   }
 }
@@ -58,7 +61,7 @@ CardStatus Card::start(int64_t now) {
 
 CardStatus Card::read(uint32_t lba, uint8_t* block) const {
   if (!present() || !started_) return CardStatus::kAbsent;
-  if (lba >= blocks_) return CardStatus::kError;
+  if (lba >= blocks_ || unreadable_) return CardStatus::kError;
   memcpy(block, image_ + static_cast<size_t>(lba) * hal::kCardBlockBytes, hal::kCardBlockBytes);
   return CardStatus::kOk;
 }

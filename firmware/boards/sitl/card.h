@@ -16,7 +16,8 @@ enum class CardFault : uint8_t {
   kReject = 1,  // the next `value` blocks are refused
   kRemove = 2,
   kInsert = 3,
-  kEveryBusy = 4,  // every block from here on takes `value` us
+  kEveryBusy = 4,   // every block from here on takes `value` us
+  kUnreadable = 5,  // reads fail while `value` is not 0
 };
 
 struct CardEvent {
@@ -58,6 +59,7 @@ class Card {
   uint32_t blocks_ = 0;
   uint8_t id_[hal::kCardIdBytes] = {};
   bool present_ = true;
+  bool unreadable_ = false;
   bool started_ = false;
   bool streaming_ = false;
   bool pending_ = false;

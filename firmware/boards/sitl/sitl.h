@@ -45,7 +45,7 @@ void sitl_hold_pressure_bus(int held);
 void sitl_add_gps(const int64_t* at, const uint8_t* bytes, size_t count);
 void sitl_add_button(const int64_t* at, const uint8_t* pressed, size_t count);
 // kind: 0 next block busy for `value` us, 1 next `value` blocks refused, 2 removed, 3 inserted,
-// 4 every block busy for `value` us.
+// 4 every block busy for `value` us, 5 reads fail while `value` is not 0.
 void sitl_add_card_events(const int64_t* at,
                           const uint8_t* kind,
                           const uint32_t* value,
