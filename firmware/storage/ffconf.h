@@ -20,7 +20,7 @@
 #define FF_PRINT_FLOAT 0
 #define FF_STRF_ENCODE 0
 
-// Names of 8.3 in capitals: no long names, no Unicode tables in flash. Of all code pages 932 has the
+// Names of 8.3 in capitals: no long names, no Unicode tables in flash. Code page 932 has the
 // smallest table in RAM (10 B; 437 has 128 B); the names of ours are ASCII.
 #define FF_CODE_PAGE 932
 #define FF_USE_LFN 0
