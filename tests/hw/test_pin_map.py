@@ -15,17 +15,18 @@ FRAMES = (HW.parent / "protocol" / "frames.toml").read_text()
 PIN_MAP = (HW / "pin_map.toml").read_text()
 
 
-def _load_generator() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("hw_generate", HW / "generate.py")
+def load_module(name: str) -> ModuleType:
+    """Load a program of hw/, which is no package."""
+    spec = importlib.util.spec_from_file_location(f"hw_{name}", HW / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules["hw_generate"] = module
+    sys.modules[f"hw_{name}"] = module
     spec.loader.exec_module(module)
     return module
 
 
-GENERATOR = _load_generator()
+GENERATOR = load_module("generate")
 
 
 def test_committed_files_are_current() -> None:

@@ -1,0 +1,71 @@
+"""The wiring pictures: committed ones are current, a wire that leads nowhere stops generation."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from tests.hw.test_pin_map import load_module
+
+HW = Path(__file__).resolve().parents[2] / "hw"
+HARNESS = (HW / "harness.toml").read_text()
+PIN_MAP = (HW / "pin_map.toml").read_text()
+GENERATOR: ModuleType = load_module("generate_wiring")
+
+
+def check(folder: Path) -> tuple[int, str]:
+    done = subprocess.run(
+        [sys.executable, folder / "generate_wiring.py", "--check"], capture_output=True, text=True
+    )
+    return done.returncode, done.stderr
+
+
+def test_committed_pictures_are_current() -> None:
+    assert check(HW) == (0, "")
+
+
+@pytest.mark.parametrize("name", ["wiring.yml", "wiring.svg", "power.yml", "power.svg"])
+def test_an_old_picture_is_found(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "hw"
+    shutil.copytree(HW, folder)
+    path = folder / "generated" / name
+    path.write_text(path.read_text().replace("sha256", "sha1").replace("pins", "legs", 1))
+    code, said = check(folder)
+    assert code == 6
+    assert f"{name} is not current" in said
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "complaint"),
+    [
+        ('["wiper", "pot_rudder"]', '["wiper", "pot_flap"]', "has no signal pot_flap"),
+        ('["wiper", "pot_rudder"]', '["wiper", "pot_elevator"]', "pot_elevator has two ends"),
+        ('pins = [["OUT", "dp_b"]]', "pins = []", "signal dp_b of pin_map.toml goes to no device"),
+        ('"Pot rudder", "IMU"', '"Pot rudder"', "IMU: rail '5 V sensors' does not feed it"),
+        ('side = "left"', 'side = "top"', "expected left or right"),
+    ],
+)
+def test_wires_that_lead_nowhere_are_refused(before: str, after: str, complaint: str) -> None:
+    assert before in HARNESS
+    with pytest.raises(GENERATOR.HarnessError, match=complaint):
+        GENERATOR.load_devices(HARNESS.replace(before, after, 1), PIN_MAP)
+
+
+def test_every_signal_leaves_the_board_at_its_own_pin() -> None:
+    source = GENERATOR.signal_picture(HARNESS, PIN_MAP)
+    board = re.search(r'"Arduino Mega 2560":\n.*\n.*\n    pins: (.*)\n    pinlabels: (.*)', source)
+    assert board is not None
+    shown = dict(zip(json.loads(board[2]), map(str, json.loads(board[1])), strict=True))
+    signals = tomllib.loads(PIN_MAP)["signal"]
+    assert shown == {row["name"]: row["pin"] for row in signals}
+    used = re.findall(r'^    - "Arduino Mega 2560": (.*)$', source, re.M)
+    pins = [str(pin) for row in used for pin in json.loads(row)]
+    assert sorted(pins) == sorted(row["pin"] for row in signals)
