@@ -96,7 +96,8 @@ def test_main_derivatives_and_modes_are_near_the_truth(
             assert found[name].value == pytest.approx(expected, rel=0.25), name
             assert found[name].half_width > 0.0
     dutch = next(m for m in answers["lateral"].modes if m.name == "dutch roll")
-    assert dutch.frequency_radps == pytest.approx(truth[4]["modes"]["dutch_roll"][0], rel=0.05)
+    sides = [m["modes"]["dutch_roll"][0] for m in truth if m["axes"][0] in ("aileron", "rudder")]
+    assert dutch.frequency_radps == pytest.approx(float(np.mean(sides)), rel=0.05)
     assert answers["lateral"].held_out
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term
 from host.sysid.errors import IdentificationError
+from host.sysid.model import without_outputs
 from host.sysid.model_file import model_from, model_text, parse_entry, read_model
 from host.sysid.templates import GRAVITY_MPS2, TEMPLATES, Trim, longitudinal, template
 
@@ -157,3 +158,16 @@ def test_garbage_samples_are_named() -> None:
     ):
         with pytest.raises(IdentificationError, match=message):
             Maneuver(dt_s, inputs, outputs)
+
+
+def test_an_output_left_out_leaves_the_others_alone() -> None:
+    model = longitudinal(TRIM)
+    fewer = without_outputs(model, ("theta_rad", "ax_mps2"))
+    theta = np.linspace(-1.0, 1.0, len(model.parameters))
+    keep = [k for k, y in enumerate(model.outputs) if y in fewer.outputs]
+    assert fewer.outputs == ("airspeed_mps", "alpha_rad", "q_radps", "az_mps2")
+    A, B, C, D = model.matrices(theta)
+    for ours, theirs in zip(fewer.matrices(theta), (A, B, C[keep], D[keep]), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    arm = without_outputs(longitudinal(TRIM, imu_sd_m=0.01), ("theta_rad",))
+    assert {x.output for x in arm.levers} == {"ax_mps2", "az_mps2"}

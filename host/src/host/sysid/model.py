@@ -330,5 +330,28 @@ def free_model(
     )
 
 
+def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
+    """Return a model that does not look at some outputs; delays that are left empty go too."""
+    keep = [k for k, y in enumerate(model.outputs) if y not in names]
+    place = {old: new for new, old in enumerate(keep)}
+    delays = [
+        replace(d, outputs=tuple(y for y in d.outputs if y not in names)) for d in model.delays
+    ]
+    return replace(
+        model,
+        outputs=tuple(model.outputs[k] for k in keep),
+        C=model.C[keep],
+        D=model.D[keep],
+        terms=tuple(
+            replace(t, row=place[t.row]) if t.matrix in "CD" else t
+            for t in model.terms
+            if t.matrix in "AB" or t.row in place
+        ),
+        output_biases=tuple(y for y in model.output_biases if y not in names),
+        delays=tuple(d for d in delays if d.outputs),
+        levers=tuple(x for x in model.levers if x.output not in names),
+    )
+
+
 def _names(value: tuple[str, ...] | str) -> tuple[str, ...]:
     return (value,) if isinstance(value, str) else tuple(value)
