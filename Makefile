@@ -10,9 +10,10 @@ help: ## list the targets
 setup: ## put everything needed into .venv and this clone
 	@.ci/setup.sh
 
-demo: ## fly two scripted minutes in simulated time and decode the log
+demo: ## fly two scripted minutes and a virtual aircraft; decode, compare, identify
 	@.ci/setup.sh demo
 	@$(PYTHON) tests/sitl/demo.py
+	@$(PYTHON) tests/sitl/virtual_demo.py
 
 test: setup ## run every test (STAGES="lint native" runs some)
 	@$(PYTHON) .ci/stages.py $(STAGES)

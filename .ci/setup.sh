@@ -121,6 +121,18 @@ print(",".join(project.get("optional-dependencies", {})))')"
   printf '%s %s\n' "$purpose" "$inputs" >>.venv/setup-done
 fi
 
+# --- compiled kernels ------------------------------------------------------------------------
+
+inputs="$({ find host/src/host/twin host/src/host/sysid -name '*.py' | sort | xargs cat
+  .venv/bin/pip --version; pwd; } | sha256sum | cut -c1-64)"
+if ! grep -qsx "$inputs" .cache/kernels-done; then
+  say "compiling the kernels of virtual flight and identification (half a minute)"
+  quietly kernels.log "$python" -m host.twin
+  quietly kernels-sysid.log "$python" -m host.sysid.kernels
+  mkdir -p .cache
+  printf '%s\n' "$inputs" >.cache/kernels-done
+fi
+
 # --- FatFs and PlatformIO --------------------------------------------------------------------
 
 [ -f build/fatfs-0.1.2/ff.c ] || say "fetching FatFs"
