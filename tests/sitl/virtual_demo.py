@@ -1,4 +1,4 @@
-"""Second act of `make demo`: fly a card with a virtual aircraft, identify it, compare with the truth.
+"""Second act of `make demo`: fly a virtual aircraft, identify it, compare with the truth.
 
 Only verbs a user has. All of it is simulated on this computer. Results stay in build/demo/virtual.
 """
