@@ -4,11 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.sysid.finder import Found
 from host.sysid.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
 from host.sysid.model import free_model
 from host.sysid.study.__main__ import main
 from host.sysid.study.accuracy import run_case as accuracy
 from host.sysid.study.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
+from host.sysid.study.flights import overlap
 from host.sysid.study.inputs import SHAPES
 from host.sysid.study.thesis import check_refusal, refusal_agreement, run_hopfield, thesis_data
 from host.sysid.study.turbulence import run_case as turbulence
@@ -60,3 +62,11 @@ def test_programs_write_their_tables(tmp_path: Path, capsys: pytest.CaptureFixtu
     text = (tmp_path / "b_accuracy.txt").read_text()
     assert text.startswith("simulated data")
     assert "rms(error/bound)" in text
+
+
+def test_overlap_counts_axis_and_both_ends() -> None:
+    found = Found("elevator_rad", "doublet", 10.0, 11.0, 14.0, 0.05, 3)
+    truth = {"axes": ["elevator"], "start_s": 10.0, "end_s": 15.0}
+    assert overlap(found, truth, 1.0) == pytest.approx(0.8)
+    assert overlap(found, {**truth, "axes": ["rudder"]}, 1.0) == 0.0
+    assert overlap(found, {**truth, "start_s": 20.0, "end_s": 25.0}, 1.0) == 0.0

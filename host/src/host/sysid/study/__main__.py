@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from host.sysid.study import accuracy, coverage, methods, thesis, turbulence
+from host.sysid.study import accuracy, coverage, flights, methods, thesis, turbulence
 
 Main = Callable[[list[str] | None], int]
 # name -> (program, arguments by size)
@@ -31,6 +31,7 @@ STUDIES: dict[str, tuple[Main, dict[str, list[str]]]] = {
         turbulence.main,
         {"small": ["--flights", "4"], "full": ["--flights", "100"]},
     ),
+    "e_flights": (flights.main, {"small": ["--flights", "1"], "full": ["--flights", "20"]}),
     "g_methods": (methods.main, {"small": ["--runs", "2"], "full": ["--runs", "20"]}),
 }
 

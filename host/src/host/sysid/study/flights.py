@@ -1,0 +1,126 @@
+"""Virtual flights through the whole chain: are maneuvers found, and do derivatives hold the truth?
+
+Every flight is flown by `host simulate` with its own seed, all tolerances drawn; windows and
+derivatives are compared with the truth file beside the log. Seeds below 200 were looked at while
+the finder was written; the study starts at 200.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from host.sysid.aircraft_file import airframe_data
+from host.sysid.errors import IdentificationError
+from host.sysid.finder import Found, find
+from host.sysid.flight import identify
+from host.sysid.tables import read_columns
+from host.sysid.truth import read_truth, true_coefficients
+
+FIRST_SEED = 200
+OVERLAP = 0.8
+CARDS = ("demo", "multisine", "sweep", "calm")
+PRINCIPAL = (
+    "CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "CY_beta", "CY_dr", "Cl_beta", "Cl_p",
+    "Cl_r", "Cl_da", "Cn_beta", "Cn_p", "Cn_r", "Cn_dr",
+)  # fmt: skip
+
+
+@dataclass(slots=True)
+class Tally:
+    """Counts over flights; relative errors, half-widths and coverage per coefficient."""
+
+    maneuvers: int = 0
+    found: int = 0
+    false: int = 0
+    minutes: float = 0.0
+    failed: int = 0
+    error: dict[str, list[float]] = field(default_factory=dict)
+    half: dict[str, list[float]] = field(default_factory=dict)
+    covered: dict[str, list[bool]] = field(default_factory=dict)
+
+
+def overlap(found: Found, maneuver: dict[str, Any], clock: float) -> float:
+    """Return intersection over union of a found window and a true one, 0 on another axis."""
+    if not any(found.axis.startswith(axis) for axis in maneuver["axes"]):
+        return 0.0
+    first, last = maneuver["start_s"] * clock, maneuver["end_s"] * clock
+    both = min(found.end_s, last) - max(found.start_s, first)
+    union = max(found.end_s, last) - min(found.start_s, first)
+    return float(max(both, 0.0) / union)
+
+
+def add_flight(tally: Tally, folder: Path, *, fit: bool, aircraft: str = "ultrastick25e") -> None:
+    """Judge one flight in a folder of `host simulate --firmware none`."""
+    truth = read_truth(folder / "flight.truth.toml")
+    columns, _ = read_columns(folder / "flight.csv")
+    clock = 1.0 + float(truth["drawn"]["clock_share"])
+    found = find(columns)
+    best = np.array([[overlap(f, m, clock) for f in found] for m in truth["maneuver"]])
+    tally.maneuvers += len(best)
+    tally.found += int(np.sum(best.max(axis=1, initial=0.0) >= OVERLAP))
+    tally.false += int(np.sum(best.max(axis=0, initial=0.0) == 0.0))
+    tally.minutes += float(truth["duration_s"]) / 60.0
+    if not fit:
+        return
+    try:
+        answers = identify(columns, airframe=airframe_data(aircraft))
+    except IdentificationError:
+        tally.failed += 1
+        return
+    for answer in answers:
+        expected = true_coefficients(truth, answer.template)
+        for c in answer.coefficients:
+            if c.name in PRINCIPAL:
+                size = abs(expected[c.name])
+                miss = c.value - expected[c.name]
+                tally.error.setdefault(c.name, []).append(miss / size)
+                tally.half.setdefault(c.name, []).append(c.half_width / size)
+                tally.covered.setdefault(c.name, []).append(abs(miss) <= c.half_width)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Fly, judge, print."""
+    from host.cli import main as host
+
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--flights", type=int, default=3, help="seeds per card")
+    parser.add_argument("--card", choices=CARDS, action="append")
+    parser.add_argument("--no-fit", action="store_true", help="only find maneuvers")
+    options = parser.parse_args(arguments)
+    write = sys.stdout.write
+    for card in options.card or CARDS[:2]:
+        tally = Tally()
+        for seed in range(FIRST_SEED, FIRST_SEED + options.flights):
+            with tempfile.TemporaryDirectory() as folder:
+                flags = ["--seed", str(seed), "--firmware", "none", "--no-picture", "-o", folder]
+                with contextlib.redirect_stdout(io.StringIO()):
+                    status = host(["simulate", card, *flags])
+                if status:
+                    raise IdentificationError(f"host simulate {card} ended with {status}")
+                add_flight(tally, Path(folder), fit=not options.no_fit)
+        write(
+            f"{card}: {tally.found} of {tally.maneuvers} windows overlap by {OVERLAP} or more,"
+            f" {tally.false} false in {tally.minutes:.1f} min; {tally.failed} fits failed\n"
+        )
+        for name in tally.error:
+            error, half = np.array(tally.error[name]), np.array(tally.half[name])
+            write(
+                f"  {name:9s} median error {100.0 * np.median(np.abs(error)):6.1f} %"
+                f"  mean {100.0 * error.mean():+7.1f} %"
+                f"  median half-width {100.0 * np.median(half):6.1f} %"
+                f"  covered {100.0 * np.mean(tally.covered[name]):5.1f} %\n"
+            )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
