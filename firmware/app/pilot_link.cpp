@@ -20,19 +20,22 @@ void PilotLink::step(const frames::ConfigFrame& config,
                      uint32_t now_us) {
   ran(kTaskPilot);
   hal::Edge edge;
-  bool due = decoder_.waiting() || now_us - decided_us_ >= kRestUs;
+  const bool rested = now_us - decided_us_ >= kRestUs;
+  bool due = rested || decoder_.waiting();
   while (hal::take_edge(&edge)) {
     decoder_.edge(core::extend_ticks(hal::now_ticks(), edge.at_ticks), edge.levels, edge.late);
     due = due || decoder_.waiting();
   }
-  if (due) decide(config, self_test_passed, outlet, now_us);
+  if (!due) return;
+  poll_receiver(outlet, now_us);
+  if (rested || decoder_.changes() != decided_changes_) {
+    decided_us_ = now_us;
+    decided_changes_ = decoder_.changes();
+    decide(config, self_test_passed, outlet, now_us);
+  }
 }
 
-void PilotLink::decide(const frames::ConfigFrame& config,
-                       bool self_test_passed,
-                       Outlet& outlet,
-                       uint32_t now_us) {
-  decided_us_ = now_us;
+void PilotLink::poll_receiver(Outlet& outlet, uint32_t now_us) {
   if (hal::lost_edges() != lost_edges_) {
     lost_edges_ = hal::lost_edges();
     decoder_.gap();
@@ -44,6 +47,12 @@ void PilotLink::decide(const frames::ConfigFrame& config,
   }
   stormy_ = storm != 0;
   decoder_.poll(hal::now_ticks());
+}
+
+void PilotLink::decide(const frames::ConfigFrame& config,
+                       bool self_test_passed,
+                       Outlet& outlet,
+                       uint32_t now_us) {
   channels_ = core::map_channels(decoder_, config);
   drive_.update(channels_, config, self_test_passed, now_us);
   for (uint8_t servo = 0; servo < core::kServos; ++servo) {

@@ -36,6 +36,7 @@ class PilotLink {
  private:
   static constexpr uint16_t kRestUs = 4000;
 
+  void poll_receiver(Outlet& outlet, uint32_t now_us);
   void decide(const frames::ConfigFrame& config,
               bool self_test_passed,
               Outlet& outlet,
@@ -51,6 +52,7 @@ class PilotLink {
   uint16_t lost_edges_ = 0;
   frames::Drive told_drive_ = frames::Drive::kDirectBoot;
   uint8_t told_missing_ = (1U << core::kChannels) - 1;
+  uint8_t decided_changes_ = 0;
   bool stormy_ = false;
 };
 

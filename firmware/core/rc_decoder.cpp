@@ -94,6 +94,7 @@ void RcDecoder::settle(uint8_t index, uint32_t low_ticks) {
       period_ticks <= kMaxPeriodTicks) {
     measure_frame(static_cast<uint16_t>(period_ticks / kTicksPerUs));
   }
+  ++changes_;
   input.accepted = input.rise;
   input.width = input.candidate;
   input.candidate = 0;
@@ -143,6 +144,7 @@ void RcDecoder::storm() {
 
 void RcDecoder::lose(uint8_t index) {
   const uint8_t bit = bit_of(index);
+  ++changes_;
   inputs_[index].width = 0;
   inputs_[index].streak = 0;
   set(valid_, bit, false);

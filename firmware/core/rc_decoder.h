@@ -49,6 +49,7 @@ class RcDecoder {
   uint8_t fresh() const { return fresh_; }         // bit per input: last pulse at most 45 ms old
   uint8_t steady() const { return steady_; }       // bit per input: three accepted in a row
   uint16_t frame_us() const { return frame_us_; }  // 0: not known
+  uint8_t changes() const { return changes_; }     // counts what poll and edge changed of these
   uint16_t glitches() const { return glitches_; }  // pulses rejected
 
  private:
@@ -76,6 +77,7 @@ class RcDecoder {
   uint8_t valid_ = 0;
   uint8_t fresh_ = 0;
   uint8_t steady_ = 0;
+  uint8_t changes_ = 0;
   uint8_t waiting_ = 0;  // bit per input: it has a candidate
   uint8_t early_ = 0;    // pulses refused for coming early
   bool locked_ = false;  // frame_us_ bounds how early the next pulse may come

@@ -55,7 +55,7 @@ class Barometer {
         }
         return BaroEvent::kNone;
       case Step::kConverting:
-        if (now_us - since_us_ >= phase().wait_us) {
+        if (now_us - since_us_ >= wait_us_) {
           read(phase().read_register, phase().size, now_us);
           step_ = Step::kData;
         }
@@ -152,6 +152,7 @@ class Barometer {
         return BaroEvent::kFound;
       case Step::kCommand:
         since_us_ = now_us;
+        wait_us_ = phase().wait_us;
         step_ = Step::kConverting;
         return BaroEvent::kNone;
       case Step::kData:
@@ -193,6 +194,7 @@ class Barometer {
   uint32_t since_us_ = 0;  // the last command was acknowledged, or the sensor was lost
   frames::BaroFrame frame_ = {};
   uint16_t words_[12] = {};
+  uint16_t wait_us_ = 0;  // of the conversion under way
   uint16_t errors_ = 0;
   uint8_t buffer_[24] = {};
   uint8_t address_ = 0x76;

@@ -9,6 +9,7 @@
 
 #include "boards/mega2560/generated/pins.h"
 #include "boards/mega2560/interrupts.h"
+#include "core/progmem.h"
 #include "hal/clock.h"
 
 namespace {
@@ -25,43 +26,120 @@ constexpr uint8_t kScansPerSupply = 128;  // about once a second
 constexpr uint8_t kIdle = _BV(ADEN) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);  // 125 kHz
 constexpr uint8_t kFree = kIdle | _BV(ADATE) | _BV(ADIE);
 
-uint16_t g_sums[hal::kAnalogSlots];
-volatile uint8_t g_done = kConversions;  // conversions of this scan that are in
-volatile uint8_t g_slot;                 // slot of the next result
-volatile uint8_t g_mux_slot;             // slot the multiplexer is set for next
 uint8_t g_scans;
-volatile uint16_t g_bandgap_counts;
 
-inline void select(const uint8_t channel) {
-  ADCSRB = channel < 8 ? 0 : _BV(MUX5);
-  ADMUX = uint8_t(kReference | (channel & 7U));
+// ADMUX of a channel; its bit ADLAR, else unused, stands for MUX5 of ADCSRB.
+constexpr uint8_t selection(const uint8_t slot) {
+  return uint8_t(kReference | (pins::kAnalogChannel[slot] & 7U) |
+                 (pins::kAnalogChannel[slot] < 8 ? 0 : _BV(ADLAR)));
 }
 
-inline uint8_t after(const uint8_t slot) {
-  return slot + 1 == hal::kAnalogSlots ? 0 : uint8_t(slot + 1);
+inline void select(const uint8_t chosen) {
+  ADCSRB = (chosen & _BV(ADLAR)) != 0 ? _BV(MUX5) : 0;
+  ADMUX = chosen & uint8_t(~_BV(ADLAR));
 }
+
+// Of the slot behind each slot.
+struct Selections {
+  uint8_t slot[hal::kAnalogSlots];
+};
+constexpr Selections make_selections() {
+  Selections all = {};
+  for (uint8_t slot = 0; slot < hal::kAnalogSlots; ++slot) {
+    all.slot[slot] = selection(slot + 1 == hal::kAnalogSlots ? 0 : uint8_t(slot + 1));
+  }
+  return all;
+}
+constexpr Selections kBehind CORE_FLASH = make_selections();
 
 }  // namespace
 
-// Its flag is cleared on entry and comes again 104 us later, so it may nest at once.
-ISR(ADC_vect, ISR_NOBLOCK) {
-  const uint16_t counts = ADC;
-  const uint8_t done = g_done;
-  if (done >= kConversions) {
-    g_bandgap_counts = counts;
-    return;
-  }
-  const uint8_t slot = g_slot;
-  g_sums[slot] = uint16_t(g_sums[slot] + counts);
-  g_slot = after(slot);
-  g_done = uint8_t(done + 1);
-  if (done + 2 < kConversions) {
-    const uint8_t next = after(g_mux_slot);
-    select(pins::kAnalogChannel[next]);
-    g_mux_slot = next;
-  } else {
-    ADCSRA = kIdle | _BV(ADIE);  // the conversion under way is the last
-  }
+#define FOR_THE_INTERRUPT __attribute__((used, externally_visible))
+
+// Shared with the assembly below, hence C names, kept by the linker.
+extern "C" {
+
+volatile uint16_t adc_sums[hal::kAnalogSlots] FOR_THE_INTERRUPT;
+volatile uint8_t adc_left FOR_THE_INTERRUPT;    // conversions of this scan still to come
+volatile uint8_t adc_offset FOR_THE_INTERRUPT;  // of the next sum, in bytes
+volatile uint16_t adc_bandgap FOR_THE_INTERRUPT;
+
+}  // extern "C"
+
+// Its flag is cleared on entry and comes again 104 us later, so it may nest at once. In assembly:
+// 98 cycles instead of 128, 4400 or 8800 times a second.
+ISR(ADC_vect, ISR_NAKED) {
+  __asm__ __volatile__(
+      "sei \n\t"
+      "push r24 \n\t"
+      "in r24, __SREG__ \n\t"
+      "push r24 \n\t"
+      "push r25 \n\t"
+      "push r18 \n\t"
+      "push r19 \n\t"
+      "push r30 \n\t"
+      "push r31 \n\t"
+      "lds r24, %[result] \n\t"
+      "lds r25, %[result]+1 \n\t"
+      "lds r18, adc_left \n\t"
+      "subi r18, 1 \n\t"
+      "brcs 3f \n\t"
+      "lds r30, adc_offset \n\t"
+      "ldi r31, 0 \n\t"
+      "subi r30, lo8(-(adc_sums)) \n\t"
+      "sbci r31, hi8(-(adc_sums)) \n\t"
+      "ld r19, Z \n\t"
+      "add r24, r19 \n\t"
+      "ldd r19, Z+1 \n\t"
+      "adc r25, r19 \n\t"
+      "st Z, r24 \n\t"
+      "std Z+1, r25 \n\t"
+      "lds r30, adc_offset \n\t"
+      "subi r30, -2 \n\t"
+      "cpi r30, %[end] \n\t"
+      "brne 1f \n\t"
+      "ldi r30, 0 \n\t"
+      "1: sts adc_offset, r30 \n\t"
+      "sts adc_left, r18 \n\t"
+      "cpi r18, 2 \n\t"
+      "brlo 2f \n\t"
+      // That slot converts already; the multiplexer is set for the one behind it.
+      "lsr r30 \n\t"
+      "ldi r31, 0 \n\t"
+      "subi r30, lo8(-(%[behind])) \n\t"
+      "sbci r31, hi8(-(%[behind])) \n\t"
+      "lpm r24, Z \n\t"
+      "ldi r25, 0 \n\t"
+      "sbrc r24, %[upper] \n\t"
+      "ldi r25, %[mux5] \n\t"
+      "sts %[control_b], r25 \n\t"
+      "andi r24, %[mux] \n\t"
+      "sts %[admux], r24 \n\t"
+      "rjmp 4f \n\t"
+      // the conversion under way is the last
+      "2: ldi r24, %[once] \n\t"
+      "sts %[control_a], r24 \n\t"
+      "rjmp 4f \n\t"
+      "3: sts adc_bandgap, r24 \n\t"
+      "sts adc_bandgap+1, r25 \n\t"
+      "4: pop r31 \n\t"
+      "pop r30 \n\t"
+      "pop r19 \n\t"
+      "pop r18 \n\t"
+      "pop r25 \n\t"
+      "pop r24 \n\t"
+      "out __SREG__, r24 \n\t"
+      "pop r24 \n\t"
+      "reti \n\t" ::[result] "n"(_SFR_MEM_ADDR(ADC)),
+      [end] "M"(2 * hal::kAnalogSlots),
+      [behind] "i"(&kBehind),
+      [upper] "I"(ADLAR),
+      [mux5] "M"(_BV(MUX5)),
+      [mux] "M"(0xFF & ~_BV(ADLAR)),
+      [control_a] "n"(_SFR_MEM_ADDR(ADCSRA)),
+      [control_b] "n"(_SFR_MEM_ADDR(ADCSRB)),
+      [admux] "n"(_SFR_MEM_ADDR(ADMUX)),
+      [once] "M"(kIdle | _BV(ADIE)));
 }
 
 namespace hal {
@@ -76,22 +154,21 @@ uint32_t start_scan() {
   while ((ADCSRA & _BV(ADSC)) != 0) {  // the supply's conversion, 104 us once a second
   }
   for (uint8_t slot = 0; slot < kAnalogSlots; ++slot) {
-    g_sums[slot] = 0;
+    adc_sums[slot] = 0;
   }
-  g_slot = 0;
-  g_mux_slot = 1;
-  g_done = 0;
-  select(pins::kAnalogChannel[0]);
+  adc_offset = 0;
+  adc_left = kConversions;
+  select(selection(0));
   const uint32_t started_us = now_us();
   ADCSRA = kFree | _BV(ADSC) | _BV(ADIF);
   _delay_us(17);  // two ADC clocks: the first conversion has taken its channel
-  select(pins::kAnalogChannel[1]);
+  select(selection(1));
   ++g_scans;
   return started_us;
 }
 
 bool scan_done() {
-  return g_done >= kConversions;
+  return adc_left == 0;
 }
 
 uint16_t scan_sum(const uint8_t slot) {
@@ -102,14 +179,14 @@ uint16_t scan_sum(const uint8_t slot) {
     _delay_us(100);
     ADCSRA = kIdle | _BV(ADIE) | _BV(ADSC);
   }
-  return g_sums[slot];
+  return adc_sums[slot];
 }
 
 uint16_t avcc_mv() {
   uint16_t counts;
   {
     const mega::InterruptsOff guard;
-    counts = g_bandgap_counts;
+    counts = adc_bandgap;
   }
   return counts == 0 ? 0 : uint16_t(uint32_t(kBandgapMv) * 1024U / counts);
 }

@@ -9,23 +9,36 @@
 // Counts turns of the timer, 32.768 ms each; 17 bits of it reach now_us(). Shared with the assembly
 // below, hence a C name, kept by the linker.
 extern "C" {
-volatile uint32_t clock_turns __attribute__((used, externally_visible));
+struct Turns {
+  uint16_t low;
+  uint8_t high;
+};
+volatile Turns clock_turns __attribute__((used, externally_visible));
 }
 
 namespace {
 
 struct Now {
-  uint32_t turns;
   uint16_t ticks;
+  uint16_t turns;
+  uint8_t odd;  // bit 16 of the turns
 };
 
-Now now() {
+inline __attribute__((always_inline)) Now now() {
   Now at;
-  const mega::InterruptsOff guard;  // the timer's bytes share TEMP with the receiver's interrupt
-  at.ticks = TCNT5;
-  at.turns = clock_turns;
-  if ((TIFR5 & _BV(TOV5)) != 0 && at.ticks < 0x8000U) {
-    ++at.turns;  // the overflow waits to be counted
+  bool uncounted;
+  {
+    const mega::InterruptsOff guard;  // the timer's bytes share TEMP with the receiver's interrupt
+    at.ticks = TCNT5;
+    uncounted = (TIFR5 & _BV(TOV5)) != 0;
+    at.turns = clock_turns.low;
+    at.odd = clock_turns.high;
+  }
+  if (uncounted && at.ticks < 0x8000U) {
+    ++at.turns;
+    if (at.turns == 0) {
+      ++at.odd;
+    }
   }
   return at;
 }
@@ -78,16 +91,15 @@ void start_clock() {
 namespace hal {
 
 uint32_t now_us() {
-  const Now at = now();
   // turns * 32768 + ticks / 2 in whole bytes and one shift: a shift by 15 is a loop of 75 cycles.
-  const uint32_t ticks = (at.turns << 16) | at.ticks;
-  const uint32_t top = (at.turns & 0x10000UL) != 0 ? 0x80000000UL : 0;
-  return (ticks >> 1) | top;
+  const Now at = now();
+  const uint32_t half = (uint32_t{at.turns} << 16 | at.ticks) >> 1;
+  return (at.odd & 1U) != 0 ? half | 0x80000000UL : half;
 }
 
 uint32_t now_ticks() {
   const Now at = now();
-  return (at.turns << 16) | at.ticks;
+  return uint32_t{at.turns} << 16 | at.ticks;
 }
 
 }  // namespace hal

@@ -10,6 +10,12 @@
 #include "boards/mega2560/interrupts.h"
 #include "hal/clock.h"
 
+// Shared with the assembly below, hence C names, kept by the linker.
+extern "C" {
+uint8_t* imu_bus_to __attribute__((used, externally_visible));   // where the next byte goes
+uint8_t imu_bus_room __attribute__((used, externally_visible));  // bytes still taken; else 0
+}
+
 namespace {
 
 // 42 with its bits 0x31 ignored: 42, 43 and 27 answer (and 10, 11, 26, 58, 59, which nobody uses).
@@ -22,12 +28,14 @@ constexpr uint8_t kNone = 2;
 
 hal::ImuPacket g_packets[2];
 volatile uint8_t g_filling = kNone;  // buffer under way; interrupt only
-volatile uint8_t g_full;             // packets waiting, 0 to 2
-volatile uint8_t g_first;            // oldest of them
+uint16_t g_start_ticks[2];
+volatile uint8_t g_full;   // packets waiting, 0 to 2
+volatile uint8_t g_first;  // oldest of them
 volatile uint16_t g_lost;
 
 void begin_packet() {
   const uint8_t waiting = g_full;
+  imu_bus_room = 0;
   if (waiting == 2) {
     ++g_lost;
     g_filling = kNone;
@@ -35,26 +43,22 @@ void begin_packet() {
   }
   const uint8_t next = (g_first + waiting) & 1U;
   hal::ImuPacket& packet = g_packets[next];
-  packet.start_us = hal::now_us();
+  {
+    // The low half of now_ticks(): a call here would make the interrupt save every register.
+    const mega::InterruptsOff guard;
+    g_start_ticks[next] = TCNT5;
+  }
   packet.address = uint8_t(TWDR >> 1);
-  packet.length = 0;
+  imu_bus_to = packet.bytes;
+  imu_bus_room = hal::kImuPacketBytes;
   g_filling = next;
 }
 
-void add_byte() {
-  const uint8_t filling = g_filling;
-  if (filling == kNone) {
-    return;
-  }
-  hal::ImuPacket& packet = g_packets[filling];
-  if (packet.length < hal::kImuPacketBytes) {
-    packet.bytes[packet.length] = TWDR;
-    ++packet.length;
-  }
-}
-
 void end_packet() {
-  if (g_filling != kNone) {
+  const uint8_t filling = g_filling;
+  if (filling != kNone) {
+    g_packets[filling].length = uint8_t(hal::kImuPacketBytes - imu_bus_room);
+    imu_bus_room = 0;
     g_filling = kNone;
     mega::g_awake = true;
     const mega::InterruptsOff guard;
@@ -64,31 +68,76 @@ void end_packet() {
 
 }  // namespace
 
-// The bus waits (SCL low) from the flag to the write of TWINT, so no byte is lost, only slowed:
-// about 8 us a byte on a bus that takes 22.5 us for one at 400 kHz.
-NESTING_ISR(TWI_vect, TWCR, kMaskedKeep) {
+// What comes once a packet, called with TWI's enable bit off and interrupts on.
+extern "C" void __vector_imu_bus_event(void) __attribute__((signal, used, externally_visible));
+void __vector_imu_bus_event(void) {
   uint8_t next = kGo;
   switch (TW_STATUS) {
     case TW_SR_SLA_ACK:
     case TW_SR_GCALL_ACK:
       begin_packet();
       break;
-    case TW_SR_DATA_ACK:
-    case TW_SR_DATA_NACK:
-      add_byte();
-      break;
     case TW_SR_STOP:
       end_packet();
       break;
     case TW_BUS_ERROR:
       g_filling = kNone;
+      imu_bus_room = 0;
       next = kGo | _BV(TWSTO);  // lets go of the lines, sends nothing
       break;
     default:
       g_filling = kNone;
+      imu_bus_room = 0;
       break;
   }
   TWCR = next;  // the next event is a byte away: 22 us
+}
+
+// The bus waits (SCL low) from the flag to the write of TWINT, so no byte is lost, only slowed. A
+// byte of a packet, 36 times of 38, is stored here in 60 cycles; the compiler's way took 119. As
+// in NESTING_ISR the own enable bit goes off first, then interrupts on.
+ISR(TWI_vect, ISR_NAKED) {
+  __asm__ __volatile__(
+      "push r24 \n\t"
+      "in r24, __SREG__ \n\t"
+      "push r24 \n\t"
+      "ldi r24, %[masked] \n\t"
+      "sts %[control], r24 \n\t"
+      "sei \n\t"
+      "lds r24, %[status] \n\t"
+      "andi r24, 0xF8 \n\t"
+      "cpi r24, %[data] \n\t"
+      "brne 2f \n\t"
+      "lds r24, imu_bus_room \n\t"
+      "subi r24, 1 \n\t"
+      "brcs 1f \n\t"
+      "sts imu_bus_room, r24 \n\t"
+      "push r30 \n\t"
+      "push r31 \n\t"
+      "lds r30, imu_bus_to \n\t"
+      "lds r31, imu_bus_to+1 \n\t"
+      "lds r24, %[byte] \n\t"
+      "st Z+, r24 \n\t"
+      "sts imu_bus_to, r30 \n\t"
+      "sts imu_bus_to+1, r31 \n\t"
+      "pop r31 \n\t"
+      "pop r30 \n\t"
+      "1: ldi r24, %[go] \n\t"
+      "sts %[control], r24 \n\t"
+      "pop r24 \n\t"
+      "out __SREG__, r24 \n\t"
+      "pop r24 \n\t"
+      "reti \n\t"
+      "2: pop r24 \n\t"
+      "out __SREG__, r24 \n\t"
+      "pop r24 \n\t"
+      "sei \n\t"
+      "jmp __vector_imu_bus_event \n\t" ::[masked] "M"(int(kMaskedKeep)),
+      [control] "n"(_SFR_MEM_ADDR(TWCR)),
+      [status] "n"(_SFR_MEM_ADDR(TWSR)),
+      [byte] "n"(_SFR_MEM_ADDR(TWDR)),
+      [data] "M"(TW_SR_DATA_ACK),
+      [go] "M"(int(kGo)));
 }
 
 namespace hal {
@@ -100,7 +149,16 @@ void start_imu_bus() {
 }
 
 const ImuPacket* imu_packet() {
-  return g_full == 0 ? nullptr : &g_packets[g_first];
+  if (g_full == 0) {
+    return nullptr;
+  }
+  // Stamps are extended here: within 32 ms of the packet, or they are that much too late.
+  const uint8_t first = g_first;
+  hal::ImuPacket& packet = g_packets[first];
+  const uint32_t now_ticks = hal::now_ticks();
+  const uint16_t age_ticks = uint16_t(uint16_t(now_ticks) - g_start_ticks[first]);
+  packet.start_us = now_us() - (age_ticks >> 1);
+  return &packet;
 }
 
 void release_imu_packet() {
@@ -120,6 +178,7 @@ void restart_imu_bus() {
   const mega::InterruptsOff guard;
   TWCR = 0;  // lets go of SDA and SCL whatever the state
   g_filling = kNone;
+  imu_bus_room = 0;
   TWCR = kGo;
 }
 

@@ -11,8 +11,10 @@ namespace mega {
 // Interrupts off for the lifetime of the object. Keep it under 2 us: 32 cycles.
 class InterruptsOff {
  public:
-  InterruptsOff() : status_(SREG) { __asm__ __volatile__("cli" ::: "memory"); }
-  ~InterruptsOff() {
+  __attribute__((always_inline)) InterruptsOff() : status_(SREG) {
+    __asm__ __volatile__("cli" ::: "memory");
+  }
+  __attribute__((always_inline)) ~InterruptsOff() {
     __asm__ __volatile__("" ::: "memory");
     SREG = status_;
   }
