@@ -3,6 +3,8 @@
 .PHONY: help setup demo test native mega sitl lint format bench flight-bench clean
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
+# mkfs.vfat and fsck.vfat live where only root looks.
+export PATH := $(PATH):/usr/sbin:/sbin
 
 help: ## list the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 22
