@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from construct import GreedyBytes, Int16ul, StreamError, Struct
 from numpy.typing import NDArray
 
 from host.blocks import HEADER_BYTES, KIND_FRAMES, KIND_SCHEMA, Blocks, read_at
@@ -18,6 +19,7 @@ from host.extents import BLOCK_BYTES
 from host.schema import Schema, packed_schema, parse_schema
 
 BLOCKS_AT_ONCE = 4096  # 2 MiB: frames and columns of one piece stay in the cache
+SCHEMA_PIECE = Struct("offset" / Int16ul, "total" / Int16ul, "text" / GreedyBytes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,12 +92,12 @@ def _schema_text(file: FileIO, blocks: Blocks, pieces: NDArray[np.intp]) -> str 
     for number in pieces:
         used = int(blocks.used[number])
         payload = read_at(file, int(blocks.position[number]) + HEADER_BYTES, used)
-        if used < 4:
+        try:
+            piece = SCHEMA_PIECE.parse(payload)
+        except StreamError:  # shorter than its own two numbers
             continue
-        offset = int.from_bytes(payload[0:2], "little")
-        total = int.from_bytes(payload[2:4], "little")
-        parts[offset] = bytes(payload[4:])
-        joined = _chain(parts, total)
+        parts[piece.offset] = piece.text
+        joined = _chain(parts, piece.total)
         if joined is not None:
             return joined.decode("ascii", errors="replace")
     return None

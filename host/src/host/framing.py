@@ -8,14 +8,37 @@ from __future__ import annotations
 import binascii
 from dataclasses import dataclass, field
 
+from construct import (
+    Checksum,
+    ChecksumError,
+    Const,
+    ExprValidator,
+    GreedyBytes,
+    Int8ul,
+    Int16ul,
+    Prefixed,
+    RawCopy,
+    StreamError,
+    Struct,
+    ValidationError,
+    this,
+)
+
 SYNC = b"\xa5\x5a"
 LONGEST_FRAME = 128
-_OVERHEAD = 5  # sync, length, CRC-16
 
 
 def crc16(data: bytes) -> int:
     """Return CRC-16/CCITT-FALSE; "123456789" gives 0x29B1."""
     return binascii.crc_hqx(data, 0xFFFF)
+
+
+_LENGTH = ExprValidator(Int8ul, lambda length, _: 1 <= length <= LONGEST_FRAME)
+ENVELOPE = Struct(
+    "sync" / Const(SYNC),
+    "covered" / RawCopy(Prefixed(_LENGTH, GreedyBytes)),
+    "crc" / Checksum(Int16ul, crc16, this.covered.data),
+)
 
 
 def envelope(frame: bytes) -> bytes:
@@ -28,8 +51,7 @@ def envelope(frame: bytes) -> bytes:
     """
     if not 1 <= len(frame) <= LONGEST_FRAME:
         raise ValueError(f"a frame of {len(frame)} bytes; an envelope holds 1 to {LONGEST_FRAME}")
-    body = bytes([len(frame)]) + frame
-    return SYNC + body + crc16(body).to_bytes(2, "little")
+    return bytes(ENVELOPE.build({"covered": {"value": frame}}))
 
 
 @dataclass(slots=True)
@@ -69,20 +91,15 @@ class EnvelopeReader:
         frames: list[bytes] = []
         while True:
             self._skip_to_sync()
-            if len(self._held) < 3:
+            try:
+                found = ENVELOPE.parse(self._held)
+            except StreamError:  # not all of it is here yet
                 return frames
-            length = self._held[2]
-            if not 1 <= length <= LONGEST_FRAME:
+            except (ValidationError, ChecksumError):
                 self._fail()
                 continue
-            if len(self._held) < length + _OVERHEAD:
-                return frames
-            covered = bytes(self._held[2 : 3 + length])
-            if crc16(covered) != int.from_bytes(self._held[3 + length : 5 + length], "little"):
-                self._fail()
-                continue
-            frames.append(covered[1:])
-            del self._held[: length + _OVERHEAD]
+            frames.append(found.covered.value)
+            del self._held[: found.covered.length + len(SYNC) + Int16ul.sizeof()]
 
     def _skip_to_sync(self) -> None:
         at = self._held.find(SYNC)
