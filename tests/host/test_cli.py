@@ -1,5 +1,6 @@
 """The command line: exit codes, one clear line per error, results on stdout."""
 
+import errno
 import json
 import os
 import subprocess
@@ -84,6 +85,8 @@ def test_other_files_end_in_4(data: bytes, said: str, capsys: pytest.CaptureFixt
         (["decode", "flight.bin", "-o", "x.mat", "--to", "csv"], "x.mat ends in .mat"),
         (["decode", "flight.bin", "-o", "-", "--to", "mat"], "stdout"),
         (["decode", "flight.csv", "-o", "flight.csv"], "source itself"),
+        (["decode", "flight.bin", "--row-rate", "10"], "original ASCII rows"),
+        (["decode", os.devnull], "a pipe or a device"),
     ],
 )
 def test_wrong_arguments_end_in_2(
@@ -95,6 +98,47 @@ def test_wrong_arguments_end_in_2(
     err = capsys.readouterr().err
     assert said in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (["decode", "nowhere.bin", "--json"], 2),
+        (["decode", "other.bin", "--json"], 4),
+        (["info", "other.bin", "--json"], 4),
+        (["decode", "flight.bin", "--json", "-o", "flight.bin/x.csv"], 2),
+        (["decode", "flight.bin", "--json"], 0),
+        (["decode", "hurt.bin", "--json"], 3),
+        (["decode", "hurt.bin", "--json", "--strict"], 6),
+    ],
+)
+def test_json_is_there_at_every_exit_code(
+    arguments: list[str], code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    put("flight.bin", GOOD)
+    put("hurt.bin", HURT)
+    put("other.bin", b"no log")
+    assert main(arguments) == code
+    answer = json.loads(capsys.readouterr().out)
+    assert answer.get("exit_code", code) == code
+    assert ("error" in answer) == (code in (2, 4))
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "mat", "npz"])
+def test_a_full_disk_is_one_line(
+    kind: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    put("flight.bin", GOOD)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("host.writing.open_writer", full)
+    assert main(["decode", "flight.bin", "--to", kind]) == 2
+    err = capsys.readouterr().err
+    assert f"flight.{kind}: cannot be written: No space left" in err
+    assert err.count("\n") == 1
+    assert [path.name for path in Path().iterdir()] == ["flight.bin"]
 
 
 def test_unknown_option_and_verb_end_in_2() -> None:
@@ -122,6 +166,33 @@ def test_folder_lists_its_flights_and_takes_the_newest(
     assert capsys.readouterr().out.count(".BIN") == 2
     Path("empty").mkdir()
     assert main(["decode", "empty"]) == 4
+
+
+def test_a_file_prepared_for_the_next_flight_is_not_the_newest(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    prepared = LogWriter(session=9)
+    prepared.schema()
+    first_block = prepared.data()[:BLOCK]
+    put("card/FLT00002.BIN", first_block + GOOD[BLOCK:] + bytes(100 * BLOCK))
+    assert main(["decode", "card"]) == 4
+    assert "no flight recorded yet" in capsys.readouterr().err
+    put("card/FLT00001.BIN", GOOD)
+    assert main(["decode", "card"]) == 0
+    out, err = capsys.readouterr()
+    assert "FLT00001.BIN" in out
+    assert "FLT00002.BIN  session 9" in err
+    assert "prepared, nothing recorded" in err
+    assert main(["info", "card", "--json"]) == 0
+    assert [one["recorded"] for one in json.loads(capsys.readouterr().out)] == [True, False]
+
+
+def test_a_folder_shows_a_flight_whose_first_blocks_are_gone(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    put("card/FLT00001.BIN", bytes(3 * BLOCK) + GOOD[3 * BLOCK :])
+    assert main(["decode", "card"]) == 3
+    assert "FLT00001.BIN" in capsys.readouterr().out
 
 
 def test_without_a_source_the_working_folder_is_meant(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
+import json
 import os
 import sys
 from collections.abc import Sequence
@@ -42,8 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return _run(arguments)
     except HostError as error:
-        print(f"host: {error}", file=sys.stderr)
-        return int(error.exit_code)
+        return _end(arguments, str(error), error.exit_code)
     except KeyboardInterrupt:
         print("\nhost: interrupted", file=sys.stderr)
         return int(ExitCode.INTERRUPTED)
@@ -53,20 +54,27 @@ def main(argv: Sequence[str] | None = None) -> int:
         return int(ExitCode.OK)
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        print(f"host: {where}{error.strerror or error}", file=sys.stderr)
-        return int(ExitCode.USAGE)
+        return _end(arguments, f"{where}{error.strerror or error}", ExitCode.USAGE)
     except MemoryError:
-        print("host: out of memory; try --to parquet, which works in pieces", file=sys.stderr)
-        return int(ExitCode.INTERNAL)
+        text = "out of memory; try --to parquet, which works in pieces"
+        return _end(arguments, text, ExitCode.INTERNAL)
     except Exception as error:
         if os.environ.get("HOST_TRACEBACK"):
             raise
-        print(
-            f"host: internal error: {type(error).__name__}: {error}"
-            " (HOST_TRACEBACK=1 shows where; please report it)",
-            file=sys.stderr,
+        text = (
+            f"internal error: {type(error).__name__}: {error}"
+            " (HOST_TRACEBACK=1 shows where; please report it)"
         )
-        return int(ExitCode.INTERNAL)
+        return _end(arguments, text, ExitCode.INTERNAL)
+
+
+def _end(arguments: list[str], text: str, code: ExitCode) -> int:
+    """Say in one line why a verb gave up, to a program in JSON too; return the exit code."""
+    print(f"host: {text}", file=sys.stderr)
+    if "--json" in arguments and "-" not in arguments:  # there stdout carries the table
+        with contextlib.suppress(OSError):  # stdout itself may be what failed
+            print(json.dumps({"error": text, "exit_code": int(code)}), flush=True)
+    return int(code)
 
 
 def verbs() -> dict[str, str]:

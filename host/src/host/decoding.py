@@ -19,7 +19,7 @@ from host.original_table import make_table
 from host.progress import progress_bar
 from host.report import lines
 from host.row_summary import row_lines, row_meta, summarise_rows
-from host.source import check_source, find_flights
+from host.source import check_source, find_flights, newest
 from host.summary import summarise
 from host.writing import Request, destination, write_frames, write_table
 
@@ -73,6 +73,8 @@ def decode(request: Request) -> Decoded:
         head = file.read(_HEAD_BYTES)
     if looks_like_rows(head):
         return decode_rows(request, path)
+    if request.row_rate_hz is not None:
+        raise UsageError(f"{path}: a log carries its times; --row-rate is for original ASCII rows")
     kind, target = destination(request, path)
     size = path.stat().st_size
     log = read_log(
@@ -121,13 +123,15 @@ def pick(source: Path) -> Path:
     if not source.is_dir():
         return source
     flights = find_flights(source)
+    chosen = newest(source, flights)
     for flight in flights:
-        mark = "->" if flight is flights[-1] else "  "
+        mark = "->" if flight is chosen else "  "
+        note = "" if flight.recorded else ", prepared, nothing recorded"
         print(
-            f"{mark} {flight.path}  session {flight.session}, {flight.size_bytes} bytes",
+            f"{mark} {flight.path}  session {flight.session}, {flight.size_bytes} bytes{note}",
             file=sys.stderr,
         )
-    return flights[-1].path
+    return chosen.path
 
 
 def table_meta(log: FlightLog, summary: dict[str, Any]) -> Meta:

@@ -50,7 +50,12 @@ def describe(path: Path) -> dict[str, Any]:
 def describe_folder(folder: Path) -> list[dict[str, Any]]:
     """Return the logs of a folder, oldest first."""
     return [
-        {"file": str(flight.path), "session": flight.session, "size_bytes": flight.size_bytes}
+        {
+            "file": str(flight.path),
+            "session": flight.session,
+            "size_bytes": flight.size_bytes,
+            "recorded": flight.recorded,
+        }
         for flight in find_flights(folder)
     ]
 

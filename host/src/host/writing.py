@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,21 +67,46 @@ def destination(request: Request, source: Path) -> tuple[str, Path]:
 
 
 def write_table(pieces: Iterable[Columns], kind: str, target: Path, meta: Meta) -> None:
-    """Write a table piece by piece; a file of that name appears only when it is whole."""
+    """Write a table piece by piece; a file of that name appears only when it is whole.
+
+    Raises
+    ------
+    UsageError
+        If the place cannot be written to, or is full.
+    """
     plain = target != STDOUT
     part = target.with_name(f"{target.stem}.part{target.suffix}") if plain else target
     try:
-        writer = open_writer(kind, part, meta)
+        with _blamed_on(target):
+            writer = open_writer(kind, part, meta)
         try:
             for piece in pieces:
-                writer.write(piece)
+                with _blamed_on(target):
+                    writer.write(piece)
         finally:
-            writer.close()
+            with _blamed_on(target):
+                writer.close()
         if plain:
-            part.replace(target)
+            with _blamed_on(target):
+                part.replace(target)
     finally:
         if plain:
             part.unlink(missing_ok=True)
+
+
+@contextmanager
+def _blamed_on(target: Path) -> Iterator[None]:
+    """Turn an error of the system into one that names the file the user asked for."""
+    try:
+        yield
+    except BrokenPipeError:  # the reader of our output left; not an error
+        raise
+    except OSError as error:
+        name = "standard output" if target == STDOUT else target
+        why = os.strerror(error.errno) if error.errno else error
+        raise UsageError(
+            f"{name}: cannot be written: {why}; make room or name another place with -o"
+        ) from error
 
 
 def write_frames(log: FlightLog, kind: str, target: Path) -> list[str]:

@@ -57,7 +57,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--session", type=int, metavar="N", help="one recording session only")
     parser.add_argument(
         "--file-id",
-        type=lambda text: int(text, 16),
+        type=hexadecimal,
         metavar="HEX",
         help="blocks of this file id: older data, a second log in the file",
     )
@@ -70,6 +70,11 @@ def add_parser(subparsers: Any) -> None:
         metavar="HZ",
         help="rate of original ASCII rows, which carry no time (10 or 20 by variant)",
     )
+
+
+def hexadecimal(text: str) -> int:
+    """Return the number behind hexadecimal digits; argparse names this function in its error."""
+    return int(text, 16)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -43,7 +43,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _table(flights: list[dict[str, Any]]) -> list[str]:
-    return [
-        f"{flight['session']:>8}  {flight['size_bytes']:>12}  {flight['file']}"
-        for flight in [{"session": "session", "size_bytes": "bytes", "file": "file"}, *flights]
-    ]
+    lines = [f"{'session':>8}  {'bytes':>12}  file"]
+    for flight in flights:
+        note = "" if flight["recorded"] else "  (prepared, nothing recorded)"
+        lines.append(f"{flight['session']:>8}  {flight['size_bytes']:>12}  {flight['file']}{note}")
+    return lines
