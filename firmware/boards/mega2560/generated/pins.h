@@ -253,7 +253,7 @@ struct Heartbeat {  // pin 8, charge pump of the relay
   static volatile uint8_t& direction() { return DDRH; }
   static volatile uint8_t& input() { return PINH; }
 };
-struct RelaySense {  // pin 9, spare relay contact
+struct RelaySense {  // pin 9, sense contacts of the relay
   static constexpr uint8_t kBit = 6;
   static constexpr uint8_t kMask = uint8_t(1U << 6);
   static volatile uint8_t& port() { return PORTH; }
