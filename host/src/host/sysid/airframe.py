@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.result import FitResult
 from host.sysid.templates import Trim
 

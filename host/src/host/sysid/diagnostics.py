@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.maneuver import Maneuver
 from host.sysid.model import LinearModel
 from host.sysid.result import FitResult

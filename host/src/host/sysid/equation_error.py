@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, signal
 
-from host.sysid.compiled import Array, IntArray
+from host.compiled import Array, IntArray
 from host.sysid.differentiation import signal_bandwidth_hz, smooth, smooth_and_differentiate
 from host.sysid.errors import IdentificationError
 from host.sysid.maneuver import Maneuver

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.differentiation import signal_bandwidth_hz
 from host.sysid.equation_error import solve_normal
 from host.sysid.errors import IdentificationError

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.maneuver import Maneuver
 from host.sysid.model import LinearModel

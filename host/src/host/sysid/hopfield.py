@@ -19,7 +19,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from host.sysid.compiled import Array, compiled
+from host.compiled import Array, compiled
 from host.sysid.equation_error import fit_equation_error, normal_equations, regression_rows
 from host.sysid.errors import IdentificationError
 from host.sysid.kernels import simulate, transition

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.noise import OutputNoise, choose_order, lagged_moments, regress
 from host.sysid.output_error import Optimum, covariance_of, minimise, whitened_slopes
 from host.sysid.problem import OutputProblem

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.kernels import transition
 from host.sysid.maneuver import Maneuver

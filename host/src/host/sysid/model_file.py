@@ -39,7 +39,7 @@ from typing import cast
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.model import MATRICES, DelayGroup, Lever, LinearModel, Parameter, Term
 from host.sysid.result import FitResult

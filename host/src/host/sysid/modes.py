@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.model import LinearModel
 from host.sysid.result import FitResult
 

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import optimize
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.equation_error import Row, fit_equation_error, regression_rows
 from host.sysid.errors import IdentificationError
 from host.sysid.maneuver import Maneuver

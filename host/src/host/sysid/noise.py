@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from host.sysid.compiled import Array, compiled
+from host.compiled import Array, compiled
 from host.sysid.kernels import ar_filter
 
 POLE_LIMIT = 0.999  # radius: closer to one, a 2000-sample record cannot tell noise from drift

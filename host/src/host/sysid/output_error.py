@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from host.sysid.compiled import Array, BoolArray
+from host.compiled import Array, BoolArray
 from host.sysid.errors import IdentificationError
 from host.sysid.noise import OutputNoise
 from host.sysid.problem import OutputProblem, Response

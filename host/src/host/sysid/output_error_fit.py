@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import signal
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.intervals import HIGHEST_ORDER, Interval, fit_with_memory
 from host.sysid.maneuver import Maneuver

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.sysid.compiled import Array, IntArray
+from host.compiled import Array, IntArray
 from host.sysid.errors import IdentificationError
 from host.sysid.kernels import delayed, propagate, simulate, transition
 from host.sysid.maneuver import Maneuver

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from host.sysid.compiled import Array, compiled
+from host.compiled import Array, compiled
 from host.sysid.equation_error import Row, fit_equation_error, regression_rows, solve_normal
 from host.sysid.errors import IdentificationError
 from host.sysid.maneuver import Maneuver

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.sysid.compiled import Array, compiled
+from host.compiled import Array, compiled
 from host.sysid.kernels import STATE_LIMIT
 
 DOUBLINGS = 40

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.equation_error import regression_rows, solve_rows
 from host.sysid.errors import IdentificationError
 from host.sysid.maneuver import Maneuver

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.sysid.compiled import Array, BoolArray
+from host.compiled import Array, BoolArray
 from host.sysid.equation_error import fit_equation_error, regression_rows
 from host.sysid.maneuver import Maneuver
 from host.sysid.model import LinearModel

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.errors import IdentificationError
 
 if TYPE_CHECKING:

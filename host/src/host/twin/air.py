@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from host.compiled import compiled_fast
 from host.twin.airframe import GRAVITY_MPS2, Array
 from host.twin.cards import Air, Flight
-from host.twin.compiled import compiled
 
 GAS_CONSTANT = 287.05287  # J/(kg K), ICAO Doc 7488
 LAPSE_KPM = 0.0065
@@ -43,14 +43,14 @@ def atmosphere(flight: Flight) -> Atmosphere:
     return Atmosphere(flight.field_pressure_pa, flight.field_temperature_degc + ZERO_CELSIUS_K)
 
 
-@compiled
+@compiled_fast
 def static_pressure_pa(air: Atmosphere, height_m: float) -> float:
     """Return static pressure at a height over the field."""
     share = 1.0 - LAPSE_KPM * height_m / air.temperature_k
     return air.pressure_pa * math.pow(share, EXPONENT)
 
 
-@compiled
+@compiled_fast
 def density_kgpm3(air: Atmosphere, height_m: float) -> float:
     """Return density at a height over the field, of dry air."""
     temperature = air.temperature_k - LAPSE_KPM * height_m
@@ -74,7 +74,7 @@ def turbulence(air: Air, height_m: float) -> Turbulence:
     return Turbulence(air.turbulence_mps * ratio, air.turbulence_mps, length_u, length_w)
 
 
-@compiled
+@compiled_fast
 def gust_step(
     t: Turbulence,
     z: Array,
@@ -125,7 +125,7 @@ def gust_step(
     out[3], out[4], out[5] = z[5], -slope_w / v, slope_v / v
 
 
-@compiled
+@compiled_fast
 def gusts(t: Turbulence, noise: Array, airspeed_mps: float, span_m: float, step_s: float) -> Array:
     """Return gusts (n, 6) at constant airspeed, for statistics."""
     z = np.zeros(GUST_STATES)

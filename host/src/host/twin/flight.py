@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from host.compiled import compiled_fast
 from host.twin import air as air_model
 from host.twin.air import GUST_STATES, Atmosphere, Turbulence, density_kgpm3, gust_step
 from host.twin.aircraft import Aircraft, load
@@ -26,7 +27,6 @@ from host.twin.airframe import (
 )
 from host.twin.attitude import quaternion
 from host.twin.cards import Card
-from host.twin.compiled import compiled
 from host.twin.draws import Draws, draw, flown
 from host.twin.motion import rotate_to_body, step
 from host.twin.pilot import Schedule, gains, schedule
@@ -102,7 +102,7 @@ class FlightRecord:
     pulse_starts_s: Array
 
 
-@compiled
+@compiled_fast
 def fly_steps(
     frame: Airframe,
     hands: Hands,

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.compiled import compiled_fast
 from host.twin.airdata import AirData
 from host.twin.airframe import DOWN, GRAVITY_MPS2, NORTH, Q0, Q3, Array, P, Q, R
 from host.twin.attitude import euler, to_body
-from host.twin.compiled import compiled
 from host.twin.draws import delay_s
 from host.twin.filters import delayed, first_order
 from host.twin.flight import STEP_S, FlightRecord
@@ -66,7 +66,7 @@ class Imu:
     raw: np.ndarray[tuple[int, int], np.dtype[np.int16]]
 
 
-@compiled
+@compiled_fast
 def complementary(
     rates: Array, force: Array, heading: Array, speed: Array, start: Array, step_s: float
 ) -> tuple[Array, Array]:
@@ -133,7 +133,7 @@ def complementary(
     return angles, biases
 
 
-@compiled
+@compiled_fast
 def felt(
     states: Array,
     force_cg: Array,

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from host.compiled import compiled_fast
 from host.twin.airframe import (
     AILERON,
     CD_ELEVATOR,
@@ -57,13 +58,12 @@ from host.twin.airframe import (
     V,
     W,
 )  # fmt: skip
-from host.twin.compiled import compiled
 
 # Below it coefficients and p_hat have no meaning, and forces go to zero with V^2.
 LOWEST_AIRSPEED_MPS = 0.5
 
 
-@compiled
+@compiled_fast
 def place(frame: Airframe, alpha_rad: float) -> tuple[int, int, float]:
     """Return the two table rows around an angle of attack and the share of the second, held
     outside."""
@@ -79,7 +79,7 @@ def place(frame: Airframe, alpha_rad: float) -> tuple[int, int, float]:
     return i, j, share
 
 
-@compiled
+@compiled_fast
 def aerodynamics(
     frame: Airframe,
     alpha_rad: float,
@@ -141,7 +141,7 @@ def aerodynamics(
     return lift + lift_q, drag, side, roll, pitch, yaw
 
 
-@compiled
+@compiled_fast
 def polynomial(coefficients: Array, x: float) -> float:
     """Evaluate a polynomial given from the highest power down."""
     y = 0.0
@@ -150,7 +150,7 @@ def polynomial(coefficients: Array, x: float) -> float:
     return y
 
 
-@compiled
+@compiled_fast
 def propeller(
     frame: Airframe, rotor_radps: float, axial_mps: float, density_kgpm3: float
 ) -> tuple[float, float]:
@@ -177,7 +177,7 @@ def propeller(
     return thrust, torque
 
 
-@compiled
+@compiled_fast
 def motor_torque(frame: Airframe, throttle: float, rotor_radps: float) -> float:
     """Return the torque of motor, friction and brake on the rotor (N m): shaft power over speed,
     current-limited."""
@@ -192,7 +192,7 @@ def motor_torque(frame: Airframe, throttle: float, rotor_radps: float) -> float:
     return drive - friction
 
 
-@compiled
+@compiled_fast
 def rotate_to_body(x: Array, a: float, b: float, c: float) -> tuple[float, float, float]:
     """Turn a vector from north-east-down to body axes by the quaternion in the state."""
     q0, q1, q2, q3 = x[Q0], x[Q1], x[Q2], x[Q3]
@@ -209,7 +209,7 @@ def rotate_to_body(x: Array, a: float, b: float, c: float) -> tuple[float, float
     )
 
 
-@compiled
+@compiled_fast
 def rotate_to_ned(x: Array, a: float, b: float, c: float) -> tuple[float, float, float]:
     """Turn a vector from body axes to north-east-down."""
     q0, q1, q2, q3 = x[Q0], x[Q1], x[Q2], x[Q3]
@@ -226,7 +226,7 @@ def rotate_to_ned(x: Array, a: float, b: float, c: float) -> tuple[float, float,
     )
 
 
-@compiled
+@compiled_fast
 def derivative(
     frame: Airframe, x: Array, command: Array, air: Array, density_kgpm3: float, out: Array
 ) -> None:
@@ -323,7 +323,7 @@ def derivative(
     out[STATE_COUNT + 3] = thrust
 
 
-@compiled
+@compiled_fast
 def step(
     frame: Airframe,
     x: Array,
@@ -354,7 +354,7 @@ def step(
     x[ROTOR] = max(x[ROTOR], 0.0)
 
 
-@compiled
+@compiled_fast
 def run(
     frame: Airframe,
     start: Array,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.diagnostics import references
 from host.sysid.equation_error import regression_rows, solve_rows
 from host.sysid.errors import IdentificationError

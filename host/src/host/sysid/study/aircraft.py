@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.model import LinearModel, Parameter, Term, free_model
 
 FOOT_M = 0.3048

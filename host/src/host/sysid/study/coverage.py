@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal, stats
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.intervals import fit_with_memory
 from host.sysid.maneuver import Maneuver

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.maneuver import Maneuver
 from host.sysid.problem import OutputProblem
 from host.sysid.study.aircraft import navion, navion_structured

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 
 LEAD_S = 1.0  # level flight before the first step
 

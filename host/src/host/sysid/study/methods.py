@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.diagnostics import references
 from host.sysid.errors import IdentificationError
 from host.sysid.fit import fit, methods

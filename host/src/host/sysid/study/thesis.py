@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.diagnostics import references, refusals, thesis_program_error_percent
 from host.sysid.errors import IdentificationError
 from host.sysid.fit import fit

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg
 
-from host.sysid.compiled import Array, BoolArray
+from host.compiled import Array, BoolArray
 from host.sysid.errors import IdentificationError
 from host.sysid.fit import fit
 from host.sysid.maneuver import Maneuver

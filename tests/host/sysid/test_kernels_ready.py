@@ -1,0 +1,43 @@
+"""After `python -m host.sysid` no answer waits for the compiler."""
+
+import json
+import os
+import subprocess
+import sys
+
+SCRIPT = """
+import importlib, json, pkgutil
+import host.sysid
+from host.sysid.__main__ import build_kernels
+from host.sysid.fit import fit
+from host.sysid.study.aircraft import navion_structured
+from host.sysid.study.data import TRUTH, with_rates
+
+kernels = {}
+for module in pkgutil.iter_modules(host.sysid.__path__, "host.sysid."):
+    if module.name.endswith("__main__"):
+        continue
+    for name, thing in vars(importlib.import_module(module.name)).items():
+        if hasattr(thing, "signatures") and thing.__module__ == module.name:
+            kernels[f"{module.name}.{name}"] = thing
+build_kernels()
+built = {name: len(kernel.signatures) for name, kernel in kernels.items()}
+model = navion_structured().with_start(1.1 * TRUTH)
+data = [with_rates(1, snr=10.0), with_rates(2, snr=10.0)]
+for method in ("output-error", "output-error-white", "filter-error", "frequency-output-error",
+               "recursive", "recursive-fourier", "extended-kalman", "unscented-kalman"):
+    fit(method, model, data)
+fit("hopfield-whitened", model, data)
+print(json.dumps([built, {name: len(kernel.signatures) for name, kernel in kernels.items()}]))
+"""
+
+
+def test_every_kernel_is_built_in_the_types_that_methods_use() -> None:
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=environment, check=True
+    )
+    built, used = json.loads(done.stdout)
+    assert len(built) >= 11
+    assert min(built.values()) >= 1, built
+    assert used == built
