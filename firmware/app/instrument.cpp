@@ -28,7 +28,7 @@ void Instrument::boot() {
   TextOut usb(hal::Port::kUsb);
   usb.ram(hal::board_name());
   usb.letter(' ');
-  usb.ram(kVersion);
+  usb.flash(kVersion);
   usb.flash(kLineEnd);
   outlet_.event(frames::Event::kReset, static_cast<uint32_t>(hal::reset_source()), now_us);
   if (hal::crash_address() != 0) {

@@ -18,7 +18,7 @@ constexpr uint32_t kRetryUs = 2000000UL;
 constexpr uint32_t kReceiverUs = 150000UL;  // six frames of the slowest receiver
 constexpr uint32_t kDeadUs = 2000000UL;     // no card is busy that long
 constexpr uint32_t kStallUs = 100000UL;     // worth an event
-constexpr uint16_t kPortion = 128;          // bytes of a block per turn: 0.2 ms on SPI
+constexpr uint16_t kPortion = 64;           // bytes of a block per turn: 0.3 ms with its CRCs
 constexpr uint32_t kLowSeconds = 60;
 constexpr uint32_t kOtherBytesPerS = 1000;  // frames beside the identification frame
 
@@ -182,12 +182,13 @@ void Recorder::identity(frames::IdentityFrame* out, uint32_t now_us) const {
   memset(out, 0, sizeof *out);
   out->t_us = now_us;
   out->session = writer_.session();
-  memcpy(out->card_id, volume_.card_id(), sizeof out->card_id);
+  (void)hal::read_card_id(out->card_id);  // zeros without a card
   out->boots = store_.boots();
   out->reset_cause = static_cast<uint8_t>(hal::reset_source());
   out->resumed = resumed_ ? 1 : 0;
   copy_text(out->board, hal::board_name(), sizeof out->board);
-  copy_text(out->firmware, kVersion, sizeof out->firmware);
+  static_assert(sizeof kVersion <= sizeof out->firmware, "the version fits its field");
+  core::flash_copy(out->firmware, kVersion, sizeof kVersion);
 }
 
 void Recorder::record(core::RecordAction action, uint32_t now_us) {

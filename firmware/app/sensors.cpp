@@ -48,9 +48,9 @@ void Sensors::step(const frames::ConfigFrame& config,
   }
   step_ident(pilot, outlet, now_us);
   step_baro(outlet, now_us);
-  slot_ = static_cast<uint8_t>((slot_ + 1U) & 3U);
-  if (slot_ == 0) step_gps(config, outlet, now_us);
-  if (slot_ == 2) watch_imu(outlet, now_us);
+  ++slot_;
+  if ((slot_ & 1U) == 0) step_gps(config, outlet, now_us);
+  if ((slot_ & 3U) == 1) watch_imu(outlet, now_us);
 }
 
 void Sensors::step_imu(Outlet& outlet) {

@@ -101,7 +101,7 @@ void Status::step(const Recorder& recorder,
     case Part::kName:
       out_.ram(hal::board_name());
       out_.letter(' ');
-      out_.ram(kVersion);
+      out_.flash(kVersion);
       break;
     case Part::kImu:
       imu(sensors);

@@ -11,8 +11,13 @@ namespace {
 constexpr uint32_t kHeadsUs = 5000000UL;
 constexpr uint8_t kKinds = frames::kBaroCoefficientsId + 1;
 
-// Least time between two frames of a kind, by id. 20 Hz of ident and the rest make 2.1 kB/s.
-constexpr uint16_t kIntervalMs[kKinds] CORE_FLASH = {0, 50, 500, 200, 200, 0, 0, 0, 0, 0, 0};
+// Least time between two frames of a kind, by id, in steps of 1.024 ms: 50, 500, 200 and 200 ms
+// less 5, because a trigger has jitter. 20 Hz of ident and the rest make 2.1 kB/s.
+constexpr uint16_t kLeastMs[kKinds] CORE_FLASH = {0, 44, 484, 191, 191, 0, 0, 0, 0, 0, 0};
+
+uint16_t to_ms(uint32_t now_us) {
+  return static_cast<uint16_t>(now_us >> 10);
+}
 
 }  // namespace
 
@@ -20,7 +25,7 @@ void Telemetry::start(const frames::ConfigFrame& config, uint32_t now_us) {
   mode_ = static_cast<frames::Telemetry>(config.telemetry);
   budget_.start(now_us, config.telemetry_budget_byteps);
   heads_.start(now_us);
-  for (uint32_t& last_us : last_us_) last_us = now_us - uint32_t{1000000};
+  for (uint16_t& last_ms : last_ms_) last_ms = static_cast<uint16_t>(to_ms(now_us) - 1000U);
   if (mode_ != frames::Telemetry::kOff) {
     hal::open_port(hal::Port::kTelemetry, config.telemetry_baud);
   }
@@ -28,11 +33,11 @@ void Telemetry::start(const frames::ConfigFrame& config, uint32_t now_us) {
 
 void Telemetry::offer(uint8_t id, const void* fields, uint8_t size, uint32_t now_us) {
   if (mode_ != frames::Telemetry::kFrames || id >= kKinds) return;
-  // A trigger has jitter: a frame 5 ms early still has its turn.
-  const uint32_t interval_us = 1000UL * core::flash_load(&kIntervalMs[id]);
-  if (now_us - last_us_[id] + 5000U < interval_us) return;
+  const uint16_t now_ms = to_ms(now_us);
+  const uint16_t since_ms = static_cast<uint16_t>(now_ms - last_ms_[id]);
+  if (since_ms < core::flash_u16(&kLeastMs[id])) return;
   if (send(id, fields, size, now_us)) {
-    last_us_[id] = now_us;
+    last_ms_[id] = now_ms;
   } else if (dropped_ != 0xFFFFU) {
     ++dropped_;
   }
@@ -46,12 +51,11 @@ bool Telemetry::poll(uint32_t now_us) {
 }
 
 bool Telemetry::send(uint8_t id, const void* fields, uint8_t size, uint32_t now_us) {
-  uint8_t envelope[frames::kMaxWireSize + core::kEnvelopeOverhead];
   const uint8_t total = static_cast<uint8_t>(size + 1 + core::kEnvelopeOverhead);
   if (hal::send_room(hal::Port::kTelemetry) < total) return false;
   if (!budget_.take(total, now_us)) return false;
-  const uint8_t filled = core::put_envelope(envelope, id, fields, size);
-  for (uint8_t i = 0; i < filled; ++i) hal::send_byte(hal::Port::kTelemetry, envelope[i]);
+  core::send_envelope(
+      [](uint8_t byte) { hal::send_byte(hal::Port::kTelemetry, byte); }, id, fields, size);
   return true;
 }
 

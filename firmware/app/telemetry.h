@@ -28,7 +28,7 @@ class Telemetry {
 
   core::ByteBudget budget_;
   core::Every heads_;
-  uint32_t last_us_[frames::kBaroCoefficientsId + 1] = {};
+  uint16_t last_ms_[frames::kBaroCoefficientsId + 1] = {};  // in steps of 1.024 ms
   uint16_t dropped_ = 0;
   frames::Telemetry mode_ = frames::Telemetry::kOff;
 };

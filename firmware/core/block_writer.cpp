@@ -31,8 +31,9 @@ bool BlockWriter::due(uint32_t now_us) {
     schema_offset_ = 0;
   }
   // The head of a session comes before its frames unless these fill half of the ring; later a
-  // piece of schema goes out only while no whole block of frames waits.
-  const uint16_t give_way = head_ ? static_cast<uint16_t>(ring_.capacity() / 2) : kBlockPayloadSize;
+  // piece of schema goes out only while the ring is nearly empty: the card may stall behind it.
+  const uint16_t give_way =
+      static_cast<uint16_t>((head_ ? ring_.capacity() : kBlockPayloadSize) / 2);
   const bool schema_goes_on = schema_pass() && (head_ || !finishing_);
   if (schema_goes_on && ring_.used() < give_way) {
     const uint16_t left = static_cast<uint16_t>(schema_size_ - schema_offset_);

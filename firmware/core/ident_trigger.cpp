@@ -34,8 +34,12 @@ void IdentTrigger::imu_packet(uint8_t seq, uint32_t arrived_us) {
 
 IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
   if (packet_waits_) {
-    packet_waits_ = false;
     const uint32_t since_us = last_packet_us_ - last_imu_us_;
+    // At 200 Hz a scan ends 0.4 ms before the next packet: one begun late makes that packet wait.
+    if (!ready && now_us - last_packet_us_ < period_us_) {
+      return Source::kNone;
+    }
+    packet_waits_ = false;
     if (!imu_leads_ || since_us + packet_period_us_ / 2 >= period_us_) {
       // Even a packet left out sets the phase: the timer stays 1.5 periods behind it, else both
       // would go on meeting each other's unfinished frames at 200 Hz.

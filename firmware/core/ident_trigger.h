@@ -14,8 +14,9 @@ class IdentTrigger {
   void start(uint16_t rate_hz, uint32_t now_us);
   // A good packet of the new kind; `arrived_us` as the interrupt stamped it.
   void imu_packet(uint8_t seq, uint32_t arrived_us);
-  // `ready`: the last frame is finished (its analogue scan takes 4.6 ms). A trigger that meets an
-  // unfinished frame is left out and counted.
+  // `ready`: the last frame is finished (its analogue scan takes 4.6 ms). A packet that meets
+  // an unfinished frame waits for a period at most; then, as the timer at once, it is left out and
+  // counted.
   Source poll(uint32_t now_us, bool ready);
 
   uint16_t late() const { return late_; }          // served more than 1 ms after they were due

@@ -3,9 +3,7 @@
 
 #include <stdint.h>
 
-#include "core/bytes.h"
 #include "core/progmem.h"
-#include "core/ubx.h"
 
 namespace drivers {
 
@@ -32,11 +30,17 @@ constexpr Message kSetup[kMessages] CORE_FLASH = {
     {0x06, 0x01, 3, {0x01, 0x07, 1, 0, 0, 0, 0, 0}},
     {0x06, 0x24, 36, {0x01, 0, 8, 0, 0, 0, 0, 0}},
 };
+// CFG-PRT: UART 1, 8N1, UBX and NMEA in, UBX only out.
+constexpr uint8_t kPortSize = 20;
+constexpr uint8_t kPort[kPortSize] CORE_FLASH = {
+    1,     0, 0,     0, 0xD0, 0x08, 0, 0, kBaud & 0xFF, kBaud >> 8 & 0xFF, kBaud >> 16, 0,
+    0b011, 0, 0b001, 0, 0,    0,    0, 0};
 }  // namespace ublox
 
 // Finds the baud, moves the receiver to 38400, switches it to UBX at 5 Hz; starts over when it
 // falls silent. Never waits.
-// Port: void set_baud(uint32_t), bool send(const uint8_t*, uint8_t) whole or not at all
+// Port: void set_baud(uint32_t), bool send(const uint8_t*, uint8_t) whole or not at all; messages
+// are handed to it byte by byte, so that neither side needs room for one.
 template <typename Port>
 class Ublox {
  public:
@@ -55,7 +59,7 @@ class Ublox {
     }
     switch (step_) {
       case Step::kTry:
-        port_.set_baud(static_cast<uint32_t>(core::flash_load(&ublox::kBaudsPer100[baud_])) * 100);
+        port_.set_baud(static_cast<uint32_t>(core::flash_u16(&ublox::kBaudsPer100[baud_])) * 100);
         next(Step::kPort, now_us);
         return;
       case Step::kPort:
@@ -104,23 +108,49 @@ class Ublox {
     since_us_ = now_us;
   }
 
-  // CFG-PRT: UART 1, 8N1, 38400 baud, UBX and NMEA in, UBX only out.
-  bool send_port() {
-    uint8_t payload[20] = {1, 0, 0, 0, 0xD0, 0x08};
-    core::put_le(payload + 8, ublox::kBaud);
-    payload[12] = 0b011;
-    payload[14] = 0b001;
-    uint8_t message[28];
-    return port_.send(message, core::put_ubx(message, 0x06, 0x00, payload, 20));
-  }
+  bool send_port() { return send(0x06, 0x00, ublox::kPortSize, ublox::kPort, ublox::kPortSize); }
 
   bool send_setup() {
-    const ublox::Message setup = core::flash_load(&ublox::kSetup[message_]);
-    uint8_t payload[36] = {};
-    memcpy(payload, setup.payload, sizeof(setup.payload));
-    uint8_t message[44];
-    return port_.send(message,
-                      core::put_ubx(message, setup.message_class, setup.id, payload, setup.size));
+    const ublox::Message& setup = ublox::kSetup[message_];
+    return send(core::flash_u8(&setup.message_class),
+                core::flash_u8(&setup.id),
+                core::flash_u8(&setup.size),
+                setup.payload,
+                sizeof(setup.payload));
+  }
+
+  // Goes on with a message as far as the port takes it; true at its end. `payload` lies in program
+  // memory; what it is too short for is 0.
+  bool send(
+      uint8_t message_class, uint8_t id, uint8_t size, const uint8_t* payload, uint8_t given) {
+    const uint8_t head[] = {0xB5, 0x62, message_class, id, size, 0};
+    for (;;) {
+      const uint8_t sums_at = static_cast<uint8_t>(size + sizeof(head));
+      uint8_t byte = 0;
+      if (at_ < sizeof(head)) {
+        byte = head[at_];
+      } else if (at_ < sums_at) {
+        const uint8_t index = static_cast<uint8_t>(at_ - sizeof(head));
+        byte = index < given ? core::flash_u8(payload + index) : uint8_t{0};
+      } else {
+        byte = at_ == sums_at ? sum_a_ : sum_b_;
+      }
+      if (!port_.send(&byte, 1)) {
+        return false;
+      }
+      if (at_ < 2) {
+        sum_a_ = 0;
+        sum_b_ = 0;
+      } else if (at_ < sums_at) {
+        sum_a_ = static_cast<uint8_t>(sum_a_ + byte);
+        sum_b_ = static_cast<uint8_t>(sum_b_ + sum_a_);
+      }
+      ++at_;
+      if (at_ == sums_at + 2) {
+        at_ = 0;
+        return true;
+      }
+    }
   }
 
   Port& port_;
@@ -129,6 +159,9 @@ class Ublox {
   uint16_t messages_ = 0;
   uint8_t baud_ = 0;
   uint8_t message_ = 0;
+  uint8_t at_ = 0;  // byte of the message under way
+  uint8_t sum_a_ = 0;
+  uint8_t sum_b_ = 0;
   Step step_ = Step::kTry;
   bool heard_ = false;
 };

@@ -9,7 +9,8 @@ enum class Port : uint8_t { kUsb, kGps, kTelemetry };
 
 void open_port(Port port, uint32_t baud);
 
-// Takes the oldest received byte; false if there is none. Main loop only.
+// Takes the oldest received byte; false if there is none. Main loop only. A board need receive on
+// the GPS's port only: nobody listens on the others, and their buffers cost RAM.
 bool take_byte(Port port, uint8_t* byte);
 
 // Room for bytes to send; the peer's "stop" (CTS) shows as room that does not grow.

@@ -4,6 +4,7 @@
 
 #include "core/block.h"
 #include "core/bytes.h"
+#include "core/progmem.h"
 #include "generated/frames.h"
 #include "storage/block_build.h"
 
@@ -14,6 +15,9 @@ using hal::CardStatus;
 namespace {
 
 uint32_t g_date = 0;
+
+// Of a flight's file; a digit stands for each 0.
+constexpr char kNamePattern[] CORE_FLASH = "FLT00000.BIN";
 
 constexpr uint32_t kNoSector = 0xFFFFFFFFUL;
 
@@ -49,7 +53,6 @@ void Volume::set_date(uint32_t fat_time) {
 VolumeStatus Volume::mount() {
   file_ = FlightFile();
   CardStatus status = hal::start_card();
-  if (status == CardStatus::kOk) status = hal::read_card_id(card_id_);
   if (status != CardStatus::kOk) return from_card(status);
   return from_result(f_mount(&fs_, "", 1));
 }
@@ -65,7 +68,7 @@ VolumeStatus Volume::from_result(FRESULT result) const {
 }
 
 void Volume::make_name(uint32_t number, Name name) {
-  memcpy(name, "FLT00000.BIN", sizeof(Name));
+  core::flash_copy(name, kNamePattern, sizeof(Name));
   for (uint8_t place = 7; number > 0; --place) {
     name[place] = static_cast<char>('0' + number % 10);
     number /= 10;
@@ -73,11 +76,13 @@ void Volume::make_name(uint32_t number, Name name) {
 }
 
 uint32_t Volume::number_of(const char* name) {
-  if (strlen(name) != 12 || memcmp(name, "FLT", 3) != 0 || memcmp(name + 8, ".BIN", 4) != 0) {
-    return 0;
-  }
   uint32_t number = 0;
-  for (uint8_t place = 3; place < 8; ++place) {
+  for (uint8_t place = 0; place < sizeof(Name); ++place) {
+    const char wanted = static_cast<char>(core::flash_u8(kNamePattern + place));
+    if (wanted != '0') {
+      if (name[place] != wanted) return 0;
+      continue;
+    }
     if (name[place] < '0' || name[place] > '9') return 0;
     number = number * 10 + static_cast<uint32_t>(name[place] - '0');
   }
@@ -235,7 +240,10 @@ VolumeStatus Volume::write_first_block(uint32_t session) {
   // that begin on the same block would get the same id. The place of the file stands in for it:
   // it tells apart two files that begin on blocks never used.
   core::put_le<uint32_t>(block + core::kBlockCrcOffset, file_.first_lba);
-  file_.file_id = core::make_file_id(card_id_, session, block);
+  uint8_t card_id[hal::kCardIdBytes];
+  status = hal::read_card_id(card_id);
+  if (status != CardStatus::kOk) return from_card(status);
+  file_.file_id = core::make_file_id(card_id, session, block);
   build_schema_block(block, file_.file_id, session);
   status = hal::write_card(file_.first_lba, block);
   file_.next_block = 1;

@@ -59,7 +59,6 @@ class Volume {
   VolumeStatus close(uint32_t used_blocks, bool end_event, uint32_t now_us);
 
   const FlightFile& file() const { return file_; }
-  const uint8_t* card_id() const { return card_id_; }
 
  private:
   using Name = char[13];  // 8.3 and a zero
@@ -79,7 +78,6 @@ class Volume {
   FATFS fs_ = {};
   FlightFile file_;
   uint32_t file_blocks_ = kFileBlocks;
-  uint8_t card_id_[hal::kCardIdBytes] = {};
 };
 
 }  // namespace storage

@@ -7,6 +7,7 @@
 #include <avr/io.h>
 #include <util/delay.h>
 
+#include "boards/mega2560/board.h"
 #include "boards/mega2560/generated/pins.h"
 #include "boards/mega2560/interrupts.h"
 #include "core/progmem.h"
@@ -119,6 +120,12 @@ ISR(ADC_vect, ISR_NAKED) {
       // the conversion under way is the last
       "2: ldi r24, %[once] \n\t"
       "sts %[control_a], r24 \n\t"
+      "tst r18 \n\t"
+      "brne 4f \n\t"
+      "lds r24, %[taken] \n\t"
+      "tst r24 \n\t"
+      "breq 4f \n\t"
+      "sts %[awake], r24 \n\t"
       "rjmp 4f \n\t"
       "3: sts adc_bandgap, r24 \n\t"
       "sts adc_bandgap+1, r25 \n\t"
@@ -139,7 +146,9 @@ ISR(ADC_vect, ISR_NAKED) {
       [control_a] "n"(_SFR_MEM_ADDR(ADCSRA)),
       [control_b] "n"(_SFR_MEM_ADDR(ADCSRB)),
       [admux] "n"(_SFR_MEM_ADDR(ADMUX)),
-      [once] "M"(kIdle | _BV(ADIE)));
+      [once] "M"(kIdle | _BV(ADIE)),
+      [taken] "i"(&mega::g_packet_taken),
+      [awake] "i"(&mega::g_awake));
 }
 
 namespace hal {
@@ -156,6 +165,7 @@ uint32_t start_scan() {
   for (uint8_t slot = 0; slot < kAnalogSlots; ++slot) {
     adc_sums[slot] = 0;
   }
+  mega::g_packet_taken = false;
   adc_offset = 0;
   adc_left = kConversions;
   select(selection(0));

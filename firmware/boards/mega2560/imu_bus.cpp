@@ -162,6 +162,7 @@ const ImuPacket* imu_packet() {
 }
 
 void release_imu_packet() {
+  mega::g_packet_taken = true;
   const mega::InterruptsOff guard;
   if (g_full != 0) {
     g_first = (g_first + 1U) & 1U;

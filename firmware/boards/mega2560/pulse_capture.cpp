@@ -15,7 +15,7 @@ constexpr uint8_t kLines =
     pins::Rc0::kMask | pins::Rc1::kMask | pins::Rc2::kMask | pins::Rc3::kMask | pins::Rc4::kMask;
 static_assert(kLines == 0x1F, "the receiver's inputs are the low five bits of one port");
 
-constexpr uint8_t kEdges = 32;  // 3 ms of five simultaneous channels
+constexpr uint8_t kEdges = 24;  // two frames of five channels
 constexpr uint8_t kLate = 0x80;
 
 struct Stamp {

@@ -68,6 +68,7 @@ ISR(WDT_vect, ISR_NAKED) {
 namespace mega {
 
 volatile bool g_awake = false;
+volatile bool g_packet_taken = false;
 
 }  // namespace mega
 

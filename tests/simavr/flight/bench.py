@@ -76,7 +76,8 @@ def measure(elf: Path, rate_hz: int, minutes: float, folder: Path) -> bool:
     end = since + round(minutes * 60 * 16e6)
     at = since
     while at < end:
-        rig.card.stall(stall_s, at_cycle=at + int(rng.integers(3 * 16_000_000)))
+        # every 3 s, at any phase to blocks, frames and schema; never two behind each other
+        rig.card.stall(stall_s, at_cycle=at + int(rng.integers(16_000_000)))
         at += 3 * 16_000_000
     rig.receiver.source = lambda t: [*(stick(t) for stick in sticks), 1500.0, 1900.0]
     first = len(rig.imu.sent)
