@@ -1,0 +1,231 @@
+#include "core/attitude.h"
+
+#include "core/fixed_point.h"
+
+namespace core {
+namespace {
+
+constexpr int32_t kOneQ30 = INT32_C(1) << 30;
+constexpr int32_t kRadpsQ27 = 35764;  // 1/65.5 deg/s in rad/s, Q27
+constexpr int16_t kGravity = 8192;
+constexpr uint32_t kHalfPerUs = 17180;              // 4e-6 * 2^32: rate Q27 to half an angle Q30
+constexpr uint32_t kTurnPerCmps = 4277;             // 16 * 8192 / (980.665 * 2^27) * 2^32
+constexpr int32_t kPermilleQ28 = 268435;            // 0.001
+constexpr int32_t kPpmQ28 = 268;                    // 1e-6
+constexpr int32_t kFastGainQ28 = INT32_C(3) << 28;  // 3 1/s while settling
+constexpr int32_t kRecoverGainQ28 = INT32_C(1) << 27;
+constexpr int32_t kFastBiasQ28 = 0;
+constexpr int32_t kBiasLimitQ30 = 93689000;  // 5 deg/s
+constexpr uint16_t kFullWeight = 4096;
+constexpr uint32_t kShortestUs = 1000;
+constexpr uint32_t kLongestUs = 40000;
+
+int32_t clamp(int32_t value, int32_t limit) {
+  return value > limit ? limit : value < -limit ? -limit : value;
+}
+
+uint16_t magnitude(int16_t value) {
+  return static_cast<uint16_t>(value < 0 ? -int32_t{value} : int32_t{value});
+}
+
+// Error Q25 rad, of which 1 counts at most, times gain Q28 1/s as a rate in Q27. Two of them and
+// the gyro's 8.7 rad/s stay below the 16 that Q27 holds.
+int32_t rate_of(int32_t error_q25, int32_t gain_q28) {
+  constexpr int32_t kMostQ25 = INT32_C(1) << 25;
+  return mul_high(clamp(error_q25, kMostQ25), gain_q28) * 64;
+}
+
+}  // namespace
+
+// q (1, half angle) to first order: the angle comes out as 2 atan(half), 0.04 deg short per second
+// at 500 deg/s.
+void Attitude::turn(Quaternion& q, const Vector& h) {
+  const Quaternion from = q;
+  q.w -= mul_q30(from.x, h.x) + mul_q30(from.y, h.y) + mul_q30(from.z, h.z);
+  q.x += mul_q30(from.w, h.x) + mul_q30(from.y, h.z) - mul_q30(from.z, h.y);
+  q.y += mul_q30(from.w, h.y) + mul_q30(from.z, h.x) - mul_q30(from.x, h.z);
+  q.z += mul_q30(from.w, h.z) + mul_q30(from.x, h.y) - mul_q30(from.y, h.x);
+}
+
+void Attitude::normalise(Quaternion& q) {
+  const int32_t size =
+      mul_q30(q.w, q.w) + mul_q30(q.x, q.x) + mul_q30(q.y, q.y) + mul_q30(q.z, q.z);
+  const int32_t more = (kOneQ30 - size) / 2;
+  q.w += mul_q30(q.w, more);
+  q.x += mul_q30(q.x, more);
+  q.y += mul_q30(q.y, more);
+  q.z += mul_q30(q.z, more);
+}
+
+Attitude::Vector Attitude::down(const Quaternion& q) {
+  return Vector{2 * (mul_q30(q.x, q.z) - mul_q30(q.w, q.y)),
+                2 * (mul_q30(q.y, q.z) + mul_q30(q.w, q.x)),
+                kOneQ30 - 2 * (mul_q30(q.x, q.x) + mul_q30(q.y, q.y))};
+}
+
+// Measured x expected direction of down, Q25 rad; its weight by how much it looks like gravity.
+Attitude::Vector Attitude::gravity_error(const AttitudeInput& in,
+                                         const Vector& rate_q27,
+                                         uint16_t& weight) const {
+  // Down as felt: the motion's acceleration omega x (V, 0, 0) minus specific force, in 1/16 LSB.
+  const int32_t turn_k = static_cast<int32_t>(speed_cmps_ * kTurnPerCmps);
+  const int32_t gx = -int32_t{in.force[0]} * 16;
+  const int32_t gy = mul_high(rate_q27.z, turn_k) - int32_t{in.force[1]} * 16;
+  const int32_t gz = -mul_high(rate_q27.y, turn_k) - int32_t{in.force[2]} * 16;
+  const int32_t x = gx / 16;
+  const int32_t y = gy / 16;
+  const int32_t z = gz / 16;
+  constexpr int32_t kMost = 37000;  // three squares still fit 32 bits
+  if (x > kMost || x < -kMost || y > kMost || y < -kMost || z > kMost || z < -kMost) {
+    weight = 0;
+    return Vector{0, 0, 0};
+  }
+  const uint16_t size = square_root(static_cast<uint32_t>(x * x) + static_cast<uint32_t>(y * y) +
+                                    static_cast<uint32_t>(z * z));
+  uint32_t off = size > kGravity ? size - kGravity : kGravity - size;
+  // A turn is not told from a bank without a speed, and not quite with the ground's: beyond 16
+  // deg/s of turning, 62 deg/s with a speed, nothing is learned.
+  const uint32_t turning = uint32_t{magnitude(in.rates[1])} + magnitude(in.rates[2]);
+  off += speed_cmps_ == 0 ? turning * 4 : turning;
+  weight = off >= kFullWeight || in.accel_saturated ? uint16_t{0}
+                                                    : static_cast<uint16_t>(kFullWeight - off);
+  constexpr int32_t kToQ27 = 1024;
+  const int32_t limit = INT32_MAX / kToQ27;
+  const int32_t mx = clamp(gx, limit) * kToQ27;
+  const int32_t my = clamp(gy, limit) * kToQ27;
+  const int32_t mz = clamp(gz, limit) * kToQ27;
+  return Vector{mul_high(my, down_.z) - mul_high(mz, down_.y),
+                mul_high(mz, down_.x) - mul_high(mx, down_.z),
+                mul_high(mx, down_.y) - mul_high(my, down_.x)};
+}
+
+void Attitude::learn(const Vector& error_q25, int32_t gain_q28, int32_t dt_k) {
+  // Q25 rad * Q28 1/s2 * s as Q30 rad/s; dt_k is 4 * dt in Q32.
+  const int32_t per_step = mul_high(gain_q28, dt_k) * 128;
+  bias_[0] = clamp(bias_[0] - mul_high(error_q25.x, per_step), kBiasLimitQ30);
+  bias_[1] = clamp(bias_[1] - mul_high(error_q25.y, per_step), kBiasLimitQ30);
+  bias_[2] = clamp(bias_[2] - mul_high(error_q25.z, per_step), kBiasLimitQ30);
+}
+
+void Attitude::learn_at_rest(const Vector& rate, int32_t dt_k) {
+  const int32_t share =
+      dt_k / 4;  // dt in Q32; 16 is 8 from Q27 to Q30 over a time constant of 0.5 s
+  bias_[0] = clamp(bias_[0] + mul_high(rate.x, share) * 16, kBiasLimitQ30);
+  bias_[1] = clamp(bias_[1] + mul_high(rate.y, share) * 16, kBiasLimitQ30);
+  bias_[2] = clamp(bias_[2] + mul_high(rate.z, share) * 16, kBiasLimitQ30);
+}
+
+void Attitude::step(const AttitudeInput& in, uint32_t dt_us) {
+  dt_us = dt_us < kShortestUs ? kShortestUs : dt_us > kLongestUs ? kLongestUs : dt_us;
+  const int32_t dt_k = static_cast<int32_t>(dt_us * kHalfPerUs);
+  const Vector rate = {in.rates[0] * kRadpsQ27 - bias_[0] / 8,
+                       in.rates[1] * kRadpsQ27 - bias_[1] / 8,
+                       in.rates[2] * kRadpsQ27 - bias_[2] / 8};
+  if (!started_) {
+    started_ = true;
+    last_rate_ = rate;
+  }
+  uint16_t weight = 0;
+  const Vector error = gravity_error(in, rate, weight);
+
+  int32_t gain = settings_.tilt_gain_permille * kPermilleQ28;
+  int32_t heading_gain = settings_.heading_gain_permille * kPermilleQ28;
+  int32_t bias_gain = settings_.bias_gain_ppm * kPpmQ28;
+  if (settle_steps_ != 0) {
+    --settle_steps_;
+    gain = heading_gain = kFastGainQ28;
+    bias_gain = kFastBiasQ28;
+  } else if (recover_steps_ != 0) {
+    gain = heading_gain = kRecoverGainQ28;
+    bias_gain = kFastBiasQ28;
+  }
+  if (recover_steps_ != 0) {
+    --recover_steps_;
+  }
+  if (in.gyro_saturated) {
+    recover_steps_ = kRecoverSteps;
+  }
+  gain = gain / kFullWeight * weight;
+  bias_gain = bias_gain / kFullWeight * weight;
+
+  const bool learning = settle_steps_ == 0 && recover_steps_ == 0 && !at_rest_;
+  Vector heading = {0, 0, 0};
+  if (field_left_us_ != 0) {
+    field_left_us_ = field_left_us_ > dt_us ? field_left_us_ - dt_us : 0;
+    // About the vertical: along down, against the error.
+    heading = Vector{-mul_q30(down_.x, heading_error_),
+                     -mul_q30(down_.y, heading_error_),
+                     -mul_q30(down_.z, heading_error_)};
+  }
+  if (speed_left_us_ != 0) {
+    speed_left_us_ = speed_left_us_ > dt_us ? speed_left_us_ - dt_us : 0;
+    speed_cmps_ = speed_left_us_ == 0 ? uint16_t{0} : speed_cmps_;
+  }
+  if (at_rest_) {
+    learn_at_rest(rate, dt_k);
+    bias_gain = 0;
+  }
+  learn(error, bias_gain, dt_k);
+  learn(heading, learning ? settings_.bias_gain_ppm * kPpmQ28 : 0, dt_k);
+
+  // The mean of two samples stands for the time between them.
+  const Vector mean = {
+      last_rate_.x / 2 + rate.x / 2 + rate_of(error.x, gain) + rate_of(heading.x, heading_gain),
+      last_rate_.y / 2 + rate.y / 2 + rate_of(error.y, gain) + rate_of(heading.y, heading_gain),
+      last_rate_.z / 2 + rate.z / 2 + rate_of(error.z, gain) + rate_of(heading.z, heading_gain)};
+  last_rate_ = rate;
+  turn(attitude_, Vector{mul_high(mean.x, dt_k), mul_high(mean.y, dt_k), mul_high(mean.z, dt_k)});
+  normalise(attitude_);
+  down_ = down(attitude_);
+  put_angles(rate);
+}
+
+void Attitude::put_angles(const Vector& rate) {
+  Quaternion q = attitude_;
+  const int32_t late_k = static_cast<int32_t>(settings_.filter_delay_us * kHalfPerUs);
+  turn(q, Vector{mul_high(rate.x, late_k), mul_high(rate.y, late_k), mul_high(rate.z, late_k)});
+  const Vector d = down(q);
+  const int32_t y = d.y >> 15;
+  const int32_t z = d.z >> 15;
+  const uint32_t level = static_cast<uint32_t>(y * y) + static_cast<uint32_t>(z * z);
+  phi_cdeg_ = atan2_cdeg(d.y, d.z);
+  theta_cdeg_ = atan2_cdeg(-d.x, static_cast<int32_t>(square_root(level)) << 15);
+  psi_cdeg_ = atan2_cdeg(2 * (mul_q30(q.x, q.y) + mul_q30(q.w, q.z)),
+                         kOneQ30 - 2 * (mul_q30(q.y, q.y) + mul_q30(q.z, q.z)));
+}
+
+void Attitude::set_speed(uint16_t speed_cmps) {
+  speed_cmps_ = speed_cmps;
+  speed_left_us_ = kSpeedUs;
+}
+
+void Attitude::set_field(const int16_t (&field)[3]) {
+  // Turned into north and east by the present attitude, then compared with the declination.
+  const Quaternion& q = attitude_;
+  const int32_t m[3] = {
+      int32_t{field[0]} * 16384, int32_t{field[1]} * 16384, int32_t{field[2]} * 16384};
+  const int32_t north = mul_high(m[0], kOneQ30 - 2 * (mul_q30(q.y, q.y) + mul_q30(q.z, q.z))) +
+                        mul_high(m[1], 2 * (mul_q30(q.x, q.y) - mul_q30(q.w, q.z))) +
+                        mul_high(m[2], 2 * (mul_q30(q.x, q.z) + mul_q30(q.w, q.y)));
+  const int32_t east = mul_high(m[0], 2 * (mul_q30(q.x, q.y) + mul_q30(q.w, q.z))) +
+                       mul_high(m[1], kOneQ30 - 2 * (mul_q30(q.x, q.x) + mul_q30(q.z, q.z))) +
+                       mul_high(m[2], 2 * (mul_q30(q.y, q.z) - mul_q30(q.w, q.x)));
+  if (north == 0 && east == 0) {
+    return;  // a field straight down says nothing
+  }
+  int32_t error = int32_t{atan2_cdeg(east, north)} - settings_.declination_cdeg;
+  error = error > 18000 ? error - 36000 : error < -18000 ? error + 36000 : error;
+  constexpr int32_t kCdegQ25 = 5856;  // 0.01 deg in rad, Q25
+  heading_error_ = error * kCdegQ25;
+  field_left_us_ = kFieldUs;
+}
+
+void Attitude::forget_bias() {
+  bias_[0] = bias_[1] = bias_[2] = 0;
+}
+
+int16_t Attitude::bias(uint8_t axis) const {
+  return static_cast<int16_t>(bias_[axis] / 8 / kRadpsQ27);
+}
+
+}  // namespace core
