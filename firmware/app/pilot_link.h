@@ -34,7 +34,7 @@ class PilotLink {
   uint16_t servo_ticks(uint8_t servo) const { return drive_.servo_ticks(servo); }
 
  private:
-  static constexpr uint16_t kRestUs = 4000;
+  static constexpr uint16_t kRestUs = 2500;
 
   void poll_receiver(Outlet& outlet, uint32_t now_us);
   void decide(const frames::ConfigFrame& config,

@@ -22,6 +22,17 @@ def flight_elf() -> Path:
     return build_flight_image()
 
 
+@pytest.fixture(scope="session")
+def flying(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[FlightRig]:
+    """A rig in flight, the Mega driving: for children made by in_fork only."""
+    from flight.rig import FlightRig, make_card
+
+    rig = FlightRig(flight_elf, make_card(tmp_path_factory.mktemp("flying") / "card.img"))
+    rig.take_off()
+    yield rig
+    rig.chip.close()
+
+
 @pytest.fixture
 def make_rig(flight_elf: Path, tmp_path: Path) -> Iterator[MakeRig]:
     """A maker of rigs with a card of their own; frees their chips afterwards."""
@@ -30,10 +41,21 @@ def make_rig(flight_elf: Path, tmp_path: Path) -> Iterator[MakeRig]:
     rigs: list[FlightRig] = []
 
     def make(
-        *, imu_hz: float = 100.0, frame_s: float = 0.020, sequential: bool = True
+        *,
+        imu_hz: float = 100.0,
+        frame_s: float = 0.020,
+        sequential: bool = True,
+        bootloader: bool = False,
     ) -> FlightRig:
         card = make_card(tmp_path / f"card{len(rigs)}.img")
-        rig = FlightRig(flight_elf, card, imu_hz=imu_hz, frame_s=frame_s, sequential=sequential)
+        rig = FlightRig(
+            flight_elf,
+            card,
+            imu_hz=imu_hz,
+            frame_s=frame_s,
+            sequential=sequential,
+            bootloader=bootloader,
+        )
         rigs.append(rig)
         return rig
 

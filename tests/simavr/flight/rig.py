@@ -22,6 +22,9 @@ from simavr_bench import (
 from simavr_bench.imu import ImuSample
 
 ROOT = Path(__file__).resolve().parents[3]
+BOOTLOADER = Path(
+    "/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex"
+)
 BUILD = ROOT / "build" / "simavr" / "flight"
 RECEIVER_PINS = ("PK0", "PK1", "PK2", "PK3", "PK4")
 SERVOS = {
@@ -106,6 +109,8 @@ class FlightRig:
         The receiver.
     busy_s : float
         Card busy after every block.
+    bootloader : bool
+        Start in Debian's Mega bootloader, after the 65 ms of start-up that the fuses ask for.
     """
 
     elf: Path
@@ -114,6 +119,7 @@ class FlightRig:
     frame_s: float = 0.020
     sequential: bool = True
     busy_s: float = 0.005
+    bootloader: bool = False
     source: Callable[[float], ImuSample] = numbered
     sticks: Callable[[float], Sequence[float]] | None = None
     chip: Chip = field(init=False)
@@ -126,7 +132,11 @@ class FlightRig:
 
     def __post_init__(self) -> None:
         """Wire everything; nothing has power yet."""
-        self.chip = Chip(startup_s=0.0)
+        if self.bootloader:
+            self.chip = Chip(bootloader=True)
+            self.chip.load(BOOTLOADER)
+        else:
+            self.chip = Chip(startup_s=0.0)
         self.chip.load(self.elf)
         self.card = SdCard(self.chip, "PB0", image=self.card_image, busy_s=self.busy_s)
         self.receiver = Receiver(
