@@ -45,7 +45,9 @@ def test_table_31_at_snr_10_is_refused_with_names() -> None:
 
 def test_refusal_agrees_where_the_bound_is_clear() -> None:
     found = refusal_agreement(20)
-    assert found.clear_agree >= 0.9 * found.clear
+    assert found.clear_agree >= 0.9 * len(found.clear)
+    assert found.firm_agree >= 0.9 * len(found.firm)
+    assert found.firm_agree > found.agree * len(found.firm) / found.systems
     assert 0 < found.expected < found.systems
 
 

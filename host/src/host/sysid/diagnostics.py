@@ -183,11 +183,17 @@ def measured_columns(model: LinearModel) -> list[int]:
     return [model.outputs.index(s) if s in model.outputs else 0 for s in model.states]
 
 
+def relative_bounds(result: FitResult, maneuvers: Sequence[Maneuver]) -> Array:
+    """Return the standard error of every common parameter over its reference value."""
+    count = len(result.model.parameters)
+    reference = references(result.model, maneuvers, plausible(result, maneuvers))
+    return np.asarray(result.standard_error[:count] / np.maximum(reference, 1e-300))
+
+
 def refusals(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Refusal, ...]:
     """Name every common parameter whose standard error exceeds its reference value."""
     count = len(result.model.parameters)
-    reference = references(result.model, maneuvers, plausible(result, maneuvers))
-    relative = result.standard_error[:count] / np.maximum(reference, 1e-300)
+    relative = relative_bounds(result, maneuvers)
     correlation = np.abs(result.correlation[:count, :count] - np.eye(count))
     found = []
     for k in np.flatnonzero(relative > REFUSAL_LIMIT):
