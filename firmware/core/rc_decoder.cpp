@@ -31,11 +31,13 @@ void RcDecoder::edge(uint32_t t_ticks, uint8_t levels, bool late) {
   }
   const uint8_t changed = levels ^ levels_;
   levels_ = levels;
-  for (uint8_t i = 0; i < kRcInputs; ++i) {
-    if ((changed & bit_of(i)) == 0) {
+  // A shift by a variable is a loop on the AVR: the bit goes along.
+  uint8_t bit = 1;
+  for (uint8_t i = 0; i < kRcInputs; ++i, bit = static_cast<uint8_t>(bit << 1)) {
+    if ((changed & bit) == 0) {
       continue;
     }
-    if ((levels & bit_of(i)) != 0) {
+    if ((levels & bit) != 0) {
       rise(i, t_ticks, late);
     } else {
       fall(i, t_ticks, late);
@@ -157,12 +159,15 @@ void RcDecoder::lose(uint8_t index) {
 }
 
 void RcDecoder::poll(uint32_t now_ticks) {
-  for (uint8_t i = 0; i < kRcInputs; ++i) {
+  uint8_t bit = 1;
+  for (uint8_t i = 0; i < kRcInputs; ++i, bit = static_cast<uint8_t>(bit << 1)) {
     Input& input = inputs_[i];
     // An edge in the ring that is younger than now_ticks settles its pulse itself, next turn.
-    const uint32_t low_ticks = now_ticks - input.fall;
-    if (input.candidate != 0 && low_ticks >= kLowAfterTicks && (levels_ & bit_of(i)) == 0) {
-      settle(i, low_ticks);
+    if (input.candidate != 0 && (levels_ & bit) == 0) {
+      const uint32_t low_ticks = now_ticks - input.fall;
+      if (low_ticks >= kLowAfterTicks) {
+        settle(i, low_ticks);
+      }
     }
     if (input.width == 0) {
       continue;
@@ -171,7 +176,7 @@ void RcDecoder::poll(uint32_t now_ticks) {
     if (age_ticks > kLostTicks) {
       lose(i);
     } else if (age_ticks > kFreshTicks) {
-      set(fresh_, bit_of(i), false);
+      set(fresh_, bit, false);
     }
   }
 }
