@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench flight-bench clean
+.PHONY: help setup demo test native mega sitl lint format bench flight-bench faults clean
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # mkfs.vfat and fsck.vfat live where only root looks.
@@ -42,6 +42,9 @@ bench: setup ## damage table and speed beside pyulog and pymavlink
 
 flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
 	@cd tests/simavr && ../../$(PYTHON) -m flight.bench $(BENCH)
+
+faults: setup ## faults and power cuts in flight on the simulated chip (minutes)
+	@cd tests/simavr && ../../$(PYTHON) -m flight.faults $(FAULTS)
 
 clean: ## remove what builds made; .venv and downloads stay
 	rm -rf .pio build/sitl build/logs build/fatfs-*

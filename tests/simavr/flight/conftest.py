@@ -27,7 +27,8 @@ def flying(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterat
     """A rig in flight, the Mega driving: for children made by in_fork only."""
     from flight.rig import FlightRig, make_card
 
-    rig = FlightRig(flight_elf, make_card(tmp_path_factory.mktemp("flying") / "card.img"))
+    card = make_card(tmp_path_factory.mktemp("flying") / "card.img")
+    rig = FlightRig(flight_elf, card, in_place=False)
     rig.take_off()
     yield rig
     rig.chip.close()

@@ -111,6 +111,9 @@ class FlightRig:
         Card busy after every block.
     bootloader : bool
         Start in Debian's Mega bootloader, after the 65 ms of start-up that the fuses ask for.
+    in_place : bool
+        Write into the image; else into private pages, so that each child of in_fork has a card of
+        its own, kept with `save_card`.
     """
 
     elf: Path
@@ -120,6 +123,7 @@ class FlightRig:
     sequential: bool = True
     busy_s: float = 0.005
     bootloader: bool = False
+    in_place: bool = True
     source: Callable[[float], ImuSample] = numbered
     sticks: Callable[[float], Sequence[float]] | None = None
     chip: Chip = field(init=False)
@@ -138,7 +142,9 @@ class FlightRig:
         else:
             self.chip = Chip(startup_s=0.0)
         self.chip.load(self.elf)
-        self.card = SdCard(self.chip, "PB0", image=self.card_image, busy_s=self.busy_s)
+        self.card = SdCard(
+            self.chip, "PB0", image=self.card_image, busy_s=self.busy_s, in_place=self.in_place
+        )
         self.receiver = Receiver(
             self.chip, RECEIVER_PINS, frame_s=self.frame_s, sequential=self.sequential
         )
@@ -171,6 +177,18 @@ class FlightRig:
     def status_lines(self) -> list[str]:
         """Lines of the USB port so far."""
         return self.chip.uart_sent(0).decode("ascii", "replace").splitlines()
+
+    def save_card(self, target: Path) -> Path:
+        """Copy the card as it is now to a sparse file."""
+        step = 2048
+        with target.open("wb") as file:
+            file.truncate(self.card.blocks * 512)
+            for first in range(0, self.card.blocks, step):
+                piece = self.card.block(first, min(step, self.card.blocks - first))
+                if piece.strip(b"\0"):
+                    file.seek(first * 512)
+                    file.write(piece)
+        return target
 
     def land(self) -> None:
         """Pull the battery and free the chip."""
