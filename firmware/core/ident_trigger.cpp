@@ -32,6 +32,19 @@ void IdentTrigger::imu_packet(uint8_t seq, uint32_t arrived_us) {
   packet_waits_ = true;
 }
 
+// A lower rate takes every 2nd, 4th or 8th sample: always those whose number divides, so that two
+// recorders of one flight, or one after a reset, keep the same samples.
+bool IdentTrigger::in_phase() const {
+  const uint16_t half_us = packet_period_us_ / 2;
+  uint8_t mask = 0;
+  for (uint8_t every = 2; every <= 8; every = static_cast<uint8_t>(every << 1)) {
+    if (period_us_ + half_us >= static_cast<uint32_t>(packet_period_us_) * every) {
+      mask = static_cast<uint8_t>(every - 1);
+    }
+  }
+  return (last_seq_ & mask) == 0;
+}
+
 IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
   if (packet_waits_) {
     const uint32_t since_us = last_packet_us_ - last_imu_us_;
@@ -40,7 +53,7 @@ IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
       return Source::kNone;
     }
     packet_waits_ = false;
-    if (!imu_leads_ || since_us + packet_period_us_ / 2 >= period_us_) {
+    if (imu_leads_ ? since_us + packet_period_us_ / 2 >= period_us_ : in_phase()) {
       // Even a packet left out sets the phase: the timer stays 1.5 periods behind it, else both
       // would go on meeting each other's unfinished frames at 200 Hz.
       imu_leads_ = true;

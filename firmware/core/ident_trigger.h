@@ -24,6 +24,8 @@ class IdentTrigger {
   uint32_t period_us() const { return period_us_; }
 
  private:
+  bool in_phase() const;
+
   uint32_t period_us_ = 10000;
   uint32_t last_us_ = 0;         // last trigger
   uint32_t last_packet_us_ = 0;  // last packet, for the measured packet period

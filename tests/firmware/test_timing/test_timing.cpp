@@ -72,6 +72,24 @@ TEST_CASE("every second packet at 100 Hz, each packet at 200 Hz, every fourth at
   }
 }
 
+TEST_CASE("at a lower rate the sample's number says which are kept, whatever came first") {
+  for (uint8_t first = 0; first < 8; ++first) {
+    core::IdentTrigger trigger;
+    trigger.start(50, 0);  // every fourth of 200 Hz
+    uint8_t kept = 0;
+    for (uint8_t i = 0; i < 40; ++i) {
+      const uint8_t seq = static_cast<uint8_t>(first + i);
+      const uint32_t t_us = 1000U + 5000U * i;
+      trigger.imu_packet(seq, t_us);
+      if (trigger.poll(t_us, true) == Source::kImu) {
+        CHECK_EQ(seq & 3, 0);
+        ++kept;
+      }
+    }
+    CHECK(kept >= 9);
+  }
+}
+
 TEST_CASE("an IMU clock half a percent off does not slip a packet") {
   const uint16_t packets_us[] = {4975, 5025};
   for (const uint16_t packet_us : packets_us) {
