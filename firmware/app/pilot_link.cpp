@@ -20,15 +20,15 @@ void PilotLink::step(const frames::ConfigFrame& config,
                      uint32_t now_us) {
   ran(kTaskPilot);
   hal::Edge edge;
-  const bool rested = now_us - decided_us_ >= kRestUs;
-  bool due = rested || decoder_.waiting();
+  bool due = decoder_.waiting() || now_us - polled_us_ >= kPollUs;
   while (hal::take_edge(&edge)) {
     decoder_.edge(core::extend_ticks(hal::now_ticks(), edge.at_ticks), edge.levels, edge.late);
     due = due || decoder_.waiting();
   }
   if (!due) return;
+  polled_us_ = now_us;
   poll_receiver(outlet, now_us);
-  if (rested || decoder_.changes() != decided_changes_) {
+  if (now_us - decided_us_ >= kRestUs || decoder_.changes() != decided_changes_) {
     decided_us_ = now_us;
     decided_changes_ = decoder_.changes();
     decide(config, self_test_passed, outlet, now_us);

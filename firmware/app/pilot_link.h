@@ -34,7 +34,8 @@ class PilotLink {
   uint16_t servo_ticks(uint8_t servo) const { return drive_.servo_ticks(servo); }
 
  private:
-  static constexpr uint16_t kRestUs = 2500;
+  static constexpr uint16_t kPollUs = 1500;  // pulses that stay away show within this
+  static constexpr uint16_t kRestUs = 4000;
 
   void poll_receiver(Outlet& outlet, uint32_t now_us);
   void decide(const frames::ConfigFrame& config,
@@ -48,6 +49,7 @@ class PilotLink {
   core::HealthGate health_{kTaskCount};
   core::RcChannels channels_ = {};
   uint16_t sent_ticks_[core::kServos] = {};
+  uint32_t polled_us_ = 0;
   uint32_t decided_us_ = 0;
   uint16_t lost_edges_ = 0;
   frames::Drive told_drive_ = frames::Drive::kDirectBoot;

@@ -5,14 +5,6 @@
 
 namespace mega {
 
-// Until the flight tests on the simulated chip have passed, servo, relay and heartbeat pins stay
-// inputs, and the boot line says so. Those tests build with FLIGHT_IMAGE.
-#ifdef FLIGHT_IMAGE
-constexpr bool kBenchOnly = false;
-#else
-constexpr bool kBenchOnly = true;
-#endif
-
 void start_clock();
 
 // Set by what the main loop has to look at: the millisecond, a packet of the IMU. Other interrupts

@@ -3,16 +3,12 @@
 
 #include <avr/io.h>
 
-#include "boards/mega2560/board.h"
 #include "boards/mega2560/generated/pins.h"
 #include "boards/mega2560/interrupts.h"
 
 namespace hal {
 
 void toggle_heartbeat() {
-  if (mega::kBenchOnly) {
-    return;
-  }
   const mega::InterruptsOff guard;  // port H is beyond sbi: a write is read, change, write
   pins::Heartbeat::direction() |= pins::Heartbeat::kMask;
   pins::Heartbeat::input() = pins::Heartbeat::kMask;  // writing a one to PIN turns the line over

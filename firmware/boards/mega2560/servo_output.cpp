@@ -4,7 +4,6 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
-#include "boards/mega2560/board.h"
 #include "boards/mega2560/generated/pins.h"
 #include "boards/mega2560/interrupts.h"
 
@@ -78,7 +77,7 @@ ISR(TIMER1_COMPA_vect) {
 namespace hal {
 
 void set_servo_pulse(const uint8_t output, const uint16_t width_ticks) {
-  if (mega::kBenchOnly || output >= kServoOutputs) {
+  if (output >= kServoOutputs) {
     return;
   }
   if ((TCCR3B & _BV(CS31)) == 0) {

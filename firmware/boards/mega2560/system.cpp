@@ -141,7 +141,7 @@ uint16_t stack_free_bytes() {
 }
 
 const char* board_name() {
-  return mega::kBenchOnly ? "BENCH ONLY" : "mega2560";
+  return "mega2560";
 }
 
 }  // namespace hal

@@ -42,12 +42,12 @@ DIRECT_US, MEGA_US = 1000.0, 1900.0
 
 
 def build_flight_image() -> Path:
-    """Build the image with servo, relay and heartbeat pins enabled.
+    """Build the image that `pio run` makes.
 
     Returns
     -------
     Path
-        The ELF, from `pio run` with FLIGHT_IMAGE defined, in a build folder of its own.
+        The ELF, in a build folder of its own: other work may be building the same image.
 
     Raises
     ------
@@ -57,7 +57,6 @@ def build_flight_image() -> Path:
     pio = Path(sys.executable).with_name("pio")
     environment = dict(os.environ)
     environment["PLATFORMIO_BUILD_DIR"] = str(BUILD / "pio")
-    environment["PLATFORMIO_BUILD_FLAGS"] = "-DFLIGHT_IMAGE"
     done = subprocess.run(
         [pio, "run", "-e", "mega2560"],
         cwd=ROOT,

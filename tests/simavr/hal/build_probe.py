@@ -22,7 +22,7 @@ PARTS = [
     "system",
 ]
 FLAGS = [
-    *("-mmcu=atmega2560", "-DF_CPU=16000000UL", "-DFLIGHT_IMAGE", "-std=gnu++14", "-Os", "-g"),
+    *("-mmcu=atmega2560", "-DF_CPU=16000000UL", "-std=gnu++14", "-Os", "-g"),
     *("-Wall", "-Wextra", "-Werror", "-ffunction-sections", "-Wl,--gc-sections"),
     *("-fno-exceptions", "-fno-threadsafe-statics", f"-I{ROOT}/firmware", f"-I{ROOT}/protocol"),
 ]

@@ -1,0 +1,69 @@
+"""What the flight image may hold: no heap, no formatting of floats, a budget, fast interrupts."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+RAM_LIMIT_BYTES = 6600
+FLASH_LIMIT_BYTES = 100_000  # 253 952 are there; more than this is a mistake
+STACK_LEFT_BYTES = 1200
+
+HEAP = re.compile(r"^(malloc|free|realloc|calloc|__malloc_\w+|__brkval|_Zn[wa]\w*|_Zd[la]\w*)$")
+FLOAT_TEXT = re.compile(r"^(vfprintf|vsnprintf|sprintf|printf|dtostre|dtostrf|__ftoa\w*|strtod)$")
+FLOAT_MATH = re.compile(r"^__(add|sub|mul|div|cmp|le|ge|float\w*|fix\w*)sf\w*$")
+DIVISION = re.compile(r"__(u?div|u?mod)\w+")
+
+
+@pytest.fixture(scope="module")
+def symbols(flight_elf: Path) -> set[str]:
+    """Names of the linked image."""
+    done = subprocess.run(["avr-nm", str(flight_elf)], capture_output=True, text=True, check=True)
+    return {line.split()[-1] for line in done.stdout.splitlines()}
+
+
+@pytest.mark.parametrize("refused", [HEAP, FLOAT_TEXT, FLOAT_MATH])
+def test_image_is_free_of(symbols: set[str], refused: re.Pattern[str]) -> None:
+    assert "main" in symbols
+    assert [name for name in symbols if refused.match(name)] == []
+
+
+def test_image_keeps_its_budget(flight_elf: Path) -> None:
+    done = subprocess.run(["avr-size", str(flight_elf)], capture_output=True, text=True, check=True)
+    text, data, bss = map(int, done.stdout.splitlines()[1].split()[:3])
+    assert data + bss <= RAM_LIMIT_BYTES
+    assert 8192 - data - bss >= STACK_LEFT_BYTES
+    assert text + data <= FLASH_LIMIT_BYTES
+
+
+def test_interrupts_never_divide(flight_elf: Path) -> None:
+    done = subprocess.run(
+        ["avr-objdump", "-d", "--no-show-raw-insn", str(flight_elf)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    calls: dict[str, set[str]] = {}
+    name = ""
+    for line in done.stdout.splitlines():
+        head = re.match(r"^[0-9a-f]+ <(.+)>:$", line)
+        if head:
+            name = head[1]
+            calls[name] = set()
+        else:
+            target = re.search(r"\b(?:r?call|r?jmp)\b.*<([^+>]+)>", line)
+            if target:
+                calls[name].add(target[1])
+    vectors = [name for name in calls if re.match(r"^__vector_(\d+|nested_\w+|imu_\w+)$", name)]
+    assert len(vectors) >= 10
+    seen: set[str] = set()
+    waiting = list(vectors)
+    while waiting:
+        at = waiting.pop()
+        if at not in seen:
+            seen.add(at)
+            waiting += calls.get(at, set())
+    assert [name for name in seen if DIVISION.search(name)] == []
