@@ -273,7 +273,10 @@ void Recorder::stream(uint32_t now_us) {
       return;
     case CardStatus::kOk:
       note_busy(now_us);
-      if (!writer_.due(now_us)) return;
+      if (!writer_.due(now_us)) {
+        tell_stall(now_us);
+        return;
+      }
       hal::open_block();
       block_open_ = true;
       next_block(now_us);
@@ -313,6 +316,7 @@ void Recorder::close_block(uint32_t now_us) {
     rejects_ = 0;
     programming_ = true;
     accepted_us_ = hal::now_us();
+    tell_stall(now_us);
     return;
   }
   stream_open_ = false;
@@ -337,7 +341,15 @@ void Recorder::note_busy(uint32_t now_us) {
   const uint32_t busy_us = now_us - accepted_us_;
   const uint32_t busy_ms = busy_us / 1000U;
   if (busy_ms > busy_max_ms_) busy_max_ms_ = static_cast<uint16_t>(busy_ms);
-  if (busy_us >= kStallUs) outlet_.event(frames::Event::kCardStall, busy_ms, now_us);
+  if (busy_us >= kStallUs) stall_ms_ = static_cast<uint16_t>(busy_ms > 0xFFFFU ? 0xFFFFU : busy_ms);
+}
+
+// After the block that makes room: an event pushed into the reserve of a full ring would tell of
+// the frames dropped so far, with more to come.
+void Recorder::tell_stall(uint32_t now_us) {
+  if (stall_ms_ == 0) return;
+  outlet_.event(frames::Event::kCardStall, stall_ms_, now_us);
+  stall_ms_ = 0;
 }
 
 void Recorder::put_health(frames::SystemFrame* out) {

@@ -62,6 +62,7 @@ class Recorder {
   void next_block(uint32_t now_us);
   void close_block(uint32_t now_us);
   void note_busy(uint32_t now_us);
+  void tell_stall(uint32_t now_us);
   uint32_t next_session();
 
   core::ByteRing& ring_;
@@ -77,6 +78,7 @@ class Recorder {
   uint32_t accepted_us_ = 0;
   uint32_t marks_ = 0;
   uint16_t card_errors_ = 0;
+  uint16_t stall_ms_ = 0;  // not yet told by an event
   uint16_t busy_max_ms_ = 0;
   State state_ = State::kNoFile;
   storage::VolumeStatus volume_status_ = storage::VolumeStatus::kNoCard;
