@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench flight-bench faults clean
+.PHONY: help setup demo test native mega sitl lint format bench study flight-bench faults clean
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # mkfs.vfat and fsck.vfat live where only root looks.
@@ -39,6 +39,9 @@ format: setup ## rewrite C++ and Python in the house format
 
 bench: setup ## damage table and speed beside pyulog and pymavlink
 	@$(PYTHON) tests/bench/run.py
+
+study: setup ## tables and pictures of identification in build/study (SIZE=full: half an hour)
+	@$(PYTHON) -m host.sysid.study build/study --size $(or $(SIZE),small)
 
 flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
 	@cd tests/simavr && ../../$(PYTHON) -m flight.bench $(BENCH)

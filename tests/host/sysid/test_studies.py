@@ -1,5 +1,6 @@
 """The studies in small: their limits hold, and the programs write their tables."""
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -58,12 +59,23 @@ def test_gusts_hurt_output_error_more_than_filter_error() -> None:
     assert np.all(case.filter_rms[dynamic] < case.output_rms[dynamic] / 3.0)
 
 
-def test_programs_write_their_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_program_writes_a_table_twice_and_a_picture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main([str(tmp_path), "--only", "b_accuracy"]) == 0
-    assert "b_accuracy.txt" in capsys.readouterr().out
-    text = (tmp_path / "b_accuracy.txt").read_text()
-    assert text.startswith("simulated data")
-    assert "rms(error/bound)" in text
+    assert "b_accuracy: md, csv, svg" in capsys.readouterr().out
+    text = (tmp_path / "b_accuracy.md").read_text()
+    assert "Simulated data throughout" in text
+    with (tmp_path / "b_accuracy.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6
+    assert text.count("\n| ") == len(rows) + 2
+    for row in rows:
+        assert float(row["ratio of 9"]) == pytest.approx(
+            float(row["Hopfield, the 9 %"]) / float(row["output error %"])
+        )
+    picture = (tmp_path / "b_accuracy.svg").read_text()
+    assert picture.count('<g id="axes_') == 2
 
 
 def test_overlap_counts_axis_and_both_ends() -> None:

@@ -1,58 +1,119 @@
-"""Run the studies and write their tables: `python -m host.sysid.study --size small OUT`."""
+"""Run the studies, write tables and pictures: `python -m host.sysid.study build/study`."""
 
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
+import os
 import sys
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
-from host.sysid.study import accuracy, coverage, flights, methods, thesis, turbulence
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-Main = Callable[[list[str] | None], int]
-# name -> (program, arguments by size)
-STUDIES: dict[str, tuple[Main, dict[str, list[str]]]] = {
-    "a_thesis": (
-        thesis.main,
-        {"small": ["--iterations", "20000", "--systems", "20"], "full": []},
-    ),
-    "b_accuracy": (
-        accuracy.main,
-        {"small": ["--runs", "20"], "full": ["--runs", "1000"]},
-    ),
-    "c_coverage": (
-        coverage.main,
-        {"small": ["--runs", "20"], "full": ["--runs", "2000"]},
-    ),
-    "d_turbulence": (
-        turbulence.main,
-        {"small": ["--flights", "4"], "full": ["--flights", "100"]},
-    ),
-    "e_flights": (flights.main, {"small": ["--flights", "1"], "full": ["--flights", "20"]}),
-    "g_methods": (methods.main, {"small": ["--runs", "2"], "full": ["--runs", "20"]}),
+from host.errors import ExitCode
+from host.sysid.fit import METHODS
+from host.sysid.hopfield import ITERATIONS
+from host.sysid.model import free_model
+from host.sysid.study import accuracy, coverage, methods, tables, thesis, turbulence
+from host.sysid.study.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
+from host.sysid.study.inputs import SHAPES
+from host.sysid.study.report import write
+
+# runs of each study: (small, full)
+ITERATION_COUNT = (20_000, ITERATIONS)
+SYSTEMS = (100, 200)
+ACCURACY_RUNS = (20, 1000)
+COVERAGE_RUNS = (20, 2000)
+FLIGHTS = (4, 100)
+METHOD_RUNS = (2, 20)
+
+
+def study_a(stem: Path, size: int) -> list[Path]:
+    """Tables 3.1 and 3.2 of the thesis, refusal."""
+    from host.sysid.study.figures import thesis_figure
+
+    runs = thesis.table_32(ITERATION_COUNT[size])
+    u = SHAPES["3-2-1-1"](thesis.AMPLITUDE_RAD, 0.01, thesis.DURATION_S)
+    check = thesis.check_refusal(TABLE_31_A, TABLE_31_B, u, 0.01)
+    found = thesis.refusal_agreement(SYSTEMS[size])
+    names = free_model("table 3.1", STATES, INPUTS).parameter_names
+    return write(tables.thesis_table(runs, check, names, found), thesis_figure(runs, found), stem)
+
+
+def study_b(stem: Path, size: int) -> list[Path]:
+    """Accuracy against the bound."""
+    from host.sysid.study.figures import accuracy_figure
+
+    cases = [
+        accuracy.run_case(shape, rate_hz, ACCURACY_RUNS[size])
+        for shape in SHAPES
+        for rate_hz in accuracy.RATES_HZ
+    ]
+    return write(tables.accuracy_table(cases), accuracy_figure(cases), stem)
+
+
+def study_c(stem: Path, size: int) -> list[Path]:
+    """Coverage of the intervals."""
+    from host.sysid.study.figures import coverage_figure
+
+    cases = [
+        coverage.run_case(noise, rate_hz, COVERAGE_RUNS[size])
+        for noise in coverage.NOISES
+        for rate_hz in coverage.RATES_HZ
+    ]
+    return write(tables.coverage_table(cases), coverage_figure(cases), stem)
+
+
+def study_d(stem: Path, size: int) -> list[Path]:
+    """Turbulence."""
+    from host.sysid.study.figures import turbulence_figure
+
+    cases = [
+        turbulence.run_case(intensity, FLIGHTS[size], pilot=pilot)
+        for intensity in (0.5, 1.0)
+        for pilot in (False, True)
+    ]
+    return write(tables.turbulence_table(cases), turbulence_figure(cases), stem)
+
+
+def study_g(stem: Path, size: int) -> list[Path]:
+    """Every method on five data sets."""
+    from host.sysid.study.figures import methods_figure
+
+    chosen = [m for m in METHODS if m not in methods.SKIPPED]
+    scores = [methods.score(m, data, METHOD_RUNS[size]) for m in chosen for data in methods.DATA]
+    return write(tables.methods_table(scores), methods_figure(scores), stem)
+
+
+STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
+    "a_thesis": study_a,
+    "b_accuracy": study_b,
+    "c_coverage": study_c,
+    "d_turbulence": study_d,
+    "g_methods": study_g,
 }
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the chosen studies one after another on one core."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="where the tables go")
+    parser.add_argument("folder", type=Path, help="where tables and pictures go")
     parser.add_argument("--size", choices=("small", "full"), default="small")
     parser.add_argument("--only", choices=list(STUDIES), action="append")
     options = parser.parse_args(arguments)
+    if find_spec("matplotlib") is None:
+        sys.stderr.write("pictures need the extra: pip install './host[plot]'\n")
+        return int(ExitCode.USAGE)
     options.folder.mkdir(parents=True, exist_ok=True)
     for name in options.only or STUDIES:
-        program, sizes = STUDIES[name]
         begin = time.perf_counter()
-        table = io.StringIO()
-        with contextlib.redirect_stdout(table):
-            program(sizes[options.size])
-        path = options.folder / f"{name}.txt"
-        path.write_text(f"simulated data; size {options.size}\n{table.getvalue()}")
-        sys.stdout.write(f"{path}  {time.perf_counter() - begin:.0f} s\n")
+        paths = STUDIES[name](options.folder / name, ("small", "full").index(options.size))
+        sys.stdout.write(
+            f"{options.folder / name}: {', '.join(p.suffix[1:] for p in paths)}"
+            f"  {time.perf_counter() - begin:.0f} s\n"
+        )
         sys.stdout.flush()
     return 0
 
