@@ -53,7 +53,7 @@ IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
       return Source::kNone;
     }
     packet_waits_ = false;
-    if (imu_leads_ ? since_us + packet_period_us_ / 2 >= period_us_ : in_phase()) {
+    if (in_phase() && (!imu_leads_ || since_us + packet_period_us_ / 2 >= period_us_)) {
       // Even a packet left out sets the phase: the timer stays 1.5 periods behind it, else both
       // would go on meeting each other's unfinished frames at 200 Hz.
       imu_leads_ = true;
