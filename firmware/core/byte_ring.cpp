@@ -19,7 +19,9 @@ bool ByteRing::fits(uint8_t id, uint16_t size) const {
 
 bool ByteRing::push(uint8_t id, const void* fields, uint32_t t_us) {
   const uint8_t size = frames::wire_size(id);
-  const uint8_t notice = dropped_pending_ != 0 ? frames::kEventWireSize : 0;
+  // An event squeezed into the reserve does not mean that there is room again.
+  const bool tells = dropped_pending_ != 0 && id != frames::kEventId;
+  const uint8_t notice = tells ? frames::kEventWireSize : 0;
   if (size == 0 || !fits(id, static_cast<uint16_t>(size + notice))) {
     if (dropped_pending_ == 0) {
       dropped_first_us_ = t_us;

@@ -1,6 +1,6 @@
 // Frames waiting for the card: whole frames, one behind the other, in a ring of bytes.
 // When it is full the newest frame is dropped and counted; before the next frame that finds room
-// stands an event `frames_dropped` with the number and the time of the first.
+// (events aside) stands an event `frames_dropped` with the number and the time of the first.
 // Main loop only: no interrupt may touch it.
 #pragma once
 
