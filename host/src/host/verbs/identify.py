@@ -48,7 +48,18 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--mat", type=Path, metavar="FILE", help="write a MAT file")
     parser.add_argument("--plots", type=Path, metavar="DIR", help="write pictures")
-    parser.add_argument("--save-model", type=Path, metavar="FILE", help="write TOML (or .mat)")
+    parser.add_argument(
+        "--save-model",
+        type=Path,
+        metavar="FILE",
+        help="write the model as .toml or .mat, with --aircraft as .xml for JSBSim",
+    )
+    parser.add_argument(
+        "--save-aircraft",
+        type=Path,
+        metavar="FILE",
+        help="write the aircraft for `host simulate`, with --aircraft",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -200,7 +211,10 @@ def _write(args: argparse.Namespace, answers: list[Answer]) -> None:
             draw(answer, args.plots)
     if args.mat:
         _write_mat(args.mat, answers)
-    if args.save_model:
+    for path in (args.save_aircraft, args.save_model):
+        if path and (path is args.save_aircraft or path.suffix == ".xml"):
+            _write_aircraft(args, path, answers)
+    if args.save_model and args.save_model.suffix != ".xml":
         from host.sysid.model_file import model_text
 
         if args.save_model.suffix == ".mat":
@@ -211,6 +225,15 @@ def _write(args: argparse.Namespace, answers: list[Answer]) -> None:
             if number:
                 path = path.with_name(f"{path.stem}_{answer.template}{path.suffix}")
             path.write_text(model_text(answer.model, answer.result))
+
+
+def _write_aircraft(args: argparse.Namespace, path: Path, answers: list[Answer]) -> None:
+    from host.sysid.aircraft_export import save_aircraft
+    from host.sysid.errors import IdentificationError
+
+    if not args.aircraft:
+        raise IdentificationError(f"{path}: an aircraft needs mass and geometry; give --aircraft")
+    save_aircraft(path, answers, args.aircraft)
 
 
 def _write_mat(path: Path, answers: list[Answer]) -> None:
