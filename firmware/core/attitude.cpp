@@ -14,11 +14,11 @@ constexpr int32_t kPermilleQ28 = 268435;            // 0.001
 constexpr int32_t kPpmQ28 = 268;                    // 1e-6
 constexpr int32_t kFastGainQ28 = INT32_C(3) << 28;  // 3 1/s while settling
 constexpr int32_t kRecoverGainQ28 = INT32_C(1) << 27;
-constexpr int32_t kFastBiasQ28 = 0;
 constexpr int32_t kBiasLimitQ30 = 93689000;  // 5 deg/s
 constexpr uint16_t kFullWeight = 4096;
 constexpr uint32_t kShortestUs = 1000;
 constexpr uint32_t kLongestUs = 40000;
+constexpr uint32_t kLongestPassedUs = 100000;  // dt_k stays below 2^31
 
 int32_t clamp(int32_t value, int32_t limit) {
   return value > limit ? limit : value < -limit ? -limit : value;
@@ -107,12 +107,11 @@ void Attitude::learn(const Vector& error_q25, int32_t gain_q28, int32_t dt_k) {
   bias_[2] = clamp(bias_[2] - mul_high(error_q25.z, per_step), kBiasLimitQ30);
 }
 
-void Attitude::learn_at_rest(const Vector& rate, int32_t dt_k) {
-  const int32_t share =
-      dt_k / 4;  // dt in Q32; 16 is 8 from Q27 to Q30 over a time constant of 0.5 s
-  bias_[0] = clamp(bias_[0] + mul_high(rate.x, share) * 16, kBiasLimitQ30);
-  bias_[1] = clamp(bias_[1] + mul_high(rate.y, share) * 16, kBiasLimitQ30);
-  bias_[2] = clamp(bias_[2] + mul_high(rate.z, share) * 16, kBiasLimitQ30);
+void Attitude::set_rest_rates(const int16_t (&rates)[3]) {
+  constexpr int32_t kMost = kBiasLimitQ30 / 8 / kRadpsQ27;
+  for (uint8_t axis = 0; axis < 3; ++axis) {
+    bias_[axis] = clamp(rates[axis], kMost) * kRadpsQ27 * 8;
+  }
 }
 
 void Attitude::step(const AttitudeInput& in, uint32_t dt_us) {
@@ -125,59 +124,75 @@ void Attitude::step(const AttitudeInput& in, uint32_t dt_us) {
     started_ = true;
     last_rate_ = rate;
   }
+  settle_steps_ = settle_steps_ == 0 ? uint16_t{0} : static_cast<uint16_t>(settle_steps_ - 1);
+  recover_steps_ = in.gyro_saturated     ? kRecoverSteps
+                   : recover_steps_ == 0 ? uint16_t{0}
+                                         : static_cast<uint16_t>(recover_steps_ - 1);
+  for (uint8_t axis = 0; axis < 3; ++axis) {
+    force_sum_[axis] += in.force[axis];
+  }
+  accel_saturated_ = accel_saturated_ || in.accel_saturated;
+  passed_us_ += dt_us;
+  ++samples_;
+  if (samples_ == kSamplesPerCorrection) {
+    correct(in, rate);
+    samples_ = 0;
+    passed_us_ = 0;
+    accel_saturated_ = false;
+    force_sum_[0] = force_sum_[1] = force_sum_[2] = 0;
+  }
+
+  // The mean of two samples stands for the time between them.
+  const Vector mean = {last_rate_.x / 2 + rate.x / 2 + correction_.x,
+                       last_rate_.y / 2 + rate.y / 2 + correction_.y,
+                       last_rate_.z / 2 + rate.z / 2 + correction_.z};
+  last_rate_ = rate;
+  turn(attitude_, Vector{mul_high(mean.x, dt_k), mul_high(mean.y, dt_k), mul_high(mean.z, dt_k)});
+  put_angles(rate);
+}
+
+void Attitude::correct(const AttitudeInput& in, const Vector& rate) {
+  normalise(attitude_);
+  down_ = down(attitude_);
+  AttitudeInput mean = in;
+  for (uint8_t axis = 0; axis < 3; ++axis) {
+    mean.force[axis] = static_cast<int16_t>(force_sum_[axis] / kSamplesPerCorrection);
+  }
+  mean.accel_saturated = accel_saturated_;
   uint16_t weight = 0;
-  const Vector error = gravity_error(in, rate, weight);
+  const Vector error = gravity_error(mean, rate, weight);
 
   int32_t gain = settings_.tilt_gain_permille * kPermilleQ28;
   int32_t heading_gain = settings_.heading_gain_permille * kPermilleQ28;
-  int32_t bias_gain = settings_.bias_gain_ppm * kPpmQ28;
   if (settle_steps_ != 0) {
-    --settle_steps_;
     gain = heading_gain = kFastGainQ28;
-    bias_gain = kFastBiasQ28;
   } else if (recover_steps_ != 0) {
     gain = heading_gain = kRecoverGainQ28;
-    bias_gain = kFastBiasQ28;
-  }
-  if (recover_steps_ != 0) {
-    --recover_steps_;
-  }
-  if (in.gyro_saturated) {
-    recover_steps_ = kRecoverSteps;
   }
   gain = gain / kFullWeight * weight;
-  bias_gain = bias_gain / kFullWeight * weight;
 
-  const bool learning = settle_steps_ == 0 && recover_steps_ == 0 && !at_rest_;
   Vector heading = {0, 0, 0};
   if (field_left_us_ != 0) {
-    field_left_us_ = field_left_us_ > dt_us ? field_left_us_ - dt_us : 0;
+    field_left_us_ = field_left_us_ > passed_us_ ? field_left_us_ - passed_us_ : 0;
     // About the vertical: along down, against the error.
     heading = Vector{-mul_q30(down_.x, heading_error_),
                      -mul_q30(down_.y, heading_error_),
                      -mul_q30(down_.z, heading_error_)};
   }
   if (speed_left_us_ != 0) {
-    speed_left_us_ = speed_left_us_ > dt_us ? speed_left_us_ - dt_us : 0;
+    speed_left_us_ = speed_left_us_ > passed_us_ ? speed_left_us_ - passed_us_ : 0;
     speed_cmps_ = speed_left_us_ == 0 ? uint16_t{0} : speed_cmps_;
   }
-  if (at_rest_) {
-    learn_at_rest(rate, dt_k);
-    bias_gain = 0;
+  const uint32_t passed_us = passed_us_ < kLongestPassedUs ? passed_us_ : kLongestPassedUs;
+  const int32_t dt_k = static_cast<int32_t>(passed_us * kHalfPerUs);
+  if (settle_steps_ == 0 && recover_steps_ == 0 && !at_rest_) {
+    const int32_t bias_gain = settings_.bias_gain_ppm * kPpmQ28;
+    learn(error, bias_gain / kFullWeight * weight, dt_k);
+    learn(heading, bias_gain, dt_k);
   }
-  learn(error, bias_gain, dt_k);
-  learn(heading, learning ? settings_.bias_gain_ppm * kPpmQ28 : 0, dt_k);
-
-  // The mean of two samples stands for the time between them.
-  const Vector mean = {
-      last_rate_.x / 2 + rate.x / 2 + rate_of(error.x, gain) + rate_of(heading.x, heading_gain),
-      last_rate_.y / 2 + rate.y / 2 + rate_of(error.y, gain) + rate_of(heading.y, heading_gain),
-      last_rate_.z / 2 + rate.z / 2 + rate_of(error.z, gain) + rate_of(heading.z, heading_gain)};
-  last_rate_ = rate;
-  turn(attitude_, Vector{mul_high(mean.x, dt_k), mul_high(mean.y, dt_k), mul_high(mean.z, dt_k)});
-  normalise(attitude_);
-  down_ = down(attitude_);
-  put_angles(rate);
+  correction_ = Vector{rate_of(error.x, gain) + rate_of(heading.x, heading_gain),
+                       rate_of(error.y, gain) + rate_of(heading.y, heading_gain),
+                       rate_of(error.z, gain) + rate_of(heading.z, heading_gain)};
 }
 
 void Attitude::put_angles(const Vector& rate) {

@@ -24,18 +24,20 @@ struct AttitudeInput {
 
 class Attitude {
  public:
-  static constexpr uint16_t kSettleSteps = 600;    // 3 s at 200 Hz of fast convergence
-  static constexpr uint16_t kRecoverSteps = 2000;  // 10 s after a saturated gyro
-  static constexpr uint32_t kSpeedUs = 1000000;    // a speed is used this long
-  static constexpr uint32_t kFieldUs = 500000;     // a heading error is worked off this long
+  static constexpr uint16_t kSettleSteps = 600;        // 3 s at 200 Hz of fast convergence
+  static constexpr uint16_t kRecoverSteps = 2000;      // 10 s after a saturated gyro
+  static constexpr uint8_t kSamplesPerCorrection = 4;  // 50 Hz: half the cycles of 200 Hz
+  static constexpr uint32_t kSpeedUs = 1000000;        // a speed is used this long
+  static constexpr uint32_t kFieldUs = 500000;         // a heading error is worked off this long
 
   explicit Attitude(const AttitudeSettings& settings) : settings_(settings) {}
 
   // The sample taken `dt_us` after the last one. Steps of 1 to 40 ms; longer ones are cut.
   void step(const AttitudeInput& in, uint32_t dt_us);
 
-  // At rest (RestDetector) the rates are the bias, and it is learned within seconds.
+  // At rest (RestDetector) gravity and field teach no bias: the mean rates of a second do.
   void set_at_rest(bool at_rest) { at_rest_ = at_rest; }
+  void set_rest_rates(const int16_t (&rates)[3]);  // as in AttitudeInput
   // True airspeed, else GPS ground speed: takes the turn's own acceleration off. Body axes.
   void set_speed(uint16_t speed_cmps);
   // Magnetic field in body axes, any scale, at the last sample.
@@ -64,16 +66,19 @@ class Attitude {
   static void normalise(Quaternion& q);
   static Vector down(const Quaternion& q);
   Vector gravity_error(const AttitudeInput& in, const Vector& rate_q27, uint16_t& weight) const;
-  void learn_at_rest(const Vector& rate_q27, int32_t dt_k);
   void learn(const Vector& error_q25, int32_t gain_q28, int32_t dt_k);
+  void correct(const AttitudeInput& in, const Vector& rate_q27);
   void put_angles(const Vector& rate_q27);
 
   const AttitudeSettings& settings_;
   Quaternion attitude_ = {INT32_C(1) << 30, 0, 0, 0};
   Vector down_ = {0, 0, INT32_C(1) << 30};  // of attitude_, in body axes
+  Vector correction_ = {};                  // Q27 rad/s, held between two corrections
   Vector last_rate_ = {};                   // Q27 rad/s
   int32_t bias_[3] = {};                    // Q30 rad/s
   int32_t heading_error_ = 0;               // Q25 rad, positive: heading too large
+  int32_t force_sum_[3] = {};
+  uint32_t passed_us_ = 0;
   uint32_t speed_left_us_ = 0;
   uint32_t field_left_us_ = 0;
   uint16_t speed_cmps_ = 0;
@@ -82,6 +87,8 @@ class Attitude {
   int16_t phi_cdeg_ = 0;
   int16_t theta_cdeg_ = 0;
   int16_t psi_cdeg_ = 0;
+  uint8_t samples_ = 0;
+  bool accel_saturated_ = false;
   bool started_ = false;
   bool at_rest_ = false;
 };

@@ -5,25 +5,20 @@
 
 namespace core {
 
-// a * b / 2^32, rounded. 64-bit shifts are loops on the AVR; the upper half is only moved bytes.
-inline int32_t mul_high(int32_t a, int32_t b) {
-  const int64_t product = int64_t{a} * b + 0x80000000LL;
-  return static_cast<int32_t>(product >> 32);
-}
+// a * b / 2^32, rounded.
+int32_t mul_high(int32_t a, int32_t b);
 
 // Both at most 2 in Q30.
-inline int32_t mul_q30(int32_t a, int32_t b) {
-  return static_cast<int32_t>(static_cast<uint32_t>(mul_high(a, b)) << 2);
-}
+int32_t mul_q30(int32_t a, int32_t b);
 
 // Largest r with r * r <= value.
 uint16_t square_root(uint32_t value);
 
-// Angle of (x, y) in 0.01 deg, -18000 to 18000; 0 for (0, 0). Off by 0.012 deg at most, rounding
+// Angle of (x, y) in 0.01 deg, -18000 to 18000; 0 for (0, 0). Off by 0.016 deg at most, rounding
 // included, where the larger of the two is 2^20 or more.
 int16_t atan2_cdeg(int32_t y, int32_t x);
 
-// 32767 times sine and cosine of an angle in 0.01 deg, off by 3 at most.
+// 32767 times sine and cosine of an angle in 0.01 deg, off by 7 at most.
 int16_t sin_q15(int16_t angle_cdeg);
 int16_t cos_q15(int16_t angle_cdeg);
 

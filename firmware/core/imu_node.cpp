@@ -21,13 +21,6 @@ int16_t less(int16_t value, int16_t offset) {
 
 }  // namespace
 
-ImuNode::ImuNode(ImuSettings& settings, bool settings_valid) : settings_(settings) {
-  if (!settings_valid) {
-    settings_.offsets_valid = 0;
-  }
-  tune();
-}
-
 void ImuNode::tune() {
   tuning_.declination_cdeg = settings_.declination_cdeg;
   tuning_.filter_delay_us = filter_delay_us(dlpf_);
@@ -53,10 +46,21 @@ void ImuNode::sample(const ImuRawSample& raw, uint32_t t_us) {
   in_.gyro_saturated = raw.gyro_saturated;
   in_.accel_saturated = raw.accel_saturated;
   attitude_.set_at_rest(at_rest());
+  if (rest_.take_means() && at_rest()) {
+    learn_at_rest();
+  }
   attitude_.step(in_, dt_us);
   if (restarted_left_ != 0) {
     --restarted_left_;
   }
+}
+
+void ImuNode::learn_at_rest() {
+  int16_t rates[3];
+  for (uint8_t axis = 0; axis < 3; ++axis) {
+    rates[axis] = less(rest_.mean_rate(axis), settings_.rate_offset[axis]);
+  }
+  attitude_.set_rest_rates(rates);
 }
 
 void ImuNode::set_field(const int16_t (&field)[3]) {

@@ -26,8 +26,8 @@ class ImuNode {
   static constexpr uint8_t kCompatEvery = 4;          // 50 Hz
   static constexpr uint16_t kMovingCmps = 300;        // GPS speed above which nothing is zeroed
 
-  // `settings` must outlive the node; `settings_valid`: the record was whole.
-  ImuNode(ImuSettings& settings, bool settings_valid);
+  // `settings` must outlive the node.
+  explicit ImuNode(ImuSettings& settings) : settings_(settings) { tune(); }
 
   void sample(const ImuRawSample& raw, uint32_t t_us);
   // A sample was due and none came: its number is used up, so that its loss shows.
@@ -47,11 +47,13 @@ class ImuNode {
   bool zero_rates();  // the rate offsets become the mean of the last second
   bool level();       // the force offsets make this attitude level: put it level first
   bool at_rest() const;
+  void settings_changed() { tune(); }
 
   const Attitude& attitude() const { return attitude_; }
   uint8_t flags() const;
 
  private:
+  void learn_at_rest();
   void put_aux(frames::ImuPacket& packet);
   void tune();
 

@@ -36,9 +36,12 @@ void RestDetector::finish() {
   bool still = quiet();
   for (uint8_t i = 0; i < 6; ++i) {
     const int32_t sum = sum_[i] + (sum_[i] < 0 ? -kWindow / 2 : kWindow / 2);
+    older_[i] = mean_[i];
     mean_[i] = static_cast<int16_t>(sum / kWindow);
     if (i < 3) {
-      still = still && mean_[i] <= kMostRate && mean_[i] >= -kMostRate;
+      const int32_t drift = int32_t{mean_[i]} - older_[i];
+      const bool steady = still_ == 0 || (drift <= kMeanDrift && drift >= -kMeanDrift);
+      still = still && steady && mean_[i] <= kMostRate && mean_[i] >= -kMostRate;
     } else {
       square += static_cast<uint32_t>(int32_t{mean_[i]} * mean_[i]);
     }
@@ -48,6 +51,13 @@ void RestDetector::finish() {
   still_ = !still                    ? uint8_t{0}
            : still_ < kWindowsNeeded ? static_cast<uint8_t>(still_ + 1)
                                      : still_;
+  fresh_ = still_ == kWindowsNeeded;
+}
+
+bool RestDetector::take_means() {
+  const bool fresh = fresh_;
+  fresh_ = false;
+  return fresh;
 }
 
 }  // namespace core

@@ -13,6 +13,7 @@ class RestDetector {
   static constexpr int16_t kForceSpread = 500;  // 0.06 g peak to peak; noise alone gives 200 LSB
   static constexpr int16_t kMostRate = 1638;    // 25 deg/s: offset of an uncalibrated gyro
   static constexpr uint16_t kForceOff = 1229;   // 0.15 g from 1 g: a steady turn is no rest
+  static constexpr int16_t kMeanDrift = 16;     // 0.25 deg/s from second to second: a slow start
   static constexpr uint8_t kWindowsNeeded = 2;
 
   // Rates without any offset taken off, 65.5 LSB per deg/s; force 8192 LSB per g.
@@ -20,9 +21,12 @@ class RestDetector {
 
   // The last two whole windows were still, and so is the present one up to now.
   bool at_rest() const { return still_ == kWindowsNeeded && quiet(); }
-  // Means of the last whole window; only while at_rest().
-  int16_t mean_rate(uint8_t axis) const { return mean_[axis]; }
-  int16_t mean_force(uint8_t axis) const { return mean_[3 + axis]; }
+  // True once at the end of each window at rest: there are new means.
+  bool take_means();
+  // Means of the window before the last: what follows it was still too, so that no beginning of a
+  // motion is in it.
+  int16_t mean_rate(uint8_t axis) const { return older_[axis]; }
+  int16_t mean_force(uint8_t axis) const { return older_[3 + axis]; }
 
  private:
   bool quiet() const;
@@ -32,8 +36,10 @@ class RestDetector {
   int16_t least_[6] = {};
   int16_t most_[6] = {};
   int16_t mean_[6] = {};
+  int16_t older_[6] = {};
   uint8_t count_ = 0;
   uint8_t still_ = 0;
+  bool fresh_ = false;
 };
 
 }  // namespace core

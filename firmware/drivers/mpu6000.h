@@ -22,7 +22,7 @@ struct MpuSample {
 enum class MpuStatus : uint8_t { kSample, kNotReady, kBusError, kGarbage, kStuck };
 
 // Bus: bool read(uint8_t reg, uint8_t* out, uint8_t size), bool write(uint8_t reg, uint8_t value),
-//      static constexpr bool kSpi. Both return false instead of waiting for a chip that is silent.
+//      bool spi(). The first two return false instead of waiting for a chip that is silent.
 // The chip sits with x forward, y left and z up, as on the ArduIMU V3: body axes are x, -y, -z.
 template <typename Bus>
 class Mpu6000 {
@@ -94,6 +94,7 @@ class Mpu6000 {
   bool running() const { return step_ == Step::kRun; }
   uint8_t product_id() const { return product_id_; }
   uint8_t dlpf() const { return dlpf_; }
+  void set_dlpf(uint8_t dlpf) { dlpf_ = dlpf; }  // before the set-up
 
   // Revision C gives 4096 LSB per g where revision D gives 8192 (product ids 0x14, 0x15 of samples,
   // 0x54, 0x55 in production).
@@ -124,13 +125,13 @@ class Mpu6000 {
   }
 
   bool set_up() {
-    return (!Bus::kSpi || bus_.write(0x6A, 0x10)) &&  // I2C_IF_DIS
-           put(0x19, 4) &&                            // 1 kHz / 5
-           put(0x1A, dlpf_) &&                        //
-           put(0x1B, 0b000'01'000) &&                 // 500 deg/s
-           put(0x1C, 0b000'01'000) &&                 // 4 g
-           put(0x37, 0b0001'0000) &&                  // 50 us pulses, any read clears the status
-           put(0x38, 0b0000'0001);                    // data ready
+    return (!bus_.spi() || bus_.write(0x6A, 0x10)) &&  // I2C_IF_DIS
+           put(0x19, 4) &&                             // 1 kHz / 5
+           put(0x1A, dlpf_) &&                         //
+           put(0x1B, 0b000'01'000) &&                  // 500 deg/s
+           put(0x1C, 0b000'01'000) &&                  // 4 g
+           put(0x37, 0b0001'0000) &&                   // 50 us pulses, any read clears the status
+           put(0x38, 0b0000'0001);                     // data ready
   }
 
   static bool all_equal(const uint8_t* bytes) {

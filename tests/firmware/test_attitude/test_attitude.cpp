@@ -148,6 +148,8 @@ TEST_CASE("a gyro bias is learned in flight, and within seconds at rest") {
   filter.run(1000);
   const int16_t after_5s = filter.attitude.bias(0);
   CHECK(after_5s < 30);
+  const int16_t means[3] = {33, 0, 0};
+  filter.attitude.set_rest_rates(means);
   filter.attitude.set_at_rest(true);
   filter.run(500);
   CHECK(off(filter.attitude.bias(0), 33) <= 1);
@@ -212,10 +214,9 @@ TEST_CASE("no input overflows: full scale on every channel, any time step, leave
   }
   Filter calm;
   filter.in = calm.in;
-  for (uint8_t i = 0; i < 3; ++i) {
-    filter.run(1000);
-    filter.attitude.set_at_rest(true);
-  }
+  const int16_t means[3] = {0, 0, 0};
+  filter.attitude.set_rest_rates(means);
+  filter.run(3000);
   CHECK(off(filter.attitude.phi_cdeg(), 0) <= 600);
   CHECK(off(filter.attitude.theta_cdeg(), 0) <= 600);
 }
@@ -234,6 +235,8 @@ TEST_CASE("rest: two still seconds, told apart from a hand, from flight and from
   CHECK_EQ(rest.mean_rate(0), 100);
   CHECK_EQ(rest.mean_rate(1), -200);
   CHECK_EQ(rest.mean_force(2), -8150);
+  CHECK(rest.take_means());
+  CHECK(!rest.take_means());
   rates[1] = 0;  // 3 deg/s of jerk
   rest.add(rates, force);
   rates[1] = -200;
@@ -253,4 +256,21 @@ TEST_CASE("rest: two still seconds, told apart from a hand, from flight and from
     heavy.add(none, pull);
   }
   CHECK(!heavy.at_rest());
+}
+
+TEST_CASE("the rounded upper half of a product, against 64 bits: random factors and the ends") {
+  const int32_t ends[] = {
+      0, 1, -1, INT32_MAX, -INT32_MAX, INT32_C(1) << 30, 0x7FFF, 0x8000, -0x10000};
+  uint32_t random = 12345;
+  uint16_t wrong = 0;
+  for (uint16_t i = 0; i < 4000; ++i) {
+    random = random * 1664525U + 1013904223U;
+    const int32_t a = i % 5 == 0 ? ends[i % 9] : static_cast<int32_t>(random) >> (i % 31);
+    random = random * 1664525U + 1013904223U;
+    const int32_t b = i % 7 == 0 ? ends[i / 7 % 9] : static_cast<int32_t>(random);
+    const int64_t product = static_cast<int64_t>(a) * b + 0x80000000LL;
+    wrong = static_cast<uint16_t>(
+        wrong + (core::mul_high(a, b) == static_cast<int32_t>(product >> 32) ? 0 : 1));
+  }
+  CHECK_EQ(wrong, 0);
 }

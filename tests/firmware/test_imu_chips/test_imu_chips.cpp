@@ -12,7 +12,7 @@ using drivers::MpuStatus;
 
 // Registers of one chip; what was written can be read back.
 struct MpuBus {
-  static constexpr bool kSpi = true;
+  static bool spi() { return true; }
   uint8_t registers[128] = {};
   bool silent = false;
   uint8_t deaf_register = 0xFF;  // writes to it are lost

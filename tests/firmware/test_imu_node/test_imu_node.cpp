@@ -3,6 +3,7 @@
 
 #include "check.h"
 #include "core/bytes.h"
+#include "core/imu_console.h"
 #include "core/imu_node.h"
 #include "core/imu_receiver.h"
 
@@ -19,7 +20,7 @@ struct Imu {
   uint32_t t_us = 0xFFFFF000U;
   uint8_t bytes[frames::kImuPacketSize];
 
-  explicit Imu(bool record_valid = true) : settings(defaults()), node(settings, record_valid) {
+  Imu() : settings(defaults()), node(settings) {
     raw.force[2] = -8192;
     raw.temperature_cdegc = 3125;
   }
@@ -120,10 +121,7 @@ TEST_CASE("a sample that never came leaves a gap of one; the flag of a restart e
 }
 
 TEST_CASE("rates are zeroed at rest, never in motion, never while a GPS says it moves") {
-  Imu imu(false);
-  imu.settings.offsets_valid = 1;
-  core::ImuNode unknown(imu.settings, false);
-  CHECK_EQ(imu.settings.offsets_valid, 0);
+  Imu imu;
   imu.raw.rates[0] = 40;
   imu.raw.rates[2] = -500;
   imu.run(399);
@@ -181,6 +179,20 @@ TEST_CASE("offsets survive a reset through the record, and a damaged record give
   imu.settings.rate_offset[0] = 2000;  // whole, but no gyro is off by 30 deg/s
   core::write_imu_record(record, imu.settings);
   CHECK(!core::read_imu_record(record, again));
+}
+
+TEST_CASE("the bias learned at rest is that of whole seconds: the start of a motion is not in it") {
+  Imu imu;
+  imu.settings.rate_offset[1] = 10;
+  imu.raw.rates[1] = 40;
+  imu.run(600);
+  CHECK((imu.node.attitude().bias(1) >= 29 && imu.node.attitude().bias(1) <= 30));
+  for (uint16_t i = 0; i < 600; ++i) {  // the slowest begin: 2 deg/s within a second, then more
+    imu.raw.rates[1] = static_cast<int16_t>(40 + i * 13 / 20);
+    imu.raw.force[0] = static_cast<int16_t>(i * 2);
+    imu.run(1);
+  }
+  CHECK((imu.node.attitude().bias(1) >= 27 && imu.node.attitude().bias(1) <= 33));
 }
 
 TEST_CASE("a parking attitude far from level is refused as level") {
@@ -249,5 +261,55 @@ TEST_CASE("single precision from integers: powers of two, signs, ends") {
     uint8_t bytes[4];
     core::put_le(bytes, core::float32_bits(each.value, each.bits));
     CHECK((number(bytes, 0) == each.truth || near(number(bytes, 0), each.truth, 1.2e-7F)));
+  }
+}
+
+namespace {
+
+core::ImuReply say(core::ImuConsole& console, Imu& imu, const char* text) {
+  core::ImuReply reply = core::ImuReply::kNone;
+  for (; *text != 0; ++text) {
+    reply = console.byte(static_cast<uint8_t>(*text), imu.node, imu.settings);
+  }
+  return reply;
+}
+
+}  // namespace
+
+TEST_CASE("the console changes settings at rest only, and refuses what it does not know") {
+  using core::ImuReply;
+  core::ImuConsole console;
+  Imu imu;
+  CHECK(say(console, imu, "imu declination -413\n") == ImuReply::kMoving);
+  CHECK(say(console, imu, "imu zero\n") == ImuReply::kMoving);
+  CHECK(say(console, imu, "imu show\n") == ImuReply::kShow);
+  imu.run(400);
+  CHECK(say(console, imu, "imu declination -413\r") == ImuReply::kChanged);
+  CHECK_EQ(int16_t{imu.settings.declination_cdeg}, -413);
+  CHECK(say(console, imu, "imu dlpf 3\n") == ImuReply::kChanged);
+  CHECK(say(console, imu, "imu compat 1\n") == ImuReply::kChanged);
+  CHECK(say(console, imu, "imu zero\n") == ImuReply::kChanged);
+  CHECK_EQ(imu.settings.dlpf, 3);
+  CHECK_EQ(imu.settings.compat, 1);
+  CHECK_EQ(imu.settings.offsets_valid, 1);
+  const char* const refused[] = {"imu dlpf 7\n",
+                                 "imu dlpf\n",
+                                 "imu compat 2\n",
+                                 "imu dlpf 2x\n",
+                                 "imu declination 99999999\n",
+                                 "imu declination 18001\n",
+                                 "imu zeros\n",
+                                 "imu \n"};
+  for (const char* const text : refused) {
+    CHECK(say(console, imu, text) != ImuReply::kChanged);
+  }
+  CHECK(say(console, imu, "imu dlpf 7\n") == ImuReply::kUnknown);
+  CHECK_EQ(imu.settings.dlpf, 3);
+  // The stream of a GPS receiver, line ends included, is not for it.
+  uint32_t random = 7;
+  for (uint16_t i = 0; i < 5000; ++i) {
+    random = random * 1664525U + 1013904223U;
+    CHECK(console.byte(static_cast<uint8_t>(random >> 24), imu.node, imu.settings) ==
+          ImuReply::kNone);
   }
 }
