@@ -1,0 +1,34 @@
+// Pins of the ArduIMU V3, and what its files offer each other. Any ATmega328P at 5 V and 16 MHz
+// with the sensor's data-ready line on PD2 serves too (README.md).
+#pragma once
+
+#include <stdint.h>
+
+namespace arduimu {
+
+constexpr uint8_t kReady = 1U << 2;   // PD2, INT0: data-ready of the MPU-6000
+constexpr uint8_t kSelect = 1U << 4;  // PD4: its chip select
+constexpr uint8_t kLed = 1U << 5;     // PD5, red: lit while samples are made
+
+// Timer 1 free at 2 MHz, timer 0 ends the sleep every 1 ms. Wraps after 71.6 min.
+void start_clock();
+uint32_t now_us();
+
+// Data-ready: true once per edge, with the instant of the last and how many there were.
+void start_ready();
+bool take_ready(uint32_t& at_us, uint8_t& edges);
+
+// Set by interrupts that the main loop has to look at.
+extern volatile bool g_awake;
+void sleep_until_interrupt();
+
+// Restarts the program after 0.5 s without feed_watchdog(); the count outlives it.
+void start_watchdog();
+void feed_watchdog();
+uint16_t resets();
+
+uint8_t read_eeprom(uint16_t address);
+bool eeprom_ready();
+void write_eeprom(uint16_t address, uint8_t value);  // only when ready
+
+}  // namespace arduimu
