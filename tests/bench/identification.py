@@ -29,6 +29,7 @@ from host.sysid.problem import OutputProblem
 from host.sysid.start import start_values
 from host.sysid.study.aircraft import navion_free
 from host.sysid.study.data import noisy, with_rates
+from identify_log import report
 from scipy import optimize, signal
 
 LIMIT_MS = 10.0
@@ -141,7 +142,7 @@ def main() -> int:
         f"closed form {1e6 * closed:.0f} us; Hopfield to 1 %: {iterations} iterations,"
         f" {hopfield:.3f} s: {advantage:.0f} times (limit {HOPFIELD_RATIO:.0f})"
     )
-    missed = (
+    missed = report() or (
         search > LIMIT_MS
         or distance > STEP_LIMIT
         or ratio < PEER_RATIO

@@ -1,0 +1,106 @@
+"""Time and memory of `host identify` on a recorded log, in a process of its own.
+
+The logs come from the recorder run on this computer over simulated flights; without `host
+simulate` and its library (`make sitl`) there is nothing to measure. Limits are held against
+processor time, as in the other benches: a busy machine does not count; wall time stands beside it.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+HEAD = 'format = 1\ntitle = "timing"\naircraft = "ultrastick25e"\n[air]\nturbulence_mps = 0.3\n'
+MANEUVERS = (
+    ("3211", "elevator", 3.0, 0.25),
+    ("doublet", "elevator", 3.0, 0.3),
+    ("doublet", "aileron", 4.0, 0.4),
+    ("doublet", "rudder", 6.0, 0.5),
+)
+# minutes, maneuvers, rest between them in s, limit in s
+CASES = ((5, 12, 12.0, 3.0), (30, 40, 35.0, 15.0))
+MEMORY_MB = 300.0  # plus ten times the log
+
+
+@dataclass(frozen=True)
+class Run:
+    """One identification from file to printed answer."""
+
+    log_mb: float
+    wall_s: float
+    processor_s: float
+    peak_mb: float
+    answered: bool
+
+
+def card(maneuvers: int, rest_s: float) -> str:
+    """Return a flight card that repeats four maneuvers."""
+    text = HEAD
+    for k in range(maneuvers):
+        kind, axis, amplitude, width_s = MANEUVERS[k % 4]
+        text += f'[[segment]]\nkind = "{kind}"\naxis = "{axis}"\n'
+        text += f"amplitude = {amplitude}\nwidth_s = {width_s}\n"
+        text += f'[[segment]]\nkind = "trim"\nduration_s = {rest_s}\n'
+    return text
+
+
+def spawn(arguments: list[str]) -> tuple[int, float, float, float]:
+    """Run `host` with one BLAS thread; return status, wall s, processor s and peak MB."""
+    command = [sys.executable, "-m", "host", *arguments]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    with tempfile.TemporaryFile() as output:
+        begin = time.perf_counter()
+        child = subprocess.Popen(command, stdout=output, stderr=output, env=environment)
+        _, status, usage = os.wait4(child.pid, 0)
+        wall_s = time.perf_counter() - begin
+    child.returncode = os.waitstatus_to_exitcode(status)
+    return child.returncode, wall_s, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024.0
+
+
+def measure(maneuvers: int, rest_s: float) -> Run:
+    """Fly, then identify once to load the caches of the disk and once to measure."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "card.toml").write_text(card(maneuvers, rest_s))
+        flags = ["--no-picture", "-o", str(folder)]
+        status = spawn(["simulate", str(folder / "card.toml"), *flags])[0]
+        if status:
+            raise SystemExit(f"host simulate ended with {status}")
+        log = folder / "flight.bin"
+        arguments = ["identify", str(log), "--aircraft", "ultrastick25e"]
+        arguments += ["--calibration", str(folder / "calibration.toml")]
+        spawn(arguments)
+        status, wall_s, processor_s, peak_mb = spawn(arguments)
+        size_mb = log.stat().st_size / 1e6
+
+    return Run(size_mb, wall_s, processor_s, peak_mb, status == 0)
+
+
+def imports_s() -> float:
+    """Return the processor seconds that Python and the imports of the verb take alone."""
+    code = "import host.sysid.flight, host.sysid.verdict, host.sysid.tables, host.log, pandas"
+    before = os.times()
+    subprocess.run([sys.executable, "-c", code], check=True)
+    after = os.times()
+    return sum(after[2:4]) - sum(before[2:4])
+
+
+def report() -> bool:
+    """Print the figures beside their limits; return whether one is missed."""
+    imports_s()
+    loading = imports_s()
+    print(f"imports of host identify: {loading:.2f} s (limit 1.5 s)")
+    missed = loading > 1.5
+    for minutes, maneuvers, rest_s, limit_s in CASES:
+        run = measure(maneuvers, rest_s)
+        most = MEMORY_MB + 10.0 * run.log_mb
+        print(
+            f"host identify, {minutes} min with {maneuvers} maneuvers, {run.log_mb:.1f} MB:"
+            f" {run.wall_s:.2f} s wall, {run.processor_s:.2f} s processor (limit {limit_s:.0f} s),"
+            f" {run.peak_mb:.0f} MB (limit {most:.0f} MB)"
+        )
+        missed |= not run.answered or run.processor_s > limit_s or run.peak_mb > most
+    return missed
