@@ -6,6 +6,8 @@ import numpy as np
 
 from host.sysid.airframe import AirframeData
 from host.sysid.errors import IdentificationError
+from host.sysid.instrument_errors import InstrumentData
+from host.sysid.powerplant import Powerplant
 
 RECTANGLE = 1.0 / np.sqrt(3.0)  # standard deviation of an even distribution over its half width
 
@@ -44,3 +46,52 @@ def airframe_data(source: str) -> AirframeData:
         )
     except KeyError as error:
         raise IdentificationError(f"aircraft {source}: no {error.args[0]} in its file") from error
+
+
+def instrument_data(source: str) -> InstrumentData:
+    """Read the sensors' places and dynamics of an aircraft by name or file.
+
+    Raises
+    ------
+    IdentificationError
+        If the file does not describe its sensors.
+    """
+    from host.twin import aircraft
+
+    loaded = aircraft.load(source)
+    try:
+        number, vector = loaded.scalar, loaded.vector
+        imu = vector("sensors.imu_m") - vector("mass.cg_m")
+        vanes = 0.5 * (vector("sensors.vane_a_m") + vector("sensors.vane_b_m"))
+        vanes -= vector("mass.cg_m")
+        return InstrumentData(
+            imu_m=(float(imu[0]), float(imu[1]), float(imu[2])),
+            vanes_m=(float(vanes[0]), float(vanes[1]), float(vanes[2])),
+            upwash=number("sensors.upwash"),
+            upwash_share=number("sensors.upwash_tolerance"),
+            vane_hz_per_mps=number("sensors.vane_frequency_hz_per_mps"),
+            vane_damping=number("sensors.vane_damping"),
+            vane_friction_rad=number("sensors.vane_friction_rad"),
+            friction_speed_mps=number("trim.airspeed_mps"),
+            pitot_lag_s=number("sensors.pitot_lag_s"),
+            position_m=number("sensors.position_tolerance_m"),
+            cg_m=number("mass.cg_tolerance_m"),
+        )
+    except KeyError as error:
+        raise IdentificationError(f"aircraft {source}: no {error.args[0]} in its file") from error
+
+
+def powerplant(source: str) -> Powerplant:
+    """Return the propeller and motor of an aircraft by name or file."""
+    from host.twin import aircraft
+    from host.twin.motion import motor_torque, propeller
+
+    frame = aircraft.load(source).airframe()
+
+    def step(
+        spin_radps: float, throttle: float, airspeed_mps: float, density_kgpm3: float
+    ) -> tuple[float, float, float]:
+        thrust, load = propeller(frame, spin_radps, airspeed_mps, density_kgpm3)
+        return thrust, load, motor_torque(frame, throttle, spin_radps)
+
+    return Powerplant(step, frame.rotor_inertia_kgm2, frame.thrust_axis, frame.hub_m)

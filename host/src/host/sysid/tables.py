@@ -92,6 +92,21 @@ def read_columns(
     return _even({k: raw[k] for k in ("t_s", *USED) if k in raw}, notes), notes
 
 
+def even_columns(table: pd.DataFrame) -> tuple[dict[str, Array], list[str]]:
+    """Return the columns identification uses of a decoded table, on an even grid, and notes.
+
+    Raises
+    ------
+    IdentificationError
+        If there is no time in it, or too little of it.
+    """
+    raw = {k: v for k, v in _from_frame(table).items() if k in WANTED}
+    if "t_s" not in raw:
+        raise IdentificationError("no column t_s in the table")
+    notes: list[str] = []
+    return _even(raw, notes), notes
+
+
 def _csv(source: Path) -> pd.DataFrame:
     import pandas as pd
 

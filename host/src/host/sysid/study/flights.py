@@ -18,18 +18,22 @@ from typing import Any
 
 import numpy as np
 
-from host.sysid.aircraft_file import airframe_data
+from host.sysid.aircraft_file import airframe_data, instrument_data, powerplant
+from host.sysid.coefficient_fit import Window, fit_coefficients
 from host.sysid.errors import IdentificationError
 from host.sysid.finder import Found, find
 from host.sysid.flight import identify
-from host.sysid.tables import read_columns
+from host.sysid.tables import even_columns, read_columns
 from host.sysid.truth import read_truth, true_coefficients
 
 FIRST_SEED = 200
 OVERLAP = 0.8
+ALONG = ("CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "CD_0")
+LEAD_S = 0.5  # of trim before a maneuver
+SETTLED_S = 3.0  # after the launch
 CARDS = ("demo", "multisine", "sweep", "calm")
 PRINCIPAL = (
-    "CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "CY_beta", "CY_dr", "Cl_beta", "Cl_p",
+    "CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "CD_0", "CY_beta", "CY_dr", "Cl_beta", "Cl_p",
     "Cl_r", "Cl_da", "Cn_beta", "Cn_p", "Cn_r", "Cn_dr",
 )  # fmt: skip
 
@@ -46,6 +50,45 @@ class Tally:
     error: dict[str, list[float]] = field(default_factory=dict)
     half: dict[str, list[float]] = field(default_factory=dict)
     covered: dict[str, list[bool]] = field(default_factory=dict)
+    flagged: dict[str, list[bool]] = field(default_factory=dict)
+
+    def add(self, name: str, truth: float, value: float, half: float, *, flagged: bool) -> None:
+        """Count one coefficient of one flight."""
+        size, miss = abs(truth), value - truth
+        self.error.setdefault(name, []).append(miss / size)
+        self.half.setdefault(name, []).append(half / size)
+        self.covered.setdefault(name, []).append(abs(miss) <= half)
+        self.flagged.setdefault(name, []).append(flagged)
+
+    def lines(self) -> list[str]:
+        """Return the table, and below it what the whole of it comes to."""
+        lines = []
+        for name in self.error:
+            error, half = np.array(self.error[name]), np.array(self.half[name])
+            lines.append(
+                f"  {name:9s} median error {100.0 * np.median(np.abs(error)):5.1f} %"
+                f"  mean {100.0 * error.mean():+6.1f} %  worst {100.0 * np.abs(error).max():5.1f} %"
+                f"  median half-width {100.0 * np.median(half):5.1f} %"
+                f"  covered {100.0 * np.mean(self.covered[name]):5.1f} %"
+                f"  flagged {100.0 * np.mean(self.flagged[name]):5.1f} %"
+            )
+        if not lines:
+            return lines
+        close = sum(float(np.median(np.abs(e))) <= 0.05 for e in self.error.values())
+        narrow = sum(float(np.median(h)) <= 0.10 for h in self.half.values())
+        cases = [
+            (abs(e), c, g)
+            for n in self.error
+            for e, c, g in zip(self.error[n], self.covered[n], self.flagged[n], strict=True)
+        ]
+        wild = sum(e > 0.15 and not g for e, _, g in cases)
+        lines.append(
+            f"  {close} of {len(self.error)} medians within 5 %, {narrow} half-widths within 10 %;"
+            f" of {len(cases)} cases {100.0 * np.mean([c for _, c, _ in cases]):.1f} % covered,"
+            f" {100.0 * np.mean([g for _, _, g in cases]):.1f} % flagged,"
+            f" {wild} beyond 15 % without a flag"
+        )
+        return lines
 
 
 def overlap(found: Found, maneuver: dict[str, Any], clock: float) -> float:
@@ -80,11 +123,54 @@ def add_flight(tally: Tally, folder: Path, *, fit: bool, aircraft: str = "ultras
         expected = true_coefficients(truth, answer.template)
         for c in answer.coefficients:
             if c.name in PRINCIPAL:
-                size = abs(expected[c.name])
-                miss = c.value - expected[c.name]
-                tally.error.setdefault(c.name, []).append(miss / size)
-                tally.half.setdefault(c.name, []).append(c.half_width / size)
-                tally.covered.setdefault(c.name, []).append(abs(miss) <= c.half_width)
+                tally.add(c.name, expected[c.name], c.value, c.half_width, flagged=False)
+
+
+def coefficient_study(
+    card: str, seeds: range, *, aircraft: str = "ultrastick25e", chain: str = "sitl"
+) -> Tally:
+    """Fit coefficients directly to flights through the recorder, in the true windows.
+
+    Parameters
+    ----------
+    card : str
+    seeds : range
+    aircraft : str
+        Whose file the fit is told; the flights are drawn around it.
+    chain : str
+        As of `host.twin.virtual.virtual_flight`.
+    """
+    from host.twin.virtual import virtual_flight
+
+    airframe, data = airframe_data(aircraft), instrument_data(aircraft)
+    plant, tally = powerplant(aircraft), Tally()
+    for seed in seeds:
+        flight = virtual_flight(card, seed, chain=chain)
+        maneuvers: list[dict[str, Any]] = list(flight.maneuvers)
+        launch_s = flight.record.card.flight.ground_s
+        columns, _ = even_columns(flight.table)
+        flying = columns["t_s"] > launch_s + SETTLED_S
+        windows = [
+            Window(float(m["start_s"]) - LEAD_S, float(m["end_s"]), "elevator" in m["axes"])
+            for m in maneuvers
+            if any(axis in m["axes"] for axis in ("elevator", "aileron", "rudder"))
+        ]
+        try:
+            fit = fit_coefficients(
+                {k: v[flying] for k, v in columns.items()}, windows, airframe, data, plant
+            )
+        except IdentificationError:
+            tally.failed += 1
+            continue
+        truth = {"maneuver": maneuvers}
+        expected = {
+            name: true_coefficients(truth, "longitudinal" if name in ALONG else "lateral")[name]
+            for name in PRINCIPAL
+        }
+        for d in fit.derivatives:
+            if d.name in PRINCIPAL:
+                tally.add(d.name, expected[d.name], d.value, d.half_width, flagged=d.flagged)
+    return tally
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -95,8 +181,17 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--flights", type=int, default=3, help="seeds per card")
     parser.add_argument("--card", choices=CARDS, action="append")
     parser.add_argument("--no-fit", action="store_true", help="only find maneuvers")
+    parser.add_argument(
+        "--coefficients", action="store_true", help="direct fit of coefficients, through the log"
+    )
     options = parser.parse_args(arguments)
     write = sys.stdout.write
+    if options.coefficients:
+        for card in options.card or ["multisine"]:
+            tally = coefficient_study(card, range(FIRST_SEED, FIRST_SEED + options.flights))
+            write(f"{card}: {options.flights} flights, {tally.failed} fits failed\n")
+            write("\n".join(tally.lines()) + "\n")
+        return 0
     for card in options.card or CARDS[:2]:
         tally = Tally()
         for seed in range(FIRST_SEED, FIRST_SEED + options.flights):
@@ -111,14 +206,7 @@ def main(arguments: list[str] | None = None) -> int:
             f"{card}: {tally.found} of {tally.maneuvers} windows overlap by {OVERLAP} or more,"
             f" {tally.false} false in {tally.minutes:.1f} min; {tally.failed} fits failed\n"
         )
-        for name in tally.error:
-            error, half = np.array(tally.error[name]), np.array(tally.half[name])
-            write(
-                f"  {name:9s} median error {100.0 * np.median(np.abs(error)):6.1f} %"
-                f"  mean {100.0 * error.mean():+7.1f} %"
-                f"  median half-width {100.0 * np.median(half):6.1f} %"
-                f"  covered {100.0 * np.mean(tally.covered[name]):5.1f} %\n"
-            )
+        write("".join(f"{line}\n" for line in tally.lines()))
     return 0
 
 

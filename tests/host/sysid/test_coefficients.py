@@ -1,0 +1,127 @@
+"""Coefficients straight from flight: the truth is found, and a wrong sensor model is noticed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from host.sysid.aircraft_file import airframe_data, instrument_data, powerplant
+from host.sysid.coefficient_fit import CoefficientFit, Window, fit_coefficients
+from host.sysid.coefficient_signals import Record, corrected, usable_length
+from host.sysid.errors import IdentificationError
+from host.sysid.instrument_errors import InstrumentData, deviations
+from host.sysid.study.flights import Tally
+from host.sysid.tables import even_columns
+from host.twin.cards import load
+from host.twin.virtual import VirtualFlight, virtual_flight
+
+NAME = "ultrastick25e"
+# What an instrument without drawn errors leaves; arms and tilts of the real one are not in it.
+WITHIN = {
+    "CL_alpha": 0.03, "CL_de": 0.12, "Cm_alpha": 0.04, "Cm_q": 0.03, "Cm_de": 0.04,
+    "CY_beta": 0.12, "CY_dr": 0.05, "Cl_beta": 0.08, "Cl_p": 0.05, "Cl_r": 0.15, "Cl_da": 0.05,
+    "Cn_beta": 0.08, "Cn_r": 0.07, "Cn_dr": 0.03,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def flight() -> VirtualFlight:
+    """Sensors with their dynamics, friction, noise and gusts; nothing drawn."""
+    card = load("multisine")
+    nominal = replace(card, sensors=replace(card.sensors, tolerances=False))
+    return virtual_flight(nominal, 7, chain="none")
+
+
+def fitted(flight: VirtualFlight, data: InstrumentData) -> CoefficientFit:
+    columns, _ = even_columns(flight.table)
+    flying = columns["t_s"] > 8.0
+    windows = [
+        Window(float(str(m["start_s"])) - 0.5, float(str(m["end_s"])), m["axes"] == ["elevator"])
+        for m in flight.maneuvers
+    ]
+    kept = {k: v[flying] for k, v in columns.items()}
+    return fit_coefficients(kept, windows, airframe_data(NAME), data, powerplant(NAME))
+
+
+def misses(flight: VirtualFlight, fit: CoefficientFit) -> dict[str, float]:
+    result = {}
+    for d in fit.derivatives:
+        if d.name not in WITHIN:
+            continue
+        along = d.name[:2] in ("CL", "CD", "Cm")
+        truths = [
+            dict(m["derivatives"])[d.name]
+            for m in flight.maneuvers
+            if (m["axes"] == ["elevator"]) == along
+        ]
+        result[d.name] = d.value / float(np.mean(truths)) - 1.0
+    return result
+
+
+def test_finds_the_truth_and_covers_it(flight: VirtualFlight) -> None:
+    fit = fitted(flight, instrument_data(NAME))
+    miss = misses(flight, fit)
+    assert {k: v for k, v in miss.items() if k in WITHIN and abs(v) > WITHIN[k]} == {}
+    for d in fit.derivatives:
+        if d.name in WITHIN:
+            assert abs(miss[d.name]) * abs(d.value) <= 1.2 * d.half_width, d.name
+    assert {d.name for d in fit.derivatives if d.flagged} >= {"Cn_p", "CD_0"}
+
+
+def test_a_vane_taken_for_frictionless_shows_in_damping(flight: VirtualFlight) -> None:
+    smooth = replace(instrument_data(NAME), vane_friction_rad=0.0)
+    miss = misses(flight, fitted(flight, smooth))
+    assert abs(miss["Cm_q"]) > 0.06
+
+
+def test_undoes_vane_inertia_upwash_and_places() -> None:
+    data = replace(instrument_data(NAME), vane_friction_rad=0.0)
+    t = np.arange(2000) * 0.01
+    alpha = 0.1 + 0.03 * np.sin(2.0 * np.pi * 2.0 * t)
+    q = 0.4 * np.sin(2.0 * np.pi * 1.5 * t)
+    local = np.arctan(
+        (1.0 + data.upwash) * (np.tan(alpha) - q * data.vanes_m[0] / (17 * np.cos(alpha)))
+    )
+    jw = 2j * np.pi * np.fft.rfftfreq(2000, 0.01)
+    omega = 2.0 * np.pi * data.vane_hz_per_mps * 17.0
+    vane = np.fft.irfft(
+        np.fft.rfft(local) / (1.0 + 2.0 * data.vane_damping * jw / omega + (jw / omega) ** 2), 2000
+    )
+    still = np.zeros(2000)
+    columns = dict.fromkeys(
+        ("beta_rad", "p_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2",
+         "elevator_rad", "aileron_rad", "rudder_rad"), still,
+    )  # fmt: skip
+    pole = jw / (2.0 * np.pi * data.imu_bandwidth_hz)
+    columns |= {
+        "alpha_rad": vane,
+        "q_radps": np.fft.irfft(np.fft.rfft(q) * np.exp(pole) / (1.0 + pole), 2000),
+        "qbar_pa": np.full(2000, 0.5 * 1.2 * 17.0**2),
+        "density_kgpm3": np.full(2000, 1.2),
+    }
+    zero = dict.fromkeys(deviations(data, airframe_data(NAME)), 0.0)
+    found = corrected(Record(0.01, columns), zero, data, 17.0)
+    middle = slice(300, -300)
+    assert np.max(np.abs(found["alpha"] - alpha)[middle]) < 5e-4
+    assert np.max(np.abs(found["q"] - q)[middle]) < 2e-3
+    # The bound fails where the vane's inertia is left in.
+    fast = replace(data, vane_hz_per_mps=10.0)
+    left_in = corrected(Record(0.01, columns), zero, fast, 17.0)["alpha"]
+    assert np.max(np.abs(left_in - alpha)[middle]) > 2e-3
+
+
+def test_lengths_that_transform_fast() -> None:
+    assert [usable_length(n) for n in (1, 7, 17449, 20000)] == [1, 6, 17280, 20000]
+
+
+def test_what_is_missing_is_named() -> None:
+    empty: dict[str, np.ndarray] = {"t_s": np.arange(10.0)}
+    with pytest.raises(IdentificationError, match="alpha_rad"):
+        fit_coefficients(empty, [], airframe_data(NAME), instrument_data(NAME), powerplant(NAME))
+
+
+def test_a_table_counts_wild_cases_without_a_flag() -> None:
+    tally = Tally()
+    for value, flagged in ((1.0, False), (1.2, False), (1.3, True)):
+        tally.add("Cm_q", 1.0, value, 0.25, flagged=flagged)
+    assert "1 beyond 15 %" in tally.lines()[-1]
+    assert "66.7 % covered" in tally.lines()[-1]
