@@ -41,6 +41,8 @@ def add_parser(subparsers: Any) -> None:
                         " gives coefficients")  # fmt: skip
     parser.add_argument("--truth", type=Path, metavar="TOML",
                         help="truth of a simulated flight: compare with it")  # fmt: skip
+    parser.add_argument("--prior", type=Path, metavar="FILE",
+                        help="coefficients to compare with: TOML, or AVL's ST output")  # fmt: skip
     parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="start of the fit")
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the fit")
     parser.add_argument("--maneuver", type=int, action="append", metavar="N",
@@ -92,6 +94,13 @@ def run(args: argparse.Namespace) -> int:
         from host.sysid.truth import read_truth
 
         truth = read_truth(args.truth)
+    prior = None
+    if args.prior:
+        from host.sysid.prior import read_prior
+
+        prior = read_prior(args.prior)
+        if not args.aircraft:
+            raise IdentificationError("--prior compares coefficients; they need --aircraft")
     windows = _windows(args, columns)
     answers: list[Answer] = []
     for method in chosen:
@@ -131,6 +140,10 @@ def run(args: argparse.Namespace) -> int:
     else:
         for answer in answers:
             lines += ["", *model_lines(answer)]
+    if prior is not None:
+        from host.sysid.prior import prior_lines
+
+        lines += ["", *prior_lines([c for a in answers for c in a.coefficients], prior)]
     if truth is not None:
         from host.sysid.truth import truth_lines
 
