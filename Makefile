@@ -37,8 +37,9 @@ format: setup ## rewrite C++ and Python in the house format
 	@find firmware tests protocol -name '*.[hc]' -o -name '*.cpp' | grep -v /generated/ | xargs .venv/bin/clang-format -i
 	@.venv/bin/ruff format --quiet .
 
-bench: setup ## damage table and speed beside pyulog and pymavlink
+bench: setup ## damage, speed and identification beside their peers
 	@$(PYTHON) tests/bench/run.py
+	-@$(PYTHON) tests/bench/identification.py
 
 study: setup ## tables and pictures of identification in build/study (SIZE=full: half an hour)
 	@$(PYTHON) -m host.sysid.study build/study --size $(or $(SIZE),small)

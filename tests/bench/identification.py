@@ -19,6 +19,7 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "host/src"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
 from host.sysid.equation_error import solve_normal
@@ -29,8 +30,9 @@ from host.sysid.problem import OutputProblem
 from host.sysid.start import start_values
 from host.sysid.study.aircraft import navion_free
 from host.sysid.study.data import noisy, with_rates
-from identify_log import report
 from scipy import optimize, signal
+
+from tests.bench.identify_log import report
 
 LIMIT_MS = 10.0
 STEP_LIMIT = 0.05  # Cramer-Rao bounds between our optimum and that of scipy

@@ -1,9 +1,11 @@
 """Coefficients straight from flight: the truth is found, and a wrong sensor model is noticed."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.compiled import Array
 from host.sysid.aircraft_file import airframe_data, instrument_data, powerplant
 from host.sysid.coefficient_fit import CoefficientFit, Window, fit_coefficients
 from host.sysid.coefficient_signals import Record, corrected, usable_length
@@ -49,9 +51,10 @@ def misses(flight: VirtualFlight, fit: CoefficientFit) -> dict[str, float]:
             continue
         along = d.name[:2] in ("CL", "CD", "Cm")
         truths = [
-            dict(m["derivatives"])[d.name]
+            local[d.name]
             for m in flight.maneuvers
             if (m["axes"] == ["elevator"]) == along
+            and isinstance(local := m["derivatives"], Mapping)
         ]
         result[d.name] = d.value / float(np.mean(truths)) - 1.0
     return result
@@ -87,7 +90,7 @@ def test_undoes_vane_inertia_upwash_and_places() -> None:
         np.fft.rfft(local) / (1.0 + 2.0 * data.vane_damping * jw / omega + (jw / omega) ** 2), 2000
     )
     still = np.zeros(2000)
-    columns = dict.fromkeys(
+    columns: dict[str, Array] = dict.fromkeys(
         ("beta_rad", "p_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2",
          "elevator_rad", "aileron_rad", "rudder_rad"), still,
     )  # fmt: skip

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.compiled import Array, BoolArray, IntArray
 from host.sysid.airframe import AirframeData
 from host.sysid.coefficient_rows import (
     GRAVITY_MPS2,
@@ -26,7 +27,6 @@ from host.sysid.coefficient_rows import (
     equations,
 )
 from host.sysid.coefficient_signals import Record, Spectrum, attitude, corrected, usable_length
-from host.sysid.compiled import Array, BoolArray, IntArray
 from host.sysid.errors import IdentificationError
 from host.sysid.gust_free import gust_free
 from host.sysid.instrument_errors import InstrumentData, deviations

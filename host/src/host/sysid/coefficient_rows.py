@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.compiled import Array
 from host.sysid.airframe import AirframeData
 from host.sysid.coefficient_signals import Record
-from host.sysid.compiled import Array
 from host.sysid.powerplant import Powerplant
 
 GRAVITY_MPS2 = 9.80665

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from host.sysid.compiled import Array, BoolArray
+from host.compiled import Array, BoolArray
 from host.sysid.errors import IdentificationError
 from host.sysid.kernels import transition
 from host.sysid.maneuver import Maneuver

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from host.compiled import Array
 from host.sysid.airframe import (
     AirframeData,
     Coefficient,
@@ -15,7 +16,6 @@ from host.sysid.airframe import (
     corrected,
     trim_of,
 )
-from host.sysid.compiled import Array
 from host.sysid.diagnostics import (
     Collinearity,
     Refusal,

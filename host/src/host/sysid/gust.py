@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.filter_error import fit_filter_error
 from host.sysid.fit import fit

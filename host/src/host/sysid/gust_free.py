@@ -13,10 +13,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from scipy import signal
 
+from host.compiled import Array
 from host.sysid.airframe import AirframeData
 from host.sysid.coefficient_rows import GRAVITY_MPS2, Flown
 from host.sysid.coefficient_signals import BLEND_RADPS, Record
-from host.sysid.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.instrument_errors import InstrumentData
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.sysid.compiled import Array
+from host.compiled import Array
 
 Step = Callable[[float, float, float, float], tuple[float, float, float]]
 STRIDE, SUBSTEPS = 4, 4  # a rotor takes 0.1 s and more to answer
