@@ -1,4 +1,4 @@
-"""What the flight image may hold: no heap, no formatting of floats, a budget, fast interrupts."""
+"""What the flight image may hold: no heap, no text of floats, RAM, flash, stack, fast interrupts."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+import stack_depth
 
 RAM_LIMIT_BYTES = 6600
 FLASH_LIMIT_BYTES = 100_000  # 253 952 are there; more than this is a mistake
@@ -67,3 +68,11 @@ def test_interrupts_never_divide(flight_elf: Path) -> None:
             seen.add(at)
             waiting += calls.get(at, set())
     assert [name for name in seen if DIVISION.search(name)] == []
+
+
+def test_deepest_stack_fits(flight_elf: Path) -> None:
+    found = stack_depth.analyse(flight_elf)
+    assert found.total_bytes <= stack_depth.room_bytes(flight_elf)
+    # every interrupt whose flag stays set lets the receiver's in: TWI, RX 2, UDRE 0, 2, 3
+    assert {26, 29, 39, 51, 52, 55} <= set(found.nesting)
+    assert 11 in found.plain
