@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term, fit
-from host.sysid.differentiation import bandwidth_hz, smooth_and_differentiate, window_for
+from host.sysid.colour import coloured_middle
+from host.sysid.differentiation import (
+    bandwidth_hz,
+    local_polynomial,
+    smooth_and_differentiate,
+    window_for,
+)
 from host.sysid.errors import IdentificationError
 from host.sysid.study.aircraft import navion, navion_free, navion_structured
 from host.sysid.study.data import TRUTH, clean, noisy, with_rates
-from scipy import optimize
+from scipy import linalg, optimize, signal
 
 
 @pytest.mark.parametrize("variant", ["", "-weighted", "-robust", "-total"])
@@ -118,6 +124,26 @@ def test_differentiation_has_the_bandwidth_it_states() -> None:
     _, rate = smooth_and_differentiate(slow, dt_s, 2.0)
     expected = 0.4 * np.pi * np.cos(0.4 * np.pi * time_s)
     np.testing.assert_allclose(rate[inner, 0], expected[inner], atol=0.002)
+
+
+@pytest.mark.parametrize(("samples", "window"), [(50, 5), (300, 41), (1000, 401)])
+@pytest.mark.parametrize("derivative", [0, 1, 2])
+def test_smoothing_is_that_of_scipy(samples: int, window: int, derivative: int) -> None:
+    values = np.cumsum(np.random.default_rng(samples).standard_normal((samples, 3)), axis=0)
+    ours = local_polynomial(values, window, 3, derivative=derivative, dt_s=0.01)
+    peer = signal.savgol_filter(values, window, 3, deriv=derivative, delta=0.01, axis=0)
+    np.testing.assert_allclose(ours, peer, atol=1e-9 * 100.0**derivative)
+
+
+@pytest.mark.parametrize("samples", [8, 333, 2000])
+def test_middle_of_the_sandwich_is_that_of_direct_sums(samples: int) -> None:
+    rng = np.random.default_rng(samples)
+    residual, slopes = rng.standard_normal(samples), rng.standard_normal((samples, 3))
+    lags = samples // 5
+    correlation = signal.correlate(residual, residual, method="direct") / samples
+    correlation[np.abs(np.arange(1 - samples, samples)) > lags] = 0.0
+    R = linalg.toeplitz(correlation[samples - 1 :])
+    np.testing.assert_allclose(coloured_middle(residual, slopes), slopes.T @ R @ slopes, rtol=1e-9)
 
 
 def test_units_of_a_state_do_not_matter() -> None:

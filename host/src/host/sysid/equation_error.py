@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, signal
+from scipy import linalg
 
 from host.compiled import Array, IntArray
+from host.sysid.colour import coloured_middle
 from host.sysid.differentiation import signal_bandwidth_hz, smooth, smooth_and_differentiate
 from host.sysid.errors import IdentificationError
 from host.sysid.maneuver import Maneuver
@@ -305,22 +306,13 @@ def _equation_scales(rows: Sequence[Row], theta: Array, *, robust: bool, dof: in
 
 
 def coloured_covariance(rows: Sequence[Row], theta: Array, white: Array, scales: Array) -> Array:
-    """Correct a covariance for coloured residuals (Klein & Morelli, sec. 5.2, and Morelli 1997).
-
-    The middle of the sandwich uses the autocorrelation of each residual up to a fifth of the
-    record.
-    """
+    """Correct a covariance for coloured residuals (Klein & Morelli, sec. 5.2)."""
     middle = np.zeros_like(white)
     for row, scale in zip(rows, scales, strict=True):
         residual = row.target - row.regressors @ theta
-        samples = len(residual)
-        lags = samples // 5
-        correlation = signal.correlate(residual, residual, mode="full", method="fft")
-        correlation = correlation[samples - 1 - lags : samples + lags] / samples
         active = np.flatnonzero(row.regressors.any(axis=0))
         block = row.regressors[:, active]
-        spread = signal.fftconvolve(block, correlation[:, None], mode="same", axes=0)
-        middle[np.ix_(active, active)] += (block.T @ spread) / scale**4
+        middle[np.ix_(active, active)] += coloured_middle(residual, block) / scale**4
     result = white @ middle @ white
     result = 0.5 * (result + result.T)
     low = np.diag(result) <= 0.0

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from scipy import signal
 
 from host.compiled import Array
 from host.sysid.airframe import AirframeData
@@ -19,23 +18,25 @@ from host.sysid.coefficient_rows import GRAVITY_MPS2, Flown
 from host.sysid.coefficient_signals import BLEND_RADPS, Record
 from host.sysid.errors import IdentificationError
 from host.sysid.instrument_errors import InstrumentData
+from host.sysid.kernels import simulate, transition
 
 LEVELLING_PERS = 0.3  # the pilot brings the wings back
 DRAG = 0.04  # only sets the mean of a force whose mean is taken out again
 
 
 def _simulate(A: Array, B: Array, inputs: Array, dt_s: float) -> Array:
-    values, vectors = np.linalg.eig(A)
-    if np.max(values.real) > -1e-3:
+    if np.max(np.linalg.eigvals(A).real) > -1e-3:
         raise IdentificationError("the coefficients found so far make an unstable aircraft")
-    pushed = np.linalg.solve(vectors, B.astype(np.complex128))
     middle = 0.5 * (inputs + np.vstack([inputs[1:], inputs[-1:]]))
-    keep = np.exp(values * dt_s)
-    modal = [
-        signal.lfilter([0.0, 1.0], [1.0, -k], (k - 1.0) / value * (middle @ row))
-        for k, value, row in zip(keep, values, pushed, strict=True)
-    ]
-    return np.ascontiguousarray((np.stack(modal, axis=1) @ vectors.T).real)
+    n, m = B.shape
+    AB = np.hstack([A, B, np.zeros((n, 1))])
+    none = np.zeros(0, dtype=np.int64)
+    step, _ = transition(AB, n, m, False, dt_s, none, none, none, np.zeros(0), 0)
+    drive = np.hstack([middle, np.ones((len(middle), 1))])
+    finite, states = simulate(step, drive, np.zeros(n))
+    if not finite:
+        raise IdentificationError("the coefficients found so far make an unstable aircraft")
+    return np.ascontiguousarray(states[:, :n])
 
 
 def gust_free(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import signal
 
 from host.compiled import Array
+from host.sysid.colour import coloured_middle
 from host.sysid.errors import IdentificationError
 from host.sysid.intervals import HIGHEST_ORDER, Interval, fit_with_memory
 from host.sysid.maneuver import Maneuver
@@ -93,24 +93,15 @@ def _warnings(problem: OutputProblem, fit: Interval) -> tuple[str, ...]:
 
 
 def coloured_output_covariance(problem: OutputProblem, fit: Interval) -> Array:
-    """Return the white covariance corrected by residual autocorrelations (the usual sandwich).
-
-    Morelli & Klein, Accuracy of aerodynamic model parameters estimated from flight test data,
-    Journal of Guidance, Control and Dynamics 20 (1997).
-    """
+    """Return the white covariance corrected by residual autocorrelations (the usual sandwich)."""
     white = fit.covariance_white
     middle = np.zeros_like(white)
     for number, response in enumerate(fit.optimum.responses):
         columns = problem.columns(number)
-        samples = response.y.shape[1]
-        lags = samples // 5
         for j, variance in enumerate(fit.optimum.variance):
             residual = fit.optimum.residuals[number][j]
-            full = signal.correlate(residual, residual, mode="full", method="fft") / samples
-            window = full[samples - 1 - lags : samples + lags]
-            slope = response.slopes[j]
-            spread = signal.fftconvolve(slope, window[:, None], mode="same", axes=0)
-            middle[np.ix_(columns, columns)] += slope.T @ spread / variance**2
+            part = coloured_middle(residual, response.slopes[j]) / variance**2
+            middle[np.ix_(columns, columns)] += part
     result = white @ middle @ white
     result = 0.5 * (result + result.T)
     low = np.diag(result) <= 0.0
