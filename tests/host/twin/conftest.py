@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,9 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture(scope="session")
 def library() -> Path:
+    given = os.environ.get("HOST_SITL")
+    if given:  # one built before
+        return Path(given)
     built = subprocess.run(
         [sys.executable, str(ROOT / "firmware" / "toolchain" / "build_sitl.py")],
         capture_output=True, text=True, check=False, timeout=600,

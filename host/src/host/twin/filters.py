@@ -15,17 +15,20 @@ VANE_SUBSTEPS = 8
 
 @compiled_fast
 def first_order(x: Array, tau_s: float, step_s: float) -> Array:
-    """Return a first-order lag of x (n,), exact for an input held over each step; starts
-    settled."""
+    """Return a first-order lag of x (n,), exact for an input straight between samples; starts
+    settled.
+
+    An input held over each step would come out half a step later than `tau_s` says.
+    """
     y = np.empty_like(x)
     if tau_s <= 0.0:
         y[:] = x
         return y
     keep = math.exp(-step_s / tau_s)
-    state = x[0]
-    for i in range(x.shape[0]):
-        y[i] = state
-        state = keep * state + (1.0 - keep) * x[i]
+    mean = (1.0 - keep) * tau_s / step_s
+    y[0] = x[0]
+    for i in range(1, x.shape[0]):
+        y[i] = keep * y[i - 1] + (mean - keep) * x[i - 1] + (1.0 - mean) * x[i]
     return y
 
 
@@ -42,13 +45,16 @@ def vane(
     """Return the angle of a vane (n,) that follows the flow.
 
     Second order with a natural frequency in proportion to airspeed; dry friction holds it within
-    `friction_rad` at `reference_mps`, by the inverse of dynamic pressure at other speeds.
+    `friction_rad` at `reference_mps`, by the inverse of dynamic pressure at other speeds. The flow
+    turns evenly between samples: behind a steady turn the vane lags by 2 damping / omega, no more.
     """
     out = np.empty_like(target_rad)
     part_s = step_s / VANE_SUBSTEPS
+    last = target_rad.shape[0] - 1
     angle, rate = target_rad[0], 0.0
     for i in range(target_rad.shape[0]):
         out[i] = angle
+        turn = (target_rad[min(i + 1, last)] - target_rad[i]) / VANE_SUBSTEPS
         speed = max(airspeed_mps[i], 1.0)
         omega = 2.0 * math.pi * frequency_hz_per_mps * speed
         stiffness = omega * omega
@@ -56,8 +62,8 @@ def vane(
         if airspeed_mps[i] < 1.0:
             angle, rate = target_rad[i], 0.0
             continue
-        for _ in range(VANE_SUBSTEPS):
-            push = stiffness * (target_rad[i] - angle)
+        for k in range(VANE_SUBSTEPS):
+            push = stiffness * (target_rad[i] + k * turn - angle)
             rate += part_s * (push - 2.0 * damping * omega * rate)
             # Dry friction takes at most the speed the vane has: then it stands until pushed harder.
             brake = part_s * dry

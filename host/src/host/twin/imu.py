@@ -67,13 +67,44 @@ class Imu:
 
 
 @compiled_fast
+def turned(c: Array, x: float, y: float, z: float) -> Array:
+    """Return the matrix (3, 3) body to north-east-down after a small turn (rad) in body axes, rows
+    orthogonal and of unit length."""
+    out = np.empty((3, 3))
+    for k in range(3):
+        a, b, d = c[k, 0], c[k, 1], c[k, 2]
+        out[k, 0] = a + b * z - d * y
+        out[k, 1] = b + d * x - a * z
+        out[k, 2] = d + a * y - b * x
+    dot = 0.5 * (out[0, 0] * out[1, 0] + out[0, 1] * out[1, 1] + out[0, 2] * out[1, 2])
+    for k in range(3):
+        a, b = out[0, k], out[1, k]
+        out[0, k], out[1, k] = a - dot * b, b - dot * a
+    for k in range(2):
+        length = math.sqrt(out[k, 0] ** 2 + out[k, 1] ** 2 + out[k, 2] ** 2)
+        for j in range(3):
+            out[k, j] /= length
+    out[2, 0] = out[0, 1] * out[1, 2] - out[0, 2] * out[1, 1]
+    out[2, 1] = out[0, 2] * out[1, 0] - out[0, 0] * out[1, 2]
+    out[2, 2] = out[0, 0] * out[1, 1] - out[0, 1] * out[1, 0]
+    return out
+
+
+@compiled_fast
 def complementary(
-    rates: Array, force: Array, heading: Array, speed: Array, start: Array, step_s: float
+    rates: Array,
+    force: Array,
+    heading: Array,
+    speed: Array,
+    start: Array,
+    step_s: float,
+    carry_s: float,
 ) -> tuple[Array, Array]:
     """Run the attitude filter; return phi, theta, psi (m, 3) and the bias estimate (m, 3).
 
     `rates` (m, 3) rad/s, `force` (m, 3) m/s2, `heading` (m,) rad from the magnetometer, `speed`
-    (m,) m/s for the centripetal correction, `start` (3,) first angles.
+    (m,) m/s for the centripetal correction, `start` (3,) first angles. As in the IMU's firmware the
+    angles are carried on by the nominal delay `carry_s` of the gyro.
     """
     m = rates.shape[0]
     angles, biases = np.empty((m, 3)), np.empty((m, 3))
@@ -84,52 +115,35 @@ def complementary(
     c[0, 0], c[0, 1], c[0, 2] = ct * cs, sp * st * cs - cp * ss, cp * st * cs + sp * ss
     c[1, 0], c[1, 1], c[1, 2] = ct * ss, sp * st * ss + cp * cs, cp * st * ss - sp * cs
     c[2, 0], c[2, 1], c[2, 2] = -st, sp * ct, cp * ct
-    bias = np.zeros(3)
+    bias, e, before = np.zeros(3), np.zeros(3), rates[0].copy()
     for i in range(m):
-        angles[i, 0] = math.atan2(c[2, 1], c[2, 2])
-        angles[i, 1] = -math.asin(min(max(c[2, 0], -1.0), 1.0))
-        angles[i, 2] = math.atan2(c[1, 0], c[0, 0])
+        now = rates[i] - bias
+        if i > 0:
+            w = (0.5 * (before + now) + e) * step_s
+            c = turned(c, w[0], w[1], w[2])
+        before = now
+        ahead = turned(c, now[0] * carry_s, now[1] * carry_s, now[2] * carry_s)
+        angles[i, 0] = math.atan2(ahead[2, 1], ahead[2, 2])
+        angles[i, 1] = -math.asin(min(max(ahead[2, 0], -1.0), 1.0))
+        angles[i, 2] = math.atan2(ahead[1, 0], ahead[0, 0])
         biases[i] = bias
-        p, q, r = rates[i, 0] - bias[0], rates[i, 1] - bias[1], rates[i, 2] - bias[2]
         # Gravity as felt: minus specific force, with the turn's own acceleration omega x V taken
         # out.
         gx = -force[i, 0]
-        gy = -(force[i, 1] - r * speed[i])
-        gz = -(force[i, 2] + q * speed[i])
+        gy = -(force[i, 1] - now[2] * speed[i])
+        gz = -(force[i, 2] + now[1] * speed[i])
         size = math.sqrt(gx * gx + gy * gy + gz * gz)
         weight = max(0.0, 1.0 - abs(size / 9.80665 - 1.0) * 2.0)
         size = max(size, 1e-6)
         gx, gy, gz = gx / size, gy / size, gz / size
         # Error: measured x expected direction of gravity (third row of c), body axes.
-        ex = (gy * c[2, 2] - gz * c[2, 1]) * weight * TILT_GAIN_PERS
-        ey = (gz * c[2, 0] - gx * c[2, 2]) * weight * TILT_GAIN_PERS
-        ez = (gx * c[2, 1] - gy * c[2, 0]) * weight * TILT_GAIN_PERS
-        turn = math.sin(heading[i] - angles[i, 2]) * HEADING_GAIN_PERS
-        ex += turn * c[2, 0]
-        ey += turn * c[2, 1]
-        ez += turn * c[2, 2]
-        ratio = BIAS_GAIN_PERS2 / TILT_GAIN_PERS
-        bias[0] -= ratio * ex * step_s
-        bias[1] -= ratio * ey * step_s
-        bias[2] -= ratio * ez * step_s
-        wx, wy, wz = (p + ex) * step_s, (q + ey) * step_s, (r + ez) * step_s
+        e[0] = (gy * c[2, 2] - gz * c[2, 1]) * weight * TILT_GAIN_PERS
+        e[1] = (gz * c[2, 0] - gx * c[2, 2]) * weight * TILT_GAIN_PERS
+        e[2] = (gx * c[2, 1] - gy * c[2, 0]) * weight * TILT_GAIN_PERS
+        off = math.sin(heading[i] - angles[i, 2]) * HEADING_GAIN_PERS
         for k in range(3):
-            a, b, d = c[k, 0], c[k, 1], c[k, 2]
-            c[k, 0] = a + b * wz - d * wy
-            c[k, 1] = b + d * wx - a * wz
-            c[k, 2] = d + a * wy - b * wx
-        # Keep the rows orthogonal and of unit length.
-        dot = 0.5 * (c[0, 0] * c[1, 0] + c[0, 1] * c[1, 1] + c[0, 2] * c[1, 2])
-        for k in range(3):
-            a, b = c[0, k], c[1, k]
-            c[0, k], c[1, k] = a - dot * b, b - dot * a
-        for k in range(2):
-            length = math.sqrt(c[k, 0] ** 2 + c[k, 1] ** 2 + c[k, 2] ** 2)
-            for j in range(3):
-                c[k, j] /= length
-        c[2, 0] = c[0, 1] * c[1, 2] - c[0, 2] * c[1, 1]
-        c[2, 1] = c[0, 2] * c[1, 0] - c[0, 0] * c[1, 2]
-        c[2, 2] = c[0, 0] * c[1, 1] - c[0, 1] * c[1, 0]
+            e[k] += off * c[2, k]
+            bias[k] -= BIAS_GAIN_PERS2 / TILT_GAIN_PERS * e[k] * step_s
     return angles, biases
 
 
@@ -242,8 +256,8 @@ def imu(
         ground[record.t_s < record.card.flight.ground_s + 2 * STEP_S] = 0.0
         speed = delayed(t, ground, 0.3, at_s)
         step = float(np.median(np.diff(at_s)))
-        estimate, bias = complementary(rates, force, heading, speed, angles[0], step)
-        angles = np.column_stack([estimate[:, 0], estimate[:, 1], estimate[:, 2]])
+        carry = FILTERS[dlpf][0][1] if switches.imu_filter else 0.0
+        angles, bias = complementary(rates, force, heading, speed, angles[0], step, carry)
     angles[:, 2] = np.mod(angles[:, 2] + np.pi, 2.0 * np.pi) - np.pi
     raw = np.column_stack([rates / GYRO_LSB_RADPS, force / ACCEL_LSB_MPS2, angles / ANGLE_LSB_RAD])
     raw = np.clip(np.round(raw), -32767, 32767)

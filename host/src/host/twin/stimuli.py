@@ -160,16 +160,17 @@ def _analog(record: FlightRecord, data: AirData, grid_s: Array, rng: np.random.G
 def _pressure(
     record: FlightRecord, data: AirData, grid_s: Array, rng: np.random.Generator
 ) -> Array:
-    # Computed at 100 Hz, the sensor takes 40 ms per value.
+    # Computed at 100 Hz, straight between: the sensor takes 40 ms per value. Held for 10 ms each, a
+    # pressure would be 5 ms old on average.
     coarse = grid_s[::10]
     pressure = np.interp(coarse, record.t_s, data.static_pa) + record.draws.scalar("baro_offset_pa")
     if record.card.sensors.noise:
-        pressure = pressure + rng.normal(0.0, bmp085.NOISE_PA, len(coarse))
+        # As for the voltages: what lies between two points is the mean of both.
+        pressure = pressure + rng.normal(0.0, bmp085.NOISE_PA * 1.5**0.5, len(coarse))
     warm = np.interp(coarse, record.t_s, data.temperature_k) - 273.15 + 3.0  # inside the box
     ut = bmp085.raw_temperature(warm)
     up = bmp085.raw_pressure(pressure, ut, OVERSAMPLING)
-    rows = np.minimum(np.arange(len(grid_s)) // 10, len(coarse) - 1)
-    return np.column_stack([ut[rows], up[rows]]).astype(np.float64)
+    return np.column_stack([np.interp(grid_s, coarse, raw) for raw in (ut, up)])
 
 
 def _gps(record: FlightRecord, rng: np.random.Generator) -> NDArray[np.void]:
