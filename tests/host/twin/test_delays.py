@@ -20,12 +20,13 @@ from host.log import FlightLog, read_log
 from host.twin import cards, compare, instrument, sitl
 from host.twin.airdata import AirData, air_data
 from host.twin.airframe import GRAVITY_MPS2
+from host.twin.delays import FILTERS, GPS_LATENCY_S
 from host.twin.draws import delay_s
 from host.twin.filters import first_order, vane
 from host.twin.flight import STEP_S, FlightRecord, fly
-from host.twin.imu import FILTERS, complementary
+from host.twin.imu import complementary
 from host.twin.stimuli import clock_share, stimuli
-from host.twin.ubx import LATENCY_S
+from host.twin.truth import summary
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -199,6 +200,23 @@ def test_a_channel_is_as_late_as_it_is_said_to_be(flown: Flown, column: str) -> 
     assert seen < -LIMIT_S
 
 
+def test_the_truth_file_states_these_delays(flown: Flown) -> None:
+    stated = summary(flown.record, flown.data)["delay_s"]
+    assert isinstance(stated, dict)
+    speed = flown.record.aircraft.scalar("trim.airspeed_mps")
+    responses = {
+        "gyro": (imu_response(flown.record, 0), FILTERS[3][0][1]),
+        "accelerometer": (imu_response(flown.record, 1), FILTERS[3][1][1]),
+        "alpha_a": (vane_response(flown.record, speed, 0), 0.0),
+        "beta_b": (vane_response(flown.record, speed, 3), 0.0),
+        "dp_b": (pitot_response(flown.record, 1), 0.0),
+    }
+    slow = np.array([0.1])
+    for name, (response, removed_s) in responses.items():
+        late = -float(np.angle(response(slow))[0]) / 0.1 + removed_s
+        assert stated[name] == pytest.approx(late, abs=1e-7), name
+
+
 @pytest.mark.parametrize(
     ("name", "state"),
     [("pot_elevator", 13), ("pot_aileron_left", 14), ("pot_aileron_right", 14), ("pot_rudder", 15)],
@@ -232,7 +250,7 @@ def test_the_gps_is_late_by_its_drawn_latency(flown: Flown) -> None:
     gps = flown.log.frames["gps"]
     at_s = gps["t_us"] * 1e-6 / (1.0 + clock_share(flown.record))
     late = at_s - (gps["itow_ms"].astype(np.int64) - 288_000_000) * 1e-3
-    drawn = LATENCY_S * (1.0 + flown.record.draws.scalar("gps_delay_share"))
+    drawn = GPS_LATENCY_S * (1.0 + flown.record.draws.scalar("gps_delay_share"))
     # Stamped when the main loop takes the byte.
     assert abs(late.mean() - drawn) < 3.0 * LIMIT_S
 

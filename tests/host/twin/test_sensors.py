@@ -11,10 +11,11 @@ from host.twin.airdata import AirData, air_data
 from host.twin.analog import analog, convert, nominal
 from host.twin.attitude import euler
 from host.twin.cards import Card, Sensors, load
+from host.twin.delays import FILTERS
 from host.twin.filters import delayed, first_order, vane
 from host.twin.flight import FlightRecord, fly
 from host.twin.ideal import measured_table, true_table
-from host.twin.imu import FILTERS, imu
+from host.twin.imu import imu
 from host.twin.stimuli import IMU_ADDRESS, stimuli, ticks
 from host.twin.ubx import packet
 

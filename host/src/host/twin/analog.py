@@ -14,7 +14,7 @@ from host.resources import resource
 from host.twin.airdata import AirData, local_velocity
 from host.twin.airframe import AILERON, ELEVATOR, RUDDER, Array
 from host.twin.cards import Fault
-from host.twin.draws import delay_s
+from host.twin.delays import dlpf_for, nominal_vane_s, sensor_delays
 from host.twin.filters import delayed, first_order, vane
 from host.twin.flight import STEP_S, FlightRecord
 
@@ -79,6 +79,7 @@ def analog(record: FlightRecord, data: AirData) -> Analog:
     friction = plane.scalar("sensors.vane_friction_rad") if switches.vane_friction else 0.0
     reference = plane.scalar("trim.airspeed_mps")
     upwash = plane.scalar("sensors.upwash") if switches.position else 0.0
+    late = sensor_delays(plane, draws, dlpf_for(record.card.flight.rate_hz))
     for side in (0, 1):
         flow = local_velocity(data, place(f"vane_{'ab'[side]}"))
         speed = np.linalg.norm(flow, axis=1)
@@ -89,28 +90,15 @@ def analog(record: FlightRecord, data: AirData) -> Analog:
         flank = np.where(moving, np.arctan2(flow[:, 1], flow[:, 0]), 0.0)
         for angle, k in ((alpha, side), (flank, 2 + side)):
             if switches.vane_dynamics:
-                # Delay of the vane: 2 zeta / omega; a slower vane is one of lower frequency.
-                nominal_s = 2.0 * damping / (2.0 * np.pi * frequency * reference)
-                late = delay_s(
-                    nominal_s,
-                    float(draws.vector("vane_delay_share")[k]),
-                    float(draws.vector("vane_delay_s")[k]),
-                )
-                angle = vane(
-                    angle, speed, frequency * nominal_s / late, damping, friction, reference, STEP_S
-                )
+                # A slower vane is one of lower frequency.
+                own = frequency * nominal_vane_s(plane) / late[CHANNELS[k]]
+                angle = vane(angle, speed, own, damping, friction, reference, STEP_S)
             zero, slope = scale[CHANNELS[k]]
             share = 1.0 + float(draws.vector("vane_scale_share")[k])
             counts[:, k] = zero + (share * angle + draws.vector("vane_zero_rad")[k]) / slope
-        lag = plane.scalar("sensors.pitot_lag_s")
-        late = delay_s(
-            lag,
-            float(draws.vector("pitot_delay_share")[side]),
-            float(draws.vector("pitot_delay_s")[side]),
-        )
         flow = local_velocity(data, place(f"pitot_{'ab'[side]}"))
         pressure = 0.5 * data.density_kgpm3 * (flow**2).sum(axis=1)
-        pressure = first_order(pressure, late, STEP_S)
+        pressure = first_order(pressure, late[CHANNELS[4 + side]], STEP_S)
         zero, slope = scale[CHANNELS[4 + side]]
         share = 1.0 + float(draws.vector("pitot_scale_share")[side])
         drift = draws.vector("pitot_drift_count")[side] * (1.0 - np.exp(-t / DRIFT_TAU_S))

@@ -14,8 +14,9 @@ from host.twin.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, Array
 from host.twin.analog import CHANNELS, analog, convert, nominal
 from host.twin.attitude import euler
 from host.twin.cards import AXES
+from host.twin.delays import FILTERS, dlpf_for
 from host.twin.flight import IDLE_US, NEUTRAL_US, THROW_US, FlightRecord
-from host.twin.imu import FILTERS, imu
+from host.twin.imu import imu
 
 CONVERSIONS = 4  # the recorder sums four conversions of each channel
 
@@ -24,11 +25,6 @@ def times(record: FlightRecord) -> Array:
     """Return the sampling times of the card's rate."""
     step = 1.0 / record.card.flight.rate_hz
     return np.arange(0.02, record.t_s[-1] - 0.02, step)
-
-
-def dlpf_for(rate_hz: float) -> int:
-    """Return the IMU's low-pass setting that goes with a logging rate."""
-    return 2 if rate_hz > 100.0 else 3
 
 
 def true_table(record: FlightRecord, data: AirData | None = None) -> pd.DataFrame:

@@ -11,16 +11,10 @@ from host.compiled import compiled_fast
 from host.twin.airdata import AirData
 from host.twin.airframe import DOWN, GRAVITY_MPS2, NORTH, Q0, Q3, Array, P, Q, R
 from host.twin.attitude import euler, to_body
-from host.twin.draws import delay_s
+from host.twin.delays import FILTERS, sensor_delays
 from host.twin.filters import delayed, first_order
 from host.twin.flight import STEP_S, FlightRecord
 
-# DLPF_CFG: bandwidth Hz and delay ms of gyro and accelerometer (register map; hardware facts 2.3).
-FILTERS = {
-    2: ((98.0, 2.8e-3), (94.0, 3.0e-3)),
-    3: ((42.0, 4.8e-3), (44.0, 4.9e-3)),
-    4: ((20.0, 8.3e-3), (21.0, 8.5e-3)),
-}
 GYRO_NOISE_RADPS_RTHZ = math.radians(0.005)  # PS-MPU-6000A: 0.005 deg/s/sqrt(Hz)
 ACCEL_NOISE_MPS2_RTHZ = 400e-6 * GRAVITY_MPS2  # 400 ug/sqrt(Hz)
 GYRO_LSB_RADPS = math.radians(1.0 / 65.5)
@@ -201,7 +195,7 @@ def imu(
     at_s : (m,) array
         Sampling times.
     dlpf : int
-        DLPF_CFG, a key of `FILTERS`.
+        DLPF_CFG, a key of `delays.FILTERS`.
     rng : numpy Generator
 
     Returns
@@ -230,13 +224,10 @@ def imu(
         ACCEL_NOISE_MPS2_RTHZ * band,
     )
     if switches.imu_filter:
-        rates, force = (
-            _low_pass(
-                signal, t, at_s, *FILTERS[dlpf][i],
-                share=draws.scalar("imu_delay_share"), least_s=draws.scalar("imu_delay_s"),
-            )
-            for i, signal in enumerate((rates, force))
-        )  # fmt: skip
+        late = sensor_delays(record.aircraft, draws, dlpf)
+        gyro_hz, accel_hz = (bandwidth_hz for bandwidth_hz, _ in FILTERS[dlpf])
+        rates = _low_pass(rates, t, at_s, gyro_hz, late["gyro"])
+        force = _low_pass(force, t, at_s, accel_hz, late["accelerometer"])
     else:
         rates, force = delayed(t, rates, 0.0, at_s), delayed(t, force, 0.0, at_s)
 
@@ -266,23 +257,11 @@ def imu(
     return Imu(at_s, dlpf, rates, force, angles, bias, magnetic, raw.astype(np.int16))
 
 
-def _low_pass(
-    x: Array,
-    t: Array,
-    at_s: Array,
-    bandwidth_hz: float,
-    nominal_s: float,
-    *,
-    share: float,
-    least_s: float,
-) -> Array:
+def _low_pass(x: Array, t: Array, at_s: Array, bandwidth_hz: float, late_s: float) -> Array:
     """Lag of the filter's bandwidth, and a pure delay for the rest of its drawn delay."""
-    tau = 1.0 / (2.0 * math.pi * bandwidth_hz)
-    late = delay_s(nominal_s, share, least_s)
-    slow = np.column_stack(
-        [first_order(x[:, k], min(tau, late), STEP_S) for k in range(x.shape[1])]
-    )
-    return delayed(t, slow, max(late - tau, 0.0), at_s)
+    tau = min(1.0 / (2.0 * math.pi * bandwidth_hz), late_s)
+    slow = np.column_stack([first_order(x[:, k], tau, STEP_S) for k in range(x.shape[1])])
+    return delayed(t, slow, late_s - tau, at_s)
 
 
 def _rotation(small_rad: Array) -> Array:

@@ -54,8 +54,8 @@ def local_derivatives(frame: Airframe, at: Array, width_rad: float = 0.01) -> di
     -------
     dict
         ``CL_alpha`` ... ``Cn_dr`` per radian; rates against p_hat = pb/2V, q_hat = qc/2V, r_hat
-        = rb/2V; ``CL_0`` ... the straight line's value at zero of all arguments, ``CL`` ... the
-        value at the condition.
+        = rb/2V; ``CL_0`` ... the straight line's value at zero of all arguments, but ``CD_0`` the
+        drag at zero lift, surfaces as flown; ``CL`` ... the value at the condition.
     """
     base = coefficients(frame, at)
     out = dict(zip(FORCES, base.tolist(), strict=True))
@@ -70,4 +70,6 @@ def local_derivatives(frame: Airframe, at: Array, width_rad: float = 0.01) -> di
             out[f"{force}_{argument}"] = float(value)
     for force, value in zip(FORCES, base - slopes @ at, strict=True):
         out[f"{force}_0"] = float(value)
+    # The parabola in lift that has this value and this slope.
+    out["CD_0"] = out["CD"] - 0.5 * out["CL"] * out["CD_alpha"] / out["CL_alpha"]
     return out

@@ -17,8 +17,8 @@ from host.twin import bmp085, ubx
 from host.twin.airdata import AirData
 from host.twin.airframe import Array
 from host.twin.analog import CHANNELS, analog
+from host.twin.delays import dlpf_for
 from host.twin.flight import GAP_US, FlightRecord
-from host.twin.ideal import dlpf_for
 from host.twin.imu import Imu, imu
 
 Ticks = NDArray[np.int64]

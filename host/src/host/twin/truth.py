@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from host.twin.airdata import AirData
 from host.twin.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, STATES, Airframe, Array
 from host.twin.attitude import euler
+from host.twin.delays import dlpf_for, sensor_delays
 from host.twin.flight import FlightRecord
 from host.twin.linear import linearise, modes
 from host.twin.local import local_derivatives
@@ -163,6 +164,9 @@ def summary(record: FlightRecord, data: AirData, first_row_s: float = 0.0) -> di
             "throttle": float(record.trim.command[3]),
         },
         "drawn": dict(record.draws.values),
+        "delay_s": sensor_delays(
+            record.aircraft, record.draws, dlpf_for(record.card.flight.rate_hz)
+        ),
         "fault": [
             {"kind": f.kind, "at_s": f.at_s, "duration_s": f.duration_s, "value": f.value}
             for f in card.faults

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.twin.airframe import DOWN, NORTH, Array
+from host.twin.delays import dlpf_for, sensor_delays
 from host.twin.flight import STEP_S, FlightRecord
 
 RATE_HZ = 5.0
-LATENCY_S = 0.15  # 50 to 200 ms without PPS (hardware facts 2.5); +-20 % drawn
 EARTH_RADIUS_M = 6_371_000.0
 POSITION_NOISE_M = 0.4  # epoch to epoch; the slow error is drawn once per flight
 VELOCITY_NOISE_MPS = 0.1  # u-blox 6 data sheet
@@ -60,7 +60,7 @@ def epochs(record: FlightRecord, rng: np.random.Generator) -> list[Epoch]:
     slow = record.draws.vector("field_m")
     late = 0.0
     if switches.gps_latency:
-        late = LATENCY_S * (1.0 + record.draws.scalar("gps_delay_share"))
+        late = sensor_delays(record.aircraft, record.draws, dlpf_for(flight.rate_hz))["gps"]
     dark = [(f.at_s, f.at_s + f.duration_s) for f in record.card.faults if f.kind == "gps_off"]
     found = []
     for i, t in enumerate(at):
