@@ -39,7 +39,7 @@ format: setup ## rewrite C++ and Python in the house format
 
 bench: setup ## damage, speed and identification beside their peers
 	@$(PYTHON) tests/bench/run.py
-	-@$(PYTHON) tests/bench/identification.py
+	@$(PYTHON) tests/bench/identification.py
 
 study: setup ## tables and pictures of identification in build/study (SIZE=full: half an hour)
 	@$(PYTHON) -m host.sysid.study build/study --size $(or $(SIZE),small)

@@ -31,7 +31,7 @@ def start_values(problem: OutputProblem) -> Array:
     for name, value in zip(names, estimate, strict=True):
         regressed[position[name]] = value
     regressed = np.clip(regressed, problem.lower, problem.upper)
-    if problem.respond(regressed) is None:
+    if problem.outputs(regressed) is None:
         return theta
     return regressed
 
