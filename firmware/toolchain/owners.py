@@ -15,6 +15,7 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from disassembly import demangle, run
@@ -34,7 +35,7 @@ ROOMS = {
     "frames": "protocol/generated",
 }
 _STAB = re.compile(r"^\d+ +(\w+) +\d+ +\d+ +([0-9a-f]+) +\d+ *(.*)$")
-_STRUCT = re.compile(r"^(\w+):Tt?(\(\d+,\d+\))=s(\d+)")
+_STRUCT = re.compile(r"^([\w:]+):Tt?(\(\d+,\d+\))=s(\d+)")
 _MEMBER = re.compile(r"(\w+):(?:/\d)?(\(\d+,\d+\))((?:=[^:]*?)?),(\d+),(\d+);")
 _ARRAY = re.compile(r"=ar.*;(\(\d+,\d+\))[^;]*$")  # the last type is that of its elements
 
@@ -141,18 +142,57 @@ class _Layout:
         self.name = name
         self.size = size
         self._unit = unit
-        self.members: list[tuple[str, str, int]] = []  # name, type, bytes
+        self.members: list[tuple[str, str, int, int]] = []  # name, type, offset, bytes
+
+    def inner(self, name: str) -> tuple[int, int, _Layout | None]:
+        """Offset, size and class of a member."""
+        for member, kind, offset, size in self.members:
+            if member == name:
+                return offset, size, self._unit.get(kind)
+        raise KeyError(f"class {self.name} has no member {name}")
 
     def leaves(self, sources: Sources, default: str) -> Iterable[tuple[str, str, int]]:
         """Owner, name and size of every member that is not of a class itself."""
-        owner = sources.of_class(self.name) or default
-        for member, kind, size in self.members:
+        owner = sources.of_class(self.name.rpartition("::")[2]) or default
+        for member, kind, _, size in self.members:
             inner = self._unit.get(kind)
             if inner is not None and inner.members and inner.size > 0:
                 for leaf_owner, path, leaf in inner.leaves(sources, owner):
                     yield leaf_owner, path, leaf * (size // inner.size)
             else:
                 yield owner, f"{self.name}::{member}", size
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A member of an object: where it is in it, its size, its own members' places and sizes.
+
+    Of an array `fields` and `stride` are those of its elements.
+    """
+
+    offset: int
+    size: int
+    stride: int
+    fields: dict[str, tuple[int, int]]
+
+
+def find_member(elf: Path, root: str, path: str) -> Member:
+    """Find a member of a class, for example ``find_member(elf, "Instrument", "pilot_.decoder_")``.
+
+    Raises
+    ------
+    KeyError
+        If the debug information has no such class or member.
+    """
+    layout: _Layout | None = _layouts(elf)[root]
+    offset = size = 0
+    for name in path.split("."):
+        if layout is None:
+            raise KeyError(f"{path}: {name} is a member of no class")
+        more, size, layout = layout.inner(name)
+        offset += more
+    fields = {m[0]: (m[2], m[3]) for m in layout.members} if layout is not None else {}
+    return Member(offset, size, layout.size if layout is not None else size, fields)
 
 
 def _layouts(elf: Path) -> dict[str, _Layout]:
@@ -167,10 +207,10 @@ def _layouts(elf: Path) -> dict[str, _Layout]:
             layout = unit.setdefault(head[2], _Layout(head[1], int(head[3]), unit))
             body = re.sub(r"=xs\w+:", "", text[head.end() :])
             layout.members = []
-            for member, kind_id, more, _, bits in _MEMBER.findall(body):
+            for member, kind_id, more, at, bits in _MEMBER.findall(body):
                 array = _ARRAY.match(more)
-                size = int(bits) // 8
-                layout.members.append((member, array[1] if array else kind_id, size))
+                kind_id = array[1] if array else kind_id
+                layout.members.append((member, kind_id, int(at) // 8, int(bits) // 8))
             if len(layout.members) > len(best[head[1]].members if head[1] in best else []):
                 best[head[1]] = layout
     return best

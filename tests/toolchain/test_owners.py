@@ -84,3 +84,12 @@ def test_inlined_code_counts_where_it_is_written(tmp_path: Path, elf: Path) -> N
     assert sum(flash.values()) == text
     assert flash["firmware/core/filter.h"] > flash["firmware/app/thing.h"] > 0
     assert flash["firmware/boards/mega2560/main.cpp"] > 0
+
+
+def test_a_member_is_found_in_its_object(elf: Path) -> None:
+    taps = owners.find_member(elf, "Thing", "filter_.taps_")
+    assert (taps.offset, taps.size, taps.stride) == (90, 30, 5)
+    assert taps.fields == {"weight": (0, 4), "delay": (4, 1)}
+    assert owners.find_member(elf, "Thing", "turns_").offset == 90 + 34
+    with pytest.raises(KeyError, match="no member gone_"):
+        owners.find_member(elf, "Thing", "filter_.gone_")
