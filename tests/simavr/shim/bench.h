@@ -12,7 +12,7 @@ typedef void (*bench_callback)(uint32_t kind, uint32_t source, uint64_t cycle, u
 
 enum { kCallbackTimer = 100, kCallbackI2c = 101 };
 
-BENCH_API chip* bench_create(uint64_t seed);
+BENCH_API chip* bench_create(uint64_t seed, uint32_t kind);
 BENCH_API void bench_destroy(chip* c);
 BENCH_API void bench_on_event(chip* c, bench_callback callback);
 BENCH_API void bench_set_startup(chip* c, uint32_t cycles, uint32_t reset_pc);
@@ -81,6 +81,50 @@ BENCH_API void bench_twi_send(chip* c,
                               uint32_t abort_kind,
                               uint32_t abort_after);
 BENCH_API void bench_twi_hold(chip* c, bool sda, bool scl);
+
+// Two chips on one bus: the master of a slave (or of register chips only). `rate`: cycles of the
+// master in one of the slave. They run together from then on.
+struct twi_bus;
+BENCH_API struct twi_bus* bench_bus(chip* master, chip* slave, double rate);
+BENCH_API void bench_bus_hold(
+    struct twi_bus* b, bool sda_low, bool scl_low, bool sda_high, bool scl_high);
+BENCH_API void bench_bus_hang(struct twi_bus* b, uint32_t clocks);  // SDA low for so many of SCL
+BENCH_API void bench_bus_log_bytes(struct twi_bus* b, bool on);
+BENCH_API void bench_bus_stretch(struct twi_bus* b, double cycles);  // SCL held after every byte
+BENCH_API double bench_bus_time(const struct twi_bus* b, const chip* c, uint64_t cycle);
+
+// MPU-6000 on SPI, MPU-6050 on the bus. Times are cycles of the chip it is wired to.
+typedef struct mpu mpu;
+typedef struct mpu_settings {
+  double clock_rate;     // of its own clock against the chip's
+  double jitter_cycles;  // of a sample, either way; does not add up
+  double gyro_noise_lsb, accel_noise_lsb;
+} mpu_settings;
+typedef struct mpu_sample {
+  uint64_t cycle;    // data-ready
+  int16_t words[7];  // ax ay az temperature gx gy gz, as in the registers
+} mpu_sample;
+BENCH_API mpu* bench_mpu_spi(chip* c, uint32_t cs_pin, uint32_t int_pin, uint32_t product_id);
+BENCH_API mpu* bench_mpu_i2c(chip* c, struct twi_bus* b, uint32_t int_pin, uint32_t product_id);
+BENCH_API void bench_mpu_set(mpu* m, const mpu_settings* settings);
+BENCH_API void bench_mpu_fault(mpu* m,
+                               uint32_t fault);  // 0 none 1 silent 2 stuck 3 garbage 4 clock
+BENCH_API void bench_mpu_reset(mpu* m);          // by itself: asleep, registers at default
+// Values by point: ax ay az in g, degC, gx gy gz in deg/s, axes of the chip.
+BENCH_API void bench_mpu_motion(mpu* m, const double* cycles, const double* values, uint32_t count);
+BENCH_API size_t bench_mpu_count(const mpu* m);
+BENCH_API const mpu_sample* bench_mpu_samples(const mpu* m);
+BENCH_API const uint8_t* bench_mpu_registers(const mpu* m);
+
+// HMC5883L, or QMC5883L; field in gauss, axes of the chip.
+typedef struct magnetometer magnetometer;
+BENCH_API magnetometer* bench_magnetometer(chip* c, struct twi_bus* b, bool qmc);
+BENCH_API void bench_magnetometer_fault(magnetometer* m, bool present, bool stuck);
+BENCH_API uint64_t bench_magnetometer_count(const magnetometer* m);
+BENCH_API void bench_magnetometer_field(magnetometer* m,
+                                        const double* cycles,
+                                        const double* values,
+                                        uint32_t count);
 
 // Devices on bit-banged I2C: a file of 256 registers with automatic increment.
 typedef struct i2c_device i2c_device;

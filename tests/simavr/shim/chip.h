@@ -1,4 +1,4 @@
-// One simulated ATmega2560: Debian's libsimavr supplies the instruction core,
+// One simulated ATmega2560 or ATmega328P: Debian's libsimavr supplies the instruction core,
 // everything around the core (interrupts, ports, timers, converters, buses,
 // memories) is modelled in this folder.
 #ifndef SIMAVR_BENCH_CHIP_H_
@@ -11,6 +11,7 @@
 #include <simavr/sim_avr.h>
 #include <simavr/sim_core.h>
 
+#include "model.h"
 #include "registers.h"
 
 enum {
@@ -66,7 +67,7 @@ enum fault {
   kFaultBadAddress = 1,       // access outside the data space, or a push over the registers
   kFaultTimerMode = 2,        // waveform mode without a model (phase correct)
   kFaultTimerClock = 3,       // external timer clock
-  kFaultTwiMaster = 4,        // START requested on the TWI
+  kFaultTwiMaster = 4,        // START where no bus is, or TWCR written while a STOP is under way
   kFaultSleepMode = 5,        // a sleep mode deeper than idle
   kFaultContention = 6,       // chip and a strong external driver disagree on a pin
   kFaultSpiWithoutModel = 7,  // SPI enabled as a slave
@@ -199,6 +200,7 @@ typedef struct twi_packet {
 
 struct chip {
   avr_t* avr;
+  const chip_model* model;
   avr_io_t hooks;  // receives WDR and SPM from the core
 
   // events
@@ -211,6 +213,8 @@ struct chip {
 
   // run loop
   bool stop_requested;
+  bool yield;  // ends the turn on a shared bus
+  struct twi_bus* bus;
   bool executing;  // inside an instruction: resets wait for its end
   bool held;       // reset asserted or start-up delay running
   bool powered;
@@ -223,6 +227,7 @@ struct chip {
   bool log_interrupts, log_marks;
   uint16_t* watched_pc;  // per flash word, 0 or a number; null until one is watched
   struct owned* owned;
+  struct owned_array* owned_arrays;
   uint64_t running_cycles, sleeping_cycles, held_cycles;
   uint16_t lowest_sp;
   uint64_t fault_count;
@@ -280,6 +285,7 @@ struct chip {
     bool sda_held, scl_held;  // by a dead master or a fault
     uint64_t wait_from;
     uint64_t stretch_cycles;
+    uint64_t released_at;  // the program cleared TWINT
     uint8_t acked;
   } twi;
 
@@ -332,6 +338,8 @@ void fault_add(chip* c, enum fault what, uint32_t detail);
 uint32_t chip_random(chip* c);
 // Memory of a device, zeroed, that goes with the chip.
 void* chip_allocate(chip* c, size_t size);
+// What `*pointer` points to at the end is freed too: for arrays of a device that grow.
+void chip_own(chip* c, void** pointer);
 void chip_free_owned(chip* c);
 
 // interrupts.c
@@ -340,6 +348,7 @@ void interrupts_reset(chip* c);
 void interrupt_refresh(chip* c, uint8_t vector);
 void interrupt_flag(chip* c, uint8_t vector, uint64_t cycle);
 void interrupt_service(chip* c, bool from_sleep);
+uint8_t interrupt_number(const chip* c, uint8_t vector);
 
 // Registers: every module hooks its own.
 typedef uint8_t (*read_fn)(chip* c, uint16_t address, void* param);
@@ -370,6 +379,7 @@ void adc_reset(chip* c);
 void adc_trigger(chip* c, uint8_t source);
 void spi_init(chip* c);
 void spi_reset(chip* c);
+uint32_t spi_divider(const chip* c);
 void uarts_init(chip* c);
 void uarts_reset(chip* c);
 void uarts_free(chip* c);
@@ -385,6 +395,9 @@ void watchdog_feed(chip* c);
 void flash_init(chip* c);
 void flash_reset(chip* c);
 void flash_store(chip* c);
+
+// run.c
+void chip_run(chip* c, uint64_t until);
 
 // reset.c
 void chip_assert_reset(chip* c, uint8_t cause);

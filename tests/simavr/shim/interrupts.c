@@ -1,5 +1,5 @@
-// Interrupt controller: flags and enables per vector, lowest vector first, 5
-// cycles to enter (4 plus one for the 22-bit program counter; datasheet 7.8.1),
+// Interrupt controller: flags and enables per vector, lowest vector first, 4
+// cycles to enter (one more for a 22-bit program counter; datasheet 7.8.1),
 // 4 more out of sleep, latency statistics.
 #include <string.h>
 
@@ -59,6 +59,14 @@ void interrupts_init(chip* c) {
   timer_vectors(c, 5, 46, true);
   uart_vectors(c, REG_UCSR2A, 51);
   uart_vectors(c, REG_UCSR3A, 54);
+  for (uint8_t vector = 0; vector < kVectorCount; vector++) {
+    if (interrupt_number(c, vector) == kNoVector) c->vectors[vector] = (vector_info){0};
+  }
+}
+
+// The chip's own number of a vector, or kNoVector.
+uint8_t interrupt_number(const chip* c, uint8_t vector) {
+  return c->model->vectors ? c->model->vectors[vector] : vector;
 }
 
 void interrupts_reset(chip* c) {
@@ -94,6 +102,7 @@ void interrupt_refresh(chip* c, uint8_t vector) {
 
 void interrupt_flag(chip* c, uint8_t vector, uint64_t cycle) {
   const vector_info* const v = &c->vectors[vector];
+  if (v->enable_reg == 0) return;  // this chip has no such source
   c->avr->data[v->flag_reg] |= (uint8_t)(1u << v->flag_bit);
   refresh_at(c, vector, cycle);
 }
@@ -110,9 +119,10 @@ void interrupt_service(chip* c, bool from_sleep) {
   const uint64_t begun = avr->cycle;
   _avr_push_addr(avr, avr->pc);
   avr_sreg_set(avr, S_I, 0);
-  avr->pc = (avr_flashaddr_t)vector * 4;
-  if (avr->data[REG_MCUCR] & 0x02) avr->pc += 0x3E000;  // IVSEL: vectors of the boot section
-  avr->cycle += from_sleep ? 9 : 5;
+  avr->pc = (avr_flashaddr_t)interrupt_number(c, vector) * 4;
+  if (avr->data[REG_MCUCR] & 0x02)
+    avr->pc += c->model->boot_start;  // IVSEL: vectors of the boot section
+  avr->cycle += c->model->entry_cycles + (from_sleep ? 4u : 0u);
   c->running_cycles += avr->cycle - begun;
 
   vector_stats* const s = &c->stats[vector];
@@ -127,7 +137,9 @@ void interrupt_service(chip* c, bool from_sleep) {
   }
   const uint16_t sp = _avr_sp_get(avr);
   if (sp < c->lowest_sp) c->lowest_sp = sp;
-  if (c->log_interrupts) log_add_at(c, avr->cycle, kLogInterrupt, vector, 1);
+  if (c->log_interrupts) {
+    log_add_at(c, avr->cycle, kLogInterrupt, interrupt_number(c, vector), 1);
+  }
 
   const vector_info* const v = &c->vectors[vector];
   if (v->level) {
@@ -144,7 +156,7 @@ void interrupt_service(chip* c, bool from_sleep) {
 }
 
 // The core reports RETI through its own "running" line; the length runs to the
-// end of RETI (5).
+// end of RETI, which takes as long as the entry.
 void interrupt_returned(struct avr_irq_t* irq, uint32_t value, void* param) {
   (void)irq;
   (void)value;
@@ -153,7 +165,7 @@ void interrupt_returned(struct avr_irq_t* irq, uint32_t value, void* param) {
   c->active_count--;
   const uint8_t vector = c->active[c->active_count].vector;
   vector_stats* const s = &c->stats[vector];
-  const uint64_t cycles = c->avr->cycle + 5 - c->active[c->active_count].entered;
-  count(s->length, &s->length_sum, &s->length_max, cycles);
-  if (c->log_interrupts) log_add_at(c, c->avr->cycle + 5, kLogInterrupt, vector, 0);
+  const uint64_t end = c->avr->cycle + c->model->entry_cycles;
+  count(s->length, &s->length_sum, &s->length_max, end - c->active[c->active_count].entered);
+  if (c->log_interrupts) log_add_at(c, end, kLogInterrupt, interrupt_number(c, vector), 0);
 }

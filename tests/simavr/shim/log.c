@@ -36,7 +36,20 @@ void* chip_allocate(chip* c, size_t size) {
   return block->bytes;
 }
 
+typedef struct owned_array {
+  struct owned_array* next;
+  void** pointer;
+} owned_array;
+
+void chip_own(chip* c, void** pointer) {
+  owned_array* const array = chip_allocate(c, sizeof *array);
+  array->pointer = pointer;
+  array->next = c->owned_arrays;
+  c->owned_arrays = array;
+}
+
 void chip_free_owned(chip* c) {
+  for (owned_array* a = c->owned_arrays; a; a = a->next) free(*a->pointer);
   while (c->owned) {
     owned* const block = c->owned;
     c->owned = block->next;

@@ -33,7 +33,7 @@ static void write_eecr(chip* c, uint16_t address, uint8_t value, void* param) {
   (void)param;
   uint8_t* const control = &c->avr->data[address];
   const uint16_t cell =
-      (uint16_t)((c->avr->data[REG_EEARL] | c->avr->data[REG_EEARH] << 8) & 0xFFF);
+      (uint16_t)((c->avr->data[REG_EEARL] | c->avr->data[REG_EEARH] << 8) & c->model->eeprom_last);
   const bool armed = (*control & kEempe) != 0;
   const bool busy = c->eeprom.programming;
   *control = (uint8_t)((*control & (kEempe | kEepe)) | (value & (busy ? 0x08 : 0x38)));
@@ -200,6 +200,10 @@ static void program(chip* c, uint32_t page, bool erase) {
 void flash_store(chip* c) {
   const uint8_t r = c->avr->data[REG_SPMCSR];
   if (!(r & kSpmen) || chip_now(c) > c->flash.armed_until || c->flash.busy) return;
+  if (!c->model->boot_modelled) {
+    fault_add(c, kFaultFlash, r);
+    return;
+  }
   if (c->avr->pc < 0x3E000) return;
   const uint32_t z =
       (uint32_t)(c->avr->data[R_ZL] | c->avr->data[R_ZH] << 8 | c->avr->data[REG_RAMPZ] << 16) &

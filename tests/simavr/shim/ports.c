@@ -1,4 +1,4 @@
-// Ports A to L: level of every pin from chip, external drivers, open-drain
+// Ports: level of every pin from chip, external drivers, open-drain
 // devices and pull-ups; pin change and external interrupts; edges to the log
 // and to whoever listens.
 #include "chip.h"
@@ -7,25 +7,30 @@ static uint16_t pin_register(uint8_t port) {
   return port < 7 ? (uint16_t)(0x20 + 3 * port) : (uint16_t)(0x100 + 3 * (port - 7));
 }
 
+// Where a port is missing, the other chip's registers may be SRAM.
+static bool has_port(const chip* c, uint8_t port) {
+  return (c->model->ports >> port) & 1;
+}
+
 static uint8_t port_of_register(uint16_t address) {
   return address < 0x100 ? (uint8_t)((address - 0x20) / 3) : (uint8_t)(7 + (address - 0x100) / 3);
 }
 
-// Pin change bank and bit, or -1: bank 0 PORTB, bank 1 PE0 PJ0..6, bank 2 PORTK
-// (datasheet 15.2.5).
-static int pcint_of(uint8_t number) {
+// Pin change bank and bit, or -1. Bank 1 of the ATmega2560 is PE0 and PJ0..6 (datasheet 15.2.5).
+static int pcint_of(const chip* c, uint8_t number) {
   const uint8_t port = number / 8, bit = number % 8;
-  if (port == 1) return bit;
+  for (int bank = 0; bank < 3; bank++) {
+    if (c->model->pin_change_port[bank] == port) return 8 * bank + bit;
+  }
+  if (c->model->pin_change_port[1] != kNoPin) return -1;
   if (number == PIN(4, 0)) return 8;
-  if (port == 8 && bit < 7) return 9 + bit;
-  if (port == 9) return 16 + bit;
-  return -1;
+  return port == 8 && bit < 7 ? 9 + bit : -1;
 }
 
-static int external_of(uint8_t number) {
-  const uint8_t port = number / 8, bit = number % 8;
-  if (port == 3 && bit < 4) return bit;  // INT0..3 = PD0..3
-  if (port == 4 && bit > 3) return bit;  // INT4..7 = PE4..7
+static int external_of(const chip* c, uint8_t number) {
+  for (int line = 0; line < 8; line++) {
+    if (c->model->external[line] == number) return line;
+  }
   return -1;
 }
 
@@ -42,11 +47,11 @@ static void external_level(chip* c, int line, bool level) {
 }
 
 static void pin_changed(chip* c, uint8_t number, bool level) {
-  const int change = pcint_of(number);
+  const int change = pcint_of(c, number);
   if (change >= 0 && ((c->avr->data[REG_PCMSK0 + change / 8] >> (change % 8)) & 1)) {
     interrupt_flag(c, (uint8_t)(kVectorPcint0 + change / 8), chip_now(c));
   }
-  const int line = external_of(number);
+  const int line = external_of(c, number);
   if (line >= 0) {
     const uint8_t mode = sense_mode(c, line);
     if (mode == 0)
@@ -79,6 +84,7 @@ static bool resolve(chip* c, uint8_t number) {
 }
 
 void pin_refresh(chip* c, uint8_t number) {
+  if (!has_port(c, number / 8)) return;
   pin* const p = &c->pins[number];
   const bool level = resolve(c, number);
   if (level == p->level) return;
@@ -155,8 +161,8 @@ static void write_enable(chip* c, uint16_t address, uint8_t value, void* param) 
   // EIMSK and both sense registers: a line in level mode requests as long as it
   // is low
   for (int line = 0; line < 8; line++) {
-    const uint8_t number = line < 4 ? PIN(3, line) : PIN(4, line);
-    external_level(c, line, c->pins[number].level);
+    const uint8_t number = c->model->external[line];
+    if (number != kNoPin) external_level(c, line, c->pins[number].level);
   }
 }
 
@@ -170,6 +176,7 @@ static void write_mcucr(chip* c, uint16_t address, uint8_t value, void* param) {
 
 void ports_init(chip* c) {
   for (uint8_t port = 0; port < kPortCount; port++) {
+    if (!has_port(c, port)) continue;
     const uint16_t base = pin_register(port);
     hook_read(c, base, read_pins, NULL);
     for (uint16_t i = 0; i < 3; i++) hook_write(c, (uint16_t)(base + i), write_port, NULL);

@@ -8,7 +8,7 @@ static void clear_registers(chip* c) {
   avr_t* const avr = c->avr;
   const uint8_t mcusr = avr->data[REG_MCUSR];
   const uint8_t eecr = avr->data[REG_EECR];
-  memset(avr->data + 32, 0, REG_LAST_IO + 1 - 32);
+  memset(avr->data + 32, 0, c->model->last_io + 1u - 32u);
   avr->data[REG_MCUSR] = mcusr;
   avr->data[REG_EECR] = eecr & 0x30;
   for (int i = 0; i < 8; i++) avr->sreg[i] = 0;
@@ -68,7 +68,7 @@ void chip_pulse_reset(chip* c, uint8_t cause) {
 
 static void forget_memory(chip* c) {
   // What SRAM holds at power-on is undefined; a seed makes it repeatable.
-  for (uint32_t i = REG_LAST_IO + 1; i <= c->avr->ramend; i++) {
+  for (uint32_t i = c->model->last_io + 1u; i <= c->avr->ramend; i++) {
     c->avr->data[i] = (uint8_t)chip_random(c);
   }
   for (uint32_t i = 0; i < 32; i++) c->avr->data[i] = (uint8_t)chip_random(c);

@@ -9,6 +9,7 @@
 #include <simavr/avr_watchdog.h>
 
 #include "bench.h"
+#include "bus.h"
 
 // ---- register hooks
 // -------------------------------------------------------------------------
@@ -103,21 +104,24 @@ static void write_mark(chip* c, uint16_t address, uint8_t value, void* param) {
     log_add(c, kLogMark, address == REG_GPIOR0 ? 0 : address - REG_GPIOR1 + 1u, value);
 }
 
-chip* bench_create(uint64_t seed) {
+chip* bench_create(uint64_t seed, uint32_t kind) {
   avr_global_logger_set(core_message);
-  avr_t* const avr = avr_make_mcu_by_name("atmega2560");
+  const chip_model* const model = model_of(kind);
+  if (!model) return NULL;
+  avr_t* const avr = avr_make_mcu_by_name(model->name);
   if (!avr) return NULL;
   chip_with_hooks* const whole = calloc(1, sizeof *whole);
   if (!whole) abort();
   chip* const c = &whole->c;
   c->avr = avr;
+  c->model = model;
   c->random_state = seed * 2 + 1;
   avr_init(avr);
   avr->custom.data = c;
   avr->frequency = 16000000;
   avr->sleep = no_sleep;
-  avr->ioend = REG_LAST_IO;  // the core's own table ends here; beyond lie
-                             // reserved addresses
+  avr->ioend = model->last_io;  // the core's own table ends here; beyond lie
+                                // reserved addresses
   memset(avr->io, 0, sizeof avr->io);
   avr->io_port = NULL;
   avr->reset = NULL;
@@ -152,6 +156,7 @@ chip* bench_create(uint64_t seed) {
 }
 
 void bench_destroy(chip* c) {
+  bus_leave(c);
   chip_free_owned(c);
   free(c->watched_pc);
   for (int i = 0; i < 16; i++) free(c->adc.channel[i].point);
@@ -204,10 +209,18 @@ static void execute(chip* c, uint64_t room) {
   if (sp < c->lowest_sp) c->lowest_sp = sp;
 }
 
+// Chips on one bus run together, whichever is asked.
 void bench_run(chip* c, uint64_t until) {
+  if (c->bus)
+    bus_run(c->bus, c, until);
+  else
+    chip_run(c, until);
+}
+
+void chip_run(chip* c, uint64_t until) {
   avr_t* const avr = c->avr;
   c->stop_requested = false;
-  while (avr->cycle < until && !c->stop_requested) {
+  while (avr->cycle < until && !c->stop_requested && !c->yield) {
     const uint64_t next = c->heap_count ? c->heap[0]->cycle : UINT64_MAX;
     if (next <= avr->cycle) {
       event_dispatch(c);
@@ -245,7 +258,7 @@ void bench_run(chip* c, uint64_t until) {
     execute(c, horizon - avr->cycle);
   }
   // What is due exactly now belongs to the past of whoever looks next.
-  if (!c->stop_requested) event_dispatch(c);
+  if (!c->stop_requested && !c->yield) event_dispatch(c);
 }
 
 void bench_stop(chip* c) {

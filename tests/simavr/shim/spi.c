@@ -3,7 +3,7 @@
 // master role away. Bytes go to the device whose chip select pin is low.
 #include "chip.h"
 
-static uint32_t divider(const chip* c) {
+uint32_t spi_divider(const chip* c) {
   static const uint32_t kDividers[4] = {4, 16, 64, 128};
   const uint32_t d = kDividers[c->avr->data[REG_SPCR] & 3];
   return c->avr->data[REG_SPSR] & 1 ? d / 2 : d;
@@ -35,8 +35,9 @@ static void clear_after_access(chip* c) {
 
 static void lose_master(chip* c) {
   const uint8_t control = c->avr->data[REG_SPCR];
-  const bool ss_is_input = !(c->avr->data[0x24] & 1);
-  if ((control & 0x50) == 0x50 && ss_is_input && !c->pins[PIN(1, 0)].level) {
+  const uint8_t ss = c->model->ss_pin;
+  const bool ss_is_input = !((c->avr->data[0x24] >> (ss % 8)) & 1);  // PORTB on both chips
+  if ((control & 0x50) == 0x50 && ss_is_input && !c->pins[ss].level) {
     c->avr->data[REG_SPCR] &= (uint8_t)~0x10u;
     event_cancel(c, &c->spi.due);
     c->spi.busy = false;
@@ -60,7 +61,7 @@ static void write_data(chip* c, uint16_t address, uint8_t value, void* param) {
   }
   c->spi.out = value;
   c->spi.busy = true;
-  event_at(c, &c->spi.due, chip_now(c) + 8u * divider(c));
+  event_at(c, &c->spi.due, chip_now(c) + 8u * spi_divider(c));
 }
 
 static uint8_t read_data(chip* c, uint16_t address, void* param) {
@@ -104,7 +105,7 @@ void spi_init(chip* c) {
   hook_read(c, REG_SPSR, read_status, NULL);
   hook_write(c, REG_SPSR, write_status, NULL);
   hook_write(c, REG_SPCR, write_control, NULL);
-  pin_listen(c, PIN(1, 0), ss_changed, NULL);
+  pin_listen(c, c->model->ss_pin, ss_changed, NULL);
 }
 
 void spi_reset(chip* c) {

@@ -117,11 +117,11 @@ static void write_wide(chip* c, uint16_t address, uint8_t value, void* param) {
 
 static void write_prescaler(chip* c, uint16_t address, uint8_t value, void* param) {
   (void)param;
-  for (uint8_t i = 0; i < kTimerCount; i++) timer_serve(c, &c->timers[i], chip_now(c));
+  for (uint8_t i = 0; i < c->model->timers; i++) timer_serve(c, &c->timers[i], chip_now(c));
   c->prescaler_held = (value & 0x81) == 0x81;
   if (value & 1) c->prescaler_base = chip_now(c);
   c->avr->data[address] = value & 0x80 ? value & 0x83 : 0;
-  for (uint8_t i = 0; i < kTimerCount; i++) {
+  for (uint8_t i = 0; i < c->model->timers; i++) {
     timer* const t = &c->timers[i];
     if (i == 2) continue;
     if (t->divider && (value & 1)) {
@@ -132,7 +132,7 @@ static void write_prescaler(chip* c, uint16_t address, uint8_t value, void* para
 }
 
 void timers_init(chip* c) {
-  for (uint8_t n = 0; n < kTimerCount; n++) {
+  for (uint8_t n = 0; n < c->model->timers; n++) {
     timer* const t = &c->timers[n];
     t->number = n;
     t->wide = n != 0 && n != 2;

@@ -6,16 +6,6 @@
 // out when the program looks at them.
 #include "timers.h"
 
-static const uint8_t kOutputPins[kTimerCount][3] = {
-    {PIN(1, 7), PIN(6, 5), 0xFF},
-    {PIN(1, 5), PIN(1, 6), PIN(1, 7)},
-    {PIN(1, 4), PIN(7, 6), 0xFF},
-    {PIN(4, 3), PIN(4, 4), PIN(4, 5)},
-    {PIN(7, 3), PIN(7, 4), PIN(7, 5)},
-    {PIN(10, 3), PIN(10, 4), PIN(10, 5)},
-};
-static const uint8_t kCapturePins[kTimerCount] = {
-    0xFF, PIN(3, 4), 0xFF, PIN(4, 7), PIN(10, 0), PIN(10, 1)};
 static const uint8_t kFirstVector[kTimerCount] = {21, 16, 13, 31, 41, 46};  // wide: the capture
 
 uint8_t timer_first_vector(const timer* t) {
@@ -48,8 +38,8 @@ static uint32_t match_at(const timer* t, uint8_t i) {
 }
 
 void timer_show_output(chip* c, timer* t, uint8_t i) {
-  const uint8_t number = kOutputPins[t->number][i];
-  if (number != 0xFF) pin_oc(c, number, t->com[i] != 0, t->oc[i]);
+  const uint8_t number = c->model->outputs[t->number][i];
+  if (number != kNoPin) pin_oc(c, number, t->com[i] != 0, t->oc[i]);
 }
 
 static bool toggles(const timer* t, uint8_t i) {
@@ -243,9 +233,9 @@ static void captured(chip* c, void* param, uint64_t argument) {
 }
 
 void timer_capture(chip* c, uint8_t number, bool level) {
-  for (uint8_t i = 1; i < kTimerCount; i++) {
+  for (uint8_t i = 1; i < c->model->timers; i++) {
     timer* const t = &c->timers[i];
-    if (kCapturePins[i] != number || t->icr_is_top) continue;
+    if (c->model->captures[i] != number || t->icr_is_top) continue;
     const uint8_t b = c->avr->data[t->base + 1];
     if (((b & 0x40) != 0) != level) continue;
     // The noise canceler delays by four system clocks (datasheet 17.6.2).
@@ -259,7 +249,7 @@ void timer_capture(chip* c, uint8_t number, bool level) {
 void timers_reset(chip* c) {
   c->prescaler_base = chip_now(c);
   c->prescaler_held = false;
-  for (uint8_t n = 0; n < kTimerCount; n++) {
+  for (uint8_t n = 0; n < c->model->timers; n++) {
     timer* const t = &c->timers[n];
     event_cancel(c, &t->due);
     t->divider = 0;

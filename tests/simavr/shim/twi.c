@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bus.h"
 #include "twi.h"
 
 enum { kTwint = 0x80, kTwea = 0x40, kTwsta = 0x20, kTwsto = 0x10, kTwen = 0x04 };
@@ -19,7 +20,6 @@ enum phase {
   kBusWaitStart,
   kBusDie,
 };
-enum { kSclPin = PIN(3, 0), kSdaPin = PIN(3, 1) };
 
 static uint8_t control(const chip* c) {
   return c->avr->data[REG_TWCR];
@@ -78,16 +78,65 @@ static void begin_byte(chip* c) {
   go(c, dies ? kBusDie : kBusByte, (uint64_t)p->scl_cycles * (dies ? 4 : 9));
 }
 
+void twi_slave_start(chip* c) {
+  if (!(control(c) & kTwen)) return;
+  const bool broken = c->twi.mid_byte, was_addressed = c->twi.addressed;
+  c->twi.mid_byte = c->twi.addressed = false;
+  if (broken)
+    raise(c, 0x00);  // START in the middle of a byte
+  else if (was_addressed)
+    raise(c, 0xA0);
+}
+
+// A slave that sends is not modelled: nobody answers a read.
+bool twi_slave_address(chip* c, uint8_t address_and_direction) {
+  const uint8_t address = address_and_direction >> 1;
+  const bool general = address == 0 && (c->avr->data[REG_TWAR] & 1);
+  if ((address_and_direction & 1) || (control(c) & (kTwen | kTwea)) != (kTwen | kTwea) ||
+      !(general || addressed_by(c, address))) {
+    return false;
+  }
+  c->twi.addressed = true;
+  c->twi.general_call = general;
+  c->avr->data[REG_TWDR] = address_and_direction;
+  raise(c, general ? 0x70 : 0x60);
+  return true;
+}
+
+bool twi_slave_byte(chip* c, uint8_t value) {
+  if (!c->twi.addressed || !(control(c) & kTwen)) return false;
+  c->avr->data[REG_TWDR] = value;
+  if (!c->twi.acknowledge) {
+    c->twi.addressed = false;
+    raise(c, c->twi.general_call ? 0x98 : 0x88);
+    return false;
+  }
+  raise(c, c->twi.general_call ? 0x90 : 0x80);
+  return true;
+}
+
+void twi_slave_stop(chip* c) {
+  const bool tell = c->twi.addressed && (control(c) & kTwen);
+  const bool broken = c->twi.mid_byte && (control(c) & kTwen);
+  c->twi.addressed = c->twi.mid_byte = false;
+  if (broken)
+    raise(c, 0x00);
+  else if (tell)
+    raise(c, 0xA0);
+}
+
+void twi_slave_break(chip* c) {
+  c->twi.mid_byte = c->twi.addressed;
+}
+
+bool twi_slave_holds(const chip* c) {
+  return (control(c) & (kTwen | kTwint)) == (kTwen | kTwint);
+}
+
 static void after_address(chip* c) {
   const twi_packet* const p = c->twi.queue;
-  const bool general = p->address == 0 && (c->avr->data[REG_TWAR] & 1);
-  if ((control(c) & (kTwen | kTwea)) == (kTwen | kTwea) &&
-      (general || addressed_by(c, p->address))) {
-    c->twi.addressed = true;
-    c->twi.general_call = general;
+  if (twi_slave_address(c, (uint8_t)(p->address << 1))) {
     c->twi.acked = 0;
-    c->avr->data[REG_TWDR] = (uint8_t)(p->address << 1);
-    raise(c, general ? 0x70 : 0x60);
     hold(c, kBusHeldAfterAddress);
     return;
   }
@@ -101,14 +150,7 @@ static void after_byte(chip* c) {
     go(c, kBusStop, p->scl_cycles);
     return;
   }
-  c->avr->data[REG_TWDR] = p->data[c->twi.index++];
-  if (c->twi.acknowledge) {
-    c->twi.acked++;
-    raise(c, c->twi.general_call ? 0x90 : 0x80);
-  } else {
-    c->twi.addressed = false;
-    raise(c, c->twi.general_call ? 0x98 : 0x88);
-  }
+  if (twi_slave_byte(c, p->data[c->twi.index++])) c->twi.acked++;
   hold(c, kBusHeldAfterByte);
 }
 
@@ -133,12 +175,8 @@ static void bus_event(chip* c, void* param, uint64_t argument) {
       c->twi.stretch_cycles = 0;
       c->twi.acked = 0;
       c->twi.index = 0;
-      if ((control(c) & kTwen) && c->twi.mid_byte) {
-        c->twi.mid_byte = false;  // START in the middle of a byte
-        c->twi.addressed = false;
-        raise(c, 0x00);
-      }
-      if ((control(c) & (kTwen | kTwint)) == (kTwen | kTwint)) {
+      twi_slave_start(c);
+      if (twi_slave_holds(c)) {
         hold(c, kBusStart);  // the slave still holds SCL from its last event
         return;
       }
@@ -153,14 +191,10 @@ static void bus_event(chip* c, void* param, uint64_t argument) {
     case kBusDie:
       master_dies(c);
       return;
-    case kBusStop: {
-      const bool tell = c->twi.addressed && (control(c) & kTwen);
-      c->twi.addressed = false;
-      c->twi.mid_byte = false;
-      if (tell) raise(c, 0xA0);
+    case kBusStop:
+      twi_slave_stop(c);
       finish(c, false);
       return;
-    }
     default:
       return;
   }
@@ -197,8 +231,13 @@ static bool waiting_for_program(const chip* c) {
 
 static void write_control(chip* c, uint16_t address, uint8_t value, void* param) {
   (void)param;
+  if (c->bus && bus_master(c->bus) == c) {
+    bus_control(c->bus, value);
+    return;
+  }
   uint8_t* const r = &c->avr->data[address];
   const bool clears = (value & kTwint) != 0;
+  if (clears || !(value & kTwen)) c->twi.released_at = chip_now(c);
   if (value & kTwsta) fault_add(c, kFaultTwiMaster, value);
   *r = (uint8_t)((*r & kTwint) | (value & ~(kTwint | kTwsta | kTwsto)));
   if (!(value & kTwen)) {
@@ -223,8 +262,8 @@ static void write_status(chip* c, uint16_t address, uint8_t value, void* param) 
 }
 
 void twi_hold(chip* c, bool sda, bool scl) {
-  if (sda != c->twi.sda_held) pin_pull_low(c, kSdaPin, sda);
-  if (scl != c->twi.scl_held) pin_pull_low(c, kSclPin, scl);
+  if (sda != c->twi.sda_held) pin_pull_low(c, c->model->sda_pin, sda);
+  if (scl != c->twi.scl_held) pin_pull_low(c, c->model->scl_pin, scl);
   const bool sda_let_go = c->twi.sda_held && !sda;
   c->twi.sda_held = sda;
   c->twi.scl_held = scl;
@@ -254,7 +293,7 @@ void twi_init(chip* c) {
   c->twi.due.run = bus_event;
   hook_write(c, REG_TWCR, write_control, NULL);
   hook_write(c, REG_TWSR, write_status, NULL);
-  c->pins[kSclPin].weak = c->pins[kSdaPin].weak = kDriveHigh;
+  c->pins[c->model->scl_pin].weak = c->pins[c->model->sda_pin].weak = kDriveHigh;
 }
 
 // The master outside goes on: a reset slave lets the lines go and answers
@@ -264,7 +303,9 @@ void twi_reset(chip* c) {
   c->avr->data[REG_TWDR] = 0xFF;
   c->avr->data[REG_TWAR] = 0xFE;
   c->twi.addressed = c->twi.mid_byte = c->twi.acknowledge = false;
+  c->twi.released_at = chip_now(c);
   if (waiting_for_program(c)) continue_bus(c);
+  if (c->bus && bus_master(c->bus) == c) bus_abandon(c->bus);
 }
 
 void twi_free(chip* c) {

@@ -258,7 +258,7 @@ void uart_send(chip* c,
 
 void uarts_init(chip* c) {
   static const uint16_t kBases[kUartCount] = {REG_UCSR0A, REG_UCSR1A, REG_UCSR2A, REG_UCSR3A};
-  for (uint8_t n = 0; n < kUartCount; n++) {
+  for (uint8_t n = 0; n < c->model->uarts; n++) {
     uart* const u = &c->uarts[n];
     u->number = n;
     u->base = kBases[n];
@@ -274,7 +274,7 @@ void uarts_init(chip* c) {
 }
 
 void uarts_reset(chip* c) {
-  for (uint8_t n = 0; n < kUartCount; n++) {
+  for (uint8_t n = 0; n < c->model->uarts; n++) {
     uart* const u = &c->uarts[n];
     event_cancel(c, &u->tx_due);
     event_cancel(c, &u->rx_due);

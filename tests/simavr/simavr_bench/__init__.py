@@ -1,4 +1,4 @@
-"""A simulated ATmega2560 with the devices of the flight recorder around it.
+"""Simulated ATmegas with the devices of the flight recorder around them.
 
 The instruction core is Debian's unmodified libsimavr; everything around it is modelled in
 ``tests/simavr/shim``. Simulation only: nothing here was measured on a board.
@@ -9,7 +9,9 @@ from simavr_bench.chip import CYCLES_PER_S, Chip, ResetCause, cycles
 from simavr_bench.firmware import Image, read_image
 from simavr_bench.fork import ForkError, in_fork
 from simavr_bench.gps import GpsUart
+from simavr_bench.i2c_bus import I2cBus
 from simavr_bench.imu import ArduImu, MasterDeath
+from simavr_bench.imu_sensors import Magnetometer, Mpu6000, MpuFault
 from simavr_bench.log import Fault, LogKind
 from simavr_bench.pins import arduino_pin, pin_name, pin_number
 from simavr_bench.radio import XBee
@@ -29,9 +31,13 @@ __all__ = [
     "Fault",
     "ForkError",
     "GpsUart",
+    "I2cBus",
     "Image",
     "LogKind",
+    "Magnetometer",
     "MasterDeath",
+    "Mpu6000",
+    "MpuFault",
     "Receiver",
     "ResetCause",
     "SdCard",

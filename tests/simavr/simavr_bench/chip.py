@@ -1,4 +1,4 @@
-"""One simulated ATmega2560."""
+"""One simulated ATmega2560 or ATmega328P."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["CYCLES_PER_S", "Chip", "ResetCause", "cycles", "run_together"]
 
 
 class Chip(PinAccess, BusAccess, MemoryAccess):
-    """An ATmega2560 at 16 MHz with nothing connected.
+    """A chip at 16 MHz with nothing connected.
 
     Several may live in one process; each is independent and, with its seed and stimuli, repeats
     itself to the cycle.
@@ -26,6 +26,8 @@ class Chip(PinAccess, BusAccess, MemoryAccess):
         From the release of reset to the first instruction; 66.024 ms is low fuse 0xFF.
     bootloader : bool
         Start at 0x3E000 (BOOTRST programmed) instead of at 0.
+    model : str
+        ``atmega2560`` or ``atmega328p``; of the latter's boot section nothing is modelled.
 
     Examples
     --------

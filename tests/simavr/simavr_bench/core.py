@@ -15,6 +15,8 @@ from simavr_bench.library import Callback, load_library
 from simavr_bench.log import LogKind
 
 CYCLES_PER_S = 16_000_000
+# `enum chip_kind` of shim/model.h, bytes of flash, bytes of EEPROM
+MODELS = {"atmega2560": (0, 262_144, 4096), "atmega328p": (1, 32_768, 1024)}
 BOOTLOADER_START = 0x3E000
 
 _TIMER, _I2C = 100, 101
@@ -49,10 +51,19 @@ class Core:
     """What every part of :class:`~simavr_bench.chip.Chip` stands on; see there."""
 
     def __init__(
-        self, *, seed: int = 1, startup_s: float = 0.066024, bootloader: bool = False
+        self,
+        *,
+        seed: int = 1,
+        startup_s: float = 0.066024,
+        bootloader: bool = False,
+        model: str = "atmega2560",
     ) -> None:
+        if model not in MODELS:
+            raise ValueError(f"no model of {model!r}, expected one of {', '.join(MODELS)}")
+        kind, self._flash_size, self._eeprom_size = MODELS[model]
         self._lib = load_library(_library_path())
-        self._chip = self._lib.bench_create(seed)
+        self._chip = self._lib.bench_create(seed, kind)
+        self._neighbours: list[Core] = []  # on one bus: they run together
         self._timers: dict[int, Callable[[], None]] = {}
         self._next_timer = 0
         self._pin_listeners: dict[int, list[Callable[[bool, int], None]]] = {}
@@ -101,6 +112,11 @@ class Core:
         """The C library, for device models."""
         return self._lib
 
+    def join(self, other: Core) -> None:
+        """Run together with another chip, as the library does for chips on one bus."""
+        self._neighbours.append(other)
+        other._neighbours.append(self)
+
     def load(self, firmware: Path | Image) -> Image:
         """Put a program into flash (and its EEPROM part into EEPROM).
 
@@ -114,8 +130,17 @@ class Core:
         -------
         Image
             The image; its symbols are added to :attr:`symbols`.
+
+        Raises
+        ------
+        ValueError
+            If the image does not fit the chip.
         """
         image = firmware if isinstance(firmware, Image) else read_image(firmware)
+        for pieces, size in ((image.flash, self._flash_size), (image.eeprom, self._eeprom_size)):
+            end = max((address + len(piece) for address, piece in pieces.items()), default=0)
+            if end > size:
+                raise ValueError(f"the image ends at {end}, the chip has {size} bytes")
         flash, eeprom = self._lib.bench_flash(self.handle), self._lib.bench_eeprom(self.handle)
         for address, piece in image.flash.items():
             ct.memmove(flash + address, piece, len(piece))
@@ -181,9 +206,10 @@ class Core:
             Whatever a scheduled callback raised; the run ends there.
         """
         self._lib.bench_run(self.handle, cycle)
-        if self._error is not None:
-            error, self._error = self._error, None
-            raise error
+        for chip in (self, *self._neighbours):
+            if chip._error is not None:
+                error, chip._error = chip._error, None
+                raise error
 
     def run_s(self, time_s: float) -> None:
         """Run for a time from now."""

@@ -27,6 +27,15 @@ class VectorRecord(ct.Structure):
     )
 
 
+class MpuSettings(ct.Structure):
+    """``mpu_settings`` of shim/bench.h."""
+
+    _fields_ = tuple(
+        (name, ct.c_double)
+        for name in ("clock_rate", "jitter_cycles", "gyro_noise_lsb", "accel_noise_lsb")
+    )
+
+
 class SdSettings(ct.Structure):
     """``sd_settings`` of shim/bench.h."""
 
@@ -108,6 +117,25 @@ _SIGNATURES: dict[str, tuple[object, tuple[object, ...]]] = {
     "i2c_registers": (ct.POINTER(ct.c_uint8), ()),
     "i2c_present": (None, (_bool,)),
     "i2c_fastest": (_u32, ()),
+    "bus": (_ptr, (_ptr, _f64)),
+    "bus_hold": (None, (_bool, _bool, _bool, _bool)),
+    "bus_hang": (None, (_u32,)),
+    "bus_stretch": (None, (_f64,)),
+    "bus_log_bytes": (None, (_bool,)),
+    "bus_time": (_f64, (_ptr, _u64)),
+    "mpu_spi": (_ptr, (_u32, _u32, _u32)),
+    "mpu_i2c": (_ptr, (_ptr, _u32, _u32)),
+    "mpu_set": (None, (ct.POINTER(MpuSettings),)),
+    "mpu_fault": (None, (_u32,)),
+    "mpu_reset": (None, ()),
+    "mpu_motion": (None, (_doubles, _doubles, _u32)),
+    "mpu_count": (ct.c_size_t, ()),
+    "mpu_samples": (_ptr, ()),
+    "mpu_registers": (ct.POINTER(ct.c_uint8), ()),
+    "magnetometer": (_ptr, (_ptr, _bool)),
+    "magnetometer_fault": (None, (_bool, _bool)),
+    "magnetometer_count": (_u64, ()),
+    "magnetometer_field": (None, (_doubles, _doubles, _u32)),
     "sd_card": (_ptr, (_u32, _ptr, ct.POINTER(SdSettings), _u64)),
     "sd_insert": (None, (_bool,)),
     "sd_stall": (None, (_u64, _u32)),
@@ -139,7 +167,7 @@ def load_library(path: Path) -> ct.CDLL:
     """
     library = ct.CDLL(str(path))
     library.bench_create.restype = _ptr
-    library.bench_create.argtypes = (_u64,)
+    library.bench_create.argtypes = (_u64, _u32)
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(library, f"bench_{name}")
         function.restype = result

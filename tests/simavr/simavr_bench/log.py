@@ -47,6 +47,9 @@ class TwiNote(IntEnum):
     DIED = 1
     REFUSED = 2
     STRETCH = 3
+    START = 4
+    ADDRESSED = 5
+    BYTE = 6
 
 
 class CardNote(IntEnum):

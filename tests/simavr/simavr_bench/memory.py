@@ -23,20 +23,20 @@ class MemoryAccess(Core):
         ct.memmove(self._lib.bench_data(self.handle) + address, value, len(value))
 
     def eeprom(self) -> bytes:
-        """All 4096 bytes of EEPROM."""
-        return ct.string_at(self._lib.bench_eeprom(self.handle), 4096)
+        """All bytes of EEPROM."""
+        return ct.string_at(self._lib.bench_eeprom(self.handle), self._eeprom_size)
 
     def set_eeprom(self, content: bytes) -> None:
-        """Set all 4096 bytes of EEPROM.
+        """Set all bytes of EEPROM.
 
         Raises
         ------
         ValueError
-            If there are not 4096.
+            If there are not as many as the chip has.
         """
-        if len(content) != 4096:
-            raise ValueError(f"EEPROM of {len(content)} bytes, expected 4096")
-        ct.memmove(self._lib.bench_eeprom(self.handle), content, 4096)
+        if len(content) != self._eeprom_size:
+            raise ValueError(f"EEPROM of {len(content)} bytes, expected {self._eeprom_size}")
+        ct.memmove(self._lib.bench_eeprom(self.handle), content, self._eeprom_size)
 
     def flash(self, address: int, count: int) -> bytes:
         """Bytes of program memory."""
