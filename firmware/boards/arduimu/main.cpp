@@ -17,7 +17,7 @@ namespace {
 
 constexpr uint32_t kSilentUs = 20000;      // four samples: the chip or its line is dead
 constexpr uint32_t kOtherBusUs = 1000000;  // no chip by SPI: an MPU-6050 by I2C, and back
-constexpr uint16_t kSealUs = 240;          // from the seal to START: put_packet takes 215 us
+constexpr uint16_t kSealUs = 260;          // from the seal to START: put_packet takes 240 us
 
 core::ImuSettings g_settings;
 arduimu::MpuBus g_mpu_bus;
@@ -137,9 +137,7 @@ void send_sample() {
   }
   const uint32_t start_us = arduimu::now_us() + kSealUs;
   g_node.put_packet(g_packet, start_us);
-  while (int32_t(arduimu::now_us() - start_us) < 0) {
-  }
-  arduimu::begin_transfer(frames::kImuPacketAddress, g_packet, frames::kImuPacketSize, 0);
+  arduimu::begin_transfer_at(start_us, frames::kImuPacketAddress, g_packet, frames::kImuPacketSize);
 }
 
 void serve_sample(const uint32_t at_us, const uint8_t edges) {

@@ -16,6 +16,7 @@ constexpr uint8_t kSda = 1U << 4;  // PC4
 constexpr uint8_t kScl = 1U << 5;  // PC5
 constexpr uint8_t kGo = _BV(TWINT) | _BV(TWEN) | _BV(TWIE);
 constexpr uint8_t kStop = _BV(TWINT) | _BV(TWEN) | _BV(TWSTO);
+constexpr uint8_t kStartUs = 14;
 
 uint8_t* volatile g_buffer;
 volatile uint8_t g_address;
@@ -80,6 +81,23 @@ void free_lines() {
   _delay_us(5);
 }
 
+// Everything but the START; false while a transfer is under way.
+bool prepare(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size) {
+  if (arduimu::poll_transfer() == TwiStatus::kBusy) {
+    return false;
+  }
+  // The STOP of the last transfer takes 2.5 us at most; START behind it waits in the hardware.
+  g_buffer = buffer;
+  g_address = address;
+  g_out = out_size;
+  g_in = in_size;
+  g_at = 0;
+  g_status = TwiStatus::kBusy;
+  g_steps_seen = g_steps;
+  g_begin_us = g_step_us = arduimu::now_us();
+  return true;
+}
+
 }  // namespace
 
 // About 3 us a byte, of 22.5 us on the wire.
@@ -128,18 +146,21 @@ void start_twi() {
 }
 
 bool begin_transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size) {
-  if (poll_transfer() == TwiStatus::kBusy) {
+  if (!prepare(address, buffer, out_size, in_size)) {
     return false;
   }
-  // The STOP of the last transfer takes 2.5 us at most; START behind it waits in the hardware.
-  g_buffer = buffer;
-  g_address = address;
-  g_out = out_size;
-  g_in = in_size;
-  g_at = 0;
-  g_status = TwiStatus::kBusy;
-  g_steps_seen = g_steps;
-  g_begin_us = g_step_us = now_us();
+  TWCR = kGo | _BV(TWSTA);
+  return true;
+}
+
+bool begin_transfer_at(uint32_t start_us, uint8_t address, uint8_t* buffer, uint8_t out_size) {
+  if (!prepare(address, buffer, out_size, 0)) {
+    return false;
+  }
+  // Half a turn of this loop, the call and the START itself: kStartUs on average (measured).
+  const uint32_t go_us = start_us - kStartUs;
+  while (int32_t(now_us() - go_us) < 0) {
+  }
   TWCR = kGo | _BV(TWSTA);
   return true;
 }

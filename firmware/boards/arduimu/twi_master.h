@@ -17,6 +17,9 @@ void start_twi();
 // is used for both and lives until the end. False while a transfer is under way.
 bool begin_transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size);
 
+// The same without a read, START at `start_us`: waits for it.
+bool begin_transfer_at(uint32_t start_us, uint8_t address, uint8_t* buffer, uint8_t out_size);
+
 // Looks at the clock: a transfer that stands still is ended, its lines freed by up to nine clocks
 // and a STOP.
 TwiStatus poll_transfer();
