@@ -23,6 +23,8 @@ def airframe_data(source: str) -> AirframeData:
     from host.twin import aircraft
 
     loaded = aircraft.load(source)
+    drawing = aircraft.read_document(source)["geometry"]
+    arms = drawing if isinstance(drawing, dict) else {}
     try:
         number, vector = loaded.scalar, loaded.vector
         vanes = tuple(tuple(map(float, vector(f"sensors.vane_{k}_m"))) for k in "ab")
@@ -43,6 +45,9 @@ def airframe_data(source: str) -> AirframeData:
             vanes_m=tuple((v[0], v[1], v[2]) for v in vanes),
             upwash=number("sensors.upwash"),
             upwash_share=number("sensors.upwash_tolerance"),
+            elevator_arm_m=float(arms.get("elevator_arm_m", 0.0)),
+            rudder_arm_m=float(arms.get("rudder_arm_m", 0.0)),
+            arm_share=float(arms.get("arm_tolerance", 0.10)) * RECTANGLE,
         )
     except KeyError as error:
         raise IdentificationError(f"aircraft {source}: no {error.args[0]} in its file") from error

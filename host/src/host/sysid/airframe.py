@@ -21,7 +21,8 @@ class AirframeData:
     """Mass, inertia, reference sizes, sensor positions with their relative uncertainties.
 
     Positions are in metres from the CG, x forward, y right, z down; relative numbers are standard
-    deviations. `upwash` is the share by which the vanes over-read.
+    deviations. `upwash` is the share by which the vanes over-read. Arms reach from the nominal CG
+    back to where a tail surface's control force acts; 0 is not known.
     """
 
     name: str
@@ -40,6 +41,9 @@ class AirframeData:
     vanes_m: tuple[tuple[float, float, float], ...] = ()
     upwash: float = 0.0
     upwash_share: float = 0.2
+    elevator_arm_m: float = 0.0
+    rudder_arm_m: float = 0.0
+    arm_share: float = 0.06
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,7 +42,7 @@ class InstrumentData:
     pitot_drift_pa: float = 4.88
     delay_share: float = 0.20
     delay_least_s: float = 1e-3
-    align_s: float = 1.0e-3  # sampling, and filters modelled as one pole: found about 1 ms off
+    align_s: float = 0.5e-3  # filters modelled as one pole and a delay
     misalignment_rad: float = 1.0 * DEGREE
     gyro_scale: float = 0.01
     gyro_bias_radps: float = 0.5 * DEGREE

@@ -10,7 +10,7 @@ import numpy as np
 from host.compiled import Array
 
 Step = Callable[[float, float, float, float], tuple[float, float, float]]
-STRIDE, SUBSTEPS = 4, 4  # a rotor takes 0.1 s and more to answer
+STRIDE, SUBSTEPS = 1, 3  # a rotor takes 0.1 s and more to answer; records come at 33 Hz
 START_RADPS = 600.0  # forgotten within half a second
 
 

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from host.sysid.aircraft_file import airframe_data, instrument_data, powerplant
-from host.sysid.coefficient_fit import Window, fit_coefficients
+from host.sysid.coefficient_fit import fit_coefficients
+from host.sysid.coefficient_windows import Window
 from host.sysid.errors import IdentificationError
 from host.sysid.finder import Found, find
 from host.sysid.flight import identify
@@ -31,7 +32,7 @@ OVERLAP = 0.8
 ALONG = ("CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "CD_0")
 LEAD_S = 0.5  # of trim before a maneuver
 SETTLED_S = 3.0  # after the launch
-CARDS = ("demo", "multisine", "sweep", "calm")
+CARDS = ("demo", "multisine", "survey", "sweep", "calm")
 PRINCIPAL = (
     "CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "CD_0", "CY_beta", "CY_dr", "Cl_beta", "Cl_p",
     "Cl_r", "Cl_da", "Cn_beta", "Cn_p", "Cn_r", "Cn_dr",
