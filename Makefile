@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench study flight-bench faults clean
+.PHONY: help setup demo test native mega sitl lint format bench study flight-bench faults power-cuts clean
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # mkfs.vfat and fsck.vfat live where only root looks.
@@ -47,8 +47,11 @@ study: setup ## tables and pictures of identification in build/study (SIZE=full:
 flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
 	@cd tests/simavr && ../../$(PYTHON) -m flight.bench $(BENCH)
 
-faults: setup ## faults and power cuts in flight on the simulated chip (minutes)
+faults: setup ## faults in flight on the simulated chip
 	@cd tests/simavr && ../../$(PYTHON) -m flight.faults $(FAULTS)
+
+power-cuts: setup ## power cuts in flight, of metadata, and the next boot (minutes)
+	@cd tests/simavr && ../../$(PYTHON) -m flight.power_cuts $(CUTS)
 
 clean: ## remove what builds made; .venv and downloads stay
 	rm -rf .pio build/sitl build/logs build/fatfs-*

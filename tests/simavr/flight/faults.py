@@ -1,7 +1,7 @@
 """Inject the faults an aircraft may meet into the flight image and print what came of each.
 
-    make faults                     the table, and power cuts at 300 instants of flight
-    make faults FAULTS="--cuts 20"
+    make faults                     the table
+    make faults FAULTS="--only IMU" rows whose text holds this
 
 Simulation only. Every fault starts from the same state, in flight with the Mega driving; the log is
 decoded and the file system checked afterwards.
@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-import zlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -259,62 +258,9 @@ def ready_rig(elf: Path, folder: Path) -> FlightRig:
     return rig
 
 
-def whole_blocks(card: Path, folder: Path) -> int:
-    """Count the blocks of the flight, from the first one on, that carry their number and CRC."""
-    data = take_log(card, folder / "cut.bin").read_bytes()
-    file_id = data[4:8]
-    count = 0
-    for at in range(0, len(data), 512):
-        block = data[at : at + 512]
-        good = zlib.crc32(block[:508]) == int.from_bytes(block[508:], "little")
-        number = int.from_bytes(block[12:16], "little")
-        if not good or block[4:8] != file_id or number != count:
-            break
-        count += 1
-    return count
-
-
-def cut_power(rig: FlightRig, wait_cycles: int, folder: Path) -> tuple[int, int]:
-    """Cut the power after some cycles; only in a child of in_fork.
-
-    Returns
-    -------
-    tuple(int, int)
-        Blocks whose busy time had ended, and blocks that decode.
-
-    Raises
-    ------
-    AssertionError
-        If fsck.vfat finds anything.
-    """
-    before = whole_blocks(rig.save_card(folder / "cut.img"), folder)
-    written = rig.card.count().written
-    rig.chip.run_until(rig.chip.cycle + wait_cycles)
-    ended = rig.card.count().written - written
-    rig.chip.power_off()
-    card = rig.save_card(folder / "cut.img")
-    check_card(card)
-    return before + ended, whole_blocks(card, folder)
-
-
-def cut_often(rig: FlightRig, cuts: int, folder: Path) -> int:
-    """Cut the power at random instants of flight; gives the number of cuts that lost a block."""
-    rng = np.random.default_rng(4)
-    bad = 0
-    for _ in range(cuts):
-        wait = int(rng.integers(2 * 16_000_000))
-        ended, decoded = in_fork(partial(cut_power, rig, wait, folder))
-        # The block under way is counted when its data are in, before its busy time ends.
-        if decoded < ended - 1:
-            bad += 1
-            print(f"power cut after {wait / 16e6:.6f} s: {ended} blocks ended, {decoded} decode")
-    return bad
-
-
 def main() -> int:
     """Print the table; 0 if every row is as expected, else 6."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--cuts", type=int, default=300, help="power cuts (default 300)")
     parser.add_argument("--only", help="faults whose text holds this")
     options = parser.parse_args()
     elf = build_flight_image()
@@ -337,9 +283,6 @@ def main() -> int:
                 f"{seen.lost:5}  {said}",
                 flush=True,
             )
-        lost = cut_often(rig, options.cuts, folder)
-        bad += lost
-        print(f"6   power cut at {options.cuts} instants: {lost} lost a block; fsck.vfat -n clean")
     return 6 if bad else 0
 
 

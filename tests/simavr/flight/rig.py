@@ -13,6 +13,7 @@ from pathlib import Path
 from simavr_bench import (
     ArduImu,
     Bmp085,
+    CardKind,
     ChargePumpRelay,
     Chip,
     GpsUart,
@@ -113,6 +114,8 @@ class FlightRig:
     in_place : bool
         Write into the image; else into private pages, so that each child of in_fork has a card of
         its own, kept with `save_card`.
+    card_kind : CardKind
+        How the card is addressed.
     """
 
     elf: Path
@@ -123,6 +126,7 @@ class FlightRig:
     busy_s: float = 0.005
     bootloader: bool = False
     in_place: bool = True
+    card_kind: CardKind = CardKind.SDHC
     source: Callable[[float], ImuSample] = numbered
     sticks: Callable[[float], Sequence[float]] | None = None
     chip: Chip = field(init=False)
@@ -142,7 +146,12 @@ class FlightRig:
             self.chip = Chip(startup_s=0.0)
         self.chip.load(self.elf)
         self.card = SdCard(
-            self.chip, "PB0", image=self.card_image, busy_s=self.busy_s, in_place=self.in_place
+            self.chip,
+            "PB0",
+            image=self.card_image,
+            busy_s=self.busy_s,
+            in_place=self.in_place,
+            kind=self.card_kind,
         )
         self.receiver = Receiver(
             self.chip, RECEIVER_PINS, frame_s=self.frame_s, sequential=self.sequential

@@ -24,9 +24,3 @@ def test_fault_in_flight(flying: FlightRig, tmp_path: Path, injected: str) -> No
     seen = in_fork(lambda: run_fault(flying, fault, tmp_path))
     boot = Counter({"reset": 1, "imu_found": 1})
     assert verdict(fault, seen, Outcome(0.0, 0, True, True, boot)) == []
-
-
-def test_power_cuts_lose_no_block_that_was_written(flying: FlightRig, tmp_path: Path) -> None:
-    from flight.faults import cut_often
-
-    assert cut_often(flying, 4, tmp_path) == 0

@@ -51,12 +51,33 @@ void sd_busy_for(sd_card* s, uint32_t cycles) {
   if (cycles) event_at(s->c, &s->done, chip_now(s->c) + cycles);
 }
 
+static void journal_begin(sd_card* s) {
+  if (!s->journal || s->journal_count++ >= s->journal_capacity) return;
+  sd_record* const r = &s->journal[s->journal_count - 1];
+  r->begun = chip_now(s->c);
+  r->ended = UINT64_MAX;
+  r->block = s->programming_block;
+  r->spoiled = 0;
+  memcpy(r->data, s->pending, 512);
+}
+
+static void journal_end(sd_card* s, const uint8_t* spoiled) {
+  if (!s->journal || s->journal_count == 0 || s->journal_count > s->journal_capacity) return;
+  sd_record* const r = &s->journal[s->journal_count - 1];
+  if (r->ended != UINT64_MAX) return;  // it began before the journal did
+  r->ended = chip_now(s->c);
+  if (!spoiled) return;
+  r->spoiled = 1;
+  memcpy(r->data, spoiled, 512);
+}
+
 static void programmed(chip* c, void* param, uint64_t argument) {
   (void)argument;
   sd_card* const s = param;
   s->busy = false;
   if (!s->programming) return;
   s->programming = false;
+  journal_end(s, NULL);
   memcpy(s->memory + (uint64_t)s->programming_block * 512, s->pending, 512);
   s->counters.written++;
   log_add(c, kLogCard, kCardWritten, s->programming_block);
@@ -86,6 +107,7 @@ static void block_received(sd_card* s) {
   s->programming = true;
   s->programming_block = s->block++;
   s->well_written++;
+  journal_begin(s);
   sd_busy_for(s, stall_for_now(s));
   if (!s->busy) programmed(s->c, s, 0);
 }
@@ -180,6 +202,7 @@ void bench_sd_power_cut(sd_card* s) {
     uint8_t* const block = s->memory + (uint64_t)s->programming_block * 512;
     for (int i = 0; i < 512; i++) block[i] = (uint8_t)card_random(s);
     s->programming = false;
+    journal_end(s, block);
     s->counters.lost++;
     log_add(s->c, kLogCard, kCardLost, s->programming_block);
   }
@@ -208,6 +231,14 @@ void bench_sd_reject(sd_card* s, uint64_t from_cycle, uint32_t count, uint32_t t
 
 bool bench_sd_busy(const sd_card* s) {
   return s->busy;
+}
+void bench_sd_journal(sd_card* s, sd_record* records, uint64_t capacity) {
+  s->journal = records;
+  s->journal_capacity = capacity;
+  s->journal_count = 0;
+}
+uint64_t bench_sd_journal_count(const sd_card* s) {
+  return s->journal_count;
 }
 void bench_sd_counters(const sd_card* s, sd_counters* out) {
   *out = s->counters;

@@ -53,6 +53,8 @@ struct sd_card {
   uint32_t stall_head, stall_count;
   uint64_t reject_from;
   uint32_t reject_count, reject_token;
+  sd_record* journal;
+  uint64_t journal_count, journal_capacity;
 };
 
 void sd_put(sd_card* s, uint8_t byte);

@@ -139,6 +139,15 @@ class SdCard:
         """Whether it is programming now."""
         return bool(self._lib.bench_sd_busy(self._card))
 
+    def start_journal(self, memory: mmap.mmap, capacity: int) -> None:
+        """Let the card keep what it programs in memory that must outlive it (CardJournal)."""
+        self._journal = (ct.c_uint8 * len(memory)).from_buffer(memory)
+        self._lib.bench_sd_journal(self._card, ct.addressof(self._journal), capacity)
+
+    def journal_count(self) -> int:
+        """Blocks whose programming began since the journal did."""
+        return int(self._lib.bench_sd_journal_count(self._card))
+
     def count(self) -> CardCount:
         """Counters since the card was made."""
         raw = SdCounters()

@@ -1,0 +1,161 @@
+"""Cut the power at random instants of flight, of preparing and of closing a file.
+
+    make power-cuts                       300 instants of flight, 100 of metadata, 30 true reboots
+    make power-cuts CUTS="--flight 30 --ground 20 --reboots 6"
+    make power-cuts CUTS="--every"        and within every block of metadata once
+
+Simulation only. A cut takes everything that comes after it: so one run of the simulated chip, with
+every block the card programmed and when, gives the card of any instant. The reboots are true cuts:
+they check that this is so, and what the next boot does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+from flight.cut_flight import PAYLOAD, Flight, FlightCuts, Plan, fly, make_base
+from flight.cut_ground import GroundRun, close_and_prepare, judge_ground_cut
+from flight.cut_reboot import BOOTS, RebootBench, RebootResult, compare_with, spread
+from flight.rig import build_flight_image
+from simavr_bench import CardKind
+from simavr_bench.card_journal import CutCard
+
+# Cards of 4 to 32 GB come with clusters of 64 blocks; those of up to 2 GB are addressed in bytes.
+LARGE = (CardKind.SDHC, 2100, 64)
+SMALL = (CardKind.SDSC, 300, 8)
+PLANS = (
+    Plan("100 Hz, SDHC", *LARGE),
+    Plan("200 Hz, SDSC", *SMALL, rate_hz=200),
+    Plan("100 Hz, stalls of 500 ms", *LARGE, stall_s=0.5),
+    Plan("200 Hz, stalls of 250 ms", *SMALL, rate_hz=200, stall_s=0.25),
+)
+
+
+def cut_flight(flight: Flight, count: int, folder: Path, seed: int) -> int:
+    """Cut a flight, print a row for each state of the card; gives the number of wrong cuts."""
+    cuts = FlightCuts(flight, folder, seed=seed)
+    rng = np.random.default_rng(seed)
+    number: Counter[str] = Counter()
+    worst: Counter[str] = Counter()
+    bad = 0
+    for cycle in np.sort(rng.integers(flight.begin, flight.end, count)):
+        result = cuts.judge(int(cycle))
+        number[result.state] += 1
+        worst[result.state] = max(worst[result.state], result.lost_bytes)
+        bad += bool(result.wrong)
+        for text in result.wrong:
+            print(f"    cut at {cycle / 16e6:.6f} s: {text}")
+    for state in sorted(number):
+        blocks = worst[state] / PAYLOAD
+        print(f"  {flight.plan.name:26} {state:8} {number[state]:5} {blocks:12.1f}", flush=True)
+    return bad
+
+
+def cut_ground(run: GroundRun, cycles: list[int], plan: Plan, folder: Path, seed: int) -> int:
+    """Cut closing or preparing, print a row; gives the number of wrong cuts."""
+    card = CutCard(run.base, folder / "ground.img", run.journal, seed=seed)
+    results = [(cycle, judge_ground_cut(run, card, cycle, folder)) for cycle in cycles]
+    for cycle, result in results:
+        for text in result.wrong:
+            print(f"    cut at {cycle / 16e6:.6f} s: {text}")
+    spoilt = sum(result.spoilt is not None for _, result in results)
+    passes = max((result.passes for _, result in results), default=0)
+    salvaged = sum(result.salvaged for _, result in results)
+    print(
+        f"  {plan.name:26} {run.name:10} {len(cycles):5} {spoilt:8} {passes:12} {salvaged:9}",
+        flush=True,
+    )
+    return sum(bool(result.wrong) for _, result in results)
+
+
+def reboot(bench: RebootBench, count: int, seed: int) -> int:
+    """Cut and boot again, print a row for each kind of boot; gives the number of wrong ones."""
+    results: dict[str, list[RebootResult]] = {boot.name: [] for boot in BOOTS}
+    for wait, boot in spread(count, seed):
+        result = bench.cut(wait, boot)
+        results[boot.name].append(result)
+        for text in result.wrong:
+            print(f"    {wait / 16e6:.6f} s, {boot.name}: {text}")
+    for name, rows in results.items():
+        if not rows:
+            continue
+        block_s = max(r.first_block_s for r in rows)
+        metadata_s = min(r.first_metadata_s for r in rows)
+        print(f"  {name:34} {len(rows):5} {block_s:10.2f} {metadata_s:10.2f}", flush=True)
+    return sum(bool(r.wrong) for rows in results.values() for r in rows)
+
+
+def share(count: int, parts: int) -> list[int]:
+    """Split a number into nearly equal parts."""
+    return [(count + k) // parts for k in range(parts)]
+
+
+def run_flights(elf: Path, count: int, seed: int, folder: Path) -> tuple[int, list[Flight]]:
+    """Fly every plan and cut it."""
+    print("flight                     card      cuts  lost blocks (most)")
+    bad, flights = 0, []
+    for k, (plan, cuts) in enumerate(zip(PLANS, share(count, len(PLANS)), strict=True)):
+        base = make_base(plan, folder / f"base{k}.img", seed + k)
+        flight = fly(elf, plan, base, seed=seed + k)
+        flights.append(flight)
+        bad += cut_flight(flight, cuts, folder, seed + k)
+    return bad, flights
+
+
+def run_ground(
+    elf: Path, flights: list[Flight], count: int, seed: int, folder: Path, *, every: bool
+) -> int:
+    """Close and prepare behind the first two flights, and cut that."""
+    print("\nground                     phase       cuts  garbage  fsck passes  salvaged")
+    bad = 0
+    counts = iter(share(count, 4))
+    for k, flight in enumerate(flights[:2]):
+        left = CutCard(flight.base, folder / f"open{k}.img", flight.journal, seed=seed)
+        left.cut(flight.end)
+        rng = np.random.default_rng(seed + k)
+        for run in close_and_prepare(elf, left.path, flight.plan.kind, folder):
+            instants = [int(c) for c in run.instants(next(counts), rng)]
+            bad += cut_ground(run, instants, flight.plan, folder, seed)
+            if every:
+                instants = [int(c) for c in run.every_block()]
+                bad += cut_ground(run, instants, flight.plan, folder, seed)
+    return bad
+
+
+def run_reboots(elf: Path, flight: Flight, count: int, seed: int, folder: Path) -> int:
+    """Cut truly, boot again."""
+    print("\nnext boot                           cuts   block, s   metadata, s after power-on")
+    bench = RebootBench.take_off(elf, flight.plan, flight.base, folder, seed=seed)
+    differs = compare_with(flight, bench)
+    if differs:
+        print(f"    {differs}")
+    return bool(differs) + reboot(bench, count, seed)
+
+
+def main() -> int:
+    """Print the tables; 0 if every cut left what it must, else 6."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--flight", type=int, default=300, help="cuts in flight (default 300)")
+    parser.add_argument("--ground", type=int, default=100, help="cuts on the ground (default 100)")
+    parser.add_argument("--reboots", type=int, default=30, help="true cuts (default 30)")
+    parser.add_argument("--every", action="store_true", help="in every block of metadata too")
+    parser.add_argument("--seed", type=int, default=1, help="default 1")
+    options = parser.parse_args()
+    elf = build_flight_image()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        bad, flights = run_flights(elf, options.flight, options.seed, folder)
+        bad += run_ground(elf, flights, options.ground, options.seed, folder, every=options.every)
+        bad += run_reboots(elf, flights[0], options.reboots, options.seed, folder)
+    total = options.flight + options.ground + options.reboots
+    print(f"\n{total} cuts, seed {options.seed}: {bad} left what they must not")
+    return 6 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
