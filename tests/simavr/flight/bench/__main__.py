@@ -1,0 +1,55 @@
+"""Run the bench: ``python -m flight.bench --help``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+from flight.bench.fly import FlightError, fly
+from flight.bench.plan import STALL_S
+from flight.bench.report import flight_rows, image_rows
+from flight.bench.table import Table
+from flight.rig import build_flight_image
+
+
+def main() -> int:
+    """Print the tables; 0 if every limit holds, else 6."""
+    parser = argparse.ArgumentParser(
+        prog="flight.bench",
+        description="Measure the flight image on the simulated chip (simulation only).",
+    )
+    parser.add_argument("--minutes", type=float, default=10.0, help="simulated (default 10)")
+    parser.add_argument("--rate", type=int, action="append", choices=sorted(STALL_S))
+    parser.add_argument("--elf", type=Path, help="another image than that of `pio run`")
+    parser.add_argument("--seed", type=int, default=1, help="of stalls, sticks and steps")
+    asked = parser.parse_args()
+    if asked.minutes < 0.5:
+        parser.error(f"--minutes {asked.minutes:g}: at least 0.5, eight receivers share them")
+    table = Table()
+    try:
+        elf = asked.elf or build_flight_image()
+        depth, room_bytes = image_rows(table, elf)
+        with tempfile.TemporaryDirectory() as folder:
+            for rate_hz in asked.rate or sorted(STALL_S):
+                flight = fly(
+                    elf,
+                    rate_hz=rate_hz,
+                    minutes=asked.minutes,
+                    folder=Path(folder),
+                    seed=asked.seed,
+                )
+                flight_rows(table, flight, depth, room_bytes)
+    except (FlightError, RuntimeError) as error:
+        print(error, file=sys.stderr)
+        return 6
+    if table.missed:
+        print(f"\nmissed: {', '.join(table.missed)}")
+        return 6
+    print("\nevery limit holds")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,146 @@
+"""What is flown: eight receivers one after the other, stalls, rejects, sensors that move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from flight.rig import MEGA_US
+from numpy.typing import NDArray
+
+CYCLES_PER_S = 16_000_000
+STALL_S = {100: 0.500, 200: 0.250}
+STALL_EVERY_S = 3.0
+# From the end of a stall until the ring is as empty as before it: nine blocks of 5 ms busy and
+# 9 ms on the bus. Two stalls nearer to each other than that would be one longer stall.
+RECOVERY_S = 0.2
+BUSY_S = 0.005
+SCHEMA_RETURN_S = 60.0
+# A pass of the schema is 15 blocks and more than 0.2 s long: a stall here is in the middle of it.
+INTO_SCHEMA_S = 0.1
+
+FRAMES_S = (0.014, 0.018, 0.020, 0.0225)
+SETTLE_S = 2.5  # of the change from one receiver to the next, not judged
+
+AVCC_VOLT = 5.0
+RAMP_SLOTS = (0, 2, 4, 6, 8)  # the slots between them step
+LOW_VOLT, HIGH_VOLT = 0.5, 4.5
+RAMP_PERIOD_S = 0.0837  # up and down again: 19.6 counts a millisecond
+
+
+@dataclass(frozen=True, slots=True)
+class ReceiverKind:
+    """One receiver of the field."""
+
+    frame_s: float
+    sequential: bool
+
+    @property
+    def name(self) -> str:
+        """As the table says it."""
+        order = "one after the other" if self.sequential else "all at once"
+        return f"{self.frame_s * 1e3:g} ms, {order}"
+
+
+RECEIVERS = tuple(ReceiverKind(f, order) for f in FRAMES_S for order in (True, False))
+
+
+@dataclass(frozen=True, slots=True)
+class Stall:
+    """One stall: when the card shall be busy, and what else happens to that block."""
+
+    cycle: int
+    reject: bool  # the block is refused first, so that its re-send stalls
+
+
+def stalls(
+    rate_hz: int, begin: int, end: int, session: int, rng: np.random.Generator
+) -> list[Stall]:
+    """Plan a stall in every 3 s, at a random phase.
+
+    The phase is uniform over all of the 3 s that leave the ring time to empty before the next 3 s
+    begin. Twice a minute chance is helped: the stall nearest to the return of the schema is moved
+    into it, and ten seconds later one hits the block that is sent again after a CRC reject.
+
+    Parameters
+    ----------
+    rate_hz : int
+        Rate of the logger.
+    begin, end : int
+        Cycles between which they start.
+    session : int
+        Cycle at which the session began: the schema returns every minute from there.
+    rng : Generator
+        Source of the phases.
+
+    Returns
+    -------
+    list of Stall
+        By rising cycle.
+    """
+    length = round(STALL_EVERY_S * CYCLES_PER_S)
+    room_s = STALL_EVERY_S - STALL_S[rate_hz] - RECOVERY_S
+    minute = round(SCHEMA_RETURN_S * CYCLES_PER_S)
+    # Windows are laid so that every minute's return falls well inside one of them.
+    first = session + round(INTO_SCHEMA_S * CYCLES_PER_S) - length // 2
+    first += -(-(begin - first) // length) * length
+    planned = []
+    for window in range(first, end - length, length):
+        phase = rng.uniform(0.0, room_s)
+        offset = (window + length // 2 - session) % minute
+        in_return = offset < length // 2
+        reject = 10 * CYCLES_PER_S <= offset < 10 * CYCLES_PER_S + length
+        at = window + (length // 2 if in_return else round(phase * CYCLES_PER_S))
+        planned.append(Stall(at, reject))
+    return planned
+
+
+class Sticks:
+    """Sticks that never rest: sines, and each pulse up to 40 us beside them.
+
+    So that each pulse tells by its width which one it is.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng(seed)
+        self.switch_us = MEGA_US
+
+    def __call__(self, time_s: float) -> list[float]:
+        """Widths in microseconds of the five channels."""
+        periods_s = np.array([2.0, 3.0, 2.5, 7.0])
+        swing_us = np.array([350.0, 250.0, 300.0, 150.0])
+        sines = 1500.0 + swing_us * np.sin(2 * np.pi * time_s / periods_s)
+        widths = sines + self._rng.uniform(-40.0, 40.0, 4)
+        return [*widths.tolist(), self.switch_us + float(self._rng.uniform(-2.0, 2.0))]
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Voltage of one analogue input: straight lines between points."""
+
+    cycles: NDArray[np.float64]
+    volts: NDArray[np.float64]
+
+    def counts(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Ideal counts of the converter at some cycles."""
+        value: NDArray[np.float64] = np.interp(at, self.cycles, self.volts) * 1024 / AVCC_VOLT
+        return value
+
+
+def ramp(begin: int, end: int, slot: int) -> Profile:
+    """Give a triangle, its phase its own in every slot."""
+    half = RAMP_PERIOD_S / 2 * CYCLES_PER_S
+    corners = np.arange(begin + slot * half / 7, end, half)
+    volts = np.where(np.arange(len(corners)) % 2 == 0, LOW_VOLT, HIGH_VOLT)
+    return Profile(corners, volts)
+
+
+def steps(begin: int, end: int, rng: np.random.Generator) -> Profile:
+    """Give a new level about once a second."""
+    at = begin + np.cumsum(rng.uniform(0.5, 1.5, int((end - begin) / CYCLES_PER_S * 2) + 1)) * (
+        CYCLES_PER_S
+    )
+    at = at[at < end]
+    levels = rng.uniform(LOW_VOLT, HIGH_VOLT, len(at) + 1)
+    # two points at one cycle make a step
+    return Profile(np.repeat(at, 2), np.repeat(levels, 2)[1:-1])

@@ -1,0 +1,94 @@
+"""What the firmware measured, read from its memory while it flies: no change of the image."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+from flight.bench.plan import CYCLES_PER_S
+from numpy.typing import NDArray
+from owners import find_member
+from simavr_bench import Chip
+
+CHANNELS = 5
+CYCLES_PER_TICK = 8
+_TURN_CYCLES = 0x10000 * CYCLES_PER_TICK
+_MILLISECOND = CYCLES_PER_S // 1000
+
+
+def find_symbol(chip: Chip, name: str) -> int:
+    """Address of a variable of the image by a part of its name, which the linker may lengthen."""
+    found = {address for symbol, (address, _) in chip.symbols.items() if name in symbol}
+    if len(found) != 1:
+        raise KeyError(f"{len(found)} variables named {name} in the image, expected 1")
+    return found.pop() & 0xFFFF
+
+
+def clock_zero(chip: Chip) -> int:
+    """Cycle at which the firmware's clock showed 0, within 60 cycles; runs the chip 65 ms at most.
+
+    The turns of timer 5 are counted by its overflow interrupt: the counter in RAM changes some
+    20 to 60 cycles behind each overflow.
+    """
+    turns = find_symbol(chip, "clock_turns")
+    before = chip.data(turns, 3)
+    while chip.data(turns, 3) == before:
+        chip.run_until(chip.cycle + 16)
+    low, high = struct.unpack("<HB", chip.data(turns, 3))
+    counted: int = (high << 16) + low
+    return chip.cycle - 40 - counted * _TURN_CYCLES
+
+
+class ReceiverWatch:
+    """Notes every pulse the firmware accepts, once a millisecond.
+
+    Attributes
+    ----------
+    accepted : list of tuple(int, int, int, int)
+        Input, cycle of the look that found it, ticks of its rise, width in ticks.
+    """
+
+    def __init__(self, chip: Chip, elf: Path) -> None:
+        inputs = find_member(elf, "Instrument", "pilot_.decoder_.inputs_")
+        self._chip = chip
+        self._address = find_symbol(chip, "g_instrument") + inputs.offset
+        self._size, self._stride = inputs.size, inputs.stride
+        self._rise, self._width = inputs.fields["accepted"][0], inputs.fields["width"][0]
+        self._last = [b""] * CHANNELS
+        self._changed = [False] * CHANNELS
+        self._on = False
+        self.accepted: list[tuple[int, int, int, int]] = []
+
+    def start(self) -> None:
+        """Look from now on."""
+        self._on = True
+        self._look()
+
+    def stop(self) -> None:
+        """Look no more."""
+        self._on = False
+
+    def _look(self) -> None:
+        if not self._on:
+            return
+        now = self._chip.cycle
+        self._chip.at(now + _MILLISECOND, self._look)
+        memory = self._chip.data(self._address, self._size)
+        for channel in range(CHANNELS):
+            first = channel * self._stride
+            rise = memory[first + self._rise : first + self._rise + 4]
+            if rise != self._last[channel]:
+                # Perhaps half written: what stands there at the next look counts.
+                self._last[channel] = rise
+                self._changed[channel] = True
+            elif self._changed[channel]:
+                self._changed[channel] = False
+                at = first + self._width
+                (width,) = struct.unpack("<H", memory[at : at + 2])
+                if width != 0:
+                    self.accepted.append((channel, now, struct.unpack("<I", rise)[0], width))
+
+    def rows(self) -> NDArray[np.int64]:
+        """All of them, shape (n, 4), columns as in :attr:`accepted`."""
+        return np.array(self.accepted, np.int64).reshape(-1, 4)
