@@ -25,8 +25,10 @@ from host.twin.draws import delay_s
 from host.twin.filters import first_order, vane
 from host.twin.flight import STEP_S, FlightRecord, fly
 from host.twin.imu import complementary
-from host.twin.stimuli import clock_share, stimuli
+from host.twin.mega_clock import clock_share
+from host.twin.stimuli import stimuli
 from host.twin.truth import summary
+from host.twin.ubx import FIRST_ITOW_MS
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -249,7 +251,7 @@ def test_the_barometer_is_dated_in_the_middle_of_its_conversion(flown: Flown) ->
 def test_the_gps_is_late_by_its_drawn_latency(flown: Flown) -> None:
     gps = flown.log.frames["gps"]
     at_s = gps["t_us"] * 1e-6 / (1.0 + clock_share(flown.record))
-    late = at_s - (gps["itow_ms"].astype(np.int64) - 288_000_000) * 1e-3
+    late = at_s - (gps["itow_ms"].astype(np.int64) - FIRST_ITOW_MS) * 1e-3
     drawn = GPS_LATENCY_S * (1.0 + flown.record.draws.scalar("gps_delay_share"))
     # Stamped when the main loop takes the byte.
     assert abs(late.mean() - drawn) < 3.0 * LIMIT_S

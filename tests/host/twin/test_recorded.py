@@ -13,8 +13,10 @@ from host.twin import cards, compare, instrument, sitl
 from host.twin.airdata import AirData, air_data
 from host.twin.bmp085 import compensate
 from host.twin.fat32 import SECTOR, CardImageError, CardReader, format_card
+from host.twin.faults import FOREVER_S, Fault
 from host.twin.flight import FlightRecord, fly
-from host.twin.stimuli import SAMPLE_STEP_TICKS, TICKS_PER_S, Stimuli, clock_share, stimuli
+from host.twin.mega_clock import TICKS_PER_S, clock_share
+from host.twin.stimuli import SAMPLE_STEP_TICKS, Stimuli, stimuli
 from host.twin.virtual import virtual_flight
 from numpy.typing import NDArray
 
@@ -226,7 +228,7 @@ def test_what_was_on_the_card_before_a_fault_stays(
     library: Path, tmp_path: Path, kind: str
 ) -> None:
     card = cards.load("calm")
-    broken = replace(card, faults=(cards.Fault(kind, 15.0, duration_s=5.0),))
+    broken = replace(card, faults=(Fault(kind, 15.0, 5.0 if kind == "baro_off" else FOREVER_S),))
     record = fly(broken, seed=3)
     recording = sitl.record(
         stimuli(record, air_data(record)), rate_hz=100, aircraft="x", faults=broken.faults

@@ -16,7 +16,9 @@ from host.twin.filters import delayed, first_order, vane
 from host.twin.flight import FlightRecord, fly
 from host.twin.ideal import measured_table, true_table
 from host.twin.imu import imu
-from host.twin.stimuli import IMU_ADDRESS, stimuli, ticks
+from host.twin.imu_stream import ADDRESS
+from host.twin.mega_clock import ticks
+from host.twin.stimuli import stimuli
 from host.twin.ubx import packet
 
 IDEAL = Sensors(**{f.name: False for f in fields(Sensors)})
@@ -235,7 +237,7 @@ def test_stimuli_are_ordered_and_on_the_recorders_clock(real: FlightRecord) -> N
     assert np.all(np.diff(given.gps["at"]) >= 0)
     starts = np.array([p.start for p in given.packets])
     assert np.all(np.diff(starts) > 0)
-    assert {p.address for p in given.packets} == {IMU_ADDRESS}
+    assert {p.address for p in given.packets} == {ADDRESS}
     assert {len(p.data) for p in given.packets} == {36}
     share = real.draws.scalar("clock_share")
     assert int(ticks(real, 10.0)) == pytest.approx(20e6 * (1.0 + share), abs=1.0)

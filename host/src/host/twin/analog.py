@@ -13,15 +13,14 @@ import numpy as np
 from host.resources import resource
 from host.twin.airdata import AirData, local_velocity
 from host.twin.airframe import AILERON, ELEVATOR, RUDDER, Array
-from host.twin.cards import Fault
 from host.twin.delays import dlpf_for, nominal_vane_s, sensor_delays
+from host.twin.faults import PITOTS, POTS, VANES, Fault
 from host.twin.filters import delayed, first_order, vane
 from host.twin.flight import STEP_S, FlightRecord
 
-CHANNELS = (
-    "alpha_a", "alpha_b", "beta_a", "beta_b", "dp_a", "dp_b",
-    "pot_elevator", "pot_aileron_left", "pot_aileron_right", "pot_rudder",
-)  # fmt: skip
+CHANNELS = (*VANES, *PITOTS, *POTS)
+# Far enough beyond the converter's range that its noise cannot bring it back.
+OPEN_COUNT, SHORT_COUNT = 1040.0, -16.0
 # Noise before the converter, counts rms: MA3 analogue 0.12 deg (hardware facts 2.8) = 0.34 counts;
 # MPXV7002 and pots: 2 mV of broadband noise on a 4.9 mV count.
 NOISE_COUNT = {"alpha": 0.34, "beta": 0.34, "dp": 0.4, "pot": 0.4}
@@ -118,19 +117,20 @@ def analog(record: FlightRecord, data: AirData) -> Analog:
 
 
 def _break(fault: Fault, t: Array, counts: Array, scale: dict[str, tuple[float, float]]) -> None:
-    inside = (t >= fault.at_s) & (t < fault.at_s + fault.duration_s)
-    if not inside.any():
+    sensor, _, what = fault.kind.partition("_")
+    first = {"vane": 0, "pitot": len(VANES), "pot": len(VANES) + len(PITOTS)}.get(sensor)
+    inside = fault.inside(t)
+    if first is None or not inside.any():
         return
-    first = int(np.argmax(inside))
-    if fault.kind == "vane_stuck":
-        counts[inside, 0] = counts[first, 0]
-    elif fault.kind == "vane_open":
-        counts[inside, 0] = 1023.0
-    elif fault.kind == "pitot_blocked":
-        counts[inside, 4] = counts[first, 4]
-    elif fault.kind == "pitot_swapped":
-        zero = scale["dp_a"][0]
-        counts[inside, 4] = 2.0 * zero - counts[inside, 4]
+    k = first + fault.place
+    if what in ("stuck", "blocked"):
+        counts[inside, k] = counts[int(np.argmax(inside)), k]
+    elif what == "open":
+        counts[inside, k] = OPEN_COUNT
+    elif what == "short":
+        counts[inside, k] = SHORT_COUNT
+    elif what == "swapped":
+        counts[inside, k] = 2.0 * scale[CHANNELS[k]][0] - counts[inside, k]
 
 
 def convert(source: Analog, t_s: Array, at_s: Array, rng: np.random.Generator) -> Array:

@@ -20,10 +20,10 @@ import numpy as np
 from host.errors import UsageError
 from host.resources import CLONE
 from host.twin import sitl
-from host.twin.cards import Fault
-from host.twin.fat32 import CardReader, format_card
-from host.twin.sitl import CARD_EVENTS, CLOSE_S, LET_GO_S, PRESS_S, Recording
-from host.twin.stimuli import TICKS_PER_S, Stimuli
+from host.twin.faults import Fault, recorder_actions
+from host.twin.mega_clock import TICKS_PER_S
+from host.twin.sitl import CLOSE_S, LET_GO_S, PRESS_S, Recording, card_image, file_of
+from host.twin.stimuli import Stimuli
 
 REPLAY = CLONE / "tests" / "simavr" / "replay.py"
 ELF = CLONE / ".pio" / "build" / "mega2560" / "firmware.elf"
@@ -57,30 +57,28 @@ def record(
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         _write(given, folder / "stimuli.npz")
-        _sparse(format_card(), folder / "card.img")
+        _sparse(card_image(faults), folder / "card.img")
         command = [sys.executable, str(replay), str(elf), str(folder / "stimuli.npz"),
                    str(folder / "card.img"), "--close-s", str(CLOSE_S),
                    "--seed", str(seed)]  # fmt: skip
-        if rate_hz != DEFAULT_RATE_HZ or sitl.LIBRARY.is_file():
-            (folder / "eeprom.bin").write_bytes(sitl.eeprom(rate_hz, aircraft))
+        damaged = any(fault.kind == "settings_damaged" for fault in faults)
+        if damaged or rate_hz != DEFAULT_RATE_HZ or sitl.LIBRARY.is_file():
+            (folder / "eeprom.bin").write_bytes(sitl.eeprom(rate_hz, aircraft, damaged=damaged))
             command += ["--eeprom", str(folder / "eeprom.bin")]
         for fault in faults:
-            if fault.kind in (*CARD_EVENTS, "power_cut", "baro_off"):
-                value = f":{fault.value:g}" if fault.value else ""
-                command += ["--fault", f"{fault.kind}:{fault.at_s:g}{value}"]
-            if fault.kind == "baro_off":
-                command += ["--fault", f"baro_on:{fault.at_s + fault.duration_s:g}"]
+            if fault.kind == "clock_wrap":
+                raise UsageError("clock_wrap: the chip's clock starts at 0; use --firmware sitl")
+            if fault.kind in ("power_cut", "card_absent"):
+                command += ["--fault", f"{fault.kind}:{fault.at_s:g}"]
+        for action in recorder_actions(faults):
+            command += ["--fault", f"{action.what}:{action.at_s:g}:{action.value:g}"]
         summary = _run(command, progress)
         with (folder / "card.img").open("rb") as file:
             image = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        reader = CardReader(image)
-        flights = sorted((f for f in reader.files() if f.name[:3] == "FLT"), key=lambda f: f.name)
-        if not flights:
-            raise UsageError(f"the recorder made no file on the card; the simulator says {summary}")
-        log = reader.read(flights[0])
+        log, file_name = file_of(image, faults)
         image.close()
     lost = summary.get("uart_bytes_lost", [0, 0, 0, 0])
-    return Recording(log, flights[0].name, 0, 0, int(lost[2]) if isinstance(lost, list) else 0)
+    return Recording(log, file_name, 0, 0, int(lost[2]) if isinstance(lost, list) else 0)
 
 
 def _write(given: Stimuli, path: Path) -> None:

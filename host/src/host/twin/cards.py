@@ -10,25 +10,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from host.errors import UsageError
+from host.twin.faults import FAULTS, Fault
 from host.twin.maneuvers import KINDS, STEPS
 
 FOLDER = Path(__file__).parent / "cards"
 AXES = ("elevator", "aileron", "rudder", "throttle")
-FAULTS = {
-    "motor_cut": "the motor stops",
-    "card_busy": "the card is busy for `value` ms at one write",
-    "card_removed": "the card is gone",
-    "imu_off": "the IMU is silent for `duration_s`",
-    "imu_garbage": "a share `value` of the IMU packets is damaged for `duration_s`",
-    "baro_off": "the barometer does not answer for `duration_s`",
-    "receiver_lost": "no receiver pulses for `duration_s`",
-    "vane_stuck": "the left alpha vane stands still for `duration_s`",
-    "vane_open": "the left alpha vane's wire is open: 1023 counts for `duration_s`",
-    "pitot_blocked": "the left pitot keeps its pressure for `duration_s`",
-    "pitot_swapped": "the ports of the left pitot are swapped for `duration_s`",
-    "gps_off": "the GPS is silent for `duration_s`",
-    "power_cut": "the battery is pulled",
-}
 
 
 class CardError(UsageError):
@@ -111,16 +97,6 @@ class Segment:
     before_s: float = 3.0
     airspeed_mps: float = 0.0
     attention: float = -1.0  # of the pilot during the input; -1: 0 for steps, 0.25 for long inputs
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """Something breaks at `at_s` after power-on."""
-
-    kind: str
-    at_s: float
-    duration_s: float = 1e9
-    value: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,9 +274,22 @@ def _fault(where: str, value: object) -> Fault:
     kind = table.pop("kind", None)
     if kind not in FAULTS:
         raise CardError(f"{where}: kind is {kind!r}, expected one of {', '.join(FAULTS)}")
+    about = FAULTS[kind]
+    channel = table.pop("channel", "")
+    if channel and channel not in about.channels:
+        known = ", ".join(about.channels) or "none"
+        raise CardError(f"{where}: channel is {channel!r}, expected of {known}")
+    allowed = ("at_s", "duration_s", "value") if about.lasts else ("at_s", "value")
     for key in table:
-        if key not in ("at_s", "duration_s", "value"):
-            raise CardError(f"{where}: unknown key {key!r}, expected at_s, duration_s or value")
-    if "at_s" not in table:
+        if key not in allowed:
+            raise CardError(
+                f"{where}: unknown key {key!r} of {kind}, expected one of"
+                f" {', '.join((*allowed, 'channel') if about.channels else allowed)}"
+            )
+    numbers = {key: _number(where, key, x) for key, x in table.items()}
+    if about.from_start:
+        if numbers.setdefault("at_s", 0.0) != 0.0:
+            raise CardError(f"{where}: {kind} stands at power-on, expected at_s = 0 or none")
+    elif "at_s" not in numbers:
         raise CardError(f"{where}: {kind} needs at_s")
-    return Fault(kind=str(kind), **{key: _number(where, key, x) for key, x in table.items()})
+    return Fault(kind=kind, channel=str(channel), **numbers)

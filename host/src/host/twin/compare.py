@@ -9,7 +9,7 @@ import pandas as pd
 
 from host.twin.flight import FlightRecord
 from host.twin.ideal import true_table
-from host.twin.stimuli import clock_share
+from host.twin.mega_clock import clock_share
 
 # Column: largest mean error and largest standard deviation of the error in flight, at 10 to 20 m/s
 # with every tolerance of `draws` at its end and light turbulence.
@@ -60,6 +60,9 @@ def true_times(record: FlightRecord, table: pd.DataFrame, first_row_us: int) -> 
     first_row_us : int
         The recorder's clock at the first row.
     """
+    for fault in record.card.faults:
+        if fault.kind == "clock_wrap":  # the clock did not begin at 0
+            first_row_us = (first_row_us + round(fault.at_s * 1e6)) % (1 << 32)
     start_s = first_row_us * 1e-6 / (1.0 + clock_share(record))
     return pd.Series(table["t_s"].to_numpy() - table["t_s"].iloc[0] + start_s)
 

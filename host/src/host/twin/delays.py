@@ -6,6 +6,7 @@ import math
 
 from host.twin.aircraft import Aircraft
 from host.twin.draws import Draws, delay_s
+from host.twin.faults import PITOTS, VANES
 
 # DLPF_CFG of the MPU-6000: bandwidth Hz and delay s of gyro and accelerometer (register map;
 # hardware facts 2.3).
@@ -15,8 +16,6 @@ FILTERS = {
     4: ((20.0, 8.3e-3), (21.0, 8.5e-3)),
 }
 GPS_LATENCY_S = 0.15  # 50 to 200 ms without PPS (hardware facts 2.5); +-20 % drawn
-VANES = ("alpha_a", "alpha_b", "beta_a", "beta_b")
-PITOTS = ("dp_a", "dp_b")
 
 
 def dlpf_for(rate_hz: float) -> int:

@@ -31,7 +31,9 @@ class RootFile:
     first_cluster: int
 
 
-def format_card(size_bytes: int = CARD_BYTES, serial: int = 0x20150601) -> mmap.mmap:
+def format_card(
+    size_bytes: int = CARD_BYTES, serial: int = 0x20150601, *, full: bool = False
+) -> mmap.mmap:
     """Return an empty, formatted card image.
 
     Parameters
@@ -40,6 +42,8 @@ def format_card(size_bytes: int = CARD_BYTES, serial: int = 0x20150601) -> mmap.
         At least 300 MB, below which 4 KiB clusters would not make a FAT32.
     serial : int
         Volume serial number.
+    full : bool
+        Every cluster is taken.
 
     Raises
     ------
@@ -65,14 +69,17 @@ def format_card(size_bytes: int = CARD_BYTES, serial: int = 0x20150601) -> mmap.
         0x80, 0, 0x29, serial, b"NO NAME    ", b"FAT32   ",
     )  # fmt: skip
     boot = boot.ljust(510, b"\0") + b"\x55\xaa"
-    info = struct.pack("<I480xIII12xI", 0x41615252, 0x61417272, clusters - 1, 3, 0xAA550000)
+    free = 0 if full else clusters - 1
+    info = struct.pack("<I480xIII12xI", 0x41615252, 0x61417272, free, 3, 0xAA550000)
     base = PARTITION_START * SECTOR
     for copy in (0, 6):
         image[base + copy * SECTOR : base + (copy + 1) * SECTOR] = boot
         image[base + (copy + 1) * SECTOR : base + (copy + 2) * SECTOR] = info
     for copy in range(2):
         fat = base + (RESERVED + copy * fat_sectors) * SECTOR
+        taken = clusters - 1 if full else 0
         image[fat : fat + 12] = struct.pack("<III", 0x0FFFFFF8, 0x0FFFFFFF, 0x0FFFFFFF)
+        image[fat + 12 : fat + 12 + 4 * taken] = struct.pack("<I", 0x0FFFFFFF) * taken
     return image
 
 

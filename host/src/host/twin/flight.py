@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from host.compiled import compiled_fast
 from host.twin import air as air_model
@@ -42,6 +43,7 @@ IDLE_US = 1120.0
 SWITCH_DIRECT_US = 1100.0
 GAP_US = 300.0  # between the pulses of a sequential receiver
 JITTER_US = 1.0  # rms of a receiver's width
+LINK_OK, LINK_LOST, LINK_PRESET = 0, 1, 2  # state of the radio in one receiver frame
 
 
 class Hands(NamedTuple):
@@ -112,6 +114,8 @@ def fly_steps(
     rest: Array,
     trimmed: Array,
     program: Array,
+    link: NDArray[np.int64],
+    preset_us: Array,
     attention: Array,
     bank_rad: Array,
     airspeed_mps: Array,
@@ -133,7 +137,8 @@ def fly_steps(
     """Integrate steps first..last; return how many were flown before the ground was touched.
 
     `more` (n, 8) takes specific force, angular acceleration, thrust, density; `held` (9,) keeps the
-    stick (4), its wander (4) and the commands between frames; the rest is as in `FlightRecord`.
+    stick (4), its wander (4) and the commands between frames; `link` (frames,) says how the radio
+    does, `preset_us` (5,) what the receiver puts out without it; the rest is as in `FlightRecord`.
     """
     work = np.empty((5, STATE_COUNT + 4))
     now = np.zeros(9)
@@ -199,6 +204,8 @@ def fly_steps(
             pulses[row, 4] = SWITCH_DIRECT_US
             for k in range(5):
                 pulses[row, k] += hands.jitter_us * stick_noise[row, 8 + k]
+                if link[row] == LINK_PRESET:
+                    pulses[row, k] = preset_us[k]
 
         # A servo moves when its pulse has ended.
         since_us = (i % hands.period_steps) * step_s * 1e6
@@ -206,7 +213,9 @@ def fly_steps(
         end = 0.0
         for k in range(4):
             end += pulses[row, k]
-            if since_us >= end:
+            if link[row] == LINK_LOST:
+                command[3] = 0.0  # without pulses a servo stays, a speed controller stops
+            elif since_us >= end:
                 if k == 0:
                     command[1] = (pulses[row, 0] - NEUTRAL_US) / THROW_US * limit[1]
                 elif k == 1:
@@ -310,6 +319,15 @@ def fly(
     turbulence = air_model.turbulence(card.air, card.flight.height_m)
     noise = rng_air.standard_normal((n if card.air.turbulence_mps > 0.0 else 1, 4))
     stick_noise = rng_radio.standard_normal((frames, 8 + RC_CHANNELS))
+    starts = np.arange(frames, dtype=np.float64) * RC_PERIOD_S
+    link = np.full(frames, LINK_OK, dtype=np.int64)
+    preset = np.array([NEUTRAL_US, NEUTRAL_US, NEUTRAL_US, IDLE_US, SWITCH_DIRECT_US])
+    for fault in card.faults:
+        if fault.kind == "receiver_lost":
+            link[fault.inside(starts)] = LINK_LOST
+        elif fault.kind == "receiver_failsafe":
+            link[fault.inside(starts)] = LINK_PRESET
+            preset[4] = fault.amount
     x, z, command = rest.copy(), np.zeros(GUST_STATES), trim.command.copy()
     held = np.zeros(9)
     held[8] = math.asin(
@@ -321,8 +339,8 @@ def fly(
         last = min(first + chunk, n)
         done = fly_steps(
             frame, hands, atmosphere, turbulence, launch, rest, trim.command, plan.program,
-            plan.attention, plan.bank_rad, plan.airspeed_mps, wind, noise, stick_noise, STEP_S,
-            first, last, x, z, held, command, states, more, air, pulses,
+            link, preset, plan.attention, plan.bank_rad, plan.airspeed_mps, wind, noise,
+            stick_noise, STEP_S, first, last, x, z, held, command, states, more, air, pulses,
         )  # fmt: skip
         if progress is not None:
             progress(done / n)
@@ -346,7 +364,7 @@ def fly(
         density_kgpm3=more[:done, 7],
         air=air[:done],
         pulses_us=pulses[:rows],
-        pulse_starts_s=np.arange(rows, dtype=np.float64) * RC_PERIOD_S,
+        pulse_starts_s=starts[:rows],
     )
 
 

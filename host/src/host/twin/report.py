@@ -143,7 +143,8 @@ def simulate(
         recorder = sitl.record if firmware == "sitl" else avr.record
         path = _recorded(outcome, folder, recorder, progress)
         clock.mark("record")
-        outcome.table = _decoded(outcome, path, folder)
+        if path is not None:
+            outcome.table = _decoded(outcome, path, folder)
     clock.mark("decode" if outcome.recording else firmware)
     outcome.files += truth.write(record, data, stem, first_row_s=outcome.first_row_s)
     clock.mark("truth")
@@ -151,7 +152,7 @@ def simulate(
     if both and firmware != "thesis":
         second, files = _thesis(record, data, folder)
         outcome.files += files
-    if pictures:
+    if pictures and outcome.table is not None:
         progress("picture", 0.0)
         image = folder / "flight.png"
         picture.draw(
@@ -171,8 +172,8 @@ def simulate(
 
 def _recorded(
     outcome: Outcome, folder: Path, recorder: Callable[..., sitl.Recording], progress: Progress
-) -> Path:
-    """Record with the firmware; write flight.bin."""
+) -> Path | None:
+    """Record with the firmware; write flight.bin, if there is one."""
     record = outcome.record
     given = stimuli.stimuli(record, outcome.data)
     outcome.recording = recorder(
@@ -184,6 +185,9 @@ def _recorded(
         progress=lambda share: progress("record", share),
     )
     path = folder / "flight.bin"
+    path.unlink(missing_ok=True)
+    if not outcome.recording.log:
+        return None
     path.write_bytes(outcome.recording.log)
     outcome.files.insert(0, path)
     return path

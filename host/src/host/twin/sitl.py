@@ -19,19 +19,23 @@ import numpy.typing as npt
 
 from host.errors import UsageError
 from host.resources import CLONE
-from host.twin.cards import Fault
 from host.twin.fat32 import CARD_BYTES, SECTOR, CardReader, format_card
+from host.twin.faults import Action, Fault, recorder_actions
 from host.twin.flight import IDLE_US, NEUTRAL_US
-from host.twin.stimuli import SAMPLE_STEP_TICKS, TICKS_PER_S, Stimuli
+from host.twin.mega_clock import TICKS_PER_S
+from host.twin.stimuli import SAMPLE_STEP_TICKS, Stimuli
 
 LIBRARY = CLONE / "build" / "sitl" / "libsitl.so"
 RATES_HZ = (25, 50, 100, 200)
 PACKET_ROOM = 40
+EEPROM_BYTES = 4096
 PRESS_S, LET_GO_S = 3.6, 3.9  # start button; preparing 64 MiB takes the Mega 2.8 s
 CLOSE_S = 20.0  # the next power-on, throttle idle for 10 s: the recorder closes the file
 # Room on the card per second of flight at 100 Hz: about 18 blocks are used.
 BLOCKS_PER_S = 40
-CARD_EVENTS = {"card_busy": 0, "card_removed": 2}
+CARD_EVENTS = {"card_busy": 0, "card_reject": 1, "card_removed": 2, "card_inserted": 3}
+NO_FILE = {"card_absent": "no card", "card_full": "a full card",
+           "card_unformatted": "a card without a file system"}  # fmt: skip
 
 
 class _State(ctypes.Structure):
@@ -63,9 +67,10 @@ class Recording:
     Attributes
     ----------
     log : bytes
-        The flight file, as long as the recorder's last boot made it.
+        The flight file, as long as the recorder's last boot made it; empty where it rightly made
+        none.
     name : str
-        Its name on the card.
+        Its name on the card; without a file, why there is none.
     lost_edges, lost_packets, lost_gps_bytes : int
         Stimuli the hardware model had no room for.
     """
@@ -119,7 +124,7 @@ def record(
     aircraft : str
         Name for the log's configuration, at most 15 characters are kept.
     faults : sequence of Fault
-        Those of card, barometer and power act here; the others are in the stimuli already.
+        Those of card, barometer and supply act here; the others are in the stimuli already.
     seed : int
         Of the garbage that a power cut leaves in a block being programmed.
     progress : callable
@@ -136,7 +141,7 @@ def record(
     """
     sitl = ctypes.CDLL(str(library_path()))
     sitl.sitl_create()
-    image = format_card()
+    image = card_image(faults)
     room = (ctypes.c_uint8 * CARD_BYTES).from_buffer(image)
     try:
         return _record(sitl, image, room, given, rate_hz, aircraft, faults, seed, progress)
@@ -145,12 +150,12 @@ def record(
         del room
 
 
-def eeprom(rate_hz: int, aircraft: str) -> bytes:
+def eeprom(rate_hz: int, aircraft: str, *, damaged: bool = False) -> bytes:
     """Return the EEPROM (4096 bytes) of a recorder with these settings; raises UsageError."""
     sitl = ctypes.CDLL(str(library_path()))
     sitl.sitl_create()
-    _configure(sitl, rate_hz, aircraft)
-    content = (ctypes.c_uint8 * 4096)()
+    _configure(sitl, rate_hz, aircraft, damaged=damaged)
+    content = (ctypes.c_uint8 * EEPROM_BYTES)()
     sitl.sitl_get_eeprom(content)
     return bytes(content)
 
@@ -166,38 +171,29 @@ def _record(
     seed: int,
     progress: Callable[[float], None],
 ) -> Recording:
-    card_id = (ctypes.c_uint8 * 16)(*b"\x03VIRT\x15card\x10\x00\x00\x01\x00\xf0")
-    sitl.sitl_insert_card(room, ctypes.c_uint32(CARD_BYTES // SECTOR), card_id)
+    kinds = {fault.kind for fault in faults}
+    if "card_absent" not in kinds:
+        card_id = (ctypes.c_uint8 * 16)(*b"\x03VIRT\x15card\x10\x00\x00\x01\x00\xf0")
+        sitl.sitl_insert_card(room, ctypes.c_uint32(CARD_BYTES // SECTOR), card_id)
     room_s = given.duration / TICKS_PER_S + 30.0
     blocks = round(room_s * BLOCKS_PER_S * max(rate_hz / 100.0, 0.5))
     sitl.sitl_set_file_blocks(ctypes.c_uint32(blocks))
-    _configure(sitl, rate_hz, aircraft)
+    _configure(sitl, rate_hz, aircraft, damaged="settings_damaged" in kinds)
+    for fault in faults:
+        if fault.kind == "clock_wrap":
+            offset_us = (1 << 32) - round(fault.at_s * 1e6)
+            sitl.sitl_set_clock_offset(ctypes.c_uint32(offset_us & 0xFFFFFFFF))
     cuts = [round(f.at_s * TICKS_PER_S) for f in faults if f.kind == "power_cut"]
     end = min([given.duration, *cuts])
     _give(sitl, given, end)
-    actions: list[tuple[int, str]] = []
-    for fault in faults:
-        at = round(fault.at_s * TICKS_PER_S)
-        if fault.kind in CARD_EVENTS:
-            value = round((fault.value or 500.0) * 1000.0)
-            sitl.sitl_add_card_events(
-                _int64([at]), _uint8([CARD_EVENTS[fault.kind]]), (ctypes.c_uint32 * 1)(value),
-                ctypes.c_size_t(1),
-            )  # fmt: skip
-        elif fault.kind == "baro_off":
-            actions.append((at, "baro_off"))
-            actions.append((round((fault.at_s + fault.duration_s) * TICKS_PER_S), "baro_on"))
+    actions = [(round(a.at_s * TICKS_PER_S), a) for a in recorder_actions(faults)]
     sitl.sitl_power_on()
-    marks = sorted(
-        {*range(TICKS_PER_S, end, TICKS_PER_S), *(a for a, _ in actions if a < end), end}
-    )
-    for mark in marks:
+    marks = {*range(TICKS_PER_S, end, TICKS_PER_S), *(at for at, _ in actions if at < end), end}
+    for mark in sorted(marks):
         sitl.sitl_run_until(ctypes.c_int64(mark))
-        for at, what in actions:
-            if at == mark and what == "baro_off":
-                sitl.sitl_remove_pressure()
-            elif at == mark:
-                _give_pressure(sitl, given)
+        for at, action in actions:
+            if at == mark:
+                _act(sitl, given, at, action)
         progress(mark / end)
     state = _State()
     sitl.sitl_state(ctypes.byref(state))
@@ -211,21 +207,53 @@ def _record(
     sitl.sitl_power_on()
     sitl.sitl_run_until(ctypes.c_int64(later + round(CLOSE_S * TICKS_PER_S)))
 
+    log, name = file_of(image, faults)
+    return Recording(log, name, state.lost_edges, state.lost_packets, state.lost_gps_bytes)
+
+
+def file_of(image: mmap.mmap, faults: Sequence[Fault]) -> tuple[bytes, str]:
+    """Return the flight's file and its name; no bytes where a fault says there can be none."""
+    for fault in faults:
+        if fault.kind in NO_FILE:
+            return b"", NO_FILE[fault.kind]
     reader = CardReader(image)
     flights = sorted((f for f in reader.files() if f.name.startswith("FLT")), key=lambda f: f.name)
     if not flights:
-        raise UsageError("the recorder made no file on the card: was the flight shorter than 3 s?")
+        raise UsageError("the recorder made no file on the card: was the flight shorter than 5 s?")
     # The reboot may have prepared the next file already: the flight is the first one.
-    return Recording(
-        log=reader.read(flights[0]),
-        name=flights[0].name,
-        lost_edges=state.lost_edges,
-        lost_packets=state.lost_packets,
-        lost_gps_bytes=state.lost_gps_bytes,
-    )
+    return reader.read(flights[0]), flights[0].name
 
 
-def _configure(sitl: ctypes.CDLL, rate_hz: int, aircraft: str) -> None:
+def card_image(faults: Sequence[Fault]) -> mmap.mmap:
+    """Return the card the flight begins with: empty and formatted, unless a fault says else."""
+    kinds = {fault.kind for fault in faults}
+    if "card_unformatted" in kinds:
+        return mmap.mmap(-1, CARD_BYTES)
+    return format_card(full="card_full" in kinds)
+
+
+def _act(sitl: ctypes.CDLL, given: Stimuli, at: int, action: Action) -> None:
+    """Do something to the recorder's world now."""
+    if action.what in CARD_EVENTS:
+        # Milliseconds to microseconds for a busy card, else a count.
+        value = round(action.value * (1000.0 if action.what == "card_busy" else 1.0))
+        sitl.sitl_add_card_events(
+            _int64([at]), _uint8([CARD_EVENTS[action.what]]), (ctypes.c_uint32 * 1)(value),
+            ctypes.c_size_t(1),
+        )  # fmt: skip
+    elif action.what == "reset":
+        sitl.sitl_reset(ctypes.c_uint8(round(action.value)))
+    elif action.what == "supply":
+        sitl.sitl_set_supply(ctypes.c_uint16(round(action.value * 1000.0)))
+    elif action.what == "baro_off":
+        sitl.sitl_remove_pressure()
+    elif action.what == "baro_on":
+        _give_pressure(sitl, given)
+    else:
+        sitl.sitl_hold_pressure_bus(ctypes.c_int(action.what == "baro_bus_stuck"))
+
+
+def _configure(sitl: ctypes.CDLL, rate_hz: int, aircraft: str, *, damaged: bool = False) -> None:
     """Change rate and aircraft in the default settings; both places are fixed by frame `config`."""
     sitl.sitl_default_config.restype = ctypes.c_size_t
     buffer = (ctypes.c_uint8 * 256)()
@@ -235,6 +263,12 @@ def _configure(sitl: ctypes.CDLL, rate_hz: int, aircraft: str) -> None:
     config[-16:] = aircraft.encode("ascii", "replace")[:15].ljust(16, b"\0")
     if not sitl.sitl_set_config((ctypes.c_uint8 * size)(*config), ctypes.c_size_t(size)):
         raise UsageError(f"the recorder refuses {rate_hz} Hz, expected one of {RATES_HZ}")
+    if damaged:
+        content = (ctypes.c_uint8 * EEPROM_BYTES)()
+        sitl.sitl_get_eeprom(content)
+        place = bytes(content).find(bytes(config[-16:]))  # the aircraft's name
+        content[place] ^= 0x20
+        sitl.sitl_set_eeprom(content)
 
 
 def _give(sitl: ctypes.CDLL, given: Stimuli, end: int) -> None:

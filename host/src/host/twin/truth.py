@@ -168,7 +168,13 @@ def summary(record: FlightRecord, data: AirData, first_row_s: float = 0.0) -> di
             record.aircraft, record.draws, dlpf_for(record.card.flight.rate_hz)
         ),
         "fault": [
-            {"kind": f.kind, "at_s": f.at_s, "duration_s": f.duration_s, "value": f.value}
+            {
+                "kind": f.kind,
+                "at_s": f.at_s,
+                "duration_s": f.duration_s,
+                "value": f.amount,
+                "channel": f.channel,
+            }
             for f in card.faults
         ],
         "maneuver": maneuvers(record, data),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from host.errors import UsageError
 from host.log import read_log
 from host.twin import compare, ideal, sitl, thesis, truth
 from host.twin.airdata import air_data
@@ -84,6 +85,8 @@ def virtual_flight(card: str | Path | Card, seed: int, *, chain: str = "sitl") -
             faults=record.card.faults,
             seed=seed,
         )
+        if not recording.log:
+            raise UsageError(f"nothing was recorded: {recording.name}")
         with tempfile.TemporaryDirectory() as folder:
             log, text = Path(folder) / "flight.bin", Path(folder) / "calibration.toml"
             log.write_bytes(recording.log)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 from host.errors import CheckError, ExitCode, UsageError
@@ -35,6 +36,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--both", action="store_true",
                         help="the thesis's logger flies along, into the same picture")  # fmt: skip
+    parser.add_argument("--faults", action="store_true",
+                        help="list the faults a card can name, and fly nothing")  # fmt: skip
     parser.add_argument("--no-picture", action="store_true", help="draw nothing")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(run=run)
@@ -49,6 +52,8 @@ def run(args: argparse.Namespace) -> int:
             f"the virtual flight needs {error.name}:"
             " install the extra, pip install './host[compiled]'"
         ) from None
+    if args.faults:
+        return _list_faults(as_json=args.json)
     if args.card is None:
         return _list(as_json=args.json)
     card = cards.load(args.card)
@@ -97,6 +102,8 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"  {duration / busy:.0f} times real time on one core, loading and picture apart ({stages})"
     )
+    if outcome.recording is not None and not outcome.recording.log:
+        print(f"  nothing was recorded: the recorder found {outcome.recording.name}")
     if outcome.deviations:
         print("  decoded log against the truth, in flight (mean and spread of the error, limits):")
     for d in outcome.deviations:
@@ -122,6 +129,23 @@ def _list(*, as_json: bool) -> int:
     print("Cards (host simulate NAME):")
     for card in known:
         print(f"  {card.name:16s} {card.title}")
+    return ExitCode.OK
+
+
+def _list_faults(*, as_json: bool) -> int:
+    from host.twin.faults import FAULTS
+
+    if as_json:
+        print(json.dumps([{"name": name, **asdict(kind)} for name, kind in FAULTS.items()]))
+        return ExitCode.OK
+    print("Faults ([[fault]] in a card: kind, at_s, duration_s, value, channel):")
+    for name, kind in FAULTS.items():
+        more = [f"value {kind.value:g}"] if kind.value else []
+        if kind.channels:
+            more.append(f"channel {', '.join(kind.channels)}")
+        if kind.from_start or not kind.lasts:
+            more.append("from power-on" if kind.from_start else "at one instant")
+        print(f"  {name:22s} {kind.text}" + (f" ({'; '.join(more)})" if more else ""))
     return ExitCode.OK
 
 
