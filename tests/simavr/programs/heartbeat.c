@@ -1,4 +1,4 @@
-// Copies receiver channel PK0 to a servo pulse on PE4 and turns the heartbeat PH5 over every 5 ms;
+// Copies receiver channel PK0 to a servo pulse on PE4 and turns the heartbeat PH5 over every 1 ms;
 // PA0 low stops the heartbeat high, PA1 low stops it low, PA2 low hangs with interrupts off.
 #include "common.h"
 
@@ -29,7 +29,7 @@ int main(void) {
   TCCR4B = _BV(CS41);
   for (;;) {
     const uint16_t now = TCNT4;
-    if ((uint16_t)(now - last) < 10000) continue;
+    if ((uint16_t)(now - last) < 2000) continue;
     last = now;
     if (!(PINA & _BV(PA2))) {
       cli();

@@ -1,13 +1,11 @@
 """The relay that gives the servos to the Mega, held by a charge pump on the heartbeat.
 
-Heartbeat, coupling capacitor, two diodes, reservoir with its bleed resistor, transistor, coil:
-every rising edge moves charge, a level that stands still moves none. Figures are those of
-hw/relay.md with the threshold that holds longest, not measurements.
+Figures are those of hw/relay.md, with the gate threshold that holds longest; not measurements. The
+sense line stands for the two sense contacts in parallel.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,6 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from simavr_bench.charge_pump import ChargePump
 from simavr_bench.chip import Chip, cycles
 
 OPEN, RECEIVER, MEGA = 0, 1, 2
@@ -33,14 +32,16 @@ class ChargePumpRelay:
     servos : mapping of str to tuple(str, str)
         For each servo the receiver's pin and the Mega's output pin.
     sense : str or None
-        Pin of the spare contact, driven low while engaged.
-    coupling_f, reservoir_f, bleed_ohm, diode_volt : float
-        The pump.
+        Pin of the sense contacts, driven low while engaged.
+    pump : ChargePump
+        From the heartbeat to the gate.
     on_volt, off_volt : float
-        Reservoir voltage at which the coil pulls in and lets go.
-    coil_s, transfer_s, bounce_s : float
-        From the coil's change to the break of the old contact, to the make of the new one, and how
-        long that bounces.
+        Gate voltage at which the coil surely pulls in, and at which it surely lets go.
+    operate_s, release_s : float
+        From the coil's current to the break of the old contact; with the diode across the coil
+        letting go takes longer.
+    transfer_s, bounce_s : float
+        From that break to the make of the new contact, and how long that bounces.
     seed : int
         For the bounces.
 
@@ -54,21 +55,18 @@ class ChargePumpRelay:
     heartbeat: str
     servos: Mapping[str, tuple[str, str]]
     sense: str | None = None
-    coupling_f: float = 1e-6
-    reservoir_f: float = 1e-6
-    bleed_ohm: float = 22_000.0
-    diode_volt: float = 0.3
+    pump: ChargePump = field(default_factory=ChargePump)
     on_volt: float = 1.5
     off_volt: float = 0.8
-    coil_s: float = 0.003
+    operate_s: float = 0.003
+    release_s: float = 0.007
     transfer_s: float = 0.005
     bounce_s: float = 0.001
     seed: int = 1
     contacts: list[tuple[int, int]] = field(default_factory=lambda: [(0, RECEIVER)])
     energised: bool = False
-    _volt: float = 0.0
     _since: int = 0
-    _generation: int = 0
+    _edges: int = 0
     _rng: np.random.Generator = field(init=False)
 
     def __post_init__(self) -> None:
@@ -81,41 +79,42 @@ class ChargePumpRelay:
             self.chip.pull(mega, False)  # the relay's own pull-down: an idle output is no pulse
         self._show_sense(False)
 
-    def _reservoir(self, cycle: int) -> float:
-        tau = self.bleed_ohm * self.reservoir_f * 16e6
-        return self._volt * math.exp(-(cycle - self._since) / tau)
-
     def volt(self) -> float:
-        """Reservoir voltage now."""
-        return self._reservoir(self.chip.cycle)
+        """Gate voltage now."""
+        return self.pump.at((self.chip.cycle - self._since) / 16e6)[1]
 
     def _edge(self, level: bool, cycle: int) -> None:
-        if not level:
-            return
-        peak = 5.0 - 2 * self.diode_volt
-        volt = self._reservoir(cycle)
-        share = self.coupling_f / (self.coupling_f + self.reservoir_f)
-        self._volt = volt + max(0.0, peak - volt) * share
+        self.pump.edge(level, (cycle - self._since) / 16e6)
         self._since = cycle
-        if not self.energised and self._volt >= self.on_volt:
-            self._switch(True)
+        self._edges += 1
         if self.energised:
-            self._generation += 1
-            mine = self._generation
-            tau = self.bleed_ohm * self.reservoir_f * 16e6
-            left = max(0.0, tau * math.log(self._volt / self.off_volt))
-            self.chip.at(cycle + math.ceil(left), lambda: self._run_down(mine))
+            return  # _look_again is on its way
+        rise_s = self.pump.rises_above(self.on_volt)
+        if rise_s is not None:
+            mine = self._edges
+            self.chip.at(cycle + cycles(rise_s), lambda: self._pull_in(mine))
 
-    def _run_down(self, generation: int) -> None:
-        if generation == self._generation and self.energised:
+    def _pull_in(self, edges: int) -> None:
+        if edges != self._edges or self.energised:
+            return  # another edge came first
+        self._switch(True)
+        self._look_again()
+
+    def _look_again(self) -> None:
+        """Let go if the gate is down, else come back when it would be if no edge came."""
+        left_s = self.pump.falls_below(self.off_volt) - (self.chip.cycle - self._since) / 16e6
+        if left_s <= 0:
             self._switch(False)
+        else:
+            self.chip.at(self.chip.cycle + max(1, cycles(left_s)), self._look_again)
 
     def _switch(self, energised: bool) -> None:
         self.energised = energised
         now = self.chip.cycle
         target = MEGA if energised else RECEIVER
-        moves = [(now + cycles(self.coil_s), OPEN)]
-        make = now + cycles(self.coil_s + self.transfer_s)
+        coil_s = self.operate_s if energised else self.release_s
+        moves = [(now + cycles(coil_s), OPEN)]
+        make = now + cycles(coil_s + self.transfer_s)
         moves.append((make, target))
         for bounce in np.sort(self._rng.integers(1, max(2, cycles(self.bounce_s)), 2)):
             moves.append((make + int(bounce), OPEN))
