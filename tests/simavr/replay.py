@@ -44,8 +44,9 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
         action="append",
         default=[],
         metavar="KIND:AT_S[:VALUE]",
-        help="card_busy (ms), card_reject (blocks), card_removed, card_inserted, baro_off, "
-        "baro_on, power_cut; may be given several times",
+        help="card_busy (ms), card_reject (blocks), card_absent, card_removed, card_inserted, "
+        "baro_off, baro_on, baro_bus_stuck, baro_bus_free, supply (V), reset (cause), power_cut; "
+        "may be given several times",
     )
     parser.add_argument("--seed", type=int, default=1)
     return parser.parse_args(argv)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from simavr_bench.barometer import Bmp085
 from simavr_bench.chip import Chip
+from simavr_bench.core import ResetCause
 from simavr_bench.pins import arduino_pin
 from simavr_bench.sd_card import SdCard
 
@@ -24,6 +25,12 @@ ANALOG = (
     *("pot_aileron_left", "pot_aileron_right", "pot_rudder", "rail"),
 )
 RECEIVER = ("rc_0", "rc_1", "rc_2", "rc_3", "rc_4")
+SUPPLY_V, BANDGAP_V = 5.0, 1.1
+CAUSES = {
+    2: ResetCause.EXTERNAL,
+    3: ResetCause.BROWN_OUT,
+    4: ResetCause.WATCHDOG,
+}  # reset_cause of protocol/frames.toml
 _AHEAD = 1_600_000  # cycles: stimuli are handed to the chip 0.1 s before their time
 
 
@@ -168,7 +175,9 @@ class Replay:
         ----------
         kind : str
             ``card_busy`` (value: ms of the next block), ``card_reject`` (blocks refused),
-            ``card_removed``, ``card_inserted``, ``baro_off`` or ``baro_on``.
+            ``card_removed``, ``card_inserted``, ``baro_off``, ``baro_on``, ``baro_bus_stuck``,
+            ``baro_bus_free``, ``reset`` (cause as the log counts them), ``supply`` (V, everything
+            analogue in proportion) or ``card_absent``.
         at_tick : int
             When.
         value : float
@@ -183,10 +192,18 @@ class Replay:
         planned: dict[str, Callable[[], None]] = {
             "card_busy": lambda: self.card.stall(value * 1e-3, at_cycle=at),
             "card_reject": lambda: self.card.reject(int(value), at_cycle=at),
+            "card_absent": self.card.remove,
             "card_removed": self.card.remove,
             "card_inserted": self.card.insert,
             "baro_off": lambda: setattr(self.baro, "present", False),
             "baro_on": lambda: setattr(self.baro, "present", True),
+            "baro_bus_stuck": lambda: self.baro.hold(sda=True, scl=False),
+            "baro_bus_free": lambda: self.baro.hold(sda=False, scl=False),
+            "reset": lambda: self._chip.reset(CAUSES[round(value)]),
+            # Only the chip's own reference is no ratio of its supply.
+            "supply": lambda: self._chip.analog_supply(
+                SUPPLY_V, bandgap_volt=BANDGAP_V * SUPPLY_V / value
+            ),
         }
         if kind not in planned:
             raise ValueError(f"no such fault: found {kind!r}, expected one of {sorted(planned)}")
