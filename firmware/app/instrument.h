@@ -41,8 +41,14 @@ class Instrument {
   void put_system(uint32_t now_us);
   void put_telemetry_heads(uint32_t now_us);
 
-  uint8_t ring_bytes_[kRingBytes] = {};
-  core::ByteRing ring_{ring_bytes_, kRingBytes};
+  // FatFs works between sessions, the ring in one.
+  union Shared {
+    uint8_t ring[kRingBytes];
+    storage::Volume::Memory volume;
+  };
+
+  Shared shared_ = {};
+  core::ByteRing ring_{shared_.ring, kRingBytes};
   frames::ConfigFrame config_ = {};
   Telemetry telemetry_;
   AsciiRow ascii_row_;
@@ -50,7 +56,7 @@ class Instrument {
   Store store_;
   PilotLink pilot_;
   Sensors sensors_;
-  Recorder recorder_{ring_, outlet_, store_, sensors_};
+  Recorder recorder_{ring_, shared_.volume, outlet_, store_, sensors_};
   Panel panel_;
   Status status_;
   core::Every second_;

@@ -32,12 +32,17 @@ void copy_text(char* to, const char* from, uint8_t size) {
 
 }  // namespace
 
-Recorder::Recorder(core::ByteRing& ring, Outlet& outlet, Store& store, Sensors& sensors)
+Recorder::Recorder(core::ByteRing& ring,
+                   storage::Volume::Memory& memory,
+                   Outlet& outlet,
+                   Store& store,
+                   Sensors& sensors)
     : ring_(ring),
       outlet_(outlet),
       store_(store),
       sensors_(sensors),
-      writer_(ring, storage::schema_text(), storage::schema_size(), storage::schema_hash()) {}
+      writer_(ring, storage::schema_text(), storage::schema_size(), storage::schema_hash()),
+      volume_(memory) {}
 
 void Recorder::step(uint32_t now_us) {
   if (state_ == State::kRecording || state_ == State::kEnding) stream(now_us);
@@ -151,6 +156,7 @@ void Recorder::begin(uint32_t why, bool same_session, uint32_t now_us) {
   const uint32_t session = same_session ? file.last_session : next_session();
   prepared_ = false;
   resumed_ = why == 2;
+  storage::Volume::unmount();  // from here its memory is the ring's
   writer_.start(file.file_id, session, file.next_block, now_us);
   outlet_.open();
   heads_told_ = false;
@@ -239,7 +245,10 @@ void Recorder::finish(uint32_t now_us) {
     boot_.start(false);
     return;
   }
-  volume_status_ = volume_.close(writer_.sequence(), false, now_us);
+  volume_status_ = volume_.mount_again();
+  if (volume_status_ == VolumeStatus::kReady) {
+    volume_status_ = volume_.close(writer_.sequence(), false, now_us);
+  }
   state_ = State::kNoFile;
   if (volume_status_ == VolumeStatus::kReady) prepare_next();
 }

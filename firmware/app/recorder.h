@@ -25,7 +25,12 @@ class Recorder {
     kFailed,    // the card went away or answers no more
   };
 
-  Recorder(core::ByteRing& ring, Outlet& outlet, Store& store, Sensors& sensors);
+  // `memory` may be the ring's: it is used between sessions only.
+  Recorder(core::ByteRing& ring,
+           storage::Volume::Memory& memory,
+           Outlet& outlet,
+           Store& store,
+           Sensors& sensors);
 
   void set_file_blocks(uint32_t blocks) { volume_.set_file_blocks(blocks); }
   // Once per turn of the main loop: carries the block under way on.

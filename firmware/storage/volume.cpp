@@ -52,8 +52,12 @@ void Volume::set_date(uint32_t fat_time) {
 
 VolumeStatus Volume::mount() {
   file_ = FlightFile();
-  CardStatus status = hal::start_card();
+  const CardStatus status = hal::start_card();
   if (status != CardStatus::kOk) return from_card(status);
+  return mount_again();
+}
+
+VolumeStatus Volume::mount_again() {
   return from_result(f_mount(&fs_, "", 1));
 }
 

@@ -42,13 +42,19 @@ class Volume {
   static constexpr uint32_t kFileBlocks = 131072;  // 64 MiB: 2.6 h at 100 Hz
   static constexpr uint32_t kMaxNumber = 99999;
 
+  // What FatFs needs between mount() and unmount(); anybody's else.
+  using Memory = FATFS;
+  explicit Volume(Memory& memory) : fs_(memory) {}
+
   // Tests use smaller files. At least 2 blocks.
   void set_file_blocks(uint32_t blocks) { file_blocks_ = blocks; }
   // Date of new and closed files, as core::fat_time() makes it; 0: not known.
   static void set_date(uint32_t fat_time);
 
   VolumeStatus mount();
-  // FatFs forgets the volume: only where a volume ends before the program does.
+  // The same for a card that is known and was not changed since; file() stays.
+  VolumeStatus mount_again();
+  // FatFs forgets the volume and its memory.
   static void unmount();
   // Looks at the file with the largest number: what it holds, and where its used part ends.
   VolumeStatus find_latest(FileState* state);
@@ -75,7 +81,7 @@ class Volume {
   hal::CardStatus write_end_event(uint32_t block, uint32_t now_us);
   uint8_t* window();
 
-  FATFS fs_ = {};
+  FATFS& fs_;
   FlightFile file_;
   uint32_t file_blocks_ = kFileBlocks;
 };
