@@ -109,8 +109,9 @@ void start_watchdog() {
   const mega::InterruptsOff guard;
   wdt_reset();
   WDTCSR = _BV(WDCE) | _BV(WDE);
-  // 0.125 s to the interrupt, which notes the address and resets; as much again if it cannot run.
-  WDTCSR = _BV(WDE) | _BV(WDIE) | _BV(WDP1) | _BV(WDP0);
+  // 64 ms to the interrupt, which notes the address and resets; as much again if it cannot run. A
+  // runaway stack may have turned receiver lines into outputs: no pulse passes until that reset.
+  WDTCSR = _BV(WDE) | _BV(WDIE) | _BV(WDP1);
 }
 
 void feed_watchdog() {
