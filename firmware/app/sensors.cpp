@@ -31,6 +31,7 @@ void Sensors::start(const frames::ConfigFrame& config, uint32_t now_us) {
   hal::start_baro_bus();
   hal::start_analog();
   trigger_.start(config.rate_hz, now_us);
+  hal::arm_scan(trigger_.mask());
   baro_turn_.start(now_us);
   mag_turn_.start(now_us);
   attitude_turn_.start(now_us);
@@ -43,7 +44,7 @@ void Sensors::step(const frames::ConfigFrame& config,
                    Outlet& outlet,
                    uint32_t now_us) {
   if (hal::imu_packet() != nullptr) {
-    step_imu(outlet);
+    step_imu(pilot, outlet);
     now_us = hal::now_us();  // the packet may be younger than this turn
   }
   step_ident(pilot, outlet, now_us);
@@ -53,21 +54,32 @@ void Sensors::step(const frames::ConfigFrame& config,
   if ((slot_ & 3U) == 1) watch_imu(outlet, now_us);
 }
 
-void Sensors::step_imu(Outlet& outlet) {
+void Sensors::step_imu(const PilotLink& pilot, Outlet& outlet) {
   const uint32_t now_us = hal::now_us();
   for (const hal::ImuPacket* packet = hal::imu_packet(); packet != nullptr;
        packet = hal::imu_packet()) {
-    const core::ImuResult result =
-        imu_.packet(packet->address, packet->bytes, packet->length, packet->start_us);
+    // Of a packet that started a scan a frame is made before the next packet is looked at.
+    const bool scan = packet->scan_after_us != 0;
+    if (scan && scanning_) finish_ident(outlet);
     const uint32_t start_us = packet->start_us;
+    const uint32_t scan_us = start_us + packet->scan_after_us;
+    const core::ImuResult result =
+        imu_.packet(packet->address, packet->bytes, packet->length, start_us);
     hal::release_imu_packet();
+    const bool good = result == core::ImuResult::kSample;
+    if (good) imu_fresh_ = true;
+    if (good && !imu_.sample().original) {
+      trigger_.imu_packet(imu_.sample().seq, start_us, scan);
+      if (scan) begin_ident(pilot, scan_us, true);
+    } else if (scan && trigger_.bad_packet(start_us)) {
+      begin_ident(pilot, scan_us, true);
+    }
+    hal::arm_scan(trigger_.mask());
     if (result == core::ImuResult::kBad) continue;
     imu_heard_us_ = start_us;
-    if (result != core::ImuResult::kSample) continue;
-    imu_fresh_ = true;
+    if (!good) continue;
     const core::ImuSample& sample = imu_.sample();
     hear(sample.original ? frames::kSensorsImuOriginal : frames::kSensorsImu);
-    if (!sample.original) trigger_.imu_packet(sample.seq, start_us);
     if (!imu_present_) outlet.event(frames::Event::kImuFound, sample.original ? 1U : 0U, now_us);
     imu_present_ = true;
     if (imu_.take_restarted()) outlet.event(frames::Event::kImuRestarted, 0, now_us);
@@ -93,20 +105,15 @@ void Sensors::watch_imu(Outlet& outlet, uint32_t now_us) {
 
 void Sensors::step_ident(const PilotLink& pilot, Outlet& outlet, uint32_t now_us) {
   if (scanning_ && hal::scan_done()) finish_ident(outlet);
-  switch (trigger_.poll(now_us, !scanning_)) {
-    case core::IdentTrigger::Source::kNone:
-      return;
-    case core::IdentTrigger::Source::kImu:
-      begin_ident(pilot, true);
-      return;
-    case core::IdentTrigger::Source::kTimer:
-      begin_ident(pilot, false);
-      return;
-  }
+  const core::IdentTrigger::Source source = trigger_.poll(now_us, !scanning_ && hal::scan_done());
+  if (source == core::IdentTrigger::Source::kNone) return;
+  uint32_t t_us = 0;
+  const bool started = hal::start_scan(&t_us);
+  hal::arm_scan(trigger_.mask());
+  if (started) begin_ident(pilot, t_us, source == core::IdentTrigger::Source::kImu);
 }
 
-void Sensors::begin_ident(const PilotLink& pilot, bool imu_triggered) {
-  const uint32_t t_us = hal::start_scan();
+void Sensors::begin_ident(const PilotLink& pilot, uint32_t t_us, bool imu_triggered) {
   scanning_ = true;
   const core::ImuSample& sample = imu_.sample();
   ident_.t_us = t_us;

@@ -36,10 +36,10 @@ class Sensors {
   uint16_t rail() const { return rail_; }
 
  private:
-  void step_imu(Outlet& outlet);
+  void step_imu(const PilotLink& pilot, Outlet& outlet);
   void watch_imu(Outlet& outlet, uint32_t now_us);
   void step_ident(const PilotLink& pilot, Outlet& outlet, uint32_t now_us);
-  void begin_ident(const PilotLink& pilot, bool imu_triggered);
+  void begin_ident(const PilotLink& pilot, uint32_t t_us, bool imu_triggered);
   void finish_ident(Outlet& outlet);
   void step_baro(Outlet& outlet, uint32_t now_us);
   void step_gps(const frames::ConfigFrame& config, Outlet& outlet, uint32_t now_us);

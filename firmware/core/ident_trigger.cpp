@@ -4,6 +4,7 @@ namespace core {
 namespace {
 
 constexpr uint16_t kLateUs = 1000;
+constexpr uint16_t kTransferUs = 1100;  // START to STOP of a packet at 400 kHz
 
 void count(uint16_t& counter) {
   if (counter != 0xFFFF) {
@@ -20,21 +21,38 @@ void IdentTrigger::start(uint16_t rate_hz, uint32_t now_us) {
   packet_waits_ = false;
 }
 
-void IdentTrigger::imu_packet(uint8_t seq, uint32_t arrived_us) {
-  const uint32_t since_us = arrived_us - last_packet_us_;
+void IdentTrigger::imu_packet(uint8_t seq, uint32_t start_us, bool started) {
+  const uint32_t since_us = start_us - last_packet_us_;
   if (seq == static_cast<uint8_t>(last_seq_ + 1) && since_us >= 1000 && since_us <= 30000) {
     const int16_t change_us = static_cast<int16_t>(static_cast<int16_t>(since_us) -
                                                    static_cast<int16_t>(packet_period_us_));
     packet_period_us_ = static_cast<uint16_t>(packet_period_us_ + change_us / 8);
   }
-  last_packet_us_ = arrived_us;
+  last_packet_us_ = start_us;
   last_seq_ = seq;
-  packet_waits_ = true;
+  packet_waits_ = !started;
+  if (started) {
+    lead(start_us);
+  }
+}
+
+void IdentTrigger::lead(uint32_t start_us) {
+  imu_leads_ = true;
+  last_imu_us_ = start_us;
+  last_us_ = start_us;
+}
+
+bool IdentTrigger::bad_packet(uint32_t start_us) {
+  if (start_us - last_us_ + packet_period_us_ / 2 < period_us_) {
+    return false;  // its number was wrong too
+  }
+  lead(start_us);
+  return true;
 }
 
 // A lower rate takes every 2nd, 4th or 8th sample: always those whose number divides, so that two
 // recorders of one flight, or one after a reset, keep the same samples.
-bool IdentTrigger::in_phase() const {
+uint8_t IdentTrigger::mask() const {
   const uint16_t half_us = packet_period_us_ / 2;
   uint8_t mask = 0;
   for (uint8_t every = 2; every <= 8; every = static_cast<uint8_t>(every << 1)) {
@@ -42,7 +60,7 @@ bool IdentTrigger::in_phase() const {
       mask = static_cast<uint8_t>(every - 1);
     }
   }
-  return (last_seq_ & mask) == 0;
+  return mask;
 }
 
 IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
@@ -53,17 +71,16 @@ IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
       return Source::kNone;
     }
     packet_waits_ = false;
-    if (in_phase() && (!imu_leads_ || since_us + packet_period_us_ / 2 >= period_us_)) {
+    if ((last_seq_ & mask()) == 0 &&
+        (!imu_leads_ || since_us + packet_period_us_ / 2 >= period_us_)) {
       // Even a packet left out sets the phase: the timer stays 1.5 periods behind it, else both
       // would go on meeting each other's unfinished frames at 200 Hz.
-      imu_leads_ = true;
-      last_imu_us_ = last_packet_us_;
-      last_us_ = last_packet_us_;
+      lead(last_packet_us_);
       if (!ready) {
         count(overruns_);
         return Source::kNone;
       }
-      if (now_us - last_packet_us_ > kLateUs) {
+      if (now_us - last_packet_us_ > kTransferUs + kLateUs) {
         count(late_);
       }
       return Source::kImu;

@@ -14,15 +14,21 @@ constexpr uint16_t kScanUs = kConversionUs * kAnalogSlots * kAnalogRounds;  // 4
 
 void start_analog();
 
-// Starts a scan and returns the instant at which its first conversion starts: conversion n holds
-// the voltage of 12 us after that instant plus n * 104 us. Only when no scan is running.
-// Main loop only.
-uint32_t start_scan();
+// Conversion n of a scan holds the voltage of 12 us after the scan's start plus n * 104 us.
 
-// True once all conversions of the last scan are in. Main loop only.
+// Lets the next packet of the IMU that core::starts_scan accepts with this mask start a scan at its
+// STOP, in the bus's interrupt, if none runs then; ImuPacket::scan_after_us tells. Once, and only
+// when the last packet that did was released. Main loop only.
+void arm_scan(uint8_t mask);
+
+// Starts a scan now, when none runs, and gives its instant; nothing is armed afterwards. False: a
+// packet has just started one. Main loop only.
+bool start_scan(uint32_t* started_us);
+
+// The scan of the last start_scan(), or of the last packet released that started one. It is done
+// once all conversions are in; a sum is that of the four conversions of a slot, 0 to 4092, and
+// stays until the scan behind it is released or started. Main loop only.
 bool scan_done();
-
-// Sum of the four conversions of a slot, 0 to 4092. Valid from scan_done() to the next start.
 uint16_t scan_sum(uint8_t slot);
 
 // The analogue supply as measured against the chip's reference between scans, in mV; 0: unknown.

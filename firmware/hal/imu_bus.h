@@ -8,9 +8,10 @@ namespace hal {
 constexpr uint8_t kImuPacketBytes = 40;  // longer transfers are cut
 
 struct ImuPacket {
-  uint32_t start_us;  // now_us() when the address matched
-  uint8_t address;    // 7 bits, as the master sent it
-  uint8_t length;     // bytes received
+  uint32_t start_us;       // now_us() when the address matched
+  uint16_t scan_after_us;  // from there to the start of the scan it started; 0: none
+  uint8_t address;         // 7 bits, as the master sent it
+  uint8_t length;          // bytes received
   uint8_t bytes[kImuPacketBytes];
 };
 

@@ -130,7 +130,7 @@ enum class Event : uint8_t {
 
 // All identification channels at one instant. A new-type IMU packet triggers it (every n-th at lower rates), or the timer 1.5 periods after the last trigger.
 struct __attribute__((packed)) IdentFrame {
-  uint32_t t_us;  // us; Mega clock at the trigger; wraps after 71.6 min
+  uint32_t t_us;  // us; Mega clock at the start of the analogue scan: the STOP of the packet that triggers it, or the timer; wraps after 71.6 min
   uint16_t count;  // identification frames made, dropped ones included; a gap is a loss
   uint16_t imu_age;  // 4 us; age of the IMU sample at t_us
   uint8_t imu_seq;  // sequence number of the IMU sample, from its packet; packets counted on arrival for original firmware

@@ -11,6 +11,7 @@ from host.twin import bmp085
 from numpy.typing import NDArray
 
 from tests.sitl import script as scripted
+from tests.sitl.instrument import byte_ticks
 from tests.sitl.script import Integers, Script
 
 Frames = Mapping[str, NDArray[np.void]]
@@ -19,8 +20,9 @@ NAMES = ("ident", "mag", "attitude", "baro", "gps")
 CONVERSION_TICKS = 208
 HOLD_TICKS = 24
 ROUNDS, SLOTS = 4, 11
-# A pulse is accepted once its line has been low for 300 us and the main loop has come by.
-ACCEPT_TICKS = (600, 600 + 2000)
+# A pulse is accepted once its line has been low for 300 us and the main loop has come by; a frame
+# takes it at the first turn behind its t_us, and a turn with card traffic lasts 0.1 ms.
+ACCEPT_TICKS = (600 - 200, 600 + 2000)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,11 +101,11 @@ def _difference(
 
 def _imu(ident: NDArray[np.void], ticks: Integers, script: Script) -> list[Difference]:
     imu = script.imu
-    # A packet counts from its STOP on: 36 bytes and the address at 22.5 us.
-    arrived = imu.start + 37 * 45
+    # A packet counts from its STOP on, behind the address and 36 bytes.
+    arrived = imu.start + 37 * byte_ticks()
     packet = np.searchsorted(arrived, ticks, side="right") - 1
     out = [_difference("imu_seq", ident["imu_seq"], packet & 0xFF)]
-    age = imu.age[packet] + (ticks - imu.start[packet]) // 8
+    age = imu.age[packet] + (ticks - imu.start[packet] - byte_ticks()) // 8
     out.append(_difference("imu_age", ident["imu_age"], age, allowed=1))
     out += [
         _difference(name, ident[name], imu.raw[packet, channel])
@@ -182,7 +184,7 @@ def _attitude(attitude: NDArray[np.void], script: Script) -> list[Difference]:
 
 
 def _packet_at(frame: NDArray[np.void], script: Script) -> Integers:
-    """Return the packet whose START is at the frame's time."""
+    """Return the packet whose address was in at the frame's time."""
     start = unwrap(frame["t_us"]) * 2
     row = np.searchsorted(script.imu.start, start + 2000) - 1
     return np.asarray(row, dtype=np.int64)

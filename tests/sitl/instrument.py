@@ -23,6 +23,9 @@ BLOCK_BYTES = 512
 PACKET_BYTES = 40
 EEPROM_BYTES = 4096
 ANALOG_CHANNELS = 11
+# A byte with its acknowledge at 400 kHz, and behind it the clock held by the Mega.
+BYTE_US = 22.5
+SLAVE_HOLD_TICKS = 7
 
 Ticks = NDArray[np.int64]
 
@@ -118,6 +121,12 @@ class State(ctypes.Structure):
     )
 
 
+def byte_ticks(byte_us: float = BYTE_US) -> int:
+    """Return how long a byte takes on the IMU's bus: the address is in after one, STOP comes behind
+    the last."""
+    return round(byte_us * TICKS_PER_US) + SLAVE_HOLD_TICKS
+
+
 class Sitl:
     """One instrument with everything around it, switched off, its EEPROM erased."""
 
@@ -190,7 +199,12 @@ class Sitl:
         self.add_button([at, at + round(seconds * TICKS_PER_S)], [1, 0])
 
     def add_packets(
-        self, start: npt.ArrayLike, address: int, packets: Sequence[bytes], *, byte_us: float = 22.5
+        self,
+        start: npt.ArrayLike,
+        address: int,
+        packets: Sequence[bytes],
+        *,
+        byte_us: float = BYTE_US,
     ) -> None:
         """Add transfers on the IMU's bus: ticks of their START (n,), one address, n packets.
 

@@ -9,7 +9,7 @@ import pytest
 from tests.sitl import script as scripted
 from tests.sitl.bench import Bench, events, flight, missing
 from tests.sitl.compare import compare
-from tests.sitl.instrument import TICKS_PER_S
+from tests.sitl.instrument import TICKS_PER_S, byte_ticks
 
 FRESH, TRIGGERED, ORIGINAL = 0x0400, 0x2000, 0x4000
 
@@ -74,7 +74,7 @@ def test_original_imu_packets(tmp_path: Path) -> None:
     live = ident[ident["t_us"] < 9_500_000]
     assert np.all(live["valid"] & (ORIGINAL | TRIGGERED) == ORIGINAL)  # the timer sets the time
     assert events(log, "imu_found") == [1]
-    arrived = start + 8000 + 33 * 180
+    arrived = start + 8000 + 33 * byte_ticks(90.0)
     row = np.searchsorted(arrived, live["t_us"].astype(np.int64) * 2, side="right") - 1
     want = np.array([rows[r][2] for r in row])
     names = ("phi", "theta", "psi", "p", "q", "r", "ax", "ay", "az")
@@ -137,7 +137,7 @@ def test_damaged_imu_packets_are_dropped_and_counted(tmp_path: Path) -> None:
     rows = np.stack([ident[name] for name in scripted.IMU], axis=1).tolist()
     assert all(tuple(row) in known for row in rows)
     until = int(log.frames["system"]["t_us"][-1]) * 2
-    ended = plan.imu.start + 37 * 45 <= until
+    ended = plan.imu.start + 37 * byte_ticks() <= until
     assert int(log.frames["system"]["imu_bad_packets"][-1]) == int(ended[damaged].sum())
 
 

@@ -23,11 +23,16 @@ constexpr uint8_t kBandgapMux = 0x1E;
 constexpr uint16_t kBandgapMv = 1100;
 constexpr uint8_t kConversions = hal::kAnalogSlots * hal::kAnalogRounds;
 constexpr uint8_t kScansPerSupply = 128;  // about once a second
+// Of the supply, behind a scan: the first only settles the reference, which wants 70 us.
+constexpr uint8_t kSupplyConversions = 2;
+constexpr uint8_t kSumBytes = 2 * hal::kAnalogSlots;
 
 constexpr uint8_t kIdle = _BV(ADEN) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);  // 125 kHz
 constexpr uint8_t kFree = kIdle | _BV(ADATE) | _BV(ADIE);
+constexpr uint8_t kOnce = kIdle | _BV(ADIE);
 
 uint8_t g_scans;
+uint8_t g_reading;  // 0 or 1: half of adc_sums that scan_sum() reads
 
 // ADMUX of a channel; its bit ADLAR, else unused, stands for MUX5 of ADCSRB.
 constexpr uint8_t selection(const uint8_t slot) {
@@ -40,14 +45,14 @@ inline void select(const uint8_t chosen) {
   ADMUX = chosen & uint8_t(~_BV(ADLAR));
 }
 
-// Of the slot behind each slot.
+// Of the slot behind each slot, for both halves of the sums.
 struct Selections {
-  uint8_t slot[hal::kAnalogSlots];
+  uint8_t slot[2 * hal::kAnalogSlots];
 };
 constexpr Selections make_selections() {
   Selections all = {};
-  for (uint8_t slot = 0; slot < hal::kAnalogSlots; ++slot) {
-    all.slot[slot] = selection(slot + 1 == hal::kAnalogSlots ? 0 : uint8_t(slot + 1));
+  for (uint8_t slot = 0; slot < 2 * hal::kAnalogSlots; ++slot) {
+    all.slot[slot] = selection(uint8_t((slot + 1) % hal::kAnalogSlots));
   }
   return all;
 }
@@ -60,15 +65,18 @@ constexpr Selections kBehind CORE_FLASH = make_selections();
 // Shared with the assembly below, hence C names, kept by the linker.
 extern "C" {
 
-volatile uint16_t adc_sums[hal::kAnalogSlots] FOR_THE_INTERRUPT;
+// Two scans: one is taken while the other waits to be read.
+volatile uint16_t adc_sums[2 * hal::kAnalogSlots] FOR_THE_INTERRUPT;
 volatile uint8_t adc_left FOR_THE_INTERRUPT;    // conversions of this scan still to come
 volatile uint8_t adc_offset FOR_THE_INTERRUPT;  // of the next sum, in bytes
+volatile uint8_t adc_end FOR_THE_INTERRUPT;     // behind the sums of this scan
+volatile uint8_t adc_supply FOR_THE_INTERRUPT;  // conversions of the supply, behind this scan
 volatile uint16_t adc_bandgap FOR_THE_INTERRUPT;
 
 }  // extern "C"
 
 // Its flag is cleared on entry and comes again 104 us later, so it may nest at once. In assembly:
-// 98 cycles instead of 128, 4400 or 8800 times a second.
+// 100 cycles instead of 128, 4400 or 8800 times a second.
 ISR(ADC_vect, ISR_NAKED) {
   __asm__ __volatile__(
       "sei \n\t"
@@ -84,8 +92,9 @@ ISR(ADC_vect, ISR_NAKED) {
       "lds r25, %[result]+1 \n\t"
       "lds r18, adc_left \n\t"
       "subi r18, 1 \n\t"
-      "brcs 3f \n\t"
-      "lds r30, adc_offset \n\t"
+      "brcc 7f \n\t"
+      "rjmp 3f \n\t"
+      "7: lds r30, adc_offset \n\t"
       "ldi r31, 0 \n\t"
       "subi r30, lo8(-(adc_sums)) \n\t"
       "sbci r31, hi8(-(adc_sums)) \n\t"
@@ -97,9 +106,10 @@ ISR(ADC_vect, ISR_NAKED) {
       "std Z+1, r25 \n\t"
       "lds r30, adc_offset \n\t"
       "subi r30, -2 \n\t"
-      "cpi r30, %[end] \n\t"
+      "lds r19, adc_end \n\t"
+      "cp r30, r19 \n\t"
       "brne 1f \n\t"
-      "ldi r30, 0 \n\t"
+      "subi r30, %[size] \n\t"
       "1: sts adc_offset, r30 \n\t"
       "sts adc_left, r18 \n\t"
       "cpi r18, 2 \n\t"
@@ -124,11 +134,26 @@ ISR(ADC_vect, ISR_NAKED) {
       "brne 4f \n\t"
       "lds r24, %[taken] \n\t"
       "tst r24 \n\t"
-      "breq 4f \n\t"
+      "breq 5f \n\t"
       "sts %[awake], r24 \n\t"
+      // The scan is done: the supply, once a second.
+      "5: lds r24, adc_supply \n\t"
+      "tst r24 \n\t"
+      "breq 4f \n\t"
+      "ldi r24, 0 \n\t"
+      "sts %[control_b], r24 \n\t"
+      "ldi r24, %[bandgap] \n\t"
+      "sts %[admux], r24 \n\t"
+      "6: ldi r24, %[again] \n\t"
+      "sts %[control_a], r24 \n\t"
       "rjmp 4f \n\t"
       "3: sts adc_bandgap, r24 \n\t"
       "sts adc_bandgap+1, r25 \n\t"
+      "lds r24, adc_supply \n\t"
+      "subi r24, 1 \n\t"
+      "brcs 4f \n\t"
+      "sts adc_supply, r24 \n\t"
+      "brne 6b \n\t"
       "4: pop r31 \n\t"
       "pop r30 \n\t"
       "pop r19 \n\t"
@@ -138,7 +163,7 @@ ISR(ADC_vect, ISR_NAKED) {
       "out __SREG__, r24 \n\t"
       "pop r24 \n\t"
       "reti \n\t" ::[result] "n"(_SFR_MEM_ADDR(ADC)),
-      [end] "M"(2 * hal::kAnalogSlots),
+      [size] "M"(kSumBytes),
       [behind] "i"(&kBehind),
       [upper] "I"(ADLAR),
       [mux5] "M"(_BV(MUX5)),
@@ -146,10 +171,57 @@ ISR(ADC_vect, ISR_NAKED) {
       [control_a] "n"(_SFR_MEM_ADDR(ADCSRA)),
       [control_b] "n"(_SFR_MEM_ADDR(ADCSRB)),
       [admux] "n"(_SFR_MEM_ADDR(ADMUX)),
-      [once] "M"(kIdle | _BV(ADIE)),
+      [once] "M"(int(kOnce)),
+      [again] "M"(kOnce | _BV(ADSC)),
+      [bandgap] "M"(kReference | kBandgapMux),
       [taken] "i"(&mega::g_packet_taken),
       [awake] "i"(&mega::g_awake));
 }
+
+namespace mega {
+
+volatile uint8_t g_scan_mask = kScanUnarmed;
+volatile bool g_scan_waits = false;
+
+bool adc_busy() {
+  return adc_left != 0 || (ADCSRA & _BV(ADSC)) != 0;
+}
+
+uint16_t begin_scan() {
+  const uint8_t begin = adc_end == kSumBytes ? kSumBytes : 0;
+  adc_offset = begin;
+  adc_end = uint8_t(begin + kSumBytes);
+  adc_left = kConversions;
+  g_packet_taken = false;
+  select(selection(0));
+  uint16_t started_ticks;
+  {
+    const InterruptsOff guard;
+    started_ticks = TCNT5;
+  }
+  ADCSRA = kFree | _BV(ADSC) | _BV(ADIF);
+  _delay_us(17);  // two ADC clocks: the first conversion has taken its channel
+  select(selection(1));
+  return started_ticks;
+}
+
+void take_scan() {
+  g_reading ^= 1U;
+  g_scan_waits = false;
+}
+
+}  // namespace mega
+
+namespace {
+
+void clear_next_sums() {
+  const uint8_t first = adc_end == kSumBytes ? hal::kAnalogSlots : 0;
+  for (uint8_t slot = 0; slot < hal::kAnalogSlots; ++slot) {
+    adc_sums[first + slot] = 0;
+  }
+}
+
+}  // namespace
 
 namespace hal {
 
@@ -157,39 +229,44 @@ void start_analog() {
   DIDR0 = 0xFF;  // A0 to A7 are analogue only
   DIDR2 = _BV(ADC13D) | _BV(ADC14D) | _BV(ADC15D);
   ADCSRA = kIdle;
+  adc_end = kSumBytes;
 }
 
-uint32_t start_scan() {
-  while ((ADCSRA & _BV(ADSC)) != 0) {  // the supply's conversion, 104 us once a second
+void arm_scan(const uint8_t mask) {
+  mega::g_scan_mask = mega::kScanUnarmed;
+  if (mega::g_scan_waits) {
+    return;
   }
-  for (uint8_t slot = 0; slot < kAnalogSlots; ++slot) {
-    adc_sums[slot] = 0;
+  clear_next_sums();
+  mega::g_scan_mask = mask;
+}
+
+bool start_scan(uint32_t* const started_us) {
+  mega::g_scan_mask = mega::kScanUnarmed;
+  if (mega::g_scan_waits) {
+    return false;
   }
-  mega::g_packet_taken = false;
-  adc_offset = 0;
-  adc_left = kConversions;
-  select(selection(0));
-  const uint32_t started_us = now_us();
-  ADCSRA = kFree | _BV(ADSC) | _BV(ADIF);
-  _delay_us(17);  // two ADC clocks: the first conversion has taken its channel
-  select(selection(1));
-  ++g_scans;
-  return started_us;
+  while (mega::adc_busy()) {  // the supply's conversions: 208 us once a second
+  }
+  clear_next_sums();
+  const uint16_t started_ticks = mega::begin_scan();
+  mega::take_scan();
+  const uint16_t since_ticks = uint16_t(uint16_t(now_ticks()) - started_ticks);
+  *started_us = now_us() - (since_ticks >> 1);
+  return true;
 }
 
 bool scan_done() {
-  return adc_left == 0;
+  const uint8_t writing = adc_end == kSumBytes ? 0 : 1;
+  return adc_left == 0 || writing != g_reading;
 }
 
 uint16_t scan_sum(const uint8_t slot) {
-  if (slot == kAnalogRail && g_scans >= kScansPerSupply) {
+  if (slot == kAnalogRail && ++g_scans >= kScansPerSupply) {
     g_scans = 0;
-    ADCSRB = 0;
-    ADMUX = kReference | kBandgapMux;
-    _delay_us(100);
-    ADCSRA = kIdle | _BV(ADIE) | _BV(ADSC);
+    adc_supply = kSupplyConversions;
   }
-  return adc_sums[slot];
+  return adc_sums[g_reading == 0 ? slot : uint8_t(slot + kAnalogSlots)];
 }
 
 uint16_t avcc_mv() {

@@ -8,6 +8,7 @@
 
 #include "boards/mega2560/board.h"
 #include "boards/mega2560/interrupts.h"
+#include "core/ident_trigger.h"
 #include "hal/clock.h"
 
 // Shared with the assembly below, hence C names, kept by the linker.
@@ -54,12 +55,28 @@ void begin_packet() {
   g_filling = next;
 }
 
+// The scan begins before anything else that a packet entails: 8 us behind its STOP.
+void start_scan_of(const uint8_t filling) {
+  hal::ImuPacket& packet = g_packets[filling];
+  packet.scan_after_us = 0;
+  const uint8_t mask = mega::g_scan_mask;
+  if (mask == mega::kScanUnarmed || mega::adc_busy() ||
+      !core::starts_scan(packet.address, packet.length, packet.bytes, mask)) {
+    return;
+  }
+  mega::g_scan_mask = mega::kScanUnarmed;
+  mega::g_scan_waits = true;
+  const uint16_t started_ticks = mega::begin_scan();
+  packet.scan_after_us = uint16_t(started_ticks - g_start_ticks[filling]) >> 1;
+}
+
 void end_packet() {
   const uint8_t filling = g_filling;
   if (filling != kNone) {
     g_packets[filling].length = uint8_t(hal::kImuPacketBytes - imu_bus_room);
     imu_bus_room = 0;
     g_filling = kNone;
+    start_scan_of(filling);
     mega::g_awake = true;
     const mega::InterruptsOff guard;
     ++g_full;
@@ -162,12 +179,17 @@ const ImuPacket* imu_packet() {
 }
 
 void release_imu_packet() {
-  mega::g_packet_taken = true;
-  const mega::InterruptsOff guard;
-  if (g_full != 0) {
-    g_first = (g_first + 1U) & 1U;
-    --g_full;
+  if (g_full == 0) {
+    return;
   }
+  if (g_packets[g_first].scan_after_us != 0) {
+    mega::take_scan();
+  } else {
+    mega::g_packet_taken = true;
+  }
+  const mega::InterruptsOff guard;
+  g_first = (g_first + 1U) & 1U;
+  --g_full;
 }
 
 uint16_t lost_imu_packets() {

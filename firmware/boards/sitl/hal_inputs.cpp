@@ -54,6 +54,10 @@ const ImuPacket* imu_packet() {
 void release_imu_packet() {
   sitl::World& w = world();
   if (w.held_count == 0) return;
+  if (w.held[0].scan_after_us != 0) {
+    w.reading ^= 1U;
+    w.scan_waits = false;
+  }
   w.held[0] = w.held[1];
   --w.held_count;
 }
@@ -86,19 +90,28 @@ const uint8_t* baro_bus_bytes() {
 
 void start_analog() {}
 
-uint32_t start_scan() {
+void arm_scan(uint8_t mask) {
+  world().scan_mask = mask;
+  world().scan_armed = !world().scan_waits;
+}
+
+bool start_scan(uint32_t* started_us) {
   sitl::World& w = world();
-  if (clock_ticks() % sitl::kTicksPerUs != 0) w.advance_to(w.now + 1);
-  w.start_scan();
-  return now_us();
+  w.scan_armed = false;
+  if (w.scan_waits) return false;
+  const sitl::Tick begin = w.start_scan();
+  w.reading ^= 1U;
+  w.advance_to(begin);
+  *started_us = now_us();
+  return true;
 }
 
 bool scan_done() {
-  return !world().scan_running;
+  return !world().scan_running || world().writing != world().reading;
 }
 
 uint16_t scan_sum(uint8_t slot) {
-  return world().sums[slot];
+  return world().sums[world().reading][slot];
 }
 
 uint16_t avcc_mv() {

@@ -210,8 +210,11 @@ void feed_watchdog() {
 
 void sleep_until_interrupt() {
   sitl::World& w = world();
-  const Tick next_ms = (w.now / kTicksPerMs + 1) * kTicksPerMs;
-  w.advance_to(std::max(w.now + 1, std::min(next_ms, w.next_event())));
+  if (!w.awake) {
+    const Tick next_ms = (w.now / kTicksPerMs + 1) * kTicksPerMs;
+    w.advance_to(std::max(w.now + 1, std::min(next_ms, w.next_event())));
+  }
+  w.awake = false;
 }
 
 uint16_t stack_free_bytes() {

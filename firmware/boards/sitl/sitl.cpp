@@ -114,7 +114,9 @@ void sitl_add_packets(const int64_t* start,
   for (size_t i = 0; i < count; ++i) {
     sitl::PacketStimulus stimulus = {};
     stimulus.start = start[i];
-    stimulus.end = start[i] + static_cast<Tick>(byte_ticks) * (1 + length[i]);
+    const Tick byte = static_cast<Tick>(byte_ticks) + sitl::kSlaveHold;
+    stimulus.matched = start[i] + byte;
+    stimulus.end = start[i] + byte * (1 + length[i]);
     stimulus.packet.address = address[i];
     stimulus.packet.length = std::min<uint8_t>(length[i], hal::kImuPacketBytes);
     memcpy(stimulus.packet.bytes, bytes + i * hal::kImuPacketBytes, stimulus.packet.length);

@@ -27,7 +27,8 @@ void sitl_insert_card(uint8_t* image, uint32_t blocks, const uint8_t* id);
 
 // --- stimuli, in order of time; more may be added behind those given ---
 void sitl_add_edges(const int64_t* at, const uint8_t* levels, size_t count);
-// 40 bytes stand in `bytes` for each packet; a byte with its acknowledge takes `byte_ticks`.
+// 40 bytes stand in `bytes` for each packet; a byte with its acknowledge takes `byte_ticks`,
+// and the Mega holds the clock for 7 ticks behind it.
 void sitl_add_packets(const int64_t* start,
                       const uint8_t* address,
                       const uint8_t* length,

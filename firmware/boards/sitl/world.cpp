@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/ident_trigger.h"
+
 namespace sitl {
 
 namespace {
@@ -71,6 +73,7 @@ void World::advance_to(Tick when) {
 }
 
 void World::fire(Tick when) {
+  if (scan_running && scan_end <= when) scan_running = false;
   for (; time_of_next(edges, &EdgeStimulus::at) <= when; ++edges.next) {
     const EdgeStimulus& edge = edges.events[edges.next];
     levels = edge.levels;
@@ -86,11 +89,21 @@ void World::fire(Tick when) {
       ++lost_packets;
       continue;
     }
+    awake = true;
     const PacketStimulus& stimulus = packets.events[packets.next];
     hal::ImuPacket& place = held[held_count++];
     place = stimulus.packet;
     place.start_us =
-        static_cast<uint32_t>((stimulus.start - booted_at) / kTicksPerUs) + clock_offset_us;
+        static_cast<uint32_t>((stimulus.matched - booted_at) / kTicksPerUs) + clock_offset_us;
+    place.scan_after_us = 0;
+    if (scan_armed && !scan_running &&
+        core::starts_scan(place.address, place.length, place.bytes, scan_mask)) {
+      scan_armed = false;
+      scan_waits = true;
+      const Tick since_boot = start_scan() - booted_at;
+      place.scan_after_us = static_cast<uint16_t>(since_boot / kTicksPerUs -
+                                                  (stimulus.matched - booted_at) / kTicksPerUs);
+    }
   }
   for (; time_of_next(gps, &ByteStimulus::at) <= when; ++gps.next) {
     receive(&ports[static_cast<size_t>(hal::Port::kGps)], gps.events[gps.next].byte);
@@ -101,23 +114,25 @@ void World::fire(Tick when) {
   for (; time_of_next(button, &LevelStimulus::at) <= when; ++button.next) {
     button_down = button.events[button.next].level;
   }
-  if (scan_running && scan_end <= when) scan_running = false;
 }
 
-void World::start_scan() {
+Tick World::start_scan() {
+  const Tick begin = now + (now - booted_at) % kTicksPerUs;
   const Tick conversion = hal::kConversionUs * kTicksPerUs;
   const Tick hold = 12 * kTicksPerUs;  // sample and hold: 1.5 clocks of 125 kHz
   for (uint8_t slot = 0; slot < hal::kAnalogSlots; ++slot) {
     uint16_t sum = 0;
     for (uint8_t round = 0; round < hal::kAnalogRounds; ++round) {
-      const Tick when = now + hold + (round * hal::kAnalogSlots + slot) * conversion;
+      const Tick when = begin + hold + (round * hal::kAnalogSlots + slot) * conversion;
       const double count = std::min(1023.0, std::max(0.0, analog.at(when, slot)));
       sum = static_cast<uint16_t>(sum + static_cast<uint16_t>(count));
     }
-    sums[slot] = sum;
+    sums[writing ^ 1U][slot] = sum;
   }
+  writing ^= 1U;
   scan_running = true;
-  scan_end = now + hal::kScanUs * kTicksPerUs;
+  scan_end = begin + hal::kScanUs * kTicksPerUs;
+  return begin;
 }
 
 void World::set_pulse(uint8_t output, uint16_t width_ticks) {
@@ -159,8 +174,12 @@ void World::reset_chip() {
   captured.clear();
   captured_taken = 0;
   held_count = 0;
+  awake = false;
   scan_running = false;
   scan_end = kNever;
+  scan_armed = false;
+  scan_waits = false;
+  reading = writing;
   for (ServoTimer& servo : servos) servo = ServoTimer();
   for (PortModel& port : ports) {
     port.received.clear();

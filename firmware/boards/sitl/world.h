@@ -27,8 +27,12 @@ struct EdgeStimulus {
   uint8_t levels;
 };
 
+// The Mega's interrupt holds SCL this long behind each byte, as measured on the simulated chip.
+constexpr Tick kSlaveHold = 7;
+
 struct PacketStimulus {
   Tick start;
+  Tick matched;  // the address is in
   Tick end;
   hal::ImuPacket packet;
 };
@@ -111,11 +115,17 @@ struct World {
   hal::ImuPacket held[2] = {};
   uint8_t held_count = 0;
   uint16_t lost_packets = 0;
+  bool awake = false;  // a packet ended: the main loop does not go to sleep
   bool button_down = false;
 
   Tick scan_end = kNever;
   bool scan_running = false;
-  uint16_t sums[hal::kAnalogSlots] = {};
+  bool scan_armed = false;
+  bool scan_waits = false;  // started by a packet that was not released yet
+  uint8_t scan_mask = 0;
+  uint8_t writing = 0;  // of `sums`, by the last scan started
+  uint8_t reading = 0;
+  uint16_t sums[2][hal::kAnalogSlots] = {};
 
   PortModel ports[3];
   std::vector<uint8_t> eeprom;
@@ -141,7 +151,8 @@ struct World {
   void advance_to(Tick when);
   // Time of the next interrupt at or after now.
   Tick next_event() const;
-  void start_scan();
+  // At `now`, or at the next whole microsecond of the clock: its instant.
+  Tick start_scan();
   void set_pulse(uint8_t output, uint16_t width_ticks);
   void toggle_heartbeat();
   // Chip peripherals as a reset leaves them; stimuli and time go on.

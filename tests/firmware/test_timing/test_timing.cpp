@@ -10,8 +10,10 @@ namespace {
 
 using Source = core::IdentTrigger::Source;
 
-// An IMU that sends every `packet_us`, a loop that turns every `turn_us`, a frame that takes
-// 4.6 ms; packets from `silent_from` to `silent_to` are lost.
+constexpr uint32_t kTransferUs = 1000;  // START to STOP
+
+// An IMU whose packets end every `packet_us`, a loop that turns every `turn_us`, a frame that takes
+// 4.6 ms; packets from `silent_from` to `silent_to` are lost. No packet starts a scan by itself.
 struct Run {
   uint32_t packet_us = 5000;
   uint32_t turn_us = 100;
@@ -32,7 +34,7 @@ struct Run {
     for (uint32_t t_us = 0; t_us < length_us; t_us += turn_us) {
       while (next_packet_us <= t_us) {
         if (next_packet_us < silent_from || next_packet_us >= silent_to) {
-          trigger.imu_packet(seq, start_us + next_packet_us);
+          trigger.imu_packet(seq, start_us + next_packet_us - kTransferUs, false);
         }
         ++seq;
         next_packet_us += packet_us;
@@ -80,7 +82,7 @@ TEST_CASE("at a lower rate the sample's number says which are kept, whatever cam
     for (uint8_t i = 0; i < 40; ++i) {
       const uint8_t seq = static_cast<uint8_t>(first + i);
       const uint32_t t_us = 1000U + 5000U * i;
-      trigger.imu_packet(seq, t_us);
+      trigger.imu_packet(seq, t_us, false);
       if (trigger.poll(t_us, true) == Source::kImu) {
         CHECK_EQ(seq & 3, 0);
         ++kept;
@@ -88,6 +90,61 @@ TEST_CASE("at a lower rate the sample's number says which are kept, whatever cam
     }
     CHECK(kept >= 9);
   }
+}
+
+TEST_CASE("a packet that has started its scan is not asked for again, and the timer follows it") {
+  core::IdentTrigger trigger;
+  const uint32_t start_us = 0xFFFFFFFFU - 20000U;
+  trigger.start(100, start_us);
+  for (uint32_t at_us = 2000; at_us < 60000; at_us += 10000) {
+    trigger.imu_packet(static_cast<uint8_t>(at_us / 10000), start_us + at_us, true);
+    for (uint32_t t_us = 1000; t_us < 10000; t_us += 1000) {
+      CHECK(trigger.poll(start_us + at_us + t_us, t_us > 5000) == Source::kNone);
+    }
+  }
+  // Silent from here on: a period and a half behind the last packet.
+  CHECK(trigger.poll(start_us + 52000 + 14999, true) == Source::kNone);
+  CHECK(trigger.poll(start_us + 52000 + 15000, true) == Source::kTimer);
+  CHECK_EQ(trigger.late(), 0);
+  CHECK_EQ(trigger.overruns(), 0);
+}
+
+TEST_CASE("the scan of a bad packet makes a frame when one is due, and only then") {
+  core::IdentTrigger trigger;
+  trigger.start(100, 0);
+  trigger.imu_packet(2, 10000, true);
+  CHECK(!trigger.bad_packet(15000));
+  CHECK(trigger.poll(16000, true) == Source::kNone);
+  CHECK(trigger.bad_packet(20000));
+  CHECK(trigger.poll(34999, true) == Source::kNone);
+  CHECK(trigger.poll(35000, true) == Source::kTimer);
+}
+
+TEST_CASE("the mask follows the measured packet period") {
+  core::IdentTrigger trigger;
+  trigger.start(100, 0);
+  CHECK_EQ(trigger.mask(), 1);  // 200 Hz until measured
+  uint32_t t_us = 0;
+  for (uint8_t seq = 0; seq < 100; ++seq) {
+    t_us += 10000;
+    trigger.imu_packet(seq, t_us, false);
+  }
+  CHECK_EQ(trigger.mask(), 0);
+  trigger.start(25, t_us);
+  CHECK_EQ(trigger.mask(), 3);
+}
+
+TEST_CASE("only a packet of the new kind, whole and in phase, starts a scan") {
+  uint8_t bytes[frames::kImuPacketSize] = {frames::kImuPacketKind, 6};
+  const uint8_t address = frames::kImuPacketAddress;
+  const uint8_t size = frames::kImuPacketSize;
+  CHECK(core::starts_scan(address, size, bytes, 0));
+  CHECK(core::starts_scan(address, size, bytes, 1));
+  CHECK(!core::starts_scan(address, size, bytes, 3));
+  CHECK(!core::starts_scan(frames::kOriginalImu1PacketAddress, size, bytes, 0));
+  CHECK(!core::starts_scan(address, static_cast<uint8_t>(size - 1), bytes, 0));
+  bytes[0] ^= 1;
+  CHECK(!core::starts_scan(address, size, bytes, 0));
 }
 
 TEST_CASE("an IMU clock half a percent off does not slip a packet") {

@@ -3,6 +3,7 @@ simulator."""
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -55,8 +56,11 @@ def logs(
 
 @pytest.fixture(scope="module")
 def pair(logs: dict[str, FlightLog]) -> tuple[Ident, Ident]:
-    """Identification frames of both, from the first IMU sample both have."""
-    one, two = (logs[name].frames["ident"] for name in ("sitl", "avr"))
+    return in_step(logs["sitl"].frames["ident"], logs["avr"].frames["ident"])
+
+
+def in_step(one: Ident, two: Ident) -> tuple[Ident, Ident]:
+    """Identification frames of two recorders, from the first IMU sample both have."""
     first = max(int(one["t_us"][0]), int(two["t_us"][0])) + 20_000
     one = one[one["t_us"] > first]
     shift = int(np.flatnonzero(two["imu_seq"] == one["imu_seq"][0])[0])
@@ -81,19 +85,44 @@ def test_both_logs_are_whole_and_hold_the_same_samples_in_the_same_order(
     assert not np.array_equal(one["q"][1:], two["q"][:-1])
 
 
-def test_samples_are_dated_alike_within_100_us(pair: tuple[Ident, Ident]) -> None:
+def clock_offset_us(pair: tuple[Ident, Ident]) -> float:
+    """What the clock of the first shows more than that of the second, from the START of packets."""
+    return float(np.median(instants_us(pair[0]) - instants_us(pair[1])))
+
+
+def worst_time_us(pair: tuple[Ident, Ident]) -> float:
+    """Largest difference between the times of a frame in both logs, by one clock."""
+    apart = pair[0]["t_us"].astype(np.int64) - pair[1]["t_us"].astype(np.int64)
+    return float(np.abs(apart - clock_offset_us(pair)).max())
+
+
+def test_frames_are_dated_alike_within_100_us(pair: tuple[Ident, Ident]) -> None:
     # The Mega's clock starts with its program, a few ms behind that of the library: one constant.
+    assert 0.0 < clock_offset_us(pair) < 10_000.0
     off = instants_us(pair[0]) - instants_us(pair[1])
-    assert 0.0 < np.median(off) < 10_000.0
-    assert np.abs(off - np.median(off)).max() < 100.0
+    assert np.abs(off - clock_offset_us(pair)).max() < 100.0
+    assert worst_time_us(pair) < 100.0
     swapped = instants_us(pair[0])[1:] - instants_us(pair[1])[:-1]
-    assert np.abs(swapped - np.median(off)).max() > 100.0
+    assert np.abs(swapped - clock_offset_us(pair)).max() > 100.0
+
+
+def test_a_scan_200_us_late_is_seen(
+    given: Stimuli, logs: dict[str, FlightLog], tmp_path: Path
+) -> None:
+    # Packets whose STOP comes 200 us later start their scans so much later.
+    slow = [dataclasses.replace(p, end=p.end + 400) for p in given.packets]
+    recording = sitl.record(
+        dataclasses.replace(given, packets=slow), rate_hz=100, aircraft="ultrastick25e", seed=5
+    )
+    (tmp_path / "slow.bin").write_bytes(recording.log)
+    late = in_step(read_log(tmp_path / "slow.bin").frames["ident"], logs["avr"].frames["ident"])
+    assert worst_time_us(late) > 100.0
 
 
 def test_analogue_channels_are_the_pins_within_a_count(
     given: Stimuli, pair: tuple[Ident, Ident]
 ) -> None:
-    start = float(np.median(instants_us(pair[0]) - instants_us(pair[1])))
+    start = clock_offset_us(pair)
     grid_us = np.arange(len(given.analog)) * SAMPLE_STEP_TICKS / 2.0
 
     def beyond(ident: Ident, offset_us: float) -> float:
@@ -116,7 +145,7 @@ def test_analogue_channels_are_the_pins_within_a_count(
 def test_receiver_pulses_agree_within_four_microseconds(
     given: Stimuli, pair: tuple[Ident, Ident]
 ) -> None:
-    start = float(np.median(instants_us(pair[0]) - instants_us(pair[1])))
+    start = clock_offset_us(pair)
     rise, fall = given.edges[0::2], given.edges[1::2]
 
     def worst(ident: Ident, offset_us: float, stretch: float = 1.0) -> float:

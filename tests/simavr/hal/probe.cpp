@@ -98,8 +98,9 @@ void serve_scan(const uint32_t now_us) {
   }
   if (scan_period_ms != 0 && !g_scanning && int32_t(now_us - g_next_scan_us) >= 0) {
     g_next_scan_us = now_us + uint32_t(scan_period_ms) * 1000U;
-    scan_start_us = hal::start_scan();
-    g_scanning = true;
+    uint32_t started_us = 0;
+    g_scanning = hal::start_scan(&started_us);
+    scan_start_us = started_us;
   }
 }
 
