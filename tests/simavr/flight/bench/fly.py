@@ -23,7 +23,7 @@ from flight.bench.plan import (
     stalls,
     steps,
 )
-from flight.bench.watch import ReceiverWatch, clock_zero, find_symbol
+from flight.bench.watch import ReceiverWatch, StallScript, clock_zero, find_symbol
 from flight.rig import ANALOG_CHANNELS, CRUISE_US, DIRECT_US, MEGA_US, SERVOS, FlightRig, make_card
 from flight.settings import settings_image
 from numpy.typing import NDArray
@@ -130,14 +130,10 @@ def fly(
     )
     chip = rig.chip
     chip.load(settings_image(rate_hz=rate_hz))
-    zero, session = _begin_session(rig, ground_s)
+    zero = _begin_session(rig, ground_s)
     begin = chip.cycle
     end = begin + round(minutes * 60 * CYCLES_PER_S)
-    planned = stalls(rate_hz, begin, end, session, rng)
-    for stall in planned:
-        rig.card.stall(STALL_S[rate_hz], at_cycle=stall.cycle)
-        if stall.reject:
-            chip.at(stall.cycle, rig.card.reject)
+    script = StallScript(chip, rig.card, elf, rate_hz, stalls(rate_hz, begin, end, rng))
     profiles = _drive_inputs(chip, begin, end, rng)
     sticks = Sticks(seed)
     rig.receiver.source = sticks
@@ -163,7 +159,6 @@ def fly(
     watch.stop()
 
     servo = {channel: _pulses(chip, pin) for channel, (_, pin) in enumerate(SERVOS.values())}
-    in_schema, resent = _stalled_blocks(rig, [stall.cycle for stall in planned], rate_hz)
     count = rig.card.count()
     flight = Flight(
         rate_hz=rate_hz,
@@ -191,9 +186,9 @@ def fly(
             bytes_ignored=count.bytes_ignored,
             erased=count.erased,
         ),
-        stalls=len(planned),
-        stalls_in_schema=in_schema,
-        stalls_of_resends=resent,
+        stalls=len(script.made),
+        stalls_in_schema=script.in_schema,
+        stalls_of_resends=_stalled_resends(rig, script.made, rate_hz),
         ring_bytes=find_member(elf, "Instrument", "ring_bytes_").size,
         faults=len(chip.faults()),
     )
@@ -201,8 +196,8 @@ def fly(
     return flight
 
 
-def _begin_session(rig: FlightRig, ground_s: float) -> tuple[int, int]:
-    """Power on, find the clock, throttle up; gives the clock's zero and the session's start."""
+def _begin_session(rig: FlightRig, ground_s: float) -> int:
+    """Power on, find the clock, throttle up; gives the cycle of the clock's zero."""
     chip = rig.chip
     rig.power_on()
     chip.run_s(ground_s)
@@ -215,10 +210,9 @@ def _begin_session(rig: FlightRig, ground_s: float) -> tuple[int, int]:
             break
     else:
         raise FlightError("no session started within 3 s of throttle; `host status` would say why")
-    session = chip.cycle
     rig.receiver.width_us[4] = MEGA_US
     chip.run_s(1.0)
-    return zero, session
+    return zero
 
 
 def _drive_inputs(
@@ -257,20 +251,14 @@ def _pulses(chip: Chip, pin: str) -> NDArray[np.int64]:
     return np.column_stack((at[rising], at[rising + 1]))
 
 
-def _stalled_blocks(rig: FlightRig, planned: list[int], rate_hz: int) -> tuple[int, int]:
-    """How many stalls hit a block of the schema, and how many a block sent again."""
+def _stalled_resends(rig: FlightRig, stalled: list[int], rate_hz: int) -> int:
+    """How many stalls hit a block that was sent again."""
     records = rig.chip.records(LogKind.CARD, CardNote.WRITTEN)
     rejected = set(rig.chip.records(LogKind.CARD, CardNote.REJECTED)["value"].tolist())
-    stall = round(STALL_S[rate_hz] * CYCLES_PER_S)
-    schema = resent = 0
-    for cycle in planned:
-        # the first block accepted behind the plan is programmed for as long as the stall
-        at = int(np.searchsorted(records["cycle"], cycle + stall))
-        if at < len(records):
-            block = int(records["value"][at])
-            schema += rig.card.block(block)[26] == 1
-            resent += block in rejected
-    return schema, resent
+    # the first block accepted behind the plan is programmed for as long as the stall
+    behind = np.array(stalled, np.uint64) + np.uint64(STALL_S[rate_hz] * CYCLES_PER_S)
+    at = np.searchsorted(records["cycle"], behind)
+    return sum(int(block) in rejected for block in records["value"][at[at < len(records)]])
 
 
 def _progress(rate_hz: int, done: int, whole: int, wall_s: float) -> None:

@@ -16,8 +16,6 @@ STALL_EVERY_S = 3.0
 RECOVERY_S = 0.2
 BUSY_S = 0.005
 SCHEMA_RETURN_S = 60.0
-# A pass of the schema is 15 blocks and more than 0.2 s long: a stall here is in the middle of it.
-INTO_SCHEMA_S = 0.1
 
 FRAMES_S = (0.014, 0.018, 0.020, 0.0225)
 SETTLE_S = 2.5  # of the change from one receiver to the next, not judged
@@ -53,23 +51,19 @@ class Stall:
     reject: bool  # the block is refused first, so that its re-send stalls
 
 
-def stalls(
-    rate_hz: int, begin: int, end: int, session: int, rng: np.random.Generator
-) -> list[Stall]:
+def stalls(rate_hz: int, begin: int, end: int, rng: np.random.Generator) -> list[Stall]:
     """Plan a stall in every 3 s, at a random phase.
 
     The phase is uniform over all of the 3 s that leave the ring time to empty before the next 3 s
-    begin. Twice a minute chance is helped: the stall nearest to the return of the schema is moved
-    into it, and ten seconds later one hits the block that is sent again after a CRC reject.
+    begin: two stalls that touch would be one of twice the length. Once a minute the block is
+    refused for its CRC first.
 
     Parameters
     ----------
     rate_hz : int
         Rate of the logger.
     begin, end : int
-        Cycles between which they start.
-    session : int
-        Cycle at which the session began: the schema returns every minute from there.
+        Cycles between which they lie.
     rng : Generator
         Source of the phases.
 
@@ -80,19 +74,10 @@ def stalls(
     """
     length = round(STALL_EVERY_S * CYCLES_PER_S)
     room_s = STALL_EVERY_S - STALL_S[rate_hz] - RECOVERY_S
-    minute = round(SCHEMA_RETURN_S * CYCLES_PER_S)
-    # Windows are laid so that every minute's return falls well inside one of them.
-    first = session + round(INTO_SCHEMA_S * CYCLES_PER_S) - length // 2
-    first += -(-(begin - first) // length) * length
-    planned = []
-    for window in range(first, end - length, length):
-        phase = rng.uniform(0.0, room_s)
-        offset = (window + length // 2 - session) % minute
-        in_return = offset < length // 2
-        reject = 10 * CYCLES_PER_S <= offset < 10 * CYCLES_PER_S + length
-        at = window + (length // 2 if in_return else round(phase * CYCLES_PER_S))
-        planned.append(Stall(at, reject))
-    return planned
+    return [
+        Stall(window + round(rng.uniform(0.0, room_s) * CYCLES_PER_S), number % 20 == 3)
+        for number, window in enumerate(range(begin, end - length + 1, length))
+    ]
 
 
 class Sticks:

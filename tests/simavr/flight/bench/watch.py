@@ -1,15 +1,17 @@
-"""What the firmware measured, read from its memory while it flies: no change of the image."""
+"""Look into the firmware's memory while it flies: what it measured, when its schema returns."""
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from flight.bench.plan import CYCLES_PER_S
+from flight.bench.plan import CYCLES_PER_S, RECOVERY_S, STALL_S, Stall
 from numpy.typing import NDArray
 from owners import find_member
-from simavr_bench import Chip
+from simavr_bench import Chip, SdCard
 
 CHANNELS = 5
 CYCLES_PER_TICK = 8
@@ -92,3 +94,68 @@ class ReceiverWatch:
     def rows(self) -> NDArray[np.int64]:
         """All of them, shape (n, 4), columns as in :attr:`accepted`."""
         return np.array(self.accepted, np.int64).reshape(-1, 4)
+
+
+class StallScript:
+    """Makes the card stall as planned, and once in every return of the schema besides.
+
+    Parameters
+    ----------
+    chip, card : Chip, SdCard
+        The instrument's.
+    elf : Path
+        Its image: whether the schema is on its way is read from the firmware's memory.
+    rate_hz : int
+        Rate of the logger; decides how long a stall is.
+    planned : sequence of Stall
+        By rising cycle.
+
+    Attributes
+    ----------
+    made : list of int
+        Cycles from which the next block accepted stalls.
+    in_schema : int
+        How many of them came while the schema was on its way.
+    """
+
+    _LOOK_S = 0.005
+    _PIECES = (3, 12)  # blocks of 476 B: the middle of a pass
+
+    def __init__(
+        self, chip: Chip, card: SdCard, elf: Path, rate_hz: int, planned: Sequence[Stall]
+    ) -> None:
+        offset = find_member(elf, "Instrument", "recorder_.writer_.schema_offset_")
+        self._chip, self._card = chip, card
+        self._address = find_symbol(chip, "g_instrument") + offset.offset
+        self._length_s = STALL_S[rate_hz]
+        self._free = 0  # the next stall not before this cycle
+        self._in_pass = False
+        self.made: list[int] = []
+        self.in_schema = 0
+        for stall in planned:
+            chip.at(stall.cycle, partial(self._begin, reject=stall.reject))
+        self._look()
+
+    def _begin(self, *, reject: bool = False) -> None:
+        now = self._chip.cycle
+        if now < self._free:
+            self._chip.at(self._free, partial(self._begin, reject=reject))
+            return
+        if reject:
+            self._card.reject(at_cycle=now)
+        self._card.stall(self._length_s, at_cycle=now)
+        self.made.append(now)
+        self.in_schema += self._schema_on_its_way()
+        self._free = now + round((self._length_s + RECOVERY_S) * CYCLES_PER_S)
+
+    def _look(self) -> None:
+        self._chip.at(self._chip.cycle + round(self._LOOK_S * CYCLES_PER_S), self._look)
+        in_pass = self._schema_on_its_way()
+        if in_pass and not self._in_pass and self._chip.cycle >= self._free:
+            self._begin()
+        self._in_pass = in_pass
+
+    def _schema_on_its_way(self) -> bool:
+        (offset,) = struct.unpack("<H", self._chip.data(self._address, 2))
+        first, last = (number * 476 for number in self._PIECES)
+        return bool(first <= offset <= last)
