@@ -266,7 +266,10 @@ def preset_pulses(f: Flown, calm: Flown) -> None:
 def extra_pulses(f: Flown, calm: Flown) -> None:
     assert f.count("rc_glitches") > calm.count("rc_glitches") + 5
     for name in RC:
-        assert np.array_equal(f.ident[name], calm.ident[name])
+        # No glitch is taken for a pulse. A pulse right behind one is refused too: the last one
+        # stands for a frame more.
+        assert set(f.ident[name].tolist()) <= set(calm.ident[name].tolist())
+        assert (f.ident[name] != calm.ident[name]).mean() < 0.05
 
 
 def storm_on_a_line(f: Flown, calm: Flown) -> None:

@@ -131,6 +131,22 @@ def test_motor_cut_stops_the_propeller_and_the_pilot_glides() -> None:
     assert air_data(record).airspeed_mps[after].min() > 14.0
 
 
+def test_a_flight_ends_where_it_meets_the_ground(tmp_path: Path) -> None:
+    card = cards.load("thesis_flight2")
+    record = fly(card, seed=1)
+    height = -record.states[:, 12]
+    assert record.touched_ground
+    assert height.min() >= 0.0
+    assert height[-1] == pytest.approx(0.0, abs=0.02)
+    assert 1.0 < record.sink_mps < 6.0
+    assert record.sink_mps == pytest.approx((height[-11] - height[-1]) / 0.01, abs=0.1)
+    text = tomllib.loads(write(record, air_data(record), tmp_path / "flight")[1].read_text())
+    assert text["ended_on_ground"] is True
+    assert not fly(cards.load("calm"), seed=1).touched_ground
+    with pytest.raises(cards.CardError, match="height_m is 0, expected above 0"):
+        cards.parse({**MINIMAL, "flight": {"height_m": 0}}, "card")
+
+
 def test_truth_windows_hold_the_input_and_nothing_of_the_next(tmp_path: Path) -> None:
     record = fly(cards.load("demo"), seed=5)
     data = air_data(record)

@@ -183,6 +183,11 @@ def parse(document: Mapping[str, object], name: str) -> Card:
     faults = document.get("fault", [])
     if not isinstance(faults, list):
         raise CardError(f"{name}: fault is not a list of tables")
+    flight = _section(name, document, "flight", Flight)
+    for key in ("height_m", "rate_hz"):
+        value = getattr(flight, key)
+        if value <= 0.0:
+            raise CardError(f"{name}: flight.{key} is {value:g}, expected above 0")
     segments: list[Segment] = []
     for i, table in enumerate(listed):
         segments += _segments(f"{name}: segment {i + 1}", table)
@@ -191,7 +196,7 @@ def parse(document: Mapping[str, object], name: str) -> Card:
         title=str(document.get("title", name)),
         aircraft=aircraft,
         segments=tuple(segments),
-        flight=_section(name, document, "flight", Flight),
+        flight=flight,
         air=_section(name, document, "air", Air),
         pilot=_section(name, document, "pilot", Pilot),
         sensors=_section(name, document, "sensors", Sensors),

@@ -29,7 +29,7 @@ from host.twin.airframe import (
 from host.twin.attitude import quaternion
 from host.twin.cards import Card
 from host.twin.draws import Draws, draw, flown
-from host.twin.motion import rotate_to_body, step
+from host.twin.motion import rotate_to_body, rotate_to_ned, step
 from host.twin.pilot import Schedule, gains, schedule
 from host.twin.trim import Trim, solve
 
@@ -64,7 +64,8 @@ class Hands(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FlightRecord:
-    """What really happened, on the grid `t_s` (n,), 1 kHz.
+    """What really happened, on the grid `t_s` (n,), 1 kHz. It ends at the card's end, or where the
+    ground is touched: there is no model of a landing.
 
     Attributes
     ----------
@@ -102,6 +103,16 @@ class FlightRecord:
     air: Array
     pulses_us: Array
     pulse_starts_s: Array
+
+    @property
+    def touched_ground(self) -> bool:
+        """Whether the flight ended on the ground before the card was through."""
+        return len(self.t_s) < len(self.schedule.attention)
+
+    @property
+    def sink_mps(self) -> float:
+        """Vertical speed at the last sample, downwards."""
+        return float(rotate_to_ned(self.states[-1], *self.states[-1, :3])[2])
 
 
 @compiled_fast

@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 
 from host.twin.airframe import Array
+from host.twin.faults import Fault
 
 COLOURS = {"elevator": "#1f77b4", "aileron": "#ff7f0e", "rudder": "#2ca02c", "throttle": "#9467bd"}
+FAULT_COLOUR = "#d62728"
 SETTLED_S = 6.5  # what comes before is the ground and the launch
 # Rows: label, (column, legend, factor) ...
 ROWS: tuple[tuple[str, tuple[tuple[str, str, float], ...]], ...] = (
@@ -40,6 +42,7 @@ def draw(
     *,
     title: str,
     windows: Sequence[Mapping[str, object]] = (),
+    faults: Sequence[Fault] = (),
     truth: Mapping[str, Array] | None = None,
     second: pd.DataFrame | None = None,
     second_name: str = "",
@@ -55,6 +58,8 @@ def draw(
     title : str
     windows : sequence of mappings
         ``kind``, ``axes``, ``start_s``, ``end_s`` of each maneuver, on the table's time.
+    faults : sequence of Fault
+        Red, from where they begin to where they end.
     truth : mapping, optional
         True columns (grey, behind), with ``t_s``.
     second : DataFrame, optional
@@ -108,6 +113,10 @@ def draw(
             first = str(kinds[0]) if isinstance(kinds, Sequence) and kinds else ""
             start, end = float(str(window["start_s"])), float(str(window["end_s"]))
             axis.axvspan(start, end, color=COLOURS.get(first, "0.5"), alpha=0.13, lw=0, zorder=0)
+        for fault in faults:
+            axis.axvline(fault.at_s, color=FAULT_COLOUR, lw=0.8, ls="--", zorder=1)
+            if fault.end_s < t[-1]:
+                axis.axvspan(fault.at_s, fault.end_s, color=FAULT_COLOUR, alpha=0.10, lw=0)
         axis.set_ylabel(label, fontsize=9)
         axis.grid(alpha=0.3)
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
@@ -119,6 +128,12 @@ def draw(
         top.annotate(
             f"{window['kind']} {names}", (middle, 1.04), xycoords=("data", "axes fraction"),
             ha="center", va="bottom", fontsize=7, rotation=90,
+        )  # fmt: skip
+    for fault in faults:
+        top.annotate(
+            " ".join((fault.kind, fault.channel)).strip(), (fault.at_s, 1.04),
+            xycoords=("data", "axes fraction"), ha="center", va="bottom", fontsize=7, rotation=90,
+            color=FAULT_COLOUR,
         )  # fmt: skip
     figure.suptitle(title, fontsize=11)
     np.atleast_1d(axes)[-1].set_xlabel("time since power-on, s")

@@ -160,6 +160,7 @@ def simulate(
             image,
             title=f"{card.title} (simulated, seed {seed})",
             windows=truth.maneuvers(record, data),
+            faults=card.faults,
             truth=truth.series(record, data),
             second=second,
             second_name="thesis logger",

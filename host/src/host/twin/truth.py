@@ -146,6 +146,7 @@ def summary(record: FlightRecord, data: AirData, first_row_s: float = 0.0) -> di
         "seed": record.seed,
         "duration_s": float(record.t_s[-1]) if len(record.t_s) else 0.0,
         "launch_s": card.flight.ground_s,
+        "ended_on_ground": record.touched_ground,
         "first_row_s": first_row_s,
         "rate_hz": card.flight.rate_hz,
         "turbulence_mps": card.air.turbulence_mps,

@@ -46,7 +46,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Fly, and print what was written; return an exit code."""
     try:
-        from host.twin import cards, report
+        from host.twin import cards, pilot, report
     except ImportError as error:
         raise UsageError(
             f"the virtual flight needs {error.name}:"
@@ -70,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
     bar.clear()
     record = outcome.record
     duration = float(record.t_s[-1])
+    planned_s = pilot.duration_s(card)
     # The chip simulator is another process: its time is only on the wall.
     spent = outcome.wall_s if args.firmware == "avr" else outcome.processor_s
     busy = sum(s for stage, s in spent.items() if stage not in ("load", "picture"))
@@ -83,6 +84,7 @@ def run(args: argparse.Namespace) -> int:
                     "seed": args.seed,
                     "firmware": args.firmware,
                     "duration_s": duration,
+                    "ended_on_ground": record.touched_ground,
                     "maneuvers": len(flown),
                     "files": [str(path) for path in outcome.files],
                     "wall_s": outcome.wall_s,
@@ -98,6 +100,9 @@ def run(args: argparse.Namespace) -> int:
         return ExitCode.OK
     print(f"{card.title}\n  {record.aircraft.title}, {duration:.1f} s, {len(flown)} maneuvers,"
           f" seed {args.seed}, simulated")  # fmt: skip
+    if record.touched_ground:
+        print(f"  on the ground after {duration:.1f} s, sinking at {record.sink_mps:.1f} m/s:"
+              f" the flight ends there, {card.name} asked for {planned_s:.1f} s")  # fmt: skip
     stages = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in spent.items())
     print(
         f"  {duration / busy:.0f} times real time on one core, loading and picture apart ({stages})"
