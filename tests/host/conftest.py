@@ -1,6 +1,7 @@
 """One thread of linear algebra per process, before numpy is loaded.
 
-The matrices here are small: on a busy machine threads that spin for them make a fit ten times slower.
+The matrices here are small: on a busy machine threads that spin for them make a fit ten times
+slower.
 """
 
 import os

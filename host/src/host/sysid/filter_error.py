@@ -132,7 +132,7 @@ class FilterProblem:
                 AB, n, m, model.hold == "foh", maneuver.dt_s, none, none, none, np.zeros(0), 0
             )
             if maneuver.dt_s not in solutions:
-                gain = self._gain(step[:, :n], C, intensity, R, maneuver.dt_s)
+                gain = self._gain(A, C, intensity, R, maneuver.dt_s)
                 if gain is None:
                     return None
                 solutions[maneuver.dt_s] = gain
@@ -153,14 +153,12 @@ class FilterProblem:
         return _Likelihood(all_e, all_S, cost) if np.isfinite(cost) else None
 
     def _gain(
-        self, transition_: Array, C: Array, intensity: Array, R: Array, dt_s: float
+        self, A: Array, C: Array, intensity: Array, R: Array, dt_s: float
     ) -> tuple[Array, Array, Array] | None:
         """Return innovation covariance, its Cholesky factor and the steady Kalman gain."""
-        F = np.ascontiguousarray(transition_)
-        if not np.isfinite(F).all() or np.max(np.abs(F)) > 1e6:
+        F, Qd = discrete_noise(A, intensity, dt_s)
+        if not np.isfinite(Qd).all() or np.max(np.abs(F)) > 1e6:
             return None
-        Q = np.diag(intensity)
-        Qd = 0.5 * dt_s * (Q + F @ Q @ F.T)  # trapezoid of the exact integral
         solved, P = predicted_covariance(F, np.ascontiguousarray(C), Qd, R)
         if not solved:
             return None
@@ -170,6 +168,31 @@ class FilterProblem:
         except np.linalg.LinAlgError:
             return None
         return S, factor, np.ascontiguousarray(np.linalg.solve(S, C @ P).T)
+
+
+def discrete_noise(A: Array, intensity: Array, dt_s: float) -> tuple[Array, Array]:
+    """Return the transition over a sample and the covariance white process noise adds in it.
+
+    Exact: Van Loan, IEEE Transactions on Automatic Control 23 (1978), by the kernel that
+    discretises. A trapezoid instead draws Cl_p 5 % off in rolling gusts at 50 Hz.
+
+    Parameters
+    ----------
+    A : Array, shape (n, n)
+    intensity : Array, shape (n,)
+        Power of each state's noise per second.
+    dt_s : float
+    """
+    n = len(A)
+    block = np.zeros((2 * n, 2 * n + 1))
+    block[:n, :n] = -A
+    block[:n, n : 2 * n] = np.diag(intensity)
+    block[n:, n : 2 * n] = A.T
+    none = np.zeros(0, dtype=np.int64)
+    E, _ = transition(block, 2 * n, 0, False, dt_s, none, none, none, np.zeros(0), 0)
+    F = np.ascontiguousarray(E[n:, n : 2 * n].T)
+    Qd = F @ np.ascontiguousarray(E[:n, n : 2 * n])
+    return F, 0.5 * (Qd + Qd.T)
 
 
 def fit_filter_error(
@@ -263,6 +286,30 @@ def fit_filter_error(
             "noise_deviation": np.exp(theta[kept + len(process) :]),
         },
     )
+
+
+def information_at(
+    model: LinearModel, maneuvers: Sequence[Maneuver], process: tuple[str, ...], theta: Array
+) -> Array:
+    """Return the Fisher information of the stochastic model at given values of everything.
+
+    Parameters
+    ----------
+    model, maneuvers, process
+        As for `fit_filter_error`.
+    theta : Array
+        The vector of a filter-error result: model and constants, log process and noise deviations.
+
+    Raises
+    ------
+    IdentificationError
+        If the filter fails there.
+    """
+    problem = FilterProblem(model, maneuvers, process)
+    point = problem.evaluate(theta)
+    if point is None:
+        raise IdentificationError(f"model {model.name}: the Kalman filter fails at these values")
+    return _scoring(problem, theta, point, np.full(len(theta), 1e-2))[0]
 
 
 def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> tuple[Array, Array]:

@@ -1,8 +1,8 @@
 """Fit a flight in turbulence: delays by output error first, then filter error with a gust state.
 
 A vertical (or side) gust is an angle of attack (sideslip) to vanes, forces and moments alike, so it
-is a state of its own whose entries are those of the angle; only its intensity is new. First-order
-Dryden form: MIL-F-8785C, sec. 3.7.
+is a state of its own whose entries are those of the angle; only its intensity is new. Dryden
+spectra: MIL-F-8785C, sec. 3.7.
 """
 
 from __future__ import annotations
@@ -17,13 +17,14 @@ from host.sysid.errors import IdentificationError
 from host.sysid.filter_error import fit_filter_error
 from host.sysid.fit import fit
 from host.sysid.maneuver import Maneuver
-from host.sysid.model import LinearModel, Term
+from host.sysid.model import LinearModel, Parameter, Term
 from host.sysid.result import FitResult
 
 SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, low altitude)
 VANES = ("alpha_rad", "beta_rad")
 # What else disturbs: thrust and longitudinal gusts; the drift of the attitude filter.
 ALSO = ("airspeed_mps", "phi_rad")
+ROLLING = "gust_roll_radps"
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,31 @@ class GustFit:
     delays: dict[str, tuple[float, float]]
 
 
-def gust_model(base: LinearModel, airspeed_mps: float, scale_m: float = SCALE_M) -> LinearModel:
+def gust_model(
+    base: LinearModel,
+    airspeed_mps: float,
+    scale_m: float = SCALE_M,
+    *,
+    span_m: float | None = None,
+    scale_share: float = 0.0,
+) -> LinearModel:
     """Return a model with the gust angle as an extra state.
+
+    Parameters
+    ----------
+    base : LinearModel
+        A template; alpha or beta must be a measured state of it.
+    airspeed_mps : float
+        Of the trim, for the gust's time scale.
+    scale_m : float
+        Length of the gusts.
+    span_m : float, optional
+        With it the second-order spectrum of gusts across the flight path, the turning of the air
+        that comes with it (a gust reaches the tail later) and, for the lateral motion, rolling
+        gusts; without it the first-order spectrum of the angle alone.
+    scale_share : float
+        Relative deviation of `scale_m`; above zero the time scale is a parameter, ``gust_rate``,
+        behind the others.
 
     Raises
     ------
@@ -47,26 +71,68 @@ def gust_model(base: LinearModel, airspeed_mps: float, scale_m: float = SCALE_M)
     vanes = [v for v in VANES if v in base.states and v in base.outputs]
     if not vanes:
         raise IdentificationError(f"model {base.name}: no vane angle a gust could act on")
-    n, column = len(base.states), base.states.index(vanes[0])
-    A = np.zeros((n + 1, n + 1))
-    A[:n, :n] = base.A
-    A[n, n] = -airspeed_mps / scale_m
-    C = np.zeros((len(base.outputs), n + 1))
-    C[:, :n] = base.C
-    C[base.outputs.index(vanes[0]), n] = 1.0
-    extra = tuple(
-        Term(t.matrix, t.row, n, t.parameter, t.gain)
-        for t in base.terms
-        if t.matrix in "AC" and t.column == column
-    )
+    vane, rate = vanes[0], airspeed_mps / scale_m
+    lag = 0.0 if span_m is None else np.pi * airspeed_mps / (4.0 * span_m)
+    turn = {"alpha_rad": ("q_radps", -1.0), "beta_rad": ("r_radps", 1.0)}[vane]
+    # Columns of the base a hidden state acts as, with gains.
+    hidden: dict[str, dict[str, float]] = {"gust_rad": {vane: 1.0}}
+    entries = [("gust_rad", "gust_rad", -1.0)]
+    fixed: list[tuple[str, str, float]] = []
+    if span_m is not None:
+        lead, trail = np.sqrt(3.0), 1.0 - np.sqrt(3.0)
+        entries += [("gust_lag_rad", "gust_rad", 1.0), ("gust_lag_rad", "gust_lag_rad", -1.0)]
+        hidden = {
+            "gust_rad": {vane: lead, turn[0]: turn[1] * lag * lead},
+            "gust_lag_rad": {vane: trail, turn[0]: turn[1] * lag * trail},
+            "gust_tail_rad": {turn[0]: -turn[1] * lag},
+        }
+        fixed = [
+            ("gust_tail_rad", "gust_rad", lag * lead),
+            ("gust_tail_rad", "gust_lag_rad", lag * trail),
+            ("gust_tail_rad", "gust_tail_rad", -lag),
+        ]
+        if vane == "beta_rad" and "p_radps" in base.states:
+            hidden[ROLLING] = {"p_radps": 1.0}
+            fixed.append((ROLLING, ROLLING, -lag))
+    states = (*base.states, *hidden)
+    n, total = len(base.states), len(base.states) + len(hidden)
+    A, C = np.zeros((total, total)), np.zeros((len(base.outputs), total))
+    A[:n, :n], C[:, :n] = base.A, base.C
+    terms = list(base.terms)
+    for column, (_, acts) in enumerate(hidden.items(), start=n):
+        for state, gain in acts.items():
+            source = base.states.index(state)
+            terms += [
+                Term(t.matrix, t.row, column, t.parameter, t.gain * gain)
+                for t in base.terms
+                if t.matrix in "AC" and t.column == source
+            ]
+            if state == vane:  # forces turn with the air, and the vane measures it
+                C[:, column] += gain * base.C[:, source]
+    for row, source_name, value in fixed:
+        A[states.index(row), states.index(source_name)] = value
+    parameters = base.parameters
+    if scale_share > 0.0:
+        terms += [
+            Term("A", states.index(a), states.index(b), "gust_rate", g) for a, b, g in entries
+        ]
+        parameters += (
+            Parameter(
+                "gust_rate", rate, lower=0.1 * rate, upper=10.0 * rate, prior_sd=scale_share * rate
+            ),
+        )
+    else:
+        for a, b, g in entries:
+            A[states.index(a), states.index(b)] = g * rate
     return replace(
         base,
         name=f"{base.name} with gust",
-        states=(*base.states, "gust_rad"),
+        states=states,
         A=A,
-        B=np.vstack([base.B, np.zeros((1, len(base.inputs)))]),
+        B=np.vstack([base.B, np.zeros((len(hidden), len(base.inputs)))]),
         C=C,
-        terms=(*base.terms, *extra),
+        terms=tuple(terms),
+        parameters=parameters,
         delays=(),
     )
 

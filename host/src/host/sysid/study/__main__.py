@@ -72,7 +72,7 @@ def study_d(stem: Path, size: int) -> list[Path]:
 
     cases = [
         turbulence.run_case(intensity, FLIGHTS[size], pilot=pilot)
-        for intensity in (0.5, 1.0)
+        for intensity in turbulence.INTENSITIES_MPS
         for pilot in (False, True)
     ]
     return write(tables.turbulence_table(cases), turbulence_figure(cases), stem)

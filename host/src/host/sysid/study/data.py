@@ -1,15 +1,25 @@
-"""NAVION maneuvers with the noise of the accuracy study: white, a given ratio of variances."""
+"""NAVION maneuvers: white noise of a given ratio of variances, or gusts and light sensor noise.
+
+Gusts reach the linear NAVION through the angle of attack; their spectrum is first-order, of the
+variance and scale of the Dryden one (MIL-F-8785C).
+"""
 
 import numpy as np
+from scipy import linalg
 
 from host.compiled import Array
 from host.sysid.maneuver import Maneuver
 from host.sysid.problem import OutputProblem
-from host.sysid.study.aircraft import navion, navion_structured
+from host.sysid.study.aircraft import FOOT_M, SPEED_FTPS, navion, navion_structured
 from host.sysid.study.inputs import SHAPES
 
 AMPLITUDE_RAD = 0.05
 TRUTH = navion_structured().start
+SPEED_MPS = SPEED_FTPS * FOOT_M
+SCALE_M = 150.0  # of vertical gusts at the height of a light aircraft's test, m
+SENSOR_SHARE = 0.02  # noise over rms of each clean signal
+FINE = 4  # integration steps per sample
+PILOT_GAIN = (0.15, 0.05)  # elevator per theta and q: a pilot who holds the attitude
 
 
 def clean(
@@ -49,4 +59,49 @@ def with_rates(
         u,
         y + deviation[0] * rng.standard_normal(y.shape),
         rates=rates + deviation[1] * rng.standard_normal(y.shape),
+    )
+
+
+def gusty(seed: int, dt_s: float, *, intensity_mps: float = 0.5, pilot: bool = False) -> Maneuver:
+    """Return one flight of the NAVION through gusts.
+
+    Parameters
+    ----------
+    seed : int
+        Of gust and sensor noise.
+    dt_s : float
+        Sample period, s.
+    intensity_mps : float
+        Standard deviation of the vertical gust, m/s.
+    pilot : bool
+        Whether attitude and rate feed back to the elevator on top of the test input.
+    """
+    u, y = clean(dt_s)
+    A, B = navion()
+    rng = np.random.default_rng([20260401, seed])
+    rate = SPEED_MPS / SCALE_M
+    wide = np.zeros((5, 5))
+    wide[:4, :4] = A
+    wide[:3, 4] = A[:3, 1]  # a gust is an angle of attack to the forces and moments
+    wide[4, 4] = -rate
+    step = dt_s / FINE
+    push = np.vstack([B, [[0.0]]])
+    block = linalg.expm(np.block([[wide, push], [np.zeros((1, 6))]]) * step)
+    F, G = block[:5, :5], block[:5, 5]
+    sigma = intensity_mps / SPEED_MPS
+    kick = sigma * np.sqrt(1.0 - np.exp(-2.0 * rate * step))
+    x = np.zeros(5)
+    x[4] = sigma * rng.standard_normal()
+    states, inputs = np.zeros_like(y), u.copy()
+    for k in range(len(u)):
+        if pilot:
+            inputs[k, 0] += PILOT_GAIN[0] * x[3] + PILOT_GAIN[1] * x[2]
+        states[k] = x[:4]
+        states[k, 1] += x[4]  # the vane sees the gust
+        for _ in range(FINE):
+            x = F @ x + G * inputs[k, 0]
+            x[4] += kick * rng.standard_normal()
+    deviation = SENSOR_SHARE * np.sqrt(np.mean(y**2, axis=0))
+    return Maneuver(
+        dt_s, inputs, states + deviation * rng.standard_normal(y.shape), name=f"gusts, seed {seed}"
     )

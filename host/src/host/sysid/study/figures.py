@@ -118,6 +118,7 @@ def turbulence_figure(cases: Sequence[GustCase]) -> Figure:
         place = np.arange(len(c.names))
         axis.bar(place - 0.2, 100.0 * c.output_rms, 0.38, color="C3", label="output error")
         axis.bar(place + 0.2, 100.0 * c.filter_rms, 0.38, color="C0", label="filter error")
+        axis.plot(place + 0.2, 100.0 * c.bound, "k_", ms=9, label="bound")
         axis.set_yscale("log")
         axis.set_ylim(0.05, 100.0)
         axis.set_xticks(place, list(c.names), fontsize=6, rotation=45)

@@ -17,8 +17,7 @@ from host.sysid.fit import fit, methods
 from host.sysid.maneuver import Maneuver
 from host.sysid.study.aircraft import navion_structured
 from host.sysid.study.coverage import NOISES, coloured_noise
-from host.sysid.study.data import TRUTH, clean
-from host.sysid.study.turbulence import gusty
+from host.sysid.study.data import TRUTH, clean, gusty
 
 SNR = 10.0
 SKIPPED = ("hopfield-line-search",)  # hours: a simulation per trial step

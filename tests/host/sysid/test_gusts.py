@@ -1,0 +1,113 @@
+"""Filter error in Dryden gusts: the aircraft of the study, the gusts as states, the bound."""
+
+import numpy as np
+import pytest
+from host.sysid.airframe import Condition
+from host.sysid.filter_error import FilterProblem, discrete_noise, information_at
+from host.sysid.gust import ROLLING
+from host.sysid.in_coefficients import dimensional_gains
+from host.sysid.study.gusts import AXES, DT_S, fly, gusty_aircraft, spectrum
+from host.sysid.study.turbulence import PROCESS, fitted_model, run_case, true_vector
+from host.twin import aircraft, trim
+from host.twin.linear import linearise
+from scipy import linalg
+
+
+@pytest.mark.parametrize("axis", list(AXES))
+def test_coefficients_give_the_linearised_aircraft(axis: str) -> None:
+    plane = gusty_aircraft()
+    A, B, _, _ = plane.models[axis].matrices(plane.truth[axis])
+    frame = aircraft.load("ultrastick25e").airframe()
+    linear = linearise(frame, trim.solve(frame, plane.airspeed_mps))
+    true_A, true_B = (
+        (linear.longitudinal_a, linear.longitudinal_b)
+        if axis == "longitudinal"
+        else (linear.lateral_a, linear.lateral_b)
+    )
+    # A change of states leaves the roots and the steady response of the attitude's row.
+    np.testing.assert_allclose(
+        np.sort_complex(np.linalg.eigvals(A)), np.sort_complex(np.linalg.eigvals(true_A)), rtol=2e-3
+    )
+    gain = [np.linalg.solve(a, b)[3] for a, b in ((A, B), (true_A, true_B))]
+    np.testing.assert_allclose(gain[0], gain[1], rtol=2e-3)
+
+
+def test_coefficients_are_what_conversion_by_hand_says() -> None:
+    plane = gusty_aircraft()
+    a, V = plane.airframe, plane.airspeed_mps
+    gains = dimensional_gains(a, Condition(V, 0.5 * 1.225 * V**2))
+    force = 0.5 * 1.225 * V**2 * a.wing_area_m2
+    assert gains["M_q"]["Cm_q"] == pytest.approx(force * a.chord_m**2 / (2.0 * V * a.iyy_kgm2))
+    inertia = np.array([[a.ixx_kgm2, -a.ixz_kgm2], [-a.ixz_kgm2, a.izz_kgm2]])
+    rolling = np.linalg.solve(inertia, [force * a.span_m**2 / (2.0 * V), 0.0])
+    assert [gains["L_p"]["Cl_p"], gains["N_p"]["Cl_p"]] == pytest.approx(list(rolling))
+
+
+def test_discrete_noise_is_the_integral() -> None:
+    rng = np.random.default_rng(5)
+    A, power = 8.0 * rng.standard_normal((4, 4)), np.array([0.0, 1.0, 0.3, 0.0])
+    F, Q = discrete_noise(A, power, 0.02)
+    times = (np.arange(2000) + 0.5) * 1e-5
+    exact = sum(linalg.expm(A * t) @ np.diag(power) @ linalg.expm(A * t).T for t in times) * 1e-5
+    np.testing.assert_allclose(F, linalg.expm(0.02 * A), rtol=1e-10)
+    np.testing.assert_allclose(Q, exact, rtol=1e-4, atol=1e-9)
+    trapezoid = 0.01 * (np.diag(power) + F @ np.diag(power) @ F.T)
+    assert np.max(np.abs(trapezoid - exact)) > 10.0 * np.max(np.abs(Q - exact))
+
+
+@pytest.mark.parametrize("axis", list(AXES))
+def test_innovations_at_the_truth_are_white_and_of_their_size(axis: str) -> None:
+    """The gust model is the twin's air: another spectrum or intensity would show here."""
+    model, theta = fitted_model(axis), true_vector(axis, 1.0)
+    outputs = len(model.outputs)
+    square, lagged = np.zeros(outputs), np.zeros(outputs)
+    flights = fly(axis, 1.0, range(6), with_pilot=True)
+    for maneuver in flights:
+        point = FilterProblem(model, [maneuver], PROCESS[axis]).evaluate(theta)
+        assert point is not None
+        white = linalg.solve_triangular(np.linalg.cholesky(point.S[0]), point.e[0].T, lower=True)
+        white = white[:, 50:]  # the filter starts without knowing the gust
+        square += np.mean(white**2, axis=1) / len(flights)
+        lagged += np.mean(white[:, 1:] * white[:, :-1], axis=1) / len(flights)
+    samples = 950 * len(flights)
+    assert np.all(np.abs(square - 1.0) < 4.0 * np.sqrt(2.0 / samples))
+    assert np.all(np.abs(lagged) < 4.0 / np.sqrt(samples))
+
+
+def test_information_is_minus_the_mean_curvature() -> None:
+    axis = "lateral"
+    model, theta = fitted_model(axis), true_vector(axis, 1.0)
+    k = [p.name for p in model.parameters].index("Cl_p")
+    step = np.zeros(len(theta))
+    step[k] = 1e-3
+    expected = curvature = 0.0
+    for maneuver in fly(axis, 1.0, range(8), with_pilot=False):
+        problem = FilterProblem(model, [maneuver], PROCESS[axis])
+        costs = [p.cost for s in (1.0, 0.0, -1.0) if (p := problem.evaluate(theta + s * step))]
+        curvature += (costs[0] - 2.0 * costs[1] + costs[2]) / 1e-6
+        expected += information_at(model, [maneuver], PROCESS[axis], theta)[k, k]
+    assert curvature == pytest.approx(expected, rel=0.1)
+
+
+def test_filter_error_knows_the_air_and_output_error_does_not() -> None:
+    case = run_case(1.0, 6, pilot=True)
+    assert case.failed == 0
+    assert case.close.all()
+    assert case.unbiased.all()
+    assert case.filter_covered >= 0.8
+    assert case.output_covered < case.filter_covered
+    assert np.all(case.filter_rms < 0.5 * case.output_rms)
+
+
+def test_process_noise_of_the_twin_is_what_its_formulas_say() -> None:
+    air = spectrum("longitudinal", 1.0)
+    assert air.length_m == pytest.approx(100.0)
+    V = gusty_aircraft().airspeed_mps
+    # Stationary variance of the second-order form is that of the intensity.
+    rate = V / air.length_m
+    A = rate * np.array([[-1.0, 0.0], [1.0, -1.0]])
+    P = linalg.solve_continuous_lyapunov(A, -np.diag([air.angle**2, 0.0]))
+    view = np.array([np.sqrt(3.0), 1.0 - np.sqrt(3.0)])
+    assert view @ P @ view * V**2 == pytest.approx(1.0, rel=1e-6)
+    assert ROLLING in fitted_model("lateral").states
+    assert DT_S * rate < 0.1
