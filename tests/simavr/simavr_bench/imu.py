@@ -77,6 +77,8 @@ class ArduImu:
         Part of the packets with one flipped bit, cut short, or with the previous sequence number.
     flags, aux_kind, aux : int, int, tuple
         Fields of the sequenced packet.
+    aux_source : callable or None
+        Gives ``aux_kind`` and ``aux`` for a sequence number, in place of the fixed ones.
     sent : list of SentSample
         Everything sent.
     """
@@ -96,6 +98,7 @@ class ArduImu:
     flags: int = 0
     aux_kind: int = 0
     aux: tuple[int, int, int] = (0, 0, 0)
+    aux_source: Callable[[int], tuple[int, tuple[int, int, int]]] | None = None
     sent: list[SentSample] = field(default_factory=list)
     _rng: np.random.Generator = field(init=False)
     _number: int = 0
@@ -167,10 +170,13 @@ class ArduImu:
 
     def _sequenced(self, sequence: int, now: int, sample: ImuSample) -> list[tuple[int, bytes]]:
         time_us = int((now - self._start) / 16 * (1 + self.clock_ppm * 1e-6)) & 0xFFFFFFFF
+        aux_kind, aux = self.aux_kind, self.aux
+        if self.aux_source is not None:
+            aux_kind, aux = self.aux_source(sequence)
         body = SEQUENCED.pack(
-            SEQUENCED_KIND, sequence, self.flags, self.aux_kind, time_us,
+            SEQUENCED_KIND, sequence, self.flags, aux_kind, time_us,
             round(self.delay_us / 4), *sample.rates, *sample.specific_force,
-            *sample.angles_cdeg, *self.aux, 0,
+            *sample.angles_cdeg, *aux, 0,
         )[:-2]  # fmt: skip
         return [(SEQUENCED_ADDRESS, body + struct.pack("<H", binascii.crc_hqx(body, 0xFFFF)))]
 

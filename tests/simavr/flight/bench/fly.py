@@ -12,6 +12,8 @@ import numpy as np
 from flight.bench.plan import (
     BUSY_S,
     CYCLES_PER_S,
+    IMU_FLAGS,
+    IMU_HZ,
     RAMP_SLOTS,
     RECEIVERS,
     SETTLE_S,
@@ -19,6 +21,7 @@ from flight.bench.plan import (
     Profile,
     ReceiverKind,
     Sticks,
+    imu_aux,
     ramp,
     stalls,
     steps,
@@ -123,11 +126,12 @@ def fly(
     rig = FlightRig(
         elf,
         card_image,
-        imu_hz=float(rate_hz),
+        imu_hz=float(IMU_HZ),
         busy_s=BUSY_S,
         frame_s=receivers[0].frame_s,
         sequential=receivers[0].sequential,
     )
+    rig.imu.flags, rig.imu.aux_source = IMU_FLAGS, imu_aux
     chip = rig.chip
     chip.load(settings_image(rate_hz=rate_hz))
     zero = _begin_session(rig, ground_s)
@@ -175,7 +179,8 @@ def fly(
         pulses_sent={channel: rig.receiver.pulses(channel) for channel in range(5)},
         pulses_accepted=watch.rows(),
         servo_pulses=servo,
-        samples_sent=rig.imu.sent,
+        # a lower rate takes the samples whose number divides
+        samples_sent=[s for s in rig.imu.sent if s.sequence % (IMU_HZ // rate_hz) == 0],
         profiles=profiles,
         card=CardCount(
             commands=count.commands,

@@ -9,6 +9,12 @@ from flight.rig import MEGA_US
 from numpy.typing import NDArray
 
 CYCLES_PER_S = 16_000_000
+# firmware/boards/arduimu samples and sends at this rate whatever the logger's; its aux fields take
+# turns, a field of the magnetometer (15 a second) first.
+IMU_HZ = 200
+IMU_FLAGS = 0x1C  # attitude, magnetometer and offsets valid
+MAGNETOMETER, GYRO_BIAS, STATUS = 0, 1, 2
+PACKETS_PER_FIELD = 13  # 15.4 a second
 STALL_S = {100: 0.500, 200: 0.250}
 STALL_EVERY_S = 3.0
 # From the end of a stall until the ring is as empty as before it: nine blocks of 5 ms busy and
@@ -97,6 +103,15 @@ class Sticks:
         sines = 1500.0 + swing_us * np.sin(2 * np.pi * time_s / periods_s)
         widths = sines + self._rng.uniform(-40.0, 40.0, 4)
         return [*widths.tolist(), self.switch_us + float(self._rng.uniform(-2.0, 2.0))]
+
+
+def imu_aux(sequence: int) -> tuple[int, tuple[int, int, int]]:
+    """Give the aux fields of a packet as the IMU's firmware sends them."""
+    if sequence % PACKETS_PER_FIELD == 0:
+        return MAGNETOMETER, (200 + sequence, -300, 400)
+    if sequence % 2:
+        return GYRO_BIAS, (3, -4, 5)
+    return STATUS, (2500, 0x0268, 0)
 
 
 @dataclass(frozen=True, slots=True)
