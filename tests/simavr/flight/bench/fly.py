@@ -26,11 +26,10 @@ from flight.bench.plan import (
     stalls,
     steps,
 )
-from flight.bench.watch import ReceiverWatch, StallScript, clock_zero, find_symbol
+from flight.bench.watch import ReceiverWatch, StallScript, clock_zero, find_symbol, read_word
 from flight.rig import ANALOG_CHANNELS, CRUISE_US, DIRECT_US, MEGA_US, SERVOS, FlightRig, make_card
 from flight.settings import settings_image
 from numpy.typing import NDArray
-from owners import find_member
 from simavr_bench import Chip
 from simavr_bench.imu import SentSample
 from simavr_bench.log import CardNote, LogKind
@@ -194,7 +193,7 @@ def fly(
         stalls=len(script.made),
         stalls_in_schema=script.in_schema,
         stalls_of_resends=_stalled_resends(rig, script.made, rate_hz),
-        ring_bytes=find_member(elf, "Instrument", "ring_bytes_").size,
+        ring_bytes=read_word(chip, elf, "ring_.capacity_"),
         faults=len(chip.faults()),
     )
     rig.land()

@@ -27,6 +27,13 @@ def find_symbol(chip: Chip, name: str) -> int:
     return found.pop() & 0xFFFF
 
 
+def read_word(chip: Chip, elf: Path, path: str) -> int:
+    """Two bytes of the instrument's memory, a member named as in its class."""
+    place = find_member(elf, "Instrument", path).offset
+    address = find_symbol(chip, "g_instrument") + place
+    return int.from_bytes(chip.data(address, 2), "little")
+
+
 def clock_zero(chip: Chip) -> int:
     """Cycle at which the firmware's clock showed 0, within 60 cycles; runs the chip 65 ms at most.
 
