@@ -127,6 +127,12 @@ def demangle(names: list[str], *, environment: Mapping[str, str] = os.environ) -
     return run(["avr-c++filt"], environment, "".join(f"{name}\n" for name in plain)).splitlines()
 
 
+def section_bytes(elf: Path, section: str, *, environment: Mapping[str, str] = os.environ) -> int:
+    """Size of a section of an image; 0 if it has none of that name."""
+    rows = run(["avr-size", "-A", "-d", str(elf)], environment).splitlines()
+    return sum(int(row.split()[1]) for row in rows if row.split()[:1] == [section])
+
+
 def _words(elf: Path, environment: Mapping[str, str]) -> list[int]:
     # objcopy cannot write to a pipe; the hex dump of the section can.
     dump = run(["avr-objdump", "-s", "-j", ".text", str(elf)], environment)

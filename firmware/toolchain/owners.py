@@ -18,7 +18,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from disassembly import demangle, run
+from disassembly import demangle, run, section_bytes
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = "(compiler's and C library)"
@@ -108,7 +108,7 @@ def ram_by_owner(elf: Path, sources: Sources | None = None) -> Counter[tuple[str
             result[owner, bare] += rest
         else:
             result[owner, bare] += size
-    static = sum(_section_bytes(elf, name) for name in (".data", ".bss", ".noinit"))
+    static = sum(section_bytes(elf, name) for name in (".data", ".bss", ".noinit"))
     result[UNNAMED, "constants the compiler made"] += static - sum(result.values())
     return +result
 
@@ -126,13 +126,8 @@ def flash_by_owner(elf: Path, sources: Sources | None = None) -> Counter[str]:
     for name, size, address in _symbols_at(elf, "tTwW"):
         if not any(address <= at < address + size for at in covered):
             result[known.of_variable(name)] += size
-    result[LIBRARY] += _section_bytes(elf, ".text") - sum(result.values())
+    result[LIBRARY] += section_bytes(elf, ".text") - sum(result.values())
     return +result
-
-
-def _section_bytes(elf: Path, section: str) -> int:
-    rows = (row.split() for row in run(["avr-size", "-A", "-d", str(elf)]).splitlines())
-    return sum(int(row[1]) for row in rows if row and row[0] == section)
 
 
 class _Layout:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import argparse
 import os
-import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+
+from disassembly import demangle, run, section_bytes
 
 MEGA_RAM_BYTES = 8192
 SMALLEST_SHOWN_BYTES = 16
@@ -38,19 +39,10 @@ def symbols(elf: Path, *, environment: Mapping[str, str] = os.environ) -> list[t
         If one of them cannot be run or does not understand the file.
     """
     nm = ["avr-nm", "--print-size", "--size-sort", "--reverse-sort", str(elf)]
-    lines = [line.split(maxsplit=3) for line in _output(nm, "", environment).splitlines()]
-    sizes = [int(size, 16) for _, size, kind, _ in lines if kind in "bBdD"]
-    # Link-time optimisation appends a number, with which a name is no longer a C++ name.
-    names = [name.partition(".lto_priv")[0] for _, _, kind, name in lines if kind in "bBdD"]
-    readable = _output(["avr-c++filt"], "".join(f"{name}\n" for name in names), environment)
-    return list(zip(readable.splitlines(), sizes, strict=True))
-
-
-def _output(command: list[str], text: str, environment: Mapping[str, str]) -> str:
-    done = subprocess.run(
-        command, input=text, capture_output=True, text=True, check=True, env=dict(environment)
-    )
-    return done.stdout
+    lines = [line.split(maxsplit=3) for line in run(nm, environment).splitlines()]
+    found = [(name, int(size, 16)) for _, size, kind, name in lines if kind in "bBdD"]
+    readable = demangle([name for name, _ in found], environment=environment)
+    return list(zip(readable, (size for _, size in found), strict=True))
 
 
 def print_table(
@@ -64,7 +56,9 @@ def print_table(
     found = symbols(elf, environment=environment)
     rows = [(name, size) for name, size in found if size >= SMALLEST_SHOWN_BYTES]
     small = sum(size for _, size in found) - sum(size for _, size in rows)
-    used = sum(size for _, size in found)
+    sections = (".data", ".bss", ".noinit")
+    used = sum(section_bytes(elf, name, environment=environment) for name in sections)
+    small += used - sum(size for _, size in found)  # constants the compiler gave no name
     for name, size in [*rows, ("(smaller ones)", small), ("left for the stack", ram_bytes - used)]:
         print(f"{size:>7} B  {name[:80]}")
     if ram_bytes - used < stack_bytes:
