@@ -14,6 +14,7 @@ from flight.bench.plan import (
     CYCLES_PER_S,
     IMU_FLAGS,
     IMU_HZ,
+    IMU_PPM,
     RAMP_SLOTS,
     RECEIVERS,
     SETTLE_S,
@@ -63,7 +64,7 @@ class Flight:
 
     rate_hz: int
     seconds: float
-    wall_s: float
+    cpu_s: float
     begin: int
     end: int
     zero: int  # cycle at which the firmware's clock showed 0
@@ -119,7 +120,7 @@ def fly(
     FlightError
         If no session starts.
     """
-    began = time.perf_counter()
+    began, began_cpu = time.perf_counter(), time.process_time()
     rng = np.random.default_rng(seed)
     card_image = make_card(folder / f"card{rate_hz}.img")
     rig = FlightRig(
@@ -127,10 +128,10 @@ def fly(
         card_image,
         imu_hz=float(IMU_HZ),
         busy_s=BUSY_S,
-        frame_s=receivers[0].frame_s,
+        frame_s=receivers[0].true_frame_s,
         sequential=receivers[0].sequential,
     )
-    rig.imu.flags, rig.imu.aux_source = IMU_FLAGS, imu_aux
+    rig.imu.flags, rig.imu.aux_source, rig.imu.clock_ppm = IMU_FLAGS, imu_aux, IMU_PPM
     chip = rig.chip
     chip.load(settings_image(rate_hz=rate_hz))
     zero = _begin_session(rig, ground_s)
@@ -166,7 +167,7 @@ def fly(
     flight = Flight(
         rate_hz=rate_hz,
         seconds=(chip.cycle - begin) / CYCLES_PER_S,
-        wall_s=time.perf_counter() - began,
+        cpu_s=time.process_time() - began_cpu,
         begin=begin,
         end=chip.cycle,
         zero=zero,
@@ -236,7 +237,7 @@ def _change_receiver(rig: FlightRig, sticks: Sticks, kind: ReceiverKind) -> None
     """Hand over to the pilot, change the receiver, hand back."""
     sticks.switch_us = DIRECT_US
     rig.chip.run_s(0.2)
-    rig.receiver.frame_s, rig.receiver.sequential = kind.frame_s, kind.sequential
+    rig.receiver.frame_s, rig.receiver.sequential = kind.true_frame_s, kind.sequential
     rig.chip.run_s(1.3)
     sticks.switch_us = MEGA_US
     rig.chip.run_s(SETTLE_S - 1.5)

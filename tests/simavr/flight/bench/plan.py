@@ -12,6 +12,9 @@ CYCLES_PER_S = 16_000_000
 # firmware/boards/arduimu samples and sends at this rate whatever the logger's; its aux fields take
 # turns, a field of the magnetometer (15 a second) first.
 IMU_HZ = 200
+# No two clocks agree: every phase between IMU, receiver, servos and loop is met in ten minutes.
+IMU_PPM = -1100.0
+RECEIVER_PPM = 270.0
 IMU_FLAGS = 0x1C  # attitude, magnetometer and offsets valid
 MAGNETOMETER, GYRO_BIAS, STATUS = 0, 1, 2
 PACKETS_PER_FIELD = 13  # 15.4 a second
@@ -38,6 +41,11 @@ class ReceiverKind:
 
     frame_s: float
     sequential: bool
+
+    @property
+    def true_frame_s(self) -> float:
+        """As the Mega's clock sees it."""
+        return self.frame_s * (1 + RECEIVER_PPM * 1e-6)
 
     @property
     def name(self) -> str:
