@@ -12,7 +12,6 @@ from host.twin import cards, handbook, thesis
 from host.twin.airdata import air_data
 from host.twin.attitude import euler
 from host.twin.flight import NEUTRAL_US, THROW_US, fly
-from host.twin.linear import load_linear, modes
 from host.twin.local import local_derivatives
 from host.twin.maneuvers import multisine, multisine_signal, sweep_signal
 from host.twin.pilot import duration_s, schedule
@@ -254,10 +253,3 @@ def test_handbook_comes_near_the_vortex_lattice_of_the_ultra_stick() -> None:
     aspect = 1.26365**2 / 0.3093671232
     assert -handbook.rolling_slope(aspect) / 8.0 == pytest.approx(-0.392, rel=0.15)
     assert handbook.lift_slope(aspect) == pytest.approx(3.93, rel=0.10)
-
-
-def test_published_linear_aircraft_has_its_modes_and_doubled_aileron() -> None:
-    linear = load_linear("ultrastick25e_linear17")
-    found = {m.name: m for m in modes(linear)}
-    assert found["short period"].frequency_radps == pytest.approx(15.7, abs=1.5)
-    assert linear.lateral_b[1, 0] == pytest.approx(2 * 78.2349394)

@@ -43,6 +43,7 @@ from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.model import MATRICES, DelayGroup, Lever, LinearModel, Parameter, Term
 from host.sysid.result import FitResult
+from host.sysid.templates import Trim
 
 _PIECE = re.compile(
     r"\s*(?P<sign>[+-]?)\s*(?:(?P<gain>[0-9.]+(?:[eE][+-]?\d+)?)(?:\s*\*\s*(?P<scaled>[A-Za-z_]\w*))?"
@@ -61,6 +62,7 @@ KEYS = {
     "delays",
     "levers",
     "fit",
+    "trim",
     *MATRICES,
 }
 
@@ -81,6 +83,23 @@ def read_model(path: Path) -> LinearModel:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise IdentificationError(f"{path}: not TOML: {error}") from error
     return model_from(document, str(path))
+
+
+def read_trim(path: Path) -> Trim:
+    """Read the flight condition that a saved answer was linearised about.
+
+    Raises
+    ------
+    IdentificationError
+        If the file has none: a model that a user wrote.
+    """
+    table = tomllib.loads(path.read_text(encoding="utf-8")).get("trim", {})
+    try:
+        return Trim(*(float(table[key]) for key in ("airspeed_mps", "alpha_rad", "theta_rad")))
+    except (KeyError, TypeError, ValueError):
+        raise IdentificationError(
+            f"{path}: no [trim] with airspeed_mps, alpha_rad and theta_rad"
+        ) from None
 
 
 def model_from(document: Mapping[str, object], source: str = "model") -> LinearModel:
@@ -237,7 +256,9 @@ def _levers(value: object, source: str) -> tuple[Lever, ...]:
     )
 
 
-def model_text(model: LinearModel, result: FitResult | None = None) -> str:
+def model_text(
+    model: LinearModel, result: FitResult | None = None, trim: Trim | None = None
+) -> str:
     """Return a model as TOML; with a result, estimates become the start values.
 
     Parameters
@@ -246,6 +267,8 @@ def model_text(model: LinearModel, result: FitResult | None = None) -> str:
         What to write.
     result : FitResult, optional
         Gives start values, and a [fit] table with standard errors.
+    trim : Trim, optional
+        Gives a [trim] table: what the model is about, for flying it again.
     """
     lines = [f'name = "{model.name}"']
     for key in ("states", "inputs", "outputs"):
@@ -275,6 +298,10 @@ def model_text(model: LinearModel, result: FitResult | None = None) -> str:
         half = result.half_width()
         for k, name in enumerate(result.names):
             lines.append(f'"{name}" = [{float(result.estimate[k])!r}, {float(half[k])!r}]')
+    if trim is not None:
+        lines.append("[trim]")
+        for key in ("airspeed_mps", "alpha_rad", "theta_rad"):
+            lines.append(f"{key} = {float(getattr(trim, key))!r}")
     for delay in model.delays:
         lines += [
             "[[delays]]",

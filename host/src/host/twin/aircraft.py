@@ -13,6 +13,7 @@ import numpy as np
 
 from host.errors import UsageError
 from host.twin.airframe import COEFFICIENTS, GRAVITY_MPS2, Airframe, Array
+from host.twin.straight import Straight
 
 FOLDER = Path(__file__).parent / "airframes"
 
@@ -61,6 +62,8 @@ class Aircraft:
         Numbers under "section.key", SI.
     sources : mapping
         Where each of them comes from, under the same keys.
+    straight : Straight, optional
+        Of a linear aircraft: what it does instead of aerodynamics and propulsion.
     """
 
     name: str
@@ -68,6 +71,7 @@ class Aircraft:
     scalars: Mapping[str, float]
     vectors: Mapping[str, Array]
     sources: Mapping[str, str]
+    straight: Straight | None = None
 
     def scalar(self, key: str) -> float:
         """Return one number by "section.key"."""
@@ -81,7 +85,7 @@ class Aircraft:
         """Return the nominal aircraft as the equations of motion take it."""
         s, v = self.scalars, self.vectors
         pitch = s["propulsion.thrust_pitch_rad"]
-        return Airframe(
+        frame = Airframe(
             mass_kg=s["mass.mass_kg"],
             ixx_kgm2=s["mass.ixx_kgm2"],
             iyy_kgm2=s["mass.iyy_kgm2"],
@@ -119,6 +123,7 @@ class Aircraft:
             gravity_mps2=GRAVITY_MPS2,
             free=1.0,
         )
+        return frame if self.straight is None else self.straight.fitted(frame)
 
 
 def names() -> list[str]:

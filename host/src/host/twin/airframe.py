@@ -49,6 +49,9 @@ COMMANDS = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
 COMMAND_COUNT = len(COMMANDS)
 
 
+NOTHING: Array = np.zeros((1, 1))
+
+
 class Airframe(NamedTuple):
     """What the equations of motion need to know about one aircraft, as it really is."""
 
@@ -86,3 +89,10 @@ class Airframe(NamedTuple):
     surface_limit_rad: Array  # elevator, aileron, rudder
     gravity_mps2: float
     free: float  # 0 switches every aerodynamic and propulsive force off
+    # A linear aircraft: accelerations of u v w p q r, without gravity and kinematics, as straight
+    # lines about a steady flight; 0: coefficients and propeller above.
+    linear: float = 0.0
+    steady: Array = NOTHING[0]  # u, w (m/s), elevator (rad), throttle
+    steady_force_mps2: Array = NOTHING[0]  # (6,)
+    slopes: Array = NOTHING  # (6, 6) by u v w p q r
+    controls: Array = NOTHING  # (6, 4) by COMMANDS

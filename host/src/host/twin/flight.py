@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from host.compiled import compiled_fast
 from host.twin import air as air_model
 from host.twin.air import GUST_STATES, Atmosphere, Turbulence, density_kgpm3, gust_step
-from host.twin.aircraft import Aircraft, load
+from host.twin.aircraft import Aircraft, AircraftError
 from host.twin.airframe import (
     DOWN,
     Q0,
@@ -29,6 +29,7 @@ from host.twin.airframe import (
 from host.twin.attitude import quaternion
 from host.twin.cards import Card
 from host.twin.draws import Draws, draw, flown
+from host.twin.linear_aircraft import load
 from host.twin.motion import rotate_to_body, rotate_to_ned, step
 from host.twin.pilot import Schedule, gains, schedule
 from host.twin.trim import Trim, solve
@@ -284,6 +285,8 @@ def fly(
         The card, its aircraft or the trim it asks for does not work.
     """
     plane = aircraft or load(card.aircraft)
+    if plane.straight is not None:
+        _fits(card, plane)
     # One stream per purpose, so that switching one thing off leaves the others as they were.
     rng_draw, rng_pilot, rng_air, rng_radio = (
         np.random.default_rng([seed, purpose]) for purpose in range(4)
@@ -377,6 +380,18 @@ def fly(
         pulses_us=pulses[:rows],
         pulse_starts_s=starts[:rows],
     )
+
+
+def _fits(card: Card, plane: Aircraft) -> None:
+    """Refuse what a linear aircraft knows nothing of."""
+    speed = plane.scalar("trim.airspeed_mps")
+    if any(fault.kind == "motor_cut" for fault in card.faults):
+        raise AircraftError(f"{plane.name}: linear, it has no motor to cut as {card.name} wants")
+    if card.flight.airspeed_mps and abs(card.flight.airspeed_mps - speed) > 0.1:
+        raise AircraftError(
+            f"{plane.name}: linear about {speed:.1f} m/s, {card.name} wants"
+            f" {card.flight.airspeed_mps:.1f} m/s"
+        )
 
 
 def _multiply(a: Array, b: Array) -> Array:

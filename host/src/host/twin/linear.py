@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from host.twin.aircraft import AircraftError, read_document
 from host.twin.airframe import ELEVATOR, Q0, STATE_COUNT, Airframe, Array
 from host.twin.attitude import euler, quaternion
 from host.twin.motion import derivative
@@ -103,41 +101,29 @@ def linearise(frame: Airframe, trim: Trim, width: float = 1e-5) -> Linear:
     )
 
 
-def load_linear(source: str | Path) -> Linear:
-    """Load an aircraft that is published as matrices only.
+def straight_derivatives(frame: Airframe, trim: Trim) -> dict[str, float]:
+    """Return the dimensional derivatives of a linear aircraft, ``X_u`` ... ``N_dr``, SI, radians.
 
     Parameters
     ----------
-    source : str or Path
-        Name of a packaged aircraft of kind ``linear``, or path of a file.
-
-    Returns
-    -------
-    Linear
-
-    Raises
-    ------
-    AircraftError
-        Not such a file, or matrices of the wrong size.
+    frame : Airframe
+        A linear one: it has no coefficients.
+    trim : Trim
     """
-    document = read_document(source)
-    if document.get("kind") != "linear":
-        raise AircraftError(f"{source}: kind is {document.get('kind')!r}, expected 'linear'")
-    matrices = {}
-    for name, shape in (
-        ("longitudinal_a", (4, 4)),
-        ("longitudinal_b", (4, 1)),
-        ("lateral_a", (4, 4)),
-        ("lateral_b", (4, 2)),
+    linear = linearise(frame, trim)
+    found: dict[str, float] = {}
+    for rows, states, controls, a, b in (
+        ("XZM", "uwq", ("de",), linear.longitudinal_a, linear.longitudinal_b),
+        ("YLN", "vpr", ("da", "dr"), linear.lateral_a, linear.lateral_b),
     ):
-        try:
-            matrix = np.array(document.get(name), dtype=np.float64)
-        except (TypeError, ValueError):
-            matrix = np.empty(0)
-        if matrix.shape != shape:
-            raise AircraftError(f"{source}: {name} has shape {matrix.shape}, expected {shape}")
-        matrices[name] = matrix
-    return Linear(**matrices, coupling=0.0)
+        for i, row in enumerate(rows):
+            found |= {f"{row}_{name}": float(a[i, j]) for j, name in enumerate(states)}
+            found |= {f"{row}_{name}": float(b[i, j]) for j, name in enumerate(controls)}
+    # The matrices hold what turning axes add to these four.
+    u, w = trim.state[0], trim.state[2]
+    for name, turn in (("X_q", w), ("Z_q", -u), ("Y_p", -w), ("Y_r", u)):
+        found[name] += float(turn)
+    return found
 
 
 def modes(linear: Linear) -> list[Mode]:

@@ -256,7 +256,7 @@ def derivative(
     hx = frame.rotor_inertia_kgm2 * x[ROTOR] * frame.thrust_axis[0]
     hz = frame.rotor_inertia_kgm2 * x[ROTOR] * frame.thrust_axis[2]
     drive = 0.0
-    if frame.free > 0.0:
+    if frame.free > 0.0 and frame.linear == 0.0:
         drive = motor_torque(frame, command[3], x[ROTOR])
         cx, cy, cz = frame.cg_m[0], frame.cg_m[1], frame.cg_m[2]
         if speed > LOWEST_AIRSPEED_MPS:
@@ -291,12 +291,6 @@ def derivative(
     my -= r * hx - p * hz
     mz -= -q * hx
 
-    sx, sy, sz = fx / frame.mass_kg, fy / frame.mass_kg, fz / frame.mass_kg
-    gx, gy, gz = rotate_to_body(x, 0.0, 0.0, frame.gravity_mps2)
-    out[U] = sx + gx + r * x[V] - q * x[W]
-    out[V] = sy + gy + p * x[W] - r * x[U]
-    out[W] = sz + gz + q * x[U] - p * x[V]
-
     ixx, iyy, izz, ixz = frame.ixx_kgm2, frame.iyy_kgm2, frame.izz_kgm2, frame.ixz_kgm2
     ex = mx - (izz - iyy) * q * r + ixz * p * q
     ez = mz - (iyy - ixx) * p * q - ixz * q * r
@@ -304,6 +298,27 @@ def derivative(
     out[P] = (izz * ex + ixz * ez) / det
     out[Q] = (my - (ixx - izz) * p * r - ixz * (p * p - r * r)) / iyy
     out[R] = (ixz * ex + ixx * ez) / det
+    sx, sy, sz = fx / frame.mass_kg, fy / frame.mass_kg, fz / frame.mass_kg
+    if frame.linear > 0.0:
+        for k in range(U, R + 1):
+            out[k] = (
+                frame.steady_force_mps2[k]
+                + frame.slopes[k, 0] * (ua - frame.steady[0])
+                + frame.slopes[k, 1] * va
+                + frame.slopes[k, 2] * (wa - frame.steady[1])
+                + frame.slopes[k, 3] * pa
+                + frame.slopes[k, 4] * qa
+                + frame.slopes[k, 5] * ra
+                + frame.controls[k, 0] * (x[ELEVATOR] - frame.steady[2])
+                + frame.controls[k, 1] * x[AILERON]
+                + frame.controls[k, 2] * x[RUDDER]
+                + frame.controls[k, 3] * (command[3] - frame.steady[3])
+            )
+        sx, sy, sz = out[U], out[V], out[W]
+    gx, gy, gz = rotate_to_body(x, 0.0, 0.0, frame.gravity_mps2)
+    out[U] = sx + gx + r * x[V] - q * x[W]
+    out[V] = sy + gy + p * x[W] - r * x[U]
+    out[W] = sz + gz + q * x[U] - p * x[V]
 
     out[Q0] = 0.5 * (-x[Q1] * p - x[Q2] * q - x[Q3] * r)
     out[Q1] = 0.5 * (x[Q0] * p + x[Q2] * r - x[Q3] * q)

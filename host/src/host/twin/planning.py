@@ -22,7 +22,7 @@ from host.sysid.problem import OutputProblem
 from host.sysid.start import start_values
 from host.sysid.templates import Trim as Condition
 from host.sysid.templates import lateral, longitudinal
-from host.twin.aircraft import Aircraft, load
+from host.twin.aircraft import Aircraft
 from host.twin.airdata import AirData, air_data
 from host.twin.airframe import Array
 from host.twin.attitude import euler
@@ -30,6 +30,7 @@ from host.twin.cards import Card, Pilot, Segment, Sensors
 from host.twin.flight import FlightRecord, fly
 from host.twin.ideal import true_table
 from host.twin.linear import linearise, modes
+from host.twin.linear_aircraft import load
 from host.twin.pilot import Window
 from host.twin.trim import solve
 

@@ -11,6 +11,7 @@ import pandas as pd
 
 from host.log import read_log
 from host.twin import avr, compare, ideal, picture, sitl, stimuli, thesis, truth
+from host.twin.aircraft import Aircraft
 from host.twin.airdata import AirData, air_data
 from host.twin.cards import Card, Segment
 from host.twin.flight import FlightRecord, fly
@@ -68,7 +69,7 @@ class _Clock:
         self._last = now
 
 
-def load_kernels(card: Card) -> None:
+def load_kernels(card: Card, aircraft: Aircraft | None = None) -> None:
     """Load (the very first time: compile) every kernel by a flight of one second."""
     short = replace(
         card,
@@ -77,7 +78,7 @@ def load_kernels(card: Card) -> None:
         flight=replace(card.flight, ground_s=0.5),
         air=replace(card.air, turbulence_mps=0.1),
     )
-    record = fly(short)
+    record = fly(short, aircraft=aircraft)
     stimuli.stimuli(record, air_data(record))
 
 
@@ -90,6 +91,7 @@ def simulate(
     pictures: bool,
     both: bool,
     progress: Progress,
+    aircraft: Aircraft | None = None,
 ) -> Outcome:
     """Fly a card and write everything it leaves.
 
@@ -107,6 +109,8 @@ def simulate(
         Fly the thesis's logger beside it, into the same picture.
     progress : callable
         Called with the stage and its share.
+    aircraft : Aircraft, optional
+        In place of the card's.
 
     Returns
     -------
@@ -119,13 +123,13 @@ def simulate(
     OSError
         The folder cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     clock = _Clock()
     progress("load", 0.0)
-    load_kernels(card)
+    load_kernels(card, aircraft)
     clock.mark("load")
-    record = fly(card, seed=seed, progress=lambda share: progress("fly", share))
+    record = fly(card, seed=seed, progress=lambda share: progress("fly", share), aircraft=aircraft)
     clock.mark("fly")
+    folder.mkdir(parents=True, exist_ok=True)
     data = air_data(record)
     outcome = Outcome(record, data)
     stem = folder / "flight"

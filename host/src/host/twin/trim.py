@@ -87,6 +87,8 @@ def solve(
     TrimError
         The residual stays above 1e-6, a surface limit or full power is passed.
     """
+    if frame.linear > 0.0:
+        return _steady(frame, density_kgpm3)
     still_air = np.zeros(9)
 
     def place(unknown: Array) -> tuple[Array, Array, float]:
@@ -148,4 +150,26 @@ def solve(
         command=command,
         state=x,
         residual=left,
+    )
+
+
+def _steady(frame: Airframe, density_kgpm3: float) -> Trim:
+    """Return the one steady flight of a linear aircraft, level."""
+    u, w, elevator, throttle = frame.steady.tolist()
+    alpha = math.atan2(w, u)
+    x = np.zeros(STATE_COUNT)
+    x[U], x[W], x[ELEVATOR] = u, w, elevator
+    x[Q0 : Q0 + 4] = quaternion(0.0, alpha, 0.0)
+    command = np.array([elevator, 0.0, 0.0, throttle])
+    out = np.empty(STATE_COUNT + 4)
+    derivative(frame, x, command, np.zeros(9), density_kgpm3, out)
+    return Trim(
+        airspeed_mps=math.hypot(u, w),
+        alpha_rad=alpha,
+        bank_rad=0.0,
+        climb_rad=0.0,
+        density_kgpm3=density_kgpm3,
+        command=command,
+        state=x,
+        residual=float(np.max(np.abs(out[U : R + 1]))),
     )

@@ -16,7 +16,7 @@ from host.twin.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, STATES, Airfra
 from host.twin.attitude import euler
 from host.twin.delays import dlpf_for, sensor_delays
 from host.twin.flight import FlightRecord
-from host.twin.linear import linearise, modes
+from host.twin.linear import linearise, modes, straight_derivatives
 from host.twin.local import local_derivatives
 from host.twin.pilot import Window
 from host.twin.tomlout import dumps
@@ -114,7 +114,11 @@ def _maneuver(
             "elevator_rad": float(at[5]),
             "thrust_n": float(record.thrust_n[inside].mean()),
         },
-        "derivatives": local_derivatives(frame, at, spread),
+        "derivatives": (
+            straight_derivatives(frame, record.trim)
+            if frame.linear > 0.0
+            else local_derivatives(frame, at, spread)
+        ),
         "modes": _modes(
             frame, mean_speed, density, motor=bool(record.thrust_n[inside].mean() > 0.0)
         ),

@@ -7,8 +7,12 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from host.errors import CheckError, ExitCode, UsageError
+
+if TYPE_CHECKING:
+    from host.twin.aircraft import Aircraft
 
 # Faults that leave every decoded value right.
 HARMLESS = ("motor_cut", "card_busy")
@@ -34,6 +38,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="who records: the firmware on this computer (default), its Mega image in the chip"
         " simulator, nobody (ideal table), or the thesis's logger",
     )
+    parser.add_argument("--aircraft", action="append", default=[], metavar="NAME|FILE",
+                        help="fly this aircraft in place of the card's, or what the card's becomes"
+                        " with a model of `host identify --save-model`; a model per axis may be"
+                        " given")  # fmt: skip
     parser.add_argument("--both", action="store_true",
                         help="the thesis's logger flies along, into the same picture")  # fmt: skip
     parser.add_argument("--faults", action="store_true",
@@ -62,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
         card,
         args.output,
         seed=args.seed,
+        aircraft=_aircraft(args.aircraft, card.aircraft),
         firmware=args.firmware,
         pictures=not args.no_picture,
         both=args.both,
@@ -122,6 +131,19 @@ def run(args: argparse.Namespace) -> int:
     if beyond and not broken:
         raise CheckError(f"{', '.join(beyond)}: decoded values are beyond what the sensors explain")
     return ExitCode.OK
+
+
+def _aircraft(given: list[str], usual: str) -> Aircraft | None:
+    from host.twin.linear_aircraft import is_model, load, with_models
+
+    models = [Path(name) for name in given if is_model(name)]
+    named = [name for name in given if not is_model(name)]
+    if len(named) > 1:
+        raise UsageError(f"{named[1]}: one aircraft flies, {named[0]} is given already")
+    if not given:
+        return None
+    base = load(named[0] if named else usual)
+    return with_models(base, models) if models else base
 
 
 def _list(*, as_json: bool) -> int:
