@@ -237,7 +237,7 @@ def _write(args: argparse.Namespace, answers: list[Answer]) -> None:
             path = args.save_model
             if number:
                 path = path.with_name(f"{path.stem}_{answer.template}{path.suffix}")
-            path.write_text(model_text(answer.model, answer.result))
+            path.write_text(model_text(answer.model, answer.result, answer.trim))
 
 
 def _write_aircraft(args: argparse.Namespace, path: Path, answers: list[Answer]) -> None:
