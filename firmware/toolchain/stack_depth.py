@@ -22,15 +22,24 @@ from pathlib import Path
 from disassembly import ImageError, Instruction, Program, run
 
 INDIRECT_CALLS = Path(__file__).with_name("indirect_calls.toml")
-RAM_END = {"atmega2560": 0x2200, "atmega328p": 0x900}
-# A return address is three bytes where the program counter has more than 16 bits.
-RETURN_BYTES = {"atmega2560": 3, "atmega328p": 2}
 
 _SPL, _SPH = 0x3D, 0x3E
 _ENDS = ("ret", "reti")
 _NO_WRITE = ("push", "out", "cp", "cpi", "cpc", "cpse", "tst", "sbrc", "sbrs", "st", "std", "sts")
 _TABLE_JUMP = "__tablejump2__"
 _DEEPEST = 8192  # more than any RAM: a loop that pushes
+
+
+@dataclass(frozen=True, slots=True)
+class Chip:
+    """What differs between the chips of this project."""
+
+    ram_end: int
+    return_bytes: int  # three where the program counter has more than 16 bits
+    vectors: int  # the reset included
+
+
+CHIPS = {"atmega2560": Chip(0x2200, 3, 57), "atmega328p": Chip(0x900, 2, 26)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,17 +101,16 @@ class StackAnalysis:
     ----------
     program : Program
         The image.
-    return_bytes : int
-        Size of a return address.
+    chip : Chip
+        What it runs on.
     indirect : dict of str to list of str
         By a pattern for the function that calls through a pointer, patterns of what it may call.
     """
 
-    def __init__(
-        self, program: Program, *, return_bytes: int, indirect: dict[str, list[str]]
-    ) -> None:
+    def __init__(self, program: Program, *, chip: Chip, indirect: dict[str, list[str]]) -> None:
         self._program = program
-        self._return = return_bytes
+        self._return = chip.return_bytes
+        self._vector_count = chip.vectors
         self._indirect = indirect
         self._table_jump = program.symbols.get(_TABLE_JUMP)
         self.walk = functools.cache(self._walk)
@@ -131,17 +139,13 @@ class StackAnalysis:
 
     def _vectors(self) -> dict[int, int]:
         unused = self._program.symbols.get("__bad_interrupt")
-        vectors, address, number = {}, 4, 1
+        vectors: dict[int, int] = {}
         instructions = self._program.instructions
-        first = instructions[0]
-        step = first.size
-        address = step
-        while address in instructions and instructions[address].name in ("jmp", "rjmp"):
-            target = instructions[address].target
+        step = instructions[0].size
+        for number in range(1, self._vector_count):
+            target = instructions[number * step].target
             if target is not None and target != unused:
                 vectors[number] = target
-            address += step
-            number += 1
         return vectors
 
     def _constructors(self) -> list[int]:
@@ -331,7 +335,7 @@ def analyse(
     elf : Path
         The linked image.
     chip : str
-        Decides the size of a return address.
+        One of CHIPS.
     indirect : dict, optional
         What calls through pointers may reach; by default the file beside this module.
 
@@ -341,7 +345,7 @@ def analyse(
         What makes a bound impossible, with the place.
     """
     known = read_indirect_calls() if indirect is None else indirect
-    return StackAnalysis(Program(elf), return_bytes=RETURN_BYTES[chip], indirect=known).of_image()
+    return StackAnalysis(Program(elf), chip=CHIPS[chip], indirect=known).of_image()
 
 
 def read_indirect_calls(path: Path = INDIRECT_CALLS) -> dict[str, list[str]]:
@@ -354,7 +358,7 @@ def room_bytes(elf: Path, *, chip: str = "atmega2560") -> int:
     """Bytes between the last variable and the end of RAM."""
     rows = run(["avr-nm", str(elf)]).splitlines()
     end = next(int(row.split()[0], 16) for row in rows if row.endswith(" _end"))
-    return RAM_END[chip] - (end & 0xFFFF)
+    return CHIPS[chip].ram_end - (end & 0xFFFF)
 
 
 def print_depth(found: StackDepth, room: int) -> bool:
@@ -373,7 +377,7 @@ def main() -> int:
     """Print the worst case of an image; 6 if it does not fit or has no bound."""
     parser = argparse.ArgumentParser(description="How deep the stack of an AVR image can get.")
     parser.add_argument("elf", type=Path)
-    parser.add_argument("--chip", choices=sorted(RAM_END), default="atmega2560")
+    parser.add_argument("--chip", choices=sorted(CHIPS), default="atmega2560")
     asked = parser.parse_args()
     if not asked.elf.is_file():
         print(f"{asked.elf}: no such file; `pio run` makes it", file=sys.stderr)

@@ -59,6 +59,8 @@ APART void deep(unsigned char a) {
   volatile unsigned char room[700];
   touch(room, a);
 }
+/* Behind the vectors: reads like one more that starts the program again. */
+__attribute__((section(".progmem.gcc_sw_table"), used)) const unsigned bait[] = {0x940C, 0};
 void (*volatile pointer)(unsigned char) = deep;
 ISR(TIMER1_OVF_vect) { sink = 1; }
 ISR(ADC_vect, ISR_NOBLOCK) { leaf(2); }
@@ -107,7 +109,9 @@ def build(folder: Path, *flags: str) -> Path:
 
 
 def analysis(elf: Path) -> stack_depth.StackAnalysis:
-    return stack_depth.StackAnalysis(Program(elf), return_bytes=3, indirect={})
+    return stack_depth.StackAnalysis(
+        Program(elf), chip=stack_depth.CHIPS["atmega2560"], indirect={}
+    )
 
 
 def total(elf: Path, indirect: dict[str, list[str]] | None = None) -> int:
