@@ -8,7 +8,7 @@ namespace hal {
 constexpr uint8_t kImuPacketBytes = 40;  // longer transfers are cut
 
 struct ImuPacket {
-  uint32_t start_us;       // now_us() when the address matched
+  uint32_t start_us;       // now_us() at START, for a master at 400 kHz
   uint16_t scan_after_us;  // from there to the start of the scan it started; 0: none
   uint8_t address;         // 7 bits, as the master sent it
   uint8_t length;          // bytes received
