@@ -64,14 +64,13 @@ Attitude::Vector Attitude::down(const Quaternion& q) {
 }
 
 // Measured x expected direction of down, Q25 rad; its weight by how much it looks like gravity.
-Attitude::Vector Attitude::gravity_error(const AttitudeInput& in,
-                                         const Vector& rate_q27,
-                                         uint16_t& weight) const {
+Attitude::Vector Attitude::gravity_error(uint16_t& weight) const {
   // Down as felt: the motion's acceleration omega x (V, 0, 0) minus specific force, in 1/16 LSB.
   const int32_t turn_k = static_cast<int32_t>(speed_cmps_ * kTurnPerCmps);
-  const int32_t gx = -int32_t{in.force[0]} * 16;
-  const int32_t gy = mul_high(rate_q27.z, turn_k) - int32_t{in.force[1]} * 16;
-  const int32_t gz = -mul_high(rate_q27.y, turn_k) - int32_t{in.force[2]} * 16;
+  constexpr int32_t kSixteenths = 16 / kSamplesPerCorrection;
+  const int32_t gx = -force_sum_[0] * kSixteenths;
+  const int32_t gy = mul_high(last_rate_.z, turn_k) - force_sum_[1] * kSixteenths;
+  const int32_t gz = -mul_high(last_rate_.y, turn_k) - force_sum_[2] * kSixteenths;
   const int32_t x = gx / 16;
   const int32_t y = gy / 16;
   const int32_t z = gz / 16;
@@ -85,10 +84,10 @@ Attitude::Vector Attitude::gravity_error(const AttitudeInput& in,
   uint32_t off = size > kGravity ? size - kGravity : kGravity - size;
   // A turn is not told from a bank without a speed, and not quite with the ground's: beyond 16
   // deg/s of turning, 62 deg/s with a speed, nothing is learned.
-  const uint32_t turning = uint32_t{magnitude(in.rates[1])} + magnitude(in.rates[2]);
+  const uint32_t turning = uint32_t{magnitude(turning_[0])} + magnitude(turning_[1]);
   off += speed_cmps_ == 0 ? turning * 4 : turning;
-  weight = off >= kFullWeight || in.accel_saturated ? uint16_t{0}
-                                                    : static_cast<uint16_t>(kFullWeight - off);
+  weight = off >= kFullWeight || accel_saturated_ ? uint16_t{0}
+                                                  : static_cast<uint16_t>(kFullWeight - off);
   constexpr int32_t kToQ27 = 1024;
   const int32_t limit = INT32_MAX / kToQ27;
   const int32_t mx = clamp(gx, limit) * kToQ27;
@@ -115,6 +114,7 @@ void Attitude::set_rest_rates(const int16_t (&rates)[3]) {
 }
 
 void Attitude::step(const AttitudeInput& in, uint32_t dt_us) {
+  catch_up();  // nothing to do, unless there was no time for it
   dt_us = dt_us < kShortestUs ? kShortestUs : dt_us > kLongestUs ? kLongestUs : dt_us;
   const int32_t dt_k = static_cast<int32_t>(dt_us * kHalfPerUs);
   const Vector rate = {in.rates[0] * kRadpsQ27 - bias_[0] / 8,
@@ -134,13 +134,8 @@ void Attitude::step(const AttitudeInput& in, uint32_t dt_us) {
   accel_saturated_ = accel_saturated_ || in.accel_saturated;
   passed_us_ += dt_us;
   ++samples_;
-  if (samples_ == kSamplesPerCorrection) {
-    correct(in, rate);
-    samples_ = 0;
-    passed_us_ = 0;
-    accel_saturated_ = false;
-    force_sum_[0] = force_sum_[1] = force_sum_[2] = 0;
-  }
+  turning_[0] = in.rates[1];
+  turning_[1] = in.rates[2];
 
   // The mean of two samples stands for the time between them.
   const Vector mean = {last_rate_.x / 2 + rate.x / 2 + correction_.x,
@@ -151,16 +146,21 @@ void Attitude::step(const AttitudeInput& in, uint32_t dt_us) {
   put_angles(rate);
 }
 
-void Attitude::correct(const AttitudeInput& in, const Vector& rate) {
+void Attitude::catch_up() {
+  if (samples_ == kSamplesPerCorrection) {
+    correct();
+    samples_ = 0;
+    passed_us_ = 0;
+    accel_saturated_ = false;
+    force_sum_[0] = force_sum_[1] = force_sum_[2] = 0;
+  }
+}
+
+void Attitude::correct() {
   normalise(attitude_);
   down_ = down(attitude_);
-  AttitudeInput mean = in;
-  for (uint8_t axis = 0; axis < 3; ++axis) {
-    mean.force[axis] = static_cast<int16_t>(force_sum_[axis] / kSamplesPerCorrection);
-  }
-  mean.accel_saturated = accel_saturated_;
   uint16_t weight = 0;
-  const Vector error = gravity_error(mean, rate, weight);
+  const Vector error = gravity_error(weight);
 
   int32_t gain = settings_.tilt_gain_permille * kPermilleQ28;
   int32_t heading_gain = settings_.heading_gain_permille * kPermilleQ28;

@@ -34,6 +34,9 @@ class Attitude {
 
   // The sample taken `dt_us` after the last one. Steps of 1 to 40 ms; longer ones are cut.
   void step(const AttitudeInput& in, uint32_t dt_us);
+  // Behind every step, when there is time: the correction that every 4th sample asks for, half of a
+  // step's cycles. It takes effect with the next step.
+  void catch_up();
 
   // At rest (RestDetector) gravity and field teach no bias: the mean rates of a second do.
   void set_at_rest(bool at_rest) { at_rest_ = at_rest; }
@@ -65,9 +68,9 @@ class Attitude {
   static void turn(Quaternion& q, const Vector& half_angle_q30);
   static void normalise(Quaternion& q);
   static Vector down(const Quaternion& q);
-  Vector gravity_error(const AttitudeInput& in, const Vector& rate_q27, uint16_t& weight) const;
+  Vector gravity_error(uint16_t& weight) const;
   void learn(const Vector& error_q25, int32_t gain_q28, int32_t dt_k);
-  void correct(const AttitudeInput& in, const Vector& rate_q27);
+  void correct();
   void put_angles(const Vector& rate_q27);
 
   const AttitudeSettings& settings_;
@@ -84,6 +87,7 @@ class Attitude {
   uint16_t speed_cmps_ = 0;
   uint16_t settle_steps_ = kSettleSteps;
   uint16_t recover_steps_ = kSettleSteps;
+  int16_t turning_[2] = {};  // q r of the last sample
   int16_t phi_cdeg_ = 0;
   int16_t theta_cdeg_ = 0;
   int16_t psi_cdeg_ = 0;

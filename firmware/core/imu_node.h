@@ -30,6 +30,8 @@ class ImuNode {
   explicit ImuNode(ImuSettings& settings) : settings_(settings) { tune(); }
 
   void sample(const ImuRawSample& raw, uint32_t t_us);
+  // Behind every sample, when its packet is on its way: what can wait (Attitude::catch_up).
+  void catch_up() { attitude_.catch_up(); }
   // A sample was due and none came: its number is used up, so that its loss shows.
   void skip() { ++seq_; }
   void set_field(const int16_t (&field)[3]);  // body axes, 1090 LSB per gauss

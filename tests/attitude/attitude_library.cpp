@@ -45,6 +45,7 @@ void run_attitude(const int16_t* settings,
       filter.set_rest_rates(means);
     }
     filter.step(in, dt_us);
+    filter.catch_up();
     const int16_t seen[3] = {field[3 * i], field[3 * i + 1], field[3 * i + 2]};
     if (seen[0] != 0 || seen[1] != 0 || seen[2] != 0) {
       filter.set_field(seen);

@@ -18,6 +18,9 @@ uint32_t now_us();
 void start_ready();
 bool take_ready(uint32_t& at_us, uint8_t& edges);
 
+// Ends the sleep at an instant at most 32 ms away, once.
+void wake_at(uint32_t at_us);
+
 // Set by interrupts that the main loop has to look at.
 extern volatile bool g_awake;
 void sleep_until_interrupt();

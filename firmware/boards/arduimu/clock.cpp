@@ -32,6 +32,11 @@ ISR(TIMER1_OVF_vect) {
   ++g_turns;
 }
 
+ISR(TIMER1_COMPA_vect) {
+  TIMSK1 = _BV(TOIE1);
+  arduimu::g_awake = true;
+}
+
 ISR(TIMER0_COMPA_vect) {
   arduimu::g_awake = true;
 }
@@ -67,6 +72,14 @@ uint32_t now_us() {
     turns = turns_at(ticks);
   }
   return us_of(turns, ticks);
+}
+
+void wake_at(const uint32_t at_us) {
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    OCR1A = uint16_t(at_us << 1);
+    TIFR1 = _BV(OCF1A);
+    TIMSK1 = _BV(TOIE1) | _BV(OCIE1A);
+  }
 }
 
 void start_ready() {

@@ -17,7 +17,10 @@ namespace {
 
 constexpr uint32_t kSilentUs = 20000;      // four samples: the chip or its line is dead
 constexpr uint32_t kOtherBusUs = 1000000;  // no chip by SPI: an MPU-6050 by I2C, and back
-constexpr uint16_t kSealUs = 260;          // from the seal to START: put_packet takes 240 us
+// From data-ready to START, always: packets come as evenly as samples. What happens in between
+// takes 2 ms, 2.7 ms when it has to wait for the magnetometer.
+constexpr uint16_t kStartUs = 3000;
+constexpr uint16_t kSealUs = 260;  // from the seal to START: put_packet takes 240 us
 
 core::ImuSettings g_settings;
 arduimu::MpuBus g_mpu_bus;
@@ -37,7 +40,10 @@ uint8_t g_packet[frames::kImuPacketSize];
 uint8_t g_second[frames::kOriginalImu2PacketSize];
 bool g_second_waits;
 uint32_t g_sample_us;
+uint32_t g_start_us;
+bool g_packet_waits;  // for its START
 uint32_t g_other_bus_us;
+bool g_chip_found;  // since boot: no reason to look at the other bus any more
 
 // A record that is not whole leaves the defaults, without offsets; every packet says so.
 void read_settings() {
@@ -132,10 +138,22 @@ void send_sample() {
     }
     return;
   }
+  g_start_us = g_sample_us + kStartUs;
+  g_packet_waits = true;
+  arduimu::wake_at(g_start_us - kSealUs);
+}
+
+// Once the packet's time has come, or has passed because something on the bus is slow.
+void seal_packet(const uint32_t now_us) {
+  if (!g_packet_waits || int32_t(now_us + kSealUs - g_start_us) < 0) {
+    return;
+  }
+  g_packet_waits = false;
   if (arduimu::poll_transfer() == arduimu::TwiStatus::kBusy) {
     return;  // the Mega is slow: this sample is missing in its sequence
   }
-  const uint32_t start_us = arduimu::now_us() + kSealUs;
+  const uint32_t soonest_us = arduimu::now_us() + kSealUs;
+  const uint32_t start_us = int32_t(soonest_us - g_start_us) > 0 ? soonest_us : g_start_us;
   g_node.put_packet(g_packet, start_us);
   arduimu::begin_transfer_at(start_us, frames::kImuPacketAddress, g_packet, frames::kImuPacketSize);
 }
@@ -183,7 +201,8 @@ void serve_chip(const uint32_t now_us) {
   if (g_mpu.poll(now_us)) {
     g_node.set_chip(g_mpu.product_id(), g_mpu.dlpf());
     g_sample_us = now_us;
-  } else if (now_us - g_other_bus_us > kOtherBusUs) {
+    g_chip_found = true;
+  } else if (!g_chip_found && now_us - g_other_bus_us > kOtherBusUs) {
     g_other_bus_us = now_us;
     g_mpu_bus.try_the_other();
   }
@@ -230,6 +249,7 @@ int main() {
       serve_sample(at_us, edges);
     }
     const uint32_t now_us = arduimu::now_us();
+    seal_packet(now_us);
     const bool idle = arduimu::poll_transfer() != arduimu::TwiStatus::kBusy;
     if (g_second_waits && idle) {
       g_second_waits = false;
@@ -237,7 +257,10 @@ int main() {
           frames::kOriginalImu2PacketAddress, g_second, frames::kOriginalImu2PacketSize, 0);
     }
     serve_chip(now_us);
-    serve_field(now_us);
+    if (!g_packet_waits) {
+      g_node.catch_up();
+      serve_field(now_us);
+    }
     serve_serial(now_us);
     serve_record();
     arduimu::feed_watchdog();

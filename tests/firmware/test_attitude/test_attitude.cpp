@@ -29,6 +29,7 @@ struct Filter {
   void run(uint16_t steps) {
     for (uint16_t i = 0; i < steps; ++i) {
       attitude.step(in, 5000);
+      attitude.catch_up();
     }
   }
 };

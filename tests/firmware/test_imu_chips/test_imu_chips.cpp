@@ -242,6 +242,25 @@ TEST_CASE("silence, garbage and a stuck converter are not samples") {
   CHECK((start(mpu, now_us) || start(mpu, now_us)));
 }
 
+TEST_CASE("a chip that lost its ranges, or a line that garbles them, gives no samples") {
+  for (const uint8_t lost : {0x1A, 0x1B, 0x1C}) {
+    MpuBus bus;
+    Mpu mpu(bus, 2);
+    uint32_t now_us = 0;
+    REQUIRE(start(mpu, now_us));
+    bus.put({1, 2, 8192, 4, 5, 6, 7});
+    MpuSample sample = {};
+    CHECK(mpu.read(sample) == MpuStatus::kSample);
+    bus.registers[lost] = 0;
+    bus.put({1, 2, 8192, 4, 500, 6, 7});
+    CHECK(mpu.read(sample) == MpuStatus::kGarbage);
+    CHECK_EQ(sample.rates[0], 5);
+    mpu.restart(now_us);
+    CHECK((start(mpu, now_us) || start(mpu, now_us)));
+    CHECK(mpu.read(sample) == MpuStatus::kSample);
+  }
+}
+
 TEST_CASE("HMC5883L: settings, order X Z Y, overflow, first sample after the gain dropped") {
   Compass compass;
   compass.bus.be_hmc();

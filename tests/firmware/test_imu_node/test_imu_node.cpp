@@ -33,6 +33,7 @@ struct Imu {
     for (uint16_t i = 0; i < samples; ++i) {
       t_us += kPeriodUs;
       node.sample(raw, t_us);
+      node.catch_up();
     }
   }
   frames::GpsFrame fix(uint16_t speed_cmps) {
