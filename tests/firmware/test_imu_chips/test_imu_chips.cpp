@@ -243,7 +243,8 @@ TEST_CASE("silence, garbage and a stuck converter are not samples") {
 }
 
 TEST_CASE("a chip that lost its ranges, or a line that garbles them, gives no samples") {
-  for (const uint8_t lost : {0x1A, 0x1B, 0x1C}) {
+  constexpr uint8_t kLost[] = {0x1A, 0x1B, 0x1C};
+  for (const uint8_t lost : kLost) {
     MpuBus bus;
     Mpu mpu(bus, 2);
     uint32_t now_us = 0;
