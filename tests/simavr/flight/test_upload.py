@@ -1,0 +1,67 @@
+"""`pio run -t upload` as a user runs it, into Debian's real bootloader; what arrived records."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from flight.rig import BUILD, CRUISE_US, ROOT, FlightRig, check_card, make_card, take_log
+from simavr_bench import read_image
+from simavr_bench.pty_bridge import PtyBridge
+
+import host
+
+BOOT_SECTION = 0x3E000
+
+
+def upload(bridge: PtyBridge) -> str:
+    """Run PlatformIO's upload to a terminal and give what it says."""
+    pio = Path(sys.executable).with_name("pio")
+    environment = {**os.environ, "PLATFORMIO_BUILD_DIR": str(BUILD / "pio")}
+    command = [str(pio), "run", "-e", "mega2560", "-t", "upload", "--upload-port", bridge.path]
+    with subprocess.Popen(
+        command,
+        cwd=ROOT,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as running:
+        try:
+            bridge.serve(lambda: running.poll() is not None, limit_s=240.0)
+        finally:
+            running.kill()
+        said: str = running.communicate()[0]
+        assert running.returncode == 0, said
+    return said
+
+
+def test_uploaded_flash_boots_and_records(flight_elf: Path, tmp_path: Path) -> None:
+    card = make_card(tmp_path / "card.img")
+    rig = FlightRig(flight_elf, card, bootloader=True)
+    chip = rig.chip
+    ctypes.memset(chip.library.bench_flash(chip.handle), 0xFF, BOOT_SECTION)
+    rig.power_on()
+    chip.run_s(0.1)
+    assert chip.pc >= BOOT_SECTION
+    with PtyBridge(chip, 0, reset_on_open=True) as bridge:
+        said = upload(bridge)
+    assert "verified" in said
+    for address, piece in read_image(flight_elf).flash.items():
+        assert chip.flash(address, len(piece)) == piece
+
+    chip.run_s(8.0)
+    assert chip.pc < BOOT_SECTION
+    assert any("mega2560" in line for line in rig.status_lines())
+    rig.receiver.width_us[3] = CRUISE_US
+    chip.run_s(4.0)
+    rig.land()
+    check_card(card)
+    log = host.read_log(take_log(card, tmp_path / "flight.bin"))
+    assert not log.loss.any
+    assert len(log.frames["ident"]) == pytest.approx(260, abs=60)
+    assert log.frames["identity"]["board"][0] == b"mega2560"
