@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from host.sysid.airframe import CoefficientTable
 from host.sysid.errors import IdentificationError
-from host.sysid.flight import Answer
 
 # Names of the aircraft file for the names of the answer.
 AXES = {"CL": "cl", "Cm": "cm", "CY": "cy", "Cl": "croll", "Cn": "cn"}
@@ -22,7 +22,9 @@ CONTROLS = {"de": "elevator", "da": "aileron", "dr": "rudder"}
 ROTOR_RADPS = 500.0  # where JSBSim's rotor starts; it finds its own speed within a second
 
 
-def aircraft_document(answers: Sequence[Answer], source: str) -> tuple[dict[str, Any], list[str]]:
+def aircraft_document(
+    tables: Sequence[CoefficientTable], source: str
+) -> tuple[dict[str, Any], list[str]]:
     """Return the aircraft file with identified coefficients, and the names that were replaced.
 
     A coefficient whose 95 % half-width exceeds its value is not used. `cl_0` and `cm_0` move so
@@ -30,8 +32,7 @@ def aircraft_document(answers: Sequence[Answer], source: str) -> tuple[dict[str,
 
     Parameters
     ----------
-    answers : sequence of Answer
-        With coefficients.
+    tables : sequence of CoefficientTable
     source : str
         The aircraft they were made with: a name or a file.
 
@@ -48,21 +49,19 @@ def aircraft_document(answers: Sequence[Answer], source: str) -> tuple[dict[str,
     origins = dict(table.get("sources", {}))
     nodes = np.asarray(table["alpha_rad"], dtype=np.float64)
     replaced = []
-    for answer in answers:
-        for c in answer.coefficients:
+    for found in tables:
+        for c in found.coefficients:
             axis, _, label = c.name.partition("_")
             key = f"{AXES.get(axis, axis)}_{CONTROLS.get(label, label)}"
             if axis not in AXES or key not in table or not c.half_width < abs(c.value):
                 continue
             if label == "alpha":
                 base = f"{AXES[axis]}_0"
-                kept = np.asarray(table[base]) + np.asarray(table[key]) * answer.trim.alpha_rad
-                table[base] = (kept - c.value * answer.trim.alpha_rad).tolist()
+                kept = np.asarray(table[base]) + np.asarray(table[key]) * found.alpha_rad
+                table[base] = (kept - c.value * found.alpha_rad).tolist()
                 origins[base] = f"such that {axis} at the trim stays, after {key} was identified"
             table[key] = [c.value] * len(nodes)
-            origins[key] = (
-                f"identified, {answer.method}: {c.value:.5g} +- {c.half_width:.2g} (95 %)"
-            )
+            origins[key] = f"identified, {found.method}: {c.value:.5g} +- {c.half_width:.2g} (95 %)"
             replaced.append(c.name)
     if not replaced:
         raise IdentificationError("no coefficient is known well enough to make an aircraft of")
@@ -73,12 +72,12 @@ def aircraft_document(answers: Sequence[Answer], source: str) -> tuple[dict[str,
     return document, replaced
 
 
-def save_aircraft(path: Path, answers: Sequence[Answer], source: str) -> list[str]:
+def save_aircraft(path: Path, tables: Sequence[CoefficientTable], source: str) -> list[str]:
     """Write ``.toml`` for `host simulate` or ``.xml`` for JSBSim; return what was replaced."""
     from host.twin import aircraft, tomlout
     from host.twin.jsbsim_model import aircraft_xml
 
-    document, replaced = aircraft_document(answers, source)
+    document, replaced = aircraft_document(tables, source)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "identified.toml"
         file.write_text(tomlout.dumps(document), encoding="utf-8")

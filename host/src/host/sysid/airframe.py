@@ -58,6 +58,16 @@ class Coefficient:
 
 
 @dataclass(frozen=True, slots=True)
+class CoefficientTable:
+    """Coefficients of one kind of maneuver: ``longitudinal``, ``lateral`` or another template."""
+
+    template: str
+    method: str
+    alpha_rad: float
+    coefficients: tuple[Coefficient, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Condition:
     """Where a coefficient is taken: mean over the maneuvers."""
 

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from host.sysid.coefficient_answer import METHOD
 from host.sysid.finder import Found, Grade
 from host.sysid.flight import Answer
+from host.sysid.modes import Mode
+
+if TYPE_CHECKING:
+    from host.sysid.coefficient_flight import CoefficientAnswer
 
 
 def maneuver_document(graded: Sequence[tuple[Found, Grade]]) -> list[dict[str, Any]]:
@@ -26,6 +31,21 @@ def maneuver_document(graded: Sequence[tuple[Found, Grade]]) -> list[dict[str, A
             "remarks": list(mark.remarks),
         }
         for item, mark in graded
+    ]
+
+
+def mode_document(modes: Sequence[Mode]) -> list[dict[str, Any]]:
+    """Return modes with their intervals."""
+    return [
+        {
+            "name": m.name,
+            "eigenvalue": [m.eigenvalue.real, m.eigenvalue.imag],
+            "frequency_radps": m.frequency_radps,
+            "frequency_half_width": 1.96 * m.frequency_sd_radps,
+            "damping": m.damping,
+            "damping_half_width": 1.96 * m.damping_sd,
+        }
+        for m in modes
     ]
 
 
@@ -66,17 +86,7 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
             c.name: {"value": c.value, "half_width": c.half_width, "fit_error": c.fit_error}
             for c in answer.coefficients
         },
-        "modes": [
-            {
-                "name": m.name,
-                "eigenvalue": [m.eigenvalue.real, m.eigenvalue.imag],
-                "frequency_radps": m.frequency_radps,
-                "frequency_half_width": 1.96 * m.frequency_sd_radps,
-                "damping": m.damping,
-                "damping_half_width": 1.96 * m.damping_sd,
-            }
-            for m in answer.modes
-        ],
+        "modes": mode_document(answer.modes),
         "fit": {
             kind: {
                 f.name: {
@@ -90,4 +100,38 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
             for kind, fits in (("fitted", answer.fits), ("held_out", answer.validation))
         },
         "maneuvers": [m.name for m in answer.maneuvers],
+    }
+
+
+def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dict[str, Any]:
+    """Return a direct fit of coefficients: verdict, values, modes, delays, instrument errors."""
+    flight = answer.fit.flight
+    return {
+        "template": "coefficients",
+        "method": METHOD,
+        "verdict": list(lines),
+        "airspeed_mps": flight.airspeed_mps,
+        "qbar_pa": flight.qbar_pa,
+        "alpha_rad": flight.alpha_rad,
+        "CL": flight.lift,
+        "CD": flight.drag,
+        "coefficients": {
+            d.name: {
+                "value": d.value,
+                "half_width": d.half_width,
+                "relative_half_width": d.share,
+                "flagged": d.flagged,
+                "widened_by": answer.causes.get(d.name, ("", 0.0))[0],
+            }
+            for d in answer.fit.derivatives
+        },
+        "modes": mode_document(answer.modes),
+        "delays_s": {n: {"value": v, "half_width": h} for n, (v, h) in answer.delays.items()},
+        "instrument_errors": {
+            n: {"value": v, "standard_deviation": d} for n, (v, d) in answer.fit.errors.items()
+        },
+        "fit": {"one_step": {n: {"nrmse": x.nrmse} for n, x in answer.fit.traces.items()}},
+        "maneuvers": [
+            f"{f.kind} on {f.axis.split('_')[0]} at {f.start_s:.1f} s" for f in answer.used
+        ],
     }

@@ -17,9 +17,10 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.airframe import AirframeData
-from host.sysid.coefficient_answer import CoefficientFit, Flight, derivatives, informed
+from host.sysid.coefficient_answer import CoefficientFit, Flight, Pull, derivatives, informed, trace
 from host.sysid.coefficient_rows import (
     GRAVITY_MPS2,
+    KINEMATIC,
     LATERAL,
     LONGITUDINAL,
     Equation,
@@ -326,15 +327,43 @@ def _answer(
     slope[position["CD_alpha"]] = -lift / (2.0 * values["CL_alpha"])
     slope[position["CL_alpha"]] = share * lift / values["CL_alpha"]
     slope[-len(names) :] = levels[1] - share * levels[2]
-    slopes = np.vstack([slopes, slope])
+    slopes = np.vstack([slopes, slope, np.eye(len(state))[-len(names) :]])
     own = slopes @ covariance @ slopes.T
     left = np.sqrt(np.maximum(np.diag(covariance)[-len(names) :], 0.0))
+    air, plant = float(np.mean(_density(search.record))), search.plant
+    spin, thrust = (float(np.mean(x)) for x in (search.flown.spin_radps, search.flown.thrust_n))
+    pull = Pull(
+        thrust,
+        plant.slope(spin, search.condition[0], air),
+        float(plant.hub_m[2] * plant.axis[0] - plant.hub_m[0] * plant.axis[2]),
+    )
     return CoefficientFit(
-        derivatives(values, own),
+        derivatives(values, own[: len(values), : len(values)], _sizes(search, rows)),
         own,
         {
             n: (float(e), float(d))
             for n, e, d in zip(names, state[-len(names) :], left, strict=True)
         },
-        Flight(*search.condition, lift),
+        Flight(*search.condition, lift, drag, pull),
+        {
+            name: trace(
+                equation.left,
+                sum(float(state[position[f"{name}_{k}"]]) * x for k, x in equation.terms.items())
+                + np.zeros(search.record.samples),
+                [b.samples for b in search.blocks if name in b.names],
+            )
+            for name, equation in rows.equations.items()
+            if name not in KINEMATIC
+        },
     )
+
+
+def _sizes(search: _Search, rows: _Rows) -> dict[str, float]:
+    """Return the rms of every regressor about its mean in each window."""
+    result = {}
+    for name, equation in rows.equations.items():
+        windows = [b.samples for b in search.blocks if name in b.names]
+        for term, values in equation.terms.items():
+            parts = np.concatenate([values[k] - values[k].mean() for k in windows])
+            result[f"{name}_{term}"] = float(np.sqrt(np.mean(parts**2)))
+    return result

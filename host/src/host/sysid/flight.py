@@ -11,6 +11,7 @@ from host.compiled import Array
 from host.sysid.airframe import (
     AirframeData,
     Coefficient,
+    CoefficientTable,
     Condition,
     coefficients,
     corrected,
@@ -91,6 +92,11 @@ class Answer:
     coefficients: tuple[Coefficient, ...]
     still: tuple[str, ...]
     delays: dict[str, tuple[float, float]]
+
+    @property
+    def table(self) -> CoefficientTable:
+        """The coefficients and what they rest on."""
+        return CoefficientTable(self.template, self.method, self.trim.alpha_rad, self.coefficients)
 
 
 def maneuvers_of(columns: Mapping[str, Array]) -> list[tuple[Found, Grade]]:

@@ -61,7 +61,7 @@ def modes_of(model: LinearModel, A: Array, covariance: Array) -> tuple[Mode, ...
         gradient = np.array([left[k] @ slope @ right[:, k] for slope in slopes])
         J = np.vstack([gradient.real, gradient.imag])
         spread = J @ covariance @ J.T
-        found.append(_mode(value, spread))
+        found.append(mode_of("", value, spread))
     found.sort(key=lambda mode: -mode.frequency_radps)
     names = _names(model, found)
     return tuple(
@@ -78,15 +78,16 @@ def modes_of(model: LinearModel, A: Array, covariance: Array) -> tuple[Mode, ...
     )
 
 
-def _mode(value: complex, spread: Array) -> Mode:
+def mode_of(name: str, value: complex, spread: Array) -> Mode:
+    """Return the mode of an eigenvalue; `spread` (2, 2) is of its real and imaginary part."""
     frequency = float(np.hypot(value.real, value.imag))
     if frequency == 0.0:
-        return Mode("", value, spread, 0.0, float(np.sqrt(spread[0, 0])), 0.0, 0.0)
+        return Mode(name, value, spread, 0.0, float(np.sqrt(spread[0, 0])), 0.0, 0.0)
     by_frequency = np.array([value.real, value.imag]) / frequency
     # zeta = -Re / |lambda|
     by_damping = np.array([-(value.imag**2), value.real * value.imag]) / frequency**3
     return Mode(
-        "",
+        name,
         value,
         spread,
         float(frequency),

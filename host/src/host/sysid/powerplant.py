@@ -52,3 +52,11 @@ class Powerplant:
         at = np.arange(len(throttle))
         thrust, spin, drive = (np.interp(at, every, row) for row in result)
         return thrust, spin, drive
+
+    def slope(self, spin_radps: float, airspeed_mps: float, density_kgpm3: float) -> float:
+        """Return how thrust changes with airspeed (N per m/s) at constant rotor speed."""
+        above, below = (
+            self.step(spin_radps, 0.5, airspeed_mps + half, density_kgpm3)[0]
+            for half in (0.5, -0.5)
+        )
+        return above - below

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from host.sysid.airframe import CoefficientTable
 from host.sysid.errors import IdentificationError
-from host.sysid.flight import AXIS_OF, Answer
+from host.sysid.flight import AXIS_OF
 
 
 def read_truth(path: Path) -> dict[str, Any]:
@@ -42,13 +43,13 @@ def true_coefficients(document: dict[str, Any], template: str) -> dict[str, floa
     return {name: sum(t[name] for t in tables) / len(tables) for name in tables[0]}
 
 
-def truth_lines(answers: Sequence[Answer], document: dict[str, Any]) -> list[str]:
+def truth_lines(tables: Sequence[CoefficientTable], document: dict[str, Any]) -> list[str]:
     """Return a table of coefficients against the truth, errors relative to it."""
     lines = ["against the truth of the simulated flight (local derivatives, mean of maneuvers)"]
     inside = total = 0
-    for answer in answers:
-        truth = true_coefficients(document, answer.template)
-        for c in answer.coefficients:
+    for table in tables:
+        truth = true_coefficients(document, table.template)
+        for c in table.coefficients:
             if c.name not in truth:
                 continue
             miss = c.value - truth[c.name]

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from host.sysid.finder import Found, Grade
 from host.sysid.flight import Answer
+
+if TYPE_CHECKING:
+    from host.sysid.coefficient_flight import CoefficientAnswer
 
 TRUST = 0.10  # 95 % half-width over value: good enough to design with
 FAIR = 0.30
@@ -126,4 +130,71 @@ def model_lines(answer: Answer) -> list[str]:
         if fits:
             shares = ", ".join(f"{f.name} {100.0 * f.nrmse:.1f} %" for f in fits)
             lines.append(f"  NRMSE ({kind}): {shares}")
+    return lines
+
+
+def coefficient_words(answer: CoefficientAnswer) -> list[str]:
+    """Return the verdict of a direct fit of coefficients."""
+    along = sum(w.longitudinal for w in answer.windows)
+    derivatives = answer.fit.derivatives
+    trusted = [d.name for d in derivatives if d.share <= TRUST]
+    fair = [d.name for d in derivatives if d.share > TRUST and not d.flagged]
+    lines = [
+        f"coefficients: {along} maneuvers of the elevator, {len(answer.windows) - along} of aileron"
+        " and rudder fitted jointly, errors of the instrument beside them",
+        f"  trust (within 10 %):  {', '.join(trusted) or 'nothing'}",
+    ]
+    if fair:
+        lines.append(f"  use with care (10 to 15 %):  {', '.join(fair)}")
+    needs = set()
+    for d in derivatives:
+        if not d.flagged:
+            continue
+        cause, part = answer.causes.get(d.name, ("", 0.0))
+        why = f"{100.0 * part:.0f} % of the variance is {cause}" if cause else "excited too little"
+        known = "do not use" if d.share > 1.0 else "do not rely on"
+        lines.append(f"  {known} {d.name}: +- {100.0 * min(d.share, 99.99):.0f} %, {why}")
+        label = d.name.split("_")[-1]
+        needs.add(
+            f"measure {cause} better" if cause else f"fly {NEEDS.get(label, 'a larger input')}"
+        )
+    if needs:
+        lines.append(f"  to learn them, {'; '.join(sorted(needs))}")
+    return lines
+
+
+def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
+    """Return coefficients, modes, delays and fit as a table for people."""
+    flight = answer.fit.flight
+    lines = [
+        f"coefficients at {flight.airspeed_mps:.2f} m/s, alpha"
+        f" {flight.alpha_rad * 57.29578:.1f} deg, CL {flight.lift:.3f}; value, 95 % half-width,"
+        " what widens it most"
+    ]
+    for d in answer.fit.derivatives:
+        small = " of 5 % of the row" if d.reference > abs(d.value) else ""
+        cause = answer.causes.get(d.name, ("", 0.0))[0]
+        line = f"  {d.name:9s} {d.value:10.4f}  +- {d.half_width:8.4f}  {100.0 * d.share:6.1f} %"
+        line += f"{small}  {cause}" + ("  flagged" if d.flagged else "")
+        lines.append(line.rstrip())
+    lines.append("  CD_0 is the drag at zero lift, surfaces as flown")
+    for mode in answer.modes:
+        if mode.oscillatory:
+            lines.append(
+                f"  {mode.name}: {mode.frequency_radps:.3f}"
+                f" +- {1.96 * mode.frequency_sd_radps:.3f} rad/s,"
+                f" damping {mode.damping:.3f} +- {1.96 * mode.damping_sd:.3f}"
+            )
+        else:
+            lines.append(
+                f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {1.96 * mode.frequency_sd_radps:.3f}"
+                " 1/s"
+            )
+    delays = ", ".join(
+        f"{name.split('_')[1]} {1e3 * value:+.2f} +- {1e3 * half:.2f} ms"
+        for name, (value, half) in answer.delays.items()
+    )
+    lines.append(f"  residual delays: {delays}")
+    shares = ", ".join(f"{n} {100.0 * x.nrmse:.1f} %" for n, x in answer.fit.traces.items())
+    lines.append(f"  NRMSE (one-step, fitted data, gusts in it): {shares}")
     return lines

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from host.sysid.airframe import CoefficientTable
+    from host.sysid.coefficient_flight import CoefficientAnswer
     from host.sysid.finder import Found
     from host.sysid.flight import Answer
 
@@ -29,6 +31,7 @@ def add_parser(subparsers: Any) -> None:
         action="append",
         metavar="NAME",
         help="longitudinal, lateral, short-period, phugoid, roll, dutch-roll or a TOML file;"
+        " 'coefficients' (with --aircraft) fits lift, drag, side force and moments directly;"
         " repeatable (default: longitudinal and lateral)",
     )
     parser.add_argument(
@@ -73,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     from host.sysid.fit import methods as single_methods
     from host.sysid.flight import DEFAULT_METHOD, STAGED, identify
     from host.sysid.tables import read_columns
-    from host.sysid.verdict import model_lines, words
+    from host.sysid.verdict import coefficient_lines, coefficient_words, model_lines, words
 
     known = {**STAGED, **single_methods()}
     chosen = args.method or [DEFAULT_METHOD]
@@ -103,6 +106,9 @@ def run(args: argparse.Namespace) -> int:
             raise IdentificationError("--prior compares coefficients; they need --aircraft")
     windows = _windows(args, columns)
     answers: list[Answer] = []
+    direct = (
+        _direct(args, columns, windows, notes) if "coefficients" in (args.model or ()) else None
+    )
     for method in chosen:
         for name, user_model in _models(args.model):
             try:
@@ -116,18 +122,26 @@ def run(args: argparse.Namespace) -> int:
                 )
             except IdentificationError as error:
                 notes.append(f"{name}, {method}: {error}")
-    if not answers:
+    if not answers and direct is None:
         raise IdentificationError("; ".join(notes))
-    _write(args, answers)
-    if args.json:
-        from host.sysid.answer_json import answer_document
+    tables = list(direct.tables) if direct else [a.table for a in answers]
+    _write(args, answers, tables)
+    if direct and args.plots:
+        from host.sysid.pictures import draw_coefficients
 
+        draw_coefficients(direct, columns, args.plots)
+    if args.json:
+        from host.sysid.answer_json import answer_document, coefficient_document
+
+        documents = [answer_document(a, words([a], [])) for a in answers]
+        if direct:
+            documents.append(coefficient_document(direct, coefficient_words(direct)))
         print(
             json.dumps(
                 {
                     "source": str(args.source),
                     "notes": notes,
-                    "answers": [answer_document(a, words([a], [])) for a in answers],
+                    "answers": documents,
                 },
                 indent=2,
                 allow_nan=True,
@@ -135,19 +149,23 @@ def run(args: argparse.Namespace) -> int:
         )
         return int(ExitCode.OK)
     lines = words(answers, notes)
+    if direct:
+        lines += coefficient_words(direct)
     if len(chosen) > 1:
         lines += ["", *_side_by_side(answers)]
     else:
         for answer in answers:
             lines += ["", *model_lines(answer)]
+    if direct:
+        lines += ["", *coefficient_lines(direct)]
     if prior is not None:
         from host.sysid.prior import prior_lines
 
-        lines += ["", *prior_lines([c for a in answers for c in a.coefficients], prior)]
+        lines += ["", *prior_lines([c for table in tables for c in table.coefficients], prior)]
     if truth is not None:
         from host.sysid.truth import truth_lines
 
-        lines += ["", *truth_lines(answers, truth)]
+        lines += ["", *truth_lines(tables, truth)]
     print("\n".join(lines))
     return int(ExitCode.OK)
 
@@ -157,11 +175,33 @@ def _models(names: list[str] | None) -> list[tuple[str, Any]]:
 
     result: list[tuple[str, Any]] = []
     for name in names or ["longitudinal", "lateral"]:
+        if name == "coefficients":
+            continue
         if name.endswith(".toml"):
             result.append((name, read_model(Path(name))))
         else:
             result.append((name, None))
     return result
+
+
+def _direct(
+    args: argparse.Namespace,
+    columns: dict[str, Any],
+    windows: list[Found] | None,
+    notes: list[str],
+) -> CoefficientAnswer | None:
+    """Fit coefficients directly; None with a note if that cannot be done."""
+    from host.sysid.errors import IdentificationError
+
+    if not args.aircraft:
+        raise IdentificationError("--model coefficients needs mass and sensors; give --aircraft")
+    from host.sysid.coefficient_flight import identify_coefficients
+
+    try:
+        return identify_coefficients(columns, args.aircraft, windows=windows)
+    except IdentificationError as error:
+        notes.append(f"coefficients: {error}")
+        return None
 
 
 def _windows(args: argparse.Namespace, columns: dict[str, Any]) -> list[Found] | None:
@@ -216,7 +256,7 @@ def _side_by_side(answers: list[Answer]) -> list[str]:
     return lines
 
 
-def _write(args: argparse.Namespace, answers: list[Answer]) -> None:
+def _write(args: argparse.Namespace, answers: list[Answer], tables: list[CoefficientTable]) -> None:
     if args.plots:
         from host.sysid.pictures import draw
 
@@ -226,7 +266,7 @@ def _write(args: argparse.Namespace, answers: list[Answer]) -> None:
         _write_mat(args.mat, answers)
     for path in (args.save_aircraft, args.save_model):
         if path and (path is args.save_aircraft or path.suffix == ".xml"):
-            _write_aircraft(args, path, answers)
+            _write_aircraft(args, path, tables)
     if args.save_model and args.save_model.suffix != ".xml":
         from host.sysid.model_file import model_text
 
@@ -240,13 +280,13 @@ def _write(args: argparse.Namespace, answers: list[Answer]) -> None:
             path.write_text(model_text(answer.model, answer.result, answer.trim))
 
 
-def _write_aircraft(args: argparse.Namespace, path: Path, answers: list[Answer]) -> None:
+def _write_aircraft(args: argparse.Namespace, path: Path, tables: list[CoefficientTable]) -> None:
     from host.sysid.aircraft_export import save_aircraft
     from host.sysid.errors import IdentificationError
 
     if not args.aircraft:
         raise IdentificationError(f"{path}: an aircraft needs mass and geometry; give --aircraft")
-    save_aircraft(path, answers, args.aircraft)
+    save_aircraft(path, tables, args.aircraft)
 
 
 def _write_mat(path: Path, answers: list[Answer]) -> None:

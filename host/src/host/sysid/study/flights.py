@@ -18,20 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from host.sysid.aircraft_file import airframe_data, instrument_data, powerplant
-from host.sysid.coefficient_fit import fit_coefficients
-from host.sysid.coefficient_windows import Window
+from host.sysid.aircraft_file import airframe_data
 from host.sysid.errors import IdentificationError
 from host.sysid.finder import Found, find
 from host.sysid.flight import identify
-from host.sysid.tables import even_columns, read_columns
+from host.sysid.tables import read_columns
 from host.sysid.truth import read_truth, true_coefficients
 
 FIRST_SEED = 200
 OVERLAP = 0.8
-ALONG = ("CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "CD_0")
-LEAD_S = 0.5  # of trim before a maneuver
-SETTLED_S = 3.0  # after the launch
 CARDS = ("demo", "multisine", "survey", "sweep", "calm")
 PRINCIPAL = (
     "CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "CD_0", "CY_beta", "CY_dr", "Cl_beta", "Cl_p",
@@ -127,53 +122,6 @@ def add_flight(tally: Tally, folder: Path, *, fit: bool, aircraft: str = "ultras
                 tally.add(c.name, expected[c.name], c.value, c.half_width, flagged=False)
 
 
-def coefficient_study(
-    card: str, seeds: range, *, aircraft: str = "ultrastick25e", chain: str = "sitl"
-) -> Tally:
-    """Fit coefficients directly to flights through the recorder, in the true windows.
-
-    Parameters
-    ----------
-    card : str
-    seeds : range
-    aircraft : str
-        Whose file the fit is told; the flights are drawn around it.
-    chain : str
-        As of `host.twin.virtual.virtual_flight`.
-    """
-    from host.twin.virtual import virtual_flight
-
-    airframe, data = airframe_data(aircraft), instrument_data(aircraft)
-    plant, tally = powerplant(aircraft), Tally()
-    for seed in seeds:
-        flight = virtual_flight(card, seed, chain=chain)
-        maneuvers: list[dict[str, Any]] = list(flight.maneuvers)
-        launch_s = flight.record.card.flight.ground_s
-        columns, _ = even_columns(flight.table)
-        flying = columns["t_s"] > launch_s + SETTLED_S
-        windows = [
-            Window(float(m["start_s"]) - LEAD_S, float(m["end_s"]), "elevator" in m["axes"])
-            for m in maneuvers
-            if any(axis in m["axes"] for axis in ("elevator", "aileron", "rudder"))
-        ]
-        try:
-            fit = fit_coefficients(
-                {k: v[flying] for k, v in columns.items()}, windows, airframe, data, plant
-            )
-        except IdentificationError:
-            tally.failed += 1
-            continue
-        truth = {"maneuver": maneuvers}
-        expected = {
-            name: true_coefficients(truth, "longitudinal" if name in ALONG else "lateral")[name]
-            for name in PRINCIPAL
-        }
-        for d in fit.derivatives:
-            if d.name in PRINCIPAL:
-                tally.add(d.name, expected[d.name], d.value, d.half_width, flagged=d.flagged)
-    return tally
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Fly, judge, print."""
     from host.cli import main as host
@@ -182,17 +130,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--flights", type=int, default=3, help="seeds per card")
     parser.add_argument("--card", choices=CARDS, action="append")
     parser.add_argument("--no-fit", action="store_true", help="only find maneuvers")
-    parser.add_argument(
-        "--coefficients", action="store_true", help="direct fit of coefficients, through the log"
-    )
     options = parser.parse_args(arguments)
     write = sys.stdout.write
-    if options.coefficients:
-        for card in options.card or ["multisine"]:
-            tally = coefficient_study(card, range(FIRST_SEED, FIRST_SEED + options.flights))
-            write(f"{card}: {options.flights} flights, {tally.failed} fits failed\n")
-            write("\n".join(tally.lines()) + "\n")
-        return 0
     for card in options.card or CARDS[:2]:
         tally = Tally()
         for seed in range(FIRST_SEED, FIRST_SEED + options.flights):

@@ -1,0 +1,148 @@
+"""Coefficients straight from flight by `host identify`: words, numbers, pictures, files."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+from host.cli import main
+from host.sysid.aircraft_file import airframe_data
+from host.sysid.airframe import AirframeData
+from host.sysid.coefficient_flight import CoefficientAnswer, identify_coefficients, joined
+from host.sysid.coefficient_modes import coefficient_modes
+from host.sysid.finder import Found
+from host.sysid.pictures import interval_bars
+from host.sysid.tables import read_columns
+from host.sysid.truth import read_truth, true_coefficients
+
+NAME = "ultrastick25e"
+RED = "#d62728"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A flight of the survey card, every tolerance drawn, without the recorder."""
+    folder = tmp_path_factory.mktemp("survey")
+    flags = ["--firmware", "none", "--no-picture", "--seed", "31", "-o", str(folder)]
+    assert main(["simulate", "survey", *flags]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def answer(folder: Path) -> CoefficientAnswer:
+    columns, _ = read_columns(folder / "flight.csv")
+    return identify_coefficients(columns, NAME)
+
+
+def test_finds_all_maneuvers_and_their_truth(folder: Path, answer: CoefficientAnswer) -> None:
+    assert [w.longitudinal for w in answer.windows] == 3 * [True] + 6 * [False]
+    truth = read_truth(folder / "flight.truth.toml")
+    inside = total = 0
+    for table in answer.tables:
+        expected = true_coefficients(truth, table.template)
+        for c in table.coefficients:
+            total += 1
+            inside += abs(c.value - expected[c.name]) <= c.half_width
+    assert total == 24
+    assert inside >= 20
+    # The bound means something: intervals a fifth as wide do not hold the truth.
+    narrow = sum(
+        abs(c.value - true_coefficients(truth, t.template)[c.name]) <= 0.2 * c.half_width
+        for t in answer.tables
+        for c in t.coefficients
+    )
+    assert narrow < 15
+
+
+def test_modes_need_no_inertia(folder: Path, answer: CoefficientAnswer) -> None:
+    truth = read_truth(folder / "flight.truth.toml")["maneuver"]
+    found = {m.name.replace(" ", "_"): m for m in answer.modes}
+    for name, axis, within in (("short_period", "elevator", 0.03), ("dutch_roll", "rudder", 0.02)):
+        expected = [m["modes"][name] for m in truth if axis in m["axes"]]
+        frequency = sum(f for f, _ in expected) / len(expected)
+        damping = sum(d for _, d in expected) / len(expected)
+        assert found[name].frequency_radps == pytest.approx(frequency, rel=within)
+        assert found[name].damping == pytest.approx(damping, abs=0.03)
+        # Inertia is uncertain by 5 %, which is 2.5 % of a frequency; the motion does not care.
+        assert 1.96 * found[name].frequency_sd_radps < 0.02 * frequency
+
+
+def test_another_inertia_than_the_fit_used_moves_the_modes(answer: CoefficientAnswer) -> None:
+    frame = airframe_data(NAME)
+    heavy = AirframeData(
+        **{f: getattr(frame, f) for f in frame.__dataclass_fields__ if f != "iyy_kgm2"},
+        iyy_kgm2=1.2 * frame.iyy_kgm2,
+    )
+    same, other = (
+        next(m for m in coefficient_modes(answer.fit, a) if m.name == "short period")
+        for a in (frame, heavy)
+    )
+    assert other.frequency_radps < 0.95 * same.frequency_radps
+
+
+def test_delays_left_over_are_told(folder: Path, answer: CoefficientAnswer) -> None:
+    drawn = read_truth(folder / "flight.truth.toml")["drawn"]
+    value, half = answer.delays["delay_imu_s"]
+    assert abs(value - float(drawn["imu_delay_s"])) <= max(1.5 * half, 3e-4)
+    assert half < 1e-3
+
+
+def test_says_what_to_trust_and_why_not(
+    folder: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    again = tmp_path / "again.toml"
+    flags = ["--aircraft", NAME, "--model", "coefficients"]
+    source = str(folder / "flight.csv")
+    assert main(["identify", source, *flags, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)["answers"][0]
+    table = document["coefficients"]
+    assert table["Cn_p"]["flagged"]
+    assert "tilt" in table["Cn_p"]["widened_by"]
+    assert not table["Cm_q"]["flagged"]
+    assert any("do not rely on Cn_p" in line for line in document["verdict"])
+    more = ["--plots", str(tmp_path / "plots"), "--save-aircraft", str(again)]
+    truth = ["--truth", str(folder / "flight.truth.toml")]
+    assert main(["identify", source, *flags, *more, *truth]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("coefficients: 3 maneuvers of the elevator, 6 of aileron and rudder")
+    assert "of 24 intervals hold the truth" in text
+    assert {p.name for p in (tmp_path / "plots").iterdir()} == {
+        f"coefficients_{k}.svg" for k in ("fit", "poles", "intervals", "input")
+    }
+    with again.open("rb") as file:
+        saved = tomllib.load(file)["aerodynamics"]
+    assert saved["cm_q"][0] == pytest.approx(table["Cm_q"]["value"], rel=1e-6)
+
+
+def test_without_an_aircraft_there_is_one_clear_line(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(folder / "flight.csv"), "--model", "coefficients"]) == 2
+    assert "--aircraft" in capsys.readouterr().err
+
+
+def test_aileron_and_rudder_flown_together_are_one_window() -> None:
+    def item(axis: str, first: float, last: float) -> Found:
+        return Found(axis, "multisine", first, last - 3.0, last, 0.1, 9)
+
+    windows = joined(
+        [
+            item("aileron_rad", 10.0, 33.0),
+            item("rudder_rad", 10.4, 32.0),
+            item("elevator_rad", 40.0, 63.0),
+            item("rudder_rad", 70.0, 80.0),
+        ]
+    )
+    assert [(w.first_s, w.last_s, w.longitudinal) for w in windows] == [
+        (39.5, 63.0, True),
+        (9.5, 33.0, False),
+        (69.5, 80.0, False),
+    ]
+
+
+def test_bars_wider_than_the_value_are_red(tmp_path: Path) -> None:
+    path = tmp_path / "bars.svg"
+    known = [("Y_v", -0.9, 0.1, False), ("Y_p", 0.1, 0.09, False)]
+    assert RED not in interval_bars(known, "refused", path).read_text()
+    assert RED in interval_bars([*known, ("Y_da", 0.1, 0.12, False)], "refused", path).read_text()
+    assert RED in interval_bars([("Z_q", 1.0, 0.1, True)], "refused", path).read_text()
