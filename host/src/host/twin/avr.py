@@ -22,7 +22,15 @@ from host.resources import CLONE
 from host.twin import sitl
 from host.twin.faults import Fault, recorder_actions
 from host.twin.mega_clock import TICKS_PER_S
-from host.twin.sitl import CLOSE_S, LET_GO_S, PRESS_S, Recording, card_image, file_of
+from host.twin.sitl import (
+    CLOSE_S,
+    LET_GO_S,
+    PRESS_S,
+    Recording,
+    card_image,
+    check_duration,
+    file_of,
+)
 from host.twin.stimuli import Stimuli
 
 REPLAY = CLONE / "tests" / "simavr" / "replay.py"
@@ -49,6 +57,7 @@ def record(
     UsageError
         Image or simulator are not built, or the simulator refused.
     """
+    check_duration(given)
     elf = Path(os.environ.get("HOST_ELF", ELF))
     replay = Path(os.environ.get("HOST_REPLAY", REPLAY))
     for path, how in ((elf, "`pio run`"), (replay, "a clone with tests/simavr")):
@@ -118,12 +127,16 @@ def _run(command: list[str], progress: Callable[[float], None]) -> dict[str, obj
     ) as running:
         assert running.stderr is not None
         assert running.stdout is not None
-        for line in running.stderr:
-            if line.strip().endswith(" %"):
-                progress(float(line.split()[0]) / 100.0)
-            else:
-                words += line
-        answer = running.stdout.read()
+        try:
+            for line in running.stderr:
+                if line.strip().endswith(" %"):
+                    progress(float(line.split()[0]) / 100.0)
+                else:
+                    words += line
+            answer = running.stdout.read()
+        except BaseException:
+            running.kill()  # interrupted: the simulator must not fly on alone
+            raise
     if running.returncode != 0:
         last = words.strip().splitlines()[-1] if words.strip() else "no word"
         raise UsageError(f"the chip simulator ended with {running.returncode}: {last}")

@@ -14,6 +14,9 @@ from host.twin.faults import FAULTS, Fault
 from host.twin.maneuvers import KINDS, STEPS
 
 FOLDER = Path(__file__).parent / "cards"
+# Numbers of [flight], [air] and [pilot] that may be below zero.
+SIGNED = ("heading_deg", "field_temperature_degc", "latitude_deg", "longitude_deg",
+          "wind_north_mps", "wind_east_mps")  # fmt: skip
 AXES = ("elevator", "aileron", "rudder", "throttle")
 
 
@@ -231,6 +234,8 @@ def _section(name: str, document: Mapping[str, object], key: str, kind: type[Sec
             values[entry] = value
         else:
             values[entry] = _number(f"{name}: [{key}]", entry, value)
+            if values[entry] < 0.0 and entry not in SIGNED:
+                raise CardError(f"{name}: {key}.{entry} is {value!r}, expected 0 or more")
     return kind(**values)
 
 

@@ -131,8 +131,8 @@ def draw(
         )  # fmt: skip
     for fault in faults:
         top.annotate(
-            " ".join((fault.kind, fault.channel)).strip(), (fault.at_s, 1.04),
-            xycoords=("data", "axes fraction"), ha="center", va="bottom", fontsize=7, rotation=90,
+            " ".join((fault.kind, fault.channel)).strip(), (fault.at_s, 0.03),
+            xycoords=("data", "axes fraction"), ha="right", va="bottom", fontsize=7, rotation=90,
             color=FAULT_COLOUR,
         )  # fmt: skip
     figure.suptitle(title, fontsize=11)

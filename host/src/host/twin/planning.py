@@ -292,7 +292,8 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
         )
         segments += [chosen] * 3
     segments.append(Segment("trim", duration_s=5.0))
-    title = f"{aircraft.title} at {speed:.0f} m/s: three of each input"
+    about = "" if aircraft.straight else f" at {speed:.0f} m/s"
+    title = f"{aircraft.title}{about}: three of each input"
     return replace(flight, title=title, segments=tuple(segments))
 
 

@@ -139,6 +139,7 @@ def record(
     UsageError
         No library, or the recorder did not make a file.
     """
+    check_duration(given)
     sitl = ctypes.CDLL(str(library_path()))
     sitl.sitl_create()
     image = card_image(faults)
@@ -148,6 +149,16 @@ def record(
     finally:
         sitl.sitl_create()  # lets go of the image
         del room
+
+
+def check_duration(given: Stimuli) -> None:
+    """Raise UsageError if the flight is over before the recorder is told to start."""
+    duration_s = given.duration / TICKS_PER_S
+    if duration_s < LET_GO_S:
+        raise UsageError(
+            f"the flight ends after {duration_s:.1f} s: its recorder is started {PRESS_S} s after"
+            " power-on, expected a longer one, or --firmware none"
+        )
 
 
 def eeprom(rate_hz: int, aircraft: str, *, damaged: bool = False) -> bytes:

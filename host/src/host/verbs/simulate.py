@@ -54,7 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Fly, and print what was written; return an exit code."""
     try:
-        from host.twin import cards, pilot, report
+        from host.twin import cards, pilot, report, sitl
     except ImportError as error:
         raise UsageError(
             f"the virtual flight needs {error.name}:"
@@ -65,6 +65,8 @@ def run(args: argparse.Namespace) -> int:
     if args.card is None:
         return _list(as_json=args.json)
     card = cards.load(args.card)
+    if args.seed < 0:
+        raise UsageError(f"seed is {args.seed}, expected 0 or more")
     bar = _Bar(enabled=sys.stderr.isatty())
     outcome = report.simulate(
         card,
@@ -116,6 +118,10 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"  {duration / busy:.0f} times real time on one core, loading and picture apart ({stages})"
     )
+    rate_hz = card.flight.rate_hz
+    if outcome.recording is not None and rate_hz not in sitl.RATES_HZ:
+        print(f"  recorded at {sitl.recorder_rate_hz(rate_hz)} Hz: {rate_hz:g} Hz of the card is"
+              f" none of {', '.join(map(str, sitl.RATES_HZ))}")  # fmt: skip
     if outcome.recording is not None and not outcome.recording.log:
         print(f"  nothing was recorded: the recorder found {outcome.recording.name}")
     if outcome.deviations:
