@@ -14,6 +14,7 @@ constexpr uint32_t kBaroUs = 40000UL;
 constexpr uint32_t kMagUs = 1000000UL / 15U;
 constexpr uint32_t kAttitudeUs = 100000UL;
 constexpr uint32_t kImuSilentUs = 100000UL;
+constexpr uint32_t kScanDeadUs = 20000UL;
 constexpr uint32_t kGpsSilentUs = 2000000UL;
 
 // An open or shorted sensor sits within two counts of a rail (sums of four conversions).
@@ -104,7 +105,15 @@ void Sensors::watch_imu(Outlet& outlet, uint32_t now_us) {
 }
 
 void Sensors::step_ident(const PilotLink& pilot, Outlet& outlet, uint32_t now_us) {
-  if (scanning_ && hal::scan_done()) finish_ident(outlet);
+  if (scanning_) {
+    if (hal::scan_done()) {
+      finish_ident(outlet);
+    } else if (static_cast<int32_t>(now_us - ident_.t_us) >= static_cast<int32_t>(kScanDeadUs)) {
+      scanning_ = false;  // the gap in `count` tells of the frame
+      hal::start_analog();
+      hal::arm_scan(trigger_.mask());
+    }
+  }
   const core::IdentTrigger::Source source = trigger_.poll(now_us, !scanning_ && hal::scan_done());
   if (source == core::IdentTrigger::Source::kNone) return;
   uint32_t t_us = 0;
@@ -222,9 +231,14 @@ void Sensors::gps_heard(const frames::GpsFrame& frame, Outlet& outlet, uint32_t 
   if (!gps_present_) outlet.event(frames::Event::kGpsFound, 0, now_us);
   gps_present_ = true;
   if (frame.week != frames::kGpsWeekInvalid && frame.fix >= 2) {
-    fat_date_ = core::fat_time(frame.week, frame.itow_ms);
+    date_week_ = frame.week;
+    date_itow_ms_ = frame.itow_ms;
   }
   outlet.put(frame);
+}
+
+uint32_t Sensors::fat_date() const {
+  return date_week_ == frames::kGpsWeekInvalid ? 0 : core::fat_time(date_week_, date_itow_ms_);
 }
 
 bool Sensors::coefficients(frames::BaroCoefficientsFrame* out, uint32_t now_us) const {

@@ -29,7 +29,8 @@ class Sensors {
   void put_health(frames::SystemFrame* out);
   // Bits of frames.toml, `sensors`: heard of during the last second.
   uint8_t heard() const { return heard_; }
-  uint32_t fat_date() const { return fat_date_; }
+  // Of the last epoch whose date was known, for the file system; 0: none yet.
+  uint32_t fat_date() const;
   const frames::BaroFrame& baro() const { return barometer_.frame(); }
   const frames::GpsFrame& gps() const { return gps_.frame(); }
   const frames::IdentFrame& ident() const { return ident_; }
@@ -59,7 +60,8 @@ class Sensors {
   frames::IdentFrame ident_ = {};
   uint32_t imu_heard_us_ = 0;
   uint32_t gps_heard_us_ = 0;
-  uint32_t fat_date_ = 0;
+  uint32_t date_itow_ms_ = 0;
+  uint16_t date_week_ = frames::kGpsWeekInvalid;
   uint16_t rail_ = 0;
   uint8_t slot_ = 0;
   uint8_t hearing_ = 0;

@@ -91,6 +91,10 @@ IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
   if (static_cast<int32_t>(since_us) < 0 || since_us < wait_us) {
     return Source::kNone;
   }
+  // Behind the scan of a bad packet that made no frame.
+  if (!ready && since_us - wait_us < period_us_) {
+    return Source::kNone;
+  }
   imu_leads_ = false;
   last_us_ += wait_us;
   if (now_us - last_us_ >= period_us_) {

@@ -33,8 +33,8 @@ class IdentTrigger {
   // or 8th at a lower rate.
   uint8_t mask() const;
   // `ready`: the last frame is finished (its analogue scan takes 4.6 ms). A packet in phase that
-  // has started no scan, because one was under way, waits for a period at most; then, as the timer
-  // at once, it is left out and counted.
+  // has started no scan, because one was under way, waits for a period at most, and so does the
+  // timer; then it is left out and counted.
   Source poll(uint32_t now_us, bool ready);
 
   uint16_t late() const { return late_; }          // served more than 1 ms after STOP or timer

@@ -12,6 +12,7 @@ constexpr uint8_t kAnalogRail = 10;
 constexpr uint16_t kConversionUs = 104;
 constexpr uint16_t kScanUs = kConversionUs * kAnalogSlots * kAnalogRounds;  // 4576
 
+// At boot, and again when a scan is not done long after its time: the converter was disturbed.
 void start_analog();
 
 // Conversion n of a scan holds the voltage of 12 us after the scan's start plus n * 104 us.

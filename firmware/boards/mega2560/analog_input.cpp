@@ -70,7 +70,8 @@ volatile uint16_t adc_sums[2 * hal::kAnalogSlots] FOR_THE_INTERRUPT;
 volatile uint8_t adc_left FOR_THE_INTERRUPT;    // conversions of this scan still to come
 volatile uint8_t adc_offset FOR_THE_INTERRUPT;  // of the next sum, in bytes
 volatile uint8_t adc_end FOR_THE_INTERRUPT;     // behind the sums of this scan
-volatile uint8_t adc_supply FOR_THE_INTERRUPT;  // conversions of the supply, behind this scan
+volatile uint8_t adc_supply FOR_THE_INTERRUPT;  // conversions of the supply still to come
+volatile uint8_t adc_wanted FOR_THE_INTERRUPT;  // of those, behind this scan
 volatile uint16_t adc_bandgap FOR_THE_INTERRUPT;
 
 }  // extern "C"
@@ -111,9 +112,9 @@ ISR(ADC_vect, ISR_NAKED) {
       "brne 1f \n\t"
       "subi r30, %[size] \n\t"
       "1: sts adc_offset, r30 \n\t"
-      "sts adc_left, r18 \n\t"
       "cpi r18, 2 \n\t"
       "brlo 2f \n\t"
+      "sts adc_left, r18 \n\t"
       // That slot converts already; the multiplexer is set for the one behind it.
       "lsr r30 \n\t"
       "ldi r31, 0 \n\t"
@@ -127,33 +128,40 @@ ISR(ADC_vect, ISR_NAKED) {
       "andi r24, %[mux] \n\t"
       "sts %[admux], r24 \n\t"
       "rjmp 4f \n\t"
-      // the conversion under way is the last
-      "2: ldi r24, %[once] \n\t"
-      "sts %[control_a], r24 \n\t"
-      "tst r18 \n\t"
-      "brne 4f \n\t"
-      "lds r24, %[taken] \n\t"
-      "tst r24 \n\t"
+      "2: tst r18 \n\t"
       "breq 5f \n\t"
-      "sts %[awake], r24 \n\t"
+      // the conversion under way is the last
+      "ldi r24, %[once] \n\t"
+      "sts %[control_a], r24 \n\t"
+      "rjmp 9f \n\t"
       // The scan is done: the supply, once a second.
-      "5: lds r24, adc_supply \n\t"
+      "5: lds r24, %[taken] \n\t"
       "tst r24 \n\t"
-      "breq 4f \n\t"
-      "ldi r24, 0 \n\t"
-      "sts %[control_b], r24 \n\t"
+      "breq 8f \n\t"
+      "sts %[awake], r24 \n\t"
+      "8: lds r24, adc_wanted \n\t"
+      "tst r24 \n\t"
+      "breq 9f \n\t"
+      "sts adc_supply, r24 \n\t"
+      "sts adc_wanted, r18 \n\t"
+      "sts %[control_b], r18 \n\t"
       "ldi r24, %[bandgap] \n\t"
       "sts %[admux], r24 \n\t"
-      "6: ldi r24, %[again] \n\t"
+      "ldi r24, %[again] \n\t"
       "sts %[control_a], r24 \n\t"
+      // With a zero here, or in adc_supply, the bus's interrupt may start the next scan at once,
+      // even inside this one: no register of the converter is written behind it.
+      "9: sts adc_left, r18 \n\t"
       "rjmp 4f \n\t"
       "3: sts adc_bandgap, r24 \n\t"
       "sts adc_bandgap+1, r25 \n\t"
       "lds r24, adc_supply \n\t"
       "subi r24, 1 \n\t"
       "brcs 4f \n\t"
-      "sts adc_supply, r24 \n\t"
-      "brne 6b \n\t"
+      "breq 6f \n\t"
+      "ldi r25, %[again] \n\t"
+      "sts %[control_a], r25 \n\t"
+      "6: sts adc_supply, r24 \n\t"
       "4: pop r31 \n\t"
       "pop r30 \n\t"
       "pop r19 \n\t"
@@ -184,7 +192,7 @@ volatile uint8_t g_scan_mask = kScanUnarmed;
 volatile bool g_scan_waits = false;
 
 bool adc_busy() {
-  return adc_left != 0 || (ADCSRA & _BV(ADSC)) != 0;
+  return adc_left != 0 || adc_supply != 0;
 }
 
 uint16_t begin_scan() {
@@ -229,7 +237,11 @@ void start_analog() {
   DIDR0 = 0xFF;  // A0 to A7 are analogue only
   DIDR2 = _BV(ADC13D) | _BV(ADC14D) | _BV(ADC15D);
   ADCSRA = kIdle;
-  adc_end = kSumBytes;
+  if (adc_end == 0) {
+    adc_end = kSumBytes;
+  }
+  adc_supply = 0;
+  adc_left = 0;
 }
 
 void arm_scan(const uint8_t mask) {
@@ -264,7 +276,7 @@ bool scan_done() {
 uint16_t scan_sum(const uint8_t slot) {
   if (slot == kAnalogRail && ++g_scans >= kScansPerSupply) {
     g_scans = 0;
-    adc_supply = kSupplyConversions;
+    adc_wanted = kSupplyConversions;
   }
   return adc_sums[g_reading == 0 ? slot : uint8_t(slot + kAnalogSlots)];
 }
