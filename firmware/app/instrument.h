@@ -18,8 +18,8 @@ namespace app {
 
 class Instrument {
  public:
-  // 500 ms of frames at 100 Hz, 250 ms at 200 Hz.
-  static constexpr uint16_t kRingBytes = 4450;
+  // 500 ms of frames at 100 Hz, 250 ms at 200 Hz, and 650 B to spare.
+  static constexpr uint16_t kRingBytes = 4700;
 
   Instrument() = default;
   Instrument(const Instrument&) = delete;

@@ -28,7 +28,8 @@ void PilotLink::step(const frames::ConfigFrame& config,
   if (!due) return;
   polled_us_ = now_us;
   poll_receiver(outlet, now_us);
-  if (now_us - decided_us_ >= kRestUs || decoder_.changes() != decided_changes_) {
+  const uint16_t rest_us = drive_.drive() == frames::Drive::kMegaHolding ? kHoldingRestUs : kRestUs;
+  if (now_us - decided_us_ >= rest_us || decoder_.changes() != decided_changes_) {
     decided_us_ = now_us;
     decided_changes_ = decoder_.changes();
     decide(config, self_test_passed, outlet, now_us);

@@ -18,7 +18,7 @@ class PilotLink {
  public:
   void start();
   // Every turn of the main loop, and while the card makes a call wait. Decides anew when a pulse
-  // may have been accepted, else every kRestUs: a decision costs 3000 cycles.
+  // may have been accepted, else every kRestUs.
   void step(const frames::ConfigFrame& config,
             bool self_test_passed,
             Outlet& outlet,
@@ -35,7 +35,8 @@ class PilotLink {
 
  private:
   static constexpr uint16_t kPollUs = 1500;  // pulses that stay away show within this
-  static constexpr uint16_t kRestUs = 4000;
+  static constexpr uint16_t kRestUs = 10000;
+  static constexpr uint16_t kHoldingRestUs = 1000;  // a hold ends on time
 
   void poll_receiver(Outlet& outlet, uint32_t now_us);
   void decide(const frames::ConfigFrame& config,

@@ -22,7 +22,10 @@ bool ByteRing::push(uint8_t id, const void* fields, uint32_t t_us) {
   // An event squeezed into the reserve does not mean that there is room again.
   const bool tells = dropped_pending_ != 0 && id != frames::kEventId;
   const uint8_t notice = tells ? frames::kEventWireSize : 0;
-  if (size == 0 || !fits(id, static_cast<uint16_t>(size + notice))) {
+  // Small frames do not slip in between large ones that are dropped: there is room again when the
+  // identification frame has some, and one event tells of all.
+  const uint8_t wanted = tells && size < frames::kIdentWireSize ? frames::kIdentWireSize : size;
+  if (size == 0 || !fits(id, static_cast<uint16_t>(wanted + notice))) {
     if (dropped_pending_ == 0) {
       dropped_first_us_ = t_us;
     }

@@ -1,7 +1,12 @@
 #include "core/drive.h"
 
+#include "core/progmem.h"
+
 namespace core {
 namespace {
+
+// A shift by a variable is a loop on the AVR: bits come from here, or go along with a loop.
+constexpr uint8_t kBitOf[8] CORE_FLASH = {1, 2, 4, 8, 16, 32, 64, 128};
 
 constexpr uint8_t kAllChannels = (1U << kChannels) - 1;
 constexpr uint8_t kServoChannels = (1U << kServos) - 1;
@@ -20,13 +25,13 @@ RcChannels map_channels(const RcDecoder& decoder, const frames::ConfigFrame& con
                                      config.input_throttle,
                                      config.input_switch};
   RcChannels rc = {};
-  for (uint8_t channel = 0; channel < kChannels; ++channel) {
+  uint8_t bit = 1;
+  for (uint8_t channel = 0; channel < kChannels; ++channel, bit = static_cast<uint8_t>(bit << 1)) {
     const uint8_t input = inputs[channel];
     if (input >= kRcInputs) {
       continue;
     }
-    const uint8_t bit = static_cast<uint8_t>(1U << channel);
-    const uint8_t input_bit = static_cast<uint8_t>(1U << input);
+    const uint8_t input_bit = flash_u8(&kBitOf[input]);
     rc.width_ticks[channel] = decoder.width_ticks(input);
     if ((decoder.fresh() & input_bit) != 0) {
       rc.fresh = static_cast<uint8_t>(rc.fresh | bit);
@@ -62,19 +67,22 @@ void DriveControl::update(const RcChannels& rc,
     switch_ = at;
     since_us_ = now_us;
   }
-  missing_ = 0;
-  for (uint8_t channel = 0; channel < kChannels; ++channel) {
+  uint8_t missing = 0;
+  uint8_t bit = 1;
+  for (uint8_t channel = 0; channel < kChannels; ++channel, bit = static_cast<uint8_t>(bit << 1)) {
     if (rc.width_ticks[channel] == 0) {
-      missing_ = static_cast<uint8_t>(missing_ | 1U << channel);
+      missing = static_cast<uint8_t>(missing | bit);
     }
   }
+  missing_ = missing;
   if (relay()) {
     keep_or_release(rc, config, self_test_passed, now_us);
   } else {
     engage_or_explain(rc, self_test_passed, now_us);
   }
-  for (uint8_t servo = 0; servo < kServos; ++servo) {
-    if ((rc.steady >> servo & 1) != 0) {
+  bit = 1;
+  for (uint8_t servo = 0; servo < kServos; ++servo, bit = static_cast<uint8_t>(bit << 1)) {
+    if ((rc.steady & bit) != 0) {
       servo_ticks_[servo] = rc.width_ticks[servo];
     } else if (drive_ != frames::Drive::kMegaHolding || servo == kThrottle) {
       servo_ticks_[servo] = 0;

@@ -159,24 +159,38 @@ void RcDecoder::lose(uint8_t index) {
 }
 
 void RcDecoder::poll(uint32_t now_ticks) {
+  if (waiting_ != 0) {
+    confirm(now_ticks);
+  }
+  if (now_ticks - aged_ticks_ < kAgeTicks) {
+    return;
+  }
+  aged_ticks_ = now_ticks;
   uint8_t bit = 1;
   for (uint8_t i = 0; i < kRcInputs; ++i, bit = static_cast<uint8_t>(bit << 1)) {
-    Input& input = inputs_[i];
-    // An edge in the ring that is younger than now_ticks settles its pulse itself, next turn.
-    if (input.candidate != 0 && (levels_ & bit) == 0) {
-      const uint32_t low_ticks = now_ticks - input.fall;
-      if (low_ticks >= kLowAfterTicks) {
-        settle(i, low_ticks);
-      }
-    }
+    const Input& input = inputs_[i];
     if (input.width == 0) {
       continue;
     }
     const uint32_t age_ticks = now_ticks - input.accepted;
     if (age_ticks > kLostTicks) {
       lose(i);
-    } else if (age_ticks > kFreshTicks) {
+    } else if (age_ticks > kFreshTicks && (fresh_ & bit) != 0) {
       set(fresh_, bit, false);
+      ++changes_;
+    }
+  }
+}
+
+void RcDecoder::confirm(uint32_t now_ticks) {
+  uint8_t bit = 1;
+  for (uint8_t i = 0; i < kRcInputs; ++i, bit = static_cast<uint8_t>(bit << 1)) {
+    // An edge in the ring that is younger than now_ticks settles its pulse itself, next turn.
+    if ((waiting_ & bit) != 0 && (levels_ & bit) == 0) {
+      const uint32_t low_ticks = now_ticks - inputs_[i].fall;
+      if (low_ticks >= kLowAfterTicks) {
+        settle(i, low_ticks);
+      }
     }
   }
 }

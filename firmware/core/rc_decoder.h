@@ -30,6 +30,7 @@ class RcDecoder {
   static constexpr uint32_t kMaxPeriodTicks = 25000UL * kTicksPerUs;
   static constexpr uint32_t kFreshTicks = 45000UL * kTicksPerUs;  // one frame missed, not two
   static constexpr uint32_t kLostTicks = 60000UL * kTicksPerUs;
+  static constexpr uint32_t kAgeTicks = 2000UL * kTicksPerUs;  // between two looks at all ages
   static constexpr uint8_t kSteadyPulses = 3;
 
   // Levels of all inputs (bit 0 to 4) behind an edge. `late`: the stamp cannot be trusted.
@@ -43,7 +44,7 @@ class RcDecoder {
   // A pulse waits for its low time: poll again within a millisecond.
   bool waiting() const { return waiting_ != 0; }
 
-  // 0: no pulse accepted within 60 ms.
+  // 0: no pulse accepted within 60 ms, seen 2 ms later at most.
   uint16_t width_ticks(uint8_t input) const { return inputs_[input].width; }
   uint8_t valid() const { return valid_; }         // bit per input: width is not 0
   uint8_t fresh() const { return fresh_; }         // bit per input: last pulse at most 45 ms old
@@ -64,12 +65,14 @@ class RcDecoder {
 
   void rise(uint8_t index, uint32_t t_ticks, bool late);
   void fall(uint8_t index, uint32_t t_ticks, bool late);
+  void confirm(uint32_t now_ticks);
   void settle(uint8_t index, uint32_t low_ticks);
   void measure_frame(uint16_t period_us);
   void reject(uint8_t index);
   void lose(uint8_t index);
 
   Input inputs_[kRcInputs];
+  uint32_t aged_ticks_ = 0;  // the last look at all ages
   uint16_t frame_us_ = 0;
   uint16_t glitches_ = 0;
   uint8_t levels_ = 0;

@@ -15,7 +15,7 @@ from simavr_bench.sd_card import make_fat32
 
 FILE_BLOCKS = 131_072  # 64 MiB
 PAYLOAD = 480
-RING = 4450  # kRingBytes of firmware/app/instrument.h
+RING = 4700  # kRingBytes of firmware/app/instrument.h
 REST_S = 0.020  # between two blocks; less, and the writer has more to write than it could
 NEVER = 2**62  # a cycle
 OTHER_FILE = "PHOTO.JPG"
