@@ -150,6 +150,10 @@ void sitl_add_gps(const int64_t* at, const uint8_t* bytes, size_t count) {
   add_bytes(&world().gps, at, bytes, count);
 }
 
+void sitl_hold_port(int port, int64_t until) {
+  if (port >= 0 && port <= 2) world().ports[port].drained_at = until;
+}
+
 void sitl_add_button(const int64_t* at, const uint8_t* pressed, size_t count) {
   for (size_t i = 0; i < count; ++i) world().button.events.push_back({at[i], pressed[i] != 0});
 }

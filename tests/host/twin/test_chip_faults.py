@@ -26,6 +26,7 @@ CARD = {
         {"kind": "receiver_storm", "at_s": 8.5, "duration_s": 0.3},
         {"kind": "vane_open", "at_s": 9.0, "duration_s": 0.5},
         {"kind": "card_reject", "at_s": 9.5, "value": 2},
+        {"kind": "telemetry_flood", "at_s": 9.8, "duration_s": 1.0},
         {"kind": "brown_out", "at_s": 11.0},
     ],
 }
@@ -42,8 +43,11 @@ def test_faults_tell_the_same_story_on_the_chip(library: Path, image: Path, tmp_
     record = fly(card, seed=5)
     given = stimuli(record, air_data(record))
     told = []
-    for recorder in (sitl.record, avr.record):
-        recording = recorder(given, rate_hz=100, aircraft="x", faults=card.faults)
+    quiet = tuple(fault for fault in card.faults if fault.kind != "telemetry_flood")
+    with pytest.raises(UsageError, match="telemetry_flood: here an interrupt takes no time"):
+        sitl.record(given, rate_hz=100, aircraft="x", faults=card.faults)
+    for recorder, faults in ((sitl.record, quiet), (avr.record, card.faults)):
+        recording = recorder(given, rate_hz=100, aircraft="x", faults=faults)
         path = tmp_path / "flight.bin"
         path.write_bytes(recording.log)
         log = read_log(path)

@@ -382,6 +382,13 @@ def gps_week_over(f: Flown, calm: Flown) -> None:
     assert np.allclose(f.log.table()["t_s"][:rows], calm.log.table()["t_s"][:rows], atol=1e-3)
 
 
+def radio_blocked(f: Flown, calm: Flown) -> None:
+    assert f.count("telemetry_dropped") > calm.count("telemetry_dropped") + 30
+    rows = min(len(f.ident), len(calm.ident))
+    assert np.array_equal(f.ident["q"][:rows], calm.ident["q"][:rows])
+    assert f.gaps() == 0
+
+
 def settings_gone(f: Flown, calm: Flown) -> None:
     assert f.told("settings_default") == [1]
     assert calm.told("settings_default") == []
@@ -440,6 +447,7 @@ CASES: list[tuple[Fault, Callable[[Flown, Flown], None]]] = [
     (make("gps_no_fix"), gps_blind),
     (make("gps_far"), gps_astray),
     (make("gps_rollover"), gps_week_over),
+    (make("telemetry_blocked"), radio_blocked),
     (make("settings_damaged"), settings_gone),
     (make("clock_wrap"), clock_over),
 ]
@@ -477,5 +485,5 @@ def test_an_unusable_card_is_refused_and_said_so(library: Path, kind: str) -> No
 
 
 def test_every_fault_a_card_can_name_is_flown_here() -> None:
-    elsewhere = {"motor_cut", "card_absent", "card_full", "card_unformatted"}
+    elsewhere = {"motor_cut", "telemetry_flood", "card_absent", "card_full", "card_unformatted"}
     assert {fault.kind for fault, _ in CASES} == set(FAULTS) - elsewhere

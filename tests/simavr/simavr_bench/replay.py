@@ -177,7 +177,7 @@ class Replay:
             ``card_busy`` (value: ms of the next block), ``card_reject`` (blocks refused),
             ``card_removed``, ``card_inserted``, ``baro_off``, ``baro_on``, ``baro_bus_stuck``,
             ``baro_bus_free``, ``reset`` (cause as the log counts them), ``supply`` (V, everything
-            analogue in proportion) or ``card_absent``.
+            analogue in proportion), ``telemetry_flood`` (bytes) or ``card_absent``.
         at_tick : int
             When.
         value : float
@@ -200,6 +200,7 @@ class Replay:
             "baro_bus_stuck": lambda: self.baro.hold(sda=True, scl=False),
             "baro_bus_free": lambda: self.baro.hold(sda=False, scl=False),
             "reset": lambda: self._chip.reset(CAUSES[round(value)]),
+            "telemetry_flood": lambda: self._chip.uart_send(3, bytes(int(value)), baud=57_600),
             # Only the chip's own reference is no ratio of its supply.
             "supply": lambda: self._chip.analog_supply(
                 SUPPLY_V, bandgap_volt=BANDGAP_V * SUPPLY_V / value

@@ -37,6 +37,10 @@ REPLAY = CLONE / "tests" / "simavr" / "replay.py"
 ELF = CLONE / ".pio" / "build" / "mega2560" / "firmware.elf"
 PACKET_ROOM = 40
 DEFAULT_RATE_HZ = 100
+NOT_ON_CHIP = {
+    "clock_wrap": "the chip's clock starts at 0",
+    "telemetry_blocked": "its modem has no line to stop the chip",
+}
 
 
 def record(
@@ -75,8 +79,8 @@ def record(
             (folder / "eeprom.bin").write_bytes(sitl.eeprom(rate_hz, aircraft, damaged=damaged))
             command += ["--eeprom", str(folder / "eeprom.bin")]
         for fault in faults:
-            if fault.kind == "clock_wrap":
-                raise UsageError("clock_wrap: the chip's clock starts at 0; use --firmware sitl")
+            if fault.kind in NOT_ON_CHIP:
+                raise UsageError(f"{fault.kind}: {NOT_ON_CHIP[fault.kind]}; use --firmware sitl")
             if fault.kind in ("power_cut", "card_absent"):
                 command += ["--fault", f"{fault.kind}:{fault.at_s:g}"]
         for action in recorder_actions(faults):

@@ -22,7 +22,9 @@ RECEIVER = ("aileron", "elevator", "rudder", "throttle", "switch")
 GYROS = ("p", "q", "r")
 FOREVER_S = 1e9
 SUPPLY_V = 5.0
+LONGEST_FLOOD_S = 600.0
 RESETS = {"brown_out": 3, "watchdog_reset": 4}  # enum reset_cause of protocol/frames.toml
+RADIO_BYTEPS = 57_600 / 10
 ENDS = {"card_removed": "card_inserted", "supply_sag": "supply", "baro_off": "baro_on",
         "baro_bus_stuck": "baro_bus_free"}  # fmt: skip
 
@@ -113,6 +115,10 @@ FAULTS = {
     "gps_rollover": FaultKind(
         24, "the GPS week ends: time of week 0, week 1024 back", lasts=False
     ),
+    "telemetry_blocked": FaultKind(25, "the radio takes no byte (not --firmware avr: its modem has"
+        " no line to say so)"),
+    "telemetry_flood": FaultKind(25, "the radio sends bytes without a pause (--firmware avr only:"
+        " elsewhere an interrupt takes no time)"),
     "settings_damaged": FaultKind(0, "a wrong byte in the stored settings", from_start=True),
     "clock_wrap": FaultKind(0, "the Mega's clock of microseconds wraps", lasts=False),
 }  # fmt: skip
@@ -172,6 +178,11 @@ def recorder_actions(faults: Sequence[Fault]) -> list[Action]:
             found.append(Action(fault.at_s, "supply", fault.amount))
         elif fault.kind in ("baro_off", "baro_bus_stuck"):
             found.append(Action(fault.at_s, fault.kind))
+        elif fault.kind == "telemetry_blocked":
+            found.append(Action(fault.at_s, fault.kind, fault.end_s))
+        elif fault.kind == "telemetry_flood":
+            end_s = min(fault.end_s, fault.at_s + LONGEST_FLOOD_S)
+            found.append(Action(fault.at_s, fault.kind, (end_s - fault.at_s) * RADIO_BYTEPS))
         if fault.kind in ENDS and fault.end_s < FOREVER_S:
             found.append(Action(fault.end_s, ENDS[fault.kind], SUPPLY_V))
     return sorted(found, key=lambda action: action.at_s)

@@ -29,6 +29,7 @@ LIBRARY = CLONE / "build" / "sitl" / "libsitl.so"
 RATES_HZ = (25, 50, 100, 200)
 PACKET_ROOM = 40
 EEPROM_BYTES = 4096
+TELEMETRY = 2  # port of sitl.h
 PRESS_S, LET_GO_S = 3.6, 3.9  # start button; preparing 64 MiB takes the Mega 2.8 s
 CLOSE_S = 20.0  # the next power-on, throttle idle for 10 s: the recorder closes the file
 # Room on the card per second of flight at 100 Hz: about 18 blocks are used.
@@ -197,6 +198,8 @@ def _record(
     cuts = [round(f.at_s * TICKS_PER_S) for f in faults if f.kind == "power_cut"]
     end = min([given.duration, *cuts])
     _give(sitl, given, end)
+    if "telemetry_flood" in kinds:
+        raise UsageError("telemetry_flood: here an interrupt takes no time; use --firmware avr")
     actions = [(round(a.at_s * TICKS_PER_S), a) for a in recorder_actions(faults)]
     sitl.sitl_power_on()
     marks = {*range(TICKS_PER_S, end, TICKS_PER_S), *(at for at, _ in actions if at < end), end}
@@ -260,6 +263,9 @@ def _act(sitl: ctypes.CDLL, given: Stimuli, at: int, action: Action) -> None:
         sitl.sitl_remove_pressure()
     elif action.what == "baro_on":
         _give_pressure(sitl, given)
+    elif action.what == "telemetry_blocked":
+        until = min(action.value, given.duration / TICKS_PER_S)
+        sitl.sitl_hold_port(ctypes.c_int(TELEMETRY), ctypes.c_int64(round(until * TICKS_PER_S)))
     else:
         sitl.sitl_hold_pressure_bus(ctypes.c_int(action.what == "baro_bus_stuck"))
 
