@@ -201,7 +201,9 @@ void Sensors::step_baro(Outlet& outlet, uint32_t now_us) {
       outlet.event(frames::Event::kBaroLost, static_cast<uint32_t>(barometer_.status()), now_us);
       return;
     case drivers::BaroEvent::kValue:
-      hear(frames::kSensorsBaro);
+      if (barometer_.frame().static_pressure != frames::kBaroStaticPressureInvalid) {
+        hear(frames::kSensorsBaro);
+      }
       outlet.put(barometer_.frame());
       return;
   }

@@ -68,7 +68,8 @@ ImuResult ImuReceiver::own_packet(const uint8_t* bytes, uint8_t size, uint32_t s
   }
   if (restart && !was_restart) {
     restarted_ = heard_;
-  } else if (heard_ && !sample_.original && start_us - sample_.start_us < kSilentUs) {
+  } else if (heard_ && !sample_.original && in.seq != sample_.seq &&
+             start_us - sample_.start_us < kSilentUs) {
     count(lost_, static_cast<uint8_t>(in.seq - sample_.seq - 1));
   }
   heard_ = true;

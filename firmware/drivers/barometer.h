@@ -18,7 +18,7 @@ enum class BaroStatus : uint8_t {
   kSilent = 1,       // nobody acknowledges
   kStuck = 2,        // a line is held low
   kOtherChip = 3,    // a chip id that is not known
-  kCoefficients = 4  // coefficients that no chip has
+  kCoefficients = 4  // coefficients that no chip has: raw values go on
 };
 
 enum class BaroEvent : uint8_t { kNone, kFound, kLost, kValue };
@@ -48,6 +48,10 @@ class Barometer {
         step_ = Step::kId;
         return BaroEvent::kNone;
       case Step::kRest:
+        if (!sane_ && now_us - words_us_ >= kRetryUs) {
+          read_words(now_us);
+          return BaroEvent::kNone;
+        }
         if (wanted_) {
           wanted_ = false;
           phase_ = 0;
@@ -133,10 +137,7 @@ class Barometer {
           return lose(BaroStatus::kOtherChip, now_us);
         }
         sensor_ = buffer_[0] == Bmp280::kChipId ? Bmp280::kSensor : Bmp085::kSensor;
-        read(is_280() ? Bmp280::kWordsRegister : Bmp085::kWordsRegister,
-             is_280() ? Bmp280::kWordsSize : Bmp085::kWordsSize,
-             now_us);
-        step_ = Step::kWords;
+        read_words(now_us);
         return BaroEvent::kNone;
       case Step::kWords:
         if (is_280()) {
@@ -144,12 +145,7 @@ class Barometer {
         } else {
           Bmp085::words(buffer_, words_);
         }
-        if (!(is_280() ? Bmp280::sane(words_) : Bmp085::sane(words_))) {
-          return lose(BaroStatus::kCoefficients, now_us);
-        }
-        step_ = Step::kRest;
-        status_ = BaroStatus::kOk;
-        return BaroEvent::kFound;
+        return judge_words(now_us);
       case Step::kCommand:
         since_us_ = now_us;
         wait_us_ = phase().wait_us;
@@ -163,6 +159,31 @@ class Barometer {
         break;
     }
     return BaroEvent::kNone;
+  }
+
+  void read_words(uint32_t now_us) {
+    read(is_280() ? Bmp280::kWordsRegister : Bmp085::kWordsRegister,
+         is_280() ? Bmp280::kWordsSize : Bmp085::kWordsSize,
+         now_us);
+    step_ = Step::kWords;
+  }
+
+  // Measures even with coefficients that no chip has: the raw values may be good. Reads them again
+  // every second, and tells of it once.
+  BaroEvent judge_words(uint32_t now_us) {
+    const bool told = status_ == BaroStatus::kCoefficients;
+    sane_ = is_280() ? Bmp280::sane(words_) : Bmp085::sane(words_);
+    step_ = Step::kRest;
+    words_us_ = now_us;
+    if (sane_) {
+      status_ = BaroStatus::kOk;
+      return BaroEvent::kFound;
+    }
+    status_ = BaroStatus::kCoefficients;
+    if (errors_ != 0xFFFF) {
+      ++errors_;
+    }
+    return told ? BaroEvent::kNone : BaroEvent::kLost;
   }
 
   BaroEvent take() {
@@ -180,8 +201,11 @@ class Barometer {
       command(since_us_);
       return BaroEvent::kNone;
     }
-    const core::BaroValue value = is_280() ? Bmp280::compensate(words_, pressure, temperature)
-                                           : Bmp085::compensate(words_, pressure, temperature);
+    core::BaroValue value;
+    if (sane_) {
+      value = is_280() ? Bmp280::compensate(words_, pressure, temperature)
+                       : Bmp085::compensate(words_, pressure, temperature);
+    }
     frame_.t_us = since_us_ + (is_280() ? Bmp280::kMiddleUs : Bmp085::kMiddleUs);
     frame_.static_pressure = value.static_pressure;
     frame_.temperature = value.temperature;
@@ -192,6 +216,7 @@ class Barometer {
 
   Bus& bus_;
   uint32_t since_us_ = 0;  // the last command was acknowledged, or the sensor was lost
+  uint32_t words_us_ = 0;  // the coefficients were read
   frames::BaroFrame frame_ = {};
   uint16_t words_[12] = {};
   uint16_t wait_us_ = 0;  // of the conversion under way
@@ -203,6 +228,7 @@ class Barometer {
   BaroStatus status_ = BaroStatus::kSilent;
   frames::BaroSensor sensor_ = frames::BaroSensor::kNone;
   bool wanted_ = false;
+  bool sane_ = true;
   bool tried_ = false;
 };
 

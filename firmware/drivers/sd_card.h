@@ -202,7 +202,7 @@ class SdCard {
   static constexpr uint8_t kWriteMany = 25, kSendOpCond = 41, kApplication = 55, kReadOcr = 58;
   static constexpr uint8_t kCrcOnOff = 59;
   static constexpr uint8_t kTokenBlock = 0xFE, kTokenMany = 0xFC, kTokenStop = 0xFD;
-  static constexpr uint8_t kIdleBit = 0b0000'0001, kIllegalBit = 0b0000'0100;
+  static constexpr uint8_t kIdleBit = 0b0000'0001, kIllegalBit = 0b0000'0100, kNoAnswer = 0xFF;
 
   bool fail(CardStatus status) {
     status_ = status;
@@ -231,17 +231,26 @@ class SdCard {
       spi_.transfer(0xFF);
     }
     spi_.select();
-    if (command(kGoIdle, 0) != kIdleBit) {
+    // A reset in flight meets a card that is still in a multi-block write, in the middle of a block
+    // or busy: end that first. A card that is busy takes CMD0 and nothing behind it.
+    const uint32_t since_us = spi_.now_us() - started_us_;
+    if (spi_.transfer(0xFF) != 0xFF && since_us <= kInitUs) {
       release();
-      // A reset in flight meets a card that is still in a multi-block write: end that first.
-      if (spi_.now_us() - started_us_ > kInitUs / 2) {
+      return Step::kAgain;
+    }
+    uint8_t r1 = command(kGoIdle, 0);
+    if (r1 == kIdleBit) {
+      r1 = command(kSendIfCond, 0x1AA);
+    }
+    if (r1 == kNoAnswer || (r1 & kIdleBit) == 0) {
+      release();
+      if (since_us > kInitUs / 2) {
         status_ = CardStatus::kNoCard;
         return Step::kFailed;
       }
       end_lost_write();
       return Step::kAgain;
     }
-    const uint8_t r1 = command(kSendIfCond, 0x1AA);
     version_2_ = (r1 & kIllegalBit) == 0;
     if (version_2_) {
       uint8_t r7[4];
@@ -334,7 +343,7 @@ class SdCard {
 
   uint32_t address(uint32_t sector) const { return high_capacity_ ? sector : sector << 9; }
 
-  // R1, or 0xFF without an answer. Section 7.3.1.1; CRC-7 in bits 7 to 1.
+  // R1, or kNoAnswer. Section 7.3.1.1; CRC-7 in bits 7 to 1.
   uint8_t command(uint8_t index, uint32_t argument) {
     uint8_t crc = 0;
     spi_.transfer(0xFF);
@@ -353,7 +362,7 @@ class SdCard {
         return r1;
       }
     }
-    return 0xFF;
+    return kNoAnswer;
   }
 
   void send_crc7(uint8_t byte, uint8_t& crc) {

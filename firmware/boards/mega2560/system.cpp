@@ -78,6 +78,8 @@ ResetSource reset_source() {
   if (g_crash_mark == kCrashMark) {
     g_crash_mark = 0;
     g_last_crash = g_crash_address;
+  }
+  if (g_last_crash != 0) {
     return ResetSource::kCrash;
   }
   // A bootloader may have cleared the register: then the cause is unknown.

@@ -177,17 +177,35 @@ TEST_CASE("nobody there: asked once a second, never in a hurry") {
   CHECK_EQ(bench.baro.errors(), 5);
 }
 
-TEST_CASE("an unknown chip and coefficients of a stuck one are refused") {
+TEST_CASE("an unknown chip is refused") {
   Bench other;
   other.bus.expect_bytes(0x77, 0xD0, 0x60, 0, 0, 1);
   CHECK(other.run_ms(100) == BaroEvent::kNone);
   CHECK(other.baro.status() == BaroStatus::kOtherChip);
+}
+
+TEST_CASE("coefficients of a stuck chip are told once; raw values go on until they are right") {
   Bench stuck;
   stuck.bus.expect_bytes(0x77, 0xD0, 0x55, 0, 0, 1);
   stuck.bus.script[stuck.bus.count++] = {0x77, {0xAA, 0}, 1, {}, 22, BusStatus::kDone};
-  CHECK(stuck.run_ms(100) == BaroEvent::kNone);
+  CHECK(stuck.run_ms(100) == BaroEvent::kLost);
   CHECK(stuck.baro.status() == BaroStatus::kCoefficients);
-  CHECK(!stuck.baro.present());
+  stuck.bus.expect_write(0x77, 0xF4, 0x2E);
+  stuck.bus.expect_bytes(0x77, 0xF6, 0x6C, 0xFA, 0, 2);
+  stuck.bus.expect_write(0x77, 0xF4, 0xB4);
+  stuck.bus.expect_bytes(0x77, 0xF6, 0x5D, 0x23, 0x80, 3);
+  stuck.baro.measure();
+  REQUIRE(stuck.run_ms(50) == BaroEvent::kValue);
+  const uint32_t raw_pressure = stuck.baro.frame().raw_pressure;
+  const uint32_t pressure = stuck.baro.frame().static_pressure;
+  CHECK(raw_pressure == 0x5D2380U >> 6);
+  CHECK(pressure == frames::kBaroStaticPressureInvalid);
+  CHECK_EQ(stuck.baro.frame().temperature, frames::kBaroTemperatureInvalid);
+  stuck.bus.script[stuck.bus.count++] = {0x77, {0xAA, 0}, 1, {}, 22, BusStatus::kDone};
+  CHECK(stuck.run_ms(1000) == BaroEvent::kNone);
+  stuck.bus.expect(0x77, 0xAA, kWords085, 22);
+  CHECK(stuck.run_ms(1000) == BaroEvent::kFound);
+  CHECK_EQ(stuck.bus.unexpected, 0);
 }
 
 TEST_CASE("lost in the middle of a measurement, told once, found again") {

@@ -141,6 +141,17 @@ TEST_CASE("gaps and duplicates are counted exactly, over the wrap of the sequenc
   CHECK_EQ(receiver.lost(), 8);
 }
 
+TEST_CASE("a number that comes again with another sample is no gap of 255") {
+  core::ImuReceiver receiver;
+  OwnPacket packet(40);
+  receiver.packet(kOwn, packet.bytes, 36, 0);
+  packet.bytes[4] ^= 1;  // t_us
+  packet.seal();
+  CHECK(receiver.packet(kOwn, packet.bytes, 36, 5000) == ImuResult::kSample);
+  CHECK_EQ(receiver.lost(), 0);
+  CHECK_EQ(receiver.good(), 2);
+}
+
 TEST_CASE("behind a second of silence the sequence says nothing about losses") {
   core::ImuReceiver receiver;
   const OwnPacket before(10);

@@ -70,6 +70,8 @@ class ModelCard {
     many_ = true;
     at_ = 100;
   }
+  // As after a reset while it programs: it takes CMD0, and nothing behind it.
+  void leave_busy(uint16_t for_bytes) { busy_ = for_bytes; }
 
  private:
   enum class Receiving : uint8_t { kCommand, kToken, kData };
@@ -147,6 +149,9 @@ class ModelCard {
       return;
     }
     at_ = 0;
+    if (busy_ != 0 && (command_[0] & 0x3F) != 0) {
+      return;
+    }
     uint8_t crc = 0;
     for (uint8_t i = 0; i < 5; ++i) {
       crc = static_cast<uint8_t>(crc ^ command_[i]);
@@ -170,7 +175,6 @@ class ModelCard {
     switch (index) {
       case 0:
         idle_ = true;
-        busy_ = 0;
         queue(1);
         return;
       case 8:

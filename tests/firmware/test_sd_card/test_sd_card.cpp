@@ -110,6 +110,18 @@ TEST_CASE("a reset in the middle of a block: the card is brought back") {
   CHECK(bench.start());
 }
 
+TEST_CASE("a reset while the card programs: waited for, not taken for an old card") {
+  Bench bench;
+  bench.model.leave_busy(2000);
+  REQUIRE(bench.start());
+  CHECK(bench.card.high_capacity());
+  CHECK(bench.longest_poll_us < 1500);
+  Bench dead;
+  dead.model.leave_busy(0xFFFF);
+  CHECK(!dead.start());
+  CHECK(dead.model.now_us() < 2000000UL);
+}
+
 TEST_CASE("sectors are written and read back") {
   Bench bench;
   REQUIRE(bench.start());
