@@ -136,6 +136,7 @@ class FlightRig:
     baro: Bmp085 = field(init=False)
     card: SdCard = field(init=False)
     relay: ChargePumpRelay = field(init=False)
+    started: list[int] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Wire everything; nothing has power yet."""
@@ -163,6 +164,7 @@ class FlightRig:
         self.gps = GpsUart(self.chip, 2, knows_pvt=True)
         self.baro = Bmp085(self.chip, "PA2", "PA3")
         self.relay = ChargePumpRelay(self.chip, "PH5", SERVOS, sense="PH6")
+        self.chip.on_start(self.started.append)
         for slot, channel in enumerate(ANALOG_CHANNELS):
             self.chip.analog(channel, 0.8 + 0.33 * slot, noise_lsb=0.5)
 

@@ -1,7 +1,9 @@
-"""A short selection of `make faults`."""
+"""A short selection of `make faults`, one of each kind; and that the judges can say no."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,18 +11,68 @@ import pytest
 
 if TYPE_CHECKING:
     from flight.rig import FlightRig
+    from simavr_bench.card_journal import CardJournal
 
-CHOSEN = ("card busy 500 ms", "block refused twice", "IMU dies holding SCL", "watchdog reset")
+CHOSEN = (
+    "card busy 1.2 s",
+    "block refused twice",
+    "every block refused for 3 s",
+    "pressure words 0xFFFF",
+    "IMU dies holding SCL",
+    "gyro saturated",
+    "all channels lost",
+    "60 glitches of 50 to 700 us",
+    "supply sags to 4.4 V",
+    "stack overflow",
+    "interrupt storm",
+    "GPS week ends",
+)
+
+
+@pytest.fixture(scope="module")
+def in_flight(
+    flight_elf: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[FlightRig, CardJournal]:
+    """A rig in flight with a journal of its card: for children made by in_fork only."""
+    from flight.faults.run import ready_rig
+
+    return ready_rig(flight_elf, tmp_path_factory.mktemp("faults"))
 
 
 @pytest.mark.parametrize("injected", CHOSEN)
-def test_fault_in_flight(flying: FlightRig, tmp_path: Path, injected: str) -> None:
-    from collections import Counter
-
-    from flight.faults import FAULTS, Outcome, run_fault, verdict
+def test_fault_in_flight(
+    in_flight: tuple[FlightRig, CardJournal], tmp_path: Path, injected: str
+) -> None:
+    from flight.faults.rows import FAULTS
+    from flight.faults.run import run_fault
     from simavr_bench import in_fork
 
     fault = next(fault for fault in FAULTS if fault.injected == injected)
-    seen = in_fork(lambda: run_fault(flying, fault, tmp_path))
-    boot = Counter({"reset": 1, "imu_found": 1})
-    assert verdict(fault, seen, Outcome(0.0, 0, True, True, boot)) == []
+    assert in_fork(partial(run_fault, *in_flight, fault, tmp_path)).wrong == []
+
+
+@pytest.mark.parametrize("injected", ["card not formatted", "card that cannot be read"])
+def test_card_that_cannot_be_recorded_on(flight_elf: Path, tmp_path: Path, injected: str) -> None:
+    from flight.faults.boot import BAD_CARDS, boot
+    from simavr_bench import in_fork
+
+    bad = next(bad for bad in BAD_CARDS if bad.injected == injected)
+    assert in_fork(partial(boot, flight_elf, tmp_path, bad)).wrong == []
+
+
+def test_an_expectation_that_is_not_met_is_said(
+    in_flight: tuple[FlightRig, CardJournal], tmp_path: Path
+) -> None:
+    """A flight without a fault, judged as if the receiver, the IMU and the card had failed."""
+    from flight.faults.card import drops_are_counted
+    from flight.faults.receiver import all_lost
+    from flight.faults.rows import NONE
+    from flight.faults.run import run_fault
+    from flight.faults.sensors import stale
+    from simavr_bench import in_fork
+
+    for check in (drops_are_counted, all_lost, stale):
+        row = replace(NONE, check=check, events=("imu_lost",), engaged=False, fault_s=1.5, after_s=1.0)
+        wrong = in_fork(partial(run_fault, *in_flight, row, tmp_path)).wrong
+        assert wrong[:2] == ["the Mega drives", "no event imu_lost"]
+        assert len(wrong) >= 3

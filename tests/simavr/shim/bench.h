@@ -156,6 +156,7 @@ BENCH_API void bench_sd_stall(sd_card* s, uint64_t from_cycle, uint32_t cycles);
 BENCH_API void bench_sd_reject(sd_card* s, uint64_t from_cycle, uint32_t count, uint32_t token);
 BENCH_API void bench_sd_power_cut(sd_card* s);
 BENCH_API bool bench_sd_busy(const sd_card* s);
+BENCH_API void bench_sd_fail_reads(sd_card* s, bool fail);
 // Keeps every block that was programmed from now on, in the caller's memory; a power cut at any
 // instant of the run can be told from it. `ended` is UINT64_MAX while the card is busy with it;
 // what a cut spoiled carries the garbage. Records beyond `capacity` are counted, not kept.

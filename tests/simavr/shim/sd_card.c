@@ -125,6 +125,12 @@ static void continue_read(sd_card* s) {
     s->state = kCommand;
     return;
   }
+  if (s->reads_fail) {
+    sd_put(s, 0x04);  // its own error correction failed
+    s->read_waiting = false;
+    s->state = kCommand;
+    return;
+  }
   sd_put_block(s, s->memory + (uint64_t)s->block * 512, 512);
   s->counters.read++;
   s->block++;
@@ -231,6 +237,9 @@ void bench_sd_reject(sd_card* s, uint64_t from_cycle, uint32_t count, uint32_t t
 
 bool bench_sd_busy(const sd_card* s) {
   return s->busy;
+}
+void bench_sd_fail_reads(sd_card* s, bool fail) {
+  s->reads_fail = fail;
 }
 void bench_sd_journal(sd_card* s, sd_record* records, uint64_t capacity) {
   s->journal = records;

@@ -7,6 +7,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from simavr_bench.chip import Chip, cycles
 
 SEQUENCED = struct.Struct("<4BIH12hH")  # packet `imu` of protocol/frames.toml
 SEQUENCED_KIND = 0xA6
+RESTARTED = 0x20  # bit of imu_flags
 SEQUENCED_ADDRESS, FIRST_ADDRESS, SECOND_ADDRESS = 43, 42, 27
 
 
@@ -73,8 +75,9 @@ class ArduImu:
     ----------
     silent : bool
         Sends nothing.
-    flip_fraction, short_fraction, repeat_fraction : float
-        Part of the packets with one flipped bit, cut short, or with the previous sequence number.
+    flip_fraction, short_fraction, repeat_fraction, twice_fraction : float
+        Part of the packets with one flipped bit, cut short, with the previous sequence number, or
+        sent twice.
     flags, aux_kind, aux : int, int, tuple
         Fields of the sequenced packet.
     aux_source : callable or None
@@ -95,6 +98,7 @@ class ArduImu:
     flip_fraction: float = 0.0
     short_fraction: float = 0.0
     repeat_fraction: float = 0.0
+    twice_fraction: float = 0.0
     flags: int = 0
     aux_kind: int = 0
     aux: tuple[int, int, int] = (0, 0, 0)
@@ -102,6 +106,8 @@ class ArduImu:
     sent: list[SentSample] = field(default_factory=list)
     _rng: np.random.Generator = field(init=False)
     _number: int = 0
+    _first: int = 0
+    _run: int = 0
     _start: int = 0
     _dies: MasterDeath = MasterDeath.LIVES
     _dies_after: int = 0
@@ -110,10 +116,13 @@ class ArduImu:
         """Seed the faults."""
         self._rng = np.random.default_rng(self.seed)
 
-    def start(self, *, at_cycle: int | None = None) -> ArduImu:
-        """Sample from a cycle on (now by default); gives itself."""
+    def start(self, *, at_cycle: int | None = None, number: int = 0) -> ArduImu:
+        """Sample from a cycle on (now by default), the first with a number; gives itself."""
         self._start = self.chip.cycle if at_cycle is None else at_cycle
-        self.chip.at(self._start, self._sample)
+        self._number = 0
+        self._first = number
+        self._run += 1
+        self.chip.at(self._start, partial(self._sample, self._run))
         return self
 
     def die(self, how: MasterDeath, *, after_bytes: int) -> None:
@@ -125,22 +134,43 @@ class ArduImu:
         self.chip.twi_hold(sda=False, scl=False)
         self.silent = False
 
+    def restart(self, off_s: float) -> None:
+        """Reset it: silent for a time, then counting from 0 with the flag `restarted` for 1 s."""
+        self.silent = True
+        begin = self.chip.cycle + cycles(off_s)
+
+        def boot() -> None:
+            self.silent = False
+            self.flags |= RESTARTED
+            self.start()
+
+        self.chip.at(begin, boot)
+        self.chip.at(begin + cycles(1.0), self._settled)
+
+    def _settled(self) -> None:
+        self.flags &= ~RESTARTED
+
     def _period(self) -> float:
         return 16e6 / (self.rate_hz * (1 + self.clock_ppm * 1e-6))
 
-    def _sample(self) -> None:
+    def _sample(self, run: int) -> None:
+        if run != self._run:
+            return  # it was started anew
         now = self.chip.cycle
         self._number += 1
-        self.chip.at(self._start + round(self._number * self._period()), self._sample)
+        due = self._start + round(self._number * self._period())
+        self.chip.at(due, partial(self._sample, run))
         if self.silent:
             return
         sample = self.source(now / 16e6)
-        sequence = (self._number - 1) & 0xFF
+        sequence = (self._first + self._number - 1) & 0xFF
         if self.repeat_fraction and self._rng.random() < self.repeat_fraction:
             sequence = (sequence - 1) & 0xFF
         packets = (
             self._original(sample) if self.original else self._sequenced(sequence, now, sample)
         )
+        if self.twice_fraction and self._rng.random() < self.twice_fraction:
+            packets = [*packets, *packets]
         numbers, spoilt = [], False
         at = now + cycles(self.delay_us * 1e-6)
         for address, data in packets:

@@ -142,6 +142,7 @@ _SIGNATURES: dict[str, tuple[object, tuple[object, ...]]] = {
     "sd_reject": (None, (_u64, _u32, _u32)),
     "sd_power_cut": (None, ()),
     "sd_busy": (_bool, ()),
+    "sd_fail_reads": (None, (_bool,)),
     "sd_journal": (None, (_ptr, _u64)),
     "sd_journal_count": (_u64, ()),
     "sd_counters": (None, (ct.POINTER(SdCounters),)),

@@ -134,6 +134,10 @@ class SdCard:
         """Answer the next blocks after a cycle with an error token."""
         self._lib.bench_sd_reject(self._card, at_cycle, count, token)
 
+    def fail_reads(self, fail: bool = True) -> None:
+        """Answer reads of blocks with an error token: its own error correction failed."""
+        self._lib.bench_sd_fail_reads(self._card, fail)
+
     @property
     def busy(self) -> bool:
         """Whether it is programming now."""

@@ -1,0 +1,1 @@
+"""The faults an aircraft may meet, injected into the flight image in flight."""
