@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench study flight-bench faults power-cuts clean
+.PHONY: help setup demo test native mega sitl lint format bench study flight-bench imu-bench faults power-cuts clean
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # mkfs.vfat and fsck.vfat live where only root looks.
@@ -46,9 +46,14 @@ study: setup ## tables and pictures of identification in build/study (SIZE=full:
 
 flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
 	@cd tests/simavr && ../../$(PYTHON) -m flight.bench $(BENCH)
+	@cd tests/simavr && ../../$(PYTHON) -m imu.bench --minutes 1
+
+imu-bench: setup ## the IMU's image and the Mega's on one bus for ten minutes, sample by sample
+	@cd tests/simavr && ../../$(PYTHON) -m imu.bench $(IMU_BENCH)
 
 faults: setup ## faults in flight on the simulated chip
 	@cd tests/simavr && ../../$(PYTHON) -m flight.faults $(FAULTS)
+	@cd tests/simavr && ../../$(PYTHON) -m imu.faults
 
 power-cuts: setup ## power cuts in flight, of metadata, and the next boot (minutes)
 	@cd tests/simavr && ../../$(PYTHON) -m flight.power_cuts $(CUTS)

@@ -88,7 +88,8 @@ struct twi_bus;
 BENCH_API struct twi_bus* bench_bus(chip* master, chip* slave, double rate);
 BENCH_API void bench_bus_hold(
     struct twi_bus* b, bool sda_low, bool scl_low, bool sda_high, bool scl_high);
-BENCH_API void bench_bus_hang(struct twi_bus* b, uint32_t clocks);  // SDA low for so many of SCL
+BENCH_API void bench_bus_hang(struct twi_bus* b, uint32_t clocks);     // SDA low for so many of SCL
+BENCH_API void bench_bus_listen(struct twi_bus* b, uint32_t address);  // acknowledges everything
 BENCH_API void bench_bus_log_bytes(struct twi_bus* b, bool on);
 BENCH_API void bench_bus_stretch(struct twi_bus* b, double cycles);  // SCL held after every byte
 BENCH_API double bench_bus_time(const struct twi_bus* b, const chip* c, uint64_t cycle);

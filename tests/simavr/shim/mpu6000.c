@@ -159,13 +159,13 @@ static void remember(mpu* m, uint64_t cycle) {
 
 static void output(mpu* m, uint64_t now) {
   if (m->fault != kStuck) convert(m, now);
-  remember(m, now);
   if (m->selected)
     m->output_waits = true;
   else
     publish(m);
   m->registers[kIntStatus] |= 0x01;
   if (!(m->registers[kIntEnable] & 0x01)) return;
+  remember(m, now);
   line(m, true);
   if (!(m->registers[kIntPinCfg] & 0x20)) event_at(m->c, &m->pulse_end, now + kPulseCycles);
 }

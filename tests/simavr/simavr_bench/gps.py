@@ -51,6 +51,8 @@ class GpsUart:
         GPS time of the next epoch; ``itow_ms`` advances by itself and wraps with the week.
     silent, garbage : bool
         Sends nothing; sends random-looking bytes instead.
+    deaf : bool
+        Hears nothing: its receive line belongs to another board.
     epochs : list of tuple(int, int)
         Cycle of the first byte and ``itow_ms`` of each epoch sent.
     configured : list of tuple(int, int)
@@ -71,6 +73,7 @@ class GpsUart:
     itow_ms: int = 345_600_000
     silent: bool = False
     garbage: bool = False
+    deaf: bool = False
     epochs: list[tuple[int, int]] = field(default_factory=list)
     configured: list[tuple[int, int]] = field(default_factory=list)
     enabled: set[tuple[int, int]] = field(default_factory=set)
@@ -140,6 +143,8 @@ class GpsUart:
         return 16e6 / (divider * (8 if control[0] & 2 else 16))
 
     def _byte(self, byte: int, cycle: int) -> None:
+        if self.deaf:
+            return
         wrong = abs(self._hears_baud() / self.baud - 1.0) > 0.04
         self._heard.append(byte ^ 0xA5 if wrong else byte)
         while len(self._heard) >= 2 and self._heard[:2] != b"\xb5\x62":

@@ -78,6 +78,11 @@ class I2cBus:
         """Hold SCL for a time after every byte behind the address."""
         self._lib.bench_bus_stretch(self.handle, time_s * 16e6)
 
+    def listen(self, *addresses: int) -> None:
+        """Acknowledge everything sent to these addresses, as a slave that is not modelled."""
+        for address in addresses:
+            self._lib.bench_bus_listen(self.handle, address)
+
     def log_bytes(self, on: bool = True) -> None:
         """Record every byte written, for :meth:`writes`."""
         self._lib.bench_bus_log_bytes(self.handle, on)

@@ -122,7 +122,7 @@ class Mpu6000:
         return int(self._lib.bench_mpu_registers(self._mpu)[number])
 
     def samples(self) -> Samples:
-        """Every sample so far.
+        """Every sample so far that was told by the data-ready line.
 
         Returns
         -------

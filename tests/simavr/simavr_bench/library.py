@@ -122,6 +122,7 @@ _SIGNATURES: dict[str, tuple[object, tuple[object, ...]]] = {
     "bus_hang": (None, (_u32,)),
     "bus_stretch": (None, (_f64,)),
     "bus_log_bytes": (None, (_bool,)),
+    "bus_listen": (None, (_u32,)),
     "bus_time": (_f64, (_ptr, _u64)),
     "mpu_spi": (_ptr, (_u32, _u32, _u32)),
     "mpu_i2c": (_ptr, (_ptr, _u32, _u32)),
