@@ -114,7 +114,7 @@ void __vector_imu_bus_event(void) {
 
 // The bus waits (SCL low) from the flag to the write of TWINT, so no byte is lost, only slowed. A
 // byte of a packet, 36 times of 38, is stored here in 60 cycles; the compiler's way took 119. As
-// in NESTING_ISR the own enable bit goes off first, then interrupts on.
+// interrupts.h says, the own enable bit goes off first, then interrupts on.
 ISR(TWI_vect, ISR_NAKED) {
   __asm__ __volatile__(
       "push r24 \n\t"
