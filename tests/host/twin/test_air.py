@@ -55,6 +55,9 @@ def test_gusts_have_the_intensity_and_spectrum_asked_for() -> None:
     # A first-order spectrum of the same intensity would be off by a factor of 3 at its upper end.
     upper = f[band] > 2.0
     assert np.exp(np.mean(np.log(ratio[upper]))) == pytest.approx(1.0, abs=0.12)
+    first_order = 2 * 0.4**2 * 2 * tau / (1 + 4 * x)
+    wrong = (power[band] / first_order)[upper]
+    assert np.exp(np.mean(np.log(wrong))) != pytest.approx(1.0, abs=0.12)
 
 
 def test_rotary_gusts_are_the_slopes_of_the_linear_ones() -> None:

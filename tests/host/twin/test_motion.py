@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from host.twin import aircraft
+from host.twin.aircraft import Aircraft
 from host.twin.airframe import GRAVITY_MPS2, ROTOR, STATE_COUNT, Airframe, Array
 from host.twin.attitude import euler, quaternion, to_body
 from host.twin.dimensional import hand_matrices
@@ -56,6 +58,9 @@ def test_tumbling_body_keeps_energy_and_both_momenta() -> None:
     assert np.ptp(angular, axis=0).max() < 1e-8
     assert np.ptp(linear, axis=0).max() < 1e-7
     assert np.ptp(energy) < 1e-9 * energy[0] * 100
+    # Without the rotor's spin the angular momentum is not kept.
+    body_alone = np.einsum("nij,nj->ni", to_ned, omega @ tensor)
+    assert np.ptp(body_alone, axis=0).max() > 1e-3
 
 
 def test_wrong_sign_of_the_product_of_inertia_would_be_seen() -> None:
@@ -72,6 +77,8 @@ def test_thrown_body_follows_a_parabola_and_feels_nothing() -> None:
     start = to_body(states[0, 6:10]).T @ states[0, :3]
     expected = start[:, None] * t + np.array([[0.0], [0.0], [0.5 * GRAVITY_MPS2]]) * t**2
     assert np.abs(states[:, 10:13].T - expected).max() < 1e-7
+    # A gravity wrong by a millionth would be seen.
+    assert np.abs(1e-6 * 0.5 * GRAVITY_MPS2 * t**2).max() > 1e-5
     assert np.abs(forces[:, :3]).max() == 0.0
 
 
@@ -83,6 +90,8 @@ def test_axisymmetric_body_precesses_at_the_analytic_rate() -> None:
     turned = (2.0 - 4.0j) * np.exp(-1j * rate * t)
     assert np.abs(states[:, 3] - 3.0).max() < 1e-10
     assert np.abs(states[:, 4] + 1j * states[:, 5] - turned).max() < 1e-7
+    off = (2.0 - 4.0j) * np.exp(-1.001j * rate * t)
+    assert np.abs(states[:, 4] + 1j * states[:, 5] - off).max() > 1e-3
 
 
 def test_step_halving_shows_fourth_order() -> None:
@@ -107,6 +116,10 @@ def test_trim_leaves_nothing_and_agrees_with_the_published_table(airspeed_mps: f
     assert trim.residual < 1e-9
     states, forces = run(frame, trim.state, np.tile(trim.command, (2000, 1)), STILL, 1.225, 1e-3)
     assert np.abs(states[-1, :6] - trim.state[:6]).max() < 1e-8
+    untrimmed = np.tile(trim.command, (2000, 1))
+    untrimmed[:, 0] += 1e-5
+    off, _ = run(frame, trim.state, untrimmed, STILL, 1.225, 1e-3)
+    assert np.abs(off[-1, :6] - trim.state[:6]).max() > 1e-6
     assert np.linalg.norm(forces[0, :3]) == pytest.approx(GRAVITY_MPS2, abs=1e-9)
     # The published table has no thrust; its lift and its nose-down moment shift both.
     published = {14.0: (0.145447, -0.187855), 16.0: (0.110666, -0.141179),
@@ -125,6 +138,8 @@ def test_glide_is_the_drag_over_lift_angle() -> None:
     )
     area = frame.stopped_drag_area_m2 / frame.wing_area_m2
     assert math.tan(-trim.climb_rad) == pytest.approx((drag + area) / lift, rel=0.02)
+    # Without the stopped propeller's drag it would be flatter.
+    assert math.tan(-trim.climb_rad) != pytest.approx(drag / lift, rel=0.02)
 
 
 def test_trim_says_when_there_is_none() -> None:
@@ -141,26 +156,37 @@ def test_linearisation_agrees_with_the_formulas_within_one_percent(name: str) ->
         airspeed_mps += 0.5  # off the kink of its table
     trim = solve(frame, airspeed_mps)
     theta = float(euler(trim.state[6:10])[1])
-    by_hand = hand_matrices(
-        plane,
-        airspeed_mps=airspeed_mps,
-        alpha_rad=trim.alpha_rad,
-        theta_rad=theta,
-        elevator_rad=float(trim.command[0]),
-        rotor_radps=float(trim.state[ROTOR]),
-    )
     linear = linearise(frame, trim)
-    pairs = zip(
-        by_hand,
-        (linear.longitudinal_a, linear.longitudinal_b, linear.lateral_a, linear.lateral_b),
-        strict=True,
-    )
-    worst = 0.0
-    for hand, numeric in pairs:
-        zero = np.abs(hand) < 1e-9
-        worst = max(worst, float(np.max(np.abs(numeric[~zero] / hand[~zero] - 1.0))))
-        assert np.abs(numeric[zero]).max(initial=0.0) < 1e-3
-    assert worst < 0.01
+
+    def worst(changed: Aircraft) -> float:
+        by_hand = hand_matrices(
+            changed,
+            airspeed_mps=airspeed_mps,
+            alpha_rad=trim.alpha_rad,
+            theta_rad=theta,
+            elevator_rad=float(trim.command[0]),
+            rotor_radps=float(trim.state[ROTOR]),
+        )
+        pairs = zip(
+            by_hand,
+            (linear.longitudinal_a, linear.longitudinal_b, linear.lateral_a, linear.lateral_b),
+            strict=True,
+        )
+        found = 0.0
+        for hand, numeric in pairs:
+            zero = np.abs(hand) < 1e-9
+            found = max(found, float(np.max(np.abs(numeric[~zero] / hand[~zero] - 1.0))))
+            assert np.abs(numeric[zero]).max(initial=0.0) < 1e-3
+        return found
+
+    assert worst(plane) < 0.01
+    # A derivative 2 % off breaks the bound.
+    for key in ("cm_q", "cn_beta", "croll_aileron"):
+        vectors = {
+            **plane.vectors,
+            f"aerodynamics.{key}": 1.02 * plane.vector(f"aerodynamics.{key}"),
+        }
+        assert worst(replace(plane, vectors=vectors)) > 0.01, key
 
 
 def test_modes_of_the_ultra_stick_are_those_of_a_trainer() -> None:
