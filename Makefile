@@ -12,9 +12,8 @@ help: ## list the targets
 setup: ## put everything needed into .venv and this clone
 	@.ci/setup.sh
 
-demo: ## fly two scripted minutes and a virtual aircraft; decode, compare, identify
+demo: ## fly a virtual flight test through the recorder; compare, decode, identify, draw
 	@.ci/setup.sh demo
-	@$(PYTHON) tests/sitl/demo.py
 	@$(PYTHON) tests/sitl/virtual_demo.py
 
 test: setup ## run every test (STAGES="lint native" runs some)

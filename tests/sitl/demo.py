@@ -1,8 +1,8 @@
-"""`make demo`: fly two scripted minutes, take the log out of the card, decode it, compare.
+"""Fly two scripted minutes, take the log out of the card, decode it, compare.
 
 All of it is simulated on this computer; nothing here was measured on a board or in flight.
-Results stay in build/demo. Exit codes: 0 every channel agrees with the script, 6 one does not or
-a step failed.
+Results stay in build/scripted. Exit codes: 0 every channel agrees with the script, 6 one does not
+or a step failed.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from tests.sitl.instrument import TICKS_PER_S, Recorder, Sitl
 from tests.sitl.script import Script, script
 
 ROOT = Path(__file__).resolve().parents[2]
-DEMO = ROOT / "build" / "demo"
+DEMO = ROOT / "build" / "scripted"
 CLUSTER_BLOCKS = 8
 NAME = "FLT00001.BIN"
 START_S, IDLE_S, STOP_S, END_S = 2.0, 121.0, 122.0, 128.0
