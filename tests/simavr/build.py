@@ -23,9 +23,11 @@ C_FLAGS = [
     *("-isystem", "/usr/include/simavr"),
 ]
 AVR_FLAGS = [
-    *("-mmcu=atmega2560", "-DF_CPU=16000000UL", "-std=gnu11", "-Os", "-g"),
+    *("-DF_CPU=16000000UL", "-std=gnu11", "-Os", "-g"),
     *("-Wall", "-Wextra", "-Werror"),
 ]
+# Programs for another chip than the ATmega2560.
+PROGRAM_CHIPS = {"twi_master": "atmega328p"}
 
 
 class BuildError(RuntimeError):
@@ -79,7 +81,7 @@ def build_library() -> Path:
 
 
 def build_program(name: str) -> Path:
-    """Compile ``programs/<name>.c`` for the ATmega2560 when it is stale.
+    """Compile ``programs/<name>.c`` for its chip when it is stale.
 
     Parameters
     ----------
@@ -105,7 +107,9 @@ def build_program(name: str) -> Path:
     headers = list((HERE / "programs").glob("*.h"))
     if _stale(target, [source, *headers, Path(__file__)]):
         target.parent.mkdir(parents=True, exist_ok=True)
-        _run(["avr-gcc", *AVR_FLAGS, str(source), "-o", str(target)], f"compiling {source.name}")
+        chip = f"-mmcu={PROGRAM_CHIPS.get(name, 'atmega2560')}"
+        command = ["avr-gcc", chip, *AVR_FLAGS, str(source), "-o", str(target)]
+        _run(command, f"compiling {source.name}")
     return target
 
 

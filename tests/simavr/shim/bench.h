@@ -112,6 +112,7 @@ BENCH_API void bench_mpu_fault(mpu* m,
                                uint32_t fault);  // 0 none 1 silent 2 stuck 3 garbage 4 clock
 BENCH_API void bench_mpu_reset(mpu* m);          // by itself: asleep, registers at default
 // Values by point: ax ay az in g, degC, gx gy gz in deg/s, axes of the chip.
+BENCH_API void bench_mpu_write(mpu* m, uint32_t number, uint32_t value);
 BENCH_API void bench_mpu_motion(mpu* m, const double* cycles, const double* values, uint32_t count);
 BENCH_API size_t bench_mpu_count(const mpu* m);
 BENCH_API const mpu_sample* bench_mpu_samples(const mpu* m);

@@ -178,7 +178,7 @@ static void byte_done(twi_bus* b) {
   }
   note(b, ack ? kTwiAddressed : kTwiRefused, value);
   b->acked = 0;
-  b->phase = value & 1 ? kReceive : kTransmit;
+  b->phase = b->value & 1 ? kReceive : kTransmit;
   if (b->phase == kReceive)
     flag(b, ack ? 0x40 : 0x48);
   else

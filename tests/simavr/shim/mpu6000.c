@@ -94,9 +94,10 @@ static void filter(mpu* m, double now, double period) {
     const double delay = (i < 3 ? kAccelDelayMs[dlpf] : kDelayMs[dlpf]) * 16e3;
     double tau = 16e6 / (2 * M_PI * kBandHz[dlpf]);
     if (tau > delay) tau = delay;
-    const double in = motion(m, i, now - (delay - tau));
-    const double share = m->settled && tau > 0 ? 1 - exp(-period / tau) : 1.0;
-    m->filtered[i] += share * (in - m->filtered[i]);
+    const double share = tau > 0 ? 1 - exp(-period / tau) : 1.0;
+    const double lag = period * (1 / share - 1);  // of the pole, sampled
+    const double in = motion(m, i, now - (delay - lag));
+    m->filtered[i] += (m->settled ? share : 1.0) * (in - m->filtered[i]);
   }
   m->settled = true;
 }
@@ -329,6 +330,11 @@ void bench_mpu_set(mpu* m, const mpu_settings* settings) {
 void bench_mpu_fault(mpu* m, uint32_t fault) {
   m->fault = (uint8_t)fault;
   m->on_bus.present = fault != kSilent;
+}
+
+void bench_mpu_write(mpu* m, uint32_t number, uint32_t value) {
+  m->reset_until = 0;
+  write_register(m, (uint8_t)number, (uint8_t)value);
 }
 
 void bench_mpu_reset(mpu* m) {

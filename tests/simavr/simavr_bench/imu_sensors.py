@@ -121,6 +121,10 @@ class Mpu6000:
         """Give the value of a register, without the effects of reading it."""
         return int(self._lib.bench_mpu_registers(self._mpu)[number])
 
+    def poke(self, number: int, value: int) -> None:
+        """Write a register as a program would."""
+        self._lib.bench_mpu_write(self._mpu, number, value)
+
     def samples(self) -> Samples:
         """Every sample so far that was told by the data-ready line.
 

@@ -129,6 +129,7 @@ _SIGNATURES: dict[str, tuple[object, tuple[object, ...]]] = {
     "mpu_set": (None, (ct.POINTER(MpuSettings),)),
     "mpu_fault": (None, (_u32,)),
     "mpu_reset": (None, ()),
+    "mpu_write": (None, (_u32, _u32)),
     "mpu_motion": (None, (_doubles, _doubles, _u32)),
     "mpu_count": (ct.c_size_t, ()),
     "mpu_samples": (_ptr, ()),
