@@ -7,8 +7,8 @@ namespace mega {
 
 void start_clock();
 
-// Set by what the main loop has to look at: the millisecond, a packet of the IMU. Other interrupts
-// (10 000 a second) let it sleep on.
+// Set by what the main loop has to look at: the millisecond, a scan's end that a packet waits for.
+// Other interrupts (10 000 a second) let it sleep on.
 extern volatile bool g_awake;
 
 // A packet of the IMU that started no scan was taken since the last one began: it may wait for that

@@ -79,7 +79,8 @@ void end_packet() {
     imu_bus_room = 0;
     g_filling = kNone;
     start_scan_of(filling);
-    mega::g_awake = true;
+    // Stamped, and its scan begun: it may wait for the next millisecond. A turn of the main loop of
+    // its own, 200 times a second, was 1.6 % of the chip.
     const mega::InterruptsOff guard;
     ++g_full;
   }
