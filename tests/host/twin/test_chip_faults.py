@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from host.errors import UsageError
 from host.log import read_log
-from host.twin import avr, cards, sitl
+from host.twin import avr, cards, compare, sitl
 from host.twin.airdata import air_data
 from host.twin.flight import fly
 from host.twin.stimuli import stimuli
@@ -51,6 +51,9 @@ def test_faults_tell_the_same_story_on_the_chip(library: Path, image: Path, tmp_
         path = tmp_path / "flight.bin"
         path.write_bytes(recording.log)
         log = read_log(path)
+        # The chip's clock begins with its program, the library's with the power.
+        late_s = compare.clock_began_s(record, given.imu, log.frames["ident"])
+        assert abs(late_s) < 1e-4 if recorder is sitl.record else 1e-3 < late_s < 0.02
         assert [session.number for session in log.sessions] == [1, 2]
         event, system, ident = (log.frames[name] for name in ("event", "system", "ident"))
         told.append(Counter(code for code in event["code"].tolist() if code != STORM))

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from host.twin.flight import FlightRecord
 from host.twin.ideal import true_table
+from host.twin.imu import Imu
 from host.twin.mega_clock import clock_share
 
 # Column: largest mean error and largest standard deviation of the error in flight, at 10 to 20 m/s
@@ -49,7 +51,35 @@ class Deviation:
         return abs(self.mean) <= self.mean_limit and self.spread <= self.spread_limit
 
 
-def true_times(record: FlightRecord, table: pd.DataFrame, first_row_us: int) -> pd.Series:
+def clock_began_s(record: FlightRecord, samples: Imu, ident: NDArray[np.void]) -> float:
+    """Return the true time at which the recorder's clock stood at 0, by its first IMU samples.
+
+    On a chip that is when its program starts, some milliseconds after power-on.
+
+    Parameters
+    ----------
+    record : FlightRecord
+    samples : Imu
+        What was sent, and when it was taken.
+    ident : structured array
+        Identification frames of the log.
+    """
+    names = ("p", "q", "r", "ax", "ay", "az", "phi", "theta", "psi")
+    sent = {row.tobytes(): t for row, t in zip(samples.raw, samples.t_s.tolist(), strict=True)}
+    first = ident[:200]
+    rows = np.column_stack([first[name] for name in names])
+    taken_us = first["t_us"].astype(float) - 4.0 * first["imu_age"]
+    found = [
+        sent[row.tobytes()] - at_us * 1e-6 / (1.0 + clock_share(record))
+        for row, at_us in zip(rows, taken_us.tolist(), strict=True)
+        if row.tobytes() in sent
+    ]
+    return float(np.median(found)) if found else 0.0
+
+
+def true_times(
+    record: FlightRecord, table: pd.DataFrame, first_row_us: int, began_s: float = 0.0
+) -> pd.Series:
     """Return the true time since power-on of each row of a decoded table.
 
     Parameters
@@ -59,11 +89,13 @@ def true_times(record: FlightRecord, table: pd.DataFrame, first_row_us: int) -> 
         With ``t_s`` from its first row, corrected by GPS.
     first_row_us : int
         The recorder's clock at the first row.
+    began_s : float
+        When that clock stood at 0.
     """
     for fault in record.card.faults:
         if fault.kind == "clock_wrap":  # the clock did not begin at 0
             first_row_us = (first_row_us + round(fault.at_s * 1e6)) % (1 << 32)
-    start_s = first_row_us * 1e-6 / (1.0 + clock_share(record))
+    start_s = began_s + first_row_us * 1e-6 / (1.0 + clock_share(record))
     return pd.Series(table["t_s"].to_numpy() - table["t_s"].iloc[0] + start_s)
 
 

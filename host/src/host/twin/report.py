@@ -15,6 +15,7 @@ from host.twin.aircraft import Aircraft
 from host.twin.airdata import AirData, air_data
 from host.twin.cards import Card, Segment
 from host.twin.flight import FlightRecord, fly
+from host.twin.imu import Imu
 from host.twin.instrument import calibration
 
 FIRMWARES = ("sitl", "avr", "none", "thesis")
@@ -145,10 +146,12 @@ def simulate(
         outcome.files += files
     else:
         recorder = sitl.record if firmware == "sitl" else avr.record
-        path = _recorded(outcome, folder, recorder, progress)
+        given = stimuli.stimuli(record, data)
+        path = _recorded(outcome, given, folder, recorder, progress)
         clock.mark("record")
         if path is not None:
-            outcome.table = _decoded(outcome, path, folder)
+            chip = given.imu if firmware == "avr" else None
+            outcome.table = _decoded(outcome, path, folder, chip)
     clock.mark("decode" if outcome.recording else firmware)
     outcome.files += truth.write(record, data, stem, first_row_s=outcome.first_row_s)
     clock.mark("truth")
@@ -176,11 +179,14 @@ def simulate(
 
 
 def _recorded(
-    outcome: Outcome, folder: Path, recorder: Callable[..., sitl.Recording], progress: Progress
+    outcome: Outcome,
+    given: stimuli.Stimuli,
+    folder: Path,
+    recorder: Callable[..., sitl.Recording],
+    progress: Progress,
 ) -> Path | None:
     """Record with the firmware; write flight.bin, if there is one."""
     record = outcome.record
-    given = stimuli.stimuli(record, outcome.data)
     outcome.recording = recorder(
         given,
         rate_hz=sitl.recorder_rate_hz(record.card.flight.rate_hz),
@@ -198,12 +204,16 @@ def _recorded(
     return path
 
 
-def _decoded(outcome: Outcome, path: Path, folder: Path) -> pd.DataFrame:
-    """Decode the log as its owner would, and put its rows on true time for the picture."""
+def _decoded(outcome: Outcome, path: Path, folder: Path, chip: Imu | None) -> pd.DataFrame:
+    """Decode the log as its owner would, and put its rows on true time for the picture.
+
+    `chip` are the IMU's samples where the recorder's clock begins later than the flight.
+    """
     log = read_log(path, calibration=folder / "calibration.toml")
     table = log.table()
-    first_us = int(log.frames["ident"]["t_us"][0])
-    table["t_s"] = compare.true_times(outcome.record, table, first_us)
+    ident = log.frames["ident"]
+    began_s = compare.clock_began_s(outcome.record, chip, ident) if chip else 0.0
+    table["t_s"] = compare.true_times(outcome.record, table, int(ident["t_us"][0]), began_s)
     outcome.deviations = compare.deviations(outcome.record, table, table["t_s"])
     outcome.first_row_s = float(table["t_s"].iloc[0])
     return table
