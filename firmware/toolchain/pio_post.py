@@ -19,6 +19,7 @@ root = Path(env.subst("$PROJECT_DIR"))
 # pio_pre.py has put this folder on the path; SCons takes it off before it builds.
 fatfs = importlib.import_module("fatfs")
 ram_table = importlib.import_module("ram_table")
+stack_depth = importlib.import_module("stack_depth")
 
 # PlatformIO's own compilers (GCC 7.3 for the AVR) were never seen here: a warning of theirs
 # must not keep a user from building.
@@ -38,13 +39,30 @@ env.Append(LIBS=archives)
 
 def show_ram(target: Any, source: Any, env: Any) -> int:
     """Print the table of RAM after linking; a stack that is too small fails the build."""
+    elf = Path(str(target[0]))
     enough = ram_table.print_table(
-        Path(str(target[0])),
+        elf,
         ram_bytes=int(env.BoardConfig().get("upload.maximum_ram_size")),
         stack_bytes=int(env.GetProjectOption("custom_stack_bytes")),
         environment=env["ENV"],
     )
-    return 0 if enough else 1
+    return 0 if show_stack(elf, env) and enough else 1
+
+
+def show_stack(elf: Path, env: Any) -> bool:
+    """Print the deepest stack; False if it does not fit."""
+    where = {"chip": env.BoardConfig().get("build.mcu"), "environment": env["ENV"]}
+    try:
+        deepest = stack_depth.analyse(elf, **where).total_bytes
+        room = stack_depth.room_bytes(elf, **where)
+    except stack_depth.ImageError as error:
+        # CI refuses such an image; a compiler never seen here must not keep a user from building.
+        print(f"the deepest stack is not known: {error}")
+        return True
+    print(f"{deepest:>7} B  of them the stack takes at most")
+    if deepest > room:
+        print(f"found a stack of up to {deepest} B, expected at most {room} B")
+    return bool(deepest <= room)
 
 
 if env.GetProjectOption("custom_stack_bytes", ""):

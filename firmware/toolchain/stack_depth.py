@@ -13,9 +13,11 @@ from __future__ import annotations
 
 import argparse
 import functools
+import os
 import re
 import sys
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -326,7 +328,11 @@ class StackAnalysis:
 
 
 def analyse(
-    elf: Path, *, chip: str = "atmega2560", indirect: dict[str, list[str]] | None = None
+    elf: Path,
+    *,
+    chip: str = "atmega2560",
+    indirect: dict[str, list[str]] | None = None,
+    environment: Mapping[str, str] = os.environ,
 ) -> StackDepth:
     """Compute what the stack of an image may need.
 
@@ -338,6 +344,8 @@ def analyse(
         One of CHIPS.
     indirect : dict, optional
         What calls through pointers may reach; by default the file beside this module.
+    environment : mapping
+        Variables for the tools of the compiler.
 
     Raises
     ------
@@ -345,7 +353,8 @@ def analyse(
         What makes a bound impossible, with the place.
     """
     known = read_indirect_calls() if indirect is None else indirect
-    return StackAnalysis(Program(elf), chip=CHIPS[chip], indirect=known).of_image()
+    program = Program(elf, environment=environment)
+    return StackAnalysis(program, chip=CHIPS[chip], indirect=known).of_image()
 
 
 def read_indirect_calls(path: Path = INDIRECT_CALLS) -> dict[str, list[str]]:
@@ -354,9 +363,11 @@ def read_indirect_calls(path: Path = INDIRECT_CALLS) -> dict[str, list[str]]:
     return {row["caller"]: list(row["callees"]) for row in table["call"]}
 
 
-def room_bytes(elf: Path, *, chip: str = "atmega2560") -> int:
+def room_bytes(
+    elf: Path, *, chip: str = "atmega2560", environment: Mapping[str, str] = os.environ
+) -> int:
     """Bytes between the last variable and the end of RAM."""
-    rows = run(["avr-nm", str(elf)]).splitlines()
+    rows = run(["avr-nm", str(elf)], environment).splitlines()
     end = next(int(row.split()[0], 16) for row in rows if row.endswith(" _end"))
     return CHIPS[chip].ram_end - (end & 0xFFFF)
 
