@@ -186,10 +186,13 @@ TwiStatus poll_transfer() {
 
 TwiStatus transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size) {
   while (poll_transfer() == TwiStatus::kBusy) {
+    sleep_until_interrupt();
   }
   begin_transfer(address, buffer, out_size, in_size);
   while (poll_transfer() == TwiStatus::kBusy) {
+    sleep_until_interrupt();
   }
+  g_awake = true;  // something for the main loop may have ended these sleeps
   return poll_transfer();
 }
 
