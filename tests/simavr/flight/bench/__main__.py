@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+from disassembly import ImageError
 from flight.bench.fly import FlightError, fly
 from flight.bench.plan import STALL_S
 from flight.bench.report import flight_rows, image_rows
@@ -15,7 +17,7 @@ from flight.rig import build_flight_image
 
 
 def main() -> int:
-    """Print the tables; 0 if every limit holds, else 6."""
+    """Print the tables; 0 if every limit holds, 6 if one does not, 1 if nothing was measured."""
     parser = argparse.ArgumentParser(
         prog="flight.bench",
         description="Measure the flight image on the simulated chip (simulation only).",
@@ -27,6 +29,8 @@ def main() -> int:
     asked = parser.parse_args()
     if asked.minutes < 0.5:
         parser.error(f"--minutes {asked.minutes:g}: at least 0.5, eight receivers share them")
+    if asked.elf is not None and not asked.elf.is_file():
+        parser.error(f"{asked.elf}: no such file; `pio run` makes .pio/build/mega2560/firmware.elf")
     table = Table()
     try:
         elf = asked.elf or build_flight_image()
@@ -41,9 +45,12 @@ def main() -> int:
                     seed=asked.seed,
                 )
                 flight_rows(table, flight, depth, room_bytes)
-    except (FlightError, RuntimeError) as error:
-        print(error, file=sys.stderr)
+    except (FlightError, ImageError) as error:
+        print(f"flight.bench: {error}", file=sys.stderr)
         return 6
+    except (OSError, RuntimeError, subprocess.CalledProcessError) as error:
+        print(f"flight.bench: {error}", file=sys.stderr)
+        return 1
     if table.missed:
         print(f"\nmissed: {', '.join(table.missed)}")
         return 6
