@@ -36,7 +36,11 @@ def main() -> int:
     )
     if flown != 0:
         return 6
-    if step("decoding its log as its owner would", "decode", log, "--calibration", calibration):
+    decoded = step(
+        "decoding its log as its owner would",
+        *("decode", log, "--calibration", calibration, "-o", str(OUT / "flight.csv")),
+    )
+    if decoded != 0:
         return 6
     identified = step(
         "identifying the aircraft from its log, beside the truth only the simulation knows",
