@@ -11,6 +11,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from host.sysid.fit import fit
+from host.sysid.flight_path import strapdown
 from host.sysid.gust import fit_with_gust
 from host.sysid.hopfield import iterate, iterate_until
 from host.sysid.maneuver import Maneuver
@@ -48,6 +49,8 @@ def build_kernels() -> None:
     W, b = -np.eye(2), np.ones(2)
     iterate(W, b, np.zeros(2), 0.1, 200.0, 3, 1e6)
     iterate_until(W, b, np.zeros(2), 0.1, 200.0, b, 0.5, 3)
+    path = np.zeros((3, 3))
+    strapdown(path, path, np.eye(3), np.zeros(3), 0.01)
     update(np.zeros(2), np.eye(2), np.ones((3, 2)), np.ones(3), 1.0)
 
 

@@ -36,7 +36,8 @@ USED = (
     "airspeed_mps", "alpha_rad", "beta_rad", "p_radps", "q_radps", "r_radps",
     "ax_mps2", "ay_mps2", "az_mps2", "phi_rad", "theta_rad", "psi_rad",
     "elevator_rad", "aileron_rad", "rudder_rad", "throttle",
-    "qbar_pa", "static_pa", "density_kgpm3",
+    "qbar_pa", "static_pa", "density_kgpm3", "altitude_m",
+    "v_north_mps", "v_east_mps", "v_down_mps",
 )  # fmt: skip
 WANTED = frozenset(("t_s", *USED))
 LONGEST_GAP_S = 0.25

@@ -105,6 +105,7 @@ def run(args: argparse.Namespace) -> int:
         if not args.aircraft:
             raise IdentificationError("--prior compares coefficients; they need --aircraft")
     windows = _windows(args, columns)
+    agreement = _agreement(columns, args.aircraft, airframe, notes)
     answers: list[Answer] = []
     direct = (
         _direct(args, columns, windows, notes) if "coefficients" in (args.model or ()) else None
@@ -141,6 +142,7 @@ def run(args: argparse.Namespace) -> int:
                 {
                     "source": str(args.source),
                     "notes": notes,
+                    "data_compatibility": agreement[1],
                     "answers": documents,
                 },
                 indent=2,
@@ -158,6 +160,8 @@ def run(args: argparse.Namespace) -> int:
             lines += ["", *model_lines(answer)]
     if direct:
         lines += ["", *coefficient_lines(direct)]
+    if agreement[0]:
+        lines += ["", *agreement[0]]
     if prior is not None:
         from host.sysid.prior import prior_lines
 
@@ -182,6 +186,23 @@ def _models(names: list[str] | None) -> list[tuple[str, Any]]:
         else:
             result.append((name, None))
     return result
+
+
+def _agreement(
+    columns: dict[str, Any], aircraft: str | None, airframe: Any, notes: list[str]
+) -> tuple[list[str], dict[str, object] | None]:
+    """Return lines and document of the data's compatibility; a note where it cannot be told."""
+    from host.sysid.aircraft_file import instrument_data
+    from host.sysid.errors import IdentificationError
+    from host.sysid.reconstruction import document, reconstruct, words
+
+    try:
+        instrument = instrument_data(aircraft) if aircraft else None
+        found = reconstruct(columns, airframe, instrument)
+    except IdentificationError as error:
+        notes.append(str(error))
+        return [], None
+    return words(found), document(found)
 
 
 def _direct(
