@@ -87,8 +87,7 @@ class Mpu6000 {
 
   // Starts the set-up again: the chip was silent, stuck or reset by itself.
   void restart(uint32_t now_us) {
-    go(false, Step::kReset, 0, now_us);
-    same_ = 0;
+    go(false, Step::kReset, 0, now_us);  // a converter that stood still must move first
   }
 
   bool running() const { return step_ == Step::kRun; }

@@ -235,6 +235,9 @@ TEST_CASE("silence, garbage and a stuck converter are not samples") {
   }
   CHECK_EQ(samples, 20);
   CHECK(mpu.read(sample) == MpuStatus::kStuck);
+  mpu.restart(now_us);
+  CHECK((start(mpu, now_us) || start(mpu, now_us)));
+  CHECK(mpu.read(sample) == MpuStatus::kStuck);  // set up again, and still the same bytes
   bus.put({1, 2, 8193, 4, 5, 6, 7});
   CHECK(mpu.read(sample) == MpuStatus::kSample);
   mpu.restart(now_us);

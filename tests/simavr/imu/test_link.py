@@ -20,7 +20,7 @@ CHOSEN = (
     "bus: SDA low",
     "bus: SCL high",
     "Mega absent (in reset)",
-    "Mega slow: 90 us a byte",
+    "Mega slow: 110 us a byte",
 )
 
 
