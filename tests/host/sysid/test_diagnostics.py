@@ -1,11 +1,14 @@
 """Figures of fit, refusals and modes against definitions and Monte Carlo."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from host.sysid import Maneuver, fit
 from host.sysid.diagnostics import (
     collinearity,
     constant_inputs,
+    exceedance,
     references,
     refusals,
     signal_fits,
@@ -16,7 +19,7 @@ from host.sysid.diagnostics import (
 from host.sysid.modes import modes, modes_of
 from host.sysid.study.aircraft import navion, navion_free, navion_structured
 from host.sysid.study.data import TRUTH, noisy
-from scipy import signal
+from scipy import signal, stats
 
 
 def test_figures_of_fit_equal_their_definitions() -> None:
@@ -58,6 +61,23 @@ def test_navion_is_answered_and_the_thesis_example_is_refused() -> None:
     named = {r.name for r in refusals(short, [still])}
     assert "X_alpha" in named
     assert "M_de" not in named
+
+
+def test_probability_of_exceeding_is_that_of_a_normal_value_over_its_bound() -> None:
+    """One parameter, far above its floor: P(|theta| < sigma) of a normal theta by its formula."""
+    result = fit("output-error", navion_structured(), [noisy(3, 0.01)])
+    k = result.index("Z_alpha")
+    for ratio in (0.7, 1.0, 1.6):
+        estimate, covariance = result.estimate.copy(), result.covariance.copy()
+        covariance[k, :] = covariance[:, k] = 0.0
+        covariance[k, k] = (estimate[k] / ratio) ** 2
+        single, any_of_them = exceedance(replace(result, covariance=covariance), [noisy(3, 0.01)])
+        # The prior pulls it a little: three times the whole state rate, here about its own size.
+        expected = stats.norm.cdf(1.0 - ratio) - stats.norm.cdf(-1.0 - ratio)
+        assert single[k] == pytest.approx(expected, abs=0.1)
+        assert any_of_them == pytest.approx(float(single[k]), abs=0.03)
+        named = {r.name for r in refusals(replace(result, covariance=covariance), [noisy(3, 0.01)])}
+        assert ("Z_alpha" in named) == (any_of_them > 0.5)
 
 
 def test_small_parameters_are_measured_by_what_would_matter() -> None:

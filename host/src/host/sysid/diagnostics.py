@@ -20,6 +20,10 @@ CORRELATED = 0.9
 CONDITION_LIMIT = 1e5  # of the scaled information: correlations beyond all digits of a sensor
 SMALL_SHARE = 0.05  # of the row's largest contribution: below it errors are relative to this share
 REFUSAL_LIMIT = 1.0  # standard error over the reference value: 100 %
+EVEN_ODDS = 0.5  # that some bound exceeds the limit: from here on a fit is refused
+SUSPECT = 0.2  # that a parameter is one of them: from here on it is named
+PRIOR_WIDTH = 3.0
+DRAWS, DRAW_SEED = 400, 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,23 +101,30 @@ def references(model: LinearModel, maneuvers: Sequence[Maneuver], theta: Array) 
     its row's largest, the value that would contribute 5 %. Of a tied parameter the row where it
     counts most decides. Regressors are taken about their mean: the trim tells nothing.
     """
-    spread = regressor_rms(model, maneuvers)
-    A, B, _, _ = model.matrices(theta)
-    wide = np.abs(np.hstack([A, B])) * spread
-    n = len(model.states)
-    result = np.abs(np.array(theta[: len(model.parameters)], dtype=np.float64))
-    for k, parameter in enumerate(model.parameters):
-        floors = []
-        for term in model.terms:
-            if term.parameter != parameter.name or term.matrix not in "AB":
-                continue
-            column = term.column + (n if term.matrix == "B" else 0)
-            scale = abs(term.gain) * spread[column]
-            if scale > 0.0:
-                floors.append(SMALL_SHARE * float(wide[term.row].max()) / scale)
-        if floors:
-            result[k] = max(result[k], min(floors))
-    return result
+    rows = _references(model, regressor_rms(model, maneuvers), np.asarray(theta)[None])
+    return np.asarray(rows[0])
+
+
+def _references(model: LinearModel, spread: Array, theta: Array) -> Array:
+    """Return references of many parameter vectors, (vectors, parameters)."""
+    n, count = len(model.states), len(model.parameters)
+    place = {p.name: k for k, p in enumerate(model.parameters)}
+    entries = [
+        (place[t.parameter], t.row, t.column + (n if t.matrix == "B" else 0), t.gain)
+        for t in model.terms
+        if t.matrix in "AB"
+    ]
+    wide = np.repeat(np.hstack([model.A, model.B])[None], len(theta), axis=0)
+    for k, row, column, gain in entries:
+        wide[:, row, column] += gain * theta[:, k]
+    largest = np.max(np.abs(wide) * spread, axis=2)
+    floor = np.full((len(theta), count), np.inf)
+    for k, row, column, gain in entries:
+        scale = abs(gain) * spread[column]
+        if scale > 0.0:
+            floor[:, k] = np.minimum(floor[:, k], SMALL_SHARE * largest[:, row] / scale)
+    result = np.abs(theta[:, :count])
+    return np.where(np.isfinite(floor), np.maximum(result, floor), result)
 
 
 def regressor_rms(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:
@@ -144,13 +155,13 @@ class Refusal:
     reason: str
 
 
-def plausible(result: FitResult, maneuvers: Sequence[Maneuver]) -> Array:
-    """Return the estimate drawn towards zero where only cancellation holds it up.
+def plausible(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, Array]:
+    """Return mean and covariance of the parameters, drawn towards zero where nothing else holds.
 
     Where the data cannot tell entries of a row apart, estimates of either sign and any size cancel
     each other, and comparing a bound with such a value hides that it is worthless. Each entry gets
-    a prior about zero under which it alone would make up the whole state rate; entries that the
-    data determine do not move.
+    a prior about zero, `PRIOR_WIDTH` times what alone would make up the whole state rate; entries
+    that the data determine do not move.
     """
     model = result.model
     count = len(model.parameters)
@@ -168,14 +179,13 @@ def plausible(result: FitResult, maneuvers: Sequence[Maneuver]) -> Array:
                 column = term.column + (n if term.matrix == "B" else 0)
                 scale = abs(term.gain) * spread[column]
                 if scale > 0.0:
-                    prior[k] = min(prior[k], rate_rms[term.row] / scale)
+                    prior[k] = min(prior[k], PRIOR_WIDTH * rate_rms[term.row] / scale)
     covariance = result.covariance[:count, :count]
-    drawn = np.linalg.solve(
-        covariance + np.diag(np.minimum(prior, 1e100) ** 2) + 1e-300 * np.eye(count),
-        result.estimate[:count],
-    )
-    moved = result.estimate[:count] - covariance @ drawn
-    return np.where(np.isfinite(prior), moved, result.estimate[:count])
+    known = np.isfinite(prior)
+    total = covariance + np.diag(np.minimum(prior, 1e100) ** 2) + 1e-300 * np.eye(count)
+    mean = result.estimate[:count] - covariance @ np.linalg.solve(total, result.estimate[:count])
+    left = covariance - covariance @ np.linalg.solve(total, covariance)
+    return np.where(known, mean, result.estimate[:count]), 0.5 * (left + left.T)
 
 
 def measured_columns(model: LinearModel) -> list[int]:
@@ -186,19 +196,45 @@ def measured_columns(model: LinearModel) -> list[int]:
 def relative_bounds(result: FitResult, maneuvers: Sequence[Maneuver]) -> Array:
     """Return the standard error of every common parameter over its reference value."""
     count = len(result.model.parameters)
-    reference = references(result.model, maneuvers, plausible(result, maneuvers))
+    reference = references(result.model, maneuvers, plausible(result, maneuvers)[0])
     return np.asarray(result.standard_error[:count] / np.maximum(reference, 1e-300))
 
 
+def exceedance(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, float]:
+    """Return the probability that each bound exceeds 100 % of its value, and that any does.
+
+    The value is as uncertain as its bound says, so one estimate over its bound decides badly near
+    100 %: values are drawn from what the fit knows of them, and each draw is compared.
+    """
+    model, count = result.model, len(result.model.parameters)
+    mean, covariance = plausible(result, maneuvers)
+    value, vector = np.linalg.eigh(covariance)
+    root = vector * np.sqrt(np.maximum(value, 0.0))
+    draws = np.random.default_rng(DRAW_SEED).standard_normal((DRAWS, count))
+    values = _references(model, regressor_rms(model, maneuvers), mean + draws @ root.T)
+    over = result.standard_error[:count] > REFUSAL_LIMIT * values
+    return np.asarray(np.mean(over, axis=0)), float(np.mean(np.any(over, axis=1)))
+
+
 def refusals(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Refusal, ...]:
-    """Name every common parameter whose standard error exceeds its reference value."""
+    """Name the common parameters that these data cannot tell; none where all can be told.
+
+    A fit is refused where more likely than not some standard error exceeds its value; then every
+    parameter is named that may well be one of them, at least the likeliest.
+    """
     count = len(result.model.parameters)
     relative = relative_bounds(result, maneuvers)
+    single, any_of_them = exceedance(result, maneuvers)
+    if any_of_them <= EVEN_ODDS:
+        return ()
+    named = np.flatnonzero(single > min(SUSPECT, 0.999 * float(single.max())))
     correlation = np.abs(result.correlation[:count, :count] - np.eye(count))
     found = []
-    for k in np.flatnonzero(relative > REFUSAL_LIMIT):
+    for k in named:
         partner = int(np.argmax(correlation[k]))
         reason = f"its bound is {100.0 * relative[k]:.0f} % of its value"
+        if relative[k] <= REFUSAL_LIMIT:
+            reason += f", above 100 % with a probability of {100.0 * single[k]:.0f} %"
         if correlation[k, partner] > CORRELATED:
             reason += (
                 f"; it moves together with {result.names[partner]}"

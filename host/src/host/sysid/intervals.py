@@ -22,6 +22,7 @@ from host.compiled import Array
 from host.sysid.noise import OutputNoise, choose_order, lagged_moments, regress
 from host.sysid.output_error import Optimum, covariance_of, minimise, whitened_slopes
 from host.sysid.problem import OutputProblem
+from host.sysid.search import search
 
 HIGHEST_ORDER = 6
 REFITS = 4
@@ -49,6 +50,7 @@ def fit_with_memory(
     *,
     highest_order: int = HIGHEST_ORDER,
     criterion: str = "bic",
+    thorough: bool = False,
 ) -> Interval:
     """Fit output error and the memory of its noise together.
 
@@ -62,8 +64,10 @@ def fit_with_memory(
         Highest AR order considered; 0 keeps the noise white.
     criterion : str
         ``bic`` or ``aicc``.
+    thorough : bool
+        See `search`.
     """
-    optimum = minimise(problem, theta)
+    optimum = search(problem, theta, thorough=thorough)
     outputs = len(problem.model.outputs)
     noise = [OutputNoise.white() for _ in range(outputs)]
     variance = _innovations(problem, optimum, noise, optimum.variance)

@@ -21,6 +21,9 @@ from host.sysid.problem import OutputProblem, Response
 STEP_LIMIT = 0.01  # in Cramer-Rao bounds: below it an iteration is not worth another
 MAX_ITERATIONS = 60
 MAX_DAMPING = 1e8
+FIRST_DAMPING = 1e-4
+LEAST_DAMPING = 1e-8
+DAMPED = 1e-2  # from here on a short step may be short because it is damped
 SINGULAR = 1e-15  # of the largest eigenvalue of the scaled information
 
 
@@ -95,7 +98,7 @@ def minimise(
             f"model {problem.model.name} diverges at its start values; give other start values"
             " or bounds that keep it finite over the maneuver"
         )
-    damping = 0.0
+    damping, growth = 0.0, 2.0
     converged = False
     step_size = np.inf
     iterations = 0
@@ -106,20 +109,25 @@ def minimise(
         trial = _evaluate(problem, trial_theta, memory, variance)
         tolerance = 1e-9 * (1.0 + abs(point.cost))
         if trial is None or not trial.cost <= point.cost + tolerance:
-            if size < step_limit:
+            if size < step_limit and damping < DAMPED:
                 converged = True
                 step_size = size
                 break
-            damping = max(4.0 * damping, 1e-3)
+            damping, growth = max(growth * damping, FIRST_DAMPING), 2.0 * growth
             if damping > MAX_DAMPING:
                 break
             continue
         iterations += 1
+        foreseen = float(gradient @ step - 0.5 * step @ information @ step)
+        gain = (point.cost - trial.cost) / foreseen if foreseen > 0.0 else 0.0
         point = trial
         step_size = size
         accepted_damping = damping
-        damping = 0.0 if damping < 1e-3 else damping / 8.0
-        if size < step_limit and accepted_damping < 1e-2:
+        # Nielsen, report IMM-REP-1999-05 (DTU): steps that keep less than they promise run from
+        # wall to wall of a bent valley, so the damping follows the gain and not mere success.
+        damping *= max(0.2, 1.0 - (2.0 * gain - 1.0) ** 3)
+        damping, growth = (damping if damping > LEAST_DAMPING else 0.0), 2.0
+        if size < step_limit and accepted_damping < DAMPED:
             converged = True
             break
         information, gradient = _normal(problem, point, memory)

@@ -11,7 +11,7 @@ from host.compiled import Array
 from host.sysid.study.accuracy import Accuracy
 from host.sysid.study.coverage import Coverage
 from host.sysid.study.methods import Score
-from host.sysid.study.thesis import FIRM, Agreement, HopfieldRun
+from host.sysid.study.thesis import SURE, Agreement, HopfieldRun
 from host.sysid.study.turbulence import GustCase
 
 GREY = "0.6"
@@ -38,16 +38,16 @@ def thesis_figure(runs: Sequence[HopfieldRun], found: Agreement) -> Figure:
         ([c for c in found.checks if c.agree], "C0", "agree"),
         ([c for c in found.checks if not c.agree], "C3", "disagree"),
     ):
-        right.loglog(
-            [100.0 * c.worst_share for c in checks],
-            [100.0 * min(max(c.found_share, 1e-2), 1e3) for c in checks],
+        right.semilogx(
+            [100.0 * min(c.worst_share, 1e3) for c in checks],
+            [100.0 * c.probability for c in checks],
             ".", color=colour, label=f"{label}: {len(checks)}",
         )  # fmt: skip
     right.axvline(100.0, color=GREY, lw=0.8)
-    right.axhline(100.0, color=GREY, lw=0.8)
-    right.axhspan(100.0 / FIRM, 100.0 * FIRM, color="0.9", zorder=0, label="not firm")
+    right.axhline(50.0, color=GREY, lw=0.8)
+    right.axhspan(100.0 * (1.0 - SURE), 100.0 * SURE, color="0.9", zorder=0, label="not firm")
     right.set_xlabel("worst bound at the truth, % (refuse right of the line)")
-    right.set_ylabel("worst bound of the fit, % (refused above)")
+    right.set_ylabel("probability of a bound above 100 %, % (refused above 50)")
     right.set_title(f"refusal of {found.systems} random systems", fontsize=9)
     right.legend(fontsize=7)
     return figure

@@ -15,7 +15,10 @@ from host.sysid.study.turbulence import GustCase
 
 
 def thesis_table(
-    runs: Sequence[HopfieldRun], check: RefusalCheck, names: Sequence[str], found: Agreement
+    runs: Sequence[HopfieldRun],
+    check: RefusalCheck,
+    names: Sequence[str],
+    found: Sequence[Agreement],
 ) -> Table:
     """Return table 3.2 re-run; what is refused of table 3.1 goes below it."""
     over = ", ".join(
@@ -46,7 +49,7 @@ def thesis_table(
         ),
         f"Table 3.1 at SNR 10 is refused: {' '.join(check.refused)}.\n\n"
         f"Analytic bounds above 100 %: {over}.\n\n"
-        f"{agreement_text(found).capitalize()}.",
+        + "\n\n".join(f"{agreement_text(one).capitalize()}." for one in found),
     )
 
 
