@@ -6,96 +6,26 @@ What must come of each is in the list of 25 faults (hardware facts, section 5).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from host.log import FlightLog, read_log
+from host.log import read_log
 from host.twin import cards, compare, sitl
 from host.twin.airdata import air_data
-from host.twin.cards import Card
 from host.twin.faults import FAULTS, Fault
-from host.twin.flight import FlightRecord, fly
-from host.twin.stimuli import Stimuli, stimuli
-from numpy.typing import NDArray
+from host.twin.flight import fly
+from host.twin.stimuli import stimuli
 
-CARD = {
-    "format": 1,
-    "aircraft": "ultrastick25e",
-    "flight": {"ground_s": 4.0},
-    "sensors": {"clock_error": False},
-    "air": {"turbulence_mps": 0.5},
-    "segment": [{"kind": "trim", "duration_s": 8.0}],
-}
-AT_S, FOR_S = 6.0, 2.0
-EVENTS = {
-    "session_start": 1, "session_end": 2, "frames_dropped": 3, "block_skipped": 4, "card_stall": 5,
-    "card_removed": 7, "imu_lost": 8, "imu_found": 9, "imu_restarted": 10, "baro_lost": 11,
-    "baro_found": 12, "gps_lost": 13, "gps_found": 14, "receiver_lost": 15, "receiver_found": 16,
-    "drive_changed": 17, "reset": 18, "settings_default": 19,
-}  # fmt: skip
+from tests.host.twin.short_flight import AT_S, CARD, FOR_S, Flown, fly_with, make
+
 FRESH, UNSATURATED, ATTITUDE, TRIGGERED = (1 << bit for bit in (10, 11, 12, 13))
 RC = ("rc_aileron", "rc_elevator", "rc_rudder", "rc_throttle", "rc_switch")
 INERTIAL = ("p", "q", "r", "ax", "ay", "az")
 ANALOGUE = ("alpha_a", "alpha_b", "beta_a", "beta_b", "dp_a", "dp_b",
             "pot_elevator", "pot_aileron_left", "pot_aileron_right", "pot_rudder")  # fmt: skip
 NO_DRIVE = {"direct_receiver_lost": 3, "direct_self_test": 4}
-
-
-@dataclass
-class Flown:
-    """One short flight with its log."""
-
-    card: Card
-    record: FlightRecord
-    given: Stimuli
-    recording: sitl.Recording
-    path: Path
-
-    def __post_init__(self) -> None:
-        self.path.write_bytes(self.recording.log)
-        self.log: FlightLog = read_log(self.path)
-        self.ident = self.log.frames["ident"]
-        self.system = self.log.frames["system"]
-        self.at_s = self.ident["t_us"] * 1e-6
-        self.during = (self.at_s > AT_S + 0.2) & (self.at_s < AT_S + FOR_S - 0.1)
-        self.after = self.at_s > AT_S + FOR_S + 0.3
-
-    def told(self, name: str) -> list[int]:
-        """Arguments of every event of a name, in order."""
-        event = self.log.frames["event"]
-        return [int(arg) for arg in event["arg"][event["code"] == EVENTS[name]]]
-
-    def valid(self, bit: int, where: NDArray[np.bool_]) -> set[int]:
-        """Values a bit of `valid` takes."""
-        return set((self.ident["valid"][where] & bit > 0).astype(int).tolist())
-
-    def count(self, name: str) -> int:
-        """A counter at the end."""
-        return int(self.system[name][-1])
-
-    def gaps(self) -> int:
-        """Identification frames missing by their counter."""
-        steps = np.diff(self.ident["count"].astype(np.int64)).tolist()
-        return sum((step - 1) % 65536 for step in steps)
-
-
-def fly_with(folder: Path, *faults: Fault) -> Flown:
-    card = replace(cards.parse(CARD, "short"), faults=faults)
-    record = fly(card, seed=2)
-    given = stimuli(record, air_data(record))
-    recording = sitl.record(given, rate_hz=100, aircraft="x", faults=faults)
-    return Flown(card, record, given, recording, folder / "flight.bin")
-
-
-def make(kind: str, value: float | None = None, channel: str = "") -> Fault:
-    about = FAULTS[kind]
-    if about.from_start:
-        return Fault(kind, 0.0, value=value)
-    if about.lasts:
-        return Fault(kind, AT_S, FOR_S, value, channel)
-    return Fault(kind, AT_S, value=value, channel=channel)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,8 @@ from host.twin.attitude import euler, quaternion, to_body
 from host.twin.dimensional import hand_matrices
 from host.twin.linear import linearise, modes
 from host.twin.local import local_derivatives
-from host.twin.motion import aerodynamics, propeller, run
+from host.twin.motion import aerodynamics, run
+from host.twin.propulsion import propeller
 from host.twin.trim import TrimError, solve
 
 STILL = np.zeros(9)

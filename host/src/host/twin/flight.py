@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from host.compiled import compiled_fast
 from host.twin import air as air_model
 from host.twin.air import GUST_STATES, Atmosphere, Turbulence, density_kgpm3, gust_step
-from host.twin.aircraft import Aircraft, AircraftError
+from host.twin.aircraft import Aircraft
 from host.twin.airframe import (
     DOWN,
     Q0,
@@ -26,10 +26,10 @@ from host.twin.airframe import (
     Array,
     P,
 )
-from host.twin.attitude import quaternion
+from host.twin.attitude import multiply, quaternion
 from host.twin.cards import Card
 from host.twin.draws import Draws, draw, flown
-from host.twin.linear_aircraft import load
+from host.twin.linear_aircraft import load, refuse_unfit
 from host.twin.motion import rotate_to_body, rotate_to_ned, step
 from host.twin.pilot import Schedule, gains, schedule
 from host.twin.trim import Trim, solve
@@ -286,7 +286,7 @@ def fly(
     """
     plane = aircraft or load(card.aircraft)
     if plane.straight is not None:
-        _fits(card, plane)
+        refuse_unfit(plane, card)
     # One stream per purpose, so that switching one thing off leaves the others as they were.
     rng_draw, rng_pilot, rng_air, rng_radio = (
         np.random.default_rng([seed, purpose]) for purpose in range(4)
@@ -319,7 +319,7 @@ def fly(
     heading = math.radians(card.flight.heading_deg)
     launch = trim.state.copy()
     turn = quaternion(0.0, 0.0, heading)
-    launch[Q0 : Q3 + 1] = _multiply(turn, trim.state[Q0 : Q3 + 1])
+    launch[Q0 : Q3 + 1] = multiply(turn, trim.state[Q0 : Q3 + 1])
     launch[0:3] += rotate_to_body(launch, wind[0], wind[1], wind[2])
     launch[DOWN] = -card.flight.height_m
     rest = np.zeros(STATE_COUNT)
@@ -379,30 +379,4 @@ def fly(
         air=air[:done],
         pulses_us=pulses[:rows],
         pulse_starts_s=starts[:rows],
-    )
-
-
-def _fits(card: Card, plane: Aircraft) -> None:
-    """Refuse what a linear aircraft knows nothing of."""
-    speed = plane.scalar("trim.airspeed_mps")
-    if any(fault.kind == "motor_cut" for fault in card.faults):
-        raise AircraftError(f"{plane.name}: linear, it has no motor to cut as {card.name} wants")
-    if card.flight.airspeed_mps and abs(card.flight.airspeed_mps - speed) > 0.1:
-        raise AircraftError(
-            f"{plane.name}: linear about {speed:.1f} m/s, {card.name} wants"
-            f" {card.flight.airspeed_mps:.1f} m/s"
-        )
-
-
-def _multiply(a: Array, b: Array) -> Array:
-    """Return the quaternion of turning by `a`, then by `b` in the turned axes."""
-    a0, a1, a2, a3 = a
-    b0, b1, b2, b3 = b
-    return np.array(
-        [
-            a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
-            a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
-            a0 * b2 - a1 * b3 + a2 * b0 + a3 * b1,
-            a0 * b3 + a1 * b2 - a2 * b1 + a3 * b0,
-        ]
     )

@@ -12,11 +12,6 @@ from host.twin.attitude import euler, quaternion
 from host.twin.motion import derivative
 from host.twin.trim import Trim
 
-LONGITUDINAL_STATES = ("u_mps", "w_mps", "q_radps", "theta_rad")
-LATERAL_STATES = ("v_mps", "p_radps", "r_radps", "phi_rad")
-LONGITUDINAL_INPUTS = ("elevator_rad",)
-LATERAL_INPUTS = ("aileron_rad", "rudder_rad")
-
 
 @dataclass(frozen=True, slots=True)
 class Linear:

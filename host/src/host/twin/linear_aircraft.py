@@ -12,6 +12,7 @@ import numpy as np
 from host.twin import aircraft
 from host.twin.aircraft import Aircraft, AircraftError, read_document
 from host.twin.airframe import GRAVITY_MPS2, Array
+from host.twin.cards import Card
 from host.twin.linear import linearise
 from host.twin.straight import Straight
 from host.twin.trim import solve
@@ -157,6 +158,18 @@ def with_models(base: Aircraft, models: Sequence[Path]) -> Aircraft:
     )
     names = ", ".join(path.name for path in models)
     return _with(base, straight, name=base.name, title=f"{base.title}, linear, with {names}")
+
+
+def refuse_unfit(plane: Aircraft, card: Card) -> None:
+    """Raise AircraftError where a card asks a linear aircraft for what it knows nothing of."""
+    speed = plane.scalar("trim.airspeed_mps")
+    if any(fault.kind == "motor_cut" for fault in card.faults):
+        raise AircraftError(f"{plane.name}: linear, it has no motor to cut as {card.name} wants")
+    if card.flight.airspeed_mps and abs(card.flight.airspeed_mps - speed) > 0.1:
+        raise AircraftError(
+            f"{plane.name}: linear about {speed:.1f} m/s, {card.name} wants"
+            f" {card.flight.airspeed_mps:.1f} m/s"
+        )
 
 
 def _axis(path: Path, states: tuple[str, ...], inputs: tuple[str, ...]) -> str:

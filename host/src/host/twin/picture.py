@@ -133,7 +133,7 @@ def draw(
         top.annotate(
             " ".join((fault.kind, fault.channel)).strip(), (fault.at_s, 0.03),
             xycoords=("data", "axes fraction"), ha="right", va="bottom", fontsize=7, rotation=90,
-            color=FAULT_COLOUR,
+            color=FAULT_COLOUR, bbox={"fc": "white", "alpha": 0.7, "lw": 0, "pad": 0.5},
         )  # fmt: skip
     figure.suptitle(title, fontsize=11)
     np.atleast_1d(axes)[-1].set_xlabel("time since power-on, s")

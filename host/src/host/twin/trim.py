@@ -25,7 +25,8 @@ from host.twin.airframe import (
     W,
 )  # fmt: skip
 from host.twin.attitude import quaternion
-from host.twin.motion import derivative, motor_torque, propeller
+from host.twin.motion import derivative
+from host.twin.propulsion import motor_torque, propeller
 
 
 class TrimError(UsageError):
