@@ -53,9 +53,9 @@ def test_wrong_valleys_are_left(number: int) -> None:
 def test_a_good_search_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
 
-    def counted(problem: OutputProblem, theta: np.ndarray, **options: int) -> Optimum:
+    def counted(problem: OutputProblem, theta: np.ndarray) -> Optimum:
         calls.append(theta)
-        return minimise(problem, theta, **options)
+        return minimise(problem, theta)
 
     monkeypatch.setattr(searching, "minimise", counted)
     problem = OutputProblem(navion_free(), [noisy(2, 0.01)])

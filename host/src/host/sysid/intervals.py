@@ -50,7 +50,6 @@ def fit_with_memory(
     *,
     highest_order: int = HIGHEST_ORDER,
     criterion: str = "bic",
-    thorough: bool = False,
 ) -> Interval:
     """Fit output error and the memory of its noise together.
 
@@ -64,10 +63,8 @@ def fit_with_memory(
         Highest AR order considered; 0 keeps the noise white.
     criterion : str
         ``bic`` or ``aicc``.
-    thorough : bool
-        See `search`.
     """
-    optimum = search(problem, theta, thorough=thorough)
+    optimum = search(problem, theta)
     outputs = len(problem.model.outputs)
     noise = [OutputNoise.white() for _ in range(outputs)]
     variance = _innovations(problem, optimum, noise, optimum.variance)

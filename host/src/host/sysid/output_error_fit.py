@@ -25,7 +25,6 @@ def fit_output_error(
     start: Array | None = None,
     highest_order: int = HIGHEST_ORDER,
     criterion: str = "bic",
-    thorough: bool = False,
 ) -> FitResult:
     """Fit by output error.
 
@@ -39,8 +38,8 @@ def fit_output_error(
         residual autocorrelation (Morelli & Klein 1997), the standard that covers 87-90 %.
     start : Array, optional
         Whole start vector; equation error gives it without.
-    highest_order, criterion, thorough
-        See `fit_with_memory` and `search`.
+    highest_order, criterion
+        See `fit_with_memory`.
 
     Raises
     ------
@@ -54,11 +53,7 @@ def fit_output_error(
             f"{len(first)} start values, {len(problem.names)} needed: {', '.join(problem.names)}"
         )
     fit = fit_with_memory(
-        problem,
-        first,
-        highest_order=highest_order if memory else 0,
-        criterion=criterion,
-        thorough=thorough,
+        problem, first, highest_order=highest_order if memory else 0, criterion=criterion
     )
     covariance = fit.covariance if memory else coloured_output_covariance(problem, fit)
     return FitResult(

@@ -33,17 +33,8 @@ LONG_SEARCH = 200  # iterations where none of them has converged
 LEAST_SAMPLES = 50
 
 
-def search(problem: OutputProblem, theta: Array, *, thorough: bool = False) -> Optimum:
+def search(problem: OutputProblem, theta: Array) -> Optimum:
     """Return the best optimum of white-noise output error found from `theta` and other starts.
-
-    Parameters
-    ----------
-    problem : OutputProblem
-    theta : Array
-        First start.
-    thorough : bool
-        Search from other starts even where the first search ended well: where every entry is free
-        one in ten ends well in the wrong valley.
 
     Raises
     ------
@@ -56,7 +47,7 @@ def search(problem: OutputProblem, theta: Array, *, thorough: bool = False) -> O
         best = minimise(problem, theta)
     except IdentificationError as error:
         failure = error
-    settled = best if best is not None and best.converged and not thorough else None
+    settled = best if best is not None and best.converged else None
     if settled is not None and _explained(problem, settled):
         return settled
     for start in _starts(problem, theta, settled)[:TRIED]:

@@ -221,7 +221,7 @@ def check_refusal(
     expected = tuple(name for name, s in zip(model.parameter_names, share, strict=True) if s > 1.0)
     start = np.concatenate([truth, np.zeros(n)]) if from_truth else None
     try:
-        result = fit("output-error", model, [maneuver], start=start, thorough=not from_truth)
+        result = fit("output-error", model, [maneuver], start=start)
         refused = tuple(r.name for r in refusals(result, [maneuver]))
         probability = exceedance(result, [maneuver])[1]
     except IdentificationError:
