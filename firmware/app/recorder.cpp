@@ -20,6 +20,8 @@ constexpr uint32_t kDeadUs = 2000000UL;     // no card is busy that long
 constexpr uint32_t kStallUs = 100000UL;     // worth an event
 constexpr uint16_t kPortion = 64;           // bytes of a block per turn: 0.3 ms with its CRCs
 constexpr uint32_t kLowSeconds = 60;
+constexpr uint32_t kLeastSeconds = 1800;  // with less left, the ground prepares a new file
+constexpr uint16_t kTaxiCmps = 300;
 constexpr uint32_t kOtherBytesPerS = 1000;  // frames beside the identification frame
 
 // Blocks the end of a session may need: the ring, and a return of the schema under way.
@@ -74,15 +76,15 @@ void Recorder::decide(const core::PilotInputs& in, frames::ConfigFrame& config, 
       if (action == core::RecordAction::kStartThrottle) begin(1, prepared_, now_us);
       break;
     case State::kRecording:
-      record(action, now_us);
+      record(action, in, now_us);
       break;
     case State::kEnding:
-      if (writer_.drained() && !block_open_ && !programming_) {
+      if (writer_.drained() && !block_open_ && !programming_ && stream_ended(now_us)) {
         finish(now_us);
       }
       break;
     case State::kFileFull:
-      if (boot_.update(in, false, now_us) == core::BootAction::kClose) finish(now_us);
+      if (landed(in, now_us)) finish(now_us);
       break;
   }
 }
@@ -104,6 +106,8 @@ void Recorder::open_volume() {
         file_wanted_ = true;
         break;
       case storage::FileState::kBlank:
+        file_wanted_ = volume_.smaller_than_new() && !room_for(kLeastSeconds, 1);
+        if (file_wanted_) break;
         volume_status_ = status;
         state_ = State::kReady;
         break;
@@ -163,6 +167,7 @@ void Recorder::begin(uint32_t why, bool same_session, uint32_t now_us) {
   put_heads(now_us);
   outlet_.event(frames::Event::kSessionStart, why, now_us);
   outlet_.release_waiting();
+  boot_.start(false);
   file_low_told_ = false;
   rejects_ = 0;
   marks_ = 0;
@@ -197,30 +202,50 @@ void Recorder::identity(frames::IdentityFrame* out, uint32_t now_us) const {
   core::flash_copy(out->firmware, kVersion, sizeof kVersion);
 }
 
-void Recorder::record(core::RecordAction action, uint32_t now_us) {
+void Recorder::record(core::RecordAction action, const core::PilotInputs& in, uint32_t now_us) {
   if (writer_.take_identities_due()) {
     // The first pass of the schema comes with the heads that begin() has put already.
     if (heads_told_) put_heads(now_us);
     heads_told_ = true;
   }
   if (action == core::RecordAction::kMark) outlet_.event(frames::Event::kMark, ++marks_, now_us);
-  watch_room(now_us);
+  watch_room(in, now_us);
   if (action == core::RecordAction::kStop) end(0, now_us);
 }
 
-void Recorder::watch_room(uint32_t now_us) {
+// Compared in bytes: a division costs 640 cycles, every turn of the loop.
+bool Recorder::room_for(uint32_t seconds, uint32_t next_block) const {
+  const uint32_t bytes_per_s =
+      static_cast<uint32_t>(config_->rate_hz) * frames::kIdentWireSize + kOtherBytesPerS;
+  const uint32_t needed = next_block + kEndBlocks;
   const uint32_t blocks = volume_.file().blocks;
+  return blocks > needed && (blocks - needed) * core::kBlockPayloadSize > bytes_per_s * seconds;
+}
+
+// Throttle idle for 10 s, and a GPS that has a fix does not say that we glide.
+bool Recorder::landed(const core::PilotInputs& in, uint32_t now_us) {
+  const bool idle = boot_.update(in, false, now_us) == core::BootAction::kClose;
+  const frames::GpsFrame& gps = sensors_.gps();
+  const bool heard = (sensors_.heard() & frames::kSensorsGps) != 0;
+  const bool moving = heard && gps.fix >= static_cast<uint8_t>(frames::GpsFix::kFix2d) &&
+                      gps.ground_speed > kTaxiCmps;
+  return idle && !moving;
+}
+
+void Recorder::watch_room(const core::PilotInputs& in, uint32_t now_us) {
   const uint32_t next = writer_.sequence();
-  if (next + kEndBlocks >= blocks) {
+  if (next + kEndBlocks >= volume_.file().blocks) {
     end(1, now_us);
     return;
   }
-  if (file_low_told_) return;
-  // Compared in bytes: a division costs 640 cycles, every turn of the loop.
-  const uint32_t bytes_per_s =
-      static_cast<uint32_t>(config_->rate_hz) * frames::kIdentWireSize + kOtherBytesPerS;
-  const uint32_t left_bytes = (blocks - next - kEndBlocks) * core::kBlockPayloadSize;
-  if (left_bytes > bytes_per_s * kLowSeconds) return;
+  // The next flight gets a new file rather than the end of this one. (A file that never had so much
+  // room is used to its half at least.)
+  if (!room_for(kLeastSeconds, next) && next > volume_.file().blocks / 2 && landed(in, now_us)) {
+    end(1, now_us);
+    full_ = false;
+    return;
+  }
+  if (file_low_told_ || room_for(kLowSeconds, next)) return;
   file_low_told_ = true;
   outlet_.event(frames::Event::kFileLow, kLowSeconds, now_us);
 }
@@ -235,16 +260,28 @@ void Recorder::end(uint32_t why, uint32_t now_us) {
   full_ = why == 1;
 }
 
-void Recorder::finish(uint32_t now_us) {
+// The card is busy for a while with the end of a stream, and takes no other call until then.
+bool Recorder::stream_ended(uint32_t now_us) {
   if (stream_open_) {
     hal::end_stream();
     stream_open_ = false;
+    stream_closing_ = true;
+    accepted_us_ = hal::now_us();
+    return false;
   }
+  if (!stream_closing_) return true;
+  if (hal::poll_stream() == CardStatus::kBusy && now_us - accepted_us_ < kDeadUs) return false;
+  stream_closing_ = false;
+  return true;
+}
+
+void Recorder::finish(uint32_t now_us) {
   if (state_ == State::kEnding && full_) {
     state_ = State::kFileFull;
     boot_.start(false);
     return;
   }
+  storage::Volume::set_date(sensors_.fat_date());
   volume_status_ = volume_.mount_again();
   if (volume_status_ == VolumeStatus::kReady) {
     volume_status_ = volume_.close(writer_.sequence(), false, now_us);

@@ -55,13 +55,16 @@ class Recorder {
   void open_volume();
   void decide_open_file(const core::PilotInputs& in, bool start_pressed, uint32_t now_us);
   void begin(uint32_t why, bool same_session, uint32_t now_us);
-  void record(core::RecordAction action, uint32_t now_us);
+  void record(core::RecordAction action, const core::PilotInputs& in, uint32_t now_us);
   void end(uint32_t why, uint32_t now_us);
+  bool stream_ended(uint32_t now_us);
   void finish(uint32_t now_us);
   void prepare_next();
   void fail(frames::Event code, uint32_t arg, uint32_t now_us);
   void put_heads(uint32_t now_us);
-  void watch_room(uint32_t now_us);
+  void watch_room(const core::PilotInputs& in, uint32_t now_us);
+  bool landed(const core::PilotInputs& in, uint32_t now_us);
+  bool room_for(uint32_t seconds, uint32_t next_block) const;
   void stream(uint32_t now_us);
   void open_stream(uint32_t now_us);
   void next_block(uint32_t now_us);
@@ -96,6 +99,7 @@ class Recorder {
   bool file_low_told_ = false;
   bool full_ = false;  // the session ended for want of room
   bool stream_open_ = false;
+  bool stream_closing_ = false;
   bool block_open_ = false;
   bool programming_ = false;
 };

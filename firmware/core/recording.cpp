@@ -69,11 +69,14 @@ uint16_t RecordControl::take_press_ms() {
 }
 
 BootAction BootControl::update(const PilotInputs& in, bool start_pressed, uint32_t now_us) {
-  if (reset_mark_ || start_pressed || (in.throttle_valid && !in.throttle_idle)) {
+  const bool flying = in.throttle_valid && !in.throttle_idle;
+  if (!in.throttle_valid || flying) {
+    idle_ = false;
+  }
+  if (reset_mark_ || start_pressed || flying) {
     return BootAction::kResume;
   }
   if (!in.throttle_valid) {
-    idle_ = false;
     return BootAction::kWait;
   }
   if (!idle_) {

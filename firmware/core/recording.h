@@ -47,7 +47,10 @@ class BootControl {
  public:
   static constexpr uint32_t kIdleUs = 10000000UL;
 
-  void start(bool reset_mark) { reset_mark_ = reset_mark; }
+  void start(bool reset_mark) {
+    reset_mark_ = reset_mark;
+    idle_ = false;
+  }
   BootAction update(const PilotInputs& in, bool start_pressed, uint32_t now_us);
 
  private:

@@ -16,7 +16,7 @@ uint32_t crash_address();
 void set_flight_mark(bool flying);
 bool flight_mark();
 
-// From here the chip resets itself 80 ms after the last feed_watchdog(), 128 ms if interrupts are
+// From here the chip resets itself 48 ms after the last feed_watchdog(), 64 ms if interrupts are
 // off.
 void start_watchdog();
 void feed_watchdog();

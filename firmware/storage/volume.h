@@ -65,6 +65,7 @@ class Volume {
   VolumeStatus close(uint32_t used_blocks, bool end_event, uint32_t now_us);
 
   const FlightFile& file() const { return file_; }
+  bool smaller_than_new() const { return file_.blocks < file_blocks_; }
 
  private:
   using Name = char[13];  // 8.3 and a zero

@@ -34,6 +34,19 @@ extern uint8_t __stack;
 // paint what will be stack. No stack, no zero register yet: plain instructions only.
 void mega_init3(void) __attribute__((naked, used, section(".init3")));
 void mega_init3(void) {
+  // After a reset all of these are zero, whatever a bootloader did. If not, a runaway program came
+  // here without one, its watchdog about to be switched off and pins in any state: it held receiver
+  // lines as outputs for good. Let go of them and reset.
+  if ((TCCR5B | PCMSK2 | DDRK) != 0) {
+    DDRB = 0;
+    DDRE = 0;
+    DDRH = 0;
+    DDRK = 0;
+    WDTCSR = _BV(WDCE) | _BV(WDE);
+    WDTCSR = _BV(WDE);
+    for (;;) {
+    }
+  }
   g_mcusr = MCUSR;
   MCUSR = 0;
   WDTCSR = _BV(WDCE) | _BV(WDE);
@@ -111,9 +124,10 @@ void start_watchdog() {
   const mega::InterruptsOff guard;
   wdt_reset();
   WDTCSR = _BV(WDCE) | _BV(WDE);
-  // 64 ms to the interrupt, which notes the address and resets; as much again if it cannot run. A
-  // runaway stack may have turned receiver lines into outputs: no pulse passes until that reset.
-  WDTCSR = _BV(WDE) | _BV(WDIE) | _BV(WDP1);
+  // 32 ms to the interrupt, which notes the address and resets; as much again if it cannot run. A
+  // runaway stack may have turned receiver lines into outputs and interrupts off: no pulse passes
+  // until that reset, and with a frame before and behind it 110 ms must do.
+  WDTCSR = _BV(WDE) | _BV(WDIE) | _BV(WDP0);
 }
 
 void feed_watchdog() {

@@ -142,6 +142,20 @@ TEST_CASE("an unclosed file: throttle above idle, a reset mark or a press resume
   CHECK(by_press.update(idle, true, 0) == BootAction::kResume);
 }
 
+TEST_CASE("idle throttle of before the flight does not count behind it") {
+  core::BootControl boot;
+  uint32_t now_us = 0;
+  for (; now_us < 5000000U; now_us += 10000U) {
+    CHECK(boot.update({false, true, true}, false, now_us) == core::BootAction::kWait);
+  }
+  for (; now_us < 60000000U; now_us += 10000U) {
+    CHECK(boot.update({false, true, false}, false, now_us) == core::BootAction::kResume);
+  }
+  CHECK(boot.update({false, true, true}, false, now_us) == core::BootAction::kWait);
+  CHECK(boot.update({false, true, true}, false, now_us + 9900000U) == core::BootAction::kWait);
+  CHECK(boot.update({false, true, true}, false, now_us + 10000000U) == core::BootAction::kClose);
+}
+
 TEST_CASE("it is closed after 10 s of valid idle throttle without a break, never before") {
   core::BootControl boot;
   const core::PilotInputs idle = {false, true, true};

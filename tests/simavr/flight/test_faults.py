@@ -72,7 +72,9 @@ def test_an_expectation_that_is_not_met_is_said(
     from simavr_bench import in_fork
 
     for check in (drops_are_counted, all_lost, stale):
-        row = replace(NONE, check=check, events=("imu_lost",), engaged=False, fault_s=1.5, after_s=1.0)
+        row = replace(
+            NONE, check=check, events=("imu_lost",), engaged=False, fault_s=1.5, after_s=1.0
+        )
         wrong = in_fork(partial(run_fault, *in_flight, row, tmp_path)).wrong
         assert wrong[:2] == ["the Mega drives", "no event imu_lost"]
         assert len(wrong) >= 3

@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
 
 from simavr_bench.chip import Chip, cycles
 
 _UCSRA = (0xC0, 0xC8, 0xD0, 0x130)
+GPS_BEGAN = datetime(1980, 1, 6, tzinfo=UTC)
+LEAP_S = 18  # since 2017
 POSLLH, SOL, PVT, VELNED = (1, 0x02), (1, 0x06), (1, 0x07), (1, 0x12)
 
 
@@ -127,7 +130,7 @@ class GpsUart:
             )
         elif kind == PVT:
             body = struct.pack(
-                "<IHBBBBBBIiBBBBiiiiIIiiiiiIIH6xihH", self.itow_ms, 2015, 11, 12, 0, 0, 0, 0x07,
+                "<IHBBBBBBIiBBBBiiiiIIiiiiiIIH6xihH", self.itow_ms, *self._utc(), 0x07,
                 50, 0, self.fix, 1 if self.fix else 0, 0, self.satellites, self.longitude_1e7,
                 self.latitude_1e7, self.height_mm + 20_000, self.height_mm, 2500, 3500,
                 10 * north, 10 * east, 10 * down, 10 * ground, 0, 500, 100_000, 180, 0, 0, 0,
@@ -135,6 +138,12 @@ class GpsUart:
         else:
             return b""
         return ubx(kind, body)
+
+    def _utc(self) -> tuple[int, ...]:
+        """Year to second of the epoch."""
+        seconds = self.itow_ms // 1000 - LEAP_S
+        at = GPS_BEGAN + timedelta(weeks=self.week, seconds=seconds)
+        return at.timetuple()[:6]
 
     def _hears_baud(self) -> float:
         base = _UCSRA[self.port]
