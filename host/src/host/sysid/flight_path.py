@@ -254,7 +254,7 @@ class PathProblem:
                 y.append(late)
                 slopes.append(slope)
         if HEIGHT in self.model.outputs:
-            slope = -_to_middles(DV[:, 2], step_s)
+            slope = -self._to_middles(DV[:, 2], step_s)
             slope[:, -1] += 1.0
             y.append(self._mean(own[-1] - _integral(v[:, 2], s.dt_s)))
             slopes.append(slope)
@@ -298,10 +298,10 @@ class PathProblem:
                     into[:, axis, self._place[scale]] = -signal[:, axis] / size[axis]
                 if tilt in self._place:
                     into[:, :, self._place[tilt]] = _cross(unit[axis], signal)
-        E = _to_middles(C @ turning, step_s)
+        E = self._to_middles(C @ turning, step_s)
         E[:, np.arange(3), common + 3 + np.arange(3)] += 1.0
         felt = np.einsum("nij,nj->ni", C, force)
-        DV = _to_middles(C @ pushing - _cross_columns(felt, E), step_s)
+        DV = self._to_middles(C @ pushing - _cross_columns(felt, E), step_s)
         DV[:, np.arange(3), common + np.arange(3)] += 1.0
         return E, DV
 
@@ -347,7 +347,7 @@ class PathProblem:
             part = (1.0 + gain) / (ahead**2 + aside**2)
             drawn = np.einsum("ni,nik->nk", middle[:, 1:], x[:, 1:]) / ahead[:, None]
             slope = part[:, None] * (ahead[:, None] * x[:, across] + aside[:, None] * drawn)
-            self._add(slope, "pitot_scale", 0.5 * part * aside * ahead)
+            self._add(slope, "pitot_scale", 0.5 * part * aside * self._mean(came) / ahead)
             self._add(slope, "pitot_zero_pa", part * aside / (s.density_kgpm3 * ahead))
             self._add(slope, f"{name}_scale", self._mean(angle))
             self._add(slope, f"{name}_zero_rad", np.ones(len(slope)))
@@ -368,6 +368,11 @@ class PathProblem:
         late = np.interp(t - delay_s, t, signal)
         rate = np.gradient(late, dt_s)
         return self._mean(late), -self._mean(rate)
+
+    def _to_middles(self, means: Array, step_s: float) -> Array:
+        """Integrate means of blocks from the first sample to the middle of each block."""
+        before = 0.5 / self.block * means[0]  # the first block begins half a sample early
+        return np.asarray(step_s * (np.cumsum(means, axis=0) - 0.5 * means - before))
 
     def _mean(self, signal: Array) -> Array:
         shape = (-1, self.block, *signal.shape[1:])
@@ -399,8 +404,3 @@ def _integral(values: Array, dt_s: float) -> Array:
     result = np.zeros_like(values)
     np.cumsum(0.5 * dt_s * (values[1:] + values[:-1]), axis=0, out=result[1:])
     return result
-
-
-def _to_middles(means: Array, step_s: float) -> Array:
-    """Integrate means of blocks from the start of the first to the middle of each."""
-    return np.asarray(step_s * (np.cumsum(means, axis=0) - 0.5 * means))
