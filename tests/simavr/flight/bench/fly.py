@@ -12,6 +12,7 @@ import numpy as np
 from flight.bench.plan import (
     BUSY_S,
     CYCLES_PER_S,
+    IMU_DELAY_US,
     IMU_FLAGS,
     IMU_HZ,
     IMU_PPM,
@@ -131,7 +132,8 @@ def fly(
         frame_s=receivers[0].true_frame_s,
         sequential=receivers[0].sequential,
     )
-    rig.imu.flags, rig.imu.aux_source, rig.imu.clock_ppm = IMU_FLAGS, imu_aux, IMU_PPM
+    rig.imu.flags, rig.imu.aux_source = IMU_FLAGS, imu_aux
+    rig.imu.delay_us, rig.imu.clock_ppm = IMU_DELAY_US, IMU_PPM
     chip = rig.chip
     chip.load(settings_image(rate_hz=rate_hz))
     zero = _begin_session(rig, ground_s)

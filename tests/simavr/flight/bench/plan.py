@@ -12,6 +12,7 @@ CYCLES_PER_S = 16_000_000
 # firmware/boards/arduimu samples and sends at this rate whatever the logger's; its aux fields take
 # turns, a field of the magnetometer (15 a second) first.
 IMU_HZ = 200
+IMU_DELAY_US = 3000.0  # from a sample to its START
 # No two clocks agree: every phase between IMU, receiver, servos and loop is met in ten minutes.
 IMU_PPM = -1100.0
 RECEIVER_PPM = 270.0
