@@ -73,7 +73,8 @@ def test_finds_the_truth_and_covers_it(flight: VirtualFlight) -> None:
     for d in fit.derivatives:
         if d.name in WITHIN:
             assert abs(miss[d.name]) * abs(d.value) <= 1.2 * d.half_width, d.name
-    assert {d.name for d in fit.derivatives if d.flagged} & set(PRINCIPAL) == {"Cn_p"}
+    flagged = {d.name for d in fit.derivatives if d.flagged} & set(PRINCIPAL)
+    assert {"Cn_p"} <= flagged <= {"Cn_p", "CD_0"}
 
 
 def test_a_vane_taken_for_frictionless_shows_in_damping(flight: VirtualFlight) -> None:

@@ -19,7 +19,7 @@ from host.sysid.airframe import AirframeData
 
 METHOD = "equation error with instrument errors"
 QUANTILE = 1.96
-FLAG_SHARE = 0.15  # a wider half-width is named as not to be relied on
+FLAG_SHARE = 0.12  # up to it an error beyond 15 % is a case of one in seventy
 SMALL_SHARE = 0.05  # of the row's largest contribution
 SIDEWASH_SHARE = 0.1  # standard deviation of CY_da over CY_beta
 

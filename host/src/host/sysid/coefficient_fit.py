@@ -51,11 +51,12 @@ from host.sysid.powerplant import Powerplant
 
 STEP = 0.3  # of a standard deviation: width of the numeric slopes
 PLAIN_ROUNDS, FULL_ROUNDS = 3, 2
-# Mean of the tangential balance over a flight: vertical wind of 0.08 m/s left after averaging.
-BALANCE_MPS2 = 0.05
+# Vertical wind of light turbulence and its length scale: averaging leaves some of it in the climb.
+GUST_MPS, GUST_LENGTH_M = 0.4, 100.0
 # Not estimated, only carried into the intervals: a vane's lag of 0.5 ms looks like an arm of 8 mm,
 # and estimating the arm drew CL_de 15 % and CY_beta 11 % off (simulated flights, seeds 300-303).
 CONSIDERED = ("cg_x_m", "imu_x_m", "ixx_share", "iyy_share", "izz_share")
+CURVATURE = ("CD_alpha2", "CD_alpha_de", "CD_de2")  # of the polar; not told
 HELD = 1e30
 COLUMNS = (
     "alpha_rad", "beta_rad", "p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2",
@@ -84,6 +85,13 @@ class _Search:
     plant: Powerplant
     condition: tuple[float, float, float]
     blocks: list[Block]
+
+    @property
+    def balance_mps2(self) -> float:
+        """Standard deviation of the mean tangential balance: vertical wind left in the mean."""
+        V = self.condition[0]
+        lengths = V * self.record.samples * self.record.dt_s / GUST_LENGTH_M
+        return float(GRAVITY_MPS2 * GUST_MPS / V * np.sqrt(2.0 / lengths))
 
     def rows(
         self,
@@ -248,10 +256,10 @@ def _solve(search: _Search, names: tuple[str, ...], sd: Array) -> CoefficientFit
         right = Z.T @ y + miss
         if full:
             balance = np.zeros(A.shape[1])
-            balance[-len(sd) :] = levels[0] / BALANCE_MPS2
+            balance[-len(sd) :] = levels[0] / search.balance_mps2
             normal += np.outer(balance, balance)
             meat += np.outer(balance, balance)
-            right -= balance * (_levels(search, rows)[0] / BALANCE_MPS2)
+            right -= balance * (_levels(search, rows)[0] / search.balance_mps2)
         scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(normal)), 1e-30))
         inverse = np.linalg.inv(normal * np.outer(scale, scale)) * np.outer(scale, scale)
         step = inverse @ right
@@ -295,7 +303,8 @@ def _levels(search: _Search, rows: _Rows) -> Array:
     static = record.columns["static_pa"]
     span = record.samples * record.dt_s
     climb = -(static[-1] - static[0]) / (float(np.mean(_density(record))) * GRAVITY_MPS2 * span)
-    along = s["ax"] * np.cos(s["alpha"]) + s["az"] * np.sin(s["alpha"])
+    plane = s["ax"] * np.cos(s["alpha"]) + s["az"] * np.sin(s["alpha"])
+    along = plane * np.cos(s["beta"]) + s["ay"] * np.sin(s["beta"])
     gain = (s["V"][-1] - s["V"][0]) / span
     balance = float(np.mean(along)) - gain - GRAVITY_MPS2 * climb / search.condition[0]
     inside = np.concatenate([b.samples for b in search.blocks if "CD" in b.names])
@@ -317,13 +326,16 @@ def _answer(
     state, covariance = informed(state, covariance, position, search.airframe)
     _, drag, lift = _levels(search, rows)
     inside = np.concatenate([b.samples for b in search.blocks if "CD" in b.names])
-    spread = float(np.mean(rows.equations["CD"].terms["alpha2"][inside]))
-    values = {name: float(state[k]) for name, k in position.items() if name != "CD_alpha2"}
+    terms = rows.equations["CD"].terms
+    spread = {n: float(np.mean(terms[n.removeprefix("CD_")][inside])) for n in CURVATURE}
+    values = {name: float(state[k]) for name, k in position.items() if name not in CURVATURE}
     slopes = np.eye(len(state))[[position[name] for name in values]]
     share = values["CD_alpha"] / (2.0 * values["CL_alpha"])
-    values["CD_0"] = drag - float(state[position["CD_alpha2"]]) * spread - share * lift
+    curved = sum(float(state[position[name]]) * size for name, size in spread.items())
+    values["CD_0"] = drag - curved - share * lift
     slope = np.zeros(len(state))
-    slope[position["CD_alpha2"]] = -spread
+    for name, size in spread.items():
+        slope[position[name]] = -size
     slope[position["CD_alpha"]] = -lift / (2.0 * values["CL_alpha"])
     slope[position["CL_alpha"]] = share * lift / values["CL_alpha"]
     slope[-len(names) :] = levels[1] - share * levels[2]

@@ -89,7 +89,10 @@ def equations(
     yaw += flown.drive_nm * plant.axis[2]
     de, alpha = s["de"], s["alpha"]
     along = {"alpha": alpha, "q": 0.5 * q * c / V, "de": de}
-    drag = {"alpha": alpha, "de": de, "alpha2": (alpha - trim_alpha_rad) ** 2}
+    bent, moved = alpha - trim_alpha_rad, de - float(np.mean(de))
+    drag = {
+        "alpha": alpha, "de": de, "alpha2": bent**2, "alpha_de": bent * moved, "de2": moved**2,
+    }  # fmt: skip
     across = {
         "beta": s["beta"], "p": 0.5 * p * b / V, "r": 0.5 * r * b / V, "da": s["da"], "dr": s["dr"],
     }  # fmt: skip

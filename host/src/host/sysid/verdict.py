@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from host.sysid.coefficient_answer import FLAG_SHARE
 from host.sysid.finder import Found, Grade
 from host.sysid.flight import Answer
 
@@ -145,7 +146,7 @@ def coefficient_words(answer: CoefficientAnswer) -> list[str]:
         f"  trust (within 10 %):  {', '.join(trusted) or 'nothing'}",
     ]
     if fair:
-        lines.append(f"  use with care (10 to 15 %):  {', '.join(fair)}")
+        lines.append(f"  use with care (10 to {100.0 * FLAG_SHARE:.0f} %):  {', '.join(fair)}")
     needs = set()
     for d in derivatives:
         if not d.flagged:
