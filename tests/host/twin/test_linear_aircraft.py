@@ -172,6 +172,7 @@ def test_what_a_linear_aircraft_cannot_do_is_refused(tmp_path: Path) -> None:
     for change, message in (
         (("-9.79069403", "9.79069403"), "gravity enters with 9.791"),
         (("base = ", "bass = "), "no aircraft"),
+        (("source = ", "# source = "), "the matrices have no source"),
         (("w_mps = 0.94", "w_mps = true"), "w_mps is True, expected a number"),
         (("[0.46979388], ", ""), r"longitudinal_b has shape \(3, 1\)"),
     ):

@@ -154,6 +154,17 @@ class Fault:
         return np.asarray((t_s >= self.at_s) & (t_s < self.end_s))
 
 
+def without_recorder(faults: Sequence[Fault]) -> list[Fault]:
+    """Return those that change nothing where no recorder flies along: the others are in the
+    aircraft, its vanes, pitots and pots."""
+    felt = ("motor_cut", "receiver_lost", "receiver_failsafe")
+    return [
+        fault
+        for fault in faults
+        if fault.kind not in felt and fault.kind.split("_")[0] not in ("vane", "pot", "pitot")
+    ]
+
+
 @dataclass(frozen=True, slots=True)
 class Action:
     """Something done to the recorder's world at one instant, as the chip simulator names it."""

@@ -53,6 +53,8 @@ def load(source: str | Path) -> Aircraft:
     document = read_document(source)
     if document.get("kind") != "linear":
         return aircraft.load(source)
+    if not isinstance(document.get("source"), str):
+        raise AircraftError(f"{source}: the matrices have no source")
     base = aircraft.load(str(document.get("base", "")))
     numbers = {
         key: _number(source, document, key)

@@ -55,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     """Fly, and print what was written; return an exit code."""
     try:
         from host.twin import cards, pilot, report, sitl
+        from host.twin.faults import without_recorder
     except ImportError as error:
         raise UsageError(
             f"the virtual flight needs {error.name}:"
@@ -118,6 +119,9 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"  {duration / busy:.0f} times real time on one core, loading and picture apart ({stages})"
     )
+    left = without_recorder(card.faults) if outcome.recording is None else []
+    if left:
+        print(f"  without the recorder nothing comes of {', '.join(f.kind for f in left)}")
     rate_hz = card.flight.rate_hz
     if outcome.recording is not None and rate_hz not in sitl.RATES_HZ:
         print(f"  recorded at {sitl.recorder_rate_hz(rate_hz)} Hz: {rate_hz:g} Hz of the card is"
