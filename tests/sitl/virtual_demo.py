@@ -46,6 +46,7 @@ def main() -> int:
         "identifying the aircraft from its log, beside the truth only the simulation knows",
         *("identify", log, "--calibration", calibration),
         *("--aircraft", "ultrastick25e", "--truth", str(OUT / "flight.truth.toml")),
+        *("--model", "longitudinal", "--model", "lateral", "--model", "coefficients"),
         *("--plots", str(OUT / "plots")),
     )
     if identified not in (0, 3):
