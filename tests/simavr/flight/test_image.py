@@ -1,4 +1,4 @@
-"""What the flight image may hold: no heap, no text of floats, RAM, flash, stack, fast interrupts."""
+"""What the flight image may hold: no heap, no text of floats, a budget, a stack that fits."""
 
 from __future__ import annotations
 
