@@ -1,6 +1,7 @@
 // Timer 5 runs free at 2 MHz: every stamp of the instrument comes from it.
 #include "hal/clock.h"
 
+#include <avr/interrupt.h>
 #include <avr/io.h>
 
 #include "boards/mega2560/board.h"
@@ -68,10 +69,39 @@ ISR(TIMER5_OVF_vect, ISR_NAKED) {
       "reti \n\t");
 }
 
-// 1 kHz: ends the sleep of the main loop, and the rest of a receiver bank that stormed.
-ISR(TIMER2_COMPA_vect, ISR_NOBLOCK) {
+// Every second time, 1 kHz: ends the sleep of the main loop, and the rest of a receiver bank that
+// stormed.
+extern "C" void __vector_millisecond(void) __attribute__((signal, used, externally_visible));
+void __vector_millisecond(void) {
   mega::g_awake = true;
   mega::tick_pulse_capture();
+}
+
+// 2 kHz: looks at the stack. One that runs away goes through all of RAM in 0.66 ms and then writes
+// return addresses into the I/O registers: on the way it may toggle the heartbeat for ever, or
+// drive receiver lines. So it is stopped before it gets there. 27 cycles with interrupts off.
+ISR(TIMER2_COMPA_vect, ISR_NAKED) {
+  __asm__ __volatile__(
+      "push r24 \n\t"
+      "in r24, __SREG__ \n\t"
+      "push r24 \n\t"
+      "in r24, __SP_H__ \n\t"
+      "cpi r24, hi8(_end + 255) \n\t"
+      "brlo 3f \n\t"
+      "sbis %[flags], 0 \n\t"
+      "rjmp 1f \n\t"
+      "cbi %[flags], 0 \n\t"
+      "pop r24 \n\t"
+      "out __SREG__, r24 \n\t"
+      "pop r24 \n\t"
+      "sei \n\t"
+      "jmp __vector_millisecond \n\t"
+      "1: sbi %[flags], 0 \n\t"
+      "pop r24 \n\t"
+      "out __SREG__, r24 \n\t"
+      "pop r24 \n\t"
+      "reti \n\t"
+      "3: jmp mega_stack_gone \n\t" ::[flags] "I"(_SFR_IO_ADDR(GPIOR0)));
 }
 
 namespace mega {
@@ -82,7 +112,7 @@ void start_clock() {
   TIMSK5 = _BV(TOIE5);
   TCCR2A = _BV(WGM21);
   TCCR2B = _BV(CS22);  // 16 MHz / 64
-  OCR2A = 249;
+  OCR2A = 124;
   TIMSK2 = _BV(OCIE2A);
 }
 

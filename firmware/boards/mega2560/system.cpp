@@ -56,8 +56,9 @@ void mega_init3(void) {
   }
 }
 
-// The watchdog's first time-out. The return address is on top of the stack, high byte first: note
-// it, then wait for the reset. Nothing here may rely on the state of the program.
+// The watchdog's first time-out, or a stack that grew into the data. The return address is on top
+// of the stack, high byte first: note it, then wait for the reset. Nothing here may rely on the
+// state of the program.
 void mega_watchdog(const uint8_t* stack) __attribute__((used, noreturn));
 void mega_watchdog(const uint8_t* const stack) {
   const uint32_t words = (uint32_t(stack[1]) << 16) | (uint32_t(stack[2]) << 8) | stack[3];
@@ -69,6 +70,18 @@ void mega_watchdog(const uint8_t* const stack) {
 }
 
 }  // extern "C"
+
+// Jumped to with interrupts off, two bytes above the return address.
+extern "C" void mega_stack_gone(void) __attribute__((naked, used));
+void mega_stack_gone(void) {
+  __asm__ __volatile__(
+      "pop r24 \n\t"
+      "pop r24 \n\t"
+      "clr __zero_reg__ \n\t"
+      "in r24, __SP_L__ \n\t"
+      "in r25, __SP_H__ \n\t"
+      "jmp mega_watchdog \n\t");
+}
 
 ISR(WDT_vect, ISR_NAKED) {
   __asm__ __volatile__(
