@@ -15,7 +15,6 @@ namespace {
 
 constexpr uint32_t kUsbBaud = 115200UL;
 constexpr uint32_t kSecondUs = 1000000UL;
-constexpr uint16_t kLeastAvccMv = 4500;  // 16 MHz wants 4.5 V (ATmega2560 datasheet, 31.4)
 
 constexpr char kLineEnd[] CORE_FLASH = "\r\n";
 
@@ -95,7 +94,7 @@ void Instrument::step_slow(uint32_t now_us) {
       panel_.step(recorder_, now_us);
       return;
     case 2:
-      status_.step(recorder_, sensors_, pilot_, now_us);
+      status_.step(recorder_, sensors_, pilot_, store_.reference_mv(), now_us);
       return;
     case 4:
       if (telemetry_.poll(now_us)) put_telemetry_heads(now_us);
@@ -112,8 +111,7 @@ void Instrument::step_slow(uint32_t now_us) {
 }
 
 bool Instrument::self_test_passed() const {
-  const uint16_t avcc_mv = hal::avcc_mv();
-  return avcc_mv == 0 || avcc_mv >= kLeastAvccMv;
+  return core::supply_good(hal::avcc_mv(), store_.reference_mv());
 }
 
 void Instrument::put_system(uint32_t now_us) {
@@ -134,6 +132,7 @@ void Instrument::put_system(uint32_t now_us) {
   }
   recorder_.put_health(&frame);
   sensors_.put_health(&frame);
+  frame.avcc_mv = core::supply_mv(hal::avcc_mv(), store_.reference_mv());
   const core::RcDecoder& receiver = pilot_.decoder();
   frame.rc_glitches = receiver.glitches();
   frame.rc_frame_us = receiver.frame_us();

@@ -23,11 +23,7 @@ class Outlet {
   // Events of the time before a session wait for it. Of more than eight the first two stay, which
   // tell of the boot, and the oldest behind them is given up.
   void event(frames::Event code, uint32_t arg, uint32_t t_us) {
-    frames::EventFrame frame;
-    frame.t_us = t_us;
-    frame.code = static_cast<uint8_t>(code);
-    frame.arg = arg;
-    telemetry_.offer(frames::EventFrame::id(), &frame, sizeof frame, t_us);
+    const frames::EventFrame frame = send(code, arg, t_us);
     if (logging_) {
       (void)ring_.push_event(code, arg, t_us);
       return;
@@ -37,6 +33,16 @@ class Outlet {
       --waiting_count_;
     }
     waiting_[waiting_count_++] = frame;
+  }
+
+  // To the radio alone.
+  frames::EventFrame send(frames::Event code, uint32_t arg, uint32_t t_us) {
+    frames::EventFrame frame;
+    frame.t_us = t_us;
+    frame.code = static_cast<uint8_t>(code);
+    frame.arg = arg;
+    telemetry_.offer(frames::EventFrame::id(), &frame, sizeof frame, t_us);
+    return frame;
   }
 
   void open() { logging_ = true; }

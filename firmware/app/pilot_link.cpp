@@ -11,6 +11,7 @@ namespace app {
 
 void PilotLink::start() {
   hal::start_pulse_capture();
+  (void)hal::relay_engaged();  // its pull-up wants a microsecond before it is believed
   lost_edges_ = hal::lost_edges();
 }
 
@@ -55,7 +56,8 @@ void PilotLink::decide(const frames::ConfigFrame& config,
                        Outlet& outlet,
                        uint32_t now_us) {
   channels_ = core::map_channels(decoder_, config);
-  drive_.update(channels_, config, self_test_passed, now_us);
+  if (!drive_.relay()) look_at_contact(now_us);
+  drive_.update(channels_, config, self_test_passed && !contact_stuck_, now_us);
   for (uint8_t servo = 0; servo < core::kServos; ++servo) {
     const uint16_t ticks = drive_.servo_ticks(servo);
     if (ticks == sent_ticks_[servo]) continue;
@@ -65,10 +67,20 @@ void PilotLink::decide(const frames::ConfigFrame& config,
   report(outlet, now_us);
 }
 
+// Part of the self-test: before the first edge, and some time after the last, the contact is open.
+void PilotLink::look_at_contact(uint32_t now_us) {
+  if (toggled_ && now_us - toggled_us_ < kReleaseUs) return;
+  toggled_ = false;
+  contact_stuck_ = hal::relay_engaged();
+}
+
 void PilotLink::beat(uint32_t now_us) {
   if (!health_.beat(now_us)) return;
   hal::feed_watchdog();
-  if (drive_.relay()) hal::toggle_heartbeat();
+  if (!drive_.relay()) return;
+  hal::toggle_heartbeat();
+  toggled_ = true;
+  toggled_us_ = now_us;
 }
 
 void PilotLink::report(Outlet& outlet, uint32_t now_us) {

@@ -32,12 +32,16 @@ class PilotLink {
   const core::RcDecoder& decoder() const { return decoder_; }
   frames::Drive drive() const { return drive_.drive(); }
   uint16_t servo_ticks(uint8_t servo) const { return drive_.servo_ticks(servo); }
+  // The relay's contact says engaged although no heartbeat holds it: it must not be used.
+  bool contact_stuck() const { return contact_stuck_; }
 
  private:
   static constexpr uint16_t kPollUs = 1500;  // pulses that stay away show within this
   static constexpr uint16_t kRestUs = 10000;
+  static constexpr uint32_t kReleaseUs = 200000UL;  // by then a contact is open again
   static constexpr uint16_t kHoldingRestUs = 1000;  // a hold ends on time
 
+  void look_at_contact(uint32_t now_us);
   void poll_receiver(Outlet& outlet, uint32_t now_us);
   void decide(const frames::ConfigFrame& config,
               bool self_test_passed,
@@ -52,11 +56,14 @@ class PilotLink {
   uint16_t sent_ticks_[core::kServos] = {};
   uint32_t polled_us_ = 0;
   uint32_t decided_us_ = 0;
+  uint32_t toggled_us_ = 0;  // the last heartbeat edge
   uint16_t lost_edges_ = 0;
   frames::Drive told_drive_ = frames::Drive::kDirectBoot;
   uint8_t told_missing_ = (1U << core::kChannels) - 1;
   uint8_t decided_changes_ = 0;
   bool stormy_ = false;
+  bool toggled_ = false;  // a heartbeat edge may hold the relay
+  bool contact_stuck_ = false;
 };
 
 }  // namespace app

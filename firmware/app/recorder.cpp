@@ -79,7 +79,9 @@ void Recorder::decide(const core::PilotInputs& in, frames::ConfigFrame& config, 
       record(action, in, now_us);
       break;
     case State::kEnding:
-      if (writer_.drained() && !block_open_ && !programming_ && stream_ended(now_us)) {
+      if (!end_told_) {
+        tell_end();
+      } else if (writer_.drained() && !block_open_ && !programming_ && stream_ended(now_us)) {
         finish(now_us);
       }
       break;
@@ -252,12 +254,23 @@ void Recorder::watch_room(const core::PilotInputs& in, uint32_t now_us) {
 
 void Recorder::end(uint32_t why, uint32_t now_us) {
   if (state_ != State::kRecording) return;
-  outlet_.event(frames::Event::kSessionEnd, why, now_us);
   outlet_.close();
-  writer_.finish();
   hal::set_flight_mark(false);
   state_ = State::kEnding;
+  ended_us_ = now_us;
   full_ = why == 1;
+  end_told_ = false;
+  (void)outlet_.send(frames::Event::kSessionEnd, why, now_us);
+  tell_end();
+}
+
+// The ring may be full: then the last words wait until the card has taken a block of it.
+void Recorder::tell_end() {
+  if (ring_.free() < 2U * frames::kEventWireSize) return;
+  (void)ring_.tell_dropped();
+  (void)ring_.push_event(frames::Event::kSessionEnd, full_ ? 1U : 0U, ended_us_);
+  writer_.finish();
+  end_told_ = true;
 }
 
 // The card is busy for a while with the end of a stream, and takes no other call until then.

@@ -57,6 +57,7 @@ class Recorder {
   void begin(uint32_t why, bool same_session, uint32_t now_us);
   void record(core::RecordAction action, const core::PilotInputs& in, uint32_t now_us);
   void end(uint32_t why, uint32_t now_us);
+  void tell_end();
   bool stream_ended(uint32_t now_us);
   void finish(uint32_t now_us);
   void prepare_next();
@@ -85,6 +86,7 @@ class Recorder {
   uint32_t retry_us_ = 0;
   uint32_t accepted_us_ = 0;
   uint32_t marks_ = 0;
+  uint32_t ended_us_ = 0;
   uint16_t card_errors_ = 0;
   uint16_t stall_ms_ = 0;  // not yet told by an event
   uint16_t busy_max_ms_ = 0;
@@ -97,7 +99,8 @@ class Recorder {
   bool resumed_ = false;
   bool heads_told_ = false;
   bool file_low_told_ = false;
-  bool full_ = false;  // the session ended for want of room
+  bool full_ = false;      // the session ended for want of room
+  bool end_told_ = false;  // by its event
   bool stream_open_ = false;
   bool stream_closing_ = false;
   bool block_open_ = false;

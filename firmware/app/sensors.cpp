@@ -182,6 +182,7 @@ void Sensors::finish_ident(Outlet& outlet) {
   ident_.pot_aileron_right = sums[8];
   ident_.pot_rudder = sums[9];
   ident_.valid = valid;
+  analog_ = valid;
   rail_ = hal::scan_sum(hal::kAnalogRail);
   outlet.put(ident_);
 }
@@ -259,7 +260,6 @@ void Sensors::put_health(frames::SystemFrame* out) {
   out->baro_errors = barometer_.errors();
   out->gps_errors = gps_.errors();
   out->ticks_late = trigger_.late();
-  out->avcc_mv = hal::avcc_mv();
   out->rail = rail_;
   out->sensors = static_cast<uint8_t>(out->sensors | heard_);
 }

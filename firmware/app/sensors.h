@@ -29,11 +29,15 @@ class Sensors {
   void put_health(frames::SystemFrame* out);
   // Bits of frames.toml, `sensors`: heard of during the last second.
   uint8_t heard() const { return heard_; }
+  uint8_t known() const { return known_; }  // of those, ever since boot
   // Of the last epoch whose date was known, for the file system; 0: none yet.
   uint32_t fat_date() const;
   const frames::BaroFrame& baro() const { return barometer_.frame(); }
   const frames::GpsFrame& gps() const { return gps_.frame(); }
   const frames::IdentFrame& ident() const { return ident_; }
+  const core::ImuSample& imu() const { return imu_.sample(); }
+  // Of the last scan: the first ten bits of `valid`, neither open nor shorted.
+  uint16_t analog() const { return analog_; }
   uint16_t rail() const { return rail_; }
 
  private:
@@ -45,7 +49,10 @@ class Sensors {
   void step_baro(Outlet& outlet, uint32_t now_us);
   void step_gps(const frames::ConfigFrame& config, Outlet& outlet, uint32_t now_us);
   void gps_heard(const frames::GpsFrame& frame, Outlet& outlet, uint32_t now_us);
-  void hear(uint8_t bit) { hearing_ = static_cast<uint8_t>(hearing_ | bit); }
+  void hear(uint8_t bit) {
+    hearing_ = static_cast<uint8_t>(hearing_ | bit);
+    known_ = static_cast<uint8_t>(known_ | bit);
+  }
 
   core::ImuReceiver imu_;
   core::IdentTrigger trigger_;
@@ -62,10 +69,12 @@ class Sensors {
   uint32_t gps_heard_us_ = 0;
   uint32_t date_itow_ms_ = 0;
   uint16_t date_week_ = frames::kGpsWeekInvalid;
+  uint16_t analog_ = 0;
   uint16_t rail_ = 0;
   uint8_t slot_ = 0;
   uint8_t hearing_ = 0;
   uint8_t heard_ = 0;
+  uint8_t known_ = 0;
   bool scanning_ = false;
   bool imu_fresh_ = false;
   bool imu_present_ = false;

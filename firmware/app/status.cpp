@@ -2,7 +2,9 @@
 
 #include "app/version.h"
 #include "core/progmem.h"
+#include "core/supply.h"
 #include "hal/analog_input.h"
+#include "hal/relay.h"
 #include "hal/system.h"
 
 namespace app {
@@ -12,10 +14,24 @@ namespace {
 constexpr uint32_t kLineUs = 1000000UL;
 constexpr uint16_t kLongestPart = 48;
 
+constexpr uint16_t kRailDivider = 2;  // 10 k over 10 k (hw/pin_map.toml)
+constexpr uint16_t kLeastRailSum = 8;
+
 constexpr char kMissing[] CORE_FLASH = " missing";
+constexpr char kStale[] CORE_FLASH = " stale";
 constexpr char kImuText[] CORE_FLASH = " | imu";
 constexpr char kImuNew[] CORE_FLASH = " ok";
 constexpr char kImuOriginal[] CORE_FLASH = " original";
+constexpr char kRoll[] CORE_FLASH = " roll ";
+constexpr char kPitch[] CORE_FLASH = " pitch ";
+constexpr char kDegrees[] CORE_FLASH = " deg";
+constexpr char kForce[] CORE_FLASH = " az ";
+constexpr char kMilliG[] CORE_FLASH = " mg";
+constexpr char kAlphaText[] CORE_FLASH = " | alpha";
+constexpr char kBetaText[] CORE_FLASH = " | beta";
+constexpr char kPitotText[] CORE_FLASH = " | pitot";
+constexpr char kPotText[] CORE_FLASH = " | pots";
+constexpr char kOpen[] CORE_FLASH = " -";
 constexpr char kBaroText[] CORE_FLASH = " | baro";
 constexpr char kPascal[] CORE_FLASH = " Pa";
 constexpr char kGpsText[] CORE_FLASH = " | gps";
@@ -24,8 +40,15 @@ constexpr char kSatellites[] CORE_FLASH = " sat ";
 constexpr char kReceiverText[] CORE_FLASH = " | rc us";
 constexpr char kCardText[] CORE_FLASH = " | card ";
 constexpr char kDriveText[] CORE_FLASH = " | drive ";
+constexpr char kRelayText[] CORE_FLASH = " | relay ";
+constexpr char kReleased[] CORE_FLASH = "released";
+constexpr char kEngaged[] CORE_FLASH = "engaged";
+constexpr char kStuck[] CORE_FLASH = "stuck";
+constexpr char kRailText[] CORE_FLASH = " | rail";
 constexpr char kSupplyText[] CORE_FLASH = " | avcc ";
-constexpr char kMillivolt[] CORE_FLASH = " mV\r\n";
+constexpr char kMillivolt[] CORE_FLASH = " mV";
+constexpr char kAbout[] CORE_FLASH = "about ";  // the reference was never compared with a meter
+constexpr char kLineEnd[] CORE_FLASH = "\r\n";
 
 constexpr char kTextNoCard[] CORE_FLASH = "missing";
 constexpr char kTextNoFat[] CORE_FLASH = "not FAT32";
@@ -91,6 +114,7 @@ void Status::start(uint32_t now_us) {
 void Status::step(const Recorder& recorder,
                   const Sensors& sensors,
                   const PilotLink& pilot,
+                  uint16_t reference_mv,
                   uint32_t now_us) {
   if (part_ == Part::kIdle) {
     if (recorder.recording() || !turn_.due(now_us, kLineUs)) return;
@@ -106,6 +130,14 @@ void Status::step(const Recorder& recorder,
     case Part::kImu:
       imu(sensors);
       break;
+    case Part::kVanes:
+      analog(kAlphaText, sensors, 0, 2);
+      analog(kBetaText, sensors, 2, 2);
+      break;
+    case Part::kPitots:
+      analog(kPitotText, sensors, 4, 2);
+      analog(kPotText, sensors, 6, 4);
+      break;
     case Part::kBaro:
       baro(sensors);
       break;
@@ -119,13 +151,26 @@ void Status::step(const Recorder& recorder,
       out_.flash(kDriveText);
       out_.flash(drive_text(pilot.drive()));
       break;
+    case Part::kRelay:
+      out_.flash(kRelayText);
+      if (pilot.contact_stuck()) {
+        out_.flash(kStuck);
+      } else {
+        out_.flash(hal::relay_engaged() ? kEngaged : kReleased);
+      }
+      break;
     case Part::kCard:
       card(recorder);
       break;
+    case Part::kRail:
+      rail(sensors.rail(), core::supply_mv(hal::avcc_mv(), reference_mv));
+      break;
     case Part::kSupply:
       out_.flash(kSupplyText);
-      out_.number(hal::avcc_mv());
+      if (reference_mv == 0) out_.flash(kAbout);
+      out_.number(core::supply_mv(hal::avcc_mv(), reference_mv));
       out_.flash(kMillivolt);
+      out_.flash(kLineEnd);
       break;
     case Part::kIdle:
       return;
@@ -133,22 +178,77 @@ void Status::step(const Recorder& recorder,
   part_ = static_cast<Part>(static_cast<uint8_t>(part_) + 1U);
 }
 
+bool Status::found(const Sensors& sensors, uint8_t bits) {
+  if ((sensors.heard() & bits) != 0) return true;
+  const bool stale = (sensors.known() & bits) != 0;
+  out_.flash(stale ? kStale : kMissing);
+  return stale;
+}
+
 void Status::imu(const Sensors& sensors) {
   out_.flash(kImuText);
-  const uint8_t heard = sensors.heard();
-  if ((heard & frames::kSensorsImu) != 0) {
-    out_.flash(kImuNew);
-  } else {
-    out_.flash((heard & frames::kSensorsImuOriginal) != 0 ? kImuOriginal : kMissing);
+  const core::ImuSample& sample = sensors.imu();
+  if (!found(sensors, frames::kSensorsImu | frames::kSensorsImuOriginal)) return;
+  if ((sensors.heard() & (frames::kSensorsImu | frames::kSensorsImuOriginal)) != 0) {
+    out_.flash(sample.original ? kImuOriginal : kImuNew);
   }
+  if ((sample.flags & frames::kImuFlagsAttitudeValid) != 0) {
+    out_.flash(kRoll);
+    out_.number(sample.phi / 100);
+    out_.flash(kPitch);
+    out_.number(sample.theta / 100);
+    out_.flash(kDegrees);
+  }
+  // The steps of original packets depend on the chip's revision: nothing to say in mg.
+  if (sample.original || sample.az == INT16_MIN) return;
+  out_.flash(kForce);
+  out_.number(static_cast<int32_t>(sample.az) * 125 / 1024);  // 8192 steps per g
+  out_.flash(kMilliG);
+}
+
+void Status::analog(const char* name, const Sensors& sensors, uint8_t slot, uint8_t count) {
+  out_.flash(name);
+  const frames::IdentFrame& ident = sensors.ident();
+  const uint16_t sums[] = {ident.alpha_a,
+                           ident.alpha_b,
+                           ident.beta_a,
+                           ident.beta_b,
+                           ident.dp_a,
+                           ident.dp_b,
+                           ident.pot_elevator,
+                           ident.pot_aileron_left,
+                           ident.pot_aileron_right,
+                           ident.pot_rudder};
+  const uint16_t usable = static_cast<uint16_t>(sensors.analog() >> slot);
+  if ((usable & ((1U << count) - 1U)) == 0) {
+    out_.flash(kMissing);
+    return;
+  }
+  for (uint8_t i = 0; i < count; ++i) {
+    if ((usable >> i & 1U) == 0) {
+      out_.flash(kOpen);
+      continue;
+    }
+    out_.letter(' ');
+    out_.number(sums[slot + i] / hal::kAnalogRounds);
+  }
+}
+
+void Status::rail(uint16_t sum, uint16_t supply_mv) {
+  out_.flash(kRailText);
+  if (sum < kLeastRailSum || supply_mv == 0) {
+    out_.flash(kMissing);
+    return;
+  }
+  out_.letter(' ');
+  out_.number(static_cast<int32_t>(static_cast<uint32_t>(sum) * kRailDivider * supply_mv /
+                                   (1024U * hal::kAnalogRounds)));
+  out_.flash(kMillivolt);
 }
 
 void Status::baro(const Sensors& sensors) {
   out_.flash(kBaroText);
-  if ((sensors.heard() & frames::kSensorsBaro) == 0) {
-    out_.flash(kMissing);
-    return;
-  }
+  if (!found(sensors, frames::kSensorsBaro)) return;
   out_.letter(' ');
   out_.number(static_cast<int32_t>(sensors.baro().static_pressure / 16U));
   out_.flash(kPascal);
@@ -156,10 +256,7 @@ void Status::baro(const Sensors& sensors) {
 
 void Status::gps(const Sensors& sensors) {
   out_.flash(kGpsText);
-  if ((sensors.heard() & frames::kSensorsGps) == 0) {
-    out_.flash(kMissing);
-    return;
-  }
+  if (!found(sensors, frames::kSensorsGps)) return;
   out_.flash(kFixText);
   out_.number(sensors.gps().fix);
   out_.flash(kSatellites);

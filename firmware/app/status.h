@@ -16,12 +16,32 @@ class Status {
   void step(const Recorder& recorder,
             const Sensors& sensors,
             const PilotLink& pilot,
+            uint16_t reference_mv,
             uint32_t now_us);
 
  private:
-  enum class Part : uint8_t { kName, kImu, kBaro, kGps, kReceiver, kServos, kCard, kSupply, kIdle };
+  enum class Part : uint8_t {
+    kName,
+    kImu,
+    kVanes,
+    kPitots,
+    kBaro,
+    kGps,
+    kReceiver,
+    kServos,
+    kRelay,
+    kCard,
+    kRail,
+    kSupply,
+    kIdle
+  };
 
+  // Writes " missing", or " stale" if it was there; true if there is a value to write.
+  bool found(const Sensors& sensors, uint8_t bits);
   void imu(const Sensors& sensors);
+  // The counts of `count` analogue channels from a slot on, "-" for one that is open or shorted.
+  void analog(const char* name, const Sensors& sensors, uint8_t slot, uint8_t count);
+  void rail(uint16_t sum, uint16_t supply_mv);
   void baro(const Sensors& sensors);
   void gps(const Sensors& sensors);
   void receiver(const PilotLink& pilot);

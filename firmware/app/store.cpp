@@ -4,17 +4,24 @@
 
 namespace app {
 
+namespace {
+
+void read(uint16_t address, uint8_t* to, uint8_t size) {
+  while (size-- != 0) *to++ = hal::read_eeprom(address++);
+}
+
+}  // namespace
+
 core::SettingsStatus Store::load(frames::ConfigFrame* config) {
   uint8_t record[core::kSettingsRecordSize];
-  for (uint8_t i = 0; i < core::kSettingsRecordSize; ++i) {
-    record[i] = hal::read_eeprom(static_cast<uint16_t>(kSettingsAddress + i));
-  }
+  read(kSettingsAddress, record, core::kSettingsRecordSize);
   const core::SettingsStatus status = core::read_settings(record, *config);
+  read(kReferenceAddress, record, core::kReferenceRecordSize);
+  reference_mv_ = core::read_reference(record);
   for (uint8_t slot = 0; slot < core::kSessionSlots; ++slot) {
-    for (uint8_t i = 0; i < core::kSessionSlotSize; ++i) {
-      bytes_[i] = hal::read_eeprom(
-          static_cast<uint16_t>(kSlotsAddress + slot * core::kSessionSlotSize + i));
-    }
+    read(static_cast<uint16_t>(kSlotsAddress + slot * core::kSessionSlotSize),
+         bytes_,
+         core::kSessionSlotSize);
     slots_.slot(slot, bytes_);
   }
   record_ = slots_.latest();

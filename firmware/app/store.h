@@ -1,10 +1,11 @@
-// What the EEPROM keeps: the settings, and the numbers of sessions and boots.
+// What the EEPROM keeps: the settings, the numbers of sessions and boots, the chip's reference.
 #pragma once
 
 #include <stdint.h>
 
 #include "core/session_record.h"
 #include "core/settings.h"
+#include "core/supply.h"
 
 namespace app {
 
@@ -12,6 +13,7 @@ class Store {
  public:
   static constexpr uint16_t kSettingsAddress = 0;
   static constexpr uint16_t kSlotsAddress = 64;
+  static constexpr uint16_t kReferenceAddress = 4096U - core::kReferenceRecordSize;
   static_assert(core::kSettingsRecordSize <= kSlotsAddress, "the records do not overlap");
 
   // Reads everything; a boot is counted. Writing goes on in poll().
@@ -22,6 +24,7 @@ class Store {
   uint32_t session() const { return record_.session; }  // largest given out
   uint32_t boots() const { return record_.boots; }
   void set_session(uint32_t session);
+  uint16_t reference_mv() const { return reference_mv_; }  // 0: not calibrated
 
  private:
   void save();
@@ -30,6 +33,7 @@ class Store {
   core::SessionRecord record_;
   uint8_t bytes_[core::kSessionSlotSize] = {};
   uint16_t address_ = 0;
+  uint16_t reference_mv_ = 0;
   uint8_t written_ = core::kSessionSlotSize;
   bool again_ = false;  // the record changed while it was being written
 };

@@ -36,19 +36,30 @@ bool ByteRing::push(uint8_t id, const void* fields, uint32_t t_us) {
     return false;
   }
   if (notice != 0) {
-    frames::EventFrame event;
-    event.t_us = dropped_first_us_;
-    event.code = static_cast<uint8_t>(frames::Event::kFramesDropped);
-    event.arg = dropped_pending_;
-    dropped_pending_ = 0;
-    append(&frames::kEventId, 1);
-    append(&event, sizeof(event));
+    (void)tell_dropped();
   }
   append(&id, 1);
   append(fields, static_cast<uint16_t>(size - 1));
   if (free() < free_min_) {
     free_min_ = free();
   }
+  return true;
+}
+
+bool ByteRing::tell_dropped() {
+  if (dropped_pending_ == 0) {
+    return true;
+  }
+  if (free() < frames::kEventWireSize) {
+    return false;
+  }
+  frames::EventFrame event;
+  event.t_us = dropped_first_us_;
+  event.code = static_cast<uint8_t>(frames::Event::kFramesDropped);
+  event.arg = dropped_pending_;
+  dropped_pending_ = 0;
+  append(&frames::kEventId, 1);
+  append(&event, sizeof(event));
   return true;
 }
 

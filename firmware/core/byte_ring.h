@@ -25,6 +25,9 @@ class ByteRing {
   }
   // Events may use the last kEventReserve bytes, which other frames leave free.
   bool push_event(frames::Event code, uint32_t arg, uint32_t t_us);
+  // Tells of the frames dropped so far, in the room for events too: at a session's end no frame
+  // comes any more that would. True: nothing is left to tell.
+  bool tell_dropped();
 
   uint16_t used() const { return used_; }
   uint16_t free() const { return static_cast<uint16_t>(capacity_ - used_); }

@@ -25,16 +25,20 @@ from tests.host.logs import ROOT
 
 # Recorded from the firmware in simulated time, and the same with everything there and nothing.
 SITL = (
-    "sitl 0.1.0 | imu missing | baro missing | gps missing | rc us 1500 1500 1500 1100 1100"
-    " | drive direct (switch) | card ready 1 | avcc 5000 mV"
+    "sitl 0.1.0 | imu missing | alpha missing | beta missing | pitot missing | pots missing"
+    " | baro missing | gps missing | rc us 1500 1500 1500 1100 1100 | drive direct (switch)"
+    " | relay released | card ready 1 | rail missing | avcc about 5000 mV"
 )
 WELL = (
-    "mega2560 0.1.0 | imu ok | baro 101325 Pa | gps fix 3 sat 9 | rc us 1501 1499 1500 1100 1900"
-    " | drive mega | card ready 12 | avcc 4987 mV"
+    "mega2560 0.1.0 | imu ok roll 1 pitch -3 deg az -998 mg | alpha 512 509 | beta 515 500"
+    " | pitot 514 511 | pots 500 498 503 512 | baro 101325 Pa | gps fix 3 sat 9"
+    " | rc us 1501 1499 1500 1100 1900 | drive mega | relay engaged | card ready 12"
+    " | rail 5012 mV | avcc 4987 mV"
 )
 BARE = (
-    "BENCH ONLY 0.1.0 | imu missing | baro missing | gps missing | rc us missing"
-    " | drive direct (boot) | card not FAT32 | avcc 4391 mV"
+    "mega2560 0.1.0 | imu missing | alpha missing | beta missing | pitot 512 - | pots missing"
+    " | baro missing | gps missing | rc us missing | drive direct (boot) | relay stuck"
+    " | card not FAT32 | rail missing | avcc 4391 mV"
 )
 
 
@@ -187,7 +191,8 @@ def test_line_from_simulated_time() -> None:
     assert [line.state(key) for key in ("imu", "baro", "gps")] == ["missing"] * 3
     assert line.numbers("rc") == [1500, 1500, 1500, 1100, 1100]
     assert line.as_json()["card"] == {"state": "ready", "file_number": 1}
-    assert len(line.complaints()) == 3
+    assert len(line.complaints()) == 8
+    assert not line.supply_calibrated
 
 
 def test_nothing_to_complain_of() -> None:
@@ -195,6 +200,9 @@ def test_nothing_to_complain_of() -> None:
     assert line is not None
     assert line.complaints() == []
     found = line.as_json()
+    assert found["imu"] == {"state": "ok", "roll_deg": 1, "pitch_deg": -3, "az_mg": -998}
+    assert found["pots"] == {"state": "ok", "counts": [500, 498, 503, 512]}
+    assert (found["relay"], found["rail_mv"]) == ("engaged", 5012)
     assert found["baro"] == {"state": "ok", "static_pressure_pa": 101325}
     assert found["gps"] == {"state": "ok", "fix": 3, "satellites": 9}
     assert (found["servos_by"], found["supply_mv"]) == ("mega", 4987)
@@ -203,9 +211,12 @@ def test_nothing_to_complain_of() -> None:
 def test_every_trouble_has_a_remedy() -> None:
     line = parse_status(BARE)
     assert line is not None
-    assert line.board == "BENCH ONLY"
+    assert line.counts("pitot") == [512, None]
     text = "\n".join(line.complaints())
-    for word in ("IMU", "barometer", "GPS", "receiver powered", "FAT32", "4.5 V", "no servo"):
+    for word in (
+        "IMU", "alpha", "beta", "pitots: one", "pots", "barometer", "GPS", "receiver powered",
+        "relay stuck", "FAT32", "servo rail", "4.5 V",
+    ):  # fmt: skip
         assert word in text
     for state in ("missing", "unreadable", "full", "fragmented", "lost", "open flight 7"):
         changed = parse_status(WELL.replace("card ready 12", f"card {state}"))
@@ -215,12 +226,25 @@ def test_every_trouble_has_a_remedy() -> None:
     assert stale is not None
     assert "stale" in stale.complaints()[0]
     assert stale.numbers("baro") == [101325]
+    stale = parse_status(WELL.replace("imu ok", "imu stale"))
+    assert stale is not None
+    assert stale.state("imu") == "stale"
+    assert len(stale.complaints()) == 1
+
+
+def test_supply_never_compared_with_a_meter_is_judged_by_its_spread() -> None:
+    # 4.5 V seen against a reference of 1.2 V instead of 1.1 V shows as 4125 mV.
+    for text, wrong in (("4499", 1), ("4500", 0), ("about 4124", 1), ("about 4126", 0)):
+        line = parse_status(WELL.replace("avcc 4987", f"avcc {text}"))
+        assert line is not None
+        assert len(line.complaints()) == wrong, text
+        assert line.supply_calibrated == (not text.startswith("about"))
 
 
 def test_what_a_later_firmware_adds_is_shown() -> None:
-    line = parse_status(WELL + " | rail 5012 mV")
+    line = parse_status(WELL + " | current 1012 mA")
     assert line is not None
-    assert "rail       5012 mV" in "\n".join(line.lines())
+    assert "current    1012 mA" in "\n".join(line.lines())
 
 
 @given(st.integers(1, len(WELL) - 1), st.sampled_from([SITL, WELL, BARE]))

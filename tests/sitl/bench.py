@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 from collections.abc import Sequence
 from functools import cache
@@ -16,6 +17,7 @@ from tests.sitl.card_image import CARD_ID, list_files, new_card, read_file
 from tests.sitl.instrument import TICKS_PER_S, Recorder, Sitl
 from tests.sitl.script import Script, script
 
+ROOT = Path(__file__).resolve().parents[2]
 FILE_BLOCKS = 4000  # 2 MB: small enough that old blocks are met again soon
 FSCK = "/usr/sbin/fsck.vfat"
 START_S = 0.5
@@ -32,6 +34,20 @@ def flight(seconds: float, frame_us: float = 20_000.0, simultaneous: bool = Fals
     return script(seconds, frame_us=frame_us, simultaneous=simultaneous, idle_from_s=seconds - 15.0)
 
 
+@cache
+def config_places() -> dict[str, tuple[int, int]]:
+    """Return first byte and size of the integers of the frame `config`, without its id."""
+    text = (ROOT / "protocol" / "generated" / "schema.json").read_text(encoding="utf-8")
+    frames = json.loads(text)["schema"]["frames"]
+    fields = next(frame["fields"] for frame in frames if frame["name"] == "config")
+    places, at = {}, 0
+    for name, kind, *_ in fields:
+        size = int(kind[5:-1]) if kind.startswith("char") else int(kind[1:]) // 8
+        places[name] = (at, size)
+        at += size
+    return places
+
+
 class Bench:
     """An instrument with a small card; button and power as a test wants them."""
 
@@ -41,11 +57,18 @@ class Bench:
         self.sitl.set_file_blocks(file_blocks)
         self.sitl.insert_card(self.image, CARD_ID)
 
+    def configure(self, **changed: int) -> None:
+        """Change settings by their names in the frame `config`; KeyError for an unknown one."""
+        config = self.sitl.default_config()
+        places = config_places()
+        for name, value in changed.items():
+            start, size = places[name]
+            config[start : start + size] = value.to_bytes(size, "little")
+        self.sitl.set_config(config)
+
     def set_rate(self, rate_hz: int) -> None:
         """Change the identification rate in the settings."""
-        config = self.sitl.default_config()
-        config[4:6] = rate_hz.to_bytes(2, "little")
-        self.sitl.set_config(config)
+        self.configure(rate_hz=rate_hz)
 
     def record(self, seconds: float) -> None:
         """Start recording with the button and let it run."""

@@ -239,6 +239,10 @@ class Sitl:
         """Set the analogue supply in mV."""
         self._c.sitl_set_supply(ctypes.c_uint16(avcc_mv))
 
+    def weld_relay(self) -> None:
+        """Let the relay's contact say engaged for ever."""
+        self._c.sitl_weld_relay(ctypes.c_int(1))
+
     def set_pressure(
         self, coefficients: Sequence[int], start: int, step: int, raw: npt.ArrayLike
     ) -> None:

@@ -36,6 +36,26 @@ def test_stall_within_the_ring_loses_nothing(tmp_path: Path, rate_hz: int, stall
     assert len(log.frames["ident"]) > 21 * rate_hz
 
 
+def test_session_that_ends_in_a_stall_tells_its_last_losses(tmp_path: Path) -> None:
+    bench = Bench()
+    flight(34.0).give(bench.sitl)
+    # The ring is full for a second when the button ends the session.
+    bench.sitl.add_card_fault(ticks(19.9), CardFault.BUSY, 1_900_000)
+    bench.sitl.power_on()
+    bench.sitl.run_for(0.5)
+    bench.record(12.0)
+    bench.sitl.run_until(ticks(19.3))
+    bench.stop()
+    log = bench.log(tmp_path)
+    told = events(log, "frames_dropped")
+    blocks = oracle.find_blocks(read_file(bytes(bench.image), "FLT00001.BIN"))
+    assert sum(told) == blocks[-1].dropped > 50
+    assert log.loss.dropped_frames == sum(told)
+    assert events(log, "session_end") == [0]
+    assert int(log.frames["event"]["code"][-1]) == 2
+    assert log.complete == "complete"
+
+
 def test_stall_beyond_the_ring_is_accounted_for_exactly(tmp_path: Path) -> None:
     bench = Bench()
     plan = flight(34.0)

@@ -154,7 +154,8 @@ def test_status_line_says_what_is_there() -> None:
     lines = bench.sitl.sent(Port.USB).decode("ascii").split("\r\n")
     assert lines[0].startswith("sitl ")
     assert lines[-2].startswith("sitl ")
-    assert "imu missing | baro missing | gps missing" in lines[-2]
+    assert "imu missing | alpha missing" in lines[-2]
+    assert "baro missing | gps missing" in lines[-2]
     assert "rc us 1500 1500 1500 1100 1100" in lines[-2]
     assert "card ready 1" in lines[-2]
     assert 4 <= len(lines) - 2 <= 7

@@ -63,7 +63,7 @@ void toggle_heartbeat() {
 }
 
 bool relay_engaged() {
-  return world().relay.engaged;
+  return world().relay.engaged || world().relay.welded;
 }
 
 void set_card_wait(CardWait wait_function, void* context) {

@@ -132,6 +132,10 @@ void sitl_set_supply(uint16_t avcc_mv) {
   world().avcc_mv = avcc_mv;
 }
 
+void sitl_weld_relay(int welded) {
+  world().relay.welded = welded != 0;
+}
+
 void sitl_set_pressure(
     const uint16_t* words, int64_t start, int64_t step, const double* raw, size_t rows) {
   world().sensor.configure(true, words);

@@ -37,7 +37,10 @@ void sitl_add_packets(const int64_t* start,
                       size_t count);
 // Rows of 11 channels in counts, in the slots of the scan (alpha_a ... pot_rudder, rail).
 void sitl_set_analog(int64_t start, int64_t step, const double* counts, size_t rows);
+// As the chip measures it against a reference of 1.1 V.
 void sitl_set_supply(uint16_t avcc_mv);
+// The relay's contacts stay where they are when engaged, heartbeat or not.
+void sitl_weld_relay(int welded);
 // A BMP085 with its 11 coefficients; rows of UT and UP, UP as at oversampling 3.
 void sitl_set_pressure(
     const uint16_t* words, int64_t start, int64_t step, const double* raw, size_t rows);

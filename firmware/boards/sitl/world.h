@@ -80,6 +80,7 @@ struct RelayModel {
   uint8_t charge = 0;
   Tick last_toggle = -kNever / 2;
   bool engaged = false;
+  bool welded = false;
 };
 
 struct PortModel {

@@ -6,23 +6,41 @@ import re
 from dataclasses import dataclass, field
 
 # In the order in which firmware/app/status.cpp writes them; others are shown as they are.
-KEYS = ("imu", "baro", "gps", "rc", "drive", "card", "avcc")
+KEYS = (
+    "imu", "alpha", "beta", "pitot", "pots", "baro", "gps", "rc", "drive", "relay", "card", "rail",
+    "avcc",
+)  # fmt: skip
+ANALOGUE = ("alpha", "beta", "pitot", "pots")
 LEAST_AVCC_MV = 4500  # 16 MHz needs 4.5 V (ATmega2560 datasheet, 31.4)
+UNCALIBRATED = 1.2 / 1.1  # the chip's reference may be 1.2 V instead of 1.1 V (same, VINT1)
 
 _TITLES = {
     "imu": "IMU",
+    "alpha": "alpha",
+    "beta": "beta",
+    "pitot": "pitots",
+    "pots": "pots",
     "baro": "barometer",
     "gps": "GPS",
     "rc": "receiver",
     "drive": "servos by",
+    "relay": "relay",
     "card": "card",
+    "rail": "servo rail",
     "avcc": "supply",
 }
 _IMAGE = re.compile(r"^([\w .-]+) (\d+\.\d+\S*)$")
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
+_COUNTS = re.compile(r"missing|(?:\d+|-)(?: (?:\d+|-))*")
 _STATES = ("missing", "stale", "original", "ok")
 _HINTS = {
     ("imu", "missing"): "no packet for a second",
+    ("alpha", "missing"): "the voltage is at an end of its range; vanes plugged in?",
+    ("beta", "missing"): "the voltage is at an end of its range; vanes plugged in?",
+    ("pitot", "missing"): "the voltage is at an end of its range; sensors plugged in?",
+    ("pots", "missing"): "the voltage is at an end of its range; pots plugged in?",
+    ("relay", "stuck"): "its contact says engaged without a heartbeat; the Mega will not drive",
+    ("rail", "missing"): "no voltage; divider plugged in, receiver powered?",
     ("baro", "missing"): "no answer on its bus",
     ("gps", "missing"): "nothing readable; antenna, plug, crossed TX and RX?",
     ("rc", "missing"): "no steady pulses; receiver powered, transmitter on?",
@@ -43,7 +61,7 @@ class StatusLine:
     Parameters
     ----------
     board, version : str
-        Of the image that runs; board ``BENCH ONLY`` drives no servo and no relay.
+        Of the image that runs.
     fields : dict of str to str
         Key of the line -> what it says.
     """
@@ -53,10 +71,12 @@ class StatusLine:
     fields: dict[str, str] = field(default_factory=dict)
 
     def state(self, key: str) -> str:
-        """``ok``, ``missing``, ``stale``, ``original``, or what the card says of itself."""
+        """``ok``, ``missing``, ``stale``, ``original``; of card and relay what they say."""
         text = self.fields[key]
         if key == "card":
             return re.sub(r"\s+\d+$", "", text)
+        if key == "relay":
+            return text
         return next((word for word in _STATES if word in text.split()), "ok")
 
     def numbers(self, key: str) -> list[float]:
@@ -72,12 +92,22 @@ class StatusLine:
                 found.append(f"{_TITLES.get(key, key)} {self.state(key)}: {hint}")
             elif self.state(key) == "stale":
                 found.append(f"{_TITLES.get(key, key)} stale: it was there and went silent")
+            elif key in ANALOGUE and "-" in self.fields[key].split():
+                found.append(f"{_TITLES[key]}: one is at an end of its range (-); plugged in?")
         supply_mv = self._first("avcc")
-        if supply_mv is not None and supply_mv < LEAST_AVCC_MV:
+        if supply_mv is not None and 0 < supply_mv < self._least_supply_mv():
             found.append(f"supply below {LEAST_AVCC_MV / 1000:.1f} V: the chip is out of its range")
-        if self.board == "BENCH ONLY":
-            found.append("this image drives no servo and no relay: for the bench only")
         return found
+
+    @property
+    def supply_calibrated(self) -> bool:
+        """Whether the chip's reference was compared with a meter once."""
+        return not self.fields["avcc"].startswith("about")
+
+    def counts(self, key: str) -> list[float | None]:
+        """Return the counts of analogue channels, None for one that is open or shorted."""
+        words = self.fields[key].split()
+        return [] if "missing" in words else [None if w == "-" else float(w) for w in words]
 
     def as_json(self) -> dict[str, object]:
         """Return the line for a program: states, numbers with their unit, and the text."""
@@ -85,13 +115,22 @@ class StatusLine:
         return {
             "board": self.board,
             "version": self.version,
-            "imu": {"state": self.state("imu")},
+            "imu": {
+                "state": self.state("imu"),
+                "roll_deg": self._behind("imu", "roll"),
+                "pitch_deg": self._behind("imu", "pitch"),
+                "az_mg": self._behind("imu", "az"),
+            },
+            **{key: {"state": self.state(key), "counts": self.counts(key)} for key in ANALOGUE},
             "baro": {"state": self.state("baro"), "static_pressure_pa": self._first("baro")},
             "gps": {"state": self.state("gps"), "fix": None, "satellites": None, **gps},
             "receiver": {"state": self.state("rc"), "pulse_us": self.numbers("rc")},
             "servos_by": self.fields["drive"],
+            "relay": self.state("relay"),
             "card": {"state": self.state("card"), "file_number": self._first("card")},
+            "rail_mv": self._first("rail"),
             "supply_mv": self._first("avcc"),
+            "supply_calibrated": self.supply_calibrated,
             "complaints": self.complaints(),
             "text": self.fields,
         }
@@ -101,10 +140,18 @@ class StatusLine:
         rows = [f"{self.board} {self.version}"]
         for key, text in self.fields.items():
             unit = " us" if key == "rc" and self.numbers("rc") else ""
+            unit = " counts" if key in ANALOGUE and self.numbers(key) else unit
             rows.append(f"  {_TITLES.get(key, key):<10} {text}{unit}")
         complaints = self.complaints()
         rows += [f"  ! {one}" for one in complaints] or ["  nothing is missing"]
         return rows
+
+    def _least_supply_mv(self) -> float:
+        return LEAST_AVCC_MV if self.supply_calibrated else LEAST_AVCC_MV / UNCALIBRATED
+
+    def _behind(self, key: str, word: str) -> float | None:
+        words = self.fields[key].split()
+        return float(words[words.index(word) + 1]) if word in words[:-1] else None
 
     def _first(self, key: str) -> float | None:
         numbers = self.numbers(key)
@@ -138,6 +185,8 @@ def parse_status(line: str) -> StatusLine | None:
         if not key or not words or key in fields:
             return None
         fields[key] = " ".join(words)
-    if not set(KEYS) <= set(fields) or not re.fullmatch(r"\d+ mV", fields["avcc"]):
+    if not set(KEYS) <= set(fields) or not re.fullmatch(r"(about )?\d+ mV", fields["avcc"]):
+        return None
+    if not all(_COUNTS.fullmatch(fields[key]) for key in ANALOGUE):
         return None
     return StatusLine(image[1], image[2], fields)

@@ -111,6 +111,35 @@ TEST_CASE("events find room that other frames leave") {
   CHECK(!ring.push(mag(3)));
 }
 
+TEST_CASE("what was dropped last is told when asked, in the room of events") {
+  core::ByteRing ring(buffer, kCapacity);
+  CHECK(ring.tell_dropped());
+  CHECK_EQ(ring.used(), 0);
+  while (ring.push(mag(7))) {
+  }
+  CHECK(!ring.push(mag(9)));
+  CHECK(ring.tell_dropped());
+  const uint16_t used = ring.used();
+  CHECK(ring.tell_dropped());
+  CHECK_EQ(ring.used(), used);
+  ring.consume(ring.whole(static_cast<uint16_t>(used - frames::kEventWireSize)));
+  const frames::EventFrame event = oldest_event(ring);
+  CHECK_EQ(event.code, static_cast<uint8_t>(frames::Event::kFramesDropped));
+  CHECK_EQ(event.arg, 2U);
+  CHECK_EQ(event.t_us, 7U);
+}
+
+TEST_CASE("no room for a word of it: told later") {
+  core::ByteRing ring(buffer, kCapacity);
+  while (ring.push(mag(7))) {
+  }
+  while (ring.push_event(frames::Event::kMark, 1, 8)) {
+  }
+  CHECK(!ring.tell_dropped());
+  ring.consume(ring.whole(100));
+  CHECK(ring.tell_dropped());
+}
+
 TEST_CASE("an unknown id is dropped, not stored") {
   core::ByteRing ring(buffer, kCapacity);
   const uint8_t fields[4] = {};

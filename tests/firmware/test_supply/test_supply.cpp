@@ -1,0 +1,46 @@
+// The analogue supply: what a measurement says, with and without the chip's own reference.
+#include "check.h"
+#include "core/supply.h"
+
+TEST_CASE("a healthy board passes whatever its reference, a starved one fails for sure") {
+  // 4.75 V, the least a 5 V regulator may give, as chips of 1.0 to 1.2 V see it.
+  for (uint16_t reference_mv = 1000; reference_mv <= 1200; ++reference_mv) {
+    const uint16_t seen_mv = static_cast<uint16_t>(4750UL * 1100U / reference_mv);
+    CHECK(core::supply_good(seen_mv, 0));
+    CHECK(core::supply_good(seen_mv, reference_mv));
+    const uint16_t starved_mv = static_cast<uint16_t>(4450UL * 1100U / reference_mv);
+    CHECK(!core::supply_good(starved_mv, reference_mv));
+  }
+  CHECK(!core::supply_good(4124, 0));
+  CHECK(core::supply_good(4126, 0));
+  CHECK(core::supply_good(0, 0));  // not measured yet
+}
+
+TEST_CASE("a calibrated measurement is the meter's within 10 mV") {
+  for (uint16_t reference_mv = 1000; reference_mv <= 1200; reference_mv += 7) {
+    const uint16_t seen_mv = static_cast<uint16_t>(5020UL * 1100U / reference_mv);
+    const uint16_t told_mv = core::supply_mv(seen_mv, reference_mv);
+    CHECK(told_mv <= 5020);
+    CHECK(told_mv >= 5010);
+    CHECK_EQ(core::supply_mv(seen_mv, 0), seen_mv);
+  }
+}
+
+TEST_CASE("a record counts whole, and only for a reference that a chip may have") {
+  uint8_t record[core::kReferenceRecordSize];
+  core::write_reference(record, 1137);
+  CHECK_EQ(core::read_reference(record), 1137);
+  for (uint8_t byte = 0; byte < core::kReferenceRecordSize; ++byte) {
+    for (uint8_t bit = 1; bit != 0; bit = static_cast<uint8_t>(bit << 1)) {
+      record[byte] ^= bit;
+      CHECK_EQ(core::read_reference(record), 0);
+      record[byte] ^= bit;
+    }
+  }
+  core::write_reference(record, 999);
+  CHECK_EQ(core::read_reference(record), 0);
+  core::write_reference(record, 1201);
+  CHECK_EQ(core::read_reference(record), 0);
+  const uint8_t erased[core::kReferenceRecordSize] = {0xFF, 0xFF, 0xFF, 0xFF};
+  CHECK_EQ(core::read_reference(erased), 0);
+}

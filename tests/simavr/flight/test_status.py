@@ -1,0 +1,82 @@
+"""The status line of the real image, and what its self-test refuses."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from host.status_line import ANALOGUE, StatusLine, parse_status
+
+if TYPE_CHECKING:
+    from flight.rig import FlightRig
+
+MakeRig = Callable[..., "FlightRig"]
+TOOL = Path(__file__).resolve().parents[3] / "hw" / "calibration" / "reference_record.py"
+
+
+def last_line(rig: FlightRig) -> StatusLine:
+    """The newest whole status line."""
+    text = rig.chip.uart_sent(0).decode("ascii").split("\r\n")[-2]
+    line = parse_status(text)
+    assert line is not None, text
+    return line
+
+
+def test_line_shows_every_sensor(make_rig: MakeRig) -> None:
+    rig = make_rig()
+    rig.power_on()
+    rig.chip.run_s(6.0)
+    line = last_line(rig)
+    assert line.complaints() == []
+    volts = [0.8 + 0.33 * slot for slot in range(11)]
+    counts = [count for key in ANALOGUE for count in line.counts(key)]
+    assert counts == pytest.approx([v / 5.0 * 1024 for v in volts[:10]], abs=2)
+    assert line.numbers("rail")[0] == pytest.approx(2000 * volts[10], abs=40)
+    assert line.state("relay") == "released"
+    assert not line.supply_calibrated
+    rig.imu.silent = True
+    rig.chip.run_s(3.0)
+    assert last_line(rig).state("imu") == "stale"
+
+
+def test_contact_closed_before_the_first_heartbeat_is_refused(make_rig: MakeRig) -> None:
+    rig = make_rig()
+    rig.power_on()
+    rig.chip.drive("PH6", False)
+    rig.chip.run_s(4.0)
+    assert last_line(rig).state("relay") == "stuck"
+    assert last_line(rig).fields["drive"] == "direct (self-test)"
+
+
+def test_record_of_the_chips_reference_corrects_the_supply(
+    make_rig: MakeRig, tmp_path: Path
+) -> None:
+    spec = importlib.util.spec_from_file_location("reference_record", TOOL)
+    assert spec is not None
+    assert spec.loader is not None
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    rig = make_rig()
+    rig.chip.analog_supply(4.8, bandgap_volt=1.17)
+    rig.power_on()
+    rig.chip.run_s(4.0)
+    line = last_line(rig)
+    shown_mv = line.numbers("avcc")[0]
+    assert shown_mv == pytest.approx(4800 * 1.1 / 1.17, abs=25)
+    assert not line.supply_calibrated
+    out = tmp_path / "reference.hex"
+    assert tool.main(["--meter", "4.8", "--shown", str(shown_mv / 1000), str(out)]) == 0
+    data = bytes.fromhex(out.read_text().splitlines()[0][1:])
+    eeprom = bytearray(rig.chip.eeprom())
+    eeprom[4088:] = data[4:12]
+    rig.chip.set_eeprom(bytes(eeprom))
+    rig.chip.reset()
+    rig.chip.run_s(4.0)
+    line = last_line(rig)
+    assert line.supply_calibrated
+    assert line.numbers("avcc")[0] == pytest.approx(4800, abs=25)
+    assert line.complaints() == []
+    assert tool.main(["--meter", "4.8", "--shown", "3.0", str(out)]) == 2
