@@ -154,6 +154,18 @@ def test_decoded_table_is_the_truth_within_the_sensors_errors(flown: Flown) -> N
     assert [d.column for d in turned if not d.within] == ["q_radps"]
 
 
+@pytest.mark.parametrize("column", compare.LIMITS)
+def test_each_column_has_limits_that_bite(flown: Flown, column: str) -> None:
+    table = flown.log.table()
+    at = compare.true_times(flown.record, table, int(flown.log.frames["ident"]["t_us"][0]))
+    mean_limit, spread_limit = compare.LIMITS[column]
+    wave = np.sin(np.arange(len(table)))
+    for fault in (2.0 * mean_limit, 2.0 * spread_limit * wave):
+        wrong = table.assign(**{column: table[column] + fault})
+        found = compare.deviations(flown.record, wrong, at)
+        assert [d.column for d in found if not d.within] == [column]
+
+
 def test_the_same_seed_gives_the_same_file(flown: Flown) -> None:
     again = sitl.record(flown.given, rate_hz=100, aircraft=flown.record.aircraft.name, seed=11)
     assert again.log == flown.recording.log
