@@ -20,6 +20,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.compiled import Array, compiled
+from host.sysid.diagnostics import thesis_program_error_percent
 from host.sysid.equation_error import fit_equation_error, normal_equations, regression_rows
 from host.sysid.errors import IdentificationError
 from host.sysid.kernels import simulate, transition
@@ -269,7 +270,11 @@ def line_search(
     return beta
 
 
-def _program_error(model: LinearModel, maneuver: Maneuver, beta: Array) -> float:
+def free_run(model: LinearModel, maneuver: Maneuver, beta: Array) -> Array | None:
+    """Return the states (samples, n) from the first measured ones on, as the program simulates.
+
+    None if they run away.
+    """
     n, m = len(model.states), len(model.inputs)
     A, B, _, _ = model.matrices(beta)
     AB = np.zeros((n, n + m + 1))
@@ -277,9 +282,14 @@ def _program_error(model: LinearModel, maneuver: Maneuver, beta: Array) -> float
     none = np.zeros(0, dtype=np.int64)
     step, _ = transition(AB, n, m, False, maneuver.dt_s, none, none, none, np.zeros(0), 0)
     drive = np.hstack([maneuver.inputs, np.ones((maneuver.samples, 1))])
-    measured = maneuver.outputs[:, model.measured_states()]
-    finite, z = simulate(step, drive, measured[0].copy())
-    if not finite:
+    first = maneuver.outputs[0, model.measured_states()].copy()
+    finite, z = simulate(step, drive, first)
+    return np.ascontiguousarray(z[:, :n]) if finite else None
+
+
+def _program_error(model: LinearModel, maneuver: Maneuver, beta: Array) -> float:
+    simulated = free_run(model, maneuver, beta)
+    if simulated is None:
         return float("inf")
-    shares = np.sum(np.abs(z[:, :n] - measured), axis=0) / np.sum(np.abs(measured), axis=0)
-    return float(np.sum(shares)) * 100.0 / maneuver.samples
+    measured = maneuver.outputs[:, model.measured_states()]
+    return thesis_program_error_percent(measured, simulated)
