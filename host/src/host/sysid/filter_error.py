@@ -39,6 +39,7 @@ class _Likelihood:
     e: list[Array]
     S: list[Array]
     cost: float
+    gains: dict[float, tuple[Array, Array, Array]]
 
 
 class FilterProblem:
@@ -80,7 +81,14 @@ class FilterProblem:
             return (parameter - self.inner.n_common) // self.inner.n_local
         return None
 
-    def evaluate(self, theta: Array, only: int | None = None) -> _Likelihood | None:
+    def evaluate(
+        self,
+        theta: Array,
+        only: int | None = None,
+        near: _Likelihood | None = None,
+        *,
+        costless: bool = False,
+    ) -> _Likelihood | None:
         """Return innovations and cost; None where the filter or the model fails.
 
         Parameters
@@ -89,6 +97,10 @@ class FilterProblem:
             All unknowns.
         only : int, optional
             Run this maneuver alone; the others give empty arrays.
+        near : _Likelihood, optional
+            Of the same model: its gains are taken.
+        costless : bool
+            Leave the cost at zero.
         """
         model = self.model
         n, m = len(model.states), len(model.inputs)
@@ -108,7 +120,7 @@ class FilterProblem:
         all_e: list[Array] = []
         all_S: list[Array] = []
         n_common = self.inner.n_common
-        solutions: dict[float, tuple[Array, Array, Array]] = {}
+        solutions = {} if near is None else near.gains
         for number, maneuver in enumerate(self.maneuvers):
             if only is not None and number != only:
                 all_e.append(np.zeros((0, 0)))
@@ -142,15 +154,17 @@ class FilterProblem:
             )
             if not finite:
                 return None
+            all_e.append(e)
+            all_S.append(S)
+            if costless:
+                continue
             white = linalg.solve_triangular(factor, e.T, lower=True)
             cost += 0.5 * float(np.sum(white**2))
             cost += len(e) * float(np.sum(np.log(np.diag(factor))))
-            all_e.append(e)
-            all_S.append(S)
         prior = self.inner.prior_precision
         miss = theta[: self.n_model] - self.inner.prior_mean
         cost += 0.5 * float(np.sum(prior * miss**2))
-        return _Likelihood(all_e, all_S, cost) if np.isfinite(cost) else None
+        return _Likelihood(all_e, all_S, cost, solutions) if np.isfinite(cost) else None
 
     def _gain(
         self, A: Array, C: Array, intensity: Array, R: Array, dt_s: float
@@ -335,22 +349,25 @@ def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> tu
 def _scoring(
     problem: FilterProblem, theta: Array, point: _Likelihood, scale: Array
 ) -> tuple[Array, Array]:
-    """Return Fisher information and minus the cost's gradient, from central differences."""
+    """Return Fisher information and minus the cost's gradient, from differences.
+
+    One-sided ones: their width is 1e-5 standard errors. Biases and start values of a maneuver leave
+    the gains as they are.
+    """
     size = len(theta)
-    slopes_e: list[list[Array]] = []
-    slopes_S: list[list[Array]] = []
+    slopes_e: list[dict[int, Array]] = []
+    slopes_S: list[dict[int, Array]] = []
     for k in range(size):
         width = max(DIFFERENCE * scale[k], 1e-9 * (1.0 + abs(theta[k])))
-        moved = []
-        for sign in (1.0, -1.0):
-            other = theta.copy()
-            other[k] += sign * width
-            moved.append(problem.evaluate(other, problem.owner(k)))
-        up, down = moved
-        if up is None or down is None:
+        other = theta.copy()
+        other[k] += width
+        only = problem.owner(k)
+        up = problem.evaluate(other, only, None if only is None else point, costless=True)
+        if up is None:
             raise IdentificationError("filter error: the likelihood is not smooth at the estimate")
-        slopes_e.append([(a - b) / (2.0 * width) for a, b in zip(up.e, down.e, strict=True)])
-        slopes_S.append([(a - b) / (2.0 * width) for a, b in zip(up.S, down.S, strict=True)])
+        runs = [number for number, e in enumerate(up.e) if len(e)]
+        slopes_e.append({i: (up.e[i] - point.e[i]) / width for i in runs})
+        slopes_S.append({i: (up.S[i] - point.S[i]) / width for i in runs})
     information = np.zeros((size, size))
     gradient = np.zeros(size)
     n = problem.n_model
@@ -369,8 +386,8 @@ def _scoring(
         spread = {k: inner @ slopes_S[k][number] @ inner.T for k in moving}
         for a in moving:
             gradient[a] -= 0.5 * (len(e) * np.trace(spread[a]) - np.sum(spread[a] * outer))
-            for b in moving:
-                information[a, b] += 0.5 * len(e) * np.sum(spread[a] * spread[b])
+        flat = np.array([spread[a].ravel() for a in moving])
+        information[np.ix_(moving, moving)] += 0.5 * len(e) * (flat @ flat.T)
     return information, gradient
 
 
