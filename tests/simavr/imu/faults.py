@@ -160,8 +160,8 @@ LOST = ("imu_lost", "imu_found")
 NONE, ALL = (0.0, 0.0), (1.0, 1.0)
 FAULTS = (
     Fault("none", "sends every sample", "logs every sample", lambda r: None, levelled=(1.0, 1.0)),
-    Fault("IMU reset", "back in 0.3 s, offsets from EEPROM", "lost, found, restarted",
-          reset_imu, events=(*LOST, "imu_restarted"), heard=(0.88, 0.96)),
+    Fault("IMU reset", "back in 0.5 s, offsets from EEPROM", "lost, found, restarted",
+          reset_imu, events=(*LOST, "imu_restarted"), heard=(0.8, 0.9)),
     Fault("IMU program hangs", "watchdog, back in 1.3 s", "lost, found, restarted",
           hang_imu, events=(*LOST, "imu_restarted"), heard=(0.55, 0.75)),
     Fault("MPU off, as without power", "sets it up again and again", "lost, timer triggers, found",
@@ -221,7 +221,15 @@ FAULTS = (
 def ready_rig(mega_elf: Path, imu_elf: Path, folder: Path) -> PairRig:
     """Bring both images into flight, the card in private pages, the IMU with offsets."""
     card = make_card(folder / "empty.img")
-    rig = PairRig(mega_elf, imu_elf, card, clock_ppm=CLOCK_PPM, mpu_ppm=MPU_PPM, in_place=False)
+    rig = PairRig(
+        mega_elf,
+        imu_elf,
+        card,
+        clock_ppm=CLOCK_PPM,
+        mpu_ppm=MPU_PPM,
+        bootloader=True,
+        in_place=False,
+    )
     rig.board.chip.load(RECORD.image())
     rig.take_off()
     fly(rig.board.mpu, rig.board.magnetometer, 30.0)

@@ -15,6 +15,9 @@ from simavr_bench import Chip, GpsUart, I2cBus, Magnetometer, Mpu6000
 
 TCCR5B = 0x121
 RAM_END = 0x900
+BOOTLOADER = Path(
+    "/usr/share/arduino/hardware/arduino/avr/bootloaders/atmega/ATmegaBOOT_168_atmega328.hex"
+)
 
 
 def build_imu_image() -> Path:
@@ -65,6 +68,8 @@ class ImuBoard:
         An MPU-6050 on the bus instead of an MPU-6000 on SPI.
     qmc : bool
         A QMC5883L where a HMC5883L is expected.
+    bootloader : bool
+        Start in Debian's copy of the board's bootloader.
     seed : int
         Of noise, jitter and memory at power-on.
     """
@@ -79,9 +84,12 @@ class ImuBoard:
         product_id: int = 0x58,
         over_i2c: bool = False,
         qmc: bool = False,
+        bootloader: bool = False,
         seed: int = 2,
     ) -> None:
-        self.chip = Chip(model="atmega328p", startup_s=0.065, seed=seed)
+        self.chip = Chip(model="atmega328p", bootloader=bootloader, startup_s=0.065, seed=seed)
+        if bootloader:
+            self.chip.load(BOOTLOADER)
         self.chip.load(elf)
         self.bus = I2cBus(self.chip, slave, master_ppm=clock_ppm)
         self.mpu = Mpu6000(
@@ -123,7 +131,7 @@ class PairRig:
         Images of both chips and of the card.
     rate_hz : int
         What the Mega logs.
-    clock_ppm, mpu_ppm, over_i2c, product_id
+    clock_ppm, mpu_ppm, over_i2c, product_id, bootloader
         See :class:`ImuBoard`.
     in_place : bool
         See :class:`flight.rig.FlightRig`.
@@ -140,6 +148,7 @@ class PairRig:
         mpu_ppm: float = 0.0,
         product_id: int = 0x58,
         over_i2c: bool = False,
+        bootloader: bool = False,
         in_place: bool = True,
     ) -> None:
         self.flight = FlightRig(mega_elf, card_image, in_place=in_place)
@@ -153,6 +162,7 @@ class PairRig:
             mpu_ppm=mpu_ppm,
             product_id=product_id,
             over_i2c=over_i2c,
+            bootloader=bootloader,
         )
         self.mega_zero_cycle = 0
 

@@ -180,7 +180,7 @@ static void write_spmcsr(chip* c, uint16_t address, uint8_t value, void* param) 
 
 static void program(chip* c, uint32_t page, bool erase) {
   uint8_t* const flash = c->avr->flash + page;
-  for (uint32_t i = 0; i < 256; i++) {
+  for (uint32_t i = 0; i < c->model->page_bytes; i++) {
     if (erase)
       flash[i] = 0xFF;
     else if (c->flash.filled[i])
@@ -190,7 +190,7 @@ static void program(chip* c, uint32_t page, bool erase) {
   c->flash.busy = true;
   event_at(c, &c->flash.due,
            chip_now(c) + 68000);  // 4.25 ms, between 3.7 and 4.5
-  if (page < 0x3E000)
+  if (page < c->model->boot_start)
     c->avr->data[REG_SPMCSR] |= kRwwsb;
   else
     c->halt_cycles += 68000;  // the boot section itself: the CPU stops
@@ -200,26 +200,23 @@ static void program(chip* c, uint32_t page, bool erase) {
 void flash_store(chip* c) {
   const uint8_t r = c->avr->data[REG_SPMCSR];
   if (!(r & kSpmen) || chip_now(c) > c->flash.armed_until || c->flash.busy) return;
-  if (!c->model->boot_modelled) {
-    fault_add(c, kFaultFlash, r);
-    return;
-  }
-  if (c->avr->pc < 0x3E000) return;
+  if (c->avr->pc < c->model->boot_start) return;
   const uint32_t z =
       (uint32_t)(c->avr->data[R_ZL] | c->avr->data[R_ZH] << 8 | c->avr->data[REG_RAMPZ] << 16) &
-      0x3FFFF;
+      c->avr->flashend;
+  const uint32_t in_page = c->model->page_bytes - 1;
   event_cancel(c, &c->flash.due);
   if (r & kPgers) {
-    program(c, z & ~0xFFu, true);
+    program(c, z & ~in_page, true);
   } else if (r & kPgwrt) {
-    program(c, z & ~0xFFu, false);
+    program(c, z & ~in_page, false);
   } else if (r & kRwwsre) {
     c->avr->data[REG_SPMCSR] &= (uint8_t) ~(kRwwsb | 0x3Fu);
   } else if (r & 0x08) {
     fault_add(c, kFaultFlash, r);  // lock bits
     c->avr->data[REG_SPMCSR] &= (uint8_t)~0x3Fu;
   } else {
-    const uint32_t at = z & 0xFE;
+    const uint32_t at = z & in_page & ~1u;
     c->flash.buffer[at] = c->avr->data[0];
     c->flash.buffer[at + 1] = c->avr->data[1];
     c->flash.filled[at] = c->flash.filled[at + 1] = true;

@@ -17,8 +17,8 @@ typedef struct chip_model {
   uint8_t timers, uarts;
   uint8_t entry_cycles;  // of an interrupt: 4, one more for a 22-bit program counter
   uint16_t eeprom_last;
-  uint32_t boot_start;  // IVSEL puts the vectors here
-  bool boot_modelled;   // SPM works
+  uint32_t boot_start;  // IVSEL puts the vectors here; SPM works from here on
+  uint32_t page_bytes;  // of flash
   uint8_t ss_pin, scl_pin, sda_pin;
   uint8_t pin_change_port[3];  // port index of each bank whose bits are those of one port
   uint8_t external[8];         // pin of each INTn

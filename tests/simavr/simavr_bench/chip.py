@@ -25,9 +25,9 @@ class Chip(PinAccess, BusAccess, MemoryAccess):
     startup_s : float
         From the release of reset to the first instruction; 66.024 ms is low fuse 0xFF.
     bootloader : bool
-        Start at 0x3E000 (BOOTRST programmed) instead of at 0.
+        Start in the boot section (BOOTRST programmed) instead of at 0.
     model : str
-        ``atmega2560`` or ``atmega328p``; of the latter's boot section nothing is modelled.
+        ``atmega2560`` or ``atmega328p``.
 
     Examples
     --------

@@ -15,9 +15,11 @@ from simavr_bench.library import Callback, load_library
 from simavr_bench.log import LogKind
 
 CYCLES_PER_S = 16_000_000
-# `enum chip_kind` of shim/model.h, bytes of flash, bytes of EEPROM
-MODELS = {"atmega2560": (0, 262_144, 4096), "atmega328p": (1, 32_768, 1024)}
-BOOTLOADER_START = 0x3E000
+# `enum chip_kind` of shim/model.h, bytes of flash and EEPROM, start of the boot section
+MODELS = {
+    "atmega2560": (0, 262_144, 4096, 0x3E000),
+    "atmega328p": (1, 32_768, 1024, 0x7800),
+}
 
 _TIMER, _I2C = 100, 101
 
@@ -60,7 +62,7 @@ class Core:
     ) -> None:
         if model not in MODELS:
             raise ValueError(f"no model of {model!r}, expected one of {', '.join(MODELS)}")
-        kind, self._flash_size, self._eeprom_size = MODELS[model]
+        kind, self._flash_size, self._eeprom_size, boot_start = MODELS[model]
         self._lib = load_library(_library_path())
         self._chip = self._lib.bench_create(seed, kind)
         self._neighbours: list[Core] = []  # on one bus: they run together
@@ -77,7 +79,7 @@ class Core:
         self._pc_watches = 0
         self._callback = Callback(self._on_event)  # kept alive as long as the chip
         self._lib.bench_on_event(self._chip, self._callback)
-        start = BOOTLOADER_START if bootloader else 0
+        start = boot_start if bootloader else 0
         self._lib.bench_set_startup(self._chip, cycles(startup_s), start)
         self.symbols: dict[str, tuple[int, int]] = {}
 
