@@ -28,6 +28,8 @@ ACCURACY_RUNS = (20, 1000)
 COVERAGE_RUNS = (20, 2000)
 FLIGHTS = (4, 100)
 METHOD_RUNS = (2, 20)
+COEFFICIENT_FLIGHTS = (2, 24)
+THESIS_FLIGHTS = (1, 10)
 
 
 def study_a(stem: Path, size: int) -> list[Path]:
@@ -79,6 +81,25 @@ def study_d(stem: Path, size: int) -> list[Path]:
     return write(tables.turbulence_table(cases), turbulence_figure(cases), stem)
 
 
+def study_e(stem: Path, size: int) -> list[Path]:
+    """Coefficients of virtual flights."""
+    from host.sysid.study import coefficients
+    from host.sysid.study.flight_report import coefficient_figure, coefficient_table
+
+    seeds = range(coefficients.FIRST_SEED, coefficients.FIRST_SEED + COEFFICIENT_FLIGHTS[size])
+    tally = coefficients.study("survey", seeds, thesis=True)
+    return write(coefficient_table(tally), coefficient_figure(tally), stem)
+
+
+def study_f(stem: Path, size: int) -> list[Path]:
+    """The two thesis flights."""
+    from host.sysid.study import thesis_flights
+    from host.sysid.study.flight_report import thesis_flights_figure, thesis_flights_table
+
+    found = thesis_flights.study(THESIS_FLIGHTS[size])
+    return write(thesis_flights_table(found), thesis_flights_figure(found), stem)
+
+
 def study_g(stem: Path, size: int) -> list[Path]:
     """Every method on five data sets."""
     from host.sysid.study.figures import methods_figure
@@ -93,6 +114,8 @@ STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
     "b_accuracy": study_b,
     "c_coverage": study_c,
     "d_turbulence": study_d,
+    "e_flights": study_e,
+    "f_thesis_flights": study_f,
     "g_methods": study_g,
 }
 

@@ -207,17 +207,22 @@ def lines(case: Case, figures: Sequence[Figures], ours: Sequence[tuple[float, fl
     ]
 
 
+def study(flights: int) -> list[tuple[Case, list[Figures], list[tuple[float, float]]]]:
+    """Re-enact every window with `flights` seeds, this product's answer beside."""
+    seeds = range(FIRST_SEED, FIRST_SEED + flights)
+    return [
+        (case, [re_enact(case, seed) for seed in seeds], [product(case, seed) for seed in seeds])
+        for case in CASES
+    ]
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Fly, fit, print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=10)
     options = parser.parse_args(arguments)
-    seeds = range(FIRST_SEED, FIRST_SEED + options.flights)
-    for case in CASES:
-        figures = [re_enact(case, seed) for seed in seeds]
-        ours = [product(case, seed) for seed in seeds]
-        sys.stdout.write("\n".join(lines(case, figures, ours)) + "\n")
-        sys.stdout.flush()
+    for item in study(options.flights):
+        sys.stdout.write("\n".join(lines(*item)) + "\n")
     return 0
 
 
