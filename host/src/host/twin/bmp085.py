@@ -34,6 +34,8 @@ class Coefficients(NamedTuple):
 
 
 EXAMPLE = Coefficients(408, -72, -14383, 32741, 32757, 23153, 6190, 4, -32768, -8711, 2868)
+# An erased EEPROM: every bit set; AC4 to AC6 are unsigned.
+BLANK = Coefficients(-1, -1, -1, 0xFFFF, 0xFFFF, 0xFFFF, -1, -1, -1, -1, -1)
 
 
 def _truncate(a: Integers, b: Integers | int) -> Integers:

@@ -133,7 +133,7 @@ def _pressure(
 def _coefficients(record: FlightRecord) -> tuple[int, ...]:
     for fault in record.card.faults:
         if fault.kind == "baro_garbage":
-            return (0xFFFF if fault.amount else 0,) * len(bmp085.EXAMPLE)
+            return tuple(bmp085.BLANK if fault.amount else [0] * len(bmp085.BLANK))
     return tuple(bmp085.EXAMPLE)
 
 
