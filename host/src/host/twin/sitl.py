@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from host.errors import UsageError
 from host.resources import CLONE
-from host.twin.fat32 import CARD_BYTES, SECTOR, CardReader, format_card
+from host.twin.fat32 import CARD_BYTES, SECTOR, CardImageError, CardReader, format_card
 from host.twin.faults import Action, Fault, recorder_actions
 from host.twin.flight import IDLE_US, NEUTRAL_US
 from host.twin.mega_clock import TICKS_PER_S
@@ -35,6 +35,9 @@ CLOSE_S = 20.0  # the next power-on, throttle idle for 10 s: the recorder closes
 # Room on the card per second of flight at 100 Hz: about 18 blocks are used.
 BLOCKS_PER_S = 40
 CARD_EVENTS = {"card_busy": 0, "card_reject": 1, "card_removed": 2, "card_inserted": 3}
+# storage::VolumeStatus of the recorder.
+VOLUMES = ("a good card", "no card", "a card without a file system", "a card it cannot read",
+           "a full card", "a card without room in one piece")  # fmt: skip
 NO_FILE = {"card_absent": "no card", "card_full": "a full card",
            "card_unformatted": "a card without a file system"}  # fmt: skip
 
@@ -222,20 +225,25 @@ def _record(
     sitl.sitl_run_until(ctypes.c_int64(later + round(CLOSE_S * TICKS_PER_S)))
 
     log, name = file_of(image, faults)
+    if not log:
+        name = VOLUMES[state.volume]
     return Recording(log, name, state.lost_edges, state.lost_packets, state.lost_gps_bytes)
 
 
 def file_of(image: mmap.mmap, faults: Sequence[Fault]) -> tuple[bytes, str]:
-    """Return the flight's file and its name; no bytes where a fault says there can be none."""
-    for fault in faults:
-        if fault.kind in NO_FILE:
-            return b"", NO_FILE[fault.kind]
-    reader = CardReader(image)
-    flights = sorted((f for f in reader.files() if f.name.startswith("FLT")), key=lambda f: f.name)
+    """Return the flight's file and its name; no bytes and why, where a fault lets be none."""
+    reasons = [NO_FILE[fault.kind] for fault in faults if fault.kind in NO_FILE]
+    try:
+        files = CardReader(image).files()
+    except CardImageError:
+        files = []
+    flights = sorted((f for f in files if f.name.startswith("FLT")), key=lambda f: f.name)
+    if reasons and not flights:
+        return b"", reasons[0]
     if not flights:
         raise UsageError("the recorder made no file on the card: was the flight shorter than 5 s?")
     # The reboot may have prepared the next file already: the flight is the first one.
-    return reader.read(flights[0]), flights[0].name
+    return CardReader(image).read(flights[0]), flights[0].name
 
 
 def card_image(faults: Sequence[Fault]) -> mmap.mmap:
