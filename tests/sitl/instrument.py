@@ -249,9 +249,22 @@ class Sitl:
         """Connect a BMP085: its coefficients AC1 ... MD, and rows of UT and UP (as at
         oversampling 3), `step` ticks apart, linear between.
         """
+        self._pressure("sitl_set_pressure", coefficients, start, step, raw)
+
+    def set_bmp280(
+        self, coefficients: Sequence[int], start: int, step: int, raw: npt.ArrayLike
+    ) -> None:
+        """Connect a BMP280 instead: its coefficients dig_T1 ... dig_P9, and rows of the 20 bits of
+        temperature and pressure.
+        """
+        self._pressure("sitl_set_bmp280", coefficients, start, step, raw)
+
+    def _pressure(
+        self, function: str, coefficients: Sequence[int], start: int, step: int, raw: npt.ArrayLike
+    ) -> None:
         words = np.array([word & 0xFFFF for word in coefficients], dtype=np.uint16)
         rows = np.ascontiguousarray(raw, dtype=np.float64).reshape(-1, 2)
-        self._c.sitl_set_pressure(
+        getattr(self._c, function)(
             _of(words),
             ctypes.c_int64(start),
             ctypes.c_int64(step),

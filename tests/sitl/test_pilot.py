@@ -1,10 +1,11 @@
 """The pilot's pulses: repeated exactly, released when they must be, never invented."""
 
 import numpy as np
+import pytest
 
 from host import original_rows
 from tests.protocol import oracle
-from tests.sitl.bench import Bench, flight, idle_receiver
+from tests.sitl.bench import Bench, config_places, flight, idle_receiver
 from tests.sitl.instrument import TICKS_PER_S, Level, Port
 from tests.sitl.script import Receiver
 
@@ -159,3 +160,55 @@ def test_status_line_says_what_is_there() -> None:
     assert "rc us 1500 1500 1500 1100 1100" in lines[-2]
     assert "card ready 1" in lines[-2]
     assert 4 <= len(lines) - 2 <= 7
+
+
+def lose_receiver(hold_ms: int) -> tuple[Bench, int]:
+    """Fly with the Mega driving until the receiver falls silent; give the end of its last pulse."""
+    bench = Bench()
+    bench.configure(hold_ms=hold_ms)
+    plan = flight(34.0)
+    at, levels = plan.receiver.edges()
+    last = int(at[at < ticks(8.0)][-1])
+    bench.sitl.add_edges(at[at <= last], levels[at <= last])
+    bench.sitl.power_on()
+    bench.sitl.run_until(ticks(7.9))
+    assert bench.sitl.state().drive == MEGA
+    bench.sitl.run_until(ticks(11.0))
+    return bench, last
+
+
+def released_s(bench: Bench, last: int) -> float:
+    """Time from the last pulse to the release of the relay."""
+    when, level = bench.sitl.levels(Level.RELAY)
+    assert level.tolist() == [1, 0]
+    return (int(when[1]) - last) / TICKS_PER_S
+
+
+def test_holding_is_off_unless_asked_for() -> None:
+    config = Bench().sitl.default_config()
+    start, size = config_places()["hold_ms"]
+    assert config[start : start + size] == bytes(size)
+
+
+@pytest.mark.parametrize("hold_ms", [200, 1000])
+def test_holding_delays_the_release_by_its_time_for_surfaces_only(hold_ms: int) -> None:
+    plain_s = released_s(*lose_receiver(0))  # one instrument at a time
+    bench, last = lose_receiver(hold_ms)
+    longer_s = released_s(bench, last) - plain_s
+    assert longer_s == pytest.approx(hold_ms / 1000, abs=0.01)
+    assert longer_s <= 1.0
+    start, output, width = bench.sitl.pulses()
+    held = start > last + ticks(0.1)
+    assert set(output[held].tolist()) == {0, 1, 2}  # never throttle
+    for channel in range(3):
+        mine = width[(output == channel) & held]
+        before = width[(output == channel) & (start <= last + ticks(0.1))][-1]
+        assert set(mine.tolist()) == {int(before)}
+        assert len(mine) >= hold_ms / 20 - 5
+    # From the release on there is not one pulse more.
+    assert (int(start[-1]) - last) / TICKS_PER_S < hold_ms / 1000 + 0.1
+
+
+def test_more_than_a_second_of_holding_is_refused() -> None:
+    with pytest.raises(ValueError, match="out of its range"):
+        Bench().configure(hold_ms=1001)

@@ -256,3 +256,43 @@ def test_identity_says_card_and_boots() -> None:
     assert bytes(identity["card_id"]) == CARD_ID
     assert identity["boots"] == 2
     assert identity["session"] == decoded(bench, 2).sessions[-1]
+
+
+@pytest.mark.parametrize("hole", [(250,), (-2,), (-5, -4, -3), (100, 101, 102, 103)])
+def test_resume_behind_a_hole_overwrites_nothing(tmp_path: Path, hole: tuple[int, ...]) -> None:
+    """Garbage between good blocks, also where the search for the end looks first (250)."""
+    bench = Bench()
+    idle_receiver(bench.sitl, 0.1, 1.0)
+    idle_receiver(bench.sitl, 1.0, 60.0, throttle_us=1700)
+    bench.sitl.power_on()
+    bench.sitl.run_for(22.0)
+    bench.sitl.power_cut(7)
+    before = oracle.find_blocks(read_file(bytes(bench.image), "FLT00001.BIN"))
+    good = [block for block in before if block.verdict == "ok"]
+    assert len(good) > 270
+    places = {}
+    for number in hole:
+        block = good[number]
+        raw = read_file(bytes(bench.image), "FLT00001.BIN")[block.position :][:512]
+        at = bytes(bench.image).index(raw)
+        bench.image[at : at + 512] = bytes((b * 7 + 1) & 0xFF for b in raw)
+        places[block.sequence] = at
+    bench.sitl.run_for(0.5)
+    bench.sitl.power_on()
+    bench.sitl.run_for(6.0)
+    assert bench.state() == Recorder.RECORDING
+    bench.sitl.power_cut(8)
+    after = {
+        block.sequence: block
+        for block in oracle.find_blocks(read_file(bytes(bench.image), "FLT00001.BIN"))
+        if block.verdict == "ok"
+    }
+    for block in good:
+        if block.sequence not in places:
+            assert after[block.sequence] == block
+    newest = [block for block in after.values() if block.session > good[-1].session]
+    assert len(newest) > 50
+    assert min(block.sequence for block in newest) == good[-1].sequence + 1
+    log = bench.log(tmp_path)
+    assert log.complete == "damaged"
+    assert sum(loss.blocks for loss in log.loss.losses) == len(hole)

@@ -10,19 +10,29 @@ using hal::BusStatus;
 
 namespace {
 
-constexpr uint8_t kAddress = 0x77;
-constexpr uint8_t kChipId = 0x55;
+constexpr uint8_t kAddress085 = 0x77;
+constexpr uint8_t kAddress280 = 0x76;
 
 // Longest conversion by oversampling (BST-BMP085-DS000-05, table 3).
 constexpr Tick kTemperatureTicks = 4500 * kTicksPerUs;
 constexpr Tick kPressureTicks[4] = {
     4500 * kTicksPerUs, 7500 * kTicksPerUs, 13500 * kTicksPerUs, 25500 * kTicksPerUs};
 
+// One temperature, four pressures (BST-BMP280-DS001-26, section 3.8.1: longest, and the typical
+// middle of the pressures).
+constexpr Tick kForcedTicks = 13325 * kTicksPerUs;
+constexpr Tick kForcedMiddleTicks = 7250 * kTicksPerUs;
+
+uint32_t count_of(double raw) {
+  return raw < 0 ? 0U : static_cast<uint32_t>(raw);
+}
+
 }  // namespace
 
-void PressureSensor::configure(bool present, const uint16_t* words) {
-  present_ = present;
-  memcpy(words_, words, sizeof words_);
+void PressureSensor::configure(Chip chip, const uint16_t* words) {
+  chip_ = chip;
+  present_ = true;
+  memcpy(words_, words, (chip == Chip::kBmp085 ? 11 : 12) * sizeof words_[0]);
 }
 
 void PressureSensor::reset_bus() {
@@ -52,7 +62,7 @@ BusStatus PressureSensor::step(int64_t now, const Grid& stimulus) {
   if (status_ != BusStatus::kBusy) return status_;
   if (held_) {
     status_ = BusStatus::kStuck;
-  } else if (!present_ || address_ != kAddress) {
+  } else if (!present_ || address_ != (chip_ == Chip::kBmp085 ? kAddress085 : kAddress280)) {
     status_ = BusStatus::kNoAck;
   } else if (--steps_left_ == 0) {
     finish_transfer(now, stimulus);
@@ -69,29 +79,51 @@ void PressureSensor::finish_transfer(int64_t now, const Grid& stimulus) {
     return;
   }
   if (reg_ != 0xF4) return;
+  if (chip_ == Chip::kBmp085) {
+    convert_085(now, stimulus);
+  } else if ((value_ & 0b11) == 0b01 || (value_ & 0b11) == 0b10) {
+    convert_280(now, stimulus);
+  }
+}
+
+void PressureSensor::convert_085(int64_t now, const Grid& stimulus) {
   const bool temperature = value_ == 0x2E;
   const uint8_t oversampling = static_cast<uint8_t>(value_ >> 6);
   const Tick duration = temperature ? kTemperatureTicks : kPressureTicks[oversampling];
-  old_result_ = read_register(0xF6, now) * 65536U + read_register(0xF7, now) * 256U +
-                read_register(0xF8, now);
+  old_result_ = now >= ready_at_ ? result_ : old_result_;
   // The converter averages; its mean instant is the middle.
-  const double raw = stimulus.at(now + duration / 2, temperature ? 0 : 1);
-  const uint32_t count = raw < 0 ? 0U : static_cast<uint32_t>(raw);
+  const uint32_t count = count_of(stimulus.at(now + duration / 2, temperature ? 0 : 1));
   result_ = temperature ? count << 8 : (count >> (3U - oversampling)) << (8U - oversampling);
   ready_at_ = now + duration;
   ++conversions_;
 }
 
+void PressureSensor::convert_280(int64_t now, const Grid& stimulus) {
+  old_result_ = now >= ready_at_ ? result_ : old_result_;
+  const uint64_t pressure = count_of(stimulus.at(now + kForcedMiddleTicks, 1)) & 0xFFFFFU;
+  const uint64_t temperature = count_of(stimulus.at(now + kForcedMiddleTicks, 0)) & 0xFFFFFU;
+  result_ = pressure << 28 | temperature << 4;
+  ready_at_ = now + kForcedTicks;
+  ++conversions_;
+}
+
 uint8_t PressureSensor::read_register(uint8_t reg, int64_t now) const {
+  const uint64_t result = now >= ready_at_ ? result_ : old_result_;
+  if (chip_ == Chip::kBmp280) {
+    if (reg >= 0x88 && reg <= 0x9F) {
+      const uint16_t word = words_[(reg - 0x88) / 2];
+      return static_cast<uint8_t>(reg % 2 == 0 ? word : word >> 8);
+    }
+    if (reg == 0xD0) return 0x58;
+    if (reg >= 0xF7 && reg <= 0xFC) return static_cast<uint8_t>(result >> (8 * (0xFC - reg)));
+    return 0;
+  }
   if (reg >= 0xAA && reg <= 0xBF) {
     const uint16_t word = words_[(reg - 0xAA) / 2];
     return static_cast<uint8_t>(reg % 2 == 0 ? word >> 8 : word);
   }
-  if (reg == 0xD0) return kChipId;
-  const uint32_t result = now >= ready_at_ ? result_ : old_result_;
-  if (reg == 0xF6) return static_cast<uint8_t>(result >> 16);
-  if (reg == 0xF7) return static_cast<uint8_t>(result >> 8);
-  if (reg == 0xF8) return static_cast<uint8_t>(result);
+  if (reg == 0xD0) return 0x55;
+  if (reg >= 0xF6 && reg <= 0xF8) return static_cast<uint8_t>(result >> (8 * (0xF8 - reg)));
   return 0;
 }
 

@@ -138,7 +138,13 @@ void sitl_weld_relay(int welded) {
 
 void sitl_set_pressure(
     const uint16_t* words, int64_t start, int64_t step, const double* raw, size_t rows) {
-  world().sensor.configure(true, words);
+  world().sensor.configure(sitl::PressureSensor::Chip::kBmp085, words);
+  fill(&world().pressure, 2, start, step, raw, rows);
+}
+
+void sitl_set_bmp280(
+    const uint16_t* words, int64_t start, int64_t step, const double* raw, size_t rows) {
+  world().sensor.configure(sitl::PressureSensor::Chip::kBmp280, words);
   fill(&world().pressure, 2, start, step, raw, rows);
 }
 

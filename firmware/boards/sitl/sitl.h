@@ -44,6 +44,9 @@ void sitl_weld_relay(int welded);
 // A BMP085 with its 11 coefficients; rows of UT and UP, UP as at oversampling 3.
 void sitl_set_pressure(
     const uint16_t* words, int64_t start, int64_t step, const double* raw, size_t rows);
+// A BMP280 with its 12 coefficients; rows of the 20 bits of temperature and pressure.
+void sitl_set_bmp280(
+    const uint16_t* words, int64_t start, int64_t step, const double* raw, size_t rows);
 void sitl_remove_pressure(void);
 void sitl_hold_pressure_bus(int held);
 void sitl_add_gps(const int64_t* at, const uint8_t* bytes, size_t count);
