@@ -8,12 +8,13 @@ from host.sysid import FitResult, Maneuver, fit, methods
 from host.sysid.errors import IdentificationError
 from host.sysid.filter_error import FilterProblem
 from host.sysid.frequency import transform
+from host.sysid.kalman import inflation
 from host.sysid.output_error import minimise
 from host.sysid.problem import OutputProblem
 from host.sysid.riccati import predicted_covariance
 from host.sysid.study.aircraft import navion, navion_free, navion_structured
-from host.sysid.study.data import TRUTH, clean, noisy
-from scipy import linalg
+from host.sysid.study.data import TRUTH, clean, gusty, noisy
+from scipy import linalg, signal
 
 CHEAP = [m for m in methods() if m not in ("hopfield-line-search", "hopfield")]
 
@@ -188,6 +189,32 @@ def test_kalman_filters_agree_with_output_error() -> None:
         assert np.median(result.standard_error / reference.standard_error[:9]) == pytest.approx(
             1.0, abs=0.35
         )
+
+
+def test_kalman_filters_say_when_their_noise_model_is_wrong() -> None:
+    """Gusts leave innovations that last: intervals must say so, and hold the truth."""
+    calm = fit("extended-kalman", navion_structured(), [noisy(13, 0.02)])
+    assert calm.warnings == ()
+    assert calm.details["inflation"] < 1.3
+    held, before = [], []
+    for seed in range(2):
+        result = fit("extended-kalman", navion_structured(), [gusty(seed, 0.05)])
+        assert "innovations" in result.warnings[0]
+        miss = np.abs(result.estimate - TRUTH)
+        held.append(miss <= result.half_width())
+        before.append(miss <= 1.96 * np.sqrt(np.diag(result.covariance_white)))
+    assert np.mean(held) > 0.7
+    assert np.mean(before) < 0.4
+
+
+def test_inflation_is_power_times_the_time_a_correlation_lasts() -> None:
+    rng = np.random.default_rng(4)
+    white = rng.standard_normal((20000, 2))
+    assert inflation([white]) == pytest.approx(1.0, abs=0.05)
+    assert inflation([2.0 * white[:9000], 2.0 * white[9000:]]) == pytest.approx(4.0, rel=0.05)
+    slow = signal.lfilter([1.0], [1.0, -0.8], white, axis=0)
+    # Of an AR(1) process: its variance times (1 + a) / (1 - a), which is 1 / (1 - a)^2.
+    assert inflation([slow]) == pytest.approx(25.0, rel=0.15)
 
 
 def test_genetic_search_finds_the_valley_from_far_away() -> None:

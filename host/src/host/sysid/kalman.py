@@ -26,6 +26,8 @@ PASSES = 2  # over the record: the second starts from the parameters of the firs
 START_SHARE = 0.5  # first standard deviation of a parameter, relative to its size
 PROCESS_SHARE = 1e-4  # default process noise per root second, of the rms of a state
 SPREAD = 1e-1  # alpha of the sigma points
+NOTHING = 0.05  # correlation taken for none: twice its deviation over 1600 samples
+LOUD = 2.0  # inflation worth a word
 
 
 @dataclass(slots=True)
@@ -87,6 +89,31 @@ def noise_deviation(maneuvers: Sequence[Maneuver]) -> Array:
     return np.asarray(np.maximum(np.sqrt(np.mean(stacked**2, axis=0) / 20.0), floor))
 
 
+def inflation(white: Sequence[Array]) -> float:
+    """Return by how much innovations tell less than the filter believes, at least 1.
+
+    Power of the whitened innovations times the time their correlation lasts, in samples: summed
+    until it first turns negative (Geyer, Statistical Science 7, 1992), mean over outputs.
+
+    Parameters
+    ----------
+    white : sequence of Array
+        Per maneuver (samples, outputs); of unit power and white where the noise model is right.
+    """
+    total = 0.0
+    for column in range(white[0].shape[1]):
+        parts = [w[:, column] for w in white]
+        lags = min(len(x) for x in parts) // 4
+        moments = np.array(
+            [sum(float(x[k:] @ x[: len(x) - k]) for x in parts) for k in range(lags)]
+        )
+        moments /= sum(len(x) for x in parts)
+        low = np.flatnonzero(moments < NOTHING * moments[0])
+        end = int(low[0]) if len(low) else lags
+        total += max(float(2.0 * np.sum(moments[:end]) - moments[0]), 0.0)
+    return float(max(total / white[0].shape[1], 1.0))
+
+
 def _run(
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
@@ -122,11 +149,12 @@ def _run(
     joint[n : n + q] = first
     spread_first = START_SHARE * np.abs(first) + 1e-3 * np.max(np.abs(first))
     residuals: list[Array] = []
+    white: list[Array] = []
     for _ in range(PASSES):
         # Each pass starts as unsure as the first: data must not be counted twice.
         P[:] = 0.0
         P[n : n + q, n : n + q] = np.diag(spread_first**2)
-        residuals = []
+        residuals, white = [], []
         for maneuver in maneuvers:
             for k, state in enumerate(model.states):
                 seen = state in model.outputs
@@ -139,20 +167,29 @@ def _run(
                 P[k, :] = P[:, k] = 0.0
                 P[k, k] = _bias_variance(model, maneuver, k - n - q)
             step = _unscented_pass if unscented else _extended_pass
-            joint, P, e = step(filter_, maneuver, joint, P)
+            joint, P, e, whitened = step(filter_, maneuver, joint, P)
             if not np.isfinite(joint).all():
                 raise IdentificationError(
                     f"{maneuver.name}: the Kalman filter diverged; give better start values"
                 )
             residuals.append(e)
-    covariance = P[n:, n:]
+            white.append(whitened)
+    excess = inflation(white)
+    covariance = excess * P[n:, n:]
+    warnings: tuple[str, ...] = ()
+    if excess > LOUD:
+        warnings = (
+            f"innovations tell {excess:.0f} times less than the noise model says (gusts, coloured"
+            f" noise): intervals are {np.sqrt(excess):.1f} times wider for it, and the estimate is"
+            " not the best one",
+        )
     return FitResult(
         method="unscented Kalman filter" if unscented else "extended Kalman filter",
         model=model,
         names=names,
         estimate=joint[n:],
         covariance=covariance,
-        covariance_white=covariance,
+        covariance_white=P[n:, n:],
         degrees_of_freedom=np.full(len(names), np.inf),
         residuals=tuple(residuals),
         fitted=tuple(m.outputs - e for m, e in zip(maneuvers, residuals, strict=True)),
@@ -160,7 +197,8 @@ def _run(
         noise_covariance=np.atleast_2d(np.cov(np.vstack(residuals).T)),
         iterations=PASSES,
         converged=True,
-        details={"noise_deviation": deviation, "process": intensity},
+        warnings=warnings,
+        details={"noise_deviation": deviation, "process": intensity, "inflation": excess},
     )
 
 
@@ -178,7 +216,7 @@ def _bias_variance(model: LinearModel, maneuver: Maneuver, k: int) -> float:
 
 def _extended_pass(
     filter_: _Filter, maneuver: Maneuver, joint: Array, P: Array
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array]:
     model, n = filter_.model, filter_.n_states
     m, q = len(model.inputs), len(model.parameters)
     foh = model.hold == "foh"
@@ -191,7 +229,7 @@ def _extended_pass(
     gain = np.concatenate([entries.gain, np.ones(rates)])
     Q = np.zeros_like(P)
     Q[:n, :n] = np.diag(filter_.process**2) * maneuver.dt_s
-    e = np.zeros_like(maneuver.outputs)
+    e, white = np.zeros_like(maneuver.outputs), np.zeros_like(maneuver.outputs)
     increments = np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:])
     for k in range(maneuver.samples):
         x, theta, biases = filter_.split(joint)
@@ -209,6 +247,7 @@ def _extended_pass(
             H[model.outputs.index(output), n + q + rates + b] = 1.0
         e[k] = maneuver.outputs[k] - predicted
         S = H @ P @ H.T + filter_.R
+        white[k] = np.linalg.solve(np.linalg.cholesky(S), e[k])
         K = np.linalg.solve(S, H @ P).T
         joint = joint + K @ e[k]
         keep = np.eye(len(joint)) - K @ H
@@ -232,12 +271,12 @@ def _extended_pass(
         joint[:n] = step @ z
         P = F @ P @ F.T + Q
         P = 0.5 * (P + P.T)
-    return joint, P, e
+    return joint, P, e, white
 
 
 def _unscented_pass(
     filter_: _Filter, maneuver: Maneuver, joint: Array, P: Array
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array]:
     model, n, size = filter_.model, filter_.n_states, len(joint)
     Q = np.zeros_like(P)
     Q[:n, :n] = np.diag(filter_.process**2) * maneuver.dt_s
@@ -246,7 +285,7 @@ def _unscented_pass(
     mean_weight[0] = 1.0 - size / scale
     weight = mean_weight.copy()
     weight[0] += 3.0 - SPREAD**2
-    e = np.zeros_like(maneuver.outputs)
+    e, white = np.zeros_like(maneuver.outputs), np.zeros_like(maneuver.outputs)
     following = np.vstack([maneuver.inputs[1:], maneuver.inputs[-1:]])
     if model.hold == "zoh":
         following = maneuver.inputs
@@ -258,6 +297,7 @@ def _unscented_pass(
         S = (weight[:, None] * dy).T @ dy + filter_.R
         K = np.linalg.solve(S, (weight[:, None] * dy).T @ dx).T
         e[k] = maneuver.outputs[k] - mean
+        white[k] = np.linalg.solve(np.linalg.cholesky(S), e[k])
         joint = joint + K @ e[k]
         P = P - K @ S @ K.T
         P = 0.5 * (P + P.T)
@@ -267,7 +307,7 @@ def _unscented_pass(
         d = moved - joint
         P = (weight[:, None] * d).T @ d + Q
         P = 0.5 * (P + P.T)
-    return joint, P, e
+    return joint, P, e, white
 
 
 def _sigma_points(joint: Array, P: Array, scale: float) -> Array:
