@@ -53,6 +53,7 @@ void Instrument::while_waiting(void* context) {
   // A call of the card that waits is bounded by itself: the recorder counts as running.
   Instrument& self = *static_cast<Instrument*>(context);
   const uint32_t now_us = hal::now_us();
+  self.pass_self_test();
   self.pilot_.step(self.config_, self.self_test_, self.outlet_, now_us);
   self.sensors_.step(self.config_, self.pilot_, self.outlet_, now_us);
   self.pilot_.ran(kTaskSensors);
@@ -105,9 +106,17 @@ void Instrument::step_slow(uint32_t now_us) {
     case 6:
       recorder_.decide(pilot_.inputs(config_), config_, now_us);
       return;
+    case 7:
+      pass_self_test();
+      return;
     default:
       return;
   }
+}
+
+// As soon as the supply is measured; put_system() takes it back.
+void Instrument::pass_self_test() {
+  if (!self_test_) self_test_ = self_test_passed();
 }
 
 bool Instrument::self_test_passed() const {

@@ -24,9 +24,6 @@ uint16_t supply_mv(uint16_t nominal_mv, uint16_t reference_mv) {
 }
 
 bool supply_good(uint16_t nominal_mv, uint16_t reference_mv) {
-  if (nominal_mv == 0) {
-    return true;
-  }
   const uint16_t at_most = reference_mv == 0 ? kMostReferenceMv : reference_mv;
   return supply_mv(nominal_mv, at_most) >= kLeastSupplyMv;
 }

@@ -21,6 +21,7 @@ void write_reference(uint8_t* record, uint16_t reference_mv);
 // `reference_mv` is 0 if not calibrated.
 uint16_t supply_mv(uint16_t nominal_mv, uint16_t reference_mv);
 // False when the supply is below 4.5 V for sure: without a calibration, even by a part of 1.2 V.
+// False while it is not measured: nothing is proven yet.
 bool supply_good(uint16_t nominal_mv, uint16_t reference_mv);
 
 }  // namespace core

@@ -31,8 +31,8 @@ constexpr uint8_t kIdle = _BV(ADEN) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);  // 
 constexpr uint8_t kFree = kIdle | _BV(ADATE) | _BV(ADIE);
 constexpr uint8_t kOnce = kIdle | _BV(ADIE);
 
-uint8_t g_scans;
-uint8_t g_reading;  // 0 or 1: half of adc_sums that scan_sum() reads
+uint8_t g_scans = kScansPerSupply - 1;  // the self-test waits for the supply of the first
+uint8_t g_reading;                      // 0 or 1: half of adc_sums that scan_sum() reads
 
 // ADMUX of a channel; its bit ADLAR, else unused, stands for MUX5 of ADCSRB.
 constexpr uint8_t selection(const uint8_t slot) {
