@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import binascii
 import json
 import struct
 import tomllib
@@ -50,6 +51,12 @@ def settings_image(**changed: int) -> Image:
             body += struct.pack("<" + FORMATS[kind], values[name])
     record = struct.pack("<HBB", MAGIC, schema["version"], len(body)) + body
     return Image(flash={}, eeprom={0: record + struct.pack("<I", zlib.crc32(record))})
+
+
+def reference_image(reference_mv: int) -> Image:
+    """Give the EEPROM record of the chip's reference voltage (core/supply.h)."""
+    word = struct.pack("<H", reference_mv)
+    return Image(flash={}, eeprom={4092: word + struct.pack("<H", binascii.crc_hqx(word, 0xFFFF))})
 
 
 def _defaults() -> dict[str, int | str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +28,7 @@ HANG = b"\xff\xcf"  # rjmp to itself
 HANG_WITHOUT_INTERRUPTS = b"\xf8\x94\xff\xcf"  # cli before it
 RECURSE = b"\xff\xdf"  # rcall to itself: the stack grows through all of RAM
 STS_PINH = 0x100
+ALL_TASKS = 0b111  # of app/pilot_link.h
 
 
 def patch(rig: FlightRig, address: int, code: bytes) -> None:
@@ -69,6 +71,57 @@ def test_program_that_hangs_lets_go_within_50_ms(flying: FlightRig, code: bytes)
     now_us = flying.chip.symbols["_ZN3hal6now_usEv"][0]
     release, gap, extra = in_fork(
         lambda: watch_fault(flying, lambda: patch(flying, now_us, code), run_s=0.2)
+    )
+    assert release <= 50
+    assert gap <= LONGEST_GAP_MS
+    assert extra <= 0
+
+
+@pytest.mark.parametrize(
+    ("frame_s", "sequential"), [(0.014, True), (0.014, False), (0.0225, True), (0.0225, False)]
+)
+def test_pulses_reach_the_servos_whenever_the_program_hangs(
+    make_rig: MakeRig, frame_s: float, sequential: bool
+) -> None:
+    """Every receiver timing, any phase of its frame; interrupts off is the longest wait."""
+    from simavr_bench import in_fork
+
+    rig = make_rig(frame_s=frame_s, sequential=sequential)
+    rig.take_off()
+    assert rig.relay.engaged
+    now_us = rig.chip.symbols["_ZN3hal6now_usEv"][0]
+
+    def end(wait_s: float) -> tuple[float, float, int]:
+        rig.chip.run_s(wait_s)
+        return watch_fault(rig, lambda: patch(rig, now_us, HANG_WITHOUT_INTERRUPTS), run_s=0.2)
+
+    for part in range(5):
+        release, gap, extra = in_fork(partial(end, 0.05 + frame_s * part / 5))
+        assert release <= 50
+        assert gap <= LONGEST_GAP_MS
+        assert extra <= 0
+
+
+def test_task_that_does_not_report_lets_go_within_50_ms(flying: FlightRig) -> None:
+    """The proof of life asks for one task more than there are; all else runs on."""
+    from simavr_bench import in_fork
+
+    chip = flying.chip
+    start, size = next(v for k, v in chip.symbols.items() if "12g_instrumentE" in k)
+    memory = chip.data(start, size)
+    now_us = chip.cycle // 16
+    gates = [
+        at
+        for at in range(size - 6)
+        if memory[at] == ALL_TASKS
+        and memory[at + 1] <= ALL_TASKS
+        and 0 <= now_us - int.from_bytes(memory[at + 2 : at + 6], "little") < 20_000
+    ]
+    assert len(gates) == 1  # core::HealthGate: required tasks, reported tasks, time of the beat
+    release, gap, extra = in_fork(
+        lambda: watch_fault(
+            flying, lambda: chip.poke(start + gates[0], bytes([2 * ALL_TASKS + 1])), run_s=0.2
+        )
     )
     assert release <= 50
     assert gap <= LONGEST_GAP_MS
@@ -228,6 +281,32 @@ def test_engages_only_behind_direct_and_then_mega(make_rig: MakeRig) -> None:
     assert max(spoiled(rig, since, servo) for servo in SERVOS) <= 1
 
 
+@pytest.mark.parametrize("trouble", ["supply", "receiver"])
+def test_does_not_engage_without_self_test_or_pulses(make_rig: MakeRig, trouble: str) -> None:
+    """A supply of 4.4 V from power-on; a receiver that is silent, then comes with the switch up."""
+    from flight.rig import DIRECT_US, MEGA_US
+    from flight.settings import reference_image
+
+    rig = make_rig()
+    if trouble == "supply":
+        rig.chip.load(reference_image(1100))
+        rig.chip.analog_supply(4.4)
+    else:
+        rig.receiver.lost = True
+    rig.power_on()
+    rig.chip.run_s(1.5)
+    rig.receiver.lost = False
+    rig.receiver.width_us[4] = MEGA_US
+    rig.chip.run_s(1.0)
+    if trouble == "supply":
+        rig.receiver.width_us[4] = DIRECT_US
+        rig.chip.run_s(0.5)
+        rig.receiver.width_us[4] = MEGA_US
+        rig.chip.run_s(0.5)
+    assert all(state != 2 for _, state in rig.relay.contacts)
+    assert max(spoiled(rig, 0, servo) for servo in SERVOS) == 0
+
+
 def test_outputs_repeat_the_receiver_within_half_a_second_of_the_start(make_rig: MakeRig) -> None:
     rig = make_rig()
     rig.chip.watch("PE4", "PE5", "PB5", "PE3")
@@ -242,6 +321,29 @@ def test_outputs_repeat_the_receiver_within_half_a_second_of_the_start(make_rig:
         wanted = rig.receiver.width_us[channel] * 16
         widths = falls[: len(rises)] - rises[: len(falls)]
         assert np.all(np.abs(widths - wanted) <= 80)  # the first one too: no twitch
+
+
+def test_reset_in_flight_goes_through_the_bootloader_and_records_again(make_rig: MakeRig) -> None:
+    """The watchdog's reset starts Debian's real bootloader: the receiver drives meanwhile."""
+    from simavr_bench import ResetCause
+
+    rig = make_rig(bootloader=True)
+    rig.take_off(ground_s=15.0)
+    assert rig.relay.engaged
+    since = rig.chip.cycle
+    written = rig.card.count().written
+    rig.chip.reset(ResetCause.WATCHDOG)
+    application = 0
+    while application == 0 and rig.chip.cycle < since + 4 * 16_000_000:
+        rig.chip.run_s(0.01)
+        application = rig.chip.cycle * (rig.chip.pc < 0x3E000 and rig.chip.state == "running")
+    assert application
+    rig.chip.run_s(2.0)
+    assert rig.card.count().written > written
+    assert not rig.relay.engaged
+    assert released_ms(rig, since) <= 50
+    assert worst_gap_ms(rig, since) <= LONGEST_GAP_MS
+    assert max(spoiled(rig, since, servo) for servo in SERVOS) <= 1
 
 
 def test_bootloader_leaves_the_servos_to_the_receiver(make_rig: MakeRig) -> None:

@@ -9,6 +9,7 @@ from flight.cut_flight import FILE_BLOCKS, place_of_file
 from flight.faults.model import CLOCK_LATE_US, Event, Fault, Outcome, Seen, event_names, valid_bit
 from flight.rig import FlightRig, check_card, make_card, take_log
 from flight.servos import LONGEST_GAP_MS, changes, spoiled, worst_gap_ms
+from flight.settings import reference_image
 from simavr_bench.card_journal import CardJournal
 
 # Bits that say who drives or what started the frame, not what may be used of it.
@@ -19,6 +20,7 @@ RESUMED_S = 2.0
 def ready_rig(elf: Path, folder: Path) -> tuple[FlightRig, CardJournal]:
     """Bring a rig into flight, its card in private pages and journalled."""
     rig = FlightRig(elf, make_card(folder / "empty.img"), in_place=False)
+    rig.chip.load(reference_image(1100))  # the model's: without it 4.4 V may be a good board's
     journal = CardJournal(rig.card)
     rig.take_off()
     rig.chip.run_s(2.0)
