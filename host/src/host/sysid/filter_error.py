@@ -21,6 +21,7 @@ from host.sysid.maneuver import Maneuver
 from host.sysid.model import LinearModel
 from host.sysid.output_error import minimise
 from host.sysid.problem import OutputProblem
+from host.sysid.repeats import pulls
 from host.sysid.result import FitResult
 from host.sysid.riccati import innovations, predicted_covariance
 from host.sysid.start import start_values
@@ -246,7 +247,8 @@ def fit_filter_error(
     )
     split = problem.n_model + len(process)
     damping, converged, iterations, size = 0.0, False, 0, np.inf
-    information, gradient = _scoring(problem, theta, point, scale)
+    parts, scores = _scoring(problem, theta, point, scale)
+    information, gradient = _summed(problem, theta, parts, scores)
     while iterations < MAX_ITERATIONS:
         held = np.zeros(len(theta), dtype=bool)
         held[split:] = (theta[split:] <= floor) & (gradient[split:] < 0.0)
@@ -275,7 +277,8 @@ def fit_filter_error(
             break
         damping = 0.0 if damping < 1e-3 else damping / 8.0
         scale = np.minimum(np.maximum(bound, 1e-8 * (1.0 + np.abs(theta))), 1.0 + np.abs(theta))
-        information, gradient = _scoring(problem, theta, point, scale)
+        parts, scores = _scoring(problem, theta, point, scale)
+        information, gradient = _summed(problem, theta, parts, scores)
     covariance = np.linalg.pinv(information, hermitian=True)
     kept = problem.n_model
     warnings = [] if converged else [f"no convergence: last step {size:.3g} bounds long"]
@@ -298,6 +301,7 @@ def fit_filter_error(
             "cost": point.cost,
             "process_deviation": np.exp(theta[kept : kept + len(process)]),
             "noise_deviation": np.exp(theta[kept + len(process) :]),
+            **pulls(parts, scores, covariance),
         },
     )
 
@@ -323,7 +327,8 @@ def information_at(
     point = problem.evaluate(theta)
     if point is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at these values")
-    return _scoring(problem, theta, point, np.full(len(theta), 1e-2))[0]
+    parts, scores = _scoring(problem, theta, point, np.full(len(theta), 1e-2))
+    return _summed(problem, theta, parts, scores)[0]
 
 
 def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> tuple[Array, Array]:
@@ -348,11 +353,11 @@ def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> tu
 
 def _scoring(
     problem: FilterProblem, theta: Array, point: _Likelihood, scale: Array
-) -> tuple[Array, Array]:
-    """Return Fisher information and minus the cost's gradient, from differences.
+) -> tuple[list[Array], list[Array]]:
+    """Return Fisher information and minus the cost's gradient of every maneuver.
 
-    One-sided ones: their width is 1e-5 standard errors. Biases and start values of a maneuver leave
-    the gains as they are.
+    From one-sided differences: their width is 1e-5 standard errors. Biases and start values of a
+    maneuver leave the gains as they are.
     """
     size = len(theta)
     slopes_e: list[dict[int, Array]] = []
@@ -368,12 +373,10 @@ def _scoring(
         runs = [number for number, e in enumerate(up.e) if len(e)]
         slopes_e.append({i: (up.e[i] - point.e[i]) / width for i in runs})
         slopes_S.append({i: (up.S[i] - point.S[i]) / width for i in runs})
-    information = np.zeros((size, size))
-    gradient = np.zeros(size)
-    n = problem.n_model
-    information[:n, :n] += np.diag(problem.inner.prior_precision)
-    gradient[:n] -= problem.inner.prior_precision * (theta[:n] - problem.inner.prior_mean)
+    parts: list[Array] = []
+    scores: list[Array] = []
     for number, (e, S) in enumerate(zip(point.e, point.S, strict=True)):
+        information, gradient = np.zeros((size, size)), np.zeros(size)
         active = [k for k in range(size) if problem.owner(k) in (None, number)]
         moving = [k for k in active if np.any(slopes_S[k][number])]
         factor = np.linalg.cholesky(S)
@@ -388,6 +391,19 @@ def _scoring(
             gradient[a] -= 0.5 * (len(e) * np.trace(spread[a]) - np.sum(spread[a] * outer))
         flat = np.array([spread[a].ravel() for a in moving])
         information[np.ix_(moving, moving)] += 0.5 * len(e) * (flat @ flat.T)
+        parts.append(information)
+        scores.append(gradient)
+    return parts, scores
+
+
+def _summed(
+    problem: FilterProblem, theta: Array, parts: Sequence[Array], scores: Sequence[Array]
+) -> tuple[Array, Array]:
+    """Return information and minus the cost's gradient of all maneuvers and the prior."""
+    information, gradient = np.sum(parts, axis=0), np.sum(scores, axis=0)
+    n = problem.n_model
+    information[:n, :n] += np.diag(problem.inner.prior_precision)
+    gradient[:n] -= problem.inner.prior_precision * (theta[:n] - problem.inner.prior_mean)
     return information, gradient
 
 

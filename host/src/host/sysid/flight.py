@@ -34,6 +34,7 @@ from host.sysid.maneuver import Maneuver
 from host.sysid.model import DelayGroup, LinearModel, without_outputs
 from host.sysid.modes import Mode, modes
 from host.sysid.problem import OutputProblem
+from host.sysid.repeats import repeats, widened
 from host.sysid.result import FitResult
 from host.sysid.templates import TEMPLATES, Trim, template
 
@@ -197,6 +198,7 @@ def _answer(
         )  # fmt: skip
     else:
         result = fit("output-error-white" if method == GUST else method, model, fitted)
+    result = widened(result, repeats(result))
     outputs = result.fitted if result.residual_kind == "output" else ()
     simulated = outputs if len(outputs) else _simulated(model, result, fitted)
     residuals = [m.outputs - y for m, y in zip(fitted, simulated, strict=True)]

@@ -12,7 +12,9 @@ from host.sysid.errors import IdentificationError
 from host.sysid.intervals import HIGHEST_ORDER, Interval, fit_with_memory
 from host.sysid.maneuver import Maneuver
 from host.sysid.model import LinearModel
+from host.sysid.output_error import whitened_slopes
 from host.sysid.problem import OutputProblem
+from host.sysid.repeats import pulls
 from host.sysid.result import FitResult
 from host.sysid.start import start_values
 
@@ -76,8 +78,26 @@ def fit_output_error(
             "refits": float(fit.refits),
             "noise_orders": np.array([float(n.order) for n in fit.noise]),
             "innovation_variance": fit.innovation_variance,
+            **_pulls(problem, fit),
         },
     )
+
+
+def _pulls(problem: OutputProblem, fit: Interval) -> dict[str, float | Array]:
+    size = len(problem.names)
+    parts, scores = [], []
+    slopes = whitened_slopes(problem, fit.optimum.responses, fit.noise)
+    for number, residual in enumerate(fit.optimum.residuals):
+        part, score = np.zeros((size, size)), np.zeros(size)
+        own = problem.columns(number)
+        for j, memory in enumerate(fit.noise):
+            J = slopes[number][j]
+            white = memory.whiten(residual[j][:, None])[:, 0]
+            part[np.ix_(own, own)] += J.T @ J / fit.innovation_variance[j]
+            score[own] += J.T @ white / fit.innovation_variance[j]
+        parts.append(part)
+        scores.append(score)
+    return pulls(parts, scores, fit.covariance)
 
 
 def _warnings(problem: OutputProblem, fit: Interval) -> tuple[str, ...]:

@@ -1,0 +1,72 @@
+"""Scatter of repeated maneuvers: fair where they agree, widened where they do not."""
+
+import numpy as np
+import pytest
+from host.sysid import FitResult, Maneuver, fit
+from host.sysid.problem import OutputProblem
+from host.sysid.repeats import repeats, widened
+from host.sysid.study.aircraft import navion_structured
+from host.sysid.study.data import TRUTH, noisy
+
+MODEL = navion_structured()
+PLACE = MODEL.parameter_names.index("M_alpha")
+
+
+def flown(seed: int, spread: float, count: int = 5, method: str = "output-error") -> FitResult:
+    """Fit maneuvers whose M_alpha differs from one to the next by a share `spread`."""
+    rng = np.random.default_rng(seed)
+    base = noisy(0, 0.05)
+    maneuvers = []
+    for _ in range(count):
+        theta = TRUTH.copy()
+        theta[PLACE] *= 1.0 + spread * rng.standard_normal()
+        outputs = OutputProblem(MODEL, [base]).outputs(np.concatenate([theta, np.zeros(4)]))
+        assert outputs is not None
+        y = outputs[0].T
+        y = y + np.sqrt(np.mean(y**2, axis=0) / 10.0) * rng.standard_normal(y.shape)
+        maneuvers.append(Maneuver(0.05, base.inputs, y))
+    return fit(method, MODEL.with_start(TRUTH), maneuvers)
+
+
+def test_maneuvers_of_one_aircraft_agree_as_often_as_chi_square_says() -> None:
+    found = [repeats(flown(seed, 0.0)) for seed in range(40)]
+    p = np.array([f.p_value for f in found if f is not None])
+    assert p.shape == (40, len(TRUTH))
+    # 360 values, nine of a flight correlated: three deviations of a share of 0.1 and of 0.5.
+    assert 0.03 < np.mean(p < 0.1) < 0.18
+    assert 0.40 < np.mean(p < 0.5) < 0.60
+    assert np.mean(p < 0.01) < 0.035
+
+
+@pytest.mark.parametrize("method", ["output-error", "output-error-white", "filter-error"])
+def test_an_aircraft_that_changes_is_named_and_its_interval_widened(method: str) -> None:
+    result = flown(0, 0.1, method=method)
+    found = repeats(result)
+    assert found is not None
+    wide = widened(result, found)
+    assert found.p_value[PLACE] < 1e-3
+    assert found.factor[PLACE] > 2.0
+    assert wide.standard_error[PLACE] == pytest.approx(
+        found.factor[PLACE] * result.standard_error[PLACE]
+    )
+    assert wide.half_width()[PLACE] == pytest.approx(2.776 * wide.standard_error[PLACE], rel=0.01)
+    assert any("do not agree on M_alpha" in line for line in wide.warnings)
+    other = MODEL.parameter_names.index("Z_u")
+    assert found.factor[other] == 1.0
+
+
+def test_widened_intervals_hold_the_mean_where_plain_ones_do_not() -> None:
+    plain, wide = [], []
+    for seed in range(30):
+        result = flown(seed, 0.1, count=6)
+        off = abs(result.value("M_alpha") - TRUTH[PLACE])
+        plain.append(off < result.half_width()[PLACE])
+        wide.append(off < widened(result, repeats(result)).half_width()[PLACE])
+    assert np.mean(plain) < 0.75
+    assert np.mean(wide) > 0.85
+
+
+def test_one_maneuver_says_nothing_of_scatter() -> None:
+    result = fit("output-error", MODEL.with_start(TRUTH), [noisy(1, 0.05)])
+    assert repeats(result) is None
+    assert widened(result, None) is result
