@@ -44,15 +44,13 @@ study: setup ## tables and pictures of identification in build/study (SIZE=full:
 	@$(PYTHON) -m host.sysid.study build/study --size $(or $(SIZE),small)
 
 flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
-	@cd tests/simavr && ../../$(PYTHON) -m flight.bench $(BENCH)
-	@cd tests/simavr && ../../$(PYTHON) -m imu.bench --minutes 1
+	@cd tests/simavr && { ../../$(PYTHON) -m flight.bench $(BENCH); bad=$$?; ../../$(PYTHON) -m imu.bench --minutes 1 && exit $$bad; }
 
 imu-bench: setup ## the IMU's image and the Mega's on one bus for ten minutes, sample by sample
 	@cd tests/simavr && ../../$(PYTHON) -m imu.bench $(IMU_BENCH)
 
 faults: setup ## faults in flight on the simulated chip
-	@cd tests/simavr && ../../$(PYTHON) -m flight.faults $(FAULTS)
-	@cd tests/simavr && ../../$(PYTHON) -m imu.faults
+	@cd tests/simavr && { ../../$(PYTHON) -m flight.faults $(FAULTS); bad=$$?; ../../$(PYTHON) -m imu.faults && exit $$bad; }
 
 power-cuts: setup ## power cuts in flight, of metadata, and the next boot (minutes)
 	@cd tests/simavr && ../../$(PYTHON) -m flight.power_cuts $(CUTS)

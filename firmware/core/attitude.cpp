@@ -28,6 +28,11 @@ uint16_t magnitude(int16_t value) {
   return static_cast<uint16_t>(value < 0 ? -int32_t{value} : int32_t{value});
 }
 
+uint16_t less(uint16_t steps) {
+  constexpr uint8_t kBy = Attitude::kSamplesPerCorrection;
+  return steps > kBy ? static_cast<uint16_t>(steps - kBy) : uint16_t{0};
+}
+
 // Error Q25 rad, of which 1 counts at most, times gain Q28 1/s as a rate in Q27. Two of them and
 // the gyro's 8.7 rad/s stay below the 16 that Q27 holds.
 int32_t rate_of(int32_t error_q25, int32_t gain_q28) {
@@ -124,10 +129,9 @@ void Attitude::step(const AttitudeInput& in, uint32_t dt_us) {
     started_ = true;
     last_rate_ = rate;
   }
-  settle_steps_ = settle_steps_ == 0 ? uint16_t{0} : static_cast<uint16_t>(settle_steps_ - 1);
-  recover_steps_ = in.gyro_saturated     ? kRecoverSteps
-                   : recover_steps_ == 0 ? uint16_t{0}
-                                         : static_cast<uint16_t>(recover_steps_ - 1);
+  if (in.gyro_saturated) {
+    recover_steps_ = kRecoverSteps;
+  }
   for (uint8_t axis = 0; axis < 3; ++axis) {
     force_sum_[axis] += in.force[axis];
   }
@@ -161,6 +165,10 @@ void Attitude::correct() {
   down_ = down(attitude_);
   uint16_t weight = 0;
   const Vector error = gravity_error(weight);
+  if (weight >= kFullWeight / 2) {  // else nothing was seen to settle on, as in a steep turn
+    settle_steps_ = less(settle_steps_);
+    recover_steps_ = less(recover_steps_);
+  }
 
   int32_t gain = settings_.tilt_gain_permille * kPermilleQ28;
   int32_t heading_gain = settings_.heading_gain_permille * kPermilleQ28;

@@ -24,8 +24,10 @@ struct AttitudeInput {
 
 class Attitude {
  public:
-  static constexpr uint16_t kSettleSteps = 600;        // 3 s at 200 Hz of fast convergence
-  static constexpr uint16_t kRecoverSteps = 2000;      // 10 s after a saturated gyro
+  // Of fast convergence, 3 s at 200 Hz; and behind a saturated gyro, 10 s. Only such count in which
+  // gravity was seen: a start or a reset in a steep turn is valid when the turn is over.
+  static constexpr uint16_t kSettleSteps = 600;
+  static constexpr uint16_t kRecoverSteps = 2000;
   static constexpr uint8_t kSamplesPerCorrection = 4;  // 50 Hz: half the cycles of 200 Hz
   static constexpr uint32_t kSpeedUs = 1000000;        // a speed is used this long
   static constexpr uint32_t kFieldUs = 500000;         // a heading error is worked off this long

@@ -188,14 +188,39 @@ TEST_CASE(
   filter.in.accel_saturated = true;
   filter.run(5);
   CHECK(filter.attitude.valid());
+  filter.in.accel_saturated = false;
   filter.in.gyro_saturated = true;
   filter.run(1);
   CHECK(!filter.attitude.valid());
   filter.in.gyro_saturated = false;
-  filter.run(Attitude::kRecoverSteps - 1);
+  filter.run(Attitude::kRecoverSteps - Attitude::kSamplesPerCorrection);
   CHECK(!filter.attitude.valid());
-  filter.run(1);
+  filter.run(2 * Attitude::kSamplesPerCorrection);
   CHECK(filter.attitude.valid());
+}
+
+TEST_CASE("a start in a steep turn is not valid before gravity was seen for three seconds") {
+  for (uint8_t known = 0; known < 2; ++known) {
+    Filter filter;
+    // 15 m/s at 45 deg: 0.6538 rad/s, 1.41 g along z.
+    filter.in.rates[1] = 1735;
+    filter.in.rates[2] = 1735;
+    filter.in.force[2] = -11585;
+    for (uint8_t second = 0; second < 20; ++second) {
+      if (known != 0) {
+        filter.attitude.set_speed(1500);
+      }
+      filter.run(200);
+      CHECK(!filter.attitude.valid());
+    }
+    filter.in.rates[1] = filter.in.rates[2] = 0;
+    filter.in.force[2] = -kG;
+    filter.run(Attitude::kSettleSteps - Attitude::kSamplesPerCorrection);
+    CHECK(!filter.attitude.valid());
+    filter.run(2 * Attitude::kSamplesPerCorrection);
+    CHECK(filter.attitude.valid());
+    CHECK(off(filter.attitude.phi_cdeg(), 0) <= 20);
+  }
 }
 
 TEST_CASE("no input overflows: full scale on every channel, any time step, leaves a rotation") {
