@@ -14,6 +14,7 @@ from host.sysid.finder import Found
 from host.sysid.pictures import interval_bars
 from host.sysid.tables import read_columns
 from host.sysid.truth import read_truth, true_coefficients
+from scipy import io
 
 NAME = "ultrastick25e"
 RED = "#d62728"
@@ -80,6 +81,25 @@ def test_another_inertia_than_the_fit_used_moves_the_modes(answer: CoefficientAn
     assert other.frequency_radps < 0.95 * same.frequency_radps
 
 
+def test_the_linear_motion_is_that_of_the_true_aircraft(
+    folder: Path, answer: CoefficientAnswer
+) -> None:
+    truth = read_truth(folder / "flight.truth.toml")
+    flown, at = truth["flown"], truth["maneuver"][0]
+    pressure = at["condition"]["qbar_pa"] * 0.3093671232
+    for entry, name, arm, inertia, row in (
+        ((2, 1), "Cm_alpha", 0.2530602, flown["iyy_kgm2"], "longitudinal"),
+        ((1, 1), "Cl_p", 1.26365**2 / (2 * at["condition"]["airspeed_mps"]), flown["ixx_kgm2"],
+         "lateral"),
+    ):  # fmt: skip
+        expected = pressure * arm * true_coefficients(truth, row)[name] / inertia
+        system = answer.systems[row]
+        assert abs(system.A[entry] - expected) <= 1.5 * system.A_half[entry]
+        # The coefficient carries 5 % of inertia, the motion does not.
+        assert system.A_half[entry] < 0.055 * abs(expected)
+    assert answer.systems["lateral"].B.shape == (4, 2)
+
+
 def test_delays_left_over_are_told(folder: Path, answer: CoefficientAnswer) -> None:
     drawn = read_truth(folder / "flight.truth.toml")["drawn"]
     value, half = answer.delays["delay_imu_s"]
@@ -101,7 +121,7 @@ def test_says_what_to_trust_and_why_not(
     assert not table["Cm_q"]["flagged"]
     assert any("do not rely on Cn_p" in line for line in document["verdict"])
     more = ["--plots", str(tmp_path / "plots"), "--save-aircraft", str(again)]
-    truth = ["--truth", str(folder / "flight.truth.toml")]
+    truth = ["--truth", str(folder / "flight.truth.toml"), "--mat", str(tmp_path / "x.mat")]
     assert main(["identify", source, *flags, *more, *truth]) == 0
     text = capsys.readouterr().out
     assert text.startswith("coefficients: 3 maneuvers of the elevator, 6 of aileron and rudder")
@@ -109,6 +129,10 @@ def test_says_what_to_trust_and_why_not(
     assert {p.name for p in (tmp_path / "plots").iterdir()} == {
         f"coefficients_{k}.svg" for k in ("fit", "poles", "intervals", "input")
     }
+    content = io.loadmat(tmp_path / "x.mat", squeeze_me=True)
+    assert content["coefficients_lateral"]["B"].item().shape == (4, 2)
+    assert main(["identify", source, *flags, "--save-model", str(tmp_path / "x.toml")]) == 2
+    assert "--save-aircraft" in capsys.readouterr().err
     with again.open("rb") as file:
         saved = tomllib.load(file)["aerodynamics"]
     assert saved["cm_q"][0] == pytest.approx(table["Cm_q"]["value"], rel=1e-6)

@@ -125,6 +125,17 @@ def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dic
             }
             for d in answer.fit.derivatives
         },
+        "systems": {
+            name: {
+                "states": list(x.states),
+                "inputs": list(x.inputs),
+                "A": x.A.tolist(),
+                "B": x.B.tolist(),
+                "A_half_width": x.A_half.tolist(),
+                "B_half_width": x.B_half.tolist(),
+            }
+            for name, x in answer.systems.items()
+        },
         "modes": mode_document(answer.modes),
         "delays_s": {n: {"value": v, "half_width": h} for n, (v, h) in answer.delays.items()},
         "instrument_errors": {

@@ -12,7 +12,7 @@ from host.sysid.aircraft_file import airframe_data, instrument_data, powerplant
 from host.sysid.airframe import Coefficient, CoefficientTable
 from host.sysid.coefficient_answer import METHOD, QUANTILE, CoefficientFit
 from host.sysid.coefficient_fit import fit_coefficients
-from host.sysid.coefficient_modes import coefficient_modes
+from host.sysid.coefficient_modes import System, coefficient_modes, dimensional
 from host.sysid.coefficient_windows import LEAST_S, Window
 from host.sysid.errors import IdentificationError
 from host.sysid.finder import FLYING_SHARE, Found, find
@@ -59,6 +59,7 @@ class CoefficientAnswer:
     windows: tuple[Window, ...]
     causes: dict[str, tuple[str, float]]
     modes: tuple[Mode, ...]
+    systems: dict[str, System]
     delays: dict[str, tuple[float, float]]
 
     @property
@@ -127,6 +128,7 @@ def identify_coefficients(
         windows=tuple(spans),
         causes=_causes(fit),
         modes=coefficient_modes(fit, airframe),
+        systems=dimensional(fit, airframe),
         delays=_delays(fit, data),
     )
 

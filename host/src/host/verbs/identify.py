@@ -45,7 +45,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--truth", type=Path, metavar="TOML",
                         help="truth of a simulated flight: compare with it")  # fmt: skip
     parser.add_argument("--prior", type=Path, metavar="FILE",
-                        help="coefficients to compare with: TOML, or AVL's ST output")  # fmt: skip
+                        help="coefficients to compare with: TOML, output of AVL (ST) or Datcom")  # fmt: skip
     parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="start of the fit")
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the fit")
     parser.add_argument("--maneuver", type=int, action="append", metavar="N",
@@ -101,7 +101,8 @@ def run(args: argparse.Namespace) -> int:
     if args.prior:
         from host.sysid.prior import read_prior
 
-        prior = read_prior(args.prior)
+        alpha = columns.get("alpha_rad")
+        prior = read_prior(args.prior, 0.0 if alpha is None else sorted(alpha)[len(alpha) // 2])
         if not args.aircraft:
             raise IdentificationError("--prior compares coefficients; they need --aircraft")
     windows = _windows(args, columns)
@@ -126,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
     if not answers and direct is None:
         raise IdentificationError("; ".join(notes))
     tables = list(direct.tables) if direct else [a.table for a in answers]
-    _write(args, answers, tables)
+    _write(args, answers, tables, direct)
     if direct and args.plots:
         from host.sysid.pictures import draw_coefficients
 
@@ -277,14 +278,19 @@ def _side_by_side(answers: list[Answer]) -> list[str]:
     return lines
 
 
-def _write(args: argparse.Namespace, answers: list[Answer], tables: list[CoefficientTable]) -> None:
+def _write(
+    args: argparse.Namespace,
+    answers: list[Answer],
+    tables: list[CoefficientTable],
+    direct: CoefficientAnswer | None,
+) -> None:
     if args.plots:
         from host.sysid.pictures import draw
 
         for answer in answers:
             draw(answer, args.plots)
     if args.mat:
-        _write_mat(args.mat, answers)
+        _write_mat(args.mat, answers, direct)
     for path in (args.save_aircraft, args.save_model):
         if path and (path is args.save_aircraft or path.suffix == ".xml"):
             _write_aircraft(args, path, tables)
@@ -292,8 +298,15 @@ def _write(args: argparse.Namespace, answers: list[Answer], tables: list[Coeffic
         from host.sysid.model_file import model_text
 
         if args.save_model.suffix == ".mat":
-            _write_mat(args.save_model, answers)
+            _write_mat(args.save_model, answers, direct)
             return
+        if not answers:
+            from host.sysid.errors import IdentificationError
+
+            raise IdentificationError(
+                f"{args.save_model}: coefficients are an aircraft; use --save-aircraft, or a name"
+                " that ends in .xml or .mat"
+            )
         for number, answer in enumerate(answers):
             path = args.save_model
             if number:
@@ -310,7 +323,7 @@ def _write_aircraft(args: argparse.Namespace, path: Path, tables: list[Coefficie
     save_aircraft(path, tables, args.aircraft)
 
 
-def _write_mat(path: Path, answers: list[Answer]) -> None:
+def _write_mat(path: Path, answers: list[Answer], direct: CoefficientAnswer | None) -> None:
     import numpy as np
     from scipy import io
 
@@ -332,4 +345,21 @@ def _write_mat(path: Path, answers: list[Answer]) -> None:
             "outputs": np.array(answer.model.outputs, dtype=object),
             "method": answer.method,
         }
+    if direct:
+        derivatives = direct.fit.derivatives
+        content["coefficients"] = {
+            "names": np.array([d.name for d in derivatives], dtype=object),
+            "estimate": np.array([d.value for d in derivatives]),
+            "half_width": np.array([d.half_width for d in derivatives]),
+            "covariance": direct.fit.covariance[: len(derivatives), : len(derivatives)],
+        }
+        for name, system in direct.systems.items():
+            content[f"coefficients_{name}"] = {
+                "A": system.A,
+                "B": system.B,
+                "A_half_width": system.A_half,
+                "B_half_width": system.B_half,
+                "states": np.array(system.states, dtype=object),
+                "inputs": np.array(system.inputs, dtype=object),
+            }
     io.savemat(path, content)
