@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from host.sysid.airframe import Coefficient
 from host.sysid.errors import IdentificationError
@@ -27,6 +28,28 @@ def test_avl_and_toml_are_read(tmp_path: Path) -> None:
     assert "Cn_beta" not in prior  # the spiral figure is no derivative
     (tmp_path / "p.toml").write_text("[coefficients]\nCm_q = -10.9\n")
     assert read_prior(tmp_path / "p.toml") == {"Cm_q": -10.9}
+
+
+# Written to the layout of Datcom's FORTRAN formats; no real aircraft.
+DATCOM = Path(__file__).with_name("datcom_layout.dat").read_text()
+
+
+def test_datcom_is_read_at_the_angle_of_attack_flown(tmp_path: Path) -> None:
+    (tmp_path / "for006.dat").write_text(DATCOM)
+    degree = 180.0 / np.pi
+    prior = read_prior(tmp_path / "for006.dat", np.radians(0.0))
+    expected = {
+        "CL_alpha": 0.075, "Cm_alpha": -0.022, "CY_beta": -0.005, "Cn_beta": 0.0015,
+        "Cl_beta": -0.0011, "CL_q": 0.13, "Cm_q": -0.19, "Cl_p": -0.0072, "CY_p": -0.0011,
+        "Cn_p": -0.0004, "Cn_r": -0.0012, "Cl_r": 0.0016,
+    }  # fmt: skip
+    assert prior == pytest.approx({k: degree * v for k, v in expected.items()})
+    # Beyond the last row that knows the slope, that row stands.
+    far = read_prior(tmp_path / "for006.dat", np.radians(6.0))
+    assert far["CL_alpha"] == pytest.approx(degree * 0.08)
+    assert far["Cl_beta"] == pytest.approx(degree * -0.0014)
+    (tmp_path / "radian.dat").write_text(DATCOM.replace("PER DEGREE", "PER RADIAN"))
+    assert read_prior(tmp_path / "radian.dat")["Cm_q"] == pytest.approx(-0.19)
 
 
 def test_disagreement_is_named() -> None:

@@ -1,8 +1,9 @@
 """What a handbook or a vortex lattice said before the flight, beside what the flight says.
 
-TOML: `[coefficients]` with names as in the answer (`CL_alpha = 4.1`), per radian; or the text that
-AVL writes with its command ST. AVL's moments are about stability axes, ours about body axes: at a
-few degrees of alpha they differ by that angle times the other moment, which is not turned here.
+TOML: `[coefficients]` with names as in the answer (`CL_alpha = 4.1`), per radian; the text that AVL
+writes with its command ST; or Digital Datcom's output (`datcom`). Both give moments about
+stability axes, ours are about body axes: at a few degrees of alpha they differ by that angle times
+the other moment, which is not turned here.
 """
 
 from __future__ import annotations
@@ -13,14 +14,22 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from host.sysid.airframe import Coefficient
+from host.sysid.datcom import is_datcom, read_datcom
 from host.sysid.errors import IdentificationError
 
 _AVL = re.compile(r"\b(CL|CY|Cl|Cm|Cn)([abpqr])\s*=\s*([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)")
 _LABELS = {"a": "alpha", "b": "beta", "p": "p", "q": "q", "r": "r"}
 
 
-def read_prior(path: Path) -> dict[str, float]:
+def read_prior(path: Path, alpha_rad: float = 0.0) -> dict[str, float]:
     """Return coefficients by name.
+
+    Parameters
+    ----------
+    path : Path
+        TOML, AVL's ST output, or Datcom's output.
+    alpha_rad : float
+        Where a table over the angle of attack is read.
 
     Raises
     ------
@@ -32,6 +41,8 @@ def read_prior(path: Path) -> dict[str, float]:
         if path.suffix == ".toml":
             table = tomllib.loads(text).get("coefficients", {})
             found = {str(k): float(v) for k, v in dict(table).items()}
+        elif is_datcom(text):
+            found = read_datcom(text, alpha_rad)
         else:
             # The line of the spiral figure, "Clb Cnr / Clr Cnb = ...", is no derivative.
             text = "\n".join(line for line in text.splitlines() if "/" not in line)
@@ -40,7 +51,8 @@ def read_prior(path: Path) -> dict[str, float]:
         raise IdentificationError(f"{path}: {error}") from error
     if not found:
         raise IdentificationError(
-            f"{path}: no coefficient; expected TOML with [coefficients], or AVL's ST output"
+            f"{path}: no coefficient; expected TOML with [coefficients], or output of AVL (ST) or"
+            " Datcom"
         )
     return found
 

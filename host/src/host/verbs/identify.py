@@ -45,7 +45,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--truth", type=Path, metavar="TOML",
                         help="truth of a simulated flight: compare with it")  # fmt: skip
     parser.add_argument("--prior", type=Path, metavar="FILE",
-                        help="coefficients to compare with: TOML, output of AVL (ST) or Datcom")  # fmt: skip
+                        help="coefficients to compare with: TOML, AVL ST, Datcom")  # fmt: skip
     parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="start of the fit")
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the fit")
     parser.add_argument("--maneuver", type=int, action="append", metavar="N",
