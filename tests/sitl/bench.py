@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 from host.log import FlightLog, read_log
+from host.twin.sitl_library import TICKS_PER_S, Recorder, Sitl
 from numpy.typing import NDArray
 
 from tests.sitl import script as scripted
 from tests.sitl.card_image import CARD_ID, list_files, new_card, read_file
-from tests.sitl.instrument import TICKS_PER_S, Recorder, Sitl
 from tests.sitl.script import Script, script
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 from host.twin import bmp085
+from host.twin.sitl_library import byte_ticks
 from numpy.typing import NDArray
 
 from tests.sitl import script as scripted
-from tests.sitl.instrument import byte_ticks
 from tests.sitl.script import Integers, Script
 
 Frames = Mapping[str, NDArray[np.void]]

@@ -18,6 +18,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from host.log import FlightLog, read_log
+from host.twin.sitl_library import TICKS_PER_S, Recorder, Sitl
 
 from tests.sitl.card_image import (
     BLOCK,
@@ -28,7 +29,6 @@ from tests.sitl.card_image import (
     read_file,
 )
 from tests.sitl.compare import Difference, compare
-from tests.sitl.instrument import TICKS_PER_S, Recorder, Sitl
 from tests.sitl.script import Script, script
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -11,9 +11,8 @@ import struct
 from dataclasses import dataclass, field
 
 import numpy as np
+from host.twin.sitl_library import TICKS_PER_S, Sitl
 from numpy.typing import NDArray
-
-from tests.sitl.instrument import TICKS_PER_S, Sitl
 
 Integers = NDArray[np.int64]
 

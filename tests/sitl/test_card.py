@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.twin.sitl_library import TICKS_PER_S, CardFault, Level, Recorder, Sitl, Volume
 
 from tests.protocol import oracle
 from tests.sitl.bench import Bench, events, flight, idle_receiver, missing, spread
 from tests.sitl.card_image import BLOCK, format_fat32, new_card, read_file
-from tests.sitl.instrument import TICKS_PER_S, CardFault, Level, Recorder, Sitl, Volume
 
 
 def ticks(seconds: float) -> int:

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.twin.sitl_library import TICKS_PER_S, Port
 
 from tests.sitl.bench import Bench, flight, missing
 from tests.sitl.compare import NAMES, compare
-from tests.sitl.instrument import TICKS_PER_S, Port
 
 
 def fly(bench: Bench, seconds: float = 20.0) -> None:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.twin.sitl_library import TICKS_PER_S, Sitl
 from numpy.typing import NDArray
 
 from tests.sitl import demo
 from tests.sitl import script as scripted
 from tests.sitl.bench import Bench, flight
 from tests.sitl.compare import NAMES, Frames, compare
-from tests.sitl.instrument import TICKS_PER_S, Sitl
 
 CHANNELS = (*scripted.IMU, *scripted.ANALOG, *scripted.RC)
 Damage = Callable[[NDArray[np.void], int], None]

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.twin.sitl_library import TICKS_PER_S, byte_ticks
 
 from tests.sitl import script as scripted
 from tests.sitl.bench import Bench, events, flight, missing
 from tests.sitl.compare import compare
-from tests.sitl.instrument import TICKS_PER_S, byte_ticks
 
 FRESH, TRIGGERED, ORIGINAL = 0x0400, 0x2000, 0x4000
 

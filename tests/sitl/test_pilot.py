@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from host.twin.sitl_library import TICKS_PER_S, Level, Port
 
 from host import original_rows
 from tests.protocol import oracle
 from tests.sitl.bench import Bench, config_places, flight, idle_receiver
-from tests.sitl.instrument import TICKS_PER_S, Level, Port
 from tests.sitl.script import Receiver
 
 MEGA, DIRECT_LOST = 5, 3

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import pytest
+from host.twin.sitl_library import EEPROM_BYTES, TICKS_PER_S, Recorder
 
 from tests.protocol import oracle
 from tests.sitl.bench import Bench, events, flight, idle_receiver, missing
 from tests.sitl.card_image import CARD_ID, format_fat32, read_file, remove_files
 from tests.sitl.compare import NAMES, compare
-from tests.sitl.instrument import EEPROM_BYTES, TICKS_PER_S, Recorder
 
 ERASED = b"\xff" * EEPROM_BYTES
 BROWN_OUT = 3

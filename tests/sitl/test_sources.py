@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.twin.sitl_library import TICKS_PER_S
 
 from tests.sitl import script as scripted
 from tests.sitl.bench import Bench, flight, idle_receiver
-from tests.sitl.instrument import TICKS_PER_S
 
 # BST-BMP280-DS001-26, section 3.12: dig_T1 ... dig_P9, and what 519888 and 415148 mean with them.
 BMP280_WORDS = (

@@ -6,10 +6,10 @@ import struct
 import numpy as np
 import pytest
 from host.status_line import StatusLine, parse_status
+from host.twin.sitl_library import TICKS_PER_S, Level, Port
 
 from tests.sitl import script as scripted
 from tests.sitl.bench import Bench, flight
-from tests.sitl.instrument import TICKS_PER_S, Level, Port
 
 SELF_TEST, MEGA = 4, 5
 REFERENCE_ADDRESS = 4092

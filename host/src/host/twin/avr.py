@@ -31,6 +31,7 @@ from host.twin.sitl import (
     check_duration,
     file_of,
 )
+from host.twin.sitl_library import LIBRARY
 from host.twin.stimuli import Stimuli
 
 REPLAY = CLONE / "tests" / "simavr" / "replay.py"
@@ -75,7 +76,7 @@ def record(
                    str(folder / "card.img"), "--close-s", str(CLOSE_S),
                    "--seed", str(seed)]  # fmt: skip
         damaged = any(fault.kind == "settings_damaged" for fault in faults)
-        if damaged or rate_hz != DEFAULT_RATE_HZ or sitl.LIBRARY.is_file():
+        if damaged or rate_hz != DEFAULT_RATE_HZ or LIBRARY.is_file():
             (folder / "eeprom.bin").write_bytes(sitl.eeprom(rate_hz, aircraft, damaged=damaged))
             command += ["--eeprom", str(folder / "eeprom.bin")]
         for fault in faults:

@@ -1,12 +1,10 @@
 """The recorder itself, as a shared library in simulated time.
 
-The library is loaded by path when a flight is recorded and reached through the C interface of
-`firmware/boards/sitl/sitl.h` only; nothing of it is imported or linked.
+What a flight does to it and what a card is afterwards; the C interface is `sitl_library`.
 """
 
 from __future__ import annotations
 
-import ctypes
 import mmap
 import os
 import struct
@@ -14,54 +12,31 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from host.errors import UsageError
-from host.resources import CLONE
-from host.twin.fat32 import CARD_BYTES, SECTOR, CardImageError, CardReader, format_card
+from host.twin.fat32 import CARD_BYTES, CardImageError, CardReader, format_card
 from host.twin.faults import Action, Fault, recorder_actions
 from host.twin.flight import IDLE_US, NEUTRAL_US
 from host.twin.mega_clock import TICKS_PER_S
+from host.twin.sitl_library import LIBRARY, TICKS_PER_US, CardFault, Port, Sitl
 from host.twin.stimuli import SAMPLE_STEP_TICKS, Stimuli
 
-LIBRARY = CLONE / "build" / "sitl" / "libsitl.so"
 RATES_HZ = (25, 50, 100, 200)
-PACKET_ROOM = 40
-EEPROM_BYTES = 4096
-TELEMETRY = 2  # port of sitl.h
 PRESS_S, LET_GO_S = 3.6, 3.9  # start button; preparing 64 MiB takes the Mega 2.8 s
 CLOSE_S = 20.0  # the next power-on, throttle idle for 10 s: the recorder closes the file
 # Room on the card per second of flight at 100 Hz: about 18 blocks are used.
 BLOCKS_PER_S = 40
-CARD_EVENTS = {"card_busy": 0, "card_reject": 1, "card_removed": 2, "card_inserted": 3}
+CARD_ID = b"\x03VIRT\x15card\x10\x00\x00\x01\x00\xf0"
+CARD_EVENTS = {
+    "card_busy": CardFault.BUSY,
+    "card_reject": CardFault.REJECT,
+    "card_removed": CardFault.REMOVE,
+    "card_inserted": CardFault.INSERT,
+}
 # storage::VolumeStatus of the recorder.
 VOLUMES = ("a good card", "no card", "a card without a file system", "a card it cannot read",
            "a full card", "a card without room in one piece")  # fmt: skip
 NO_FILE = {"card_absent": "no card", "card_full": "a full card",
            "card_unformatted": "a card without a file system"}  # fmt: skip
-
-
-class _State(ctypes.Structure):
-    _fields_ = (
-        ("now", ctypes.c_int64),
-        ("clock_us", ctypes.c_uint32),
-        ("file_number", ctypes.c_uint32),
-        ("blocks_taken", ctypes.c_uint32),
-        ("ground_writes", ctypes.c_uint32),
-        ("conversions", ctypes.c_uint32),
-        ("lost_edges", ctypes.c_uint16),
-        ("lost_packets", ctypes.c_uint16),
-        ("lost_gps_bytes", ctypes.c_uint16),
-        ("recorder", ctypes.c_uint8),
-        ("volume", ctypes.c_uint8),
-        ("drive", ctypes.c_uint8),
-        ("relay", ctypes.c_uint8),
-        ("powered", ctypes.c_uint8),
-        ("programming", ctypes.c_uint8),
-        ("led", ctypes.c_uint8),
-        ("buzzer", ctypes.c_uint8),
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,15 +119,12 @@ def record(
         No library, or the recorder did not make a file.
     """
     check_duration(given)
-    sitl = ctypes.CDLL(str(library_path()))
-    sitl.sitl_create()
+    sitl = Sitl(library_path())
     image = card_image(faults)
-    room = (ctypes.c_uint8 * CARD_BYTES).from_buffer(image)
     try:
-        return _record(sitl, image, room, given, rate_hz, aircraft, faults, seed, progress)
+        return _record(sitl, image, given, rate_hz, aircraft, faults, seed, progress)
     finally:
-        sitl.sitl_create()  # lets go of the image
-        del room
+        sitl.close()
 
 
 def check_duration(given: Stimuli) -> None:
@@ -167,18 +139,14 @@ def check_duration(given: Stimuli) -> None:
 
 def eeprom(rate_hz: int, aircraft: str, *, damaged: bool = False) -> bytes:
     """Return the EEPROM (4096 bytes) of a recorder with these settings; raises UsageError."""
-    sitl = ctypes.CDLL(str(library_path()))
-    sitl.sitl_create()
+    sitl = Sitl(library_path())
     _configure(sitl, rate_hz, aircraft, damaged=damaged)
-    content = (ctypes.c_uint8 * EEPROM_BYTES)()
-    sitl.sitl_get_eeprom(content)
-    return bytes(content)
+    return sitl.eeprom()
 
 
 def _record(
-    sitl: ctypes.CDLL,
+    sitl: Sitl,
     image: mmap.mmap,
-    room: ctypes.Array[ctypes.c_uint8],
     given: Stimuli,
     rate_hz: int,
     aircraft: str,
@@ -188,41 +156,38 @@ def _record(
 ) -> Recording:
     kinds = {fault.kind for fault in faults}
     if "card_absent" not in kinds:
-        card_id = (ctypes.c_uint8 * 16)(*b"\x03VIRT\x15card\x10\x00\x00\x01\x00\xf0")
-        sitl.sitl_insert_card(room, ctypes.c_uint32(CARD_BYTES // SECTOR), card_id)
+        sitl.insert_card(image, CARD_ID)
     room_s = given.duration / TICKS_PER_S + 30.0
     blocks = round(room_s * BLOCKS_PER_S * max(rate_hz / 100.0, 0.5))
-    sitl.sitl_set_file_blocks(ctypes.c_uint32(blocks))
+    sitl.set_file_blocks(blocks)
     _configure(sitl, rate_hz, aircraft, damaged="settings_damaged" in kinds)
     for fault in faults:
         if fault.kind == "clock_wrap":
             offset_us = (1 << 32) - round(fault.at_s * 1e6)
-            sitl.sitl_set_clock_offset(ctypes.c_uint32(offset_us & 0xFFFFFFFF))
+            sitl.set_clock_offset(offset_us & 0xFFFFFFFF)
     cuts = [round(f.at_s * TICKS_PER_S) for f in faults if f.kind == "power_cut"]
     end = min([given.duration, *cuts])
     _give(sitl, given, end)
     if "telemetry_flood" in kinds:
         raise UsageError("telemetry_flood: here an interrupt takes no time; use --firmware avr")
     actions = [(round(a.at_s * TICKS_PER_S), a) for a in recorder_actions(faults)]
-    sitl.sitl_power_on()
+    sitl.power_on()
     marks = {*range(TICKS_PER_S, end, TICKS_PER_S), *(at for at, _ in actions if at < end), end}
     for mark in sorted(marks):
-        sitl.sitl_run_until(ctypes.c_int64(mark))
+        sitl.run_until(mark)
         for at, action in actions:
             if at == mark:
                 _act(sitl, given, at, action)
         progress(mark / end)
-    state = _State()
-    sitl.sitl_state(ctypes.byref(state))
+    state = sitl.state()
 
     # The pilot pulls the battery; at the bench the next power-on closes the file.
-    sitl.sitl_power_cut(ctypes.c_uint32(seed & 0xFFFFFFFF))
+    sitl.power_cut(seed & 0xFFFFFFFF)
     later = end + TICKS_PER_S
-    sitl.sitl_run_until(ctypes.c_int64(later))
-    times, levels = _idle_receiver(later, later + round(CLOSE_S * TICKS_PER_S))
-    sitl.sitl_add_edges(_int64(times), _uint8(levels), ctypes.c_size_t(len(times)))
-    sitl.sitl_power_on()
-    sitl.sitl_run_until(ctypes.c_int64(later + round(CLOSE_S * TICKS_PER_S)))
+    sitl.run_until(later)
+    sitl.add_edges(*_idle_receiver(later, later + round(CLOSE_S * TICKS_PER_S)))
+    sitl.power_on()
+    sitl.run_until(later + round(CLOSE_S * TICKS_PER_S))
 
     log, name = file_of(image, faults)
     if not log:
@@ -254,87 +219,66 @@ def card_image(faults: Sequence[Fault]) -> mmap.mmap:
     return format_card(full="card_full" in kinds)
 
 
-def _act(sitl: ctypes.CDLL, given: Stimuli, at: int, action: Action) -> None:
+def _act(sitl: Sitl, given: Stimuli, at: int, action: Action) -> None:
     """Do something to the recorder's world now."""
     if action.what in CARD_EVENTS:
         # Milliseconds to microseconds for a busy card, else a count.
         value = round(action.value * (1000.0 if action.what == "card_busy" else 1.0))
-        sitl.sitl_add_card_events(
-            _int64([at]), _uint8([CARD_EVENTS[action.what]]), (ctypes.c_uint32 * 1)(value),
-            ctypes.c_size_t(1),
-        )  # fmt: skip
+        sitl.add_card_fault(at, CARD_EVENTS[action.what], value)
     elif action.what == "reset":
-        sitl.sitl_reset(ctypes.c_uint8(round(action.value)))
+        sitl.reset(round(action.value))
     elif action.what == "supply":
-        sitl.sitl_set_supply(ctypes.c_uint16(round(action.value * 1000.0)))
+        sitl.set_supply(round(action.value * 1000.0))
     elif action.what == "baro_off":
-        sitl.sitl_remove_pressure()
+        sitl.remove_pressure()
     elif action.what == "baro_on":
         _give_pressure(sitl, given)
     elif action.what == "telemetry_blocked":
         until = min(action.value, given.duration / TICKS_PER_S)
-        sitl.sitl_hold_port(ctypes.c_int(TELEMETRY), ctypes.c_int64(round(until * TICKS_PER_S)))
+        sitl.hold_port(Port.TELEMETRY, round(until * TICKS_PER_S))
     else:
-        sitl.sitl_hold_pressure_bus(ctypes.c_int(action.what == "baro_bus_stuck"))
+        sitl.hold_pressure_bus(action.what == "baro_bus_stuck")
 
 
-def _configure(sitl: ctypes.CDLL, rate_hz: int, aircraft: str, *, damaged: bool = False) -> None:
+def _configure(sitl: Sitl, rate_hz: int, aircraft: str, *, damaged: bool = False) -> None:
     """Change rate and aircraft in the default settings; both places are fixed by frame `config`."""
-    sitl.sitl_default_config.restype = ctypes.c_size_t
-    buffer = (ctypes.c_uint8 * 256)()
-    size = sitl.sitl_default_config(buffer, ctypes.c_size_t(len(buffer)))
-    config = bytearray(buffer[:size])
+    config = sitl.default_config()
     struct.pack_into("<H", config, 4, rate_hz)
     config[-16:] = aircraft.encode("ascii", "replace")[:15].ljust(16, b"\0")
-    if not sitl.sitl_set_config((ctypes.c_uint8 * size)(*config), ctypes.c_size_t(size)):
-        raise UsageError(f"the recorder refuses {rate_hz} Hz, expected one of {RATES_HZ}")
+    try:
+        sitl.set_config(config)
+    except ValueError as error:
+        raise UsageError(
+            f"the recorder refuses {rate_hz} Hz, expected one of {RATES_HZ}"
+        ) from error
     if damaged:
-        content = (ctypes.c_uint8 * EEPROM_BYTES)()
-        sitl.sitl_get_eeprom(content)
-        place = bytes(content).find(bytes(config[-16:]))  # the aircraft's name
+        content = bytearray(sitl.eeprom())
+        place = content.find(bytes(config[-16:]))  # the aircraft's name
         content[place] ^= 0x20
-        sitl.sitl_set_eeprom(content)
+        sitl.set_eeprom(bytes(content))
 
 
-def _give(sitl: ctypes.CDLL, given: Stimuli, end: int) -> None:
+def _give(sitl: Sitl, given: Stimuli, end: int) -> None:
     """Hand over what reaches the pins before `end`: the next power-on is at the bench."""
     edges, gps = given.edges[given.edges["at"] < end], given.gps[given.gps["at"] < end]
-    sitl.sitl_add_edges(_int64(edges["at"]), _uint8(edges["levels"]), ctypes.c_size_t(len(edges)))
-    sitl.sitl_add_gps(_int64(gps["at"]), _uint8(gps["levels"]), ctypes.c_size_t(len(gps)))
+    sitl.add_edges(edges["at"], edges["levels"])
+    sitl.add_gps(gps["at"], gps["levels"])
     packets = [p for p in given.packets if p.start < end]
     if packets:
-        data = b"".join(p.data.ljust(PACKET_ROOM, b"\0") for p in packets)
-        byte_ticks = round((packets[0].end - packets[0].start) / (len(packets[0].data) + 1))
-        sitl.sitl_add_packets(
-            _int64([p.start for p in packets]),
-            _uint8([p.address for p in packets]),
-            _uint8([len(p.data) for p in packets]),
-            data,
-            ctypes.c_uint32(byte_ticks),
-            ctypes.c_size_t(len(packets)),
+        ticks = (packets[0].end - packets[0].start) / (len(packets[0].data) + 1)
+        sitl.add_packets(
+            [p.start for p in packets],
+            [p.address for p in packets],
+            [p.data for p in packets],
+            byte_us=round(ticks) / TICKS_PER_US,
         )
-    counts = np.ascontiguousarray(given.analog, dtype=np.float64)
-    sitl.sitl_set_analog(
-        ctypes.c_int64(0),
-        ctypes.c_int64(SAMPLE_STEP_TICKS),
-        counts.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
-        ctypes.c_size_t(len(counts)),
-    )
+    sitl.set_analog(0, SAMPLE_STEP_TICKS, given.analog)
     _give_pressure(sitl, given)
-    press = [round(PRESS_S * TICKS_PER_S), round(LET_GO_S * TICKS_PER_S)]
-    sitl.sitl_add_button(_int64(press), _uint8([1, 0]), ctypes.c_size_t(2))
+    sitl.press(round(PRESS_S * TICKS_PER_S), LET_GO_S - PRESS_S)
 
 
-def _give_pressure(sitl: ctypes.CDLL, given: Stimuli) -> None:
-    raw = np.ascontiguousarray(given.pressure, dtype=np.float64)
-    words = (ctypes.c_uint16 * 11)(*(word & 0xFFFF for word in given.coefficients))
-    sitl.sitl_set_pressure(
-        words,
-        ctypes.c_int64(0),
-        ctypes.c_int64(SAMPLE_STEP_TICKS),
-        raw.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
-        ctypes.c_size_t(len(raw)),
-    )
+def _give_pressure(sitl: Sitl, given: Stimuli) -> None:
+    sitl.set_pressure(given.coefficients, 0, SAMPLE_STEP_TICKS, given.pressure)
 
 
 def _idle_receiver(first: int, last: int) -> tuple[list[int], list[int]]:
@@ -349,13 +293,3 @@ def _idle_receiver(first: int, last: int) -> tuple[list[int], list[int]]:
             levels += [1 << k, 0]
             rise = fall + 600
     return at, levels
-
-
-def _int64(values: npt.ArrayLike) -> object:
-    array = np.ascontiguousarray(values, dtype=np.int64)
-    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
-
-
-def _uint8(values: npt.ArrayLike) -> object:
-    array = np.ascontiguousarray(values, dtype=np.uint8)
-    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_uint8))

@@ -1,7 +1,7 @@
-"""The firmware on this computer, one instrument in simulated time: boards/sitl/sitl.h, typed.
+"""The recorder as a shared library: the C interface of `firmware/boards/sitl/sitl.h`, typed.
 
-Times are ticks of 0.5 us since the `Sitl` was made. The library holds one instrument, so one
-`Sitl` is in use at a time.
+The library is loaded by path; nothing of it is imported or linked. It holds one instrument, so one
+`Sitl` is in use at a time. Times are ticks of 0.5 us since the `Sitl` was made.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
-LIBRARY = Path(__file__).resolve().parents[2] / "build" / "sitl" / "libsitl.so"
+from host.resources import CLONE
+
+LIBRARY = CLONE / "build" / "sitl" / "libsitl.so"
 TICKS_PER_US = 2
 TICKS_PER_S = 2_000_000
 BLOCK_BYTES = 512
@@ -201,12 +203,12 @@ class Sitl:
     def add_packets(
         self,
         start: npt.ArrayLike,
-        address: int,
+        address: int | Sequence[int],
         packets: Sequence[bytes],
         *,
         byte_us: float = BYTE_US,
     ) -> None:
-        """Add transfers on the IMU's bus: ticks of their START (n,), one address, n packets.
+        """Add transfers on the IMU's bus: ticks of their START (n,), one address or n, n packets.
 
         `byte_us` is the time of a byte with its acknowledge: 22.5 at 400 kHz, 90 at 100 kHz.
         """
@@ -215,7 +217,7 @@ class Sitl:
         for row, packet in zip(data, packets, strict=True):
             row[: len(packet)] = np.frombuffer(packet, dtype=np.uint8)
         lengths = _bytes([len(packet) for packet in packets])
-        addresses = np.full(len(packets), address, dtype=np.uint8)
+        addresses = _bytes(np.broadcast_to(np.asarray(address), len(packets)))
         _in_order(when, lengths)
         self._c.sitl_add_packets(
             _of(when),
@@ -272,9 +274,17 @@ class Sitl:
             ctypes.c_size_t(len(rows)),
         )
 
+    def hold_pressure_bus(self, held: bool) -> None:
+        """Let a line of the pressure sensor's bus be stuck, or let it go."""
+        self._c.sitl_hold_pressure_bus(ctypes.c_int(held))
+
     def remove_pressure(self) -> None:
         """Let the pressure sensor answer no more."""
         self._c.sitl_remove_pressure()
+
+    def hold_port(self, port: Port, until: int) -> None:
+        """Let the far end of a port take no byte until then: what is sent waits."""
+        self._c.sitl_hold_port(ctypes.c_int(port), ctypes.c_int64(until))
 
     def add_card_fault(self, at: int, fault: CardFault, value: int = 0) -> None:
         """Let the card misbehave from `at` ticks on."""
