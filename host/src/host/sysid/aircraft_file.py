@@ -89,7 +89,7 @@ def instrument_data(source: str) -> InstrumentData:
 def powerplant(source: str) -> Powerplant:
     """Return the propeller and motor of an aircraft by name or file."""
     from host.twin import aircraft
-    from host.twin.motion import motor_torque, propeller
+    from host.twin.propulsion import motor_torque, propeller
 
     frame = aircraft.load(source).airframe()
 
