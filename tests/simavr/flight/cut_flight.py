@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,7 @@ from simavr_bench.sd_card import make_fat32
 
 FILE_BLOCKS = 131_072  # 64 MiB
 PAYLOAD = 480
-RING = 4700  # kRingBytes of firmware/app/instrument.h
+INSTRUMENT = Path(__file__).resolve().parents[3] / "firmware" / "app" / "instrument.h"
 REST_S = 0.020  # between two blocks; less, and the writer has more to write than it could
 NEVER = 2**62  # a cycle
 OTHER_FILE = "PHOTO.JPG"
@@ -100,6 +102,21 @@ class CutResult:
     state: str
     lost_bytes: int
     wrong: list[str]
+
+
+@cache
+def ring_bytes() -> int:
+    """Size of the ring of frames, from the firmware's source.
+
+    Raises
+    ------
+    AssertionError
+        If it is not where it was.
+    """
+    found = re.search(r"kRingBytes = (\d+);", INSTRUMENT.read_text())
+    if found is None:
+        raise AssertionError(f"{INSTRUMENT.name} does not give kRingBytes")
+    return int(found[1])
 
 
 def make_base(plan: Plan, target: Path, seed: int) -> Path:
@@ -216,7 +233,7 @@ class FlightCuts:
         wrong += self._missing(cycle)
         state = self.state(cycle)
         lost = self.lost_bytes(cycle)
-        allowed = 2 * PAYLOAD if state == "idle" else RING + PAYLOAD
+        allowed = 2 * PAYLOAD if state == "idle" else ring_bytes() + PAYLOAD
         if lost > allowed:
             wrong.append(f"{lost} bytes of frames lost with the card {state}, allowed {allowed}")
         return CutResult(state, lost, wrong)

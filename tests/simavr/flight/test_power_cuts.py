@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+import host
+
 if TYPE_CHECKING:
     from flight.cut_flight import Flight
     from flight.cut_ground import GroundRun
@@ -149,3 +151,24 @@ def test_a_file_closed_too_short_is_noticed(cuttable: Cuttable, tmp_path: Path) 
     card = CutCard(run.base, tmp_path / "short.img", short)
     cut = judge_ground_cut(run, card, int(short["ended"][run.last]) + 1, tmp_path)
     assert any("blocks lost" in text for text in cut.wrong)
+
+
+def test_what_fsck_salvaged_decodes_in_one_piece(cuttable: Cuttable, tmp_path: Path) -> None:
+    """The FAT's sector with the flight's end spoilt: the file and the FSCK files put together."""
+    from flight.card_files import list_files, read_file, repair, whole_blocks
+    from simavr_bench.card_journal import CutCard
+
+    run = cuttable.closing
+    card = CutCard(run.base, tmp_path / "cut.img", run.journal, seed=8)
+    rows = run.journal[run.first : run.last + 1]
+    fat = next(k for k, row in enumerate(rows) if row["data"][:4].tobytes() != b"FLT1")
+    card.cut(int(rows["begun"][fat]) + 1)
+    repair(card.path)
+    names = list_files(card.path)
+    assert any(name.startswith("FSCK") for name in names)
+    pieces = [read_file(card.path, name, tmp_path / "piece") for name in names]
+    whole = tmp_path / "whole.bin"
+    whole.write_bytes(b"".join(piece for piece in pieces if whole_blocks(piece)))
+    log = host.read_log(whole)
+    assert not log.loss.frames
+    assert len(log.scan.blocks) == len(run.flights) + 1  # and the one that ends the session
