@@ -76,7 +76,8 @@ def record(
                    str(folder / "card.img"), "--close-s", str(CLOSE_S),
                    "--seed", str(seed)]  # fmt: skip
         damaged = any(fault.kind == "settings_damaged" for fault in faults)
-        if damaged or rate_hz != DEFAULT_RATE_HZ or LIBRARY.is_file():
+        library = os.environ.get("HOST_SITL") or LIBRARY.is_file()
+        if damaged or rate_hz != DEFAULT_RATE_HZ or library:
             (folder / "eeprom.bin").write_bytes(sitl.eeprom(rate_hz, aircraft, damaged=damaged))
             command += ["--eeprom", str(folder / "eeprom.bin")]
         for fault in faults:
