@@ -14,10 +14,12 @@ namespace {
 constexpr uint8_t kPaint = 0xC5;
 constexpr uint32_t kFlightMark = 0x464C5921;  // a power cut does not leave this
 constexpr uint32_t kCrashMark = 0x43525348;
+constexpr uint32_t kAliveMark = 0x414C4956;
 
 // Kept over a reset, lost with the supply; the marks tell which.
 __attribute__((section(".noinit"))) uint32_t g_flight_mark;
 __attribute__((section(".noinit"))) uint32_t g_crash_mark;
+__attribute__((section(".noinit"))) uint32_t g_alive_mark;
 __attribute__((section(".noinit"))) uint32_t g_crash_address;
 __attribute__((section(".noinit"))) uint8_t g_mcusr;
 
@@ -101,6 +103,13 @@ volatile bool g_packet_taken = false;
 namespace hal {
 
 ResetSource reset_source() {
+  // A bootloader may have cleared the register: then the cause is unknown, unless memory was lost.
+  if (g_alive_mark != kAliveMark) {
+    g_alive_mark = kAliveMark;
+    if (g_mcusr == 0) {
+      g_mcusr = _BV(PORF);
+    }
+  }
   if (g_crash_mark == kCrashMark) {
     g_crash_mark = 0;
     g_last_crash = g_crash_address;
@@ -108,7 +117,6 @@ ResetSource reset_source() {
   if (g_last_crash != 0) {
     return ResetSource::kCrash;
   }
-  // A bootloader may have cleared the register: then the cause is unknown.
   if ((g_mcusr & _BV(PORF)) != 0) {
     return ResetSource::kPowerOn;
   }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,8 @@ from flight.servos import (
     spoiled,
     worst_gap_ms,
 )
+
+import host
 
 if TYPE_CHECKING:
     from flight.rig import FlightRig
@@ -323,8 +326,11 @@ def test_outputs_repeat_the_receiver_within_half_a_second_of_the_start(make_rig:
         assert np.all(np.abs(widths - wanted) <= 80)  # the first one too: no twitch
 
 
-def test_reset_in_flight_goes_through_the_bootloader_and_records_again(make_rig: MakeRig) -> None:
+def test_reset_in_flight_goes_through_the_bootloader_and_records_again(
+    make_rig: MakeRig, tmp_path: Path
+) -> None:
     """The watchdog's reset starts Debian's real bootloader: the receiver drives meanwhile."""
+    from flight.rig import take_log
     from simavr_bench import ResetCause
 
     rig = make_rig(bootloader=True)
@@ -341,6 +347,9 @@ def test_reset_in_flight_goes_through_the_bootloader_and_records_again(make_rig:
     rig.chip.run_s(2.0)
     assert rig.card.count().written > written
     assert not rig.relay.engaged
+    # The bootloader clears the register: what memory lost is a power-on, the rest unknown.
+    log = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin"))
+    assert [int(cause) for cause in log.frames["identity"]["reset_cause"]] == [1, 0]
     assert released_ms(rig, since) <= 50
     assert worst_gap_ms(rig, since) <= LONGEST_GAP_MS
     assert max(spoiled(rig, since, servo) for servo in SERVOS) <= 1
