@@ -105,7 +105,7 @@ def _imu(ident: NDArray[np.void], ticks: Integers, script: Script) -> list[Diffe
     arrived = imu.start + 37 * byte_ticks()
     packet = np.searchsorted(arrived, ticks, side="right") - 1
     out = [_difference("imu_seq", ident["imu_seq"], packet & 0xFF)]
-    age = imu.age[packet] + (ticks - imu.start[packet] - byte_ticks()) // 8
+    age = imu.age[packet] + (ticks - imu.start[packet]) // 8
     out.append(_difference("imu_age", ident["imu_age"], age, allowed=1))
     out += [
         _difference(name, ident[name], imu.raw[packet, channel])
@@ -184,7 +184,7 @@ def _attitude(attitude: NDArray[np.void], script: Script) -> list[Difference]:
 
 
 def _packet_at(frame: NDArray[np.void], script: Script) -> Integers:
-    """Return the packet whose address was in at the frame's time."""
+    """Return the packet whose START is at the frame's time."""
     start = unwrap(frame["t_us"]) * 2
     row = np.searchsorted(script.imu.start, start + 2000) - 1
     return np.asarray(row, dtype=np.int64)

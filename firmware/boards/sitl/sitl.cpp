@@ -115,7 +115,6 @@ void sitl_add_packets(const int64_t* start,
     sitl::PacketStimulus stimulus = {};
     stimulus.start = start[i];
     const Tick byte = static_cast<Tick>(byte_ticks) + sitl::kSlaveHold;
-    stimulus.matched = start[i] + byte;
     stimulus.end = start[i] + byte * (1 + length[i]);
     stimulus.packet.address = address[i];
     stimulus.packet.length = std::min<uint8_t>(length[i], hal::kImuPacketBytes);

@@ -94,7 +94,7 @@ void World::fire(Tick when) {
     hal::ImuPacket& place = held[held_count++];
     place = stimulus.packet;
     place.start_us =
-        static_cast<uint32_t>((stimulus.matched - booted_at) / kTicksPerUs) + clock_offset_us;
+        static_cast<uint32_t>((stimulus.start - booted_at) / kTicksPerUs) + clock_offset_us;
     place.scan_after_us = 0;
     if (scan_armed && !scan_running &&
         core::starts_scan(place.address, place.length, place.bytes, scan_mask)) {
@@ -102,7 +102,7 @@ void World::fire(Tick when) {
       scan_waits = true;
       const Tick since_boot = start_scan() - booted_at;
       place.scan_after_us = static_cast<uint16_t>(since_boot / kTicksPerUs -
-                                                  (stimulus.matched - booted_at) / kTicksPerUs);
+                                                  (stimulus.start - booted_at) / kTicksPerUs);
     }
   }
   for (; time_of_next(gps, &ByteStimulus::at) <= when; ++gps.next) {

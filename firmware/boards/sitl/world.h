@@ -32,7 +32,6 @@ constexpr Tick kSlaveHold = 7;
 
 struct PacketStimulus {
   Tick start;
-  Tick matched;  // the address is in
   Tick end;
   hal::ImuPacket packet;
 };

@@ -76,8 +76,7 @@ def test_every_imu_sample_is_logged_bit_by_bit_with_its_age(flown: Flown) -> Non
     assert agreement(0) == 1.0
     assert agreement(-1) < 0.05  # one sample off would be seen
     age_us = ident["imu_age"] * 4.0
-    # The Mega hears of a transfer behind its address byte: 22.5 us, and 3.5 us of held clock.
-    expected = sent_age[row] * 4.0 + (ident["t_us"] - start_us[row]) - 26.0
+    expected = sent_age[row] * 4.0 + (ident["t_us"] - start_us[row])
     assert np.abs(age_us - expected).max() <= 8.0
 
 

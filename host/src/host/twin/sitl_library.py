@@ -124,8 +124,7 @@ class State(ctypes.Structure):
 
 
 def byte_ticks(byte_us: float = BYTE_US) -> int:
-    """Return how long a byte takes on the IMU's bus: the address is in after one, STOP comes behind
-    the last."""
+    """Return how long a byte takes on the IMU's bus; STOP comes behind address and data."""
     return round(byte_us * TICKS_PER_US) + SLAVE_HOLD_TICKS
 
 
