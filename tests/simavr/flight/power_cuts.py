@@ -12,6 +12,7 @@ they check that this is so, and what the next boot does.
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import tempfile
 from collections import Counter
@@ -146,9 +147,10 @@ def main() -> int:
     parser.add_argument("--every", action="store_true", help="in every block of metadata too")
     parser.add_argument("--seed", type=int, default=1, help="default 1")
     options = parser.parse_args()
-    elf = build_flight_image()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        # Its own copy: a build meanwhile would make the reboots another program's.
+        elf = Path(shutil.copy(build_flight_image(), folder / "firmware.elf"))
         bad, flights = run_flights(elf, options.flight, options.seed, folder)
         bad += run_ground(elf, flights, options.ground, options.seed, folder, every=options.every)
         bad += run_reboots(elf, flights[0], options.reboots, options.seed, folder)

@@ -51,7 +51,9 @@ def test_fault_in_flight(
     assert in_fork(partial(run_fault, *in_flight, fault, tmp_path)).wrong == []
 
 
-@pytest.mark.parametrize("injected", ["card not formatted", "card that cannot be read"])
+@pytest.mark.parametrize(
+    "injected", ["card not formatted", "card that cannot be read", "card with FLT99999.BIN"]
+)
 def test_card_that_cannot_be_recorded_on(flight_elf: Path, tmp_path: Path, injected: str) -> None:
     from flight.faults.boot import BAD_CARDS, boot
     from simavr_bench import in_fork

@@ -10,6 +10,7 @@ decoded and the file system checked afterwards. Power cuts (6) are `make power-c
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import tempfile
 from functools import partial
@@ -39,10 +40,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--only", default="", help="rows whose text holds this")
     options = parser.parse_args()
-    elf = build_flight_image()
     bad = 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        elf = Path(shutil.copy(build_flight_image(), folder / "firmware.elf"))
         rig, journal = ready_rig(elf, folder)
         print("gap: longest of any servo, ms; lost: identification frames; back: s from its end")
         head = (
