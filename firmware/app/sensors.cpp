@@ -32,7 +32,7 @@ void Sensors::start(const frames::ConfigFrame& config, uint32_t now_us) {
   hal::start_baro_bus();
   hal::start_analog();
   trigger_.start(config.rate_hz, now_us);
-  hal::arm_scan(trigger_.mask());
+  arm();
   baro_turn_.start(now_us);
   mag_turn_.start(now_us);
   attitude_turn_.start(now_us);
@@ -75,7 +75,7 @@ void Sensors::step_imu(const PilotLink& pilot, Outlet& outlet) {
     } else if (scan && trigger_.bad_packet(start_us)) {
       begin_ident(pilot, scan_us, true);
     }
-    hal::arm_scan(trigger_.mask());
+    if (scan || trigger_.mask() != armed_mask_) arm();
     if (result == core::ImuResult::kBad) continue;
     imu_heard_us_ = start_us;
     if (!good) continue;
@@ -91,6 +91,11 @@ void Sensors::step_imu(const PilotLink& pilot, Outlet& outlet) {
   if (imu_.take_attitude(attitude) && attitude_turn_.due(now_us, kAttitudeUs)) {
     outlet.put(attitude);
   }
+}
+
+void Sensors::arm() {
+  armed_mask_ = trigger_.mask();
+  hal::arm_scan(armed_mask_);
 }
 
 void Sensors::watch_imu(Outlet& outlet, uint32_t now_us) {
@@ -111,14 +116,14 @@ void Sensors::step_ident(const PilotLink& pilot, Outlet& outlet, uint32_t now_us
     } else if (static_cast<int32_t>(now_us - ident_.t_us) >= static_cast<int32_t>(kScanDeadUs)) {
       scanning_ = false;  // the gap in `count` tells of the frame
       hal::start_analog();
-      hal::arm_scan(trigger_.mask());
+      arm();
     }
   }
   const core::IdentTrigger::Source source = trigger_.poll(now_us, !scanning_ && hal::scan_done());
   if (source == core::IdentTrigger::Source::kNone) return;
   uint32_t t_us = 0;
   const bool started = hal::start_scan(&t_us);
-  hal::arm_scan(trigger_.mask());
+  arm();
   if (started) begin_ident(pilot, t_us, source == core::IdentTrigger::Source::kImu);
 }
 

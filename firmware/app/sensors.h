@@ -42,6 +42,7 @@ class Sensors {
 
  private:
   void step_imu(const PilotLink& pilot, Outlet& outlet);
+  void arm();
   void watch_imu(Outlet& outlet, uint32_t now_us);
   void step_ident(const PilotLink& pilot, Outlet& outlet, uint32_t now_us);
   void begin_ident(const PilotLink& pilot, uint32_t t_us, bool imu_triggered);
@@ -75,6 +76,7 @@ class Sensors {
   uint8_t hearing_ = 0;
   uint8_t heard_ = 0;
   uint8_t known_ = 0;
+  uint8_t armed_mask_ = 0;
   bool scanning_ = false;
   bool imu_fresh_ = false;
   bool imu_present_ = false;

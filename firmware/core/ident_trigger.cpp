@@ -19,6 +19,7 @@ void IdentTrigger::start(uint16_t rate_hz, uint32_t now_us) {
   last_us_ = now_us;
   imu_leads_ = false;
   packet_waits_ = false;
+  measure_mask();
 }
 
 void IdentTrigger::imu_packet(uint8_t seq, uint32_t start_us, bool started) {
@@ -30,6 +31,9 @@ void IdentTrigger::imu_packet(uint8_t seq, uint32_t start_us, bool started) {
   }
   last_packet_us_ = start_us;
   last_seq_ = seq;
+  if ((seq & 7U) == 0) {
+    measure_mask();
+  }
   packet_waits_ = !started;
   if (started) {
     lead(start_us);
@@ -52,7 +56,7 @@ bool IdentTrigger::bad_packet(uint32_t start_us) {
 
 // A lower rate takes every 2nd, 4th or 8th sample: always those whose number divides, so that two
 // recorders of one flight, or one after a reset, keep the same samples.
-uint8_t IdentTrigger::mask() const {
+void IdentTrigger::measure_mask() {
   const uint16_t half_us = packet_period_us_ / 2;
   uint8_t mask = 0;
   for (uint8_t every = 2; every <= 8; every = static_cast<uint8_t>(every << 1)) {
@@ -60,7 +64,7 @@ uint8_t IdentTrigger::mask() const {
       mask = static_cast<uint8_t>(every - 1);
     }
   }
-  return mask;
+  mask_ = mask;
 }
 
 IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
@@ -71,7 +75,7 @@ IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
       return Source::kNone;
     }
     packet_waits_ = false;
-    if ((last_seq_ & mask()) == 0 &&
+    if ((last_seq_ & mask_) == 0 &&
         (!imu_leads_ || since_us + packet_period_us_ / 2 >= period_us_)) {
       // Even a packet left out sets the phase: the timer stays 1.5 periods behind it, else both
       // would go on meeting each other's unfinished frames at 200 Hz.

@@ -31,7 +31,7 @@ class IdentTrigger {
   bool bad_packet(uint32_t start_us);
   // Packets whose sequence number has none of these bits start a scan: every one, or every 2nd, 4th
   // or 8th at a lower rate.
-  uint8_t mask() const;
+  uint8_t mask() const { return mask_; }
   // `ready`: the last frame is finished (its analogue scan takes 4.6 ms). A packet in phase that
   // has started no scan, because one was under way, waits for a period at most, and so does the
   // timer; then it is left out and counted.
@@ -43,6 +43,7 @@ class IdentTrigger {
 
  private:
   void lead(uint32_t start_us);  // a packet triggers
+  void measure_mask();
 
   uint32_t period_us_ = 10000;
   uint32_t last_us_ = 0;         // last trigger
@@ -52,6 +53,7 @@ class IdentTrigger {
   uint16_t late_ = 0;
   uint16_t overruns_ = 0;
   uint8_t last_seq_ = 0;
+  uint8_t mask_ = 0;
   bool packet_waits_ = false;
   bool imu_leads_ = false;  // the last trigger was a packet
 };
