@@ -40,7 +40,7 @@ bench: setup ## damage, speed and identification beside their peers
 	@$(PYTHON) tests/bench/run.py
 	@$(PYTHON) tests/bench/identification.py
 
-study: setup ## tables and pictures of identification in build/study (SIZE=full: half an hour)
+study: setup sitl ## tables and pictures of identification in build/study (SIZE=full: half an hour)
 	@$(PYTHON) -m host.sysid.study build/study --size $(or $(SIZE),small)
 
 flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
