@@ -27,7 +27,7 @@ SYSTEMS = (25, 200)
 ACCURACY_RUNS = (20, 1000)
 COVERAGE_RUNS = (20, 2000)
 FLIGHTS = (4, 100)
-METHOD_RUNS = (2, 20)
+METHOD_RUNS = (12, 60)  # of cheap methods; dear ones a sixth
 COEFFICIENT_FLIGHTS = (2, 24)
 THESIS_FLIGHTS = (1, 10)
 
@@ -105,7 +105,11 @@ def study_g(stem: Path, size: int) -> list[Path]:
     from host.sysid.study.figures import methods_figure
 
     chosen = [m for m in METHODS if m not in methods.SKIPPED]
-    scores = [methods.score(m, data, METHOD_RUNS[size]) for m in chosen for data in methods.DATA]
+    scores = [
+        methods.score(m, data, methods.runs_of(m, METHOD_RUNS[size]))
+        for m in chosen
+        for data in methods.DATA
+    ]
     return write(tables.methods_table(scores), methods_figure(scores), stem)
 
 
