@@ -65,13 +65,19 @@ void Instrument::while_waiting(void* context) {
 void Instrument::step() {
   const uint32_t now_us = turn_us_;
   pilot_.step(config_, self_test_, outlet_, now_us);
+  const uint16_t stored = ring_.used();
   sensors_.step(config_, pilot_, outlet_, now_us);
+  const bool made_frame = ring_.used() != stored;
   pilot_.ran(kTaskSensors);
   recorder_.step(now_us);
   pilot_.ran(kTaskRecorder);
-  // A reading per turn: a row is 30 ms long, and no turn is.
-  ascii_row_.step(sensors_, pilot_.channels(), telemetry_, now_us);
-  step_slow(now_us);
+  // A turn that made a frame leaves the rest to the next: a receiver pulse that ends behind the
+  // pilot's step waits for the end of the turn, and 2 ms is all it may.
+  if (!made_frame) {
+    // A reading per turn: a row is 30 ms long, and no turn is.
+    ascii_row_.step(sensors_, pilot_.channels(), telemetry_, now_us);
+    step_slow(now_us);
+  }
   pilot_.beat(now_us);
 
   const uint32_t end_us = hal::now_us();

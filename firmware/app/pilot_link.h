@@ -36,7 +36,7 @@ class PilotLink {
   bool contact_stuck() const { return contact_stuck_; }
 
  private:
-  static constexpr uint16_t kPollUs = 1500;  // pulses that stay away show within this
+  static constexpr uint16_t kPollUs = 3500;  // pulses that stay away show within this
   static constexpr uint16_t kRestUs = 10000;
   static constexpr uint32_t kReleaseUs = 200000UL;  // by then a contact is open again
   static constexpr uint16_t kHoldingRestUs = 1000;  // a hold ends on time
