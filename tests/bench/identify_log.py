@@ -88,7 +88,8 @@ def measure(maneuvers: int, rest_s: float) -> Run:
 
 def imports_s() -> float:
     """Return the processor seconds that Python and the imports of the verb take alone."""
-    code = "import host.sysid.flight, host.sysid.verdict, host.sysid.tables, host.log, pandas"
+    code = "import host.sysid.flight, host.sysid.verdict, host.sysid.tables, host.log"
+    code += ", host.sysid.reconstruction, host.sysid.aircraft_file"
     before = os.times()
     subprocess.run([sys.executable, "-c", code], check=True)
     after = os.times()
