@@ -166,16 +166,17 @@ def test_injected_bias_scale_and_delay_come_back() -> None:
 
 
 def test_gusts_do_not_pass_for_vanes_that_under_read() -> None:
-    columns, true = flown(1)
-    problem, follows, _ = prepare(columns, AIRFRAME, INSTRUMENT)
-    place = problem.common.index("alpha_scale")
-    fit = fit_path(problem, follows)
-    error = fit.theta[place] - true["alpha_scale"]
-    # The same without instruments: aircraft that ride with gusts look like shrunken vanes.
-    plain = fit_path(problem, [f[:, :0] for f in follows])
-    fault = plain.theta[place] - true["alpha_scale"]
-    assert abs(error) < 0.03
-    assert abs(fault) > 1.5 * abs(error)
+    errors, faults = [], []
+    for seed in (1, 2):
+        columns, true = flown(seed)
+        problem, follows, _ = prepare(columns, AIRFRAME, INSTRUMENT)
+        place = problem.common.index("alpha_scale")
+        errors.append(fit_path(problem, follows).theta[place] - true["alpha_scale"])
+        # The same without instruments: aircraft that ride with gusts look like shrunken vanes.
+        plain = fit_path(problem, [f[:, :0] for f in follows])
+        faults.append(plain.theta[place] - true["alpha_scale"])
+    assert abs(np.mean(errors)) < 0.03
+    assert abs(np.mean(faults)) > 2.0 * abs(np.mean(errors))
 
 
 def test_without_gps_the_pitot_scale_is_called_unobservable() -> None:
