@@ -223,8 +223,7 @@ void Sensors::step_gps(const frames::ConfigFrame& config, Outlet& outlet, uint32
       if (gps_.byte(byte, now_us)) gps_heard(gps_.frame(), outlet, now_us);
     }
   } else if (config.gps_source == static_cast<uint8_t>(frames::GpsSource::kOriginalImu)) {
-    frames::GpsFrame frame;
-    if (imu_.take_position(frame)) gps_heard(frame, outlet, now_us);
+    if (imu_.take_position(gps_.other_source())) gps_heard(gps_.frame(), outlet, now_us);
   }
   const uint32_t silent_us = now_us - gps_heard_us_;
   if (gps_present_ && static_cast<int32_t>(silent_us) >= static_cast<int32_t>(kGpsSilentUs)) {

@@ -15,6 +15,8 @@ class GpsReceiver {
   bool byte(uint8_t value, uint32_t now_us);
 
   const frames::GpsFrame& frame() const { return frame_; }
+  // For positions that do not come through this port: there is one latest, whoever gave it.
+  frames::GpsFrame& other_source() { return frame_; }
   uint16_t errors() const { return errors_; }
   uint16_t messages() const { return messages_; }  // good ones of any kind: the baud is right
 
