@@ -92,7 +92,9 @@ def draw(
             values = table[column].to_numpy() * factor
             colour = COLOURS.get(name, f"C{i}")
             if truth is not None and column in truth:
-                axis.plot(truth["t_s"], truth[column] * factor, color="0.72", lw=1.6, zorder=1)
+                word = "truth" if i == 0 else None
+                true_values = truth[column] * factor
+                axis.plot(truth["t_s"], true_values, color="0.72", lw=1.6, zorder=1, label=word)
             axis.plot(t, values, color=colour, lw=0.8, label=name, zorder=2)
             seen.append(values[t > t[0] + SETTLED_S])
             if second is not None and column in second.columns:
