@@ -32,6 +32,7 @@ HANG_WITHOUT_INTERRUPTS = b"\xf8\x94\xff\xcf"  # cli before it
 RECURSE = b"\xff\xdf"  # rcall to itself: the stack grows through all of RAM
 STS_PINH = 0x100
 ALL_TASKS = 0b111  # of app/pilot_link.h
+CRASH = 20  # event of protocol/frames.toml
 
 
 def patch(rig: FlightRig, address: int, code: bytes) -> None:
@@ -353,6 +354,37 @@ def test_reset_in_flight_goes_through_the_bootloader_and_records_again(
     assert released_ms(rig, since) <= 50
     assert worst_gap_ms(rig, since) <= LONGEST_GAP_MS
     assert max(spoiled(rig, since, servo) for servo in SERVOS) <= 1
+
+
+def test_crash_and_flight_are_remembered_through_the_bootloader(
+    make_rig: MakeRig, tmp_path: Path
+) -> None:
+    """A hang in a glide: its address and the mark of a flight outlive the bootloader's own RAM."""
+    from flight.rig import IDLE_US, take_log
+
+    rig = make_rig(bootloader=True)
+    rig.take_off(ground_s=15.0)
+    rig.receiver.width_us[3] = IDLE_US
+    rig.chip.run_s(0.5)
+    start, size = rig.chip.symbols["_ZN3hal6now_usEv"]
+    right = rig.chip.flash(start, len(HANG))
+    patch(rig, start, HANG)
+    rig.chip.run_s(0.2)
+    assert rig.chip.pc >= 0x3E000
+    patch(rig, start, right)
+    while rig.chip.pc >= 0x3E000:
+        rig.chip.run_s(0.01)
+    written = rig.card.count().written
+    rig.chip.run_s(2.0)
+    assert rig.card.count().written > written
+    rig.land()
+    log = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin"))
+    identity = log.frames["identity"]
+    assert identity["reset_cause"].tolist() == [1, 5]
+    assert identity["resumed"].tolist() == [0, 1]
+    crashes = log.frames["event"][log.frames["event"]["code"] == CRASH]
+    assert len(crashes) == 1
+    assert start <= int(crashes["arg"][0]) < start + size
 
 
 def test_bootloader_leaves_the_servos_to_the_receiver(make_rig: MakeRig) -> None:
