@@ -18,15 +18,15 @@ const char* behind(const char* text, const char* word) {
   return *text == ' ' ? text + 1 : nullptr;
 }
 
-// A decimal number and nothing else.
-bool number(const char* text, int16_t least, int16_t most, int16_t& out) {
+// A decimal number from `text` to a blank or the end, left behind it.
+bool take_number(const char*& text, int16_t least, int16_t most, int16_t& out) {
   const bool negative = *text == '-';
   text += negative ? 1 : 0;
-  if (*text == 0) {
+  if (*text == 0 || *text == ' ') {
     return false;
   }
   int32_t value = 0;
-  for (; *text != 0; ++text) {
+  for (; *text != 0 && *text != ' '; ++text) {
     if (*text < '0' || *text > '9' || value > 10000) {
       return false;
     }
@@ -35,6 +35,23 @@ bool number(const char* text, int16_t least, int16_t most, int16_t& out) {
   value = negative ? -value : value;
   out = static_cast<int16_t>(value);
   return value >= least && value <= most;
+}
+
+// A decimal number and nothing else.
+bool number(const char* text, int16_t least, int16_t most, int16_t& out) {
+  return take_number(text, least, most, out) && *text == 0;
+}
+
+// Three numbers, a blank between two.
+bool iron(const char* text, ImuSettings& out) {
+  for (uint8_t axis = 0; axis < 3; ++axis) {
+    int16_t value = 0;
+    if ((axis != 0 && *text++ != ' ') || !take_number(text, -2048, 2048, value)) {
+      return false;
+    }
+    out.field_offset[axis] = value;
+  }
+  return *text == 0;
 }
 
 }  // namespace
@@ -77,6 +94,8 @@ ImuReply ImuConsole::line(ImuNode& node, ImuSettings& settings) {
     wanted.dlpf = static_cast<uint8_t>(value);
   } else if ((text = behind(command, "compat")) != nullptr && number(text, 0, 1, value)) {
     wanted.compat = static_cast<uint8_t>(value);
+  } else if ((text = behind(command, "iron")) != nullptr && iron(text, wanted)) {
+    // Taken off every field from the next one on.
   } else {
     return ImuReply::kUnknown;
   }

@@ -1,5 +1,6 @@
 // Lines from the IMU's serial header, for the ground: `imu zero`, `imu level`, `imu declination
-// 413`, `imu dlpf 2`, `imu compat 1`, `imu show`. Everything but `show` is refused in motion.
+// 413`, `imu iron 120 -45 30`, `imu dlpf 2`, `imu compat 1`, `imu show`. Everything but `show` is
+// refused in motion.
 #pragma once
 
 #include <stdint.h>
@@ -21,7 +22,7 @@ class ImuConsole {
   ImuReply byte(uint8_t value, ImuNode& node, ImuSettings& settings);
 
  private:
-  static constexpr uint8_t kLongest = 23;
+  static constexpr uint8_t kLongest = 27;
   ImuReply line(ImuNode& node, ImuSettings& settings);
 
   char line_[kLongest + 1] = {};

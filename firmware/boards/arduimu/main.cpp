@@ -122,7 +122,7 @@ void serve_serial(const uint32_t now_us) {
         print("imu: not at rest, nothing changed\r\n");
         break;
       case core::ImuReply::kUnknown:
-        print("imu: zero level show declination dlpf compat\r\n");
+        print("imu: zero level show declination iron dlpf compat\r\n");
         break;
     }
   }

@@ -293,7 +293,27 @@ TEST_CASE("the console changes settings at rest only, and refuses what it does n
   CHECK_EQ(imu.settings.dlpf, 3);
   CHECK_EQ(imu.settings.compat, 1);
   CHECK_EQ(imu.settings.offsets_valid, 1);
-  const char* const refused[] = {"imu dlpf 7\n",
+  CHECK(say(console, imu, "imu iron -2048 -2047 -2046\n") == ImuReply::kChanged);
+  CHECK(say(console, imu, "imu iron 120 -45 0\n") == ImuReply::kChanged);
+  CHECK_EQ(int16_t{imu.settings.field_offset[0]}, 120);
+  CHECK_EQ(int16_t{imu.settings.field_offset[1]}, -45);
+  CHECK_EQ(int16_t{imu.settings.field_offset[2]}, 0);
+  imu.settings.compat = 0;
+  imu.node.set_field({300, -200, 100});
+  frames::ImuPacket packet;
+  imu.node.put_packet(imu.bytes, imu.t_us);
+  memcpy(&packet, imu.bytes, sizeof(packet));
+  CHECK_EQ(int16_t{packet.aux[0]}, 180);
+  CHECK_EQ(int16_t{packet.aux[1]}, -155);
+  CHECK_EQ(int16_t{packet.aux[2]}, 100);
+  const char* const refused[] = {"imu iron 1 2\n",
+                                 "imu iron 1 2 3 4\n",
+                                 "imu iron 1  3\n",
+                                 "imu iron 1 2 2049\n",
+                                 "imu iron 1 2 \n",
+                                 "imu iron\n",
+                                 "imu dlpf 3 3\n",
+                                 "imu dlpf 7\n",
                                  "imu dlpf\n",
                                  "imu compat 2\n",
                                  "imu dlpf 2x\n",
@@ -306,6 +326,7 @@ TEST_CASE("the console changes settings at rest only, and refuses what it does n
   }
   CHECK(say(console, imu, "imu dlpf 7\n") == ImuReply::kUnknown);
   CHECK_EQ(imu.settings.dlpf, 3);
+  CHECK_EQ(int16_t{imu.settings.field_offset[0]}, 120);
   // The stream of a GPS receiver, line ends included, is not for it.
   uint32_t random = 7;
   for (uint16_t i = 0; i < 5000; ++i) {
