@@ -37,6 +37,7 @@ EVENT_NAMES = {8: "imu_lost", 9: "imu_found", 10: "imu_restarted", 18: "reset"}
 RECORD = ImuRecord(rate_offset=(40, -30, 20), force_offset=(150, -90, 60), offsets_valid=1)
 FRESH, UNSATURATED, ATTITUDE = 1 << 10, 1 << 11, 1 << 12
 IMU_WATCHDOG = 6
+LOAD_LIMIT = 0.60  # of the IMU's cycles, whatever happens
 IMU_DATA_READY = 1
 
 
@@ -109,6 +110,8 @@ class Fault:
         Of the Mega.
     saturated, levelled : tuple of float
         Least and largest part of the samples marked so.
+    imu_resets : tuple of int
+        Fewest and most resets by the IMU's watchdog.
     """
 
     injected: str
@@ -124,6 +127,7 @@ class Fault:
     engaged: bool = True
     saturated: tuple[float, float] = (0.0, 0.0)
     levelled: tuple[float, float] = (0.0, 1.0)
+    imu_resets: tuple[int, int] = (0, 0)
 
 
 def saturate(rig: PairRig) -> None:
@@ -163,7 +167,8 @@ FAULTS = (
     Fault("IMU reset", "back in 0.5 s, offsets from EEPROM", "lost, found, restarted",
           reset_imu, events=(*LOST, "imu_restarted"), heard=(0.8, 0.9)),
     Fault("IMU program hangs", "watchdog, back in 1.3 s", "lost, found, restarted",
-          hang_imu, events=(*LOST, "imu_restarted"), heard=(0.55, 0.75)),
+          hang_imu, events=(*LOST, "imu_restarted"), heard=(0.55, 0.75),
+          imu_resets=(1, 2)),
     Fault("MPU off, as without power", "sets it up again and again", "lost, timer triggers, found",
           lambda r: r.board.mpu.fail(MpuFault.SILENT),
           lambda r: r.board.mpu.fail(MpuFault.NONE), events=LOST, heard=NONE, recovered_ms=900),
@@ -336,6 +341,11 @@ def verdict(fault: Fault, seen: Outcome) -> list[str]:
         wrong.append(f"gap of {seen.gap_ms:.0f} ms")
     if seen.engaged != fault.engaged:
         wrong.append("Mega drives" if seen.engaged else "receiver drives")
+    low_resets, high_resets = fault.imu_resets
+    if not low_resets <= seen.imu_resets <= high_resets:
+        wrong.append(f"{seen.imu_resets} watchdog resets of the IMU")
+    if seen.imu_load > LOAD_LIMIT:
+        wrong.append(f"the IMU's load {100 * seen.imu_load:.0f} %")
     if not seen.offsets_kept:
         wrong.append("offsets changed")
     return wrong

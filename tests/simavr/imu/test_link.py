@@ -24,16 +24,16 @@ CHOSEN = (
 )
 
 
-@pytest.mark.parametrize(("clock_ppm", "mpu_ppm"), [(3000.0, -8000.0)])
+@pytest.mark.parametrize("over_i2c", [False, True], ids=["mpu6000", "mpu6050"])
 def test_every_sample_is_in_the_log_once_at_its_instant(
-    mega_elf: Path, imu_elf: Path, tmp_path: Path, clock_ppm: float, mpu_ppm: float
+    mega_elf: Path, imu_elf: Path, tmp_path: Path, over_i2c: bool
 ) -> None:
     from flight.rig import make_card
     from imu.link import run_link
     from imu.rig import PairRig
 
     card = make_card(tmp_path / "card.img")
-    rig = PairRig(mega_elf, imu_elf, card, clock_ppm=clock_ppm, mpu_ppm=mpu_ppm)
+    rig = PairRig(mega_elf, imu_elf, card, clock_ppm=3000.0, mpu_ppm=-8000.0, over_i2c=over_i2c)
     link = run_link(rig, 6.0, tmp_path)
     rig.close()
     assert link.match.made > 1200
