@@ -77,6 +77,15 @@ def test_finds_the_truth_and_covers_it(flight: VirtualFlight) -> None:
     assert {"Cn_p"} <= flagged <= {"Cn_p", "CD_0"}
 
 
+def test_roll_under_the_elevator_tells_a_cg_beside_the_plane_of_symmetry() -> None:
+    beside = virtual_flight("multisine", 700, chain="none")
+    true_m = float(beside.record.draws.values["cg_m"][1])
+    value, left = fitted(beside, instrument_data(NAME)).errors["cg_y_m"]
+    assert abs(true_m) > 0.007
+    assert left < 0.001
+    assert abs(value - true_m) < 3.0 * left
+
+
 def test_a_vane_taken_for_frictionless_shows_in_damping(flight: VirtualFlight) -> None:
     smooth = replace(instrument_data(NAME), vane_friction_rad=0.0)
     miss = misses(flight, fitted(flight, smooth))

@@ -21,8 +21,6 @@ from host.sysid.coefficient_answer import CoefficientFit, Flight, Pull, derivati
 from host.sysid.coefficient_rows import (
     GRAVITY_MPS2,
     KINEMATIC,
-    LATERAL,
-    LONGITUDINAL,
     Equation,
     Flown,
     equations,
@@ -205,8 +203,8 @@ def _density(record: Record) -> Array:
 def _solve(search: _Search, names: tuple[str, ...], sd: Array) -> CoefficientFit:
     rows = search.rows(search.record, search.flown, np.zeros(len(sd)), names)
     position: dict[str, int] = {}
-    for name in dict.fromkeys((*LONGITUDINAL, *LATERAL)):
-        for term in rows.equations[name].terms:
+    for name, equation in rows.equations.items():
+        for term in equation.terms:
             position[f"{name}_{term}"] = len(position)
     theta, errors = np.zeros(len(position)), np.zeros(len(sd))
     noise: dict[str, tuple[Array, Array]] = {}

@@ -17,7 +17,8 @@ from host.sysid.coefficient_signals import Record
 from host.sysid.powerplant import Powerplant
 
 GRAVITY_MPS2 = 9.80665
-LONGITUDINAL = ("CL", "CD", "Cm", "w", "u")
+# Roll under the elevator: lift beside a CG off the plane of symmetry, its only clear trace.
+LONGITUDINAL = ("CL", "CD", "Cm", "Cl", "w", "u")
 LATERAL = ("CY", "Cl", "Cn", "v")
 KINEMATIC = ("u", "v", "w")
 
@@ -87,6 +88,10 @@ def equations(
     pitch -= arm_z * tx - arm_x * tz
     yaw = izz * s["rd"] - ixz * (s["pd"] - q * r) + (iyy - ixx) * p * q - q * hx
     yaw += flown.drive_nm * plant.axis[2]
+    # About the plane of symmetry, where neither lift nor drag rolls or yaws: a CG 8 mm beside it
+    # makes Cl_alpha -0.024, which left out drew Cl_r by 4 %.
+    roll += e["cg_y_m"] * mass * s["az"]
+    yaw -= e["cg_y_m"] * mass * s["ax"]
     de, alpha = s["de"], s["alpha"]
     along = {"alpha": alpha, "q": 0.5 * q * c / V, "de": de}
     bent, moved = alpha - trim_alpha_rad, de - float(np.mean(de))
