@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 MakeRig = Callable[..., "FlightRig"]
 
 ASCII_ROW, ORIGINAL_GPS = 2, 2  # telemetry, gps_source of firmware/settings.toml
-BUTTON = "PG0"
+BUTTON, LED, BUZZER = "PG0", "PH3", "PH4"
 LATITUDE, LONGITUDE = 250_500_000, 1_215_000_000  # of the original packets of simavr_bench/imu.py
 RATE_STEPS = 16.4 / 65.5  # of the original packets, to those of ours
 
@@ -106,13 +106,22 @@ def test_bare_board_with_a_card_records_what_is_there(make_rig: MakeRig, tmp_pat
 
     rig = make_rig()
     rig.baro.present = False
+    rig.chip.watch(LED, BUZZER)
     rig.chip.power_on()
     rig.chip.run_s(7.0)
     assert "card ready 1" in rig.status_lines()[-1]
+    pressed = rig.chip.cycle
+    assert rig.chip.level(LED)
     rig.chip.drive(BUTTON, False)
     rig.chip.run_s(0.2)
     rig.chip.drive(BUTTON, None)
     rig.chip.run_s(4.0)
+    at, _ = rig.chip.edges(LED)
+    assert np.all(at[at < pressed] < pressed - 16_000_000)  # steady: ready
+    assert np.diff(at[at > pressed])[1:] / 16e3 == pytest.approx(500, abs=20)  # it records
+    at, level = rig.chip.edges(BUZZER)
+    assert level[at > pressed].tolist() == [1, 0]  # one tone
+    assert np.diff(at[at > pressed]) / 16e3 == pytest.approx(500, abs=20)
     assert all(state != 2 for _, state in rig.relay.contacts)
     rig.land()
     check_card(rig.card_image)

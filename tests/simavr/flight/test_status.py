@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,6 +43,31 @@ def test_line_shows_every_sensor(make_rig: MakeRig) -> None:
     rig.imu.silent = True
     rig.chip.run_s(3.0)
     assert last_line(rig).state("imu") == "stale"
+
+
+def test_host_status_shows_the_line_of_the_real_image(make_rig: MakeRig) -> None:
+    """The command as a user types it, on the image's USB port as a pseudo-terminal."""
+    from simavr_bench.pty_bridge import PtyBridge
+
+    rig = make_rig()
+    rig.power_on()
+    rig.chip.run_s(4.0)
+    with PtyBridge(rig.chip, 0) as bridge:
+        command = [sys.executable, "-m", "host", "status", bridge.path, "--once", "--json"]
+        with subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as running:
+            try:
+                bridge.serve(lambda: running.poll() is not None, limit_s=60.0)
+            finally:
+                running.kill()
+            out, err = running.communicate()
+    assert (running.returncode, err) == (0, "")
+    shown = json.loads(out)
+    assert (shown["board"], shown["imu"]["state"]) == ("mega2560", "ok")
+    assert shown["card"] == {"state": "ready", "file_number": 1}
+    assert shown["receiver"]["pulse_us"] == pytest.approx([1500, 1500, 1500, 1000, 1000], abs=4)
+    assert shown["complaints"] == []
 
 
 def test_contact_closed_before_the_first_heartbeat_is_refused(make_rig: MakeRig) -> None:
