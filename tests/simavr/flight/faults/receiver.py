@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from flight.faults.card import turns
 from flight.faults.model import Check, Fault, Seen, change, expect
+from flight.faults.program import came_back
 from flight.rig import ANALOG_CHANNELS, FlightRig
 from simavr_bench import Supply, XBee, cycles
 
@@ -176,7 +177,8 @@ SUPPLY = (
           lambda r: sag(r, 4.4), lambda r: sag(r, 5.0), events=("drive_changed",), engaged=False,
           check=sag_is_logged),
     Fault("21", "supply dips to 4.0 V for 100 ms", "brown-out reset, resumes in 2 s",
-          brown_out, lossless=False, events=("reset",), engaged=False, resets=True),
+          brown_out, lossless=False, events=("reset",), engaged=False, resets=True,
+          check=came_back("brown_out")),
 )  # fmt: skip
 
 RADIO = (
