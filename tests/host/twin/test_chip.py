@@ -132,7 +132,7 @@ def test_analogue_channels_are_the_pins_within_a_count(
             for turn in range(4):
                 at = ident["t_us"] + offset_us + 12.0 + (turn * 11 + slot) * 104.0
                 total += np.floor(np.interp(at, grid_us, given.analog[:, slot]))
-            slope = np.abs(np.gradient(given.analog[:, slot], 1000.0))
+            slope = np.abs(np.gradient(given.analog[:, slot], SAMPLE_STEP_TICKS / 2.0))
             moved = np.interp(ident["t_us"] + offset_us, grid_us, slope) * 100.0
             wrong += int((np.abs(ident[name] - total) > 4.0 * (1.0 + moved)).sum())
         return wrong / (len(ANALOGUE) * len(ident))

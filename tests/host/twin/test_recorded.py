@@ -95,7 +95,7 @@ def test_analogue_channels_are_the_pins_at_their_instants(flown: Flown) -> None:
                 at = ident["t_us"] + late_us + 12.0 + (turn * 11 + slot) * 104.0
                 total += np.floor(np.interp(at, grid_us, flown.given.analog[:, source]))
             # The scan starts within 100 us of t_us: what the channel moves meanwhile is allowed.
-            slope = np.abs(np.gradient(flown.given.analog[:, source], 1000.0))
+            slope = np.abs(np.gradient(flown.given.analog[:, source], SAMPLE_STEP_TICKS / 2.0))
             moved = np.interp(ident["t_us"].astype(float), grid_us, slope) * 100.0
             wrong += int((np.abs(ident[name] - total) > 4.0 * (1.0 + moved)).sum())
         return wrong / (len(names) * len(ident))

@@ -83,9 +83,7 @@ def test_noise_of_an_analogue_channel_passes_the_converter(
     # voltage stands.
     drawn = mean + noise * np.random.default_rng(1).standard_normal(100_000)
     size = 2.0 * float(np.round(drawn).std())
-    # The stimulus is straight between points of 1 ms: 13 % less noise between them, 22 % more on
-    # them, and one channel's conversions may stay there for seconds.
-    assert spread(logs[True], "ident", name) == pytest.approx(size, rel=0.20)
+    assert spread(logs[True], "ident", name) == pytest.approx(size, rel=0.08)
     assert spread(logs[False], "ident", name) < 0.5 * size
 
 

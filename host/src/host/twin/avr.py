@@ -32,7 +32,7 @@ from host.twin.sitl import (
     file_of,
 )
 from host.twin.sitl_library import LIBRARY
-from host.twin.stimuli import Stimuli
+from host.twin.stimuli import SAMPLE_STEP_TICKS, Stimuli
 
 REPLAY = CLONE / "tests" / "simavr" / "replay.py"
 ELF = CLONE / ".pio" / "build" / "mega2560" / "firmware.elf"
@@ -104,6 +104,7 @@ def _write(given: Stimuli, path: Path) -> None:
         path,
         allow_pickle=False,
         duration=np.int64(given.duration),
+        step=np.int64(SAMPLE_STEP_TICKS),
         edge_at=given.edges["at"],
         edge_levels=given.edges["levels"],
         packet_start=np.array([p.start for p in packets], dtype=np.int64),
