@@ -49,6 +49,21 @@ def test_every_packaged_card_flies_and_stays_in_the_air(name: str) -> None:
             {"segment": [{"kind": "doublet", "axis": "rudder", "amplitude": [1, 2], "width_s": 1}]},
             "1 axes and 2 amplitudes",
         ),
+        (
+            {
+                "segment": [
+                    {
+                        "kind": "multisine",
+                        "axis": ["elevator", "aileron", "rudder"],
+                        "amplitude": [1, 1, 1],
+                        "duration_s": 4,
+                        "low_hz": 0.2,
+                        "high_hz": 0.6,
+                    }
+                ]
+            },
+            "2 whole multiples of 1/duration_s between low_hz and high_hz for 3 axes",
+        ),
         ({"wind": 3}, "unknown key 'wind'"),
         ({"air": {"gust": 3}}, "unknown air.gust"),
         ({"air": {"turbulence_mps": -1}}, "turbulence_mps is -1, expected 0 or more"),
@@ -99,6 +114,23 @@ def test_pilot_keeps_off_during_an_input_unless_he_corrects_early() -> None:
     eager = replace(card, pilot=replace(card.pilot, early=1.0))
     early = schedule(eager, 17.0, 1e-3, np.random.default_rng(1))
     assert all(w.attention_s < w.input_end_s for w in early.windows)
+
+
+def test_three_multisines_reach_the_sticks_orthogonal_and_in_their_own_sizes() -> None:
+    document = {
+        **MINIMAL,
+        "segment": [
+            {"kind": "multisine", "axis": ["elevator", "aileron", "rudder"],
+             "amplitude": [2.0, 3.0, 4.0], "duration_s": 20, "low_hz": 0.1, "high_hz": 2.5}
+        ],
+    }  # fmt: skip
+    plan = schedule(cards.parse(document, "card"), 17.0, 1e-3, np.random.default_rng(1))
+    sticks = plan.program[:, :3]
+    assert np.degrees(np.abs(sticks).max(axis=0)) == pytest.approx([2.0, 3.0, 4.0], rel=0.01)
+    unit = sticks / np.linalg.norm(sticks, axis=0)
+    assert np.abs(unit.T @ unit - np.eye(3)).max() < 1e-9
+    # One input half a second late, and they are no longer.
+    assert abs(np.roll(unit[:, 0], 500) @ unit[:, 1]) > 1e-3
 
 
 def test_multisines_are_orthogonal_flat_and_start_at_zero() -> None:

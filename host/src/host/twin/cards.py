@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from host.errors import UsageError
 from host.twin.faults import FAULTS, Fault
-from host.twin.maneuvers import KINDS, STEPS
+from host.twin.maneuvers import KINDS, STEPS, harmonics
 
 FOLDER = Path(__file__).parent / "cards"
 # Numbers of [flight], [air] and [pilot] that may be below zero.
@@ -276,6 +276,13 @@ def _segments(where: str, value: object) -> list[Segment]:
             raise CardError(f"{where}: {kind} needs {key} above 0, found {numbers.get(key)!r}")
     if kind in KINDS and kind not in STEPS and numbers["high_hz"] <= numbers["low_hz"]:
         raise CardError(f"{where}: high_hz is {numbers['high_hz']!r}, expected above low_hz")
+    if kind == "multisine":
+        tones = harmonics(numbers["duration_s"], numbers["low_hz"], numbers["high_hz"])
+        if len(tones) < len(axes):
+            raise CardError(
+                f"{where}: {len(tones)} whole multiples of 1/duration_s between low_hz and high_hz"
+                f" for {len(axes)} axes, expected at least one each: a longer input or a wider band"
+            )
     return [Segment(kind=str(kind), axes=tuple(axes), amplitudes=amplitudes, **numbers)] * repeat
 
 

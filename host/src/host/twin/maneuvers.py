@@ -48,6 +48,12 @@ def staircase(t_s: Array, switches_s: Array, levels: Array, hand_s: float) -> Ar
     return out
 
 
+def harmonics(duration_s: float, low_hz: float, high_hz: float) -> Array:
+    """Return the whole multiples of the fundamental 1/`duration_s` inside a band (k,)."""
+    first, last = math.ceil(low_hz * duration_s), math.floor(high_hz * duration_s)
+    return np.arange(first, last + 1, dtype=np.float64)
+
+
 def multisine(
     duration_s: float, low_hz: float, high_hz: float, inputs: int
 ) -> tuple[list[Array], list[Array]]:
@@ -68,10 +74,10 @@ def multisine(
         One array each per input; unit amplitude each. Phases by Schroeder (IEEE Trans. Inf.
         Theory 16, 1970), shifted so that the sum starts at zero.
     """
-    harmonics = np.arange(math.ceil(low_hz * duration_s), math.floor(high_hz * duration_s) + 1)
+    tones = harmonics(duration_s, low_hz, high_hz)
     frequencies, phases = [], []
     for k in range(inputs):
-        own = harmonics[k::inputs]
+        own = tones[k::inputs]
         index = np.arange(1, len(own) + 1)
         phase = -np.pi * index * (index - 1) / max(len(own), 1)
         f = own / duration_s
