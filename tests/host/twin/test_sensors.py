@@ -20,6 +20,7 @@ from host.twin.imu_stream import ADDRESS
 from host.twin.mega_clock import ticks
 from host.twin.stimuli import stimuli
 from host.twin.ubx import packet
+from scipy.stats import kstest
 
 IDEAL = Sensors(**{f.name: False for f in fields(Sensors)})
 
@@ -70,13 +71,22 @@ def test_draws_stay_within_their_stated_ranges(calm: Card) -> None:
 
     plane = load_aircraft("ultrastick25e")
     drawn = [draw(plane, np.random.default_rng(k), tolerances=True) for k in range(300)]
-    limits = {"mass_share": 0.01, "inertia_share": 0.05, "cg_m": 0.01, "imu_m": 0.01,
-              "upwash_share": 0.2, "vane_scale_share": 0.03, "pitot_scale_share": 0.03,
-              "pitot_drift_count": 1.0, "misalignment_rad": np.deg2rad(1.0),
-              "imu_delay_share": 0.2, "vane_delay_s": 1e-3}  # fmt: skip
+    limits = {
+        "mass_share": 0.01, "inertia_share": 0.05, "cg_m": 0.01, "imu_m": 0.01, "vane_a_m": 0.01,
+        "vane_b_m": 0.01, "pitot_a_m": 0.01, "pitot_b_m": 0.01, "upwash_share": 0.2,
+        "vane_scale_share": 0.03, "pitot_scale_share": 0.03, "pitot_drift_count": 1.0,
+        "misalignment_rad": np.deg2rad(1.0), "imu_delay_share": 0.2, "vane_delay_share": 0.2,
+        "pitot_delay_share": 0.2, "gps_delay_share": 0.2, "imu_delay_s": 1e-3,
+        "vane_delay_s": 1e-3, "pitot_delay_s": 1e-3, "clock_share": 0.005,
+    }  # fmt: skip
     for name, limit in limits.items():
         size = np.array([np.abs(d.vector(name)).max() for d in drawn])
         assert 0.95 * limit < size.max() <= limit, name
+        # Uniform, centred, elements drawn each for itself: Kolmogorov and Smirnov, one in a
+        # million.
+        every = np.concatenate([np.ravel(d.vector(name)) for d in drawn]) / limit
+        assert kstest(every, "uniform", args=(-1.0, 2.0)).pvalue > 1e-6, name
+        assert kstest(every**2, "uniform").pvalue < 1e-6, name
     none = draw(plane, np.random.default_rng(1), tolerances=False)
     assert all(np.all(value == 0.0) for value in none.values.values())
 
