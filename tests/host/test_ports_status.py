@@ -345,8 +345,9 @@ def test_port_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
     assert "no such port" in one_line(capsys)
 
 
-def test_file_is_no_port(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["status", __file__]) == 5
+@pytest.mark.parametrize("path", [__file__, "/dev/null", "/tmp"])
+def test_file_is_no_port(path: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["status", path]) == 5
     assert "not a serial port" in one_line(capsys)
 
 

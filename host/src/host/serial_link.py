@@ -240,7 +240,8 @@ def _why_not(device: str, error: Exception) -> str:
         return "busy: another program has it open (a monitor, an upload); close that one"
     if number in (errno.EACCES, errno.EPERM):
         return "not allowed; join the group that owns it (often dialout) and log in again"
-    if number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR) or Path(device).is_file():
+    no_tty = number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR) or Path(device).is_file()
+    if no_tty or "could not configure port" in text:  # pyserial's word for ENOTTY
         return f"not a serial port; {look}"
     return f"cannot be opened ({error}); {look}"
 
