@@ -1,0 +1,76 @@
+"""Force and moment coefficients come from rates and accelerations: no angle stands in them."""
+
+from dataclasses import replace
+
+import numpy as np
+from host.compiled import Array
+from host.sysid.aircraft_file import airframe_data, instrument_data, powerplant
+from host.sysid.coefficient_answer import CoefficientFit
+from host.sysid.coefficient_fit import fit_coefficients
+from host.sysid.coefficient_rows import KINEMATIC, Equation, Flown, equations
+from host.sysid.coefficient_signals import Record
+from host.sysid.coefficient_windows import Window
+from host.sysid.tables import even_columns
+from host.twin.cards import load
+from host.twin.virtual import virtual_flight
+
+NAME = "ultrastick25e"
+
+SAMPLES = 64
+SIGNALS = (
+    "p", "q", "r", "pd", "qd", "rd", "V", "ax", "ay", "az", "qbar", "alpha", "beta",
+    "de", "da", "dr",
+)  # fmt: skip
+ERRORS = (
+    "mass_share", "ixx_share", "iyy_share", "izz_share", "thrust_share", "cg_x_m", "cg_y_m",
+    "cg_z_m",
+)  # fmt: skip
+
+
+def seen_with(phi_rad: Array, theta_rad: Array) -> dict[str, Equation]:
+    random = np.random.default_rng(4)
+    signals = {name: 1.0 + 0.1 * random.standard_normal(SAMPLES) for name in SIGNALS}
+    thrust, spin, drive = (random.standard_normal(SAMPLES) for _ in range(3))
+    return equations(
+        Record(0.01, dict(signals)), signals, dict.fromkeys(ERRORS, 0.01),
+        Flown(thrust, spin, drive, phi_rad, theta_rad),
+        airframe_data(NAME), powerplant(NAME), 0.05,
+    )  # fmt: skip
+
+
+def test_force_and_moment_equations_hold_no_attitude() -> None:
+    t = np.linspace(0.0, 1.0, SAMPLES)
+    level, tumbling = seen_with(0.0 * t, 0.0 * t), seen_with(2.0 * t, -1.0 * t)
+    for name, equation in level.items():
+        same = np.array_equal(equation.left, tumbling[name].left)
+        assert same is (name not in KINEMATIC), name
+        for term, values in equation.terms.items():
+            np.testing.assert_array_equal(values, tumbling[name].terms[term])
+
+
+def test_an_attitude_wrong_by_degrees_moves_no_coefficient() -> None:
+    card = load("multisine")
+    nominal = replace(card, sensors=replace(card.sensors, tolerances=False))
+    flight = virtual_flight(nominal, 7, chain="none")
+    columns, _ = even_columns(flight.table)
+    flying = columns["t_s"] > 8.0
+    right = {name: values[flying] for name, values in columns.items()}
+    windows = [
+        Window(float(str(m["start_s"])) - 0.5, float(str(m["end_s"])), m["axes"] == ["elevator"])
+        for m in flight.maneuvers
+    ]
+
+    def fitted(given: dict[str, Array]) -> CoefficientFit:
+        return fit_coefficients(
+            given, windows, airframe_data(NAME), instrument_data(NAME), powerplant(NAME)
+        )
+
+    # What a tilted vertical and a slow drift of the filter leave.
+    wander = np.deg2rad(2.0 + 2.0 * np.sin(2.0 * np.pi * right["t_s"] / 30.0))
+    wrong = right | {name: right[name] + wander for name in ("phi_rad", "theta_rad")}
+    moved = {d.name: d.value for d in fitted(wrong).derivatives}
+    shares = {
+        d.name: abs(moved[d.name] - d.value) / d.half_width for d in fitted(right).derivatives
+    }
+    assert len(shares) > 20
+    assert max(shares.values()) < 0.1, shares
