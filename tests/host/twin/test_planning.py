@@ -98,6 +98,28 @@ def test_command_prints_the_card_and_its_json(
     assert "leave the card's name out" in capsys.readouterr().err
 
 
+def test_command_hears_another_aircraft_and_keeps_unlike_inputs_apart(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document: dict[str, object] = {
+        "format": 1,
+        "aircraft": "ultrastick25e",
+        "segment": [
+            {"kind": "doublet", "axis": "elevator", "amplitude": 2.0, "width_s": width_s}
+            for width_s in (0.3, 0.3, 0.5)
+        ],
+    }
+    path = tmp_path / "card.toml"
+    path.write_text(dumps(document))
+    assert main(["plan", str(path), "--aircraft", "kadetlt40", "--airspeed", "15"]) == 0
+    text = capsys.readouterr().out
+    assert "Kadet LT-40" in text
+    assert "2x doublet elevator" in text
+    assert "1x doublet elevator" in text
+    assert main(["plan", "demo", "--airspeed", "-4"]) == 2
+    assert "--airspeed is -4, expected above 0" in capsys.readouterr().err
+
+
 def test_simulate_command_lists_flies_and_refuses(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,10 +27,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         " for the aircraft from its prior model.",
     )
     parser.add_argument("card", nargs="?", help="name of a card, or a TOML file")
-    parser.add_argument("--aircraft", default="ultrastick25e",
-                        help="design for this aircraft (default ultrastick25e)")  # fmt: skip
-    parser.add_argument("--airspeed", type=float, default=0.0, metavar="MPS",
-                        help="design for this airspeed (default: the aircraft file's)")  # fmt: skip
+    parser.add_argument(
+        "--aircraft",
+        metavar="NAME|FILE",
+        help="for this aircraft (default: the card's, else ultrastick25e)",
+    )
+    parser.add_argument(
+        "--airspeed",
+        type=float,
+        metavar="MPS",
+        help="for this airspeed (default: the card's, else the aircraft file's)",
+    )
     parser.add_argument("--save", type=Path, metavar="FILE", help="write the designed card as TOML")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(run=run)
@@ -45,14 +52,19 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(
             f"planning needs {error.name}: install the extra, pip install './host[compiled]'"
         ) from None
+    if args.airspeed is not None and not args.airspeed > 0.0:
+        raise UsageError(f"--airspeed is {args.airspeed:g}, expected above 0")
     if args.card is None:
-        card = planning.design(args.aircraft, args.airspeed)
+        card = planning.design(args.aircraft or "ultrastick25e", args.airspeed or 0.0)
         if args.save is not None:
             args.save.write_text(dumps(planning.document(card)), encoding="utf-8")
     elif args.save is not None:
         raise UsageError("--save goes with a designed card: leave the card's name out")
     else:
         card = cards.load(args.card)
+        card = replace(card, aircraft=args.aircraft or card.aircraft)
+        speed = args.airspeed or card.flight.airspeed_mps
+        card = replace(card, flight=replace(card.flight, airspeed_mps=speed))
     plan = planning.judge(card)
     if args.json:
         print(
@@ -84,8 +96,8 @@ def _print(plan: Plan) -> None:
     count = 0
     rows: list[tuple[int, Point]] = []
     for point in plan.points:
-        same = last is not None and (point.kind, point.axes, point.amplitudes) == (
-            last.kind, last.axes, last.amplitudes,
+        same = last is not None and (point.kind, point.axes, point.amplitudes, point.width_s) == (
+            last.kind, last.axes, last.amplitudes, last.width_s,
         )  # fmt: skip
         count = count + 1 if same else 1
         if same:
