@@ -12,6 +12,7 @@ from host.twin.analog import analog, convert, nominal
 from host.twin.attitude import euler
 from host.twin.cards import Card, Sensors, load
 from host.twin.delays import FILTERS
+from host.twin.draws import GROUPS
 from host.twin.filters import delayed, first_order, vane
 from host.twin.flight import FlightRecord, fly
 from host.twin.ideal import measured_table, true_table
@@ -89,6 +90,19 @@ def test_draws_stay_within_their_stated_ranges(calm: Card) -> None:
         assert kstest(every**2, "uniform").pvalue < 1e-6, name
     none = draw(plane, np.random.default_rng(1), tolerances=False)
     assert all(np.all(value == 0.0) for value in none.values.values())
+
+
+def test_one_switch_leaves_nominal_its_own_draws_and_no_others(calm: Card) -> None:
+    real = fly(calm, seed=3).draws.values
+    for group, names in GROUPS.items():
+        sensors = replace(calm.sensors, tolerances=True, **{group: False})
+        drawn = fly(replace(calm, sensors=sensors), seed=3).draws.values
+        for name, value in drawn.items():
+            if name in names:
+                assert np.any(real[name] != 0.0), name
+                assert np.all(value == 0.0), (group, name)
+            else:
+                assert np.array_equal(value, real[name]), (group, name)
 
 
 def test_vane_is_a_second_order_system_with_the_stated_frequency_and_damping() -> None:

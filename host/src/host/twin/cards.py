@@ -71,7 +71,18 @@ class Pilot:
 class Sensors:
     """One switch per error; false makes that part of the chain ideal."""
 
-    tolerances: bool = True  # per-flight draws
+    tolerances: bool = True  # per-flight draws, all of them; the next eleven: one group each
+    imu_bias: bool = True
+    imu_scale: bool = True
+    imu_misalignment: bool = True
+    vane_scale: bool = True  # and zero
+    pitot_scale: bool = True
+    potentiometers: bool = True
+    upwash_tolerance: bool = True
+    delay_tolerance: bool = True
+    place_tolerance: bool = True  # of CG and sensors
+    mass_tolerance: bool = True  # and inertia
+    barometer_offset: bool = True
     noise: bool = True
     imu_filter: bool = True
     vane_dynamics: bool = True

@@ -6,6 +6,7 @@ the aircraft file and the calibration, with these ranges as their uncertainty.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,29 @@ VANE_ZERO_RAD = np.deg2rad(0.5)
 POT_ZERO_RAD = np.deg2rad(0.3)
 POT_SCALE = 0.01
 
+# Switches of a card and the draws they leave nominal.
+GROUPS: dict[str, tuple[str, ...]] = {
+    "imu_bias": ("gyro_bias_radps", "accel_bias_mps2"),
+    "imu_scale": ("gyro_scale_share", "accel_scale_share"),
+    "imu_misalignment": ("misalignment_rad",),
+    "vane_scale": ("vane_scale_share", "vane_zero_rad"),
+    "pitot_scale": ("pitot_scale_share",),
+    "potentiometers": ("pot_zero_rad", "pot_scale_share"),
+    "upwash_tolerance": ("upwash_share",),
+    "delay_tolerance": (
+        "imu_delay_share",
+        "vane_delay_share",
+        "pitot_delay_share",
+        "imu_delay_s",
+        "vane_delay_s",
+        "pitot_delay_s",
+        "gps_delay_share",
+    ),
+    "place_tolerance": ("cg_m", "imu_m", "vane_a_m", "vane_b_m", "pitot_a_m", "pitot_b_m"),
+    "mass_tolerance": ("mass_share", "inertia_share"),
+    "barometer_offset": ("baro_offset_pa",),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Draws:
@@ -51,7 +75,13 @@ class Draws:
         return self.values[name]
 
 
-def draw(aircraft: Aircraft, rng: np.random.Generator, *, tolerances: bool) -> Draws:
+def draw(
+    aircraft: Aircraft,
+    rng: np.random.Generator,
+    *,
+    tolerances: bool,
+    nominal: Collection[str] = (),
+) -> Draws:
     """Draw the errors of one flight.
 
     Parameters
@@ -61,6 +91,8 @@ def draw(aircraft: Aircraft, rng: np.random.Generator, *, tolerances: bool) -> D
     rng : numpy Generator
     tolerances : bool
         False: everything is exactly nominal (the generator advances all the same).
+    nominal : collection of str
+        Keys of `GROUPS` whose draws are nominal while the others stay as they were.
 
     Returns
     -------
@@ -106,6 +138,9 @@ def draw(aircraft: Aircraft, rng: np.random.Generator, *, tolerances: bool) -> D
         "imu_clock_share": within(CLOCK_SHARE),
         "baro_offset_pa": within(100.0),  # BMP085 absolute accuracy, +-1 hPa typical
     }
+    for group in nominal:
+        for name in GROUPS[group]:
+            values[name] = np.zeros_like(values[name])
     return Draws(values)
 
 

@@ -28,7 +28,7 @@ from host.twin.airframe import (
 )
 from host.twin.attitude import multiply, quaternion
 from host.twin.cards import Card
-from host.twin.draws import Draws, draw, flown
+from host.twin.draws import GROUPS, Draws, draw, flown
 from host.twin.linear_aircraft import load, refuse_unfit
 from host.twin.motion import rotate_to_body, rotate_to_ned, step
 from host.twin.pilot import Schedule, gains, schedule
@@ -291,7 +291,8 @@ def fly(
     rng_draw, rng_pilot, rng_air, rng_radio = (
         np.random.default_rng([seed, purpose]) for purpose in range(4)
     )
-    draws = draw(plane, rng_draw, tolerances=card.sensors.tolerances)
+    nominal = [group for group in GROUPS if not getattr(card.sensors, group)]
+    draws = draw(plane, rng_draw, tolerances=card.sensors.tolerances, nominal=nominal)
     frame = flown(plane, draws)
     atmosphere = air_model.atmosphere(card.flight)
     wanted = card.flight.airspeed_mps or plane.scalar("trim.airspeed_mps")
