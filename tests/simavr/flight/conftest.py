@@ -17,9 +17,9 @@ MakeRig = Callable[..., "FlightRig"]
 @pytest.fixture(scope="session")
 def flight_elf() -> Path:
     """The flight image."""
-    from flight.rig import build_flight_image
+    from flight.images import build_image
 
-    return build_flight_image()
+    return build_image("mega2560")
 
 
 @pytest.fixture(scope="session")

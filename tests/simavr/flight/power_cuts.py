@@ -22,7 +22,7 @@ import numpy as np
 from flight.cut_flight import PAYLOAD, Flight, FlightCuts, Plan, fly, make_base
 from flight.cut_ground import GroundRun, close_and_prepare, judge_ground_cut
 from flight.cut_reboot import BOOTS, RebootBench, RebootResult, compare_with, spread
-from flight.rig import build_flight_image
+from flight.images import build_image
 from simavr_bench import CardKind
 from simavr_bench.card_journal import CutCard
 
@@ -150,7 +150,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         # Its own copy: a build meanwhile would make the reboots another program's.
-        elf = Path(shutil.copy(build_flight_image(), folder / "firmware.elf"))
+        elf = Path(shutil.copy(build_image("mega2560"), folder / "firmware.elf"))
         bad, flights = run_flights(elf, options.flight, options.seed, folder)
         bad += run_ground(elf, flights, options.ground, options.seed, folder, every=options.every)
         bad += run_reboots(elf, flights[0], options.reboots, options.seed, folder)

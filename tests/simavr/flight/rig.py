@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,11 +20,9 @@ from simavr_bench import (
 )
 from simavr_bench.imu import ImuSample
 
-ROOT = Path(__file__).resolve().parents[3]
 BOOTLOADER = Path(
     "/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex"
 )
-BUILD = ROOT / "build" / "simavr" / "flight"
 RECEIVER_PINS = ("PK0", "PK1", "PK2", "PK3", "PK4")
 SERVOS = {
     "aileron": ("PK0", "PE4"),
@@ -40,35 +36,6 @@ CYCLES_PER_US = 16
 
 IDLE_US, CRUISE_US = 1000.0, 1500.0
 DIRECT_US, MEGA_US = 1000.0, 1900.0
-
-
-def build_flight_image() -> Path:
-    """Build the image that `pio run` makes.
-
-    Returns
-    -------
-    Path
-        The ELF, in a build folder of its own: other work may be building the same image.
-
-    Raises
-    ------
-    RuntimeError
-        If the build fails; the text is its last lines.
-    """
-    pio = Path(sys.executable).with_name("pio")
-    environment = dict(os.environ)
-    environment["PLATFORMIO_BUILD_DIR"] = str(BUILD / "pio")
-    done = subprocess.run(
-        [pio, "run", "-e", "mega2560"],
-        cwd=ROOT,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if done.returncode != 0:
-        raise RuntimeError(f"building the flight image failed:\n{done.stdout[-2000:]}{done.stderr}")
-    return BUILD / "pio" / "mega2560" / "firmware.elf"
 
 
 def make_card(path: Path, *, mebibytes: int = 300) -> Path:

@@ -7,11 +7,10 @@ import json
 import struct
 import tomllib
 import zlib
-from pathlib import Path
 
+from flight.images import ROOT
 from simavr_bench import Image
 
-ROOT = Path(__file__).resolve().parents[3]
 MAGIC = 0x5346
 FORMATS = {"u8": "B", "i8": "b", "u16": "H", "i16": "h", "u32": "I", "i32": "i"}
 

@@ -3,41 +3,17 @@
 from __future__ import annotations
 
 import ctypes
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from flight.rig import BUILD, CRUISE_US, ROOT, FlightRig, check_card, make_card, take_log
+from flight.images import upload
+from flight.rig import CRUISE_US, FlightRig, check_card, make_card, take_log
 from simavr_bench import read_image
 from simavr_bench.pty_bridge import PtyBridge
 
 import host
 
 BOOT_SECTION = 0x3E000
-
-
-def upload(bridge: PtyBridge) -> str:
-    """Run PlatformIO's upload to a terminal and give what it says."""
-    pio = Path(sys.executable).with_name("pio")
-    environment = {**os.environ, "PLATFORMIO_BUILD_DIR": str(BUILD / "pio")}
-    command = [str(pio), "run", "-e", "mega2560", "-t", "upload", "--upload-port", bridge.path]
-    with subprocess.Popen(
-        command,
-        cwd=ROOT,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    ) as running:
-        try:
-            bridge.serve(lambda: running.poll() is not None, limit_s=240.0)
-        finally:
-            running.kill()
-        said: str = running.communicate()[0]
-        assert running.returncode == 0, said
-    return said
 
 
 def test_uploaded_flash_boots_and_records(flight_elf: Path, tmp_path: Path) -> None:
@@ -49,7 +25,7 @@ def test_uploaded_flash_boots_and_records(flight_elf: Path, tmp_path: Path) -> N
     chip.run_s(0.1)
     assert chip.pc >= BOOT_SECTION
     with PtyBridge(chip, 0, reset_on_open=True) as bridge:
-        said = upload(bridge)
+        said = upload("mega2560", bridge)
     assert "verified" in said
     for address, piece in read_image(flight_elf).flash.items():
         assert chip.flash(address, len(piece)) == piece

@@ -16,9 +16,10 @@ from pathlib import Path
 
 import numpy as np
 from flight.bench.table import Table
-from flight.rig import build_flight_image, make_card
+from flight.images import build_image
+from flight.rig import make_card
 from imu.link import Link, run_link
-from imu.rig import PairRig, build_imu_image
+from imu.rig import PairRig
 from simavr_bench import Chip
 from stack_depth import analyse, room_bytes
 
@@ -95,7 +96,7 @@ def main() -> int:
         parser.error(f"--minutes {asked.minutes:g}: expected 0.05 to 60")
     table = Table()
     try:
-        imu_elf, mega_elf = build_imu_image(), build_flight_image()
+        imu_elf, mega_elf = build_image("arduimu"), build_image("mega2560")
     except RuntimeError as error:
         print(error, file=sys.stderr)
         return 6

@@ -31,17 +31,17 @@ class MakeBoard(Protocol):
 @pytest.fixture(scope="session")
 def imu_elf() -> Path:
     """The IMU's image."""
-    from imu.rig import build_imu_image
+    from flight.images import build_image
 
-    return build_imu_image()
+    return build_image("arduimu")
 
 
 @pytest.fixture(scope="session")
 def mega_elf() -> Path:
     """The flight image."""
-    from flight.rig import build_flight_image
+    from flight.images import build_image
 
-    return build_flight_image()
+    return build_image("mega2560")
 
 
 @pytest.fixture

@@ -19,11 +19,12 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from flight.rig import build_flight_image, check_card, make_card, take_log
+from flight.images import build_image
+from flight.rig import check_card, make_card, take_log
 from flight.servos import LONGEST_GAP_MS, worst_gap_ms
 from imu.motion import fly, swaying
 from imu.record import ImuRecord, read_record
-from imu.rig import PairRig, build_imu_image
+from imu.rig import PairRig
 from imu.truth import match
 from numpy.typing import NDArray
 from simavr_bench import MpuFault, ResetCause, in_fork
@@ -356,7 +357,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--only", help="faults whose text holds this")
     options = parser.parse_args()
-    mega_elf, imu_elf = build_flight_image(), build_imu_image()
+    mega_elf, imu_elf = build_image("mega2560"), build_image("arduimu")
     bad = 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
-from flight.rig import BUILD, CRUISE_US, MEGA_US, ROOT, FlightRig
+from flight.rig import CRUISE_US, MEGA_US, FlightRig
 from flight.settings import settings_image
 from numpy.typing import NDArray
 from simavr_bench import Chip, GpsUart, I2cBus, Magnetometer, Mpu6000
@@ -18,35 +15,6 @@ RAM_END = 0x900
 BOOTLOADER = Path(
     "/usr/share/arduino/hardware/arduino/avr/bootloaders/atmega/ATmegaBOOT_168_atmega328.hex"
 )
-
-
-def build_imu_image() -> Path:
-    """Build the image that `pio run -e arduimu` makes.
-
-    Returns
-    -------
-    Path
-        The ELF, in the build folder of the flight image's tests.
-
-    Raises
-    ------
-    RuntimeError
-        If the build fails; the text is its last lines.
-    """
-    pio = Path(sys.executable).with_name("pio")
-    environment = dict(os.environ)
-    environment["PLATFORMIO_BUILD_DIR"] = str(BUILD / "pio")
-    done = subprocess.run(
-        [pio, "run", "-e", "arduimu"],
-        cwd=ROOT,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if done.returncode != 0:
-        raise RuntimeError(f"building the IMU's image failed:\n{done.stdout[-2000:]}{done.stderr}")
-    return BUILD / "pio" / "arduimu" / "firmware.elf"
 
 
 class ImuBoard:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-import os
-import subprocess
-import sys
 from pathlib import Path
 
-from flight.rig import BUILD, ROOT
+from flight.images import upload
 from imu.packets import imu_packets
 from imu.record import ImuRecord, read_record
 from imu.rig import BOOTLOADER
@@ -16,28 +13,6 @@ from simavr_bench import Chip, I2cBus, Mpu6000, ResetCause, read_image
 from simavr_bench.pty_bridge import PtyBridge
 
 BOOT_SECTION = 0x7800
-
-
-def upload(bridge: PtyBridge) -> str:
-    """Run PlatformIO's upload to a terminal and give what it says."""
-    pio = Path(sys.executable).with_name("pio")
-    environment = {**os.environ, "PLATFORMIO_BUILD_DIR": str(BUILD / "pio")}
-    command = [str(pio), "run", "-e", "arduimu", "-t", "upload", "--upload-port", bridge.path]
-    with subprocess.Popen(
-        command,
-        cwd=ROOT,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    ) as running:
-        try:
-            bridge.serve(lambda: running.poll() is not None, limit_s=240.0)
-        finally:
-            running.kill()
-        said: str = running.communicate()[0]
-        assert running.returncode == 0, said
-    return said
 
 
 def test_uploaded_flash_sends_samples_and_keeps_the_offsets(imu_elf: Path) -> None:
@@ -54,7 +29,7 @@ def test_uploaded_flash_sends_samples_and_keeps_the_offsets(imu_elf: Path) -> No
         chip.run_s(0.1)
         assert chip.pc >= BOOT_SECTION
         with PtyBridge(chip, 0, baud=57_600.0, reset_on_open=True) as bridge:
-            said = upload(bridge)
+            said = upload("arduimu", bridge)
         assert "verified" in said
         for address, piece in read_image(imu_elf).flash.items():
             assert chip.flash(address, len(piece)) == piece

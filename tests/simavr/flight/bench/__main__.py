@@ -13,7 +13,7 @@ from flight.bench.fly import FlightError, fly
 from flight.bench.plan import STALL_S
 from flight.bench.report import flight_rows, image_rows
 from flight.bench.table import Table
-from flight.rig import build_flight_image
+from flight.images import build_image
 
 
 def main() -> int:
@@ -33,7 +33,7 @@ def main() -> int:
         parser.error(f"{asked.elf}: no such file; `pio run` makes .pio/build/mega2560/firmware.elf")
     table = Table()
     try:
-        elf = asked.elf or build_flight_image()
+        elf = asked.elf or build_image("mega2560")
         depth, room_bytes = image_rows(table, elf)
         with tempfile.TemporaryDirectory() as folder:
             for rate_hz in asked.rate or sorted(STALL_S):

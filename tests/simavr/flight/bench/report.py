@@ -13,7 +13,8 @@ from flight.bench import pulses, signals
 from flight.bench.fly import FIELDS, LAST_S, Flight
 from flight.bench.plan import CYCLES_PER_S, RAMP_SLOTS, SCHEMA_RETURN_S, STALL_S
 from flight.bench.table import Table
-from flight.rig import ROOT, SERVOS, check_card, take_log
+from flight.images import ROOT
+from flight.rig import SERVOS, check_card, take_log
 from numpy.typing import NDArray
 from owners import Sources, flash_by_owner, ram_by_owner, room_of
 

@@ -20,7 +20,7 @@ from flight.faults.boot import run_boots
 from flight.faults.model import Fault, Outcome
 from flight.faults.rows import FAULTS
 from flight.faults.run import ready_rig, run_fault
-from flight.rig import build_flight_image
+from flight.images import build_image
 from simavr_bench import in_fork
 
 
@@ -43,7 +43,7 @@ def main() -> int:
     bad = 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        elf = Path(shutil.copy(build_flight_image(), folder / "firmware.elf"))
+        elf = Path(shutil.copy(build_image("mega2560"), folder / "firmware.elf"))
         rig, journal = ready_rig(elf, folder)
         print("gap: longest of any servo, ms; lost: identification frames; back: s from its end")
         head = (

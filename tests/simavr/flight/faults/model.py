@@ -6,10 +6,10 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from flight.images import ROOT
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from host import FlightLog
 
-ROOT = Path(__file__).resolve().parents[4]
 FAULT_S, AFTER_S = 3.0, 3.0
 CLOCK_LATE_US = 10_000  # the Mega's clock starts some ms behind the first instruction
 ALL_SERVOS = ("aileron", "elevator", "rudder", "throttle")
