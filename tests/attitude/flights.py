@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from host.twin.airdata import AirData, air_data
-from host.twin.airframe import DOWN, NORTH, Q0, Q3
-from host.twin.attitude import euler
-from host.twin.cards import load
-from host.twin.filters import delayed
-from host.twin.flight import STEP_S, FlightRecord, fly
-from host.twin.imu import FIELD_NED_T, imu
+from host.twin.aircraft.airframe import DOWN, NORTH, Q0, Q3
+from host.twin.flight.fly import STEP_S, FlightRecord, fly
+from host.twin.motion.attitude import euler
+from host.twin.sensors.airdata import AirData, air_data
+from host.twin.sensors.filters import delayed
+from host.twin.sensors.imu import FIELD_NED_T, imu
+from host.twin.testcard.cards import load
 from numpy.typing import NDArray
 
 from tests.attitude import dcm, library

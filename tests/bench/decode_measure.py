@@ -132,8 +132,8 @@ def parquet_pymavlink(path: Path) -> Made:
 
 
 def _decode(path: Path, kind: str) -> Made:
-    from host.columns import COLUMNS
     from host.decoding import decode
+    from host.physical.columns import COLUMNS
     from host.writing import Request
 
     with tempfile.TemporaryDirectory() as folder:

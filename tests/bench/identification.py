@@ -22,9 +22,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "host/src"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
-from host.sysid.output_error import covariance_of, minimise
-from host.sysid.problem import OutputProblem
-from host.sysid.start import start_values
+from host.sysid.estimators.start import start_values
+from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.problem import OutputProblem
 from host.sysid.study.aircraft import navion_free
 from host.sysid.study.data import noisy
 

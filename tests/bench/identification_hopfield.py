@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 from host.compiled import Array
-from host.sysid.equation_error import solve_normal
-from host.sysid.hopfield import iterate_until, largest_stable_gain, network
-from host.sysid.maneuver import Maneuver
+from host.sysid.estimators.equation_error import solve_normal
+from host.sysid.estimators.hopfield import iterate_until, largest_stable_gain, network
+from host.sysid.models.maneuver import Maneuver
 from host.sysid.study.aircraft import FOOT_M, navion_free
 from host.sysid.study.data import with_rates
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import aeroid
 import numpy as np
 from host.compiled import Array
-from host.sysid.problem import OutputProblem
-from host.sysid.start import start_values
+from host.sysid.estimators.start import start_values
+from host.sysid.numerics.problem import OutputProblem
 from numpy.typing import NDArray
 from scipy import optimize, signal
 

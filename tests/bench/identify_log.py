@@ -88,8 +88,9 @@ def measure(maneuvers: int, rest_s: float) -> Run:
 
 def imports_s() -> float:
     """Return the processor seconds that Python and the imports of the verb take alone."""
-    code = "import host.sysid.flight, host.sysid.verdict, host.sysid.tables, host.log"
-    code += ", host.sysid.reconstruction, host.sysid.aircraft_file"
+    code = "import host.sysid.flight.linear, host.sysid.answer.verdict, host.log"
+    code += ", host.sysid.flight.tables, host.sysid.compatibility.reconstruction"
+    code += ", host.sysid.aircraft.aircraft_file"
     before = os.times()
     subprocess.run([sys.executable, "-c", code], check=True)
     after = os.times()

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from host.calibration import load_calibration
-
-from host import airdata
+from host.physical import airdata
+from host.physical.calibration import load_calibration
 
 
 @pytest.mark.parametrize(

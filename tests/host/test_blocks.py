@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host.blocks import scan
-from host.extents import data_extents
-from host.frames import find_schemas, frame_pieces
-from host.schema import packed_schema
+from host.wire.blocks import scan
+from host.wire.extents import data_extents
+from host.wire.frames import find_schemas, frame_pieces
+from host.wire.schema import packed_schema
 
 from tests.host.logs import ROOT
 from tests.protocol.flights import simple_log
@@ -47,7 +47,7 @@ def test_case(tmp_path: Path, case: dict[str, Any]) -> None:
 def test_shifted_blocks_are_found_across_windows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shift: int
 ) -> None:
-    monkeypatch.setattr("host.blocks.WINDOW_BYTES", 8 * BLOCK)
+    monkeypatch.setattr("host.wire.blocks.WINDOW_BYTES", 8 * BLOCK)
     path = tmp_path / "shifted.bin"
     path.write_bytes(LOG[: 9 * BLOCK] + b"\x11" * shift + LOG[9 * BLOCK :])
     found = scan(path)

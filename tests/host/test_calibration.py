@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.calibration import load_calibration
-from host.columns import ANALOGUE, INERTIAL
 from host.errors import CalibrationError
+from host.physical.calibration import load_calibration
+from host.physical.columns import ANALOGUE, INERTIAL
 from host.summary import calibration_note
 
 from tests.host.logs import flight, read, written

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
-from host.columns import COLUMNS, UNITS
+from host.physical.columns import COLUMNS, UNITS
 from pyarrow import parquet
 from scipy.io import loadmat
 

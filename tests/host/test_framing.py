@@ -4,7 +4,7 @@ import tomllib
 from typing import Any
 
 import pytest
-from host.framing import EnvelopeReader, crc16, envelope
+from host.wire.framing import EnvelopeReader, crc16, envelope
 from hypothesis import given
 from hypothesis import strategies as st
 

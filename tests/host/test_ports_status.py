@@ -16,8 +16,8 @@ from types import SimpleNamespace
 
 import pytest
 from host.cli import main
-from host.serial_link import LineSplitter, SerialPort, choose_port, receive
-from host.status_line import KEYS, parse_status
+from host.link.serial import LineSplitter, SerialPort, choose_port, receive
+from host.link.status_line import KEYS, parse_status
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.columns import ANALOGUE, COLUMNS
+from host.physical.columns import ANALOGUE, COLUMNS
 from numpy.typing import NDArray
 
 from tests.host.logs import even, flight, read, written
@@ -173,8 +173,8 @@ def test_packets_of_the_original_imu_are_turned_once(tmp_path: Path) -> None:
 def test_streaming_gives_the_same_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     data = written(*flight(300.0))
     whole = read(tmp_path, data).columns()
-    monkeypatch.setattr("host.store.KEEP_BLOCKS", 0)
-    monkeypatch.setattr("host.frames.BLOCKS_AT_ONCE", 97)
+    monkeypatch.setattr("host.wire.store.KEEP_BLOCKS", 0)
+    monkeypatch.setattr("host.wire.frames.BLOCKS_AT_ONCE", 97)
     log = read(tmp_path, data)
     assert not log.store.kept
     pieces = log.columns()

@@ -62,7 +62,7 @@ def test_gps_corrects_the_clock(tmp_path: Path, ppm: float) -> None:
 
 
 def test_half_width_covers_the_truth(tmp_path: Path) -> None:
-    from host.timebase import fit_gps
+    from host.physical.timebase import fit_gps
 
     hits = 0
     for seed in range(200):

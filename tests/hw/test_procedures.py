@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.calibration import load_calibration
+from host.physical.calibration import load_calibration
 
 from tests.host.logs import flight, written
 from tests.protocol.flights import wrapped

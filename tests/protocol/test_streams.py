@@ -1,7 +1,7 @@
 """Telemetry streams of random content: host and independent decoder find the same frames."""
 
 import numpy as np
-from host.framing import EnvelopeReader
+from host.wire.framing import EnvelopeReader
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from host.log import FlightLog, read_log
-from host.twin.sitl_library import TICKS_PER_S, Recorder, Sitl
+from host.twin.recorder.sitl_library import TICKS_PER_S, Recorder, Sitl
 from numpy.typing import NDArray
 
 from tests.sitl import script as scripted

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from host.twin import bmp085
-from host.twin.sitl_library import byte_ticks
+from host.twin.recorder.sitl_library import byte_ticks
+from host.twin.sensors import bmp085
 from numpy.typing import NDArray
 
 from tests.sitl import script as scripted

@@ -18,7 +18,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from host.log import FlightLog, read_log
-from host.twin.sitl_library import TICKS_PER_S, Recorder, Sitl
+from host.twin.recorder.sitl_library import TICKS_PER_S, Recorder, Sitl
 
 from tests.sitl.card_image import (
     BLOCK,

@@ -11,7 +11,7 @@ import struct
 from dataclasses import dataclass, field
 
 import numpy as np
-from host.twin.sitl_library import TICKS_PER_S, Sitl
+from host.twin.recorder.sitl_library import TICKS_PER_S, Sitl
 from numpy.typing import NDArray
 
 Integers = NDArray[np.int64]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.twin.sitl_library import TICKS_PER_S, CardFault, Level, Recorder, Sitl, Volume
+from host.twin.recorder.sitl_library import TICKS_PER_S, CardFault, Level, Recorder, Sitl, Volume
 
 from tests.protocol import oracle
 from tests.sitl.bench import Bench, events, flight, idle_receiver, missing, spread

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.twin.sitl_library import TICKS_PER_S, Port
+from host.twin.recorder.sitl_library import TICKS_PER_S, Port
 
 from tests.sitl.bench import Bench, flight, missing
 from tests.sitl.compare import NAMES, compare

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.twin.sitl_library import TICKS_PER_S, Sitl
+from host.twin.recorder.sitl_library import TICKS_PER_S, Sitl
 from numpy.typing import NDArray
 
 from tests.sitl import demo

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from host.twin.sitl_library import TICKS_PER_S, Level, Port
+from host.original import rows as original_rows
+from host.twin.recorder.sitl_library import TICKS_PER_S, Level, Port
 
-from host import original_rows
 from tests.protocol import oracle
 from tests.sitl.bench import Bench, config_places, flight, idle_receiver
 from tests.sitl.script import Receiver

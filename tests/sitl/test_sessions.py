@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from host.twin.sitl_library import EEPROM_BYTES, TICKS_PER_S, Recorder
+from host.twin.recorder.sitl_library import EEPROM_BYTES, TICKS_PER_S, Recorder
 
 from tests.protocol import oracle
 from tests.sitl.bench import Bench, events, flight, idle_receiver, missing

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.twin.sitl_library import TICKS_PER_S
+from host.twin.recorder.sitl_library import TICKS_PER_S
 
 from tests.sitl import script as scripted
 from tests.sitl.bench import Bench, flight, idle_receiver

@@ -5,8 +5,8 @@ import struct
 
 import numpy as np
 import pytest
-from host.status_line import StatusLine, parse_status
-from host.twin.sitl_library import TICKS_PER_S, Level, Port
+from host.link.status_line import StatusLine, parse_status
+from host.twin.recorder.sitl_library import TICKS_PER_S, Level, Port
 
 from tests.sitl import script as scripted
 from tests.sitl.bench import Bench, flight

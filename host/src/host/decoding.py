@@ -9,16 +9,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from host.calibration import load_calibration
-from host.columns import COLUMNS, UNITS
 from host.errors import ExitCode, UsageError
 from host.export.writer import Meta
 from host.log import FlightLog, read_log
-from host.original_rows import looks_like_rows, read_rows
-from host.original_table import make_table
+from host.original.rows import looks_like_rows, read_rows
+from host.original.summary import row_lines, row_meta, summarise_rows
+from host.original.table import make_table
+from host.physical.calibration import load_calibration
+from host.physical.columns import COLUMNS, UNITS
 from host.progress import progress_bar
 from host.report import lines
-from host.row_summary import row_lines, row_meta, summarise_rows
 from host.source import check_source, find_flights, newest
 from host.summary import summarise
 from host.writing import Request, destination, write_frames, write_table

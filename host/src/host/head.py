@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from host.log import read_log
-from host.original_rows import looks_like_rows, parse_rows
+from host.original.rows import looks_like_rows, parse_rows
 from host.source import find_flights
 
 HEAD_BYTES = 256 << 10

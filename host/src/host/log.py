@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from host.blocks import Progress, Scan, scan
-from host.calibration import Calibration, load_calibration
-from host.columns import CHANNELS, COLUMNS
 from host.errors import LogError
-from host.frames import find_schemas
 from host.ledger import Ledger
 from host.losses import make_ledger
-from host.schema import Schema
-from host.selection import Selection, select
-from host.session import Session, surface_sources
-from host.store import FAST, Frames, FrameStore
-from host.table import Columns, SessionTable
-from host.timebase import ClockFit, block_times_us, fit_gps, gps_times_ms, session_slices
+from host.physical.calibration import Calibration, load_calibration
+from host.physical.columns import CHANNELS, COLUMNS
+from host.physical.session import Session, surface_sources
+from host.physical.table import Columns, SessionTable
+from host.physical.timebase import ClockFit, block_times_us, fit_gps, gps_times_ms, session_slices
+from host.wire.blocks import Progress, Scan, scan
+from host.wire.frames import find_schemas
+from host.wire.schema import Schema
+from host.wire.selection import Selection, select
+from host.wire.store import FAST, Frames, FrameStore
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -136,13 +136,13 @@ class FlightLog:
             True brings every channel to the instant ``t_s`` of its row: linearly between the two
             samples around it, with the delays of the schema removed. A value is NaN where one of
             the two is invalid or a sample between them is missing. False leaves each value as it
-            was sampled, ``host.channels.constant_delay_us`` plus its age before ``t_s``.
+            was sampled, ``host.physical.channels.constant_delay_us`` plus its age before ``t_s``.
 
         Returns
         -------
         pandas.DataFrame
-            One row per identification frame, columns of `host.columns.COLUMNS`; units, sources of
-            the inputs and calibration in ``attrs``.
+            One row per identification frame, columns of `host.physical.columns.COLUMNS`; units,
+            sources of the inputs and calibration in ``attrs``.
         """
         import pandas as pd
 

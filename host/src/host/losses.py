@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from host.blocks import MAGIC, Blocks, Scan, read_at
-from host.extents import BLOCK_BYTES
 from host.ledger import Ledger, Loss
-from host.selection import Selection
-from host.session import Session
-from host.store import FrameStore
+from host.physical.session import Session
+from host.wire.blocks import MAGIC, Blocks, Scan, read_at
+from host.wire.extents import BLOCK_BYTES
+from host.wire.selection import Selection
+from host.wire.store import FrameStore
 
 _OUTSIDE_DAMAGE = frozenset({"ring_full", "unexplained", "truncated"})
 # A file that goes on for no more than this behind its last block, without a session end, is taken

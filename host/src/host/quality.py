@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from host.calibration import Line
-from host.channels import END_OF_RANGE as IMU_END
-from host.columns import ANALOGUE, INERTIAL
-from host.schema import Frame
-from host.session import Session
+from host.physical.calibration import Line
+from host.physical.channels import END_OF_RANGE as IMU_END
+from host.physical.columns import ANALOGUE, INERTIAL
+from host.physical.session import Session
+from host.wire.schema import Frame
 
 Array = NDArray[np.float64]
 

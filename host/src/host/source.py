@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from host.blocks import scan
 from host.errors import NotALogError, UsageError
+from host.wire.blocks import scan
 
 # Of each file in a folder this much is read: more than a few destroyed blocks cover.
 _HEAD_BYTES = 64 << 10

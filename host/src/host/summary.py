@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from host.channels import constant_delay_us
-from host.columns import ANALOGUE, COLUMNS, INERTIAL, RESTS_ON
 from host.log import FlightLog
+from host.physical.channels import constant_delay_us
+from host.physical.columns import ANALOGUE, COLUMNS, INERTIAL, RESTS_ON
+from host.physical.session import Session
 from host.quality import Quality, judge
-from host.session import Session
 
 Json = dict[str, Any]
 

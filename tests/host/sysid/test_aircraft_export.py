@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 from host.cli import main
-from host.sysid.aircraft_export import AXES, CONTROLS
-from host.sysid.aircraft_file import airframe_data
-from host.sysid.flight import identify
-from host.sysid.tables import read_columns
-from host.sysid.truth import read_truth, true_coefficients
+from host.sysid.aircraft.aircraft_file import airframe_data
+from host.sysid.answer.aircraft_export import AXES, CONTROLS
+from host.sysid.answer.truth import read_truth, true_coefficients
+from host.sysid.flight.linear import identify
+from host.sysid.flight.tables import read_columns
 
 JSBSIM = """
 import sys, jsbsim

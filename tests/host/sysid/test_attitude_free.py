@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 from host.compiled import Array
-from host.sysid.aircraft_file import airframe_data, instrument_data, powerplant
-from host.sysid.coefficient_answer import CoefficientFit
-from host.sysid.coefficient_fit import fit_coefficients
-from host.sysid.coefficient_rows import KINEMATIC, Equation, Flown, equations
-from host.sysid.coefficient_signals import Record
-from host.sysid.coefficient_windows import Window
-from host.sysid.tables import even_columns
-from host.twin.cards import load
+from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
+from host.sysid.coefficients.answer import CoefficientFit
+from host.sysid.coefficients.fit import fit_coefficients
+from host.sysid.coefficients.rows import KINEMATIC, Equation, Flown, equations
+from host.sysid.coefficients.windows import Window
+from host.sysid.compatibility.signals import Record
+from host.sysid.flight.tables import even_columns
+from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 
 NAME = "ultrastick25e"

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 from host.cli import main
-from host.sysid.aircraft_file import airframe_data
-from host.sysid.airframe import AirframeData
-from host.sysid.coefficient_flight import CoefficientAnswer, identify_coefficients, joined
-from host.sysid.coefficient_modes import coefficient_modes
-from host.sysid.finder import Found
-from host.sysid.pictures import interval_bars
-from host.sysid.tables import read_columns
-from host.sysid.truth import read_truth, true_coefficients
+from host.sysid.aircraft.aircraft_file import airframe_data
+from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.answer.pictures import interval_bars
+from host.sysid.answer.truth import read_truth, true_coefficients
+from host.sysid.coefficients.flight import CoefficientAnswer, identify_coefficients, joined
+from host.sysid.coefficients.modes import coefficient_modes
+from host.sysid.flight.finder import Found
+from host.sysid.flight.tables import read_columns
 from scipy import io
 
 NAME = "ultrastick25e"

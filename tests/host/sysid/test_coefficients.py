@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.compiled import Array
-from host.sysid.aircraft_file import airframe_data, instrument_data, powerplant
-from host.sysid.airframe import AirframeData
-from host.sysid.coefficient_answer import CoefficientFit
-from host.sysid.coefficient_fit import fit_coefficients
-from host.sysid.coefficient_signals import Record, corrected, usable_length
-from host.sysid.coefficient_windows import Window
+from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
+from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.aircraft.instrument_errors import InstrumentData, deviations
+from host.sysid.coefficients.answer import CoefficientFit
+from host.sysid.coefficients.fit import fit_coefficients
+from host.sysid.coefficients.windows import Window
+from host.sysid.compatibility.signals import Record, corrected, usable_length
 from host.sysid.errors import IdentificationError
-from host.sysid.instrument_errors import InstrumentData, deviations
+from host.sysid.flight.tables import even_columns
 from host.sysid.study.flights import PRINCIPAL, Tally
-from host.sysid.tables import even_columns
-from host.twin.cards import load
+from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 NAME = "ultrastick25e"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.sysid import Maneuver, fit
-from host.sysid.diagnostics import (
+from host.sysid.models.diagnostics import (
     collinearity,
     constant_inputs,
     exceedance,
@@ -16,7 +16,7 @@ from host.sysid.diagnostics import (
     thesis_sum_of_mean_errors,
     whiteness,
 )
-from host.sysid.modes import modes, modes_of
+from host.sysid.models.modes import modes, modes_of
 from host.sysid.study.aircraft import navion, navion_free, navion_structured
 from host.sysid.study.data import TRUTH, noisy
 from scipy import signal, stats

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from host.sysid.kernels import ar_filter, delayed
-from host.sysid.maneuver import Maneuver
-from host.sysid.model import DelayGroup, LinearModel, Parameter, Term
-from host.sysid.noise import OutputNoise, autocovariance
-from host.sysid.problem import OutputProblem
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import DelayGroup, LinearModel, Parameter, Term
+from host.sysid.numerics.kernels import ar_filter, delayed
+from host.sysid.numerics.noise import OutputNoise, autocovariance
+from host.sysid.numerics.problem import OutputProblem
 from scipy import signal
 
 STATES = ("alpha_rad", "q_radps")

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term, fit
-from host.sysid.colour import coloured_middle
-from host.sysid.differentiation import (
+from host.sysid.errors import IdentificationError
+from host.sysid.numerics.colour import coloured_middle
+from host.sysid.numerics.differentiation import (
     bandwidth_hz,
     local_polynomial,
     smooth_and_differentiate,
     window_for,
 )
-from host.sysid.errors import IdentificationError
 from host.sysid.study.aircraft import navion, navion_free, navion_structured
 from host.sysid.study.data import TRUTH, clean, noisy, with_rates
 from scipy import linalg, optimize, signal

@@ -10,15 +10,15 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.sysid import Maneuver, fit
-from host.sysid.aircraft_file import airframe_data
-from host.sysid.airframe import AirframeData, Condition, coefficients, corrected
+from host.sysid.aircraft.aircraft_file import airframe_data
+from host.sysid.aircraft.airframe import AirframeData, Condition, coefficients, corrected
 from host.sysid.errors import IdentificationError
-from host.sysid.finder import find, grade
-from host.sysid.flight import identify
-from host.sysid.model_file import read_model
-from host.sysid.problem import OutputProblem
-from host.sysid.tables import read_columns
-from host.sysid.templates import Trim, longitudinal
+from host.sysid.flight.finder import find, grade
+from host.sysid.flight.linear import identify
+from host.sysid.flight.tables import read_columns
+from host.sysid.models.model_file import read_model
+from host.sysid.models.templates import Trim, longitudinal
+from host.sysid.numerics.problem import OutputProblem
 
 
 @pytest.fixture(scope="module")

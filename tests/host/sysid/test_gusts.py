@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
-from host.sysid.airframe import Condition
-from host.sysid.filter_error import FilterProblem, discrete_noise, information_at
-from host.sysid.gust import ROLLING
-from host.sysid.in_coefficients import dimensional_gains
+from host.sysid.aircraft.airframe import Condition
+from host.sysid.aircraft.in_coefficients import dimensional_gains
+from host.sysid.estimators.filter_error import FilterProblem, discrete_noise, information_at
+from host.sysid.estimators.gust import ROLLING
 from host.sysid.study.gusts import AXES, DT_S, fly, gusty_aircraft, spectrum
 from host.sysid.study.turbulence import PROCESS, fitted_model, run_case, true_vector
-from host.twin import aircraft, trim
-from host.twin.linear import linearise
+from host.twin.aircraft import file as aircraft
+from host.twin.motion import trim
+from host.twin.motion.linear import linearise
 from scipy import linalg
 
 

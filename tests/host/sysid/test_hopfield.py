@@ -3,10 +3,17 @@
 import numpy as np
 import pytest
 from host.sysid import fit
-from host.sysid.diagnostics import thesis_program_error_percent
 from host.sysid.errors import IdentificationError
-from host.sysid.hopfield import LAMBDA, RHO, STEP_S, largest_stable_gain, line_search, network
-from host.sysid.problem import OutputProblem
+from host.sysid.estimators.hopfield import (
+    LAMBDA,
+    RHO,
+    STEP_S,
+    largest_stable_gain,
+    line_search,
+    network,
+)
+from host.sysid.models.diagnostics import thesis_program_error_percent
+from host.sysid.numerics.problem import OutputProblem
 from host.sysid.study.aircraft import navion_free
 from host.sysid.study.data import with_rates
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.sysid import fit
-from host.sysid.noise import choose_order, lagged_moments, regress, stabilised
+from host.sysid.numerics.noise import choose_order, lagged_moments, regress, stabilised
 from host.sysid.study.aircraft import navion_structured
 from host.sysid.study.coverage import NOISES, coloured_noise, run_case
 from host.sysid.study.data import noisy

@@ -9,12 +9,12 @@ SCRIPT = """
 import importlib, json, pkgutil
 import host.sysid
 from host.sysid.__main__ import build_kernels
-from host.sysid.fit import fit
+from host.sysid.estimators.fit import fit
 from host.sysid.study.aircraft import navion_structured
 from host.sysid.study.data import TRUTH, with_rates
 
 kernels = {}
-for module in pkgutil.iter_modules(host.sysid.__path__, "host.sysid."):
+for module in pkgutil.walk_packages(host.sysid.__path__, "host.sysid."):
     if module.name.endswith("__main__"):
         continue
     for name, thing in vars(importlib.import_module(module.name)).items():

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from host.sysid import FitResult, Maneuver, fit, methods
 from host.sysid.errors import IdentificationError
-from host.sysid.filter_error import FilterProblem
-from host.sysid.frequency import transform
-from host.sysid.kalman import inflation
-from host.sysid.output_error import minimise
-from host.sysid.problem import OutputProblem
-from host.sysid.riccati import predicted_covariance
+from host.sysid.estimators.filter_error import FilterProblem
+from host.sysid.estimators.frequency import transform
+from host.sysid.estimators.kalman import inflation
+from host.sysid.numerics.output_error import minimise
+from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.riccati import predicted_covariance
 from host.sysid.study.aircraft import navion, navion_free, navion_structured
 from host.sysid.study.data import TRUTH, clean, gusty, noisy
 from scipy import linalg, signal

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term
 from host.sysid.errors import IdentificationError
-from host.sysid.model import without_outputs
-from host.sysid.model_file import model_from, model_text, parse_entry, read_model
-from host.sysid.templates import GRAVITY_MPS2, TEMPLATES, Trim, longitudinal, template
+from host.sysid.models.model import without_outputs
+from host.sysid.models.model_file import model_from, model_text, parse_entry, read_model
+from host.sysid.models.templates import GRAVITY_MPS2, TEMPLATES, Trim, longitudinal, template
 
 TRIM = Trim(airspeed_mps=17.0, alpha_rad=0.1, theta_rad=0.16)
 

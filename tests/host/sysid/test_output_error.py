@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from host.sysid import Maneuver, Parameter, fit
 from host.sysid.errors import IdentificationError
-from host.sysid.output_error import covariance_of, minimise
-from host.sysid.problem import OutputProblem
-from host.sysid.start import start_values
+from host.sysid.estimators.start import start_values
+from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.problem import OutputProblem
 from host.sysid.study.aircraft import navion_free, navion_structured
 from host.sysid.study.data import TRUTH, clean, noisy
 from scipy import optimize

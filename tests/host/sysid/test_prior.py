@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.sysid.airframe import Coefficient
+from host.sysid.aircraft.airframe import Coefficient
+from host.sysid.aircraft.prior import prior_lines, read_prior
 from host.sysid.errors import IdentificationError
-from host.sysid.prior import prior_lines, read_prior
 
 AVL = """
  Stability-axis derivatives...

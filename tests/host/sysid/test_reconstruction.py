@@ -4,9 +4,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from host.sysid.aircraft_file import airframe_data, instrument_data
-from host.sysid.errors import IdentificationError
-from host.sysid.flight_path import (
+from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data
+from host.sysid.compatibility.flight_path import (
     AIR,
     GPS,
     GRAVITY_MPS2,
@@ -16,12 +15,13 @@ from host.sysid.flight_path import (
     rotation,
     strapdown,
 )
-from host.sysid.path_data import prepare
-from host.sysid.path_fit import fit_path
-from host.sysid.reconstruction import document, reconstruct, words
-from host.sysid.tables import even_columns
-from host.twin.delays import FILTERS, sensor_delays
-from host.twin.flight import FlightRecord
+from host.sysid.compatibility.path_data import prepare
+from host.sysid.compatibility.path_fit import fit_path
+from host.sysid.compatibility.reconstruction import document, reconstruct, words
+from host.sysid.errors import IdentificationError
+from host.sysid.flight.tables import even_columns
+from host.twin.flight.fly import FlightRecord
+from host.twin.sensors.delays import FILTERS, sensor_delays
 from host.twin.virtual import virtual_flight
 
 NAME = "ultrastick25e"

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from host.sysid import FitResult, Maneuver, fit
-from host.sysid.problem import OutputProblem
-from host.sysid.repeats import repeats, widened
+from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.repeats import repeats, widened
 from host.sysid.study.aircraft import navion_structured
 from host.sysid.study.data import TRUTH, noisy
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from host.sysid import search as searching
 from host.sysid.errors import IdentificationError
-from host.sysid.maneuver import Maneuver
-from host.sysid.model import LinearModel, free_model
-from host.sysid.output_error import Optimum, minimise
-from host.sysid.problem import OutputProblem
-from host.sysid.search import search, white_cost
-from host.sysid.start import start_values
+from host.sysid.estimators import search as searching
+from host.sysid.estimators.search import search, white_cost
+from host.sysid.estimators.start import start_values
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel, free_model
+from host.sysid.numerics.output_error import Optimum, minimise
+from host.sysid.numerics.problem import OutputProblem
 from host.sysid.study.aircraft import navion_free
 from host.sysid.study.data import noisy
 from host.sysid.study.inputs import SHAPES

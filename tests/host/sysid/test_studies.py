@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.sysid.finder import Found
-from host.sysid.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
-from host.sysid.model import free_model
+from host.sysid.estimators.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
+from host.sysid.flight.finder import Found
+from host.sysid.models.model import free_model
 from host.sysid.study.__main__ import main
 from host.sysid.study.accuracy import run_case as accuracy
 from host.sysid.study.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B

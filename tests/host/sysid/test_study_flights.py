@@ -4,14 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host.sysid.coefficient_flight import identify_coefficients
-from host.sysid.hopfield import free_run
-from host.sysid.maneuver import Maneuver
-from host.sysid.model import free_model
+from host.sysid.coefficients.flight import identify_coefficients
+from host.sysid.estimators.hopfield import free_run
+from host.sysid.flight.tables import even_columns
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import free_model
 from host.sysid.study.coefficients import CoefficientTally, true_delays, truths
 from host.sysid.study.flights import PRINCIPAL
 from host.sysid.study.thesis_flights import CASES, lines, nrmse, re_enact
-from host.sysid.tables import even_columns
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 

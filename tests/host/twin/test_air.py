@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from host.twin.air import (
+from host.twin.motion.air import (
     Turbulence,
     atmosphere,
     density_kgpm3,
@@ -14,7 +14,7 @@ from host.twin.air import (
     static_pressure_pa,
     turbulence,
 )
-from host.twin.cards import Air, Flight
+from host.twin.testcard.cards import Air, Flight
 from scipy import signal
 
 

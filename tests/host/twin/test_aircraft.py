@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from host.twin import aircraft
+from host.twin.aircraft import file as aircraft
 
 
 @pytest.mark.parametrize("name", ["ultrastick25e", "kadetlt40", "lowsupertrainer"])

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.log import FlightLog, read_log
-from host.twin import avr, cards, sitl
-from host.twin.airdata import air_data
-from host.twin.flight import fly
-from host.twin.stimuli import SAMPLE_STEP_TICKS, Stimuli, stimuli
+from host.twin.flight.fly import fly
+from host.twin.recorder import avr, sitl
+from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli, stimuli
+from host.twin.sensors.airdata import air_data
+from host.twin.testcard import cards
 from numpy.typing import NDArray
 
 CARD = {

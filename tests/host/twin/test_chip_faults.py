@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 from host.errors import UsageError
 from host.log import read_log
-from host.twin import avr, cards, compare, sitl
-from host.twin.airdata import air_data
-from host.twin.flight import fly
-from host.twin.stimuli import stimuli
+from host.twin.flight.fly import fly
+from host.twin.outcome import compare
+from host.twin.recorder import avr, sitl
+from host.twin.recorder.stimuli import stimuli
+from host.twin.sensors.airdata import air_data
+from host.twin.testcard import cards
 
 CARD = {
     "format": 1,

@@ -15,20 +15,22 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from host.channels import constant_delay_us
 from host.log import FlightLog, read_log
-from host.twin import cards, compare, instrument, sitl
-from host.twin.airdata import AirData, air_data
-from host.twin.airframe import GRAVITY_MPS2
-from host.twin.delays import FILTERS, GPS_LATENCY_S
-from host.twin.draws import delay_s
-from host.twin.filters import first_order, vane
-from host.twin.flight import STEP_S, FlightRecord, fly
-from host.twin.imu import complementary
-from host.twin.mega_clock import clock_share
-from host.twin.stimuli import stimuli
-from host.twin.truth import summary
-from host.twin.ubx import FIRST_ITOW_MS
+from host.physical.channels import constant_delay_us
+from host.twin.aircraft.airframe import GRAVITY_MPS2
+from host.twin.flight.draws import delay_s
+from host.twin.flight.fly import STEP_S, FlightRecord, fly
+from host.twin.outcome import compare, instrument
+from host.twin.outcome.truth import summary
+from host.twin.recorder import sitl
+from host.twin.recorder.stimuli import stimuli
+from host.twin.sensors.airdata import AirData, air_data
+from host.twin.sensors.delays import FILTERS, GPS_LATENCY_S
+from host.twin.sensors.filters import first_order, vane
+from host.twin.sensors.imu import complementary
+from host.twin.sensors.mega_clock import clock_share
+from host.twin.sensors.ubx import FIRST_ITOW_MS
+from host.twin.testcard import cards
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]

@@ -8,14 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.twin import cards, handbook, thesis
-from host.twin.airdata import air_data
-from host.twin.attitude import euler
-from host.twin.flight import NEUTRAL_US, THROW_US, fly
-from host.twin.local import local_derivatives
-from host.twin.maneuvers import multisine, multisine_signal, sweep_signal
-from host.twin.pilot import duration_s, schedule
-from host.twin.truth import maneuvers, series, write
+from host.twin.aircraft import handbook
+from host.twin.flight.fly import NEUTRAL_US, THROW_US, fly
+from host.twin.flight.pilot import duration_s, schedule
+from host.twin.motion.attitude import euler
+from host.twin.motion.local import local_derivatives
+from host.twin.outcome import thesis
+from host.twin.outcome.truth import maneuvers, series, write
+from host.twin.sensors.airdata import air_data
+from host.twin.testcard import cards
+from host.twin.testcard.maneuvers import multisine, multisine_signal, sweep_signal
 
 MINIMAL = {"format": 1, "aircraft": "ultrastick25e", "segment": [{"kind": "trim", "duration_s": 2}]}
 

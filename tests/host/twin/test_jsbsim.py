@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.twin import aircraft
-from host.twin.airframe import ELEVATOR, ROTOR, Array
-from host.twin.attitude import euler
-from host.twin.jsbsim_model import aircraft_xml, planet_xml
-from host.twin.motion import run
-from host.twin.trim import solve
+from host.twin.aircraft import file as aircraft
+from host.twin.aircraft.airframe import ELEVATOR, ROTOR, Array
+from host.twin.aircraft.jsbsim_model import aircraft_xml, planet_xml
+from host.twin.motion.attitude import euler
+from host.twin.motion.rigid_body import run
+from host.twin.motion.trim import solve
 
 STEP_S = 1e-3
 SIGNALS = ("u", "v", "w", "p", "q", "r", "phi", "theta")

@@ -11,20 +11,21 @@ import numpy as np
 import pytest
 from host.cli import main
 from host.sysid.errors import IdentificationError
-from host.sysid.model import LinearModel
-from host.sysid.model_file import model_text
-from host.sysid.templates import Trim, template
-from host.twin import aircraft, cards
-from host.twin.aircraft import Aircraft, AircraftError
-from host.twin.airdata import air_data
-from host.twin.airframe import Array
-from host.twin.faults import Fault
-from host.twin.flight import fly
-from host.twin.linear import linearise, modes, straight_derivatives
-from host.twin.linear_aircraft import is_model, load, with_models
-from host.twin.motion import run
-from host.twin.trim import solve
-from host.twin.truth import maneuvers
+from host.sysid.models.model import LinearModel
+from host.sysid.models.model_file import model_text
+from host.sysid.models.templates import Trim, template
+from host.twin.aircraft import file as aircraft
+from host.twin.aircraft.airframe import Array
+from host.twin.aircraft.file import Aircraft, AircraftError
+from host.twin.flight.fly import fly
+from host.twin.motion.linear import linearise, modes, straight_derivatives
+from host.twin.motion.linear_aircraft import is_model, load, with_models
+from host.twin.motion.rigid_body import run
+from host.twin.motion.trim import solve
+from host.twin.outcome.truth import maneuvers
+from host.twin.sensors.airdata import air_data
+from host.twin.testcard import cards
+from host.twin.testcard.faults import Fault
 from scipy.signal import lsim
 
 NAME = "ultrastick25e_linear17"

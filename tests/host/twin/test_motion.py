@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host.twin import aircraft
-from host.twin.aircraft import Aircraft
-from host.twin.airframe import GRAVITY_MPS2, ROTOR, STATE_COUNT, Airframe, Array
-from host.twin.attitude import euler, quaternion, to_body
-from host.twin.dimensional import hand_matrices
-from host.twin.linear import linearise, modes
-from host.twin.local import local_derivatives
-from host.twin.motion import aerodynamics, run
-from host.twin.propulsion import propeller
-from host.twin.trim import TrimError, solve
+from host.twin.aircraft import file as aircraft
+from host.twin.aircraft.airframe import GRAVITY_MPS2, ROTOR, STATE_COUNT, Airframe, Array
+from host.twin.aircraft.dimensional import hand_matrices
+from host.twin.aircraft.file import Aircraft
+from host.twin.motion.attitude import euler, quaternion, to_body
+from host.twin.motion.linear import linearise, modes
+from host.twin.motion.local import local_derivatives
+from host.twin.motion.propulsion import propeller
+from host.twin.motion.rigid_body import aerodynamics, run
+from host.twin.motion.trim import TrimError, solve
 
 STILL = np.zeros(9)
 

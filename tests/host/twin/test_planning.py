@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.cli import main
-from host.twin import cards, planning
-from host.twin.aircraft import load
-from host.twin.cards import parse
-from host.twin.linear import linearise
-from host.twin.tomlout import dumps
-from host.twin.trim import solve
+from host.twin import planning
+from host.twin.aircraft.file import load
+from host.twin.aircraft.tomlout import dumps
+from host.twin.motion.linear import linearise
+from host.twin.motion.trim import solve
+from host.twin.testcard import cards
+from host.twin.testcard.cards import parse
 
 
 @pytest.fixture(scope="module")

@@ -6,21 +6,21 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from host.twin import bmp085
-from host.twin.airdata import AirData, air_data
-from host.twin.analog import analog, convert, nominal
-from host.twin.attitude import euler
-from host.twin.cards import Card, Sensors, load
-from host.twin.delays import FILTERS
-from host.twin.draws import GROUPS
-from host.twin.filters import delayed, first_order, vane
-from host.twin.flight import FlightRecord, fly
-from host.twin.ideal import measured_table, true_table
-from host.twin.imu import imu
-from host.twin.imu_stream import ADDRESS
-from host.twin.mega_clock import ticks
-from host.twin.stimuli import stimuli
-from host.twin.ubx import packet
+from host.twin.flight.draws import GROUPS
+from host.twin.flight.fly import FlightRecord, fly
+from host.twin.motion.attitude import euler
+from host.twin.outcome.ideal import measured_table, true_table
+from host.twin.recorder.stimuli import stimuli
+from host.twin.sensors import bmp085
+from host.twin.sensors.airdata import AirData, air_data
+from host.twin.sensors.analog import analog, convert, nominal
+from host.twin.sensors.delays import FILTERS
+from host.twin.sensors.filters import delayed, first_order, vane
+from host.twin.sensors.imu import imu
+from host.twin.sensors.imu_stream import ADDRESS
+from host.twin.sensors.mega_clock import ticks
+from host.twin.sensors.ubx import packet
+from host.twin.testcard.cards import Card, Sensors, load
 from scipy.stats import kstest
 
 IDEAL = Sensors(**{f.name: False for f in fields(Sensors)})
@@ -67,8 +67,8 @@ def test_deterministic_by_seed_and_different_by_seed(calm: Card, real: FlightRec
 
 
 def test_draws_stay_within_their_stated_ranges(calm: Card) -> None:
-    from host.twin.aircraft import load as load_aircraft
-    from host.twin.draws import draw
+    from host.twin.aircraft.file import load as load_aircraft
+    from host.twin.flight.draws import draw
 
     plane = load_aircraft("ultrastick25e")
     drawn = [draw(plane, np.random.default_rng(k), tolerances=True) for k in range(300)]

@@ -8,13 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.log import FlightLog, read_log
-from host.twin import analog, bmp085, cards, flight, imu, sitl, ubx
-from host.twin.airdata import air_data
-from host.twin.analog import CHANNELS
-from host.twin.delays import FILTERS
-from host.twin.flight import fly
-from host.twin.mega_clock import clock_share
-from host.twin.stimuli import stimuli
+from host.twin.flight import fly as flight
+from host.twin.flight.fly import fly
+from host.twin.recorder import sitl
+from host.twin.recorder.stimuli import stimuli
+from host.twin.sensors import analog, bmp085, imu, ubx
+from host.twin.sensors.airdata import air_data
+from host.twin.sensors.analog import CHANNELS
+from host.twin.sensors.delays import FILTERS
+from host.twin.sensors.mega_clock import clock_share
+from host.twin.testcard import cards
 
 CARD = {
     "format": 1,

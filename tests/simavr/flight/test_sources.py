@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from host.original_rows import parse_rows
+from host.original.rows import parse_rows
 
 import host
 

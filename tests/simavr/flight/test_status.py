@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from host.status_line import ANALOGUE, StatusLine, parse_status
+from host.link.status_line import ANALOGUE, StatusLine, parse_status
 
 if TYPE_CHECKING:
     from flight.rig import FlightRig

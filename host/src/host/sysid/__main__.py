@@ -10,15 +10,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from host.sysid.fit import fit
-from host.sysid.flight_path import strapdown
-from host.sysid.gust import fit_with_gust
-from host.sysid.hopfield import iterate, iterate_until
-from host.sysid.maneuver import Maneuver
-from host.sysid.model import DelayGroup, LinearModel
-from host.sysid.problem import OutputProblem
-from host.sysid.recursive import update
-from host.sysid.templates import Trim, longitudinal
+from host.sysid.compatibility.flight_path import strapdown
+from host.sysid.estimators.fit import fit
+from host.sysid.estimators.gust import fit_with_gust
+from host.sysid.estimators.hopfield import iterate, iterate_until
+from host.sysid.estimators.recursive import update
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import DelayGroup, LinearModel
+from host.sysid.models.templates import Trim, longitudinal
+from host.sysid.numerics.problem import OutputProblem
 
 SPEED_MPS = 17.0
 

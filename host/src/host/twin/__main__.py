@@ -6,10 +6,11 @@ from __future__ import annotations
 import sys
 import time
 
-from host.twin import cards, ideal
-from host.twin.airdata import air_data
-from host.twin.flight import fly
-from host.twin.report import load_kernels
+from host.twin.flight.fly import fly
+from host.twin.outcome import ideal
+from host.twin.outcome.report import load_kernels
+from host.twin.sensors.airdata import air_data
+from host.twin.testcard import cards
 
 
 def main() -> int:

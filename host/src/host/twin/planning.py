@@ -15,24 +15,24 @@ import numpy as np
 import pandas as pd
 
 from host.sysid.errors import IdentificationError
-from host.sysid.maneuver import Maneuver
-from host.sysid.model import LinearModel
-from host.sysid.output_error import covariance_of, minimise
-from host.sysid.problem import OutputProblem
-from host.sysid.start import start_values
-from host.sysid.templates import Trim as Condition
-from host.sysid.templates import lateral, longitudinal
-from host.twin.aircraft import Aircraft
-from host.twin.airdata import AirData, air_data
-from host.twin.airframe import Array
-from host.twin.attitude import euler
-from host.twin.cards import Card, Pilot, Segment, Sensors
-from host.twin.flight import FlightRecord, fly
-from host.twin.ideal import true_table
-from host.twin.linear import linearise, modes
-from host.twin.linear_aircraft import load
-from host.twin.pilot import Window
-from host.twin.trim import solve
+from host.sysid.estimators.start import start_values
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.templates import Trim as Condition
+from host.sysid.models.templates import lateral, longitudinal
+from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.problem import OutputProblem
+from host.twin.aircraft.airframe import Array
+from host.twin.aircraft.file import Aircraft
+from host.twin.flight.fly import FlightRecord, fly
+from host.twin.flight.pilot import Window
+from host.twin.motion.attitude import euler
+from host.twin.motion.linear import linearise, modes
+from host.twin.motion.linear_aircraft import load
+from host.twin.motion.trim import solve
+from host.twin.outcome.ideal import true_table
+from host.twin.sensors.airdata import AirData, air_data
+from host.twin.testcard.cards import Card, Pilot, Segment, Sensors
 
 # White noise of each output at 100 Hz: two vanes and two pitots averaged, four conversions each,
 # MPU-6000 behind its filter; attitude as good as a filter makes it over one maneuver.

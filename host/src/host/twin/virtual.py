@@ -10,12 +10,13 @@ import pandas as pd
 
 from host.errors import UsageError
 from host.log import read_log
-from host.twin import compare, ideal, sitl, thesis, truth
-from host.twin.airdata import air_data
-from host.twin.cards import Card, load
-from host.twin.flight import FlightRecord, fly
-from host.twin.instrument import calibration
-from host.twin.stimuli import stimuli
+from host.twin.flight.fly import FlightRecord, fly
+from host.twin.outcome import compare, ideal, thesis, truth
+from host.twin.outcome.instrument import calibration
+from host.twin.recorder import sitl
+from host.twin.recorder.stimuli import stimuli
+from host.twin.sensors.airdata import air_data
+from host.twin.testcard.cards import Card, load
 
 CHAINS = ("sitl", "none", "true", "thesis")
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from host.sysid.airframe import CoefficientTable
-    from host.sysid.coefficient_flight import CoefficientAnswer
-    from host.sysid.finder import Found
-    from host.sysid.flight import Answer
+    from host.sysid.aircraft.airframe import CoefficientTable
+    from host.sysid.coefficients.flight import CoefficientAnswer
+    from host.sysid.flight.finder import Found
+    from host.sysid.flight.linear import Answer
 
 
 def add_parser(subparsers: Any) -> None:
@@ -72,11 +72,11 @@ def run(args: argparse.Namespace) -> int:
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
+    from host.sysid.answer.verdict import coefficient_lines, coefficient_words, model_lines, words
     from host.sysid.errors import IdentificationError
-    from host.sysid.fit import methods as single_methods
-    from host.sysid.flight import DEFAULT_METHOD, STAGED, identify
-    from host.sysid.tables import read_columns
-    from host.sysid.verdict import coefficient_lines, coefficient_words, model_lines, words
+    from host.sysid.estimators.fit import methods as single_methods
+    from host.sysid.flight.linear import DEFAULT_METHOD, STAGED, identify
+    from host.sysid.flight.tables import read_columns
 
     known = {**STAGED, **single_methods()}
     chosen = args.method or [DEFAULT_METHOD]
@@ -89,17 +89,17 @@ def run(args: argparse.Namespace) -> int:
     columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
     airframe = None
     if args.aircraft:
-        from host.sysid.aircraft_file import airframe_data
+        from host.sysid.aircraft.aircraft_file import airframe_data
 
         airframe = airframe_data(args.aircraft)
     truth = None
     if args.truth:
-        from host.sysid.truth import read_truth
+        from host.sysid.answer.truth import read_truth
 
         truth = read_truth(args.truth)
     prior = None
     if args.prior:
-        from host.sysid.prior import read_prior
+        from host.sysid.aircraft.prior import read_prior
 
         alpha = columns.get("alpha_rad")
         prior = read_prior(args.prior, 0.0 if alpha is None else sorted(alpha)[len(alpha) // 2])
@@ -129,11 +129,11 @@ def run(args: argparse.Namespace) -> int:
     tables = list(direct.tables) if direct else [a.table for a in answers]
     _write(args, answers, tables, direct)
     if direct and args.plots:
-        from host.sysid.pictures import draw_coefficients
+        from host.sysid.answer.pictures import draw_coefficients
 
         draw_coefficients(direct, columns, args.plots)
     if args.json:
-        from host.sysid.answer_json import answer_document, coefficient_document
+        from host.sysid.answer.json import answer_document, coefficient_document
 
         documents = [answer_document(a, words([a], [])) for a in answers]
         if direct:
@@ -164,11 +164,11 @@ def run(args: argparse.Namespace) -> int:
     if agreement[0]:
         lines += ["", *agreement[0]]
     if prior is not None:
-        from host.sysid.prior import prior_lines
+        from host.sysid.aircraft.prior import prior_lines
 
         lines += ["", *prior_lines([c for table in tables for c in table.coefficients], prior)]
     if truth is not None:
-        from host.sysid.truth import truth_lines
+        from host.sysid.answer.truth import truth_lines
 
         lines += ["", *truth_lines(tables, truth)]
     print("\n".join(lines))
@@ -176,7 +176,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _models(names: list[str] | None) -> list[tuple[str, Any]]:
-    from host.sysid.model_file import read_model
+    from host.sysid.models.model_file import read_model
 
     result: list[tuple[str, Any]] = []
     for name in names or ["longitudinal", "lateral"]:
@@ -193,9 +193,9 @@ def _agreement(
     columns: dict[str, Any], aircraft: str | None, airframe: Any, notes: list[str]
 ) -> tuple[list[str], dict[str, object] | None]:
     """Return lines and document of the data's compatibility; a note where it cannot be told."""
-    from host.sysid.aircraft_file import instrument_data
+    from host.sysid.aircraft.aircraft_file import instrument_data
+    from host.sysid.compatibility.reconstruction import document, reconstruct, words
     from host.sysid.errors import IdentificationError
-    from host.sysid.reconstruction import document, reconstruct, words
 
     try:
         instrument = instrument_data(aircraft) if aircraft else None
@@ -217,7 +217,7 @@ def _direct(
 
     if not args.aircraft:
         raise IdentificationError("--model coefficients needs mass and sensors; give --aircraft")
-    from host.sysid.coefficient_flight import identify_coefficients
+    from host.sysid.coefficients.flight import identify_coefficients
 
     try:
         return identify_coefficients(columns, args.aircraft, windows=windows)
@@ -229,7 +229,7 @@ def _direct(
 def _windows(args: argparse.Namespace, columns: dict[str, Any]) -> list[Found] | None:
     """Return the maneuvers the user asked for; None leaves the choice to identification."""
     from host.sysid.errors import IdentificationError
-    from host.sysid.finder import Found, find
+    from host.sysid.flight.finder import Found, find
 
     if args.from_s is not None or args.to_s is not None:
         t = columns["t_s"]
@@ -285,7 +285,7 @@ def _write(
     direct: CoefficientAnswer | None,
 ) -> None:
     if args.plots:
-        from host.sysid.pictures import draw
+        from host.sysid.answer.pictures import draw
 
         for answer in answers:
             draw(answer, args.plots)
@@ -295,7 +295,7 @@ def _write(
         if path and (path is args.save_aircraft or path.suffix == ".xml"):
             _write_aircraft(args, path, tables)
     if args.save_model and args.save_model.suffix != ".xml":
-        from host.sysid.model_file import model_text
+        from host.sysid.models.model_file import model_text
 
         if args.save_model.suffix == ".mat":
             _write_mat(args.save_model, answers, direct)
@@ -315,7 +315,7 @@ def _write(
 
 
 def _write_aircraft(args: argparse.Namespace, path: Path, tables: list[CoefficientTable]) -> None:
-    from host.sysid.aircraft_export import save_aircraft
+    from host.sysid.answer.aircraft_export import save_aircraft
     from host.sysid.errors import IdentificationError
 
     if not args.aircraft:

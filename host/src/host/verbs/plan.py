@@ -46,8 +46,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Judge or design a card and print it; return an exit code."""
     try:
-        from host.twin import cards, planning
-        from host.twin.tomlout import dumps
+        from host.twin import planning
+        from host.twin.aircraft.tomlout import dumps
+        from host.twin.testcard import cards
     except ImportError as error:
         raise UsageError(
             f"planning needs {error.name}: install the extra, pip install './host[compiled]'"

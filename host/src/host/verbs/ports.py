@@ -21,7 +21,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the ports; exit code 5 without one on USB."""
     from host.errors import ExitCode
-    from host.serial_link import DeviceError, SerialPort, serial_ports
+    from host.link.serial import DeviceError, SerialPort, serial_ports
 
     def row(port: SerialPort) -> str:
         return f"{port.device:<16}  {port.usb_ids:<9}  {port.looks_like:<30}  {port.description}"

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from host.serial_link import Received
-    from host.status_line import StatusLine
+    from host.link.serial import Received
+    from host.link.status_line import StatusLine
 
 _SHOWN_BYTES = 32
 
@@ -46,7 +46,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show status lines until Ctrl-C, or one of them."""
     from host.errors import ExitCode
-    from host.serial_link import SerialLink, choose_port, receive, serial_ports
+    from host.link.serial import SerialLink, choose_port, receive, serial_ports
 
     device = args.port
     if device is None:
@@ -111,8 +111,8 @@ def _status_lines(
     received: Iterator[Received], device: str, timeout_s: float, screen: _Screen
 ) -> Iterator[StatusLine]:
     """Yield status lines; give up if none comes at first, say so if they stop later."""
-    from host.serial_link import DeviceError, printable
-    from host.status_line import parse_status
+    from host.link.serial import DeviceError, printable
+    from host.link.status_line import parse_status
 
     count_bytes = 0
     sample = b""

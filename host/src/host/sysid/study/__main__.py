@@ -12,9 +12,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from host.errors import ExitCode
-from host.sysid.fit import METHODS
-from host.sysid.hopfield import ITERATIONS
-from host.sysid.model import free_model
+from host.sysid.estimators.fit import METHODS
+from host.sysid.estimators.hopfield import ITERATIONS
+from host.sysid.models.model import free_model
 from host.sysid.study import accuracy, coverage, methods, tables, thesis, turbulence
 from host.sysid.study.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
 from host.sysid.study.inputs import SHAPES

@@ -15,14 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.compiled import Array
-from host.sysid.diagnostics import references
-from host.sysid.equation_error import regression_rows, solve_rows
 from host.sysid.errors import IdentificationError
-from host.sysid.hopfield import network
-from host.sysid.maneuver import Maneuver
-from host.sysid.output_error import covariance_of, minimise
-from host.sysid.problem import OutputProblem
-from host.sysid.start import start_values
+from host.sysid.estimators.equation_error import regression_rows, solve_rows
+from host.sysid.estimators.hopfield import network
+from host.sysid.estimators.start import start_values
+from host.sysid.models.diagnostics import references
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.problem import OutputProblem
 from host.sysid.study.aircraft import navion, navion_free, navion_structured
 from host.sysid.study.data import clean
 from host.sysid.study.inputs import SHAPES

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from host.compiled import Array
-from host.sysid.model import LinearModel, Parameter, Term, free_model
+from host.sysid.models.model import LinearModel, Parameter, Term, free_model
 
 FOOT_M = 0.3048
 SPEED_FTPS = 176.0

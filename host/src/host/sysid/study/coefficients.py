@@ -16,16 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from host.sysid.aircraft_file import airframe_data
-from host.sysid.coefficient_flight import CoefficientAnswer, identify_coefficients
+from host.sysid.aircraft.aircraft_file import airframe_data
+from host.sysid.answer.truth import true_coefficients
+from host.sysid.coefficients.flight import CoefficientAnswer, identify_coefficients
 from host.sysid.errors import IdentificationError
-from host.sysid.finder import Found
-from host.sysid.flight import identify
+from host.sysid.flight.finder import Found
+from host.sysid.flight.linear import identify
+from host.sysid.flight.tables import even_columns
 from host.sysid.study.flights import PRINCIPAL, Tally
-from host.sysid.tables import even_columns
-from host.sysid.truth import true_coefficients
-from host.twin.cards import load
-from host.twin.delays import dlpf_for, sensor_delays
+from host.twin.sensors.delays import dlpf_for, sensor_delays
+from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 FIRST_SEED = 700

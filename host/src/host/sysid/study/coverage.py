@@ -16,12 +16,12 @@ from scipy import signal, stats
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
-from host.sysid.intervals import fit_with_memory
-from host.sysid.maneuver import Maneuver
-from host.sysid.noise import OutputNoise, autocovariance
-from host.sysid.output_error import covariance_of, minimise
-from host.sysid.problem import OutputProblem
-from host.sysid.start import start_values
+from host.sysid.estimators.intervals import fit_with_memory
+from host.sysid.estimators.start import start_values
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.numerics.noise import OutputNoise, autocovariance
+from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.problem import OutputProblem
 from host.sysid.study.aircraft import navion_structured
 from host.sysid.study.inputs import multistep_3211
 

@@ -8,8 +8,8 @@ import numpy as np
 from scipy import linalg
 
 from host.compiled import Array
-from host.sysid.maneuver import Maneuver
-from host.sysid.problem import OutputProblem
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.numerics.problem import OutputProblem
 from host.sysid.study.aircraft import FOOT_M, SPEED_FTPS, navion, navion_structured
 from host.sysid.study.inputs import SHAPES
 

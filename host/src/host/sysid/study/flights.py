@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from host.sysid.aircraft_file import airframe_data
+from host.sysid.aircraft.aircraft_file import airframe_data
+from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.errors import IdentificationError
-from host.sysid.finder import Found, find
-from host.sysid.flight import identify
-from host.sysid.tables import read_columns
-from host.sysid.truth import read_truth, true_coefficients
+from host.sysid.flight.finder import Found, find
+from host.sysid.flight.linear import identify
+from host.sysid.flight.tables import read_columns
 
 FIRST_SEED = 200
 OVERLAP = 0.8

@@ -15,17 +15,19 @@ import numpy as np
 from scipy import linalg
 
 from host.compiled import Array
-from host.sysid.aircraft_file import airframe_data
-from host.sysid.airframe import AirframeData, Condition
-from host.sysid.in_coefficients import dimensional_gains, in_coefficients
-from host.sysid.maneuver import Maneuver
-from host.sysid.model import MATRICES, LinearModel
+from host.sysid.aircraft.aircraft_file import airframe_data
+from host.sysid.aircraft.airframe import AirframeData, Condition
+from host.sysid.aircraft.in_coefficients import dimensional_gains, in_coefficients
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import MATRICES, LinearModel
+from host.sysid.models.templates import Trim, template
 from host.sysid.study.inputs import steps
-from host.sysid.templates import Trim, template
-from host.twin import air, aircraft, local, pilot, trim
-from host.twin.attitude import euler
-from host.twin.cards import Air
-from host.twin.linear import linearise
+from host.twin.aircraft import file as aircraft
+from host.twin.flight import pilot
+from host.twin.motion import air, local, trim
+from host.twin.motion.attitude import euler
+from host.twin.motion.linear import linearise
+from host.twin.testcard.cards import Air
 
 AIRCRAFT = "ultrastick25e"
 HEIGHT_M = 100.0

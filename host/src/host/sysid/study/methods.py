@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.compiled import Array
-from host.sysid.diagnostics import references
 from host.sysid.errors import IdentificationError
-from host.sysid.fit import fit, methods
-from host.sysid.maneuver import Maneuver
+from host.sysid.estimators.fit import fit, methods
+from host.sysid.models.diagnostics import references
+from host.sysid.models.maneuver import Maneuver
 from host.sysid.study.aircraft import navion_structured
 from host.sysid.study.coverage import NOISES, coloured_noise
 from host.sysid.study.data import TRUTH, clean, gusty

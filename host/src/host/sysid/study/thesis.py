@@ -17,15 +17,9 @@ import numpy as np
 from scipy import linalg, signal, special
 
 from host.compiled import Array
-from host.sysid.diagnostics import (
-    exceedance,
-    references,
-    refusals,
-    thesis_program_error_percent,
-)
 from host.sysid.errors import IdentificationError
-from host.sysid.fit import fit
-from host.sysid.hopfield import (
+from host.sysid.estimators.fit import fit
+from host.sysid.estimators.hopfield import (
     ITERATIONS,
     LAMBDA,
     RHO,
@@ -34,10 +28,16 @@ from host.sysid.hopfield import (
     largest_stable_gain,
     network,
 )
-from host.sysid.maneuver import Maneuver
-from host.sysid.model import LinearModel, free_model
-from host.sysid.output_error import covariance_of, minimise
-from host.sysid.problem import OutputProblem
+from host.sysid.models.diagnostics import (
+    exceedance,
+    references,
+    refusals,
+    thesis_program_error_percent,
+)
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel, free_model
+from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.problem import OutputProblem
 from host.sysid.study.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
 from host.sysid.study.inputs import SHAPES
 

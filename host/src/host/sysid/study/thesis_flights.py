@@ -18,17 +18,17 @@ from typing import Any
 import numpy as np
 
 from host.compiled import Array
-from host.sysid.diagnostics import (
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.equation_error import fit_equation_error
+from host.sysid.estimators.hopfield import free_run, line_search, network
+from host.sysid.flight.linear import identify
+from host.sysid.flight.tables import even_columns
+from host.sysid.models.diagnostics import (
     thesis_program_error_percent,
     thesis_sum_of_mean_errors,
 )
-from host.sysid.equation_error import fit_equation_error
-from host.sysid.errors import IdentificationError
-from host.sysid.flight import identify
-from host.sysid.hopfield import free_run, line_search, network
-from host.sysid.maneuver import Maneuver
-from host.sysid.model import LinearModel, free_model
-from host.sysid.tables import even_columns
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel, free_model
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 FIRST_SEED = 500

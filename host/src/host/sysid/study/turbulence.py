@@ -14,11 +14,11 @@ import numpy as np
 
 from host.compiled import Array, BoolArray
 from host.sysid.errors import IdentificationError
-from host.sysid.filter_error import information_at
-from host.sysid.fit import fit
-from host.sysid.gust import ROLLING, gust_model
-from host.sysid.maneuver import Maneuver
-from host.sysid.model import LinearModel
+from host.sysid.estimators.filter_error import information_at
+from host.sysid.estimators.fit import fit
+from host.sysid.estimators.gust import ROLLING, gust_model
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
 from host.sysid.study.gusts import AXES, NOISE, fly, gusty_aircraft, spectrum
 
 SCALE_SHARE = 0.5  # how well the fit knows the length of the gusts beforehand

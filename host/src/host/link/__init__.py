@@ -1,0 +1,1 @@
+"""The USB line: ports, bytes to lines, lines to values."""

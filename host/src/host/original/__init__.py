@@ -1,0 +1,1 @@
+"""The text rows of the original logger."""

@@ -1,0 +1,1 @@
+"""Frames to a table in SI: calibration, instants, air data."""

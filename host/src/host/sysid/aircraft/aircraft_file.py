@@ -1,0 +1,102 @@
+"""What identification needs out of an aircraft file of the package."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.aircraft.instrument_errors import InstrumentData
+from host.sysid.aircraft.powerplant import Powerplant
+from host.sysid.errors import IdentificationError
+
+RECTANGLE = 1.0 / np.sqrt(3.0)  # standard deviation of an even distribution over its half width
+
+
+def airframe_data(source: str) -> AirframeData:
+    """Read an aircraft by name or file.
+
+    Raises
+    ------
+    IdentificationError
+        If the file has no mass properties (a linear aircraft).
+    """
+    from host.twin.aircraft import file as aircraft
+
+    loaded = aircraft.load(source)
+    drawing = aircraft.read_document(source)["geometry"]
+    arms = drawing if isinstance(drawing, dict) else {}
+    try:
+        number, vector = loaded.scalar, loaded.vector
+        vanes = tuple(tuple(map(float, vector(f"sensors.vane_{k}_m"))) for k in "ab")
+        imu = tuple(map(float, vector("sensors.imu_m") - vector("mass.cg_m")))
+        return AirframeData(
+            name=loaded.title,
+            mass_kg=number("mass.mass_kg"),
+            ixx_kgm2=number("mass.ixx_kgm2"),
+            iyy_kgm2=number("mass.iyy_kgm2"),
+            izz_kgm2=number("mass.izz_kgm2"),
+            ixz_kgm2=number("mass.ixz_kgm2"),
+            wing_area_m2=number("geometry.wing_area_m2"),
+            span_m=number("geometry.span_m"),
+            chord_m=number("geometry.chord_m"),
+            mass_share=number("mass.mass_tolerance") * RECTANGLE,
+            inertia_share=number("mass.inertia_tolerance") * RECTANGLE,
+            imu_m=(imu[0], imu[1], imu[2]),
+            vanes_m=tuple((v[0], v[1], v[2]) for v in vanes),
+            upwash=number("sensors.upwash"),
+            upwash_share=number("sensors.upwash_tolerance"),
+            elevator_arm_m=float(arms.get("elevator_arm_m", 0.0)),
+            rudder_arm_m=float(arms.get("rudder_arm_m", 0.0)),
+            arm_share=float(arms.get("arm_tolerance", 0.10)) * RECTANGLE,
+        )
+    except KeyError as error:
+        raise IdentificationError(f"aircraft {source}: no {error.args[0]} in its file") from error
+
+
+def instrument_data(source: str) -> InstrumentData:
+    """Read the sensors' places and dynamics of an aircraft by name or file.
+
+    Raises
+    ------
+    IdentificationError
+        If the file does not describe its sensors.
+    """
+    from host.twin.aircraft import file as aircraft
+
+    loaded = aircraft.load(source)
+    try:
+        number, vector = loaded.scalar, loaded.vector
+        imu = vector("sensors.imu_m") - vector("mass.cg_m")
+        vanes = 0.5 * (vector("sensors.vane_a_m") + vector("sensors.vane_b_m"))
+        vanes -= vector("mass.cg_m")
+        return InstrumentData(
+            imu_m=(float(imu[0]), float(imu[1]), float(imu[2])),
+            vanes_m=(float(vanes[0]), float(vanes[1]), float(vanes[2])),
+            upwash=number("sensors.upwash"),
+            upwash_share=number("sensors.upwash_tolerance"),
+            vane_hz_per_mps=number("sensors.vane_frequency_hz_per_mps"),
+            vane_damping=number("sensors.vane_damping"),
+            vane_friction_rad=number("sensors.vane_friction_rad"),
+            friction_speed_mps=number("trim.airspeed_mps"),
+            pitot_lag_s=number("sensors.pitot_lag_s"),
+            position_m=number("sensors.position_tolerance_m"),
+            cg_m=number("mass.cg_tolerance_m"),
+        )
+    except KeyError as error:
+        raise IdentificationError(f"aircraft {source}: no {error.args[0]} in its file") from error
+
+
+def powerplant(source: str) -> Powerplant:
+    """Return the propeller and motor of an aircraft by name or file."""
+    from host.twin.aircraft import file as aircraft
+    from host.twin.motion.propulsion import motor_torque, propeller
+
+    frame = aircraft.load(source).airframe()
+
+    def step(
+        spin_radps: float, throttle: float, airspeed_mps: float, density_kgpm3: float
+    ) -> tuple[float, float, float]:
+        thrust, load = propeller(frame, spin_radps, airspeed_mps, density_kgpm3)
+        return thrust, load, motor_torque(frame, throttle, spin_radps)
+
+    return Powerplant(step, frame.rotor_inertia_kgm2, frame.thrust_axis, frame.hub_m)

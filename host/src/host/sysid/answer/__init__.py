@@ -1,0 +1,1 @@
+"""What is said and saved: verdict, JSON, pictures, aircraft files."""

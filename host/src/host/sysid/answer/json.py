@@ -1,0 +1,148 @@
+"""The answer for programs: plain numbers, lists and strings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from host.sysid.coefficients.answer import METHOD
+from host.sysid.flight.finder import Found, Grade
+from host.sysid.flight.linear import Answer
+from host.sysid.models.modes import Mode
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.flight import CoefficientAnswer
+
+
+def maneuver_document(graded: Sequence[tuple[Found, Grade]]) -> list[dict[str, Any]]:
+    """Return the maneuvers with their grades."""
+    return [
+        {
+            "axis": item.axis,
+            "kind": item.kind,
+            "start_s": item.start_s,
+            "input_end_s": item.input_end_s,
+            "end_s": item.end_s,
+            "amplitude": item.amplitude,
+            "grade": mark.score,
+            "response_over_noise": mark.response_over_noise,
+            "trim_quiet": mark.trim_quiet,
+            "feedback": mark.feedback,
+            "remarks": list(mark.remarks),
+        }
+        for item, mark in graded
+    ]
+
+
+def mode_document(modes: Sequence[Mode]) -> list[dict[str, Any]]:
+    """Return modes with their intervals."""
+    return [
+        {
+            "name": m.name,
+            "eigenvalue": [m.eigenvalue.real, m.eigenvalue.imag],
+            "frequency_radps": m.frequency_radps,
+            "frequency_half_width": 1.96 * m.frequency_sd_radps,
+            "damping": m.damping,
+            "damping_half_width": 1.96 * m.damping_sd,
+        }
+        for m in modes
+    ]
+
+
+def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
+    """Return one fitted model: verdict, estimates with intervals, modes, figures of fit."""
+    result = answer.result
+    half = result.half_width()
+    A, B, C, D = result.matrices()
+    return {
+        "template": answer.template,
+        "method": result.method,
+        "verdict": list(lines),
+        "converged": result.converged,
+        "warnings": list(result.warnings),
+        "airspeed_mps": answer.condition.airspeed_mps,
+        "qbar_pa": answer.condition.qbar_pa,
+        "alpha_rad": answer.trim.alpha_rad,
+        "states": list(answer.model.states),
+        "inputs": list(answer.model.inputs),
+        "outputs": list(answer.model.outputs),
+        "A": A.tolist(),
+        "B": B.tolist(),
+        "C": C.tolist(),
+        "D": D.tolist(),
+        "parameters": {
+            name: {"value": float(result.estimate[k]), "half_width": float(half[k])}
+            for k, name in enumerate(result.names)
+        },
+        "delays_s": {
+            name: {"value": value, "half_width": width}
+            for name, (value, width) in answer.delays.items()
+        },
+        "refused": [
+            {"name": r.name, "relative_bound": r.relative_bound, "reason": r.reason}
+            for r in answer.refused
+        ],
+        "coefficients": {
+            c.name: {"value": c.value, "half_width": c.half_width, "fit_error": c.fit_error}
+            for c in answer.coefficients
+        },
+        "modes": mode_document(answer.modes),
+        "fit": {
+            kind: {
+                f.name: {
+                    "r_squared": f.r_squared,
+                    "nrmse": f.nrmse,
+                    "theil": f.theil,
+                    "ljung_box_p": f.ljung_box_p,
+                }
+                for f in fits
+            }
+            for kind, fits in (("fitted", answer.fits), ("held_out", answer.validation))
+        },
+        "maneuvers": [m.name for m in answer.maneuvers],
+    }
+
+
+def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dict[str, Any]:
+    """Return a direct fit of coefficients: verdict, values, modes, delays, instrument errors."""
+    flight = answer.fit.flight
+    return {
+        "template": "coefficients",
+        "method": METHOD,
+        "verdict": list(lines),
+        "airspeed_mps": flight.airspeed_mps,
+        "qbar_pa": flight.qbar_pa,
+        "alpha_rad": flight.alpha_rad,
+        "CL": flight.lift,
+        "CD": flight.drag,
+        "coefficients": {
+            d.name: {
+                "value": d.value,
+                "half_width": d.half_width,
+                "relative_half_width": d.share,
+                "flagged": d.flagged,
+                "widened_by": answer.causes.get(d.name, ("", 0.0))[0],
+            }
+            for d in answer.fit.derivatives
+        },
+        "systems": {
+            name: {
+                "states": list(x.states),
+                "inputs": list(x.inputs),
+                "A": x.A.tolist(),
+                "B": x.B.tolist(),
+                "A_half_width": x.A_half.tolist(),
+                "B_half_width": x.B_half.tolist(),
+            }
+            for name, x in answer.systems.items()
+        },
+        "modes": mode_document(answer.modes),
+        "delays_s": {n: {"value": v, "half_width": h} for n, (v, h) in answer.delays.items()},
+        "instrument_errors": {
+            n: {"value": v, "standard_deviation": d} for n, (v, d) in answer.fit.errors.items()
+        },
+        "fit": {"one_step": {n: {"nrmse": x.nrmse} for n, x in answer.fit.traces.items()}},
+        "maneuvers": [
+            f"{f.kind} on {f.axis.split('_')[0]} at {f.start_s:.1f} s" for f in answer.used
+        ],
+    }

@@ -1,0 +1,201 @@
+"""The answer in words: what to trust, what not and why, what to fly again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from host.sysid.coefficients.answer import FLAG_SHARE
+from host.sysid.flight.finder import Found, Grade
+from host.sysid.flight.linear import Answer
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.flight import CoefficientAnswer
+
+TRUST = 0.10  # 95 % half-width over value: good enough to design with
+FAIR = 0.30
+NEEDS = {
+    "alpha": "an elevator 3-2-1-1 at the short-period frequency",
+    "q": "a quicker elevator 3-2-1-1",
+    "de": "a larger elevator doublet",
+    "V": "an elevator pulse and 20 s hands off, for the phugoid",
+    "beta": "a rudder doublet at the dutch-roll frequency",
+    "p": "a larger aileron doublet",
+    "r": "a rudder 3-2-1-1",
+    "da": "a larger aileron doublet",
+    "dr": "a larger rudder doublet",
+}
+
+
+def maneuver_lines(graded: Sequence[tuple[Found, Grade]]) -> list[str]:
+    """Return the list of maneuvers for people."""
+    lines = [f"{len(graded)} maneuvers found"]
+    for number, (item, mark) in enumerate(graded, start=1):
+        unit = "" if item.axis == "throttle" else " deg"
+        size = item.amplitude if item.axis == "throttle" else item.amplitude * 57.29578
+        lines.append(
+            f"  {number:2d}  {item.start_s:8.2f} to {item.end_s:8.2f} s"
+            f"  {item.axis.split('_')[0]:8s} {item.kind:10s} {size:5.1f}{unit}"
+            f"  grade {mark.score:4.2f}" + (f"  {'; '.join(mark.remarks)}" if mark.remarks else "")
+        )
+    return lines
+
+
+def words(answers: Sequence[Answer], notes: Sequence[str]) -> list[str]:
+    """Return the verdict: notes first, then per model what to trust and what to re-fly."""
+    lines = [f"note: {note}" for note in notes]
+    for answer in answers:
+        lines += _verdict(answer)
+    return lines
+
+
+def _verdict(answer: Answer) -> list[str]:
+    result = answer.result
+    half = result.half_width()
+    refused = {r.name for r in answer.refused}
+    trusted, fair = [], []
+    for k, parameter in enumerate(answer.model.parameters):
+        name = parameter.name
+        if name in refused or name.startswith("imu_"):
+            continue
+        share = float(half[k]) / max(abs(float(result.estimate[k])), 1e-300)
+        if share <= TRUST:
+            trusted.append(name)
+        elif share <= FAIR:
+            fair.append(name)
+    lines = [
+        f"{answer.template}: {len(answer.used)} maneuvers fitted jointly by"
+        f" {result.method}, {len(answer.held_out)} held out"
+    ]
+    lines.append(f"  trust (within 10 %):  {', '.join(trusted) or 'nothing'}")
+    if fair:
+        lines.append(f"  use with care (10 to 30 %):  {', '.join(fair)}")
+    for refusal in answer.refused:
+        if not refusal.name.startswith("imu_"):
+            lines.append(f"  do not use {refusal.name}: {refusal.reason}")
+    flights = {
+        NEEDS[r.name.split("_")[-1]] for r in answer.refused if r.name.split("_")[-1] in NEEDS
+    }
+    if flights:
+        lines.append(f"  to learn them, fly {'; '.join(sorted(flights))}")
+    for name in answer.still:
+        lines.append(f"  {name} never moved: its derivatives are the bias under another name")
+    if answer.together.severe:
+        pairs = ", ".join(f"{a} with {b}" for a, b, _ in answer.together.pairs[:3])
+        lines.append(f"  the data are close to collinear ({pairs})")
+    for warning in result.warnings:
+        lines.append(f"  warning: {warning}")
+    poor = [f.name for f in answer.validation if not f.nrmse < 0.5]
+    if answer.validation:
+        lines.append(
+            "  prediction of the unseen maneuver: "
+            + ("fails for " + ", ".join(poor) if poor else "holds for every output")
+        )
+    return lines
+
+
+def model_lines(answer: Answer) -> list[str]:
+    """Return estimates, modes and fit as a table for people."""
+    result = answer.result
+    half = result.half_width()
+    lines = [
+        f"{answer.template} at {answer.condition.airspeed_mps:.2f} m/s,"
+        f" alpha {answer.trim.alpha_rad * 57.29578:.1f} deg; value and 95 % half-width"
+    ]
+    refused = {r.name for r in answer.refused if not r.name.startswith("imu_")}
+    for k, name in enumerate(answer.model.parameter_names):
+        mark = "  refused" if name in refused else ""
+        lines.append(f"  {name:16s} {result.estimate[k]:11.5g}  +- {half[k]:9.3g}{mark}")
+    for name, (value, width) in answer.delays.items():
+        lines.append(f"  {name:16s} {value:11.5g}  +- {width:9.3g}")
+    if answer.coefficients:
+        lines.append("  coefficients (mass, inertia, pressure and upwash in the half-width)")
+        lines += [
+            f"  {c.name:16s} {c.value:11.5g}  +- {c.half_width:9.3g}" for c in answer.coefficients
+        ]
+    for mode in answer.modes:
+        if mode.oscillatory:
+            lines.append(
+                f"  {mode.name}: {mode.frequency_radps:.3f} +- {1.96 * mode.frequency_sd_radps:.3f}"
+                f" rad/s, damping {mode.damping:.3f} +- {1.96 * mode.damping_sd:.3f}"
+            )
+        else:
+            lines.append(
+                f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {1.96 * mode.frequency_sd_radps:.3f}"
+                " 1/s"
+            )
+    for kind, fits in (
+        ("free simulation, fitted data", answer.fits),
+        ("free simulation, held-out data", answer.validation),
+    ):
+        if fits:
+            shares = ", ".join(f"{f.name} {100.0 * f.nrmse:.1f} %" for f in fits)
+            lines.append(f"  NRMSE ({kind}): {shares}")
+    return lines
+
+
+def coefficient_words(answer: CoefficientAnswer) -> list[str]:
+    """Return the verdict of a direct fit of coefficients."""
+    along = sum(w.longitudinal for w in answer.windows)
+    derivatives = answer.fit.derivatives
+    trusted = [d.name for d in derivatives if d.share <= TRUST]
+    fair = [d.name for d in derivatives if d.share > TRUST and not d.flagged]
+    lines = [
+        f"coefficients: {along} maneuvers of the elevator, {len(answer.windows) - along} of aileron"
+        " and rudder fitted jointly, errors of the instrument beside them",
+        f"  trust (within 10 %):  {', '.join(trusted) or 'nothing'}",
+    ]
+    if fair:
+        lines.append(f"  use with care (10 to {100.0 * FLAG_SHARE:.0f} %):  {', '.join(fair)}")
+    needs = set()
+    for d in derivatives:
+        if not d.flagged:
+            continue
+        cause, part = answer.causes.get(d.name, ("", 0.0))
+        why = f"{100.0 * part:.0f} % of the variance is {cause}" if cause else "excited too little"
+        known = "do not use" if d.share > 1.0 else "do not rely on"
+        lines.append(f"  {known} {d.name}: +- {100.0 * min(d.share, 99.99):.0f} %, {why}")
+        label = d.name.split("_")[-1]
+        needs.add(
+            f"measure {cause} better" if cause else f"fly {NEEDS.get(label, 'a larger input')}"
+        )
+    if needs:
+        lines.append(f"  to learn them, {'; '.join(sorted(needs))}")
+    return lines
+
+
+def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
+    """Return coefficients, modes, delays and fit as a table for people."""
+    flight = answer.fit.flight
+    lines = [
+        f"coefficients at {flight.airspeed_mps:.2f} m/s, alpha"
+        f" {flight.alpha_rad * 57.29578:.1f} deg, CL {flight.lift:.3f}; value, 95 % half-width,"
+        " what widens it most"
+    ]
+    for d in answer.fit.derivatives:
+        small = " of 5 % of the row" if d.reference > abs(d.value) else ""
+        cause = answer.causes.get(d.name, ("", 0.0))[0]
+        line = f"  {d.name:9s} {d.value:10.4f}  +- {d.half_width:8.4f}  {100.0 * d.share:6.1f} %"
+        line += f"{small}  {cause}" + ("  flagged" if d.flagged else "")
+        lines.append(line.rstrip())
+    lines.append("  CD_0 is the drag at zero lift, surfaces as flown")
+    for mode in answer.modes:
+        if mode.oscillatory:
+            lines.append(
+                f"  {mode.name}: {mode.frequency_radps:.3f}"
+                f" +- {1.96 * mode.frequency_sd_radps:.3f} rad/s,"
+                f" damping {mode.damping:.3f} +- {1.96 * mode.damping_sd:.3f}"
+            )
+        else:
+            lines.append(
+                f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {1.96 * mode.frequency_sd_radps:.3f}"
+                " 1/s"
+            )
+    delays = ", ".join(
+        f"{name.split('_')[1]} {1e3 * value:+.2f} +- {1e3 * half:.2f} ms"
+        for name, (value, half) in answer.delays.items()
+    )
+    lines.append(f"  residual delays: {delays}")
+    shares = ", ".join(f"{n} {100.0 * x.nrmse:.1f} %" for n, x in answer.fit.traces.items())
+    lines.append(f"  NRMSE (one-step, fitted data, gusts in it): {shares}")
+    return lines

@@ -1,0 +1,1 @@
+"""Non-dimensional coefficients straight from flight."""

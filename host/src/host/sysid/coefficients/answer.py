@@ -1,0 +1,165 @@
+"""What a fit of coefficients says, and what the airframe's drawing adds to it.
+
+The arm between accelerometers and CG shows in the data only together with lift: a longer arm and
+a larger CL_de are the same flight. What tells them apart is where a control surface's force acts:
+between a quarter of the tail's chord and the hinge line, so moment over force is an arm that a tape
+measure knows. Ailerons on a straight wing make side force only by their sidewash on the fin, which
+says as much of the arm along z. Both enter as measurements with their uncertainty (Kalman update).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array, IntArray
+from host.sysid.aircraft.airframe import AirframeData
+
+METHOD = "equation error with instrument errors"
+QUANTILE = 1.96
+FLAG_SHARE = 0.12  # up to it an error beyond 15 % is a case of one in seventy
+SMALL_SHARE = 0.05  # of the row's largest contribution
+SIDEWASH_SHARE = 0.1  # standard deviation of CY_da over CY_beta
+
+
+@dataclass(frozen=True, slots=True)
+class Derivative:
+    """A coefficient with its 95 % half-width; `flagged` if it is too wide to be relied on.
+
+    Widths are judged against `reference`: the value, or what would contribute 5 % of the row's
+    largest term, if that is more.
+    """
+
+    name: str
+    value: float
+    half_width: float
+    reference: float
+
+    @property
+    def share(self) -> float:
+        """Half-width over the reference."""
+        return self.half_width / max(self.reference, 1e-300)
+
+    @property
+    def flagged(self) -> bool:
+        """Whether it is too wide to be relied on."""
+        return self.share > FLAG_SHARE
+
+
+@dataclass(frozen=True, slots=True)
+class Pull:
+    """Mean thrust (N), its slope with airspeed at constant rotor speed, pitching moment per N."""
+
+    thrust_n: float
+    slope_npmps: float
+    arm_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """Mean condition of the maneuvers; angle of attack, CL and CD of the longitudinal ones."""
+
+    airspeed_mps: float
+    qbar_pa: float
+    alpha_rad: float
+    lift: float
+    drag: float
+    pull: Pull
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """One coefficient over all its maneuvers end to end, each (n,); the model's constant and slope
+    of each maneuver are fitted."""
+
+    measured: Array
+    model: Array
+
+    @property
+    def nrmse(self) -> float:
+        """Rms of the difference over the standard deviation of what was measured."""
+        return float(np.std(self.measured - self.model) / np.std(self.measured))
+
+
+@dataclass(frozen=True, slots=True)
+class CoefficientFit:
+    """Coefficients, and the instrument's errors as value and deviation left.
+
+    `covariance` is of all derivatives and behind them all errors, in their order; `traces` are the
+    six force and moment coefficients in time, measured and by the derivatives.
+    """
+
+    derivatives: tuple[Derivative, ...]
+    covariance: Array
+    errors: dict[str, tuple[float, float]]
+    flight: Flight
+    traces: dict[str, Trace]
+
+
+def informed(
+    state: Array, covariance: Array, position: Mapping[str, int], airframe: AirframeData
+) -> tuple[Array, Array]:
+    """Return state and covariance once the airframe's drawing has been heard.
+
+    Parameters
+    ----------
+    state, covariance : (n,) and (n, n) Array
+        Of the fit; coefficients at `position`.
+    position : mapping
+    airframe : AirframeData
+        Arms of 0 are not known and say nothing.
+    """
+    a = airframe
+    chord, span = a.chord_m, a.span_m
+    known: list[tuple[dict[str, float], float]] = []
+    if a.elevator_arm_m > 0.0:
+        sd = a.arm_share * abs(state[position["Cm_de"]])
+        known.append(({"CL_de": a.elevator_arm_m / chord, "Cm_de": 1.0}, sd))
+    if a.rudder_arm_m > 0.0:
+        sd = a.arm_share * abs(state[position["Cn_dr"]])
+        known.append(({"CY_dr": a.rudder_arm_m / span, "Cn_dr": 1.0}, sd))
+    known.append(({"CY_da": 1.0}, SIDEWASH_SHARE * abs(state[position["CY_beta"]])))
+    for weights, sd in known:
+        row = np.zeros(len(state))
+        for name, weight in weights.items():
+            row[position[name]] = weight
+        gain = covariance @ row / (row @ covariance @ row + sd**2)
+        state = state - gain * (row @ state)
+        keep = np.eye(len(state)) - np.outer(gain, row)
+        covariance = keep @ covariance @ keep.T + np.outer(gain, gain) * sd**2
+    return state, covariance
+
+
+def derivatives(
+    values: Mapping[str, float], covariance: Array, sizes: Mapping[str, float]
+) -> tuple[Derivative, ...]:
+    """Return coefficients with intervals, in the order of the covariance.
+
+    `sizes` is the rms of each coefficient's regressor; one without is judged by its value alone.
+    """
+    halves = QUANTILE * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    largest: dict[str, float] = {}
+    for name, size in sizes.items():
+        row = name.split("_")[0]
+        largest[row] = max(largest.get(row, 0.0), abs(values.get(name, 0.0)) * size)
+    found = []
+    for (name, value), half in zip(values.items(), halves, strict=True):
+        least = 0.0
+        if sizes.get(name, 0.0) > 0.0:
+            least = SMALL_SHARE * largest[name.split("_")[0]] / sizes[name]
+        found.append(Derivative(name, value, float(half), float(max(abs(value), least))))
+    return tuple(found)
+
+
+def trace(left: Array, model: Array, windows: Sequence[IntArray]) -> Trace:
+    """Return measured and modelled coefficient (n,) over the samples of some windows."""
+    measured, fitted = [], []
+    for samples in windows:
+        gap = left[samples] - model[samples]
+        line = np.linspace(-1.0, 1.0, len(samples))[:, None] ** np.arange(2)
+        gone = line @ np.linalg.lstsq(line, gap, rcond=None)[0]
+        measured.append(left[samples])
+        fitted.append(model[samples] + gone)
+    return Trace(np.concatenate(measured), np.concatenate(fitted))

@@ -1,0 +1,185 @@
+"""From the columns of a flight to coefficients with a verdict: maneuvers found, fitted, judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array, BoolArray
+from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
+from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
+from host.sysid.aircraft.instrument_errors import InstrumentData
+from host.sysid.coefficients.answer import METHOD, QUANTILE, CoefficientFit
+from host.sysid.coefficients.fit import fit_coefficients
+from host.sysid.coefficients.modes import System, coefficient_modes, dimensional
+from host.sysid.coefficients.windows import LEAST_S, Window
+from host.sysid.errors import IdentificationError
+from host.sysid.flight.finder import FLYING_SHARE, Found, find
+from host.sysid.models.modes import Mode
+
+NAME = "coefficients"
+LEAD_S = 0.5  # of trim before a maneuver
+SETTLED_S = 3.0  # after the launch
+LONGITUDINAL = ("CL", "CD", "Cm")
+NAMED_SHARE = 0.25  # of the variance: a smaller part is not worth naming
+CAUSES = {
+    "mass": ("mass_share",),
+    "Ixx": ("ixx_share",),
+    "Iyy": ("iyy_share",),
+    "Izz": ("izz_share",),
+    "place of CG and IMU along x": ("cg_x_m", "imu_x_m"),
+    "place of CG and IMU along y": ("cg_y_m", "imu_y_m"),
+    "place of CG and IMU along z": ("cg_z_m", "imu_z_m"),
+    "IMU tilt about x": ("tilt_x_rad",),
+    "IMU tilt and vane zero about y": ("tilt_y_rad", "alpha_zero_rad"),
+    "IMU tilt about z": ("tilt_z_rad",),
+    "vane scale and upwash": ("alpha_scale", "beta_scale", "upwash_share"),
+    "places of the vanes": ("vane_x_m", "vane_z_m"),
+    "pitot": ("pitot_scale", "pitot_drift_pa"),
+    "zeros of the accelerometers": (
+        "accel_x_bias_mps2", "accel_y_bias_mps2", "accel_z_bias_mps2",
+    ),
+    "thrust": ("thrust_share",),
+    "surface pots": ("elevator_scale", "aileron_scale", "rudder_scale"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class CoefficientAnswer:
+    """What the equations of motion say straight from a flight.
+
+    `used` are the inputs found, `windows` what was fitted; `causes` is what widens each coefficient
+    most, with its share of the variance; `delays` are residual (s) with 95 % half-width.
+    """
+
+    fit: CoefficientFit
+    used: tuple[Found, ...]
+    windows: tuple[Window, ...]
+    causes: dict[str, tuple[str, float]]
+    modes: tuple[Mode, ...]
+    systems: dict[str, System]
+    delays: dict[str, tuple[float, float]]
+
+    @property
+    def coefficients(self) -> tuple[Coefficient, ...]:
+        """The derivatives as the rest of the package takes them."""
+        return tuple(
+            Coefficient(
+                d.name, d.value, d.half_width / QUANTILE, d.half_width / QUANTILE, d.half_width
+            )
+            for d in self.fit.derivatives
+        )
+
+    @property
+    def tables(self) -> tuple[CoefficientTable, ...]:
+        """Coefficients of the longitudinal and of the lateral maneuvers."""
+        alpha = self.fit.flight.alpha_rad
+        along = tuple(c for c in self.coefficients if c.name[:2] in LONGITUDINAL)
+        across = tuple(c for c in self.coefficients if c.name[:2] not in LONGITUDINAL)
+        return (
+            CoefficientTable("longitudinal", METHOD, alpha, along),
+            CoefficientTable("lateral", METHOD, alpha, across),
+        )
+
+
+def identify_coefficients(
+    columns: Mapping[str, Array], aircraft: str, *, windows: Sequence[Found] | None = None
+) -> CoefficientAnswer:
+    """Find the maneuvers of a flight and fit coefficients to all of them at once.
+
+    Parameters
+    ----------
+    columns : mapping
+        SI columns on an even grid, as `host.sysid.flight.tables` returns them.
+    aircraft : str
+        Name or path of the aircraft file.
+    windows : sequence of Found, optional
+        Use these instead of finding them.
+
+    Raises
+    ------
+    IdentificationError
+        If a column or an axis is missing, or the aircraft file lacks what is needed.
+    """
+    airframe, data = airframe_data(aircraft), instrument_data(aircraft)
+    if "airspeed_mps" not in columns:
+        raise IdentificationError("coefficients need the columns airspeed_mps and qbar_pa")
+    flying = _airborne(columns)
+    t = columns["t_s"][flying]
+    found = [
+        f
+        for f in (windows if windows is not None else find(columns))
+        if f.axis != "throttle" and f.end_s - f.start_s + LEAD_S >= LEAST_S
+        and t[0] <= f.start_s - LEAD_S and f.end_s <= t[-1]
+    ]  # fmt: skip
+    spans = joined(found)
+    fit = fit_coefficients(
+        {k: v[flying] for k, v in columns.items()},
+        spans,
+        airframe,
+        data,
+        powerplant(aircraft),
+    )
+    return CoefficientAnswer(
+        fit=fit,
+        used=tuple(found),
+        windows=tuple(spans),
+        causes=_causes(fit),
+        modes=coefficient_modes(fit, airframe),
+        systems=dimensional(fit, airframe),
+        delays=_delays(fit, data),
+    )
+
+
+def joined(found: Sequence[Found]) -> list[Window]:
+    """Return the windows of maneuvers; aileron and rudder flown together are one."""
+    windows: list[Window] = []
+    for item in sorted(found, key=lambda f: (f.axis != "elevator_rad", f.start_s)):
+        along = item.axis == "elevator_rad"
+        first, last = item.start_s - LEAD_S, item.end_s
+        if windows and not along and not windows[-1].longitudinal:
+            before = windows[-1]
+            if first < before.last_s - LEAST_S:
+                windows[-1] = Window(before.first_s, max(last, before.last_s), longitudinal=False)
+                continue
+        windows.append(Window(first, last, along))
+    return windows
+
+
+def _airborne(columns: Mapping[str, Array]) -> BoolArray:
+    """Return from some seconds after the launch to the last moment of flight."""
+    t, speed = columns["t_s"], columns["airspeed_mps"]
+    up = np.flatnonzero(speed > FLYING_SHARE * float(np.median(speed)))
+    inside = np.zeros(len(t), dtype=bool)
+    inside[up[0] : up[-1] + 1] = True
+    return np.asarray(inside & (t > t[up[0]] + SETTLED_S))
+
+
+def _causes(fit: CoefficientFit) -> dict[str, tuple[str, float]]:
+    """Return for each coefficient the errors whose knowledge would narrow it most."""
+    count, names = len(fit.derivatives), list(fit.errors)
+    result = {}
+    for k, d in enumerate(fit.derivatives):
+        shares = {}
+        for cause, members in CAUSES.items():
+            at = [count + names.index(m) for m in members]
+            with_them = fit.covariance[k, at]
+            narrowed = with_them @ np.linalg.solve(fit.covariance[np.ix_(at, at)], with_them)
+            shares[cause] = float(narrowed / max(fit.covariance[k, k], 1e-300))
+        cause = max(shares, key=shares.__getitem__)
+        if shares[cause] >= NAMED_SHARE:
+            result[d.name] = (cause, shares[cause])
+    return result
+
+
+def _delays(fit: CoefficientFit, data: InstrumentData) -> dict[str, tuple[float, float]]:
+    omega = 2.0 * np.pi * data.vane_hz_per_mps * data.friction_speed_mps
+    vane_s = 2.0 * data.vane_damping / omega
+    table = {"delay_imu_s": ("imu_delay_s", 1.0)}
+    table |= {f"delay_{k}_s": (f"{k}_lag_share", -vane_s) for k in ("alpha", "beta")}
+    return {
+        name: (scale * fit.errors[key][0], QUANTILE * abs(scale) * fit.errors[key][1])
+        for name, (key, scale) in table.items()
+    }

@@ -1,0 +1,167 @@
+"""The linear motion and natural modes of the aircraft that a fit of coefficients found.
+
+Mass and inertia cancel: what is uncertain in a moment coefficient by the inertia assumed is exact
+in the motion it stands for, and the joint covariance of both says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.coefficients.answer import QUANTILE, CoefficientFit
+from host.sysid.coefficients.rows import GRAVITY_MPS2
+from host.sysid.models.modes import Mode, mode_of
+
+PAIRS = (("short period", "phugoid"), ("dutch roll", "roll and spiral"))
+SINGLE = ("roll", "spiral")
+SIGNALS = {
+    "longitudinal": (("airspeed_mps", "alpha_rad", "q_radps", "theta_rad"), ("elevator_rad",)),
+    "lateral": (("beta_rad", "p_radps", "r_radps", "phi_rad"), ("aileron_rad", "rudder_rad")),
+}
+
+
+def coefficient_modes(fit: CoefficientFit, airframe: AirframeData) -> tuple[Mode, ...]:
+    """Return short period, phugoid, dutch roll, roll and spiral as far as they exist.
+
+    Parameters
+    ----------
+    fit : CoefficientFit
+    airframe : AirframeData
+        The one the fit was made with.
+    """
+    base, moved, steps = _moved(fit, airframe)
+    found = []
+    for k, pair_names in enumerate(PAIRS):
+        values, right = np.linalg.eig(base[k][0])
+        left = np.linalg.inv(right)
+        slopes = [(m[k][0] - base[k][0]) / step for m, step in zip(moved, steps, strict=True)]
+        own: dict[str, list[Mode]] = {"pair": [], "single": []}
+        for j in np.argsort(-np.abs(values)):
+            value = complex(values[j])
+            if value.imag < 0.0:
+                continue
+            gradient = np.array([left[j] @ slope @ right[:, j] for slope in slopes])
+            J = np.vstack([gradient.real, gradient.imag])
+            names_here = pair_names if value.imag > 0.0 else SINGLE if k else pair_names
+            kind = own["pair" if value.imag > 0.0 else "single"]
+            kind.append(mode_of(names_here[min(len(kind), 1)], value, J @ fit.covariance @ J.T))
+        found += [*own["pair"], *own["single"]]
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """States' rates by states (A) and inputs (B), each with its 95 % half-width."""
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    A: Array
+    B: Array
+    A_half: Array
+    B_half: Array
+
+
+def dimensional(fit: CoefficientFit, airframe: AirframeData) -> dict[str, System]:
+    """Return the linear motion that coefficients stand for, ``longitudinal`` and ``lateral``.
+
+    Parameters
+    ----------
+    fit : CoefficientFit
+    airframe : AirframeData
+        The one the fit was made with; what mass and inertia may be wrong by cancels.
+    """
+    base, moved, steps = _moved(fit, airframe)
+    found = {}
+    for k, (name, (states, inputs)) in enumerate(SIGNALS.items()):
+        halves = []
+        for part in (0, 1):
+            slope = np.stack(
+                [(m[k][part] - base[k][part]) / s for m, s in zip(moved, steps, strict=True)]
+            )
+            variance = np.einsum("iab,ij,jab->ab", slope, fit.covariance, slope)
+            halves.append(QUANTILE * np.sqrt(np.maximum(variance, 0.0)))
+        found[name] = System(states, inputs, *base[k], *halves)
+    return found
+
+
+Matrices = tuple[Array, Array]
+
+
+def _moved(
+    fit: CoefficientFit, airframe: AirframeData
+) -> tuple[tuple[Matrices, Matrices], list[tuple[Matrices, Matrices]], Array]:
+    """Return both systems, and with each unknown moved by a step; the steps."""
+    names = [d.name for d in fit.derivatives] + list(fit.errors)
+    state = np.array([d.value for d in fit.derivatives] + [e for e, _ in fit.errors.values()])
+
+    def systems(values: Array) -> tuple[Matrices, Matrices]:
+        table = dict(zip(names, values.tolist(), strict=True))
+        return longitudinal(table, fit, airframe), lateral(table, fit, airframe)
+
+    steps = 1e-3 * np.maximum(np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)), 1e-9)
+    moved = [
+        systems(state + step * row) for step, row in zip(steps, np.eye(len(state)), strict=True)
+    ]
+    return systems(state), moved, steps
+
+
+def longitudinal(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -> Matrices:
+    """Return the system of airspeed, alpha, q, theta in level flight, and its inputs."""
+    f = fit.flight
+    V, force = _moving(v, fit, a)
+    mass = a.mass_kg * (1.0 + v["mass_share"])
+    iyy = a.iyy_kgm2 * (1.0 + v["iyy_share"])
+    hat, g = 0.5 * a.chord_m / V, GRAVITY_MPS2
+    pitch = force * a.chord_m / iyy
+    # In trim the moments of air and thrust cancel; with airspeed one grows, the other falls.
+    by_speed = f.pull.arm_m * (f.pull.slope_npmps - 2.0 * f.pull.thrust_n / V) / iyy
+    A = np.array(
+        [
+            [
+                (f.pull.slope_npmps - 2.0 * force * f.drag / V) / mass,
+                g - force * v["CD_alpha"] / mass, 0.0, -g,
+            ],
+            [
+                -2.0 * g / V**2,
+                -force * (v["CL_alpha"] + f.drag) / (mass * V),
+                1.0 - force * v["CL_q"] * hat / (mass * V), 0.0,
+            ],
+            [by_speed, pitch * v["Cm_alpha"], pitch * v["Cm_q"] * hat, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+        ]
+    )  # fmt: skip
+    lifted = -force * v["CL_de"] / (mass * V)
+    return A, np.array([[-force * v["CD_de"] / mass], [lifted], [pitch * v["Cm_de"]], [0.0]])
+
+
+def lateral(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -> Matrices:
+    """Return the system of beta, p, r, phi in level flight, and its inputs."""
+    f = fit.flight
+    V, force = _moving(v, fit, a)
+    mass = a.mass_kg * (1.0 + v["mass_share"])
+    ixx, izz = (n * (1.0 + v[k]) for n, k in ((a.ixx_kgm2, "ixx_share"), (a.izz_kgm2, "izz_share")))
+    inertia = np.array([[ixx, -a.ixz_kgm2], [-a.ixz_kgm2, izz]])
+    A, B = np.zeros((4, 4)), np.zeros((4, 2))
+    hat = 0.5 * a.span_m / V
+    for j, (k, scale) in enumerate({"beta": 1.0, "p": hat, "r": hat}.items()):
+        A[0, j] = force / (mass * V) * v[f"CY_{k}"] * scale
+        moments = force * a.span_m * np.array([v[f"Cl_{k}"], v[f"Cn_{k}"]]) * scale
+        A[1:3, j] = np.linalg.solve(inertia, moments)
+    for j, k in enumerate(("da", "dr")):
+        B[0, j] = force / (mass * V) * v[f"CY_{k}"]
+        moments = force * a.span_m * np.array([v[f"Cl_{k}"], v[f"Cn_{k}"]])
+        B[1:3, j] = np.linalg.solve(inertia, moments)
+    A[0, 1:] += [np.sin(f.alpha_rad), -np.cos(f.alpha_rad), GRAVITY_MPS2 / V]
+    A[3] = 0.0, 1.0, np.tan(f.alpha_rad), 0.0
+    return A, B
+
+
+def _moving(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -> tuple[float, float]:
+    """Return airspeed and dynamic pressure times wing area, the pitot's error taken out."""
+    share = 1.0 / (1.0 + v["pitot_scale"])
+    return fit.flight.airspeed_mps * share**0.5, fit.flight.qbar_pa * share * a.wing_area_m2

@@ -1,0 +1,155 @@
+"""Windows of a flight in the frequency domain: transforms, trends, weights from residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array, BoolArray, IntArray
+from host.sysid.coefficients.rows import KINEMATIC, LATERAL, LONGITUDINAL, Equation
+from host.sysid.compatibility.signals import Spectrum
+from host.sysid.errors import IdentificationError
+
+LOW_HZ, HIGH_HZ = 0.1, 4.5
+KINEMATIC_LOW_HZ = 0.4  # below, the attitude filter's own errors rule
+TRENDS = 4  # constant to cubic, taken out of the kinematic equations; constant and slope elsewhere
+SMOOTHING_HZ, GRID = 0.5, 12  # of residual spectra
+LEAST_S = 2.0  # shortest window
+Key = tuple[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A maneuver: from and to in the time of the columns, and whether the elevator moved."""
+
+    first_s: float
+    last_s: float
+    longitudinal: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One window: its samples, frequencies, transform, transformed trends."""
+
+    samples: IntArray
+    hertz: Array
+    cosines: Array
+    sines: Array
+    trends: Spectrum
+    names: tuple[str, ...]
+
+
+def window_block(samples: IntArray, dt_s: float, window: Window) -> Block:
+    """Return the transform of one window.
+
+    Raises
+    ------
+    IdentificationError
+        If it is too short.
+    """
+    n = len(samples)
+    length = n * dt_s
+    if length < LEAST_S:
+        raise IdentificationError(
+            f"window of {length:.1f} s at {window.first_s:.1f} s: {LEAST_S:.0f} s needed"
+        )
+    hertz = np.arange(1, int(HIGH_HZ * length) + 1) / length
+    hertz = hertz[hertz >= LOW_HZ]
+    phase = np.outer(hertz, np.arange(n) * dt_s)
+    cosines, sines = (f(2.0 * np.pi * phase) / np.sqrt(n) for f in (np.cos, np.sin))
+    trend = np.linspace(-1.0, 1.0, n)[:, None] ** np.arange(TRENDS)
+    trends = cosines @ trend - 1j * (sines @ trend)
+    names = LONGITUDINAL if window.longitudinal else LATERAL
+    return Block(samples, hertz, cosines, sines, trends, names)
+
+
+def transformed(full: Mapping[str, Equation], blocks: Sequence[Block]) -> dict[Key, Spectrum]:
+    """Return left side and regressors of every equation in every window, (F, 1 + terms) each."""
+    result: dict[Key, Spectrum] = {}
+    for number, block in enumerate(blocks):
+        columns, ends = [], [0]
+        for name in block.names:
+            columns += [full[name].left, *full[name].terms.values()]
+            ends.append(len(columns))
+        table = np.stack([c[block.samples] for c in columns], axis=1)
+        table -= table.mean(axis=0)
+        spectra = block.cosines @ table - 1j * (block.sines @ table)
+        for k, name in enumerate(block.names):
+            result[name, number] = spectra[:, ends[k] : ends[k + 1]]
+    return result
+
+
+def used(block: Block, name: str) -> BoolArray:
+    """Return which frequencies of a window an equation is compared at."""
+    return block.hertz >= (KINEMATIC_LOW_HZ if name in KINEMATIC else LOW_HZ)
+
+
+def stacked(
+    blocks: Sequence[Block],
+    spectra: Mapping[Key, Spectrum],
+    left: Mapping[Key, Spectrum],
+    terms: Mapping[str, Sequence[str]],
+    slopes: Mapping[Key, Spectrum],
+    left_slopes: Mapping[Key, Spectrum],
+    own: Mapping[str, Array],
+    position: Mapping[str, int],
+    n_errors: int,
+    noise: Mapping[str, tuple[Array, Array]],
+) -> tuple[Array, Array, Array, list[tuple[str, int]]]:
+    """Return slopes, left factors and residuals, real and imaginary parts weighted."""
+    keys = [(name, k) for k, block in enumerate(blocks) for name in block.names]
+    degrees = [TRENDS if name in KINEMATIC else 2 for name, _ in keys]
+    begin = len(position) + np.concatenate([[0], np.cumsum(degrees)])
+    width = int(begin[-1]) + n_errors
+    A: list[Array] = []
+    Z: list[Array] = []
+    y: list[Array] = []
+    for n, (name, k) in enumerate(keys):
+        block, kept = blocks[k], used(blocks[k], name)
+        weight = np.sqrt(2.0) / np.ones(int(kept.sum()))
+        if name in noise:
+            weight = np.sqrt(2.0 / np.interp(block.hertz[kept], *noise[name]))
+        places = [position[f"{name}_{term}"] for term in terms[name]]
+        spectrum = spectra[name, k]
+        for source, its_slopes, target in ((spectra, slopes, A), (left, left_slopes, Z)):
+            M = np.zeros((len(block.hertz), width), np.complex128)
+            M[:, places] = source[name, k][:, 1:]
+            M[:, begin[n] : begin[n + 1]] = block.trends[:, : degrees[n]]
+            if its_slopes:
+                M[:, -n_errors:] = -its_slopes[name, k]
+            target.append(_real(M[kept] * weight[:, None]))
+        y.append(_real((spectrum[:, 0] - spectrum[:, 1:] @ own[name])[kept] * weight))
+    return np.vstack(A), np.vstack(Z), np.concatenate(y), keys
+
+
+def _real(values: Spectrum) -> Array:
+    return np.concatenate([values.real, values.imag])
+
+
+def noise_spectra(
+    blocks: Sequence[Block],
+    residual: Array,
+    keys: Sequence[Key],
+    before: Mapping[str, tuple[Array, Array]],
+) -> dict[str, tuple[Array, Array]]:
+    """Return the smoothed residual spectrum of every equation, pooled over maneuvers."""
+    found: dict[str, list[tuple[Array, Array]]] = {}
+    at = 0
+    for name, k in keys:
+        hertz = blocks[k].hertz[used(blocks[k], name)]
+        own = residual[at : at + 2 * len(hertz)].reshape(2, -1)
+        at += 2 * len(hertz)
+        power = 0.5 * np.sum(own**2, axis=0)
+        if name in before:
+            power = power * np.interp(hertz, *before[name])
+        found.setdefault(name, []).append((hertz, power))
+    grid = np.linspace(LOW_HZ, HIGH_HZ, GRID)
+    result: dict[str, tuple[Array, Array]] = {}
+    for name, parts in found.items():
+        hertz = np.concatenate([h for h, _ in parts])
+        power = np.concatenate([p for _, p in parts])
+        near = np.exp(-0.5 * ((hertz[None, :] - grid[:, None]) / SMOOTHING_HZ) ** 2)
+        result[name] = (grid, np.maximum(near @ power / near.sum(axis=1), 1e-30))
+    return result

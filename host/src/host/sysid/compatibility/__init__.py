@@ -1,0 +1,1 @@
+"""Do the sensors agree with each other? Flight-path reconstruction and corrections."""

@@ -1,0 +1,406 @@
+"""Kinematics of a flight from its own inertial sensors, with exact first-order slopes.
+
+Rates turn the attitude, specific force and gravity move the velocity: nothing aerodynamic, so what
+vanes, pitot, barometer and GPS say must agree with it whatever the aircraft is. Errors of the
+inertial sensors become errors of attitude (small turns in the earth's frame) and velocity by
+integrals along the path: Titterton & Weston, Strapdown Inertial Navigation Technology, sec. 12.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array, IntArray, compiled
+from host.sysid.numerics.problem import Response
+
+GRAVITY_MPS2 = 9.80665
+# Errors of the inertial sensors, in the order of their slopes.
+INERTIAL = (
+    *(f"gyro_bias_{a}_radps" for a in "xyz"),
+    *(f"gyro_scale_{a}" for a in "xyz"),
+    *(f"accel_bias_{a}_mps2" for a in "xyz"),
+    *(f"accel_scale_{a}" for a in "xyz"),
+    *(f"imu_tilt_{a}_rad" for a in "xyz"),
+)
+FLOW = ("alpha_scale", "alpha_zero_rad", "beta_scale", "beta_zero_rad")
+PITOT = ("pitot_scale", "pitot_zero_pa")
+DELAYS = ("vane_delay_s", "pitot_delay_s")
+PLACES = ("vane_x_m", "vane_z_m")  # of the vanes from the IMU, beyond the drawing
+WITH_GPS = ("gps_delay_s", "wind_north_mps", "wind_east_mps")
+START = ("north_mps", "east_mps", "down_mps", "turn_north_rad", "turn_east_rad", "turn_down_rad")
+AIR = ("airspeed_mps", "alpha_rad", "beta_rad")
+GPS = ("v_north_mps", "v_east_mps", "v_down_mps")
+HEIGHT = "altitude_m"
+LEAST_SPEED_MPS = 1.0
+
+
+@compiled
+def strapdown(
+    rates: Array, force: Array, attitude: Array, velocity: Array, dt_s: float
+) -> tuple[Array, Array]:
+    """Integrate attitude (n, 3, 3; body to north-east-down) and velocity (n, 3)."""
+    n = rates.shape[0]
+    turn = np.zeros((n, 3, 3))
+    moved = np.zeros((n, 3))
+    turned = np.zeros((3, 3))
+    for i in range(3):
+        moved[0, i] = velocity[i]
+        for j in range(3):
+            turn[0, i, j] = attitude[i, j]
+    for k in range(n - 1):
+        x = 0.5 * dt_s * (rates[k, 0] + rates[k + 1, 0])
+        y = 0.5 * dt_s * (rates[k, 1] + rates[k + 1, 1])
+        z = 0.5 * dt_s * (rates[k, 2] + rates[k + 1, 2])
+        angle = np.sqrt(x * x + y * y + z * z)
+        s, c = 1.0, 0.5
+        if angle > 1e-9:
+            s = np.sin(angle) / angle
+            c = (1.0 - np.cos(angle)) / (angle * angle)
+        turned[0, 0] = 1.0 - c * (y * y + z * z)
+        turned[0, 1] = c * x * y - s * z
+        turned[0, 2] = c * x * z + s * y
+        turned[1, 0] = c * x * y + s * z
+        turned[1, 1] = 1.0 - c * (x * x + z * z)
+        turned[1, 2] = c * y * z - s * x
+        turned[2, 0] = c * x * z - s * y
+        turned[2, 1] = c * y * z + s * x
+        turned[2, 2] = 1.0 - c * (x * x + y * y)
+        for i in range(3):
+            felt = 0.0
+            for j in range(3):
+                value = 0.0
+                for m in range(3):
+                    value += turn[k, i, m] * turned[m, j]
+                turn[k + 1, i, j] = value
+                felt += turn[k, i, j] * force[k, j] + value * force[k + 1, j]
+            moved[k + 1, i] = moved[k, i] + 0.5 * dt_s * felt
+        moved[k + 1, 2] += GRAVITY_MPS2 * dt_s
+    return turn, moved
+
+
+def rotation(phi: float, theta: float, psi: float) -> Array:
+    """Return the matrix from body axes to north-east-down."""
+    sp, cp, st, ct = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    ss, cs = np.sin(psi), np.cos(psi)
+    return np.array(
+        [
+            [ct * cs, sp * st * cs - cp * ss, cp * st * cs + sp * ss],
+            [ct * ss, sp * st * ss + cp * cs, cp * st * ss - sp * cs],
+            [-st, sp * ct, cp * ct],
+        ]
+    )
+
+
+def small_turn(vector: Array) -> Array:
+    """Return the rotation matrix of a turn (rad) about an axis."""
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < 1e-9:
+        return np.asarray(np.eye(3) + K)
+    return np.asarray(
+        np.eye(3) + np.sin(angle) / angle * K + (1.0 - np.cos(angle)) / angle**2 * (K @ K)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A stretch of flight on an even grid, at the CG; `start` is a first guess of it.
+
+    Attributes
+    ----------
+    dt_s : float
+    rates, force : Array, shape (n, 3)
+    density_kgpm3 : float
+        Mean.
+    airspeed_mps : Array, shape (n,)
+        As measured, smoothed: a gust from ahead changes what an angle means.
+    measured : Array, shape (p, blocks)
+        Means over the blocks of samples that count as one.
+    attitude : Array, shape (3, 3)
+        First guess at the first sample, body to north-east-down.
+    velocity_mps : Array, shape (3,)
+        First guess at the first sample.
+    fixes : IntArray, shape (blocks,)
+        Sample of the GPS fix in a block, -1 where there is none.
+    vane_s2 : float
+        One over the square of the vanes' natural frequency (rad/s); 0: a pure delay.
+    """
+
+    dt_s: float
+    rates: Array
+    force: Array
+    density_kgpm3: float
+    airspeed_mps: Array
+    measured: Array
+    attitude: Array
+    velocity_mps: Array
+    fixes: IntArray
+    vane_s2: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PathModel:
+    """What minimisation wants to know of a model: its name and its outputs."""
+
+    name: str
+    outputs: tuple[str, ...]
+
+
+class PathProblem:
+    """Outputs of all stretches as a function of sensor errors, wind and start values.
+
+    Parameters
+    ----------
+    stretches : sequence of Stretch
+    outputs : tuple of str
+        Of `AIR`, `HEIGHT` and `GPS`, in the order of `Stretch.measured`.
+    prior : dict
+        Mean and standard deviation of every common unknown; those not in it are not free.
+    start_sd : Array, shape (6,)
+        Standard deviations of the first guess of velocity and turn.
+    block : int
+        Samples averaged to one.
+    """
+
+    def __init__(
+        self,
+        stretches: Sequence[Stretch],
+        outputs: tuple[str, ...],
+        prior: dict[str, tuple[float, float]],
+        start_sd: Array,
+        block: int,
+    ) -> None:
+        self.stretches = tuple(stretches)
+        self.model = PathModel("flight path", outputs)
+        self.block = block
+        self.common = tuple(prior)
+        self._place = {name: k for k, name in enumerate(self.common)}
+        local = START + (("height_m",) if HEIGHT in outputs else ())
+        names = list(self.common)
+        self._index: list[IntArray] = []
+        for number in range(1, len(self.stretches) + 1):
+            own = np.arange(len(names), len(names) + len(local))
+            names += [f"{name}@{number}" for name in local]
+            self._index.append(np.concatenate([np.arange(len(self.common)), own]))
+        self.names = tuple(names)
+        mean, sd = (np.array(column) for column in zip(*prior.values(), strict=True))
+        own_sd = np.concatenate([start_sd, np.full(len(local) - len(START), np.inf)])
+        count = len(self.stretches)
+        self.prior_mean = np.concatenate([mean, np.zeros(count * len(local))])
+        self.prior_precision = np.concatenate([sd**-2.0, np.tile(own_sd**-2.0, count)])
+        self.lower = np.full(len(names), -np.inf)
+        self.upper = np.full(len(names), np.inf)
+
+    @property
+    def samples(self) -> int:
+        """Blocks of all stretches together."""
+        return sum(s.measured.shape[1] for s in self.stretches)
+
+    def counted(self, output: str) -> int:
+        """Return how many blocks of all stretches say something of an output."""
+        if output in GPS:
+            return sum(int(np.sum(s.fixes >= 0)) for s in self.stretches)
+        return self.samples
+
+    def columns(self, maneuver: int) -> IntArray:
+        """Return which unknowns a stretch depends on."""
+        return self._index[maneuver]
+
+    def measured(self, maneuver: int) -> Array:
+        """Return the measured outputs of a stretch, (p, blocks)."""
+        return self.stretches[maneuver].measured
+
+    def respond(self, theta: Array) -> list[Response] | None:
+        """Return outputs and slopes of all stretches; None if one is not finite."""
+        found = [self._one(s, theta[i]) for s, i in zip(self.stretches, self._index, strict=True)]
+        return found if all(np.isfinite(r.y).all() for r in found) else None
+
+    def _value(self, local: Array, names: Sequence[str]) -> Array:
+        return np.array([local[self._place[n]] if n in self._place else 0.0 for n in names])
+
+    def _one(self, s: Stretch, local: Array) -> Response:
+        common = len(self.common)
+        errors = self._value(local, INERTIAL)
+        spread, stretch, tilt = 1.0 + errors[3:6], 1.0 + errors[9:12], errors[12:15]
+        plain = (s.rates - errors[0:3]) / spread, (s.force - errors[6:9]) / stretch
+        rates, force = (x + _cross(tilt, x) for x in plain)
+        own = local[common:]
+        attitude = small_turn(own[3:6]) @ s.attitude
+        C, v = strapdown(rates, force, attitude, s.velocity_mps + own[0:3], s.dt_s)
+        step_s = self.block * s.dt_s
+        E, DV = self._path_slopes(
+            self._mean(C),
+            tuple(self._mean(x) for x in plain),
+            self._mean(force),
+            (spread, stretch),
+            step_s,
+        )
+
+        y, slopes = [], []
+        if AIR[0] in self.model.outputs:
+            wind = np.append(self._value(local, WITH_GPS[1:]), 0.0)
+            through = v - wind
+            flow = np.einsum("nij,ni->nj", C, through)
+            moving = DV + _cross_columns(self._mean(through), E)
+            for k, name in enumerate(WITH_GPS[1:]):
+                if name in self._place:
+                    moving[:, k, self._place[name]] -= 1.0
+            x = self._mean(C).transpose(0, 2, 1) @ moving
+            for late, slope in self._air(s, local, flow, x, rates):
+                y.append(late)
+                slopes.append(slope)
+        if HEIGHT in self.model.outputs:
+            slope = -self._to_middles(DV[:, 2], step_s)
+            slope[:, -1] += 1.0
+            y.append(self._mean(own[-1] - _integral(v[:, 2], s.dt_s)))
+            slopes.append(slope)
+        if GPS[0] in self.model.outputs:
+            delay = self._value(local, WITH_GPS[:1])[0]
+            for axis in range(3):
+                # GPS hops over the motion of a multisine: only its fixes count, one by one.
+                t = np.arange(len(v)) * s.dt_s
+                late = np.interp(t - delay, t, v[:, axis])
+                back = np.clip(np.arange(len(DV)) - round(delay / step_s), 0, len(DV) - 1)
+                slope = DV[back, axis]
+                self._add(slope, WITH_GPS[0], -np.gradient(late, s.dt_s)[s.fixes])
+                slope[s.fixes < 0] = 0.0
+                row = self.model.outputs.index(GPS[axis])
+                y.append(np.where(s.fixes < 0, s.measured[row], late[s.fixes]))
+                slopes.append(slope)
+        return Response(np.stack(y), np.ascontiguousarray(np.stack(slopes)))
+
+    def _path_slopes(
+        self,
+        C: Array,
+        plain: tuple[Array, ...],
+        force: Array,
+        sizes: tuple[Array, Array],
+        step_s: float,
+    ) -> tuple[Array, Array]:
+        """Return slopes of attitude (small turns) and velocity, (blocks, 3, unknowns)."""
+        common = len(self.common)
+        width = common + len(START) + (HEIGHT in self.model.outputs)
+        turning, pushing = np.zeros((2, len(C), 3, width))
+        unit = np.eye(3)
+        for into, signal, size, first in (
+            (turning, plain[0], sizes[0], 0),
+            (pushing, plain[1], sizes[1], 6),
+        ):
+            for axis in range(3):
+                bias, scale, tilt = (INERTIAL[k + axis] for k in (first, first + 3, 12))
+                if bias in self._place:
+                    into[:, axis, self._place[bias]] = -1.0 / size[axis]
+                if scale in self._place:
+                    into[:, axis, self._place[scale]] = -signal[:, axis] / size[axis]
+                if tilt in self._place:
+                    into[:, :, self._place[tilt]] = _cross(unit[axis], signal)
+        E = self._to_middles(C @ turning, step_s)
+        E[:, np.arange(3), common + 3 + np.arange(3)] += 1.0
+        felt = np.einsum("nij,nj->ni", C, force)
+        DV = self._to_middles(C @ pushing - _cross_columns(felt, E), step_s)
+        DV[:, np.arange(3), common + np.arange(3)] += 1.0
+        return E, DV
+
+    def _air(
+        self, s: Stretch, local: Array, flow: Array, x: Array, rates: Array
+    ) -> list[tuple[Array, Array]]:
+        """Return airspeed, alpha and beta as the sensors tell them, with slopes."""
+        alpha_scale, alpha_zero, beta_scale, beta_zero = self._value(local, FLOW)
+        scale, zero = self._value(local, PITOT)
+        vane_delay, pitot_delay = self._value(local, DELAYS)
+        # Angles are taken against the air as it came, gusts from ahead (3 % of speed) included.
+        least = LEAST_SPEED_MPS**2
+        came = np.maximum(s.airspeed_mps**2 - 2.0 * zero / s.density_kgpm3, least) / (1.0 + scale)
+        u = np.sqrt(np.maximum(came - flow[:, 1] ** 2 - flow[:, 2] ** 2, least))
+        speed = np.maximum(np.linalg.norm(flow, axis=1), LEAST_SPEED_MPS)
+        square = (1.0 + scale) * speed**2 + 2.0 * zero / s.density_kgpm3
+        told = np.sqrt(np.maximum(square, least))
+        result = []
+
+        late, change = self._late(told, pitot_delay, s.dt_s)
+        middle, size = self._mean(flow), self._mean(told)
+        slope = ((1.0 + scale) / size)[:, None] * np.einsum("ni,nik->nk", middle, x)
+        self._add(slope, "pitot_scale", self._mean(speed) ** 2 / (2.0 * size))
+        self._add(slope, "pitot_zero_pa", 1.0 / (s.density_kgpm3 * size))
+        self._add(slope, "pitot_delay_s", change)
+        result.append((late, slope))
+        arm_x, arm_z = self._value(local, PLACES)
+        by_x, by_z = rates[:, [1, 2]] * [-1.0, 1.0] / u[:, None], -rates[:, 0] / u
+        for across, gain, offset, name in (
+            (2, alpha_scale, alpha_zero, "alpha"),
+            (1, beta_scale, beta_zero, "beta"),
+        ):
+            along = by_x[:, 2 - across]
+            angle = np.arctan2(flow[:, across], u) + arm_x * along
+            if across == 1:
+                angle = angle + arm_z * by_z
+            told = (1.0 + gain) * angle + offset
+            # A vane is a spring: what it swings beyond a delay tau is (tau^2/2 - 1/omega^2) s^2.
+            swing = 0.5 * vane_delay**2 - s.vane_s2 if s.vane_s2 else 0.0
+            told = told + swing * np.gradient(np.gradient(told, s.dt_s), s.dt_s)
+            late, change = self._late(told, vane_delay, s.dt_s)
+            ahead, aside = self._mean(u), middle[:, across]
+            part = (1.0 + gain) / (ahead**2 + aside**2)
+            drawn = np.einsum("ni,nik->nk", middle[:, 1:], x[:, 1:]) / ahead[:, None]
+            slope = part[:, None] * (ahead[:, None] * x[:, across] + aside[:, None] * drawn)
+            self._add(slope, "pitot_scale", 0.5 * part * aside * self._mean(came) / ahead)
+            self._add(slope, "pitot_zero_pa", part * aside / (s.density_kgpm3 * ahead))
+            self._add(slope, f"{name}_scale", self._mean(angle))
+            self._add(slope, f"{name}_zero_rad", np.ones(len(slope)))
+            self._add(slope, "vane_x_m", (1.0 + gain) * self._mean(along))
+            if across == 1:
+                self._add(slope, "vane_z_m", (1.0 + gain) * self._mean(by_z))
+            self._add(slope, "vane_delay_s", change)
+            result.append((late, slope))
+        return result
+
+    def _add(self, slope: Array, name: str, value: Array) -> None:
+        if name in self._place:
+            slope[:, self._place[name]] += value
+
+    def _late(self, signal: Array, delay_s: float, dt_s: float) -> tuple[Array, Array]:
+        """Return block means of a signal read `delay_s` earlier, and their slope by it."""
+        t = np.arange(len(signal)) * dt_s
+        late = np.interp(t - delay_s, t, signal)
+        rate = np.gradient(late, dt_s)
+        return self._mean(late), -self._mean(rate)
+
+    def _to_middles(self, means: Array, step_s: float) -> Array:
+        """Integrate means of blocks from the first sample to the middle of each block."""
+        before = 0.5 / self.block * means[0]  # the first block begins half a sample early
+        return np.asarray(step_s * (np.cumsum(means, axis=0) - 0.5 * means - before))
+
+    def _mean(self, signal: Array) -> Array:
+        shape = (-1, self.block, *signal.shape[1:])
+        return np.asarray(signal.reshape(shape).mean(axis=1), dtype=np.float64)
+
+
+def _cross(vector: Array, series: Array) -> Array:
+    """Return vector x series, (n, 3)."""
+    x, y, z = vector
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(series @ K.T)
+
+
+def _cross_columns(series: Array, slopes: Array) -> Array:
+    """Return series (n, 3) x slopes (n, 3, columns)."""
+    a, b = series[:, :, None], slopes
+    return np.stack(
+        [
+            a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
+            a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
+            a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0],
+        ],
+        axis=1,
+    )
+
+
+def _integral(values: Array, dt_s: float) -> Array:
+    """Integrate along the first axis from zero (trapezoid)."""
+    result = np.zeros_like(values)
+    np.cumsum(0.5 * dt_s * (values[1:] + values[:-1]), axis=0, out=result[1:])
+    return result

@@ -1,0 +1,253 @@
+"""Prepare a flight for reconstruction: what is open before it, corrections, lively stretches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from host.compiled import Array, BoolArray
+from host.sysid.aircraft.airframe import AirframeData, corrected
+from host.sysid.aircraft.instrument_errors import DEGREE, EVEN, PAIR, InstrumentData
+from host.sysid.compatibility.flight_path import (
+    AIR,
+    DELAYS,
+    FLOW,
+    GPS,
+    HEIGHT,
+    INERTIAL,
+    LEAST_SPEED_MPS,
+    PITOT,
+    PLACES,
+    START,
+    WITH_GPS,
+    PathProblem,
+    Stretch,
+    rotation,
+)
+from host.sysid.compatibility.signals import SLIDING_RADPS
+from host.sysid.errors import IdentificationError
+from host.sysid.numerics.differentiation import local_polynomial
+
+BLOCK_S = 0.05  # samples are averaged to this: a trainer's motion is far below 10 Hz
+STRETCH_S = 12.0
+SHORT_STRETCH_S = 6.0  # without GPS nothing holds the path for longer
+# Without GPS a tilt of the IMU, a bias of an accelerometer and the attitude look alike.
+WITHOUT_GPS = (*INERTIAL[0:3], *FLOW, *DELAYS)
+MOST_STRETCHES = 8
+QUADRANTS = 4  # of heading: wind and pitot scale need them
+LAGS = (*range(0, 10), *range(10, 31, 2))  # in blocks: what an answer to a surface lasts
+START_SD = np.array([1.0, 1.0, 1.0, 5.0 * DEGREE, 5.0 * DEGREE, 20.0 * DEGREE])
+SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
+SMOOTH_S = 0.03  # half a window for derivatives: 9 Hz at 100 Hz
+SPEED_SMOOTH_S = 0.25  # half a window: one count of the pitot is 1.4 % of trim speed
+SMOOTHED = "airspeed_mps smoothed"
+BEND_MPS = 1e-6
+DENSITY_SHARE = 0.01  # a barometer in a warm fuselage reads 3 K high
+FLYING = 0.5  # of the median airspeed
+# What no calibration says: deviation of the steady wind, delays of vanes and GPS.
+WIND_SD_MPS = 10.0
+VANE_DELAY_S = (0.010, 0.010)
+GPS_DELAY_S = (0.10, 0.08)
+
+
+def prepare(
+    columns: Mapping[str, Array],
+    airframe: AirframeData | None,
+    instrument: InstrumentData | None,
+) -> tuple[PathProblem, list[Array], tuple[tuple[float, float], ...]]:
+    """Return the problem, what the pilot did in every stretch, and when the stretches were (s).
+
+    Raises
+    ------
+    IdentificationError
+        If inertial sensors or all air data are missing, or nothing of the flight is long enough.
+    """
+    inertial = [*(f"{a}_radps" for a in "pqr"), *(f"a{a}_mps2" for a in "xyz")]
+    missing = [c for c in (*inertial, *AIR, "t_s") if c not in columns]
+    if missing:
+        raise IdentificationError(f"data compatibility needs {', '.join(missing)}")
+    gps = all(name in columns for name in GPS)
+    outputs = AIR + ((HEIGHT,) if HEIGHT in columns else ()) + (GPS if gps else ())
+    wanted = {*inertial, *outputs, "t_s", "phi_rad", "theta_rad", "psi_rad", "density_kgpm3"}
+    data = {k: v for k, v in columns.items() if k in wanted}
+    dt_s = float(data["t_s"][1] - data["t_s"][0])
+    if instrument is not None:
+        data |= {name: _unstuck(data, name, instrument, dt_s) for name in AIR[1:]}
+        data |= {name: _unfiltered(data[name], instrument, dt_s) for name in inertial}
+    if airframe is not None:
+        data = _at_cg(data, airframe, dt_s)
+    block = max(1, round(BLOCK_S / dt_s))
+    half = max(2, round(SPEED_SMOOTH_S / dt_s))
+    data[SMOOTHED] = local_polynomial(data[AIR[0]][:, None], 2 * half + 1, 2)[:, 0]
+    fixes = _fixes(data) if gps else np.zeros(len(data["t_s"]), dtype=bool)
+    cuts = _cuts(data, dt_s, block, STRETCH_S if gps else SHORT_STRETCH_S)
+    vane = 0.0 if instrument is None else 1.0 / (2.0 * np.pi * instrument.vane_hz_per_mps)
+    stretches = [_stretch(data, cut, outputs, dt_s, block, vane, fixes[cut]) for cut in cuts]
+    start_sd = START_SD if gps else np.where(np.arange(len(START)) == 5, 1e-6, START_SD)
+    open_now = prior(instrument)
+    if not gps:
+        open_now = {k: v for k, v in open_now.items() if k in WITHOUT_GPS}
+    problem = PathProblem(stretches, outputs, open_now, start_sd, block)
+    t = data["t_s"]
+    when = tuple((float(t[c.start]), float(t[c.stop - 1])) for c in cuts)
+    return problem, [_follows(columns, cut, block) for cut in cuts], when
+
+
+def prior(instrument: InstrumentData | None) -> dict[str, tuple[float, float]]:
+    """Return mean and standard deviation of every unknown before the flight."""
+    i = instrument or InstrumentData(
+        (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), upwash=0.1, upwash_share=0.2, vane_hz_per_mps=1.0,
+        vane_damping=0.1, vane_friction_rad=0.0, friction_speed_mps=1.0, pitot_lag_s=0.010,
+    )  # fmt: skip
+    result = dict.fromkeys(INERTIAL[0:3], (0.0, i.gyro_bias_radps * EVEN))
+    result |= dict.fromkeys(INERTIAL[3:6], (0.0, i.gyro_scale * EVEN))
+    result |= dict.fromkeys(INERTIAL[6:9], (0.0, i.accel_bias_mps2 * EVEN))
+    result |= dict.fromkeys(INERTIAL[9:12], (0.0, i.accel_scale * EVEN))
+    result |= dict.fromkeys(INERTIAL[12:15], (0.0, i.misalignment_rad * EVEN))
+    vane, upwash = i.vane_scale * EVEN * PAIR, i.upwash * i.upwash_share * EVEN * PAIR
+    zero = i.vane_zero_rad * EVEN * PAIR
+    sd = {
+        "alpha_scale": float(np.hypot(vane, upwash)),
+        "alpha_zero_rad": zero,
+        "beta_scale": vane,
+        "beta_zero_rad": zero,
+        "pitot_scale": float(np.hypot(i.pitot_scale * EVEN * PAIR, DENSITY_SHARE)),
+        "pitot_zero_pa": i.pitot_drift_pa * EVEN * PAIR,
+    }
+    result |= {name: (0.0, sd[name]) for name in (*FLOW, *PITOT)}
+    result |= dict(zip(DELAYS, (VANE_DELAY_S, (i.pitot_lag_s, i.pitot_lag_s)), strict=True))
+    # Both were measured from the same point: where the balance is does not matter.
+    place = i.position_m * EVEN * float(np.hypot(1.0, PAIR))
+    result |= dict.fromkeys(PLACES, (0.0, place))
+    wind = (0.0, WIND_SD_MPS)
+    result |= dict(zip(WITH_GPS, (GPS_DELAY_S, wind, wind), strict=True))
+    return {name: (float(mean), float(sd)) for name, (mean, sd) in result.items()}
+
+
+def _unstuck(data: Mapping[str, Array], name: str, i: InstrumentData, dt_s: float) -> Array:
+    """Return a vane's angle with its dry friction undone: it hangs back where it moves."""
+    angle = data[name]
+    window = 2 * max(2, round(SMOOTH_S / dt_s)) + 1
+    moving = local_polynomial(angle[:, None], window, 2, derivative=1, dt_s=dt_s)[:, 0]
+    slower = i.friction_speed_mps / np.maximum(data[AIR[0]], LEAST_SPEED_MPS)
+    hold = i.vane_friction_rad * np.minimum(slower, 3.0) ** 2
+    return np.asarray(angle + hold * np.tanh(moving / SLIDING_RADPS))
+
+
+def _unfiltered(signal: Array, i: InstrumentData, dt_s: float) -> Array:
+    """Return an inertial signal with the loss of its low-pass and of interpolation undone."""
+    lost_s2 = 0.5 / (2.0 * np.pi * i.imu_bandwidth_hz) ** 2 + dt_s**2 / 12.0
+    return np.asarray(signal - lost_s2 * np.gradient(np.gradient(signal, dt_s), dt_s))
+
+
+def _at_cg(data: dict[str, Array], airframe: AirframeData, dt_s: float) -> dict[str, Array]:
+    """Correct for position, upwash and rotation with rates smoothed for their derivative."""
+    smooth = dict(data)
+    window = 2 * max(2, round(SMOOTH_S / dt_s)) + 1
+    for axis in "pqr":
+        name = f"{axis}_radps"
+        smooth[name] = local_polynomial(data[name][:, None], window, 2)[:, 0]
+    moved = corrected(smooth, airframe)
+    return {**moved, **{f"{axis}_radps": data[f"{axis}_radps"] for axis in "pqr"}}
+
+
+def _cuts(data: Mapping[str, Array], dt_s: float, block: int, length_s: float) -> list[slice]:
+    """Return the stretches that tell most: something of every heading, then the liveliest."""
+    samples = max(block, round(length_s / dt_s) // block * block)
+    speed = np.nan_to_num(data["airspeed_mps"])
+    flying = speed > max(FLYING * float(np.median(speed)), LEAST_SPEED_MPS)
+    candidates = [
+        slice(k, k + samples)
+        for k in range(0, len(speed) - samples + 1, samples)
+        if flying[k : k + samples].all()
+    ]
+    if not candidates:
+        raise IdentificationError(
+            f"data compatibility: no {length_s:.0f} s of flight without interruption"
+        )
+    rates = np.stack([data[f"{a}_radps"] for a in "pqr"])
+    life = {c.start: float(np.sum(np.var(rates[:, c], axis=1))) for c in candidates}
+    chosen: list[slice] = []
+    if "psi_rad" in data:
+        middle = np.array([np.median(data["psi_rad"][c]) for c in candidates])
+        for quadrant in range(QUADRANTS):
+            low = 2.0 * np.pi * quadrant / QUADRANTS
+            own = [
+                c
+                for c, psi in zip(candidates, np.mod(middle, 2.0 * np.pi), strict=True)
+                if low <= psi < low + 2.0 * np.pi / QUADRANTS
+            ]
+            chosen += sorted(own, key=lambda c: -life[c.start])[:1]
+    rest = sorted((c for c in candidates if c not in chosen), key=lambda c: -life[c.start])
+    chosen += rest[: MOST_STRETCHES - len(chosen)]
+    return sorted(chosen, key=lambda c: c.start)
+
+
+def _fixes(data: Mapping[str, Array]) -> BoolArray:
+    """Return at which samples GPS spoke: between them a decoded table runs straight."""
+    bend = sum(np.abs(np.diff(data[name], n=2)) for name in GPS)
+    bend = np.concatenate([[0.0], bend, [0.0]])
+    known = bend > BEND_MPS
+    peak = (bend >= np.roll(bend, 1)) & (bend > np.roll(bend, -1))
+    return np.asarray(known & peak)
+
+
+def _follows(columns: Mapping[str, Array], cut: slice, block: int) -> Array:
+    """Return what the pilot did, at lags of whole blocks, (blocks, surfaces x lags)."""
+    at = np.arange(cut.start, cut.stop)
+    lagged = [
+        columns[name][np.maximum(at - lag * block, 0)].reshape(-1, block).mean(axis=1)
+        for name in SURFACES
+        if name in columns
+        for lag in LAGS
+    ]
+    return np.column_stack(lagged) if lagged else np.zeros((len(at) // block, 0))
+
+
+def _stretch(
+    data: Mapping[str, Array],
+    cut: slice,
+    outputs: tuple[str, ...],
+    dt_s: float,
+    block: int,
+    vane_s_mps: float,
+    fixes: BoolArray,
+) -> Stretch:
+    gps = bool(fixes.any())
+    zero = np.zeros(cut.stop - cut.start)
+    measured = np.stack([data[name][cut].reshape(-1, block).mean(axis=1) for name in outputs])
+    blocks = fixes.reshape(-1, block)
+    first = np.arange(len(blocks)) * block + np.argmax(blocks, axis=1)
+    at = np.where(blocks.any(axis=1), first, -1)
+    for row, name in enumerate(outputs):
+        if name in GPS:
+            measured[row] = np.where(at < 0, measured[row], data[name][cut][at])
+    # Without a compass or GPS heading is anything, and nothing depends on it.
+    angles = [
+        float(data.get(f"{a}_rad", zero)[cut.start if f"{a}_rad" in data else 0])
+        for a in ("phi", "theta", "psi")
+    ]
+    if not gps:
+        angles[2] = 0.0
+    attitude = rotation(*angles)
+    speed, alpha, beta = (float(np.median(data[name][cut][:block])) for name in AIR)
+    through = speed * np.array(
+        [np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)]
+    )
+    velocity = attitude @ through
+    if gps:
+        velocity = np.array([float(np.median(data[name][cut][:block])) for name in GPS])
+    density = data.get("density_kgpm3", np.full(cut.stop, 1.225))
+    return Stretch(
+        dt_s=dt_s,
+        rates=np.column_stack([data[f"{a}_radps"][cut] for a in "pqr"]),
+        force=np.column_stack([data[f"a{a}_mps2"][cut] for a in "xyz"]),
+        density_kgpm3=float(np.mean(density[cut])),
+        airspeed_mps=data[SMOOTHED][cut],
+        measured=measured,
+        attitude=attitude,
+        velocity_mps=velocity,
+        fixes=at.astype(np.int64),
+        vane_s2=(vane_s_mps / float(np.median(data[AIR[0]][cut]))) ** 2,
+    )

@@ -1,0 +1,139 @@
+"""Fit sensor errors along a flight path although the aircraft answers to gusts.
+
+Vanes and pitot feel the gust itself, and a moment later so do the accelerometers that predict
+them: least squares takes an aircraft that rides with slow gusts for vanes that under-read (by half
+in light turbulence if residuals are taken for white, by 6 % if their memory is modelled). So the
+slopes of air data are replaced by the part of them that follows the control surfaces: instrumental
+variables, which know nothing of gusts (Soderstrom & Stoica 1983). Residuals are whitened by a short
+memory, so that the covariance is that of white noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.compatibility.flight_path import AIR, GPS, PathProblem
+from host.sysid.errors import IdentificationError
+from host.sysid.numerics.noise import OutputNoise, lagged_moments, regress
+
+ORDER = 2  # memory of the residuals: a gust and a sensor
+MOST_ITERATIONS = 25
+MEMORY_FROM = 2  # iteration at which residuals are worth modelling
+MEMORY_UNTIL = 5  # from then on memory and instruments stay, and the equations can settle
+SETTLED = 0.05  # of a standard error: the last step
+DRIFT_POWERS = 4  # constants to cubics follow no gust either
+LARGEST_STEP = 4.0  # in prior deviations
+
+
+@dataclass(frozen=True)
+class PathFit:
+    """Estimate, covariance, residuals of a reconstruction."""
+
+    theta: Array
+    covariance: Array
+    residuals: Sequence[Array]
+    iterations: int
+    converged: bool
+
+
+def fit_path(problem: PathProblem, follows: Sequence[Array]) -> PathFit:
+    """Solve the instrumented equations.
+
+    Parameters
+    ----------
+    problem : PathProblem
+    follows : sequence of Array, shape (blocks, columns)
+        Per stretch what the pilot did: surfaces at several lags. No columns: plain least squares.
+
+    Raises
+    ------
+    IdentificationError
+        If the path is not finite at some step or the equations are singular.
+    """
+    theta = problem.prior_mean.copy()
+    outputs = problem.model.outputs
+    noise = [OutputNoise.white() for _ in outputs]
+    held: dict[int, list[Array]] = {}
+    converged = False
+    iteration = 0
+    while True:
+        responses = problem.respond(theta)
+        if responses is None:
+            raise IdentificationError("data compatibility: the flight path is not finite")
+        residuals = [problem.measured(k) - r.y for k, r in enumerate(responses)]
+        learning = MEMORY_FROM <= iteration <= MEMORY_UNTIL
+        H = np.diag(problem.prior_precision)
+        B = H.copy()
+        g = problem.prior_precision * (problem.prior_mean - theta)
+        for j, name in enumerate(outputs):
+            if learning and name not in GPS:
+                noise[j] = _memory([r[j] for r in residuals])
+            white = [noise[j].whiten(r[j][:, None])[:, 0] for r in residuals]
+            slopes = [noise[j].whiten(r.slopes[j]) for r in responses]
+            variance = float(np.sum(np.concatenate(white) ** 2)) / problem.counted(name)
+            variance = max(variance, 1e-300)
+            if learning and name in AIR:
+                held[j] = _instruments(problem, slopes, follows, noise[j])
+            tools = held.get(j, slopes)
+            for k, (e, J, Z) in enumerate(zip(white, slopes, tools, strict=True)):
+                own = problem.columns(k)
+                block = np.ix_(own, own)
+                H[block] += Z.T @ J / variance
+                B[block] += Z.T @ Z / variance
+                g[own] += Z.T @ e / variance
+        size = np.sqrt(np.maximum(np.abs(np.diag(H)), 1e-300))
+        try:
+            inverse = np.linalg.inv(H / np.outer(size, size)) / np.outer(size, size)
+        except np.linalg.LinAlgError as error:
+            raise IdentificationError("data compatibility: singular equations") from error
+        if converged or iteration == MOST_ITERATIONS:
+            covariance = inverse @ B @ inverse.T
+            both = 0.5 * (covariance + covariance.T)
+            return PathFit(theta, both, residuals, iteration, converged)
+        step = inverse @ g
+        with np.errstate(divide="ignore"):
+            most = LARGEST_STEP / np.sqrt(problem.prior_precision)
+        theta = theta + np.clip(step, -most, most)
+        iteration += 1
+        error_size = np.sqrt(np.maximum(np.abs(np.diag(inverse)), 1e-300))
+        small = bool(np.all(np.abs(step) < SETTLED * error_size))
+        converged = small and iteration > MEMORY_FROM + 1
+
+
+def _memory(residuals: Sequence[Array]) -> OutputNoise:
+    none = [np.zeros((len(r), 0)) for r in residuals]
+    coefficient, _ = regress(lagged_moments(residuals, none, ORDER), ORDER)
+    return OutputNoise.from_coefficient(coefficient)
+
+
+def _instruments(
+    problem: PathProblem,
+    slopes: Sequence[Array],
+    follows: Sequence[Array],
+    memory: OutputNoise,
+) -> list[Array]:
+    """Return the part of whitened slopes that follows surfaces, slow drift and the wind's angle."""
+    if not follows[0].shape[1]:
+        return list(slopes)
+    common = len(problem.common)
+    wind = [k for k, name in enumerate(problem.common) if name.startswith("wind_")]
+    count = len(slopes)
+    bases = []
+    for k, (slope, moved) in enumerate(zip(slopes, follows, strict=True)):
+        t = np.linspace(-1.0, 1.0, len(moved))[:, None]
+        drift = np.zeros((len(moved), count * DRIFT_POWERS))
+        drift[:, k * DRIFT_POWERS : (k + 1) * DRIFT_POWERS] = t ** np.arange(DRIFT_POWERS)
+        bases.append(np.hstack([memory.whiten(np.hstack([drift, moved])), slope[:, wind]]))
+    Q, _ = np.linalg.qr(np.vstack(bases))
+    ends = np.cumsum([len(b) for b in bases])
+    parts = np.split(Q, ends[:-1])
+    # Common unknowns are pooled over stretches, each one's own start values are its own.
+    pooled = sum(part.T @ slope[:, :common] for part, slope in zip(parts, slopes, strict=True))
+    return [
+        np.hstack([part @ pooled, part @ (part.T @ slope[:, common:])])
+        for part, slope in zip(parts, slopes, strict=True)
+    ]

@@ -1,0 +1,194 @@
+"""Data compatibility: do vanes, pitot, barometer and GPS agree with what the inertial sensors say?
+
+Flight-path reconstruction by output error over the kinematics (`flight_path`): sensor errors and
+wind are common to all stretches of the flight, start values their own. What the calibration leaves
+open is the prior, so that an interval never pretends. Klein & Morelli, Aircraft System
+Identification, ch. 10; Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 10.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.aircraft.instrument_errors import InstrumentData
+from host.sysid.compatibility.flight_path import FLOW, GPS, INERTIAL
+from host.sysid.compatibility.path_data import prepare, prior
+from host.sysid.compatibility.path_fit import fit_path
+from host.sysid.errors import IdentificationError
+
+TOLD = 0.7  # of the prior's deviation: what stays above is the calibration's word, not the data's
+VANE_MODEL = 0.006  # of scale: dry friction known to 20 % of its 3 %
+# Without GPS only vanes and pitot hold the path, gusts and all: on eight flights rms errors
+# were up to 2.5 times what the equations say, more for biases of the gyro.
+GUSTY = 2.5
+HIDDEN = INERTIAL[0:3]
+NORMAL = 1.959964  # 97.5 % of the normal distribution
+REASONS = {
+    "pitot_scale": "wind and scale look alike on one heading, gusts hide it: fly full turns",
+    "pitot_zero_pa": "fly slow and fast parts, or zero the pitot at rest",
+}
+REASONS_NO_GPS = {
+    "pitot_scale": "unobservable without GPS: no other sensor knows the speed",
+    "pitot_zero_pa": "unobservable without GPS: no other sensor knows the speed",
+    "wind_north_mps": "unobservable without GPS",
+    "wind_east_mps": "unobservable without GPS",
+    "gps_delay_s": "no GPS",
+}
+USUAL = "the motion flown does not show it; the calibration stands"
+USUAL_NO_GPS = "not told from attitude and gusts without GPS; the calibration stands"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One sensor error: estimate, 95 % half-width, and the half-width the calibration left open.
+
+    `told` is false where the data say no more than the calibration did; `reason` says why and what
+    to fly.
+    """
+
+    name: str
+    value: float
+    half_width: float
+    prior_half_width: float
+    told: bool
+    reason: str
+
+    @property
+    def significant(self) -> bool:
+        """Whether the data tell an error that is not zero."""
+        return self.told and abs(self.value) > self.half_width
+
+
+@dataclass(frozen=True)
+class Compatibility:
+    """What flight-path reconstruction found.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        Sensor errors, delays behind the IMU, steady wind.
+    rms : dict
+        Residual of each output, over all stretches.
+    stretches : tuple of (from, to), s
+        What it rests on.
+    gps : bool
+    """
+
+    findings: tuple[Finding, ...]
+    rms: dict[str, float]
+    stretches: tuple[tuple[float, float], ...]
+    gps: bool
+
+    def __getitem__(self, name: str) -> Finding:
+        """Return a finding by name."""
+        return next(f for f in self.findings if f.name == name)
+
+
+def reconstruct(
+    columns: Mapping[str, Array],
+    airframe: AirframeData | None = None,
+    instrument: InstrumentData | None = None,
+) -> Compatibility:
+    """Reconstruct the flight path and estimate what the sensors are wrong by.
+
+    Parameters
+    ----------
+    columns : mapping
+        Even SI columns as `tables.read_columns` gives them, not yet corrected for position.
+    airframe : AirframeData, optional
+        Places of the sensors and upwash; without, vanes and IMU are taken to sit at the CG.
+    instrument : InstrumentData, optional
+        What the calibration leaves open; usual values without.
+
+    Raises
+    ------
+    IdentificationError
+        If inertial sensors or all air data are missing, nothing of the flight is long enough, or
+        the equations do not settle.
+    """
+    problem, follows, when = prepare(columns, airframe, instrument)
+    fit = fit_path(problem, follows)
+    if not fit.converged:
+        raise IdentificationError(
+            f"data compatibility: no agreement after {fit.iterations} iterations; a sensor is"
+            " further off than its calibration allows"
+        )
+    gps = GPS[0] in problem.model.outputs
+    count = len(problem.common)
+    covariance = fit.covariance[:count, :count]
+    scales = [problem.common.index(name) for name in FLOW[::2]]
+    covariance[scales, scales] += VANE_MODEL**2
+    findings = []
+    for name, (mean, sd) in prior(instrument).items():
+        known = name in problem.common and (gps or name not in HIDDEN)
+        k = problem.common.index(name) if known else None
+        deviation = sd if k is None else float(np.sqrt(covariance[k, k]))
+        deviation = deviation if gps else min(GUSTY * deviation, sd)
+        told = deviation < TOLD * sd
+        findings.append(
+            Finding(
+                name=name,
+                value=mean if k is None else float(fit.theta[k]),
+                half_width=NORMAL * deviation,
+                prior_half_width=NORMAL * sd,
+                told=told,
+                reason="" if told else _reason(name, gps=gps),
+            )
+        )
+    squares = np.sum(np.hstack(fit.residuals) ** 2, axis=1)
+    rms = {
+        name: float(np.sqrt(q / problem.counted(name)))
+        for name, q in zip(problem.model.outputs, squares, strict=True)
+    }
+    return Compatibility(tuple(findings), rms, when, gps)
+
+
+def _reason(name: str, *, gps: bool) -> str:
+    if gps:
+        return REASONS.get(name, USUAL)
+    return REASONS_NO_GPS.get(name, USUAL_NO_GPS)
+
+
+def words(found: Compatibility) -> list[str]:
+    """Return the paragraph of a verdict: errors found, then what the data cannot tell and why."""
+    lines = [
+        f"data compatibility over {len(found.stretches)} stretches,"
+        f" {'with' if found.gps else 'without'} GPS:"
+    ]
+    wrong = [f for f in found.findings if f.significant]
+    lines += [f"  {f.name:20s} {f.value:11.4g}  +- {f.half_width:8.2g}" for f in wrong]
+    if not wrong:
+        lines.append("  no sensor error stands out of its interval")
+    reasons: dict[str, list[str]] = {}
+    for f in found.findings:
+        if not f.told:
+            reasons.setdefault(f.reason, []).append(f.name)
+    for why, names in reasons.items():
+        text = f"  not told: {', '.join(names)} ({why})"
+        lines += textwrap.wrap(text, 100, initial_indent="  ", subsequent_indent="    ")
+    return lines
+
+
+def document(found: Compatibility) -> dict[str, object]:
+    """Return everything for JSON."""
+    return {
+        "gps": found.gps,
+        "stretches_s": [list(s) for s in found.stretches],
+        "residual_rms": found.rms,
+        "findings": {
+            f.name: {
+                "value": f.value,
+                "half_width": f.half_width,
+                "calibration_half_width": f.prior_half_width,
+                "told": f.told,
+                "reason": f.reason,
+            }
+            for f in found.findings
+        },
+    }

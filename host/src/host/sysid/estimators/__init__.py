@@ -1,0 +1,1 @@
+"""One file per method, behind the door `fit`."""

@@ -1,0 +1,385 @@
+"""Equation error: regress measured rates and accelerations on measured states and inputs.
+
+Ordinary, weighted, robust (Huber, iteratively reweighted) and total least squares on one set of
+regression rows. Klein & Morelli, Aircraft System Identification, ch. 5; Van Huffel & Vandewalle,
+The Total Least Squares Problem, sec. 3.5 (exact columns); Huber, Robust Statistics, sec. 7.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from host.compiled import Array, IntArray
+from host.sysid.errors import IdentificationError
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.result import FitResult
+from host.sysid.numerics.colour import coloured_middle
+from host.sysid.numerics.differentiation import (
+    signal_bandwidth_hz,
+    smooth,
+    smooth_and_differentiate,
+)
+from host.sysid.numerics.problem import check_shapes
+
+HUBER_LIMIT = 1.345  # 95 % efficiency on normal residuals (Huber 1981)
+MAD_TO_SIGMA = 1.4826
+COLLINEAR = 1e12  # condition number of scaled regressors at which double precision gives up
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One regression: `target` = `regressors` @ theta + residual, in one maneuver.
+
+    `equation` numbers the equation across maneuvers, `noisy` marks regressors made of measured
+    states (inputs and constants are exact).
+    """
+
+    equation: int
+    label: str
+    maneuver: int
+    target: Array
+    regressors: Array
+    noisy: Array
+
+
+def regression_rows(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    bandwidth: float | None = None,
+    use_rates: bool = True,
+) -> tuple[tuple[str, ...], list[Row]]:
+    """Write the model as regressions.
+
+    Parameters
+    ----------
+    model : LinearModel
+        Every state must be measured.
+    maneuvers : sequence of Maneuver
+        Data; measured rates are used as they are, others come from differentiation.
+    bandwidth : float, optional
+        Half-power frequency of smoothing and differentiation, Hz; found from the data without.
+    use_rates : bool
+        Use measured rates where a maneuver has them.
+
+    Returns
+    -------
+    names : tuple of str
+        Parameters: the common ones, then rate biases and output biases per maneuver.
+    rows : list of Row
+        State equations, then outputs that are no state, where anything is free.
+    """
+    measured = model.measured_states()
+    n_common = len(model.parameters)
+    extra = [j for j in range(len(model.outputs)) if j not in set(measured.tolist())]
+    extra_biases = [y for y in model.output_biases if model.outputs.index(y) in extra]
+    names = [p.name for p in model.parameters]
+    for number in range(1, len(maneuvers) + 1):
+        names += [f"bias_rate.{s}@{number}" for s in model.state_biases]
+        names += [f"bias.{y}@{number}" for y in extra_biases]
+    n_local = len(model.state_biases) + len(extra_biases)
+    state_entries, output_entries = model.entries("AB"), model.entries("CD")
+    rows: list[Row] = []
+    for number, maneuver in enumerate(maneuvers):
+        check_shapes(model, maneuver)
+        states, inputs, rates, outputs = _signals(model, maneuver, measured, bandwidth, use_rates)
+        z = np.hstack([states, inputs])
+        place = n_common + number * n_local
+        for entries, fixed, left, indices, biases, offset in (
+            (state_entries, np.hstack([model.A, model.B]), rates, range(len(model.states)),
+             [model.states.index(s) for s in model.state_biases], place),
+            (output_entries, np.hstack([model.C, model.D]), outputs, extra,
+             [model.outputs.index(y) for y in extra_biases], place + len(model.state_biases)),
+        ):  # fmt: skip
+            for i in indices:
+                regressors = np.zeros((len(z), len(names)))
+                noisy = np.zeros(len(names))
+                for k in np.flatnonzero(entries.row == i):
+                    column, parameter = entries.column[k], entries.parameter[k]
+                    regressors[:, parameter] += entries.gain[k] * z[:, column]
+                    noisy[parameter] = float(column < len(model.states))
+                if i in biases:
+                    regressors[:, offset + biases.index(i)] = 1.0
+                if not regressors.any():
+                    continue
+                is_state = left is rates
+                rows.append(
+                    Row(
+                        equation=i if is_state else len(model.states) + i,
+                        label=model.states[i] if is_state else model.outputs[i],
+                        maneuver=number,
+                        target=left[:, i] - z @ fixed[i],
+                        regressors=regressors,
+                        noisy=noisy,
+                    )
+                )
+    return tuple(names), rows
+
+
+def _signals(
+    model: LinearModel,
+    maneuver: Maneuver,
+    measured: IntArray,
+    bandwidth: float | None,
+    use_rates: bool,
+) -> tuple[Array, Array, Array, Array]:
+    """Return states, inputs, rates and outputs, all with the same smoothing."""
+    raw = maneuver.outputs[:, measured]
+    if use_rates and maneuver.rates is not None:
+        return raw, maneuver.inputs, maneuver.rates, maneuver.outputs
+    edge = bandwidth if bandwidth is not None else signal_bandwidth_hz(raw, maneuver.dt_s)
+    states, rates = smooth_and_differentiate(raw, maneuver.dt_s, edge)
+    inputs = maneuver.inputs
+    if model.hold == "zoh":
+        # A held input jumps at its sample; seen at that instant it is the mean of both sides.
+        inputs = 0.5 * (inputs + np.vstack([inputs[:1], inputs[:-1]]))
+    outputs = maneuver.outputs
+    if outputs.shape[1] > len(measured):
+        outputs = smooth(outputs, maneuver.dt_s, edge)
+    return states, smooth(inputs, maneuver.dt_s, edge), rates, outputs
+
+
+def solve_rows(rows: Sequence[Row], n_parameters: int, weights: Array | None = None) -> Array:
+    """Solve the stacked regressions by normal equations, columns scaled first.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        Regressions.
+    n_parameters : int
+        Length of the solution.
+    weights : Array, optional
+        One weight per row of `rows`.
+
+    Raises
+    ------
+    IdentificationError
+        If the regressors are collinear to working precision.
+    """
+    normal, right = normal_equations(rows, n_parameters, weights)
+    return solve_normal(normal, right)
+
+
+def normal_equations(
+    rows: Sequence[Row], n_parameters: int, weights: Array | None = None
+) -> tuple[Array, Array]:
+    """Return X'WX and X'Wy over all rows."""
+    normal = np.zeros((n_parameters, n_parameters))
+    right = np.zeros(n_parameters)
+    for k, row in enumerate(rows):
+        weight = 1.0 if weights is None else float(weights[k])
+        active = np.flatnonzero(row.regressors.any(axis=0))
+        block = row.regressors[:, active]
+        normal[np.ix_(active, active)] += weight * (block.T @ block)
+        right[active] += weight * (block.T @ row.target)
+    return normal, right
+
+
+def solve_normal(normal: Array, right: Array) -> Array:
+    """Solve symmetric normal equations after scaling; refuse singular ones."""
+    scale = np.sqrt(np.diag(normal))
+    if np.any(scale == 0.0):
+        raise IdentificationError("a parameter has no regressor: its state or input never moved")
+    scaled = normal / np.outer(scale, scale)
+    try:
+        factor = linalg.cho_factor(scaled)
+    except linalg.LinAlgError as error:
+        raise IdentificationError(
+            "collinear regressors: the data do not tell the free entries apart"
+        ) from error
+    return np.asarray(linalg.cho_solve(factor, right / scale) / scale, dtype=np.float64)
+
+
+def fit_equation_error(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    variant: str = "ordinary",
+    deviations: tuple[Array, Array] | None = None,
+    bandwidth: float | None = None,
+    use_rates: bool = True,
+) -> FitResult:
+    """Fit by equation error.
+
+    Parameters
+    ----------
+    model, maneuvers
+        See `regression_rows`.
+    variant : str
+        ``ordinary``, ``weighted`` (equations weighted by their residual variance; differs only
+        with tied entries), ``robust`` (Huber) or ``total`` (errors in states as well as rates).
+    deviations : tuple of Array, optional
+        For ``total``: noise standard deviations of the states and of the rates, each of shape
+        (n,). Without, they come from third differences, which takes fast signals for noise.
+    bandwidth, use_rates
+        See `regression_rows`.
+    """
+    names, rows = regression_rows(model, maneuvers, bandwidth=bandwidth, use_rates=use_rates)
+    warnings: list[str] = []
+    sample_weights = [np.ones(len(row.target)) for row in rows]
+    iterations = 1
+    theta = (
+        _total(model, rows, len(names), deviations)
+        if variant == "total"
+        else solve_rows(rows, len(names))
+    )
+    if variant in ("weighted", "robust"):
+        while iterations < 50:
+            iterations += 1
+            scales = _equation_scales(rows, theta, robust=variant == "robust")
+            before = theta
+            if variant == "robust":
+                for k, row in enumerate(rows):
+                    size = np.abs(row.target - row.regressors @ theta) / scales[k]
+                    sample_weights[k] = np.minimum(1.0, HUBER_LIMIT / np.maximum(size, 1e-12))
+            theta = solve_rows(_weighted(rows, sample_weights), len(names), scales**-2.0)
+            if np.all(np.abs(theta - before) <= 1e-8 * np.abs(theta) + 1e-14):
+                break
+    elif variant not in ("ordinary", "total"):
+        raise IdentificationError(
+            f"equation error '{variant}' unknown; use ordinary, weighted, robust or total"
+        )
+    scales = _equation_scales(rows, theta, robust=False, dof=len(names))
+    used = _weighted(rows, sample_weights)
+    normal, _ = normal_equations(used, len(names), scales**-2.0)
+    white = np.linalg.pinv(normal, hermitian=True)
+    coloured = coloured_covariance(used, theta, white, scales)
+    labels = sorted({row.equation for row in rows})
+    residuals, fitted = [], []
+    for number in range(len(maneuvers)):
+        mine = [row for row in rows if row.maneuver == number]
+        fitted.append(np.column_stack([row.regressors @ theta for row in mine]))
+        residuals.append(np.column_stack([row.target for row in mine]) - fitted[-1])
+    stacked = np.vstack(residuals)
+    if len(labels) != stacked.shape[1]:
+        warnings.append("some equations are missing in some maneuvers")
+    return FitResult(
+        method=f"equation error ({variant})",
+        model=model,
+        names=names,
+        estimate=theta,
+        covariance=coloured,
+        covariance_white=white,
+        degrees_of_freedom=np.full(len(names), float(max(len(stacked) - len(names), 1))),
+        residuals=tuple(residuals),
+        fitted=tuple(fitted),
+        residual_kind="rate",
+        noise_covariance=np.atleast_2d(np.cov(stacked.T)),
+        iterations=iterations,
+        converged=True,
+        warnings=tuple(warnings),
+    )
+
+
+def _weighted(rows: Sequence[Row], weights: Sequence[Array]) -> list[Row]:
+    result = []
+    for row, weight in zip(rows, weights, strict=True):
+        root = np.sqrt(weight)
+        result.append(
+            Row(
+                row.equation,
+                row.label,
+                row.maneuver,
+                row.target * root,
+                row.regressors * root[:, None],
+                row.noisy,
+            )
+        )
+    return result
+
+
+def _equation_scales(rows: Sequence[Row], theta: Array, *, robust: bool, dof: int = 0) -> Array:
+    """Return the residual scale of each row, pooled over maneuvers of one equation."""
+    scale: dict[int, float] = {}
+    for equation in {row.equation for row in rows}:
+        mine = [row for row in rows if row.equation == equation]
+        residual = np.concatenate([row.target - row.regressors @ theta for row in mine])
+        if robust:
+            value = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
+        else:
+            active = len(np.flatnonzero(mine[0].regressors.any(axis=0))) if dof else 0
+            value = float(np.sqrt(residual @ residual / max(len(residual) - active, 1)))
+        size = max(float(np.max(np.abs(row.target), initial=0.0)) for row in mine)
+        scale[equation] = max(value, 1e-12 * size, 1e-150)
+    return np.array([scale[row.equation] for row in rows])
+
+
+def coloured_covariance(rows: Sequence[Row], theta: Array, white: Array, scales: Array) -> Array:
+    """Correct a covariance for coloured residuals (Klein & Morelli, sec. 5.2)."""
+    middle = np.zeros_like(white)
+    for row, scale in zip(rows, scales, strict=True):
+        residual = row.target - row.regressors @ theta
+        active = np.flatnonzero(row.regressors.any(axis=0))
+        block = row.regressors[:, active]
+        middle[np.ix_(active, active)] += coloured_middle(residual, block) / scale**4
+    result = white @ middle @ white
+    result = 0.5 * (result + result.T)
+    low = np.diag(result) <= 0.0
+    if low.any():
+        result[low] = white[low]
+        result[:, low] = white[:, low]
+    return np.asarray(result, dtype=np.float64)
+
+
+def _total(
+    model: LinearModel,
+    rows: Sequence[Row],
+    n_parameters: int,
+    deviations: tuple[Array, Array] | None,
+) -> Array:
+    """Mixed total least squares, equation by equation: exact columns are eliminated by QR.
+
+    Noisy columns and the target are first scaled to equal noise: given, or estimated from the
+    third differences of each signal (which hold 20 times the variance of white noise).
+    """
+    theta = np.full(n_parameters, np.nan)
+    for equation in sorted({row.equation for row in rows}):
+        mine = [row for row in rows if row.equation == equation]
+        X = np.vstack([row.regressors for row in mine])
+        y = np.concatenate([row.target for row in mine])
+        active = np.flatnonzero(X.any(axis=0))
+        if not np.all(np.isnan(theta[active])):
+            raise IdentificationError(
+                "total least squares cannot tie entries across equations; use weighted"
+            )
+        noisy = mine[0].noisy[active] > 0.0
+        exact_columns, noisy_columns = X[:, active[~noisy]], X[:, active[noisy]]
+        block = np.column_stack([noisy_columns, y])
+        noise = np.sqrt(np.mean(np.diff(block, n=3, axis=0) ** 2, axis=0) / 20.0)
+        if deviations is not None and equation < len(model.states):
+            noise = np.append(_noise_of_columns(model, active[noisy], deviations[0]), 0.0)
+            noise[-1] = deviations[1][equation]
+        noise = np.maximum(noise, 1e-12 * np.max(np.abs(block), axis=0) + 1e-300)
+        block = block / noise
+        if exact_columns.shape[1]:
+            Q, _ = np.linalg.qr(exact_columns)
+            reduced = block - Q @ (Q.T @ block)
+        else:
+            reduced = block
+        _, _, vectors = np.linalg.svd(reduced, full_matrices=False)
+        last = vectors[-1]
+        if abs(last[-1]) < 1e-12:
+            raise IdentificationError("total least squares has no solution on these data")
+        solution = np.zeros(len(active))
+        solution[noisy] = -last[:-1] / last[-1] * noise[-1] / noise[:-1]
+        if exact_columns.shape[1]:
+            rest = y - noisy_columns @ solution[noisy]
+            solution[~noisy] = np.linalg.lstsq(exact_columns, rest, rcond=None)[0]
+        theta[active] = solution
+    return theta
+
+
+def _noise_of_columns(model: LinearModel, parameters: IntArray, states: Array) -> Array:
+    """Return the noise of each regressor column: gain times the noise of its state."""
+    entries = model.entries("AB")
+    power = np.zeros(len(parameters))
+    for k, parameter in enumerate(parameters):
+        for t in np.flatnonzero(entries.parameter == parameter):
+            if entries.column[t] < len(model.states):
+                power[k] += (entries.gain[t] * states[entries.column[t]]) ** 2
+    return np.sqrt(power)

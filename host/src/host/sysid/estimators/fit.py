@@ -1,0 +1,134 @@
+"""One door to every method: `fit(method, model, maneuvers)`.
+
+Methods register here by name and are imported when first used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from host.sysid.errors import IdentificationError
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.result import FitResult
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """Where a method lives and how it is called.
+
+    `options` are the settings that make this name out of a more general function.
+    """
+
+    module: str
+    function: str
+    about: str
+    options: tuple[tuple[str, object], ...] = ()
+
+
+METHODS: dict[str, Method] = {
+    "equation-error": Method("equation_error", "fit_equation_error", "ordinary least squares"),
+    "equation-error-weighted": Method(
+        "equation_error",
+        "fit_equation_error",
+        "least squares, equations weighted by their residuals",
+        (("variant", "weighted"),),
+    ),
+    "equation-error-robust": Method(
+        "equation_error", "fit_equation_error", "Huber M-estimate", (("variant", "robust"),)
+    ),
+    "equation-error-total": Method(
+        "equation_error", "fit_equation_error", "total least squares", (("variant", "total"),)
+    ),
+    "output-error": Method(
+        "output_error_fit",
+        "fit_output_error",
+        "maximum likelihood, memory of the noise estimated (default)",
+    ),
+    "output-error-white": Method(
+        "output_error_fit",
+        "fit_output_error",
+        "maximum likelihood for white noise, covariance corrected for colour",
+        (("memory", False),),
+    ),
+    "filter-error": Method(
+        "filter_error", "fit_filter_error", "maximum likelihood with process noise"
+    ),
+    "frequency-equation-error": Method(
+        "frequency", "fit_frequency_equation_error", "least squares on chirp-z transforms"
+    ),
+    "frequency-output-error": Method(
+        "frequency", "fit_frequency_output_error", "maximum likelihood on chirp-z transforms"
+    ),
+    "stepwise": Method("stepwise", "fit_stepwise", "terms chosen by partial F"),
+    "recursive": Method(
+        "recursive", "fit_recursive_least_squares", "recursive least squares, real time"
+    ),
+    "recursive-fourier": Method(
+        "recursive", "fit_recursive_fourier", "regression on running transforms, real time"
+    ),
+    "extended-kalman": Method("kalman", "fit_extended", "joint states and parameters"),
+    "unscented-kalman": Method(
+        "kalman", "fit_unscented", "joint states and parameters, sigma points"
+    ),
+    "genetic": Method("genetic", "fit_genetic", "differential evolution, polished"),
+    "neural-delta": Method("neural", "fit_neural", "derivatives of a trained network"),
+    "hopfield": Method("hopfield", "fit_hopfield", "the printed network iteration"),
+    "hopfield-line-search": Method(
+        "hopfield", "fit_hopfield", "the original program", (("variant", "line-search"),)
+    ),
+    "hopfield-whitened": Method(
+        "hopfield", "fit_hopfield", "the network, preconditioned", (("variant", "whitened"),)
+    ),
+}
+
+
+def methods() -> dict[str, str]:
+    """Return the known methods and what each is in a few words."""
+    return {name: method.about for name, method in METHODS.items()}
+
+
+def fit(
+    method: str, model: LinearModel, maneuvers: Sequence[Maneuver], **options: object
+) -> FitResult:
+    """Fit a model to one or several maneuvers jointly.
+
+    Parameters
+    ----------
+    method : str
+        A key of `methods()`.
+    model : LinearModel
+        What is known and what is free.
+    maneuvers : sequence of Maneuver
+        Data in the columns of the model.
+    **options
+        Settings of the method; see its own function.
+
+    Returns
+    -------
+    FitResult
+        Estimate, covariance, residuals and diagnostics.
+
+    Raises
+    ------
+    IdentificationError
+        If the method is unknown, or the data cannot carry the fit.
+
+    Examples
+    --------
+    >>> from host.sysid import fit
+    >>> result = fit("output-error", model, [maneuver])  # doctest: +SKIP
+    """
+    if method not in METHODS:
+        raise IdentificationError(f"unknown method '{method}'; known: {', '.join(METHODS)}")
+    if not maneuvers:
+        raise IdentificationError("no maneuver to fit: give at least one")
+    entry = METHODS[method]
+    function: Callable[..., Any] = getattr(
+        import_module(f"host.sysid.estimators.{entry.module}"), entry.function
+    )
+    result: FitResult = function(model, maneuvers, **{**dict(entry.options), **options})
+    return result

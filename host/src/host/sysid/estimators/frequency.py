@@ -1,0 +1,329 @@
+"""Frequency-domain equation error and output error, chirp-z transforms of one band.
+
+Equation error carries the ends of the record as unknowns: at harmonics of the record the transform
+of a rate is j w X plus x(T) - x(0), and a bias adds nothing. Output error works on the sampled
+system, (z - Phi) X = Gamma U + z (x0 - xN z^-N), which is exact for held inputs, ends included.
+Klein & Morelli, Aircraft System Identification, ch. 7; Morelli, NASA TM-1999-209120.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.equation_error import solve_normal
+from host.sysid.estimators.start import start_values_of
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.result import FitResult
+from host.sysid.numerics.differentiation import signal_bandwidth_hz
+from host.sysid.numerics.kernels import transition
+from host.sysid.numerics.problem import check_shapes
+
+Spectrum = NDArray[np.complexfloating]
+MAX_ITERATIONS = 40
+STEP_LIMIT = 0.01
+
+
+def transform(values: Array, dt_s: float, frequency_hz: Array) -> Spectrum:
+    """Return sums of values exp(-j w t) at evenly spaced frequencies, (frequencies, columns)."""
+    spacing = frequency_hz[1] - frequency_hz[0]
+    return np.asarray(
+        signal.czt(
+            values,
+            m=len(frequency_hz),
+            w=np.exp(-2j * np.pi * spacing * dt_s),
+            a=np.exp(2j * np.pi * frequency_hz[0] * dt_s),
+            axis=0,
+        )
+    )
+
+
+def band(
+    maneuver: Maneuver,
+    signals: Array,
+    limits_hz: tuple[float, float] | None,
+    *,
+    intervals: int | None = None,
+) -> Array:
+    """Return harmonics of the record inside a band, the one that stands out of noise without.
+
+    Raises
+    ------
+    IdentificationError
+        If fewer than four harmonics are inside.
+    """
+    spacing = 1.0 / ((intervals or maneuver.samples) * maneuver.dt_s)
+    if limits_hz is None:
+        limits_hz = (0.5 * spacing, signal_bandwidth_hz(signals, maneuver.dt_s))
+    first = max(1, int(np.ceil(limits_hz[0] / spacing - 1e-9)))
+    last = min(int(np.floor(limits_hz[1] / spacing + 1e-9)), maneuver.samples // 2 - 1)
+    if last - first < 3:
+        raise IdentificationError(
+            f"{maneuver.name}: the band {limits_hz[0]:.3g} to {limits_hz[1]:.3g} Hz holds"
+            f" {max(last - first + 1, 0)} harmonics of {spacing:.3g} Hz, at least 4 are needed"
+        )
+    return spacing * np.arange(first, last + 1)
+
+
+def fit_frequency_equation_error(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    limits_hz: tuple[float, float] | None = None,
+) -> FitResult:
+    """Fit by equation error in the frequency domain; no rate is ever differentiated.
+
+    Parameters
+    ----------
+    model, maneuvers
+        Model and data; every state must be measured.
+    limits_hz : tuple of float, optional
+        Band; found from the data without.
+    """
+    measured = model.measured_states()
+    count = len(model.parameters)
+    entries = model.entries("AB")
+    fixed = np.hstack([model.A, model.B])
+    n = len(model.states)
+    active = sorted(set(entries.row.tolist()))
+    size = count + len(active) * len(maneuvers)  # and x(T) - x(0) per equation and maneuver
+    X_rows: list[Array] = []
+    y_rows: list[Array] = []
+    keys: list[int] = []
+    for number, maneuver in enumerate(maneuvers):
+        check_shapes(model, maneuver)
+        states = maneuver.outputs[:, measured]
+        f = band(maneuver, states, limits_hz, intervals=maneuver.samples - 1)
+        inputs = maneuver.inputs
+        if model.hold == "zoh":
+            inputs = 0.5 * (inputs + np.vstack([inputs[:1], inputs[:-1]]))
+        signals = np.hstack([states, inputs])
+        signals[[0, -1]] *= 0.5  # trapezoids: the sum is then the integral over the record
+        z = maneuver.dt_s * transform(signals, maneuver.dt_s, f)
+        s = 2j * np.pi * f
+        for position, row in enumerate(active):
+            X = np.zeros((len(f), size), dtype=np.complex128)
+            for k in np.flatnonzero(entries.row == row):
+                X[:, entries.parameter[k]] += entries.gain[k] * z[:, entries.column[k]]
+            X[:, count + number * len(active) + position] = 1.0
+            y = s * z[:, row] - z @ fixed[row]
+            X_rows.append(np.vstack([X.real, X.imag]))
+            y_rows.append(np.concatenate([y.real, y.imag]))
+            keys.append(row)
+    used = np.flatnonzero(np.any([X.any(axis=0) for X in X_rows], axis=0))
+    X_rows = [block[:, used] for block in X_rows]
+    weights = np.ones(len(keys))
+    theta: Array = np.zeros(len(used))
+    for _ in range(3):
+        normal = sum(w * X.T @ X for w, X in zip(weights, X_rows, strict=True))
+        right = sum(w * X.T @ y for w, X, y in zip(weights, X_rows, y_rows, strict=True))
+        theta = solve_normal(np.asarray(normal), np.asarray(right))
+        power = {key: [0.0, 0.0] for key in keys}
+        for key, block, y in zip(keys, X_rows, y_rows, strict=True):
+            miss = y - block @ theta
+            free = int(np.count_nonzero(block.any(axis=0)))
+            power[key][0] += float(miss @ miss)
+            power[key][1] += max(len(y) - free, 1)
+        weights = np.array([power[key][1] / max(power[key][0], 1e-300) for key in keys])
+    covariance = np.linalg.pinv(
+        np.asarray(sum(w * X.T @ X for w, X in zip(weights, X_rows, strict=True))), hermitian=True
+    )
+    residuals = [y - X @ theta for X, y in zip(X_rows, y_rows, strict=True)]
+    per = len(active)
+    stacked = tuple(
+        np.column_stack(residuals[k * per : (k + 1) * per]) for k in range(len(maneuvers))
+    )
+    fitted = tuple(
+        np.column_stack(y_rows[k * per : (k + 1) * per]) - stacked[k] for k in range(len(maneuvers))
+    )
+    freedom = float(sum(len(y) for y in y_rows) - len(used))
+    return FitResult(
+        method="frequency equation error",
+        model=model,
+        names=model.parameter_names[:count],
+        estimate=theta[:count],
+        covariance=covariance[:count, :count],
+        covariance_white=covariance[:count, :count],
+        degrees_of_freedom=np.full(count, max(freedom, 1.0)),
+        residuals=stacked,
+        fitted=fitted,
+        residual_kind="rate",
+        noise_covariance=np.atleast_2d(np.cov(np.vstack(stacked).T)),
+        iterations=3,
+        converged=True,
+        details={"states": float(n)},
+    )
+
+
+@dataclass(slots=True)
+class _Record:
+    """One maneuver in the frequency domain."""
+
+    z: Spectrum  # e^(j w dt), (frequencies,)
+    drive: Spectrum  # inputs, one and increments, (frequencies, w)
+    y: Spectrum  # (frequencies, p)
+    end: Spectrum  # z^-N
+    samples: int
+    dt_s: float
+
+
+def fit_frequency_output_error(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    limits_hz: tuple[float, float] | None = None,
+    start: Array | None = None,
+) -> FitResult:
+    """Fit by output error in the frequency domain.
+
+    Parameters
+    ----------
+    model, maneuvers
+        Model and data; no residual delays.
+    limits_hz : tuple of float, optional
+        Band; found from the data without.
+    start : Array, optional
+        Common parameters; equation error gives them without.
+    """
+    if model.delays or model.levers:
+        raise IdentificationError(
+            "frequency output error has no delays or levers: use output-error"
+        )
+    n, m = len(model.states), len(model.inputs)
+    count, p = len(model.parameters), len(model.outputs)
+    foh = model.hold == "foh"
+    records = []
+    for maneuver in maneuvers:
+        check_shapes(model, maneuver)
+        f = band(maneuver, maneuver.outputs, limits_hz)
+        columns = [maneuver.inputs, np.ones((maneuver.samples, 1))]
+        if foh:
+            columns.append(np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:]))
+        z = np.exp(2j * np.pi * f * maneuver.dt_s)
+        records.append(
+            _Record(
+                z=z,
+                drive=transform(np.hstack(columns), maneuver.dt_s, f),
+                y=transform(maneuver.outputs, maneuver.dt_s, f),
+                end=z ** (-maneuver.samples),
+                samples=maneuver.samples,
+                dt_s=maneuver.dt_s,
+            )
+        )
+    # Per maneuver: x0 - xN (harmonics of the record see only their difference).
+    width = count + n
+    theta = start_values_of(model, maneuvers)[:count] if start is None else np.array(start)
+    ends: list[Array] = [np.zeros(n) for _ in records]
+    entries = model.entries("AB")
+    outputs = model.entries("CD")
+    variance = np.ones(p)
+    cost, converged, iterations, damping = np.inf, False, 0, 0.0
+    accepted: tuple[Array, list[Array], Array, Array, list[Spectrum]] | None = None
+    trial, trial_ends = theta, ends
+    while iterations < MAX_ITERATIONS:
+        A, B, C, D = model.matrices(trial)
+        AB = np.hstack([A, B, np.zeros((n, 1))])
+        J_all: list[Spectrum] = []
+        r_all: list[Spectrum] = []
+        for number, record in enumerate(records):
+            step, slopes = transition(
+                AB, n, m, foh, record.dt_s, entries.row, entries.column,
+                entries.parameter, entries.gain, count,
+            )  # fmt: skip
+            inverse = np.linalg.inv(record.z[:, None, None] * np.eye(n) - step[:, :n])
+            push = record.drive @ step[:, n:].T + record.z[:, None] * trial_ends[number]
+            X = np.einsum("fij,fj->fi", inverse, push)
+            wide = np.hstack([X, record.drive])
+            dX = np.zeros((len(record.z), n, width), dtype=np.complex128)
+            dX[:, :, :count] = inverse @ np.einsum("ijq,fj->fiq", slopes, wide)
+            dX[:, :, count:] = inverse * record.z[:, None, None]
+            y = X @ C.T + record.drive[:, :m] @ D.T
+            J = np.einsum("ji,fiq->fjq", C, dX)
+            for k in range(len(outputs.row)):
+                J[:, outputs.row[k], outputs.parameter[k]] += (
+                    outputs.gain[k] * wide[:, outputs.column[k]]
+                )
+            J_all.append(J / np.sqrt(record.samples))
+            r_all.append((record.y - y) / np.sqrt(record.samples))
+        points = sum(len(r) for r in r_all)
+        fresh = np.sum([np.sum(np.abs(r) ** 2, axis=0) for r in r_all], axis=0) / points
+        trial_cost = float(points * np.sum(np.log(np.maximum(fresh, 1e-300))))
+        if not np.isfinite(trial_cost) or trial_cost > cost + 1e-9 * abs(cost):
+            damping = max(4.0 * damping, 1e-3)
+            if accepted is None or damping > 1e8:
+                break
+        else:
+            done = accepted is not None and damping < 1e-2 and _small(accepted, trial, trial_ends)
+            theta, ends, cost, variance = trial, trial_ends, trial_cost, fresh
+            damping = 0.0 if damping < 1e-3 else damping / 8.0
+            iterations += 1
+            information, gradient = _normal(J_all, r_all, variance, count, n)
+            accepted = (theta, ends, information, gradient, r_all)
+            if done:
+                converged = True
+                break
+        assert accepted is not None
+        information, gradient = accepted[2], accepted[3]
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        matrix = information / np.outer(scale, scale) + max(damping, 1e-13) * np.eye(len(scale))
+        move = np.linalg.solve(matrix, gradient / scale) / scale
+        trial = theta + move[:count]
+        trial_ends = [end + move[count + k * n : count + (k + 1) * n] for k, end in enumerate(ends)]
+    if accepted is None:
+        raise IdentificationError(f"model {model.name}: no finite response at the start")
+    covariance = np.linalg.pinv(accepted[2], hermitian=True)[:count, :count]
+    residuals = tuple(np.vstack([r.real, r.imag]) for r in accepted[4])
+    return FitResult(
+        method="frequency output error",
+        model=model,
+        names=model.parameter_names[:count],
+        estimate=theta,
+        covariance=covariance,
+        covariance_white=covariance,
+        degrees_of_freedom=np.full(count, float(max(2 * sum(map(len, accepted[4])) - width, 1))),
+        residuals=residuals,
+        fitted=residuals,
+        residual_kind="output",
+        noise_covariance=np.diag(variance),
+        iterations=iterations,
+        converged=converged,
+        warnings=() if converged else ("no convergence",),
+        details={"noise_variance": variance},
+    )
+
+
+def _small(
+    accepted: tuple[Array, list[Array], Array, Array, list[Spectrum]],
+    trial: Array,
+    ends: list[Array],
+) -> bool:
+    theta, old_ends, information, _, _ = accepted
+    bound = np.sqrt(np.abs(np.diag(np.linalg.pinv(information, hermitian=True))))
+    step = np.concatenate([trial - theta, *[a - b for a, b in zip(ends, old_ends, strict=True)]])
+    return bool(np.all(np.abs(step) <= STEP_LIMIT * bound + 1e-300))
+
+
+def _normal(
+    J_all: list[Spectrum], r_all: list[Spectrum], variance: Array, count: int, n: int
+) -> tuple[Array, Array]:
+    """Return information and gradient; a complex line of variance v is two of v/2."""
+    size = count + n * len(J_all)
+    information = np.zeros((size, size))
+    gradient = np.zeros(size)
+    for number, (J, r) in enumerate(zip(J_all, r_all, strict=True)):
+        columns = np.concatenate(
+            [np.arange(count), np.arange(count + number * n, count + (number + 1) * n)]
+        )
+        weighted = J / np.sqrt(0.5 * variance)[None, :, None]
+        flat = weighted.reshape(-1, J.shape[2])
+        miss = (r / np.sqrt(0.5 * variance)).ravel()
+        information[np.ix_(columns, columns)] += (flat.conj().T @ flat).real
+        gradient[columns] += (flat.conj().T @ miss).real
+    return information, gradient

@@ -1,0 +1,99 @@
+"""Genetic search of the output-error likelihood, polished by Gauss-Newton.
+
+Differential evolution (Storn & Price, Journal of Global Optimization 11, 1997) over a
+box of the dynamics; biases and start states keep their first guess during the search, an offset per
+output stands in for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.result import FitResult
+from host.sysid.numerics.problem import OutputProblem
+
+POPULATION = 40
+GENERATIONS = 120
+BOX = 3.0  # half width of the default box: this many times the start value
+WEIGHT = 0.7
+CROSSOVER = 0.9
+
+
+def fit_genetic(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    population: int = POPULATION,
+    generations: int = GENERATIONS,
+    seed: int = 1,
+    polish: bool = True,
+) -> FitResult:
+    """Search globally, then fit by output error from the best individual.
+
+    Parameters
+    ----------
+    model, maneuvers
+        Model and data; the box is the model's bounds, or about the start values where it has none.
+    population, generations : int
+        Size of the search.
+    seed : int
+        Of the random numbers: the answer is repeatable.
+    polish : bool
+        Model the memory of the noise in the final fit.
+    """
+    problem = OutputProblem(model, maneuvers)
+    count = len(model.parameters)
+    start = model.start
+    size = BOX * np.maximum(np.abs(start), 0.05 * max(float(np.max(np.abs(start))), 1e-3))
+    lower = np.where(np.isfinite(problem.lower[:count]), problem.lower[:count], start - size)
+    upper = np.where(np.isfinite(problem.upper[:count]), problem.upper[:count], start + size)
+    rng = np.random.default_rng(seed)
+    people = lower + (upper - lower) * rng.random((population, count))
+    people[0] = np.clip(start, lower, upper)
+    base = problem.first_guess()
+    scores = np.array([_score(problem, base, person) for person in people])
+    for _ in range(generations):
+        for k in range(population):
+            a, b, c = rng.choice(population, 3, replace=False)
+            mutant = people[a] + WEIGHT * (people[b] - people[c])
+            take = rng.random(count) < CROSSOVER
+            take[rng.integers(count)] = True
+            trial = np.where(take, mutant, people[k])
+            outside = (trial < lower) | (trial > upper)
+            trial = np.where(outside, lower + (upper - lower) * rng.random(count), trial)
+            score = _score(problem, base, trial)
+            if score <= scores[k]:
+                people[k], scores[k] = trial, score
+    best = people[int(np.argmin(scores))]
+    if not np.isfinite(scores.min()):
+        raise IdentificationError("genetic search: every trial diverges; give tighter bounds")
+    theta = base.copy()
+    theta[:count] = best
+    result = fit_output_error(model, maneuvers, start=theta, memory=polish)
+    details = {**result.details, "search_score": float(scores.min()), "search_best": best}
+    return replace(result, method="genetic search, polished", details=details)
+
+
+def _score(problem: OutputProblem, base: Array, person: Array) -> float:
+    """Return the concentrated cost, constants left at their first guess."""
+    theta = base.copy()
+    theta[: len(person)] = person
+    outputs = problem.outputs(theta)
+    if outputs is None:
+        return float("inf")
+    total = np.zeros(len(problem.model.outputs))
+    for number, y in enumerate(outputs):
+        miss = problem.measured(number) - y
+        # Constants are the cheap part: an offset per output stands for biases and start.
+        miss = miss - miss.mean(axis=1, keepdims=True)
+        total += np.sum(miss**2, axis=1)
+    value = float(np.sum(np.log(np.maximum(total, 1e-300))))
+    return value if np.isfinite(value) else float("inf")

@@ -1,0 +1,213 @@
+"""Fit a flight in turbulence: delays by output error first, then filter error with a gust state.
+
+A vertical (or side) gust is an angle of attack (sideslip) to vanes, forces and moments alike, so it
+is a state of its own whose entries are those of the angle; only its intensity is new. Dryden
+spectra: MIL-F-8785C, sec. 3.7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.filter_error import fit_filter_error
+from host.sysid.estimators.fit import fit
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel, Parameter, Term
+from host.sysid.models.result import FitResult
+
+SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, low altitude)
+VANES = ("alpha_rad", "beta_rad")
+# What else disturbs: thrust and longitudinal gusts; the drift of the attitude filter.
+ALSO = ("airspeed_mps", "phi_rad")
+ROLLING = "gust_roll_radps"
+
+
+@dataclass(frozen=True)
+class GustFit:
+    """Result on the model without the gust, its maneuvers with delays taken out, the delays."""
+
+    result: FitResult
+    model: LinearModel
+    maneuvers: tuple[Maneuver, ...]
+    delays: dict[str, tuple[float, float]]
+
+
+def gust_model(
+    base: LinearModel,
+    airspeed_mps: float,
+    scale_m: float = SCALE_M,
+    *,
+    span_m: float | None = None,
+    scale_share: float = 0.0,
+) -> LinearModel:
+    """Return a model with the gust angle as an extra state.
+
+    Parameters
+    ----------
+    base : LinearModel
+        A template; alpha or beta must be a measured state of it.
+    airspeed_mps : float
+        Of the trim, for the gust's time scale.
+    scale_m : float
+        Length of the gusts.
+    span_m : float, optional
+        With it the second-order spectrum of gusts across the flight path, the turning of the air
+        that comes with it (a gust reaches the tail later) and, for the lateral motion, rolling
+        gusts; without it the first-order spectrum of the angle alone.
+    scale_share : float
+        Relative deviation of `scale_m`; above zero the time scale is a parameter, ``gust_rate``,
+        behind the others.
+
+    Raises
+    ------
+    IdentificationError
+        If neither alpha nor beta is a measured state of it.
+    """
+    vanes = [v for v in VANES if v in base.states and v in base.outputs]
+    if not vanes:
+        raise IdentificationError(f"model {base.name}: no vane angle a gust could act on")
+    vane, rate = vanes[0], airspeed_mps / scale_m
+    lag = 0.0 if span_m is None else np.pi * airspeed_mps / (4.0 * span_m)
+    turn = {"alpha_rad": ("q_radps", -1.0), "beta_rad": ("r_radps", 1.0)}[vane]
+    # Columns of the base a hidden state acts as, with gains.
+    hidden: dict[str, dict[str, float]] = {"gust_rad": {vane: 1.0}}
+    entries = [("gust_rad", "gust_rad", -1.0)]
+    fixed: list[tuple[str, str, float]] = []
+    if span_m is not None:
+        lead, trail = np.sqrt(3.0), 1.0 - np.sqrt(3.0)
+        entries += [("gust_lag_rad", "gust_rad", 1.0), ("gust_lag_rad", "gust_lag_rad", -1.0)]
+        hidden = {
+            "gust_rad": {vane: lead, turn[0]: turn[1] * lag * lead},
+            "gust_lag_rad": {vane: trail, turn[0]: turn[1] * lag * trail},
+            "gust_tail_rad": {turn[0]: -turn[1] * lag},
+        }
+        fixed = [
+            ("gust_tail_rad", "gust_rad", lag * lead),
+            ("gust_tail_rad", "gust_lag_rad", lag * trail),
+            ("gust_tail_rad", "gust_tail_rad", -lag),
+        ]
+        if vane == "beta_rad" and "p_radps" in base.states:
+            hidden[ROLLING] = {"p_radps": 1.0}
+            fixed.append((ROLLING, ROLLING, -lag))
+    states = (*base.states, *hidden)
+    n, total = len(base.states), len(base.states) + len(hidden)
+    A, C = np.zeros((total, total)), np.zeros((len(base.outputs), total))
+    A[:n, :n], C[:, :n] = base.A, base.C
+    terms = list(base.terms)
+    for column, (_, acts) in enumerate(hidden.items(), start=n):
+        for state, gain in acts.items():
+            source = base.states.index(state)
+            terms += [
+                Term(t.matrix, t.row, column, t.parameter, t.gain * gain)
+                for t in base.terms
+                if t.matrix in "AC" and t.column == source
+            ]
+            if state == vane:  # forces turn with the air, and the vane measures it
+                C[:, column] += gain * base.C[:, source]
+    for row, source_name, value in fixed:
+        A[states.index(row), states.index(source_name)] = value
+    parameters = base.parameters
+    if scale_share > 0.0:
+        terms += [
+            Term("A", states.index(a), states.index(b), "gust_rate", g) for a, b, g in entries
+        ]
+        parameters += (
+            Parameter(
+                "gust_rate", rate, lower=0.1 * rate, upper=10.0 * rate, prior_sd=scale_share * rate
+            ),
+        )
+    else:
+        for a, b, g in entries:
+            A[states.index(a), states.index(b)] = g * rate
+    return replace(
+        base,
+        name=f"{base.name} with gust",
+        states=states,
+        A=A,
+        B=np.vstack([base.B, np.zeros((len(hidden), len(base.inputs)))]),
+        C=C,
+        terms=tuple(terms),
+        parameters=parameters,
+        delays=(),
+    )
+
+
+def fit_with_gust(
+    model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float
+) -> GustFit:
+    """Fit a template in two stages.
+
+    Parameters
+    ----------
+    model : LinearModel
+        With delays and levers as wanted.
+    maneuvers : sequence of Maneuver
+        Data as measured.
+    airspeed_mps : float
+        Of the trim, for the gust's time scale.
+    """
+    first = fit("output-error-white", model, maneuvers)
+    half = first.half_width()
+    delays = {d.name: (first.value(d.name), float(half[first.index(d.name)])) for d in model.delays}
+    shifts = np.zeros(len(model.outputs))
+    for delay in model.delays:
+        for output in delay.outputs:
+            shifts[model.outputs.index(output)] = delays[delay.name][0]
+    shifted = [_advanced(m, shifts) for m in maneuvers]
+    count = len(model.parameters)
+    start = np.concatenate([first.estimate[:count], first.estimate[len(model.parameter_names) :]])
+    wide = gust_model(model, airspeed_mps)
+    process = ("gust_rad", *(s for s in ALSO if s in model.states))
+    plain = replace(model, delays=())
+    try:
+        result = fit_filter_error(wide, shifted, process=process, start=start)
+        failure = "" if result.converged else result.warnings[0]
+    except IdentificationError as error:
+        failure = str(error)
+    if failure:
+        # Better the plain answer with its wider intervals than a search that has not ended.
+        result = fit("output-error-white", plain, shifted, start=start)
+        result = replace(
+            result,
+            warnings=(*result.warnings, f"filter error: {failure}; output error stands instead"),
+        )
+        return GustFit(result, plain, tuple(shifted), delays)
+    covariance = result.covariance.copy()
+    covariance[:count, :count] += _from_delays(first, model)
+    return GustFit(
+        result=replace(result, method="filter error with gust", model=plain, covariance=covariance),
+        model=plain,
+        maneuvers=tuple(shifted),
+        delays=delays,
+    )
+
+
+def _from_delays(first: FitResult, model: LinearModel) -> Array:
+    """Return what the uncertainty of the delays adds to the covariance of the parameters.
+
+    The second stage takes the delays for known; the first one says how the parameters move with
+    them: d theta / d tau = C_theta_tau C_tau_tau^-1.
+    """
+    count, names = len(model.parameters), len(model.parameter_names)
+    own = first.covariance[count:names, count:names]
+    cross = first.covariance[:count, count:names]
+    live = np.flatnonzero(np.diag(own) > 0.0)
+    if len(live) == 0:
+        return np.zeros((count, count))
+    part = cross[:, live] @ np.linalg.pinv(own[np.ix_(live, live)]) @ cross[:, live].T
+    return np.asarray(0.5 * (part + part.T), dtype=np.float64)
+
+
+def _advanced(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
+    """Read each output later by its delay, so that all belong to one instant."""
+    t = maneuver.time_s
+    columns = [
+        np.interp(t + shift, t, column)
+        for shift, column in zip(shifts_s, maneuver.outputs.T, strict=True)
+    ]
+    return replace(maneuver, outputs=np.column_stack(columns))

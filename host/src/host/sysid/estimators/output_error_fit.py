@@ -1,0 +1,129 @@
+"""Output error as one of the methods: start values, search, intervals, one result."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.intervals import HIGHEST_ORDER, Interval, fit_with_memory
+from host.sysid.estimators.start import start_values
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.result import FitResult
+from host.sysid.numerics.colour import coloured_middle
+from host.sysid.numerics.output_error import whitened_slopes
+from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.repeats import pulls
+
+
+def fit_output_error(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    memory: bool = True,
+    start: Array | None = None,
+    highest_order: int = HIGHEST_ORDER,
+    criterion: str = "bic",
+) -> FitResult:
+    """Fit by output error.
+
+    Parameters
+    ----------
+    model, maneuvers
+        Model and data; the states need not be measured.
+    memory : bool
+        Model the memory of the noise, refit with it and let the intervals stand on it (default).
+        Without, noise is taken as white for the estimate and the covariance is corrected by the
+        residual autocorrelation (Morelli & Klein 1997), the standard that covers 87-90 %.
+    start : Array, optional
+        Whole start vector; equation error gives it without.
+    highest_order, criterion
+        See `fit_with_memory`.
+
+    Raises
+    ------
+    IdentificationError
+        If no start is finite or the information is singular.
+    """
+    problem = OutputProblem(model, maneuvers)
+    first = start_values(problem) if start is None else np.asarray(start, dtype=np.float64)
+    if len(first) != len(problem.names):
+        raise IdentificationError(
+            f"{len(first)} start values, {len(problem.names)} needed: {', '.join(problem.names)}"
+        )
+    fit = fit_with_memory(
+        problem, first, highest_order=highest_order if memory else 0, criterion=criterion
+    )
+    covariance = fit.covariance if memory else coloured_output_covariance(problem, fit)
+    return FitResult(
+        method="output error" if memory else "output error (white)",
+        model=model,
+        names=problem.names,
+        estimate=fit.optimum.theta,
+        covariance=covariance,
+        covariance_white=fit.covariance_white,
+        degrees_of_freedom=fit.degrees_of_freedom,
+        residuals=tuple(r.T.copy() for r in fit.optimum.residuals),
+        fitted=tuple(r.y.T.copy() for r in fit.optimum.responses),
+        residual_kind="output",
+        noise_covariance=np.atleast_2d(np.cov(np.hstack(fit.optimum.residuals))),
+        iterations=fit.optimum.iterations,
+        converged=fit.optimum.converged,
+        warnings=_warnings(problem, fit),
+        details={
+            "cost": fit.optimum.cost,
+            "refits": float(fit.refits),
+            "noise_orders": np.array([float(n.order) for n in fit.noise]),
+            "innovation_variance": fit.innovation_variance,
+            **_pulls(problem, fit),
+        },
+    )
+
+
+def _pulls(problem: OutputProblem, fit: Interval) -> dict[str, float | Array]:
+    size = len(problem.names)
+    parts, scores = [], []
+    slopes = whitened_slopes(problem, fit.optimum.responses, fit.noise)
+    for number, residual in enumerate(fit.optimum.residuals):
+        part, score = np.zeros((size, size)), np.zeros(size)
+        own = problem.columns(number)
+        for j, memory in enumerate(fit.noise):
+            J = slopes[number][j]
+            white = memory.whiten(residual[j][:, None])[:, 0]
+            part[np.ix_(own, own)] += J.T @ J / fit.innovation_variance[j]
+            score[own] += J.T @ white / fit.innovation_variance[j]
+        parts.append(part)
+        scores.append(score)
+    return pulls(parts, scores, fit.covariance)
+
+
+def _warnings(problem: OutputProblem, fit: Interval) -> tuple[str, ...]:
+    found = []
+    if not fit.optimum.converged:
+        found.append(
+            f"no convergence: the last step was {fit.optimum.step:.3g} Cramer-Rao bounds long"
+        )
+    held = [n for n, free in zip(problem.names, fit.optimum.free, strict=True) if not free]
+    if held:
+        found.append(f"on a bound, so without an interval: {', '.join(held)}")
+    return tuple(found)
+
+
+def coloured_output_covariance(problem: OutputProblem, fit: Interval) -> Array:
+    """Return the white covariance corrected by residual autocorrelations (the usual sandwich)."""
+    white = fit.covariance_white
+    middle = np.zeros_like(white)
+    for number, response in enumerate(fit.optimum.responses):
+        columns = problem.columns(number)
+        for j, variance in enumerate(fit.optimum.variance):
+            residual = fit.optimum.residuals[number][j]
+            part = coloured_middle(residual, response.slopes[j]) / variance**2
+            middle[np.ix_(columns, columns)] += part
+    result = white @ middle @ white
+    result = 0.5 * (result + result.T)
+    low = np.diag(result) <= 0.0
+    result[low], result[:, low] = white[low], white[:, low]
+    return np.asarray(result, dtype=np.float64)

@@ -1,0 +1,216 @@
+"""Estimates that run beside the data: recursive least squares and recursive Fourier regression.
+
+Ljung, System Identification, 2nd ed., sec. 11.2; Morelli, Real-time parameter estimation in the
+frequency domain, Journal of Guidance, Control and Dynamics 23 (2000).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from host.compiled import Array, compiled
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.equation_error import (
+    Row,
+    fit_equation_error,
+    regression_rows,
+    solve_normal,
+)
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.result import FitResult
+
+Spectrum = NDArray[np.complexfloating]
+START_VARIANCE = 1e8  # of scaled regressors: a start that weighs nothing
+SPREAD_HZ = 0.04  # spacing of the running transforms
+
+
+@compiled
+def update(theta: Array, P: Array, regressors: Array, targets: Array, forgetting: float) -> Array:
+    """Run recursive least squares over samples, in place; returns the history of theta."""
+    samples, n = regressors.shape
+    history = np.zeros((samples, n))
+    gain = np.zeros(n)
+    for k in range(samples):
+        x = regressors[k]
+        total = forgetting
+        for i in range(n):
+            value = 0.0
+            for j in range(n):
+                value += P[i, j] * x[j]
+            gain[i] = value
+            total += x[i] * value
+        miss = targets[k]
+        for i in range(n):
+            miss -= x[i] * theta[i]
+        for i in range(n):
+            theta[i] += gain[i] / total * miss
+        for i in range(n):
+            for j in range(n):
+                P[i, j] = (P[i, j] - gain[i] * gain[j] / total) / forgetting
+        for i in range(n):
+            for j in range(i):
+                mean = 0.5 * (P[i, j] + P[j, i])
+                P[i, j] = mean
+                P[j, i] = mean
+        for i in range(n):
+            history[k, i] = theta[i]
+    return history
+
+
+def fit_recursive_least_squares(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    forgetting: float = 1.0,
+    bandwidth: float | None = None,
+) -> FitResult:
+    """Fit by recursive least squares, sample after sample.
+
+    Parameters
+    ----------
+    model, maneuvers
+        Model and data; entries must not be tied across equations.
+    forgetting : float
+        Weight of the past per sample, above 0 and at most 1.
+    bandwidth : float, optional
+        Of the differentiation, Hz.
+    """
+    if not 0.0 < forgetting <= 1.0:
+        raise IdentificationError(f"forgetting {forgetting}, expected above 0 and at most 1")
+    names, rows = regression_rows(model, maneuvers, bandwidth=bandwidth)
+    theta = np.zeros(len(names))
+    histories: list[Array] = []
+    for equation in sorted({row.equation for row in rows}):
+        mine = [row for row in rows if row.equation == equation]
+        X = np.vstack([row.regressors for row in mine])
+        y = np.concatenate([row.target for row in mine])
+        active = np.flatnonzero(X.any(axis=0))
+        if theta[active].any():
+            raise IdentificationError("recursive least squares cannot tie entries of equations")
+        scale = np.sqrt(np.mean(X[:, active] ** 2, axis=0))
+        estimate = np.zeros(len(active))
+        P = START_VARIANCE * np.eye(len(active))
+        history = update(estimate, P, np.ascontiguousarray(X[:, active] / scale), y, forgetting)
+        full = np.zeros((len(history), len(names)))
+        full[:, active] = history / scale
+        histories.append(full)
+        theta[active] = estimate / scale
+    batch = fit_equation_error(model, maneuvers, bandwidth=bandwidth)
+    return _like(batch, "recursive least squares", names, theta, np.sum(histories, axis=0), rows)
+
+
+def fit_recursive_fourier(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    limits_hz: tuple[float, float] = (0.1, 2.0),
+    every_s: float = 1.0,
+) -> FitResult:
+    """Fit by regression on running Fourier transforms, an estimate every second.
+
+    Rates need no differentiation: the transform of a rate is j w times that of the state. Trim
+    and drift are kept out by the lowest frequency and by starting from the first sample.
+
+    Parameters
+    ----------
+    model, maneuvers
+        Model and one or several maneuvers; every state must be measured.
+    limits_hz : tuple of float
+        Band of the transforms.
+    every_s : float
+        Time between estimates, s.
+    """
+    measured = model.measured_states()
+    entries = model.entries("AB")
+    count = len(model.parameters)
+    fixed = np.hstack([model.A, model.B])
+    f = np.arange(limits_hz[0], limits_hz[1] + 1e-9, SPREAD_HZ)
+    if len(f) < 4:
+        raise IdentificationError(f"band {limits_hz} Hz holds {len(f)} lines, at least 4 needed")
+    s = 2j * np.pi * f
+    past = (np.zeros((count, count)), np.zeros(count))
+    history: list[Array] = []
+    normal, right = past
+    last: dict[int, tuple[Spectrum, Spectrum]] = {}
+    for maneuver in maneuvers:
+        signals = np.hstack([maneuver.outputs[:, measured], maneuver.inputs])
+        signals = signals - signals[0]
+        time_s = maneuver.time_s
+        running = maneuver.dt_s * np.cumsum(
+            signals[:, None, :] * np.exp(-np.outer(time_s, s))[:, :, None], axis=0
+        )
+        hop = max(1, round(every_s / maneuver.dt_s))
+        for k in [*range(hop - 1, maneuver.samples - 1, hop), maneuver.samples - 1]:
+            z = running[k]
+            end = np.exp(-s * time_s[k])[:, None] * signals[k, : len(measured)]
+            normal, right = past[0].copy(), past[1].copy()
+            for row in sorted(set(entries.row.tolist())):
+                X: Spectrum = np.zeros((len(f), count), dtype=np.complex128)
+                for t in np.flatnonzero(entries.row == row):
+                    X[:, entries.parameter[t]] += entries.gain[t] * z[:, entries.column[t]]
+                y = s * z[:, row] + end[:, row] - z @ fixed[row]
+                last[row] = (X, y)
+                normal += (X.conj().T @ X).real
+                right += (X.conj().T @ y).real
+            try:
+                history.append(solve_normal(normal, right))
+            except IdentificationError:
+                continue  # before the first input there is nothing to estimate
+        past = (normal, right)
+    theta = solve_normal(normal, right)
+    batch = fit_equation_error(model, maneuvers)
+    # Equations have unlike residuals: the sandwich weighs each with its own power.
+    middle = np.zeros_like(normal)
+    for lines, y in last.values():
+        miss = y - lines @ theta
+        middle += (lines.conj().T @ lines).real * float(np.mean(np.abs(miss) ** 2))
+    inverse = np.linalg.pinv(normal, hermitian=True)
+    covariance = batch.covariance.copy()
+    covariance[:count, :count] = inverse @ middle @ inverse
+    names, rows = regression_rows(model, maneuvers)
+    full = batch.estimate.copy()
+    full[:count] = theta
+    result = _like(batch, "recursive Fourier regression", names, full, np.array(history), rows)
+    return replace(result, covariance=covariance, covariance_white=covariance)
+
+
+def _like(
+    batch: FitResult,
+    method: str,
+    names: tuple[str, ...],
+    theta: Array,
+    history: Array,
+    rows: list[Row],
+) -> FitResult:
+    """Return a result with the residuals and covariance of the batch regression."""
+    residuals = tuple(
+        np.column_stack(
+            [row.target - row.regressors @ theta for row in rows if row.maneuver == number]
+        )
+        for number in range(len(batch.residuals))
+    )
+    fitted = tuple(
+        np.column_stack([row.regressors @ theta for row in rows if row.maneuver == number])
+        for number in range(len(batch.residuals))
+    )
+    return FitResult(
+        method=method,
+        model=batch.model,
+        names=names,
+        estimate=theta,
+        covariance=batch.covariance,
+        covariance_white=batch.covariance_white,
+        degrees_of_freedom=batch.degrees_of_freedom,
+        residuals=residuals,
+        fitted=fitted,
+        residual_kind="rate",
+        noise_covariance=batch.noise_covariance,
+        iterations=len(history),
+        converged=True,
+        details={"history": history},
+    )

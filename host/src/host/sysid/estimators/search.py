@@ -1,0 +1,181 @@
+"""Search from several starts where the first one may have led into a wrong valley.
+
+Differentiated noise draws equation error far off where the noise is large and the motion fast.
+Where the first search ends without convergence, or leaves more than the sensors' own noise, others
+start from equation error on filtered signals: states, inputs and rates pass one lag, whose
+derivative needs no differentiation (state variable filter; Garnier & Wang (eds.), Identification of
+Continuous-time Models from Sampled Data, 2008), then with the simulated response as instruments.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.equation_error import Row, regression_rows, solve_rows
+from host.sysid.estimators.kalman import noise_deviation
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.numerics.kernels import simulate
+from host.sysid.numerics.output_error import Optimum, minimise
+from host.sysid.numerics.problem import OutputProblem
+
+CORNERS_RADPS = (0.5, 2.0, 6.0, 20.0)  # of the lag: slow and fast motions of small aircraft
+INSTRUMENT_CORNERS_RADPS = (2.0, 6.0)
+INSTRUMENT_ROUNDS = 3
+SETTLED = 3.0  # time constants until the lag has forgotten its start
+UNEXPLAINED = 2.0  # residual over white noise power: from here on the fit is looked at again
+TRIED = 4  # searches from other starts
+LONG_SEARCH = 200  # iterations where none of them has converged
+LEAST_SAMPLES = 50
+
+
+def search(problem: OutputProblem, theta: Array) -> Optimum:
+    """Return the best optimum of white-noise output error found from `theta` and other starts.
+
+    Raises
+    ------
+    IdentificationError
+        If no start is finite over the maneuvers.
+    """
+    best: Optimum | None = None
+    failure: IdentificationError | None = None
+    try:
+        best = minimise(problem, theta)
+    except IdentificationError as error:
+        failure = error
+    settled = best if best is not None and best.converged else None
+    if settled is not None and _explained(problem, settled):
+        return settled
+    for start in _starts(problem, theta, settled)[:TRIED]:
+        try:
+            other = minimise(problem, start)
+        except IdentificationError:
+            continue
+        if best is None or other.cost < best.cost:
+            best = other
+    if best is None:
+        assert failure is not None
+        raise failure
+    if not best.converged:
+        best = minimise(problem, best.theta, max_iterations=LONG_SEARCH)
+    return best
+
+
+def white_cost(problem: OutputProblem, theta: Array) -> float:
+    """Return the concentrated likelihood of white noise as `minimise` counts it."""
+    outputs = problem.outputs(theta)
+    if outputs is None:
+        return np.inf
+    with np.errstate(over="ignore"):
+        squares = np.sum(
+            [np.sum((problem.measured(k) - y) ** 2, axis=1) for k, y in enumerate(outputs)], axis=0
+        )
+    if not np.isfinite(squares).all():
+        return np.inf
+    prior = problem.prior_precision * (theta - problem.prior_mean) ** 2
+    power = np.maximum(squares / problem.samples, 1e-300)
+    return 0.5 * (problem.samples * float(np.sum(np.log(power))) + float(np.sum(prior)))
+
+
+def _explained(problem: OutputProblem, optimum: Optimum) -> bool:
+    noise = noise_deviation(problem.maneuvers) ** 2
+    power = np.mean(np.hstack(optimum.residuals) ** 2, axis=1)
+    return bool(np.all(power <= UNEXPLAINED * noise))
+
+
+def _starts(problem: OutputProblem, theta: Array, settled: Optimum | None) -> list[Array]:
+    """Return other starts, the deepest first; none where a state is not seen.
+
+    Nor where a search has settled and none of them begins deeper than that.
+    """
+    try:
+        problem.model.measured_states()
+    except IdentificationError:
+        return []
+    found: list[tuple[float, Array]] = []
+    for corner in CORNERS_RADPS:
+        _add(found, problem, _lagged_equations(problem, corner, None))
+    if settled is not None and all(cost >= settled.cost for cost, _ in found):
+        return []
+    first = white_cost(problem, theta)
+    for _ in range(INSTRUMENT_ROUNDS):
+        found.sort(key=lambda pair: pair[0])
+        source = found[0][1] if found and found[0][0] < first else theta
+        outputs = problem.outputs(source)
+        if outputs is None:
+            break
+        for corner in INSTRUMENT_CORNERS_RADPS:
+            _add(found, problem, _lagged_equations(problem, corner, outputs))
+    return [start for cost, start in sorted(found, key=lambda pair: pair[0]) if np.isfinite(cost)]
+
+
+def _add(found: list[tuple[float, Array]], problem: OutputProblem, start: Array | None) -> None:
+    if start is not None:
+        start = np.clip(start, problem.lower, problem.upper)
+        found.append((white_cost(problem, start), start))
+
+
+def _lagged_equations(
+    problem: OutputProblem, corner_radps: float, simulated: list[Array] | None
+) -> Array | None:
+    """Solve equation error on lagged signals, with a simulated response as instruments."""
+    model = problem.model
+    try:
+        lagged = [_lagged(model, m, corner_radps) for m in problem.maneuvers]
+        names, rows = regression_rows(model, lagged)
+        if simulated is None:
+            estimate = solve_rows(rows, len(names))
+        else:
+            calm = [
+                _lagged(model, replace(m, outputs=y.T), corner_radps)
+                for m, y in zip(problem.maneuvers, simulated, strict=True)
+            ]
+            _, instruments = regression_rows(model, calm)
+            estimate = _with_instruments(rows, instruments, len(names))
+    except (IdentificationError, np.linalg.LinAlgError):
+        return None
+    theta = problem.first_guess()
+    place = {name: k for k, name in enumerate(problem.names)}
+    for name, value in zip(names, estimate, strict=True):
+        theta[place[name]] = value
+    return theta
+
+
+def _with_instruments(rows: list[Row], instruments: list[Row], count: int) -> Array:
+    normal, right = np.zeros((count, count)), np.zeros(count)
+    for row, calm in zip(rows, instruments, strict=True):
+        normal += calm.regressors.T @ row.regressors
+        right += calm.regressors.T @ row.target
+    scale = np.sqrt(np.maximum(np.abs(np.diag(normal)), 1e-300))
+    return np.asarray(np.linalg.solve(normal / np.outer(scale, scale), right / scale) / scale)
+
+
+def _lagged(model: LinearModel, maneuver: Maneuver, corner_radps: float) -> Maneuver:
+    """Pass everything through corner / (s + corner); rates of the lagged states are exact."""
+    keep = float(np.exp(-corner_radps * maneuver.dt_s))
+    skip = round(SETTLED / (corner_radps * maneuver.dt_s))
+    if maneuver.samples - skip < LEAST_SAMPLES:
+        raise IdentificationError(f"{maneuver.name}: too short for a lag of {corner_radps} rad/s")
+    outputs = _lag(maneuver.outputs, keep, held=False)
+    inputs = _lag(maneuver.inputs, keep, held=model.hold == "zoh")
+    seen = model.measured_states()
+    return Maneuver(
+        maneuver.dt_s,
+        inputs[skip:],
+        outputs[skip:],
+        rates=corner_radps * (maneuver.outputs - outputs)[skip:, seen],
+        name=maneuver.name,
+    )
+
+
+def _lag(values: Array, keep: float, *, held: bool) -> Array:
+    """Pass columns through a lag from rest; they run linearly between samples unless held."""
+    following = values if held else 0.5 * (values + np.vstack([values[1:], values[-1:]]))
+    columns = values.shape[1]
+    step = np.hstack([keep * np.eye(columns), np.eye(columns)])
+    _, z = simulate(step, np.ascontiguousarray((1.0 - keep) * following), np.zeros(columns))
+    return z[:, :columns]

@@ -1,0 +1,133 @@
+"""Stepwise regression: let each equation choose its terms by significance.
+
+Klein & Morelli, Aircraft System Identification, sec. 5.4: a term enters when its partial F is
+above the limit and leaves when it falls below; refitted terms get the structure's own covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from host.compiled import Array, BoolArray
+from host.sysid.estimators.equation_error import fit_equation_error, regression_rows
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.result import FitResult
+
+F_IN = 20.0  # sec. 5.4.1: far above the 95 % point, because model error is no white noise
+GAIN_LIMIT = 0.005  # a term must also lift R2 by half a percent
+
+
+def choose_terms(
+    X: Array, y: Array, forced: BoolArray, *, f_in: float = F_IN, gain: float = GAIN_LIMIT
+) -> list[int]:
+    """Return the columns of X that earn their place.
+
+    Parameters
+    ----------
+    X : Array, shape (samples, candidates)
+    y : Array, shape (samples,)
+    forced : Array of bool, shape (candidates,)
+        Columns that are always in (bias).
+    f_in : float
+        Partial F to enter and to stay.
+    gain : float
+        Least rise of R2.
+    """
+    chosen = [int(k) for k in np.flatnonzero(forced)]
+    total = float(np.sum((y - (y.mean() if chosen else 0.0)) ** 2))
+    for _ in range(4 * X.shape[1]):
+        rss = _rss(X[:, chosen], y)
+        best, best_f, best_rss = -1, 0.0, rss
+        for k in range(X.shape[1]):
+            if k in chosen or not X[:, k].any():
+                continue
+            trial = _rss(X[:, [*chosen, k]], y)
+            f = (rss - trial) / max(trial / max(len(y) - len(chosen) - 1, 1), 1e-300)
+            if f > best_f:
+                best, best_f, best_rss = k, f, trial
+        if best < 0 or best_f < f_in or (rss - best_rss) < gain * total:
+            break
+        chosen.append(best)
+        for k in [c for c in chosen if not forced[c]]:
+            rest = [c for c in chosen if c != k]
+            now, without = _rss(X[:, chosen], y), _rss(X[:, rest], y)
+            f = (without - now) / max(now / max(len(y) - len(chosen), 1), 1e-300)
+            if f < f_in:
+                chosen = rest
+    return sorted(chosen)
+
+
+def fit_stepwise(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    f_in: float = F_IN,
+    bandwidth: float | None = None,
+) -> FitResult:
+    """Choose the terms of each equation, then fit them by equation error.
+
+    Parameters
+    ----------
+    model, maneuvers
+        Candidates are the free entries of the model.
+    f_in : float
+        Partial F to enter and to stay.
+    bandwidth : float, optional
+        Of the differentiation, Hz.
+
+    Returns
+    -------
+    FitResult
+        Dropped parameters are zero with zero variance and named in a warning.
+    """
+    names, rows = regression_rows(model, maneuvers, bandwidth=bandwidth)
+    kept: set[str] = set()
+    for equation in {row.equation for row in rows}:
+        mine = [row for row in rows if row.equation == equation]
+        X = np.vstack([row.regressors for row in mine])
+        y = np.concatenate([row.target for row in mine])
+        forced = np.array([name.startswith("bias") for name in names]) & X.any(axis=0)
+        kept |= {names[k] for k in choose_terms(X, y, forced, f_in=f_in)}
+    dropped = [p.name for p in model.parameters if p.name not in kept]
+    smaller = replace(
+        model,
+        terms=tuple(t for t in model.terms if t.parameter in kept),
+        parameters=tuple(p for p in model.parameters if p.name in kept),
+    )
+    result = fit_equation_error(smaller, maneuvers, bandwidth=bandwidth)
+    place = [names.index(name) for name in result.names]
+    estimate = np.zeros(len(names))
+    estimate[place] = result.estimate
+    wide = []
+    for covariance in (result.covariance, result.covariance_white):
+        full = np.zeros((len(names), len(names)))
+        full[np.ix_(place, place)] = covariance
+        wide.append(full)
+    warnings = result.warnings
+    if dropped:
+        warnings = (*warnings, f"not significant, set to zero: {', '.join(dropped)}")
+    return replace(
+        result,
+        method="stepwise regression",
+        model=model,
+        names=names,
+        estimate=estimate,
+        covariance=wide[0],
+        covariance_white=wide[1],
+        degrees_of_freedom=np.full(len(names), float(result.degrees_of_freedom[0])),
+        warnings=warnings,
+        details={"kept": float(len(smaller.parameters))},
+    )
+
+
+def _rss(X: Array, y: Array) -> float:
+    if X.shape[1] == 0:
+        return float(y @ y)
+    scale = np.sqrt(np.sum(X**2, axis=0))
+    solution, _, _, _ = np.linalg.lstsq(np.asarray(X / scale, dtype=np.float64), y, rcond=1e-12)
+    miss = y - (X / scale) @ solution
+    return float(miss @ miss)

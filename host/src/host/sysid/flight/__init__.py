@@ -1,0 +1,1 @@
+"""A whole flight: files, maneuvers found, linear models fitted and validated."""

@@ -1,0 +1,1 @@
+"""What is fitted to what, and what comes back: models, maneuvers, results."""

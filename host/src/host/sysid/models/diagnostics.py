@@ -1,0 +1,309 @@
+"""What a fit is worth: figures of fit, whiteness, collinearity, refusals.
+
+The thesis's two error figures are kept under their own names beside honest ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from host.compiled import Array
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.result import FitResult
+
+CORRELATED = 0.9
+CONDITION_LIMIT = 1e5  # of the scaled information: correlations beyond all digits of a sensor
+SMALL_SHARE = 0.05  # of the row's largest contribution: below it errors are relative to this share
+REFUSAL_LIMIT = 1.0  # standard error over the reference value: 100 %
+EVEN_ODDS = 0.5  # that some bound exceeds the limit: from here on a fit is refused
+SUSPECT = 0.2  # that a parameter is one of them: from here on it is named
+PRIOR_WIDTH = 3.0
+DRAWS, DRAW_SEED = 400, 1
+
+
+@dataclass(frozen=True, slots=True)
+class SignalFit:
+    """Figures of one output: all of free simulation or one step, as the result says."""
+
+    name: str
+    r_squared: float
+    nrmse: float
+    theil: float
+    autocorrelation_outside: float
+    ljung_box_p: float
+
+
+def signal_fits(
+    names: Sequence[str], measured: Sequence[Array], residuals: Sequence[Array]
+) -> tuple[SignalFit, ...]:
+    """Return figures of fit per signal, maneuvers pooled.
+
+    Parameters
+    ----------
+    names : sequence of str
+        One per column.
+    measured, residuals : sequence of Array
+        Per maneuver (samples, columns).
+    """
+    result = []
+    for column, name in enumerate(names):
+        y = np.concatenate([m[:, column] - m[:, column].mean() for m in measured])
+        raw = np.concatenate([m[:, column] for m in measured])
+        e = np.concatenate([r[:, column] for r in residuals])
+        power = float(y @ y)
+        rms = float(np.sqrt(np.mean(e**2)))
+        model = raw - e
+        theil = rms / max(float(np.sqrt(np.mean(raw**2)) + np.sqrt(np.mean(model**2))), 1e-300)
+        outside, p_value = whiteness([r[:, column] for r in residuals])
+        result.append(
+            SignalFit(
+                name=name,
+                r_squared=1.0 - float(e @ e) / power if power > 0.0 else float("nan"),
+                nrmse=rms / float(np.sqrt(power / len(y))) if power > 0.0 else float("nan"),
+                theil=theil,
+                autocorrelation_outside=outside,
+                ljung_box_p=p_value,
+            )
+        )
+    return tuple(result)
+
+
+def whiteness(residuals: Sequence[Array], lags: int = 25) -> tuple[float, float]:
+    """Return the share of autocorrelations outside 95 % limits and the Ljung-Box p value.
+
+    Ljung & Box, Biometrika 65 (1978). White residuals leave 5 % outside and p above 0.05 in 95 of
+    100 cases.
+    """
+    total = sum(len(e) for e in residuals)
+    lags = min(lags, min(len(e) for e in residuals) // 4)
+    power = sum(float(e @ e) for e in residuals)
+    if power == 0.0 or lags < 1:
+        return 0.0, 1.0
+    correlation = np.array(
+        [sum(float(e[k:] @ e[:-k]) for e in residuals) / power for k in range(1, lags + 1)]
+    )
+    outside = float(np.mean(np.abs(correlation) > 1.96 / np.sqrt(total)))
+    statistic = (
+        total * (total + 2.0) * float(np.sum(correlation**2 / (total - np.arange(1, lags + 1))))
+    )
+    return outside, float(special.chdtrc(lags, statistic))
+
+
+def references(model: LinearModel, maneuvers: Sequence[Maneuver], theta: Array) -> Array:
+    """Return the value each parameter's error is compared with.
+
+    |parameter|, or, where its contribution (|parameter| times rms of its regressor) is below 5 % of
+    its row's largest, the value that would contribute 5 %. Of a tied parameter the row where it
+    counts most decides. Regressors are taken about their mean: the trim tells nothing.
+    """
+    rows = _references(model, regressor_rms(model, maneuvers), np.asarray(theta)[None])
+    return np.asarray(rows[0])
+
+
+def _references(model: LinearModel, spread: Array, theta: Array) -> Array:
+    """Return references of many parameter vectors, (vectors, parameters)."""
+    n, count = len(model.states), len(model.parameters)
+    place = {p.name: k for k, p in enumerate(model.parameters)}
+    entries = [
+        (place[t.parameter], t.row, t.column + (n if t.matrix == "B" else 0), t.gain)
+        for t in model.terms
+        if t.matrix in "AB"
+    ]
+    wide = np.repeat(np.hstack([model.A, model.B])[None], len(theta), axis=0)
+    for k, row, column, gain in entries:
+        wide[:, row, column] += gain * theta[:, k]
+    largest = np.max(np.abs(wide) * spread, axis=2)
+    floor = np.full((len(theta), count), np.inf)
+    for k, row, column, gain in entries:
+        scale = abs(gain) * spread[column]
+        if scale > 0.0:
+            floor[:, k] = np.minimum(floor[:, k], SMALL_SHARE * largest[:, row] / scale)
+    result = np.abs(theta[:, :count])
+    return np.where(np.isfinite(floor), np.maximum(result, floor), result)
+
+
+def regressor_rms(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:
+    """Return the rms about the mean of every state (where measured) and input."""
+    columns = []
+    for source, names in (("outputs", model.states), ("inputs", model.inputs)):
+        for position, name in enumerate(names):
+            if source == "outputs" and name not in model.outputs:
+                columns.append(1.0)
+                continue
+            index = model.outputs.index(name) if source == "outputs" else position
+            power = np.concatenate(
+                [
+                    getattr(m, source)[:, index] - getattr(m, source)[:, index].mean()
+                    for m in maneuvers
+                ]
+            )
+            columns.append(float(np.sqrt(np.mean(power**2))))
+    return np.array(columns)
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A parameter that these data cannot tell, and why."""
+
+    name: str
+    relative_bound: float
+    reason: str
+
+
+def plausible(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, Array]:
+    """Return mean and covariance of the parameters, drawn towards zero where nothing else holds.
+
+    Where the data cannot tell entries of a row apart, estimates of either sign and any size cancel
+    each other, and comparing a bound with such a value hides that it is worthless. Each entry gets
+    a prior about zero, `PRIOR_WIDTH` times what alone would make up the whole state rate; entries
+    that the data determine do not move.
+    """
+    model = result.model
+    count = len(model.parameters)
+    spread = regressor_rms(model, maneuvers)
+    A, B, _, _ = model.matrices(result.estimate)
+    z = [np.hstack([m.outputs[:, measured_columns(model)], m.inputs]) for m in maneuvers]
+    wide = np.hstack([A, B])
+    rates = np.concatenate([(block - block.mean(axis=0)) @ wide.T for block in z])
+    rate_rms = np.sqrt(np.mean(rates**2, axis=0))
+    n = len(model.states)
+    prior = np.full(count, np.inf)
+    for k, parameter in enumerate(model.parameters):
+        for term in model.terms:
+            if term.parameter == parameter.name and term.matrix in "AB":
+                column = term.column + (n if term.matrix == "B" else 0)
+                scale = abs(term.gain) * spread[column]
+                if scale > 0.0:
+                    prior[k] = min(prior[k], PRIOR_WIDTH * rate_rms[term.row] / scale)
+    covariance = result.covariance[:count, :count]
+    known = np.isfinite(prior)
+    total = covariance + np.diag(np.minimum(prior, 1e100) ** 2) + 1e-300 * np.eye(count)
+    mean = result.estimate[:count] - covariance @ np.linalg.solve(total, result.estimate[:count])
+    left = covariance - covariance @ np.linalg.solve(total, covariance)
+    return np.where(known, mean, result.estimate[:count]), 0.5 * (left + left.T)
+
+
+def measured_columns(model: LinearModel) -> list[int]:
+    """Return the output that measures each state, the first output where none does."""
+    return [model.outputs.index(s) if s in model.outputs else 0 for s in model.states]
+
+
+def relative_bounds(result: FitResult, maneuvers: Sequence[Maneuver]) -> Array:
+    """Return the standard error of every common parameter over its reference value."""
+    count = len(result.model.parameters)
+    reference = references(result.model, maneuvers, plausible(result, maneuvers)[0])
+    return np.asarray(result.standard_error[:count] / np.maximum(reference, 1e-300))
+
+
+def exceedance(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, float]:
+    """Return the probability that each bound exceeds 100 % of its value, and that any does.
+
+    The value is as uncertain as its bound says, so one estimate over its bound decides badly near
+    100 %: values are drawn from what the fit knows of them, and each draw is compared.
+    """
+    model, count = result.model, len(result.model.parameters)
+    mean, covariance = plausible(result, maneuvers)
+    value, vector = np.linalg.eigh(covariance)
+    root = vector * np.sqrt(np.maximum(value, 0.0))
+    draws = np.random.default_rng(DRAW_SEED).standard_normal((DRAWS, count))
+    values = _references(model, regressor_rms(model, maneuvers), mean + draws @ root.T)
+    over = result.standard_error[:count] > REFUSAL_LIMIT * values
+    return np.asarray(np.mean(over, axis=0)), float(np.mean(np.any(over, axis=1)))
+
+
+def refusals(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Refusal, ...]:
+    """Name the common parameters that these data cannot tell; none where all can be told.
+
+    A fit is refused where more likely than not some standard error exceeds its value; then every
+    parameter is named that may well be one of them, at least the likeliest.
+    """
+    count = len(result.model.parameters)
+    relative = relative_bounds(result, maneuvers)
+    single, any_of_them = exceedance(result, maneuvers)
+    if any_of_them <= EVEN_ODDS:
+        return ()
+    named = np.flatnonzero(single > min(SUSPECT, 0.999 * float(single.max())))
+    correlation = np.abs(result.correlation[:count, :count] - np.eye(count))
+    found = []
+    for k in named:
+        partner = int(np.argmax(correlation[k]))
+        reason = f"its bound is {100.0 * relative[k]:.0f} % of its value"
+        if relative[k] <= REFUSAL_LIMIT:
+            reason += f", above 100 % with a probability of {100.0 * single[k]:.0f} %"
+        if correlation[k, partner] > CORRELATED:
+            reason += (
+                f"; it moves together with {result.names[partner]}"
+                f" (correlation {correlation[k, partner]:.3f})"
+            )
+        else:
+            reason += "; the maneuver excites it too little for this noise"
+        found.append(Refusal(result.names[int(k)], float(relative[k]), reason))
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Collinearity:
+    """Condition number of the scaled information and strongly correlated pairs."""
+
+    condition: float
+    pairs: tuple[tuple[str, str, float], ...]
+
+    @property
+    def severe(self) -> bool:
+        """Whether the information is close to singular."""
+        return self.condition > CONDITION_LIMIT
+
+
+def collinearity(result: FitResult) -> Collinearity:
+    """Return what the parameters have in common."""
+    live = np.flatnonzero(result.standard_error > 0.0)
+    correlation = result.correlation[np.ix_(live, live)]
+    values = np.linalg.eigvalsh(correlation)
+    condition = float(values[-1] / max(values[0], 1e-300))
+    pairs = []
+    count = len(result.model.parameters)
+    for i in range(len(live)):
+        for j in range(i):
+            if live[i] < count and abs(correlation[i, j]) > CORRELATED:
+                pairs.append(
+                    (result.names[live[j]], result.names[live[i]], float(correlation[i, j]))
+                )
+    pairs.sort(key=lambda pair: -abs(pair[2]))
+    return Collinearity(condition, tuple(pairs))
+
+
+def constant_inputs(model: LinearModel, maneuvers: Sequence[Maneuver]) -> tuple[str, ...]:
+    """Name inputs that never move: they are the bias under another name."""
+    still = []
+    for k, name in enumerate(model.inputs):
+        if all(float(np.ptp(m.inputs[:, k])) == 0.0 for m in maneuvers):
+            still.append(name)
+    return tuple(still)
+
+
+def relative_errors(
+    model: LinearModel, maneuvers: Sequence[Maneuver], estimate: Array, truth: Array
+) -> Array:
+    """Return |estimate - truth| over the reference value of the truth, common parameters."""
+    count = len(model.parameters)
+    reference = references(model, maneuvers, truth)
+    return np.asarray(np.abs(estimate[:count] - truth[:count]) / reference, dtype=np.float64)
+
+
+def thesis_sum_of_mean_errors(measured: Array, simulated: Array) -> float:
+    """Return the thesis's equation 5.3: sum over states of mean |error|, units mixed."""
+    return float(np.sum(np.mean(np.abs(measured - simulated), axis=0)))
+
+
+def thesis_program_error_percent(measured: Array, simulated: Array) -> float:
+    """Return the figure its program prints: relative L1 error divided once more by the samples.
+
+    Multiply by the number of samples for the sum over states of honest relative errors in percent.
+    """
+    shares = np.sum(np.abs(measured - simulated), axis=0) / np.sum(np.abs(measured), axis=0)
+    return float(np.sum(shares) * 100.0 / len(measured))

@@ -1,0 +1,339 @@
+"""Models as TOML: read what a user wrote, write what a fit found.
+
+```toml
+name = "short-period"
+states = ["alpha_rad", "q_radps"]
+inputs = ["elevator_rad"]
+outputs = ["alpha_rad", "q_radps", "az_mps2"]
+hold = "foh"
+state_biases = ["alpha_rad", "q_radps"]
+output_biases = ["az_mps2"]
+initial_states = ["alpha_rad", "q_radps"]
+A = [["Z_alpha", 1.0], ["M_alpha", "M_q"]]
+B = [["Z_de"], ["M_de"]]
+C = [[1, 0], [0, 1], ["17.0*Z_alpha", 0]]
+D = [[0], [0], ["17.0*Z_de"]]
+[parameters]
+Z_alpha = { start = -5.0, lower = -50.0, upper = 0.0 }
+[[delays]]
+name = "delay_vanes_s"
+outputs = ["alpha_rad"]
+[[levers]]
+output = "az_mps2"
+state = "q_radps"
+parameter = "imu_x_m"
+gain = -1.0
+```
+
+An entry is a number, a parameter, ``gain*parameter`` or a sum of those; parameters without a line
+of their own start at zero.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.models.model import MATRICES, DelayGroup, Lever, LinearModel, Parameter, Term
+from host.sysid.models.result import FitResult
+from host.sysid.models.templates import Trim
+
+_PIECE = re.compile(
+    r"\s*(?P<sign>[+-]?)\s*(?:(?P<gain>[0-9.]+(?:[eE][+-]?\d+)?)(?:\s*\*\s*(?P<scaled>[A-Za-z_]\w*))?"
+    r"|(?P<name>[A-Za-z_]\w*))\s*"
+)
+KEYS = {
+    "name",
+    "states",
+    "inputs",
+    "outputs",
+    "hold",
+    "state_biases",
+    "output_biases",
+    "initial_states",
+    "parameters",
+    "delays",
+    "levers",
+    "fit",
+    "trim",
+    *MATRICES,
+}
+
+
+def read_model(path: Path) -> LinearModel:
+    """Read a model file.
+
+    Raises
+    ------
+    IdentificationError
+        If the file is no TOML or no model; the line says where.
+    """
+    try:
+        with path.open("rb") as file:
+            document = tomllib.load(file)
+    except OSError as error:
+        raise IdentificationError(f"{path}: cannot be read ({error.strerror})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise IdentificationError(f"{path}: not TOML: {error}") from error
+    return model_from(document, str(path))
+
+
+def read_trim(path: Path) -> Trim:
+    """Read the flight condition that a saved answer was linearised about.
+
+    Raises
+    ------
+    IdentificationError
+        If the file has none: a model that a user wrote.
+    """
+    table = tomllib.loads(path.read_text(encoding="utf-8")).get("trim", {})
+    try:
+        return Trim(*(float(table[key]) for key in ("airspeed_mps", "alpha_rad", "theta_rad")))
+    except (KeyError, TypeError, ValueError):
+        raise IdentificationError(
+            f"{path}: no [trim] with airspeed_mps, alpha_rad and theta_rad"
+        ) from None
+
+
+def model_from(document: Mapping[str, object], source: str = "model") -> LinearModel:
+    """Build a model from a parsed document."""
+    strangers = sorted(set(document) - KEYS)
+    if strangers:
+        raise IdentificationError(
+            f"{source}: unknown key {', '.join(strangers)}; known are {', '.join(sorted(KEYS))}"
+        )
+    signals = {
+        key: _names(document, key, source, needed=key in ("states", "inputs", "outputs"))
+        for key in (
+            "states",
+            "inputs",
+            "outputs",
+            "state_biases",
+            "output_biases",
+            "initial_states",
+        )
+    }
+    n, m, p = (len(signals[key]) for key in ("states", "inputs", "outputs"))
+    shapes = {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}
+    fixed: dict[str, Array] = {}
+    terms: list[Term] = []
+    for label, shape in shapes.items():
+        fixed[label], found = _matrix(document.get(label), label, shape, signals, source)
+        terms += found
+    levers = _levers(document.get("levers", []), source)
+    used = list(dict.fromkeys([t.parameter for t in terms] + [x.parameter for x in levers]))
+    return LinearModel(
+        name=str(document.get("name", Path(source).stem)),
+        states=signals["states"],
+        inputs=signals["inputs"],
+        outputs=signals["outputs"],
+        A=fixed["A"],
+        B=fixed["B"],
+        C=fixed["C"],
+        D=fixed["D"],
+        terms=tuple(terms),
+        parameters=_parameters(document.get("parameters", {}), used, source),
+        state_biases=signals["state_biases"],
+        output_biases=signals["output_biases"],
+        initial_states=signals["initial_states"],
+        delays=_delays(document.get("delays", []), source),
+        hold=str(document.get("hold", "foh")),
+        levers=levers,
+    )
+
+
+def _names(
+    document: Mapping[str, object], key: str, source: str, *, needed: bool
+) -> tuple[str, ...]:
+    value = document.get(key)
+    if value is None and not needed:
+        return ()
+    if not isinstance(value, list) or not all(isinstance(x, str) for x in value):
+        raise IdentificationError(f"{source}: {key} must be a list of signal names")
+    return tuple(cast(list[str], value))
+
+
+def _matrix(
+    value: object,
+    label: str,
+    shape: tuple[int, int],
+    signals: Mapping[str, tuple[str, ...]],
+    source: str,
+) -> tuple[Array, list[Term]]:
+    fixed = np.zeros(shape)
+    if value is None:
+        if label == "C":
+            for row, output in enumerate(signals["outputs"]):
+                if output in signals["states"]:
+                    fixed[row, signals["states"].index(output)] = 1.0
+        return fixed, []
+    rows = value if isinstance(value, list) else []
+    if len(rows) != shape[0] or any(not isinstance(r, list) or len(r) != shape[1] for r in rows):
+        raise IdentificationError(f"{source}: {label} must have {shape[0]} rows of {shape[1]}")
+    terms = []
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            constant, pieces = parse_entry(entry, f"{source}: {label}[{i}][{j}]")
+            fixed[i, j] = constant
+            terms += [Term(label, i, j, name, gain) for name, gain in pieces]
+    return fixed, terms
+
+
+def parse_entry(entry: object, where: str) -> tuple[float, list[tuple[str, float]]]:
+    """Return the known part and the (parameter, gain) pairs of one matrix entry."""
+    if isinstance(entry, bool) or not isinstance(entry, int | float | str):
+        raise IdentificationError(f"{where}: {entry!r}, expected a number or a sum of parameters")
+    if not isinstance(entry, str):
+        return float(entry), []
+    constant, pieces, position = 0.0, [], 0
+    while position < len(entry):
+        found = _PIECE.match(entry, position)
+        if found is None or found.end() == position or (position > 0 and not found["sign"]):
+            raise IdentificationError(
+                f"{where}: '{entry}' not understood; write 1.0, Z_alpha or 17.0*Z_alpha - g"
+            )
+        sign = -1.0 if found["sign"] == "-" else 1.0
+        if found["name"]:
+            pieces.append((found["name"], sign))
+        elif found["scaled"]:
+            pieces.append((found["scaled"], sign * float(found["gain"])))
+        else:
+            constant += sign * float(found["gain"])
+        position = found.end()
+    return constant, pieces
+
+
+def _parameters(value: object, used: list[str], source: str) -> tuple[Parameter, ...]:
+    if not isinstance(value, dict):
+        raise IdentificationError(f"{source}: [parameters] must be a table")
+    unknown = sorted(set(value) - set(used))
+    if unknown:
+        raise IdentificationError(f"{source}: parameter {', '.join(unknown)} enters no matrix")
+    result = []
+    for name in used:
+        settings = value.get(name, {})
+        if isinstance(settings, int | float):
+            settings = {"start": settings}
+        allowed = {"start", "lower", "upper", "prior_sd"}
+        if not isinstance(settings, dict) or set(settings) - allowed:
+            raise IdentificationError(
+                f"{source}: parameter {name}: expected start, lower, upper or prior_sd"
+            )
+        numbers = {k: float(v) for k, v in settings.items()}
+        result.append(Parameter(name, **numbers))
+    return tuple(result)
+
+
+def _delays(value: object, source: str) -> tuple[DelayGroup, ...]:
+    if not isinstance(value, list):
+        raise IdentificationError(f"{source}: [[delays]] must be a list of tables")
+    result = []
+    for item in value:
+        if not isinstance(item, dict) or "name" not in item or "outputs" not in item:
+            raise IdentificationError(f"{source}: a delay needs name and outputs")
+        numbers = {k: float(item[k]) for k in ("prior_sd_s", "limit_s") if k in item}
+        result.append(DelayGroup(str(item["name"]), tuple(item["outputs"]), **numbers))
+    return tuple(result)
+
+
+def _levers(value: object, source: str) -> tuple[Lever, ...]:
+    needed = ("output", "state", "parameter")
+    if not isinstance(value, list) or any(
+        not isinstance(item, dict) or any(not isinstance(item.get(k), str) for k in needed)
+        for item in value
+    ):
+        raise IdentificationError(f"{source}: a lever needs output, state and parameter")
+    return tuple(
+        Lever(item["output"], item["state"], item["parameter"], float(item.get("gain", 1.0)))
+        for item in value
+    )
+
+
+def model_text(
+    model: LinearModel, result: FitResult | None = None, trim: Trim | None = None
+) -> str:
+    """Return a model as TOML; with a result, estimates become the start values.
+
+    Parameters
+    ----------
+    model : LinearModel
+        What to write.
+    result : FitResult, optional
+        Gives start values, and a [fit] table with standard errors.
+    trim : Trim, optional
+        Gives a [trim] table: what the model is about, for flying it again.
+    """
+    lines = [f'name = "{model.name}"']
+    for key in ("states", "inputs", "outputs"):
+        lines.append(f"{key} = {_list(getattr(model, key))}")
+    lines.append(f'hold = "{model.hold}"')
+    for key in ("state_biases", "output_biases", "initial_states"):
+        lines.append(f"{key} = {_list(getattr(model, key))}")
+    for label in MATRICES:
+        matrix = getattr(model, label)
+        rows = []
+        for i in range(matrix.shape[0]):
+            entries = [_entry(model, label, i, j) for j in range(matrix.shape[1])]
+            rows.append("[" + ", ".join(entries) + "]")
+        lines.append(f"{label} = [" + ", ".join(rows) + "]")
+    lines.append("[parameters]")
+    for k, parameter in enumerate(model.parameters):
+        start = parameter.start if result is None else float(result.estimate[k])
+        parts = [f"start = {start!r}"]
+        for key in ("lower", "upper", "prior_sd"):
+            value = getattr(parameter, key)
+            if np.isfinite(value):
+                parts.append(f"{key} = {value!r}")
+        lines.append(f"{parameter.name} = {{ {', '.join(parts)} }}")
+    if result is not None:
+        lines.append("[fit]")
+        lines.append(f'method = "{result.method}"')
+        half = result.half_width()
+        for k, name in enumerate(result.names):
+            lines.append(f'"{name}" = [{float(result.estimate[k])!r}, {float(half[k])!r}]')
+    if trim is not None:
+        lines.append("[trim]")
+        for key in ("airspeed_mps", "alpha_rad", "theta_rad"):
+            lines.append(f"{key} = {float(getattr(trim, key))!r}")
+    for delay in model.delays:
+        lines += [
+            "[[delays]]",
+            f'name = "{delay.name}"',
+            f"outputs = {_list(delay.outputs)}",
+            f"prior_sd_s = {delay.prior_sd_s!r}",
+            f"limit_s = {delay.limit_s!r}",
+        ]
+    for lever in model.levers:
+        lines += [
+            "[[levers]]",
+            f'output = "{lever.output}"',
+            f'state = "{lever.state}"',
+            f'parameter = "{lever.parameter}"',
+            f"gain = {lever.gain!r}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _list(names: tuple[str, ...]) -> str:
+    return "[" + ", ".join(f'"{name}"' for name in names) + "]"
+
+
+def _entry(model: LinearModel, label: str, row: int, column: int) -> str:
+    known = float(getattr(model, label)[row, column])
+    pieces = [
+        f"{term.gain!r}*{term.parameter}"
+        for term in model.terms
+        if (term.matrix, term.row, term.column) == (label, row, column)
+    ]
+    if not pieces:
+        return repr(known)
+    if known != 0.0:
+        pieces.insert(0, repr(known))
+    return '"' + " + ".join(pieces).replace("+ -", "- ") + '"'

@@ -1,0 +1,105 @@
+"""One answer type for every method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import special
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.models.model import LinearModel
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """Estimate, covariance, residuals and diagnostics of one fit.
+
+    Attributes
+    ----------
+    method : str
+        Method name as given to `fit`.
+    model : LinearModel
+        The model that was fitted.
+    names : tuple of str
+        Parameter names in the order of `estimate`: common ones first, then per maneuver.
+    estimate : Array, shape (P,)
+    covariance : Array, shape (P, P)
+        Covariance the intervals stand on (coloured or prewhitened where the method says so).
+    covariance_white : Array, shape (P, P)
+        Covariance if the residuals were white.
+    degrees_of_freedom : Array, shape (P,)
+        Of the t distribution of each interval; infinite means normal.
+    residuals : tuple of Array
+        Per maneuver (samples, columns): measured minus model, of the outputs or of the rates.
+    fitted : tuple of Array
+        Per maneuver the model's side of those residuals.
+    residual_kind : str
+        ``output`` (free simulation), ``rate`` (equation error) or ``innovation`` (one step).
+    noise_covariance : Array
+        Covariance of the residual columns.
+    iterations : int
+    converged : bool
+    warnings : tuple of str
+        Clear statements about anything that should make a reader careful.
+    details : dict
+        Method-specific numbers for reports: name to value or array.
+    """
+
+    method: str
+    model: LinearModel
+    names: tuple[str, ...]
+    estimate: Array
+    covariance: Array
+    covariance_white: Array
+    degrees_of_freedom: Array
+    residuals: tuple[Array, ...]
+    fitted: tuple[Array, ...]
+    residual_kind: str
+    noise_covariance: Array
+    iterations: int
+    converged: bool
+    warnings: tuple[str, ...] = ()
+    details: dict[str, float | Array] = field(default_factory=dict)
+
+    def index(self, name: str) -> int:
+        """Return the position of a parameter.
+
+        Raises
+        ------
+        IdentificationError
+            If the result has no such parameter.
+        """
+        if name not in self.names:
+            raise IdentificationError(
+                f"no parameter '{name}' in this {self.method} result; it has"
+                f" {', '.join(self.names)}"
+            )
+        return self.names.index(name)
+
+    def value(self, name: str) -> float:
+        """Return the estimate of one parameter."""
+        return float(self.estimate[self.index(name)])
+
+    @property
+    def standard_error(self) -> Array:
+        """Standard deviation of each estimate."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    def half_width(self, confidence: float = 0.95) -> Array:
+        """Return half-widths of the two-sided intervals, shape (P,)."""
+        dof = np.minimum(self.degrees_of_freedom, 1e9)
+        quantile = np.asarray(special.stdtrit(dof, 0.5 + confidence / 2.0), dtype=np.float64)
+        return quantile * self.standard_error
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation matrix of the estimates."""
+        sd = self.standard_error
+        safe = np.where(sd > 0.0, sd, 1.0)
+        return np.asarray(self.covariance / np.outer(safe, safe), dtype=np.float64)
+
+    def matrices(self) -> tuple[Array, Array, Array, Array]:
+        """Return A, B, C, D at the estimate."""
+        return self.model.matrices(self.estimate[: len(self.model.parameters)])

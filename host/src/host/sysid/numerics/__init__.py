@@ -1,0 +1,1 @@
+"""What estimators share: kernels, residuals and slopes, memory of noise, Riccati equation."""

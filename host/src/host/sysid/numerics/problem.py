@@ -1,0 +1,274 @@
+"""A model and its maneuvers made ready for the kernels: one vector in, residuals and slopes out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array, IntArray
+from host.sysid.errors import IdentificationError
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import EntryTable, LinearModel
+from host.sysid.numerics.kernels import delayed, propagate, simulate, transition
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """Output of one maneuver: y (p, samples) and slopes (p, samples, columns of this maneuver)."""
+
+    y: Array
+    slopes: Array
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    drive: Array
+    measured: Array
+    index: IntArray  # of the columns of this maneuver in the whole vector
+    dt_s: float
+
+
+class OutputProblem:
+    """Residuals and sensitivities of all outputs of several maneuvers.
+
+    Parameters
+    ----------
+    model : LinearModel
+        What is free.
+    maneuvers : sequence of Maneuver
+        The data.
+
+    Raises
+    ------
+    IdentificationError
+        If the columns of a maneuver do not fit the model.
+    """
+
+    def __init__(self, model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:
+        if not maneuvers:
+            raise IdentificationError("no maneuver to fit: give at least one")
+        self.model = model
+        self.maneuvers = tuple(maneuvers)
+        n, m = len(model.states), len(model.inputs)
+        common = len(model.parameter_names)
+        self.n_common = common
+        local = model.local_names(1)
+        names = list(model.parameter_names)
+        self._parts: list[_Part] = []
+        for number, maneuver in enumerate(self.maneuvers, start=1):
+            check_shapes(model, maneuver)
+            begin = len(names)
+            names.extend(model.local_names(number))
+            index = np.concatenate([np.arange(common), np.arange(begin, len(names))])
+            one = np.ones((maneuver.samples, 1))
+            columns = [maneuver.inputs, one]
+            if model.hold == "foh":
+                increments = np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:])
+                columns.append(increments)
+            self._parts.append(
+                _Part(
+                    drive=np.ascontiguousarray(np.hstack(columns)),
+                    measured=np.ascontiguousarray(maneuver.outputs.T),
+                    index=index.astype(np.int64),
+                    dt_s=maneuver.dt_s,
+                )
+            )
+        self.names = tuple(names)
+        self.n_local = len(local)
+        width = common + len(local)
+        state_entries = model.entries("AB")
+        n_rates = len(model.state_biases)
+        self._entries = EntryTable(
+            row=np.concatenate(
+                [
+                    state_entries.row,
+                    np.array([model.states.index(s) for s in model.state_biases], dtype=np.int64),
+                ]
+            ),
+            column=np.concatenate([state_entries.column, np.full(n_rates, n + m, dtype=np.int64)]),
+            parameter=np.concatenate(
+                [state_entries.parameter, np.arange(common, common + n_rates, dtype=np.int64)]
+            ),
+            gain=np.concatenate([state_entries.gain, np.ones(n_rates)]),
+        )
+        self._bias_parameter = np.full(len(model.outputs), -1, dtype=np.int64)
+        for k, output in enumerate(model.output_biases):
+            self._bias_parameter[model.outputs.index(output)] = common + n_rates + k
+        self._start_parameter = np.full(n, -1, dtype=np.int64)
+        for k, state in enumerate(model.initial_states):
+            position = common + n_rates + len(model.output_biases) + k
+            self._start_parameter[model.states.index(state)] = position
+        self._start_slopes = np.zeros((n, width))
+        for i in np.flatnonzero(self._start_parameter >= 0):
+            self._start_slopes[i, self._start_parameter[i]] = 1.0
+        output_entries = model.entries("CD")
+        free_output = len(output_entries.row) + len(model.levers) > 0
+        self._arms = [
+            (
+                model.outputs.index(lever.output),
+                model.states.index(lever.state),
+                [p.name for p in model.parameters].index(lever.parameter),
+                lever.gain,
+            )
+            for lever in model.levers
+        ]
+        self._CD_slopes = np.zeros((len(model.outputs) if free_output else 0, n + m, width))
+        for k in range(len(output_entries.row)):
+            self._CD_slopes[
+                output_entries.row[k], output_entries.column[k], output_entries.parameter[k]
+            ] += output_entries.gain[k]
+        self._width = width
+        self.lower, self.upper, self.prior_mean, self.prior_precision = self._limits()
+
+    def _limits(self) -> tuple[Array, Array, Array, Array]:
+        free = len(self.names)
+        lower, upper = np.full(free, -np.inf), np.full(free, np.inf)
+        mean, precision = np.zeros(free), np.zeros(free)
+        for k, parameter in enumerate(self.model.parameters):
+            lower[k], upper[k], mean[k] = parameter.lower, parameter.upper, parameter.start
+            precision[k] = parameter.prior_sd**-2
+        for k, delay in enumerate(self.model.delays, start=len(self.model.parameters)):
+            lower[k], upper[k] = -delay.limit_s, delay.limit_s
+            precision[k] = delay.prior_sd_s**-2
+        return lower, upper, mean, precision
+
+    @property
+    def samples(self) -> int:
+        """Samples of all maneuvers together."""
+        return sum(m.samples for m in self.maneuvers)
+
+    def columns(self, maneuver: int) -> IntArray:
+        """Return which entries of the whole vector the slopes of a maneuver belong to."""
+        return self._parts[maneuver].index
+
+    def measured(self, maneuver: int) -> Array:
+        """Return the measured outputs of a maneuver, shape (p, samples)."""
+        return self._parts[maneuver].measured
+
+    def first_guess(self) -> Array:
+        """Return start values: the model's, and first measured samples as initial states."""
+        theta = np.zeros(len(self.names))
+        theta[: len(self.model.parameters)] = self.model.start
+        for part, maneuver in zip(self._parts, self.maneuvers, strict=True):
+            place = part.index[-len(self.model.initial_states) :]
+            for k, state in enumerate(self.model.initial_states):
+                if state in self.model.outputs:
+                    theta[place[k]] = maneuver.outputs[0, self.model.outputs.index(state)]
+        return theta
+
+    def respond(self, theta: Array) -> list[Response] | None:
+        """Simulate every maneuver with sensitivities; None if a response left all bounds."""
+        model = self.model
+        n, m = len(model.states), len(model.inputs)
+        A, B, C, D = model.matrices(theta)
+        AB = np.zeros((n, n + m + 1))
+        AB[:, :n], AB[:, n : n + m] = A, B
+        CD = np.hstack([C, D])
+        CD_slopes = self._with_levers(AB[:, :-1], theta)
+        result = []
+        for part in self._parts:
+            local = theta[part.index]
+            AB[:, -1] = 0.0
+            for k, state in enumerate(model.state_biases):
+                AB[model.states.index(state), -1] = local[self.n_common + k]
+            step, slopes = transition(
+                AB,
+                n,
+                m,
+                model.hold == "foh",
+                part.dt_s,
+                self._entries.row,
+                self._entries.column,
+                self._entries.parameter,
+                self._entries.gain,
+                self._width,
+            )
+            finite, z = simulate(
+                step,
+                part.drive,
+                np.where(self._start_parameter >= 0, local[self._start_parameter], 0.0),
+            )
+            if not finite:
+                return None
+            y = CD @ z[:, : n + m].T
+            y += np.where(self._bias_parameter >= 0, local[self._bias_parameter], 0.0)[:, None]
+            push = (z @ slopes.transpose(1, 0, 2).reshape(z.shape[1], -1)).reshape(len(z), n, -1)
+            slope = propagate(step, push, C, self._start_slopes)
+            for j in np.flatnonzero(self._bias_parameter >= 0):
+                slope[j, :, self._bias_parameter[j]] += 1.0
+            for row, output_slope in enumerate(CD_slopes):
+                slope[row] += z[:, : n + m] @ output_slope
+            self._delay(y, slope, local, part.dt_s)
+            result.append(Response(y, slope))
+        return result
+
+    def _with_levers(self, AB: Array, theta: Array) -> Array:
+        """Return the slopes of [C D]; an arm carries a whole state row into an output."""
+        if not self._arms:
+            return self._CD_slopes
+        slopes = self._CD_slopes.copy()
+        entries = self._entries
+        for output, state, parameter, gain in self._arms:
+            slopes[output, :, parameter] += gain * AB[state]
+            for t in np.flatnonzero(entries.row == state):
+                if entries.column[t] < AB.shape[1]:
+                    slopes[output, entries.column[t], entries.parameter[t]] += (
+                        gain * theta[parameter] * entries.gain[t]
+                    )
+        return slopes
+
+    def outputs(self, theta: Array) -> list[Array] | None:
+        """Simulate without sensitivities: outputs (p, samples) per maneuver, None if divergent."""
+        model = self.model
+        n, m = len(model.states), len(model.inputs)
+        A, B, C, D = model.matrices(theta)
+        AB = np.zeros((n, n + m + 1))
+        AB[:, :n], AB[:, n : n + m] = A, B
+        none = np.zeros(0, dtype=np.int64)
+        result: list[Array] = []
+        for part in self._parts:
+            local = theta[part.index]
+            AB[:, -1] = 0.0
+            for k, state in enumerate(model.state_biases):
+                AB[model.states.index(state), -1] = local[self.n_common + k]
+            step, _ = transition(
+                AB, n, m, model.hold == "foh", part.dt_s, none, none, none, np.zeros(0), 0
+            )
+            start = np.where(self._start_parameter >= 0, local[self._start_parameter], 0.0)
+            finite, z = simulate(step, part.drive, start)
+            if not finite:
+                return None
+            y = np.hstack([C, D]) @ z[:, : n + m].T
+            y += np.where(self._bias_parameter >= 0, local[self._bias_parameter], 0.0)[:, None]
+            self._delay(y, np.zeros((len(y), 0, 0)), local, part.dt_s)
+            result.append(y)
+        return result
+
+    def _delay(self, y: Array, slope: Array, local: Array, dt_s: float) -> None:
+        for k, delay in enumerate(self.model.delays, start=len(self.model.parameters)):
+            shift = local[k] / dt_s
+            for output in delay.outputs:
+                j = self.model.outputs.index(output)
+                late, by_shift = delayed(np.ascontiguousarray(y[j][:, None]), shift)
+                y[j] = late[:, 0]
+                if slope.shape[1] == 0:
+                    continue
+                if shift != 0.0:
+                    slope[j] = delayed(slope[j], shift)[0]
+                slope[j][:, k] += by_shift[:, 0] / dt_s
+
+
+def check_shapes(model: LinearModel, maneuver: Maneuver) -> None:
+    """Refuse a maneuver whose columns do not fit the model."""
+    for label, array, expected in (
+        ("inputs", maneuver.inputs, model.inputs),
+        ("outputs", maneuver.outputs, model.outputs),
+        ("rates", maneuver.rates, model.states),
+    ):
+        if array is not None and array.shape[1] != len(expected):
+            raise IdentificationError(
+                f"{maneuver.name}: {array.shape[1]} {label}, model {model.name} has"
+                f" {len(expected)} ({', '.join(expected)})"
+            )

@@ -1,0 +1,1 @@
+"""Aircraft files and where their derivatives come from."""

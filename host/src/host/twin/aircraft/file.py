@@ -1,0 +1,230 @@
+"""Aircraft files: mass, geometry, aerodynamics, propulsion, sensors, and where each number comes
+from."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from host.errors import UsageError
+from host.twin.aircraft.airframe import COEFFICIENTS, GRAVITY_MPS2, Airframe, Array
+from host.twin.aircraft.straight import Straight
+
+FOLDER = Path(__file__).parent / "airframes"
+
+_SCALARS: Mapping[str, tuple[str, ...]] = {
+    "mass": (
+        "mass_kg", "ixx_kgm2", "iyy_kgm2", "izz_kgm2", "ixz_kgm2",
+        "mass_tolerance", "inertia_tolerance", "cg_tolerance_m",
+    ),
+    "geometry": ("wing_area_m2", "span_m", "chord_m"),
+    "trim": ("airspeed_mps", "minimum_airspeed_mps", "maximum_airspeed_mps"),
+    "aerodynamics": ("cd_0", "induced_factor", "stall_lift_perrad2", "stall_drag_perrad2"),
+    "propulsion": (
+        "diameter_m", "advance_ratio_max", "rotor_inertia_kgm2", "motor_torque_max_nm",
+        "friction_torque_nm", "brake_torque_nm", "stopped_drag_area_m2", "thrust_pitch_rad",
+    ),
+    "servo": ("bandwidth_hz", "rate_limit_radps"),
+    "surfaces": ("elevator_limit_rad", "aileron_limit_rad", "rudder_limit_rad"),
+    "sensors": ("position_tolerance_m", "upwash", "upwash_tolerance",
+        "vane_frequency_hz_per_mps", "vane_damping", "vane_friction_rad", "pitot_lag_s"),
+}  # fmt: skip
+_VECTORS: Mapping[str, tuple[str, ...]] = {
+    "mass": ("cg_m",),
+    "geometry": (),
+    "trim": (),
+    "aerodynamics": ("alpha_rad", "stall_alpha_rad", *COEFFICIENTS),
+    "propulsion": ("ct_polynomial", "cp_polynomial", "motor_power_polynomial_w", "hub_m"),
+    "servo": (),
+    "surfaces": (),
+    "sensors": ("imu_m", "vane_a_m", "vane_b_m", "pitot_a_m", "pitot_b_m", "gps_m"),
+}
+
+
+class AircraftError(UsageError):
+    """An aircraft file that cannot be used: what was found, what was expected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Aircraft:
+    """One aircraft file.
+
+    Attributes
+    ----------
+    name, title : str
+        Name of the file, name for people.
+    scalars, vectors : mapping
+        Numbers under "section.key", SI.
+    sources : mapping
+        Where each of them comes from, under the same keys.
+    straight : Straight, optional
+        Of a linear aircraft: what it does instead of aerodynamics and propulsion.
+    """
+
+    name: str
+    title: str
+    scalars: Mapping[str, float]
+    vectors: Mapping[str, Array]
+    sources: Mapping[str, str]
+    straight: Straight | None = None
+
+    def scalar(self, key: str) -> float:
+        """Return one number by "section.key"."""
+        return self.scalars[key]
+
+    def vector(self, key: str) -> Array:
+        """Return a copy of one array by "section.key"."""
+        return self.vectors[key].copy()
+
+    def airframe(self) -> Airframe:
+        """Return the nominal aircraft as the equations of motion take it."""
+        s, v = self.scalars, self.vectors
+        pitch = s["propulsion.thrust_pitch_rad"]
+        frame = Airframe(
+            mass_kg=s["mass.mass_kg"],
+            ixx_kgm2=s["mass.ixx_kgm2"],
+            iyy_kgm2=s["mass.iyy_kgm2"],
+            izz_kgm2=s["mass.izz_kgm2"],
+            ixz_kgm2=s["mass.ixz_kgm2"],
+            cg_m=v["mass.cg_m"].copy(),
+            wing_area_m2=s["geometry.wing_area_m2"],
+            span_m=s["geometry.span_m"],
+            chord_m=s["geometry.chord_m"],
+            alpha_nodes_rad=v["aerodynamics.alpha_rad"].copy(),
+            derivatives=np.column_stack([v[f"aerodynamics.{name}"] for name in COEFFICIENTS]),
+            cd_0=s["aerodynamics.cd_0"],
+            induced_factor=s["aerodynamics.induced_factor"],
+            stall_alpha_low_rad=float(v["aerodynamics.stall_alpha_rad"][0]),
+            stall_alpha_high_rad=float(v["aerodynamics.stall_alpha_rad"][1]),
+            stall_lift_perrad2=s["aerodynamics.stall_lift_perrad2"],
+            stall_drag_perrad2=s["aerodynamics.stall_drag_perrad2"],
+            propeller_diameter_m=s["propulsion.diameter_m"],
+            ct_polynomial=v["propulsion.ct_polynomial"].copy(),
+            cp_polynomial=v["propulsion.cp_polynomial"].copy(),
+            advance_ratio_max=s["propulsion.advance_ratio_max"],
+            rotor_inertia_kgm2=s["propulsion.rotor_inertia_kgm2"],
+            motor_power_polynomial_w=v["propulsion.motor_power_polynomial_w"].copy(),
+            motor_torque_max_nm=s["propulsion.motor_torque_max_nm"],
+            friction_torque_nm=s["propulsion.friction_torque_nm"],
+            brake_torque_nm=s["propulsion.brake_torque_nm"],
+            stopped_drag_area_m2=s["propulsion.stopped_drag_area_m2"],
+            thrust_axis=np.array([math.cos(pitch), 0.0, -math.sin(pitch)]),
+            hub_m=v["propulsion.hub_m"].copy(),
+            servo_bandwidth_radps=2.0 * math.pi * s["servo.bandwidth_hz"],
+            servo_rate_radps=s["servo.rate_limit_radps"],
+            surface_limit_rad=np.array(
+                [s[f"surfaces.{name}_limit_rad"] for name in ("elevator", "aileron", "rudder")]
+            ),
+            gravity_mps2=GRAVITY_MPS2,
+            free=1.0,
+        )
+        return frame if self.straight is None else self.straight.fitted(frame)
+
+
+def names() -> list[str]:
+    """Return the names of the aircraft that come with the package, linear ones too, sorted."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def read_document(source: str | Path) -> dict[str, object]:
+    """Read an aircraft file as it stands.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a packaged aircraft, or path of a file.
+
+    Raises
+    ------
+    AircraftError
+        No such file, not TOML, or of another format.
+    """
+    path = Path(source)
+    if path.suffix != ".toml":
+        path = FOLDER / f"{source}.toml"
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        known = ", ".join(names())
+        raise AircraftError(f"no aircraft {source!r}: expected a file or one of {known}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise AircraftError(f"{path.name}: not TOML: {error}") from None
+    if document.get("format") != 1:
+        found = document.get("format")
+        raise AircraftError(f"{path.name}: format is {found!r}, expected 1")
+    return document
+
+
+def load(source: str | Path) -> Aircraft:
+    """Load a non-linear aircraft.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a packaged aircraft, or path of a file.
+
+    Returns
+    -------
+    Aircraft
+
+    Raises
+    ------
+    AircraftError
+        A number is missing, is not a number, has no source, or a table has the wrong length.
+    """
+    document = read_document(source)
+    kind = document.get("kind")
+    if kind != "nonlinear":
+        raise AircraftError(f"{source}: kind is {kind!r}, expected 'nonlinear'")
+    scalars: dict[str, float] = {}
+    vectors: dict[str, Array] = {}
+    sources: dict[str, str] = {}
+    for section, keys in _SCALARS.items():
+        table = document.get(section)
+        if not isinstance(table, dict):
+            raise AircraftError(f"{source}: section [{section}] is missing")
+        for key in keys:
+            scalars[f"{section}.{key}"] = _number(source, section, table, key)
+        for key in _VECTORS[section]:
+            vectors[f"{section}.{key}"] = _numbers(source, section, table, key)
+        own = table.get("sources", {})
+        for key in (*keys, *_VECTORS[section]):
+            origin = own.get(key, table.get("source", ""))
+            if not isinstance(origin, str) or not origin:
+                raise AircraftError(f"{source}: {section}.{key} has no source")
+            sources[f"{section}.{key}"] = origin
+    nodes = len(vectors["aerodynamics.alpha_rad"])
+    for name in COEFFICIENTS:
+        found = len(vectors[f"aerodynamics.{name}"])
+        if found != nodes:
+            raise AircraftError(
+                f"{source}: aerodynamics.{name} has {found} values, expected {nodes} as alpha_rad"
+            )
+    if np.any(np.diff(vectors["aerodynamics.alpha_rad"]) <= 0.0):
+        raise AircraftError(f"{source}: aerodynamics.alpha_rad must increase")
+    return Aircraft(
+        name=str(document.get("name", Path(source).stem)),
+        title=str(document.get("title", source)),
+        scalars=scalars,
+        vectors=vectors,
+        sources=sources,
+    )
+
+
+def _number(source: str | Path, section: str, table: Mapping[str, object], key: str) -> float:
+    value = table.get(key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise AircraftError(f"{source}: {section}.{key} is {value!r}, expected a number")
+    return float(value)
+
+
+def _numbers(source: str | Path, section: str, table: Mapping[str, object], key: str) -> Array:
+    value = table.get(key)
+    if not isinstance(value, list) or not all(isinstance(x, (int, float)) for x in value):
+        raise AircraftError(f"{source}: {section}.{key} is {value!r}, expected a list of numbers")
+    return np.array(value, dtype=np.float64)

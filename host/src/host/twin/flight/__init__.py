@@ -1,0 +1,1 @@
+"""The flight itself: pilot, draws of the day, integration."""

@@ -1,0 +1,200 @@
+"""The pilot: from a flight card to what the hands and the eyes do, second by second."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from host.twin.aircraft.airframe import Airframe, Array
+from host.twin.motion.linear import linearise
+from host.twin.motion.trim import Trim
+from host.twin.testcard.cards import AXES, Card, Segment
+from host.twin.testcard.maneuvers import (
+    STEPS,
+    multisine,
+    multisine_signal,
+    staircase,
+    sweep_signal,
+)
+
+CROSSOVER_RADPS = 1.2  # of attitude control by eye; a person on the ground manages about 1-2 rad/s
+WINDOW_TAIL_S = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """One maneuver as it was really flown; times from power-on.
+
+    Attributes
+    ----------
+    kind, axes : str, tuple of str
+    start_s : float
+        First departure of the input.
+    input_end_s : float
+        Last motion of the input.
+    end_s : float
+        3 s later, or where the next input starts.
+    attention_s : float
+        When the pilot took over again.
+    """
+
+    kind: str
+    axes: tuple[str, ...]
+    start_s: float
+    input_end_s: float
+    end_s: float
+    attention_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """What the pilot does, on the time grid of the flight.
+
+    Attributes
+    ----------
+    program : (n, 4) array
+        Test input added to the sticks: elevator, aileron, rudder (rad), throttle (share).
+    attention : (n,) array
+        Weight of the pilot's corrections, 0 to 1.
+    bank_rad, airspeed_mps : (n,) arrays
+        What the pilot wants to see.
+    windows : list of Window
+    """
+
+    program: Array
+    attention: Array
+    bank_rad: Array
+    airspeed_mps: Array
+    windows: list[Window] = field(default_factory=list)
+
+
+def duration_s(card: Card) -> float:
+    """Return the length of the card, ground time included."""
+    return card.flight.ground_s + sum(_length_s(card, s) for s in card.segments)
+
+
+def _length_s(card: Card, s: Segment) -> float:
+    if s.kind in STEPS:
+        units = sum(length for _, length in STEPS[s.kind])
+        return s.before_s + units * s.width_s + card.pilot.hands_off_s
+    if s.kind in ("trim", "turn"):
+        return s.duration_s
+    return s.before_s + s.duration_s + card.pilot.hands_off_s
+
+
+def schedule(card: Card, airspeed_mps: float, step_s: float, rng: np.random.Generator) -> Schedule:
+    """Turn a card into the pilot's program, with the errors of a human hand.
+
+    Parameters
+    ----------
+    card : Card
+    airspeed_mps : float
+        Wanted where the card does not say.
+    step_s : float
+    rng : numpy Generator
+
+    Returns
+    -------
+    Schedule
+    """
+    n = round(duration_s(card) / step_s)
+    t = np.arange(n, dtype=np.float64) * step_s
+    result = Schedule(
+        program=np.zeros((n, 4)),
+        attention=np.ones(n),
+        bank_rad=np.zeros(n),
+        airspeed_mps=np.full(n, airspeed_mps),
+    )
+    inputs: list[tuple[Segment, float, float, float]] = []
+    at = card.flight.ground_s
+    for s in card.segments:
+        begin, at = at, at + _length_s(card, s)
+        span = slice(round(begin / step_s), round(at / step_s))
+        if s.airspeed_mps > 0.0:
+            result.airspeed_mps[span] = s.airspeed_mps
+        if s.kind == "turn":
+            # The bank is rolled in and out over a second each by the wish itself.
+            local = t[span] - begin
+            share = np.clip(np.minimum(local, s.duration_s - local), 0.0, 1.0)
+            result.bank_rad[span] = math.radians(s.bank_deg) * share
+        elif s.kind != "trim":
+            inputs.append((s, *_fly_input(card, s, begin + s.before_s, t, result, rng)))
+    for i, (s, start, end, again) in enumerate(inputs):
+        tail = end + WINDOW_TAIL_S
+        if i + 1 < len(inputs):
+            tail = min(tail, inputs[i + 1][1])
+        result.windows.append(Window(s.kind, s.axes, start, end, min(tail, n * step_s), again))
+    return result
+
+
+def _fly_input(
+    card: Card, s: Segment, start_s: float, t: Array, into: Schedule, rng: np.random.Generator
+) -> tuple[float, float, float]:
+    """Add one input; return its start, its end and when the pilot corrects again."""
+    pilot = card.pilot
+    if s.kind in STEPS:
+        signs = np.array([sign for sign, _ in STEPS[s.kind]])
+        lengths = np.array([length for _, length in STEPS[s.kind]]) * s.width_s
+        edges = np.concatenate([[0.0], np.cumsum(lengths)])
+        edges = edges + rng.normal(0.0, pilot.timing_s, len(edges))
+        edges = start_s + np.maximum.accumulate(edges)  # a hand is never back before it left
+        levels = signs * (1.0 + rng.normal(0.0, pilot.amplitude, len(signs)))
+        begin, end = float(edges[0]), float(edges[-1]) + pilot.hand_s
+        span = _span(t, begin - 0.1, end + 0.1)
+        local = t[span]
+        wave = staircase(local, edges, levels, pilot.hand_s)
+        # A held stick creeps: the level drifts until the next edge.
+        for i, level in enumerate(levels):
+            inside = (local >= edges[i] + pilot.hand_s) & (local < edges[i + 1])
+            creep = rng.normal(0.0, pilot.drift) * level
+            wave[inside] += creep * (local[inside] - edges[i] - pilot.hand_s)
+        waves = [wave] * len(s.axes)
+        attention = 0.0 if s.attention < 0.0 else s.attention
+    else:
+        begin, end = start_s, start_s + s.duration_s
+        span = _span(t, begin - 0.1, end + 0.1)
+        local = t[span] - start_s
+        if s.kind == "multisine":
+            sums = multisine(s.duration_s, s.low_hz, s.high_hz, len(s.axes))
+            waves = [
+                multisine_signal(local, s.duration_s, f, phase)
+                for f, phase in zip(*sums, strict=True)
+            ]
+        else:
+            waves = [sweep_signal(local, s.duration_s, s.low_hz, s.high_hz)] * len(s.axes)
+        attention = 0.25 if s.attention < 0.0 else s.attention
+    for axis, amplitude, wave in zip(s.axes, s.amplitudes, waves, strict=True):
+        size = amplitude if axis == "throttle" else math.radians(amplitude)
+        into.program[span, AXES.index(axis)] += size * wave
+    again = end + pilot.hands_off_s
+    if rng.random() < pilot.early:
+        again = begin + rng.uniform(0.6, 1.0) * (end - begin)
+    # The pilot lets go half a second before the input and comes back within 0.4 s.
+    into.attention[_span(t, begin - 0.5, again)] = attention
+    back = _span(t, again, again + 0.4)
+    into.attention[back] = attention + (1.0 - attention) * (t[back] - again) / 0.4
+    return begin, end, again
+
+
+def _span(t: Array, first_s: float, last_s: float) -> slice:
+    """Return the samples from first to before last."""
+    low, high = np.searchsorted(t, [first_s, last_s])
+    return slice(int(low), int(high))
+
+
+def gains(frame: Airframe, trim: Trim) -> Array:
+    """Return the pilot's gains: aileron per bank, elevator per pitch error (rad/rad).
+
+    They give every aircraft the same crossover, as a pilot does who knows his aircraft.
+
+    Returns
+    -------
+    (2,) array
+    """
+    linear = linearise(frame, trim)
+    roll_rate = -linear.lateral_b[1, 0] / linear.lateral_a[1, 1]
+    short = linear.longitudinal_a[1:3, 1:3]
+    pitch_rate = float(np.linalg.solve(short, -linear.longitudinal_b[1:3, 0])[1])
+    return np.array([CROSSOVER_RADPS / roll_rate, CROSSOVER_RADPS / pitch_rate])

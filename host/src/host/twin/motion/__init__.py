@@ -1,0 +1,1 @@
+"""How the aircraft moves: rigid body, air, propulsion, trim, linearisation."""

@@ -1,0 +1,1 @@
+"""What is written of a flight: tables, truth, verdict, picture."""

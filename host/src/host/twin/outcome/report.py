@@ -1,0 +1,237 @@
+"""One virtual flight from card to files."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pandas as pd
+
+from host.log import read_log
+from host.twin.aircraft.file import Aircraft
+from host.twin.flight.fly import FlightRecord, fly
+from host.twin.outcome import compare, ideal, picture, thesis, truth
+from host.twin.outcome.instrument import calibration
+from host.twin.recorder import avr, sitl, stimuli
+from host.twin.sensors.airdata import AirData, air_data
+from host.twin.sensors.imu import Imu
+from host.twin.testcard.cards import Card, Segment
+
+FIRMWARES = ("sitl", "avr", "none", "thesis")
+Progress = Callable[[str, float], None]
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What a virtual flight left behind.
+
+    Attributes
+    ----------
+    record : FlightRecord
+    data : AirData
+    files : list of Path
+    table : DataFrame or None
+        What the picture shows: decoded, ideal or thesis rows.
+    recording : Recording or None
+        With the firmware on this computer.
+    deviations : list of Deviation
+        The decoded log against the truth.
+    first_row_s : float
+        True time since power-on of the log's first row.
+    wall_s, processor_s : dict
+        Wall-clock seconds, and those of this process's processor time, per stage.
+    """
+
+    record: FlightRecord
+    data: AirData
+    files: list[Path] = field(default_factory=list)
+    table: pd.DataFrame | None = None
+    recording: sitl.Recording | None = None
+    deviations: list[compare.Deviation] = field(default_factory=list)
+    first_row_s: float = 0.0
+    wall_s: dict[str, float] = field(default_factory=dict)
+    processor_s: dict[str, float] = field(default_factory=dict)
+
+
+class _Clock:
+    """Times of stages: on the wall, and of this process (another one may hold the core)."""
+
+    def __init__(self) -> None:
+        self.wall_s: dict[str, float] = {}
+        self.processor_s: dict[str, float] = {}
+        self._last = time.perf_counter(), time.process_time()
+
+    def mark(self, stage: str) -> None:
+        """End a stage."""
+        now = time.perf_counter(), time.process_time()
+        self.wall_s[stage] = now[0] - self._last[0]
+        self.processor_s[stage] = now[1] - self._last[1]
+        self._last = now
+
+
+def load_kernels(card: Card, aircraft: Aircraft | None = None) -> None:
+    """Load (the very first time: compile) every kernel by a flight of one second."""
+    short = replace(
+        card,
+        segments=(Segment("trim", duration_s=1.0),),
+        faults=(),
+        flight=replace(card.flight, ground_s=0.5),
+        air=replace(card.air, turbulence_mps=0.1),
+    )
+    record = fly(short, aircraft=aircraft)
+    stimuli.stimuli(record, air_data(record))
+
+
+def simulate(
+    card: Card,
+    folder: Path,
+    *,
+    seed: int,
+    firmware: str,
+    pictures: bool,
+    both: bool,
+    progress: Progress,
+    aircraft: Aircraft | None = None,
+) -> Outcome:
+    """Fly a card and write everything it leaves.
+
+    Parameters
+    ----------
+    card : Card
+    folder : Path
+        Made if missing; files of an earlier flight are overwritten.
+    seed : int
+    firmware : str
+        One of `FIRMWARES`.
+    pictures : bool
+        Draw flight.png.
+    both : bool
+        Fly the thesis's logger beside it, into the same picture.
+    progress : callable
+        Called with the stage and its share.
+    aircraft : Aircraft, optional
+        In place of the card's.
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    HostError
+        The card, the aircraft or the firmware does not work as asked.
+    OSError
+        The folder cannot be written.
+    """
+    clock = _Clock()
+    progress("load", 0.0)
+    load_kernels(card, aircraft)
+    clock.mark("load")
+    record = fly(card, seed=seed, progress=lambda share: progress("fly", share), aircraft=aircraft)
+    clock.mark("fly")
+    folder.mkdir(parents=True, exist_ok=True)
+    data = air_data(record)
+    outcome = Outcome(record, data)
+    stem = folder / "flight"
+    text = folder / "calibration.toml"
+    text.write_text(calibration(record.aircraft), encoding="utf-8")
+    outcome.files.append(text)
+    if firmware == "none":
+        outcome.table = ideal.measured_table(record, data)
+        outcome.files += _csv(outcome.table, stem.with_name("flight.csv"))
+        outcome.files += _csv(ideal.true_table(record, data), stem.with_name("flight.true.csv"))
+    elif firmware == "thesis":
+        outcome.table, files = _thesis(record, data, folder)
+        outcome.files += files
+    else:
+        recorder = sitl.record if firmware == "sitl" else avr.record
+        given = stimuli.stimuli(record, data)
+        path = _recorded(outcome, given, folder, recorder, progress)
+        clock.mark("record")
+        if path is not None:
+            chip = given.imu if firmware == "avr" else None
+            outcome.table = _decoded(outcome, path, folder, chip)
+    clock.mark("decode" if outcome.recording else firmware)
+    outcome.files += truth.write(record, data, stem, first_row_s=outcome.first_row_s)
+    clock.mark("truth")
+    second = None
+    if both and firmware != "thesis":
+        second, files = _thesis(record, data, folder)
+        outcome.files += files
+    if pictures and outcome.table is not None:
+        progress("picture", 0.0)
+        image = folder / "flight.png"
+        picture.draw(
+            outcome.table,
+            image,
+            title=f"{card.title} (simulated, seed {seed})",
+            windows=truth.maneuvers(record, data),
+            faults=card.faults,
+            truth=truth.series(record, data),
+            second=second,
+            second_name="thesis logger",
+        )
+        outcome.files.append(image)
+        clock.mark("picture")
+    outcome.wall_s, outcome.processor_s = clock.wall_s, clock.processor_s
+    return outcome
+
+
+def _recorded(
+    outcome: Outcome,
+    given: stimuli.Stimuli,
+    folder: Path,
+    recorder: Callable[..., sitl.Recording],
+    progress: Progress,
+) -> Path | None:
+    """Record with the firmware; write flight.bin, if there is one."""
+    record = outcome.record
+    outcome.recording = recorder(
+        given,
+        rate_hz=sitl.recorder_rate_hz(record.card.flight.rate_hz),
+        aircraft=record.aircraft.name,
+        faults=record.card.faults,
+        seed=record.seed,
+        progress=lambda share: progress("record", share),
+    )
+    path = folder / "flight.bin"
+    path.unlink(missing_ok=True)
+    if not outcome.recording.log:
+        return None
+    path.write_bytes(outcome.recording.log)
+    outcome.files.insert(0, path)
+    return path
+
+
+def _decoded(outcome: Outcome, path: Path, folder: Path, chip: Imu | None) -> pd.DataFrame:
+    """Decode the log as its owner would, and put its rows on true time for the picture.
+
+    `chip` are the IMU's samples where the recorder's clock begins later than the flight.
+    """
+    log = read_log(path, calibration=folder / "calibration.toml")
+    table = log.table()
+    ident = log.frames["ident"]
+    began_s = compare.clock_began_s(outcome.record, chip, ident) if chip else 0.0
+    table["t_s"] = compare.true_times(outcome.record, table, int(ident["t_us"][0]), began_s)
+    outcome.deviations = compare.deviations(outcome.record, table, table["t_s"])
+    outcome.first_row_s = float(table["t_s"].iloc[0])
+    return table
+
+
+def _csv(table: pd.DataFrame, path: Path) -> list[Path]:
+    table.to_csv(path, index=False, float_format="%.9g")
+    return [path]
+
+
+def _thesis(record: FlightRecord, data: AirData, folder: Path) -> tuple[pd.DataFrame, list[Path]]:
+    rate = record.card.flight.rate_hz
+    if rate > 20.0:
+        # The same flight, at the rate of the thesis's second one.
+        slow = replace(record.card, flight=replace(record.card.flight, rate_hz=20.0))
+        record = replace(record, card=slow)
+    printed = thesis.rows(record, data)
+    path = folder / "flight.thesis.txt"
+    thesis.write_rows(printed, path)
+    return thesis.table(printed), [path]

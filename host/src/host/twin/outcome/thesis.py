@@ -1,0 +1,223 @@
+"""The thesis's own logger as a chain of sensors: rows of 10 or 20 a second, with all its faults.
+
+Hardware facts 1.2, 1.3 and 1.6, by their numbers: D1 the vane expression overflows int16; D3 zeros
+from boot, one sample of a vane and 4 s of pressure; D4 the halves of an IMU sample alternate and
+are one or two rows old; D8 altitude in whole metres with a dead band; D9 sea-level standard
+pressure; D10 pressure clipped at zero, filtered twice; D11 surfaces are commands through hand-made
+maps; D12 no time in the row. Speed in km/h.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from host.twin.aircraft.airframe import GRAVITY_MPS2, Array
+from host.twin.flight.fly import FlightRecord
+from host.twin.sensors.airdata import AirData
+from host.twin.sensors.analog import analog, convert
+from host.twin.sensors.imu import imu
+
+IMU_RATE_HZ = 50.0
+GYRO_COUNTS_PER_DEGPS = 16.4
+GRAVITY_COUNTS = 8192.0
+MINIMUM_US = (1100, 1152, 1124, 1100)  # aileron, elevator, rudder, throttle
+MAXIMUM_US = (1956, 1904, 1904, 1960)
+# Times of the readings inside one turn of the loop, seconds after its start (27 ms of text follow).
+VANE_AT_S = 0.004
+PRESSURE_AT_S = 0.006
+BOOT_READINGS = 200
+
+
+def row_times(record: FlightRecord) -> Array:
+    """Return when the loop starts each row: the nominal rate with 3 % of jitter."""
+    rng = np.random.default_rng([record.seed, 20])
+    period = 1.0 / record.card.flight.rate_hz
+    count = int((record.t_s[-1] - 0.2) / period)
+    steps = period * (1.0 + 0.03 * rng.standard_normal(count))
+    at = 0.1 + np.cumsum(np.maximum(steps, 0.5 * period))
+    return np.asarray(at[at < record.t_s[-1] - 0.05])
+
+
+def _map_us(pulse_us: Array, channel: int) -> Array:
+    """Arduino's map() to 1000..2000 in integers."""
+    low, high = MINIMUM_US[channel], MAXIMUM_US[channel]
+    return np.trunc((np.trunc(pulse_us) - low) * 1000 / (high - low)) + 1000
+
+
+def overflowed_vane(count: Array) -> Array:
+    """`analogRead * 90 / 27` in 16 bits: D1."""
+    product = np.mod(count.astype(np.int64) * 90 + 32768, 65536) - 32768
+    return np.trunc(product / 27)
+
+
+def rows(record: FlightRecord, data: AirData) -> pd.DataFrame:
+    """Return the rows of flight 1 and 2 as the thesis's program printed them.
+
+    Parameters
+    ----------
+    record : FlightRecord
+        Its card's rate is the row rate.
+    data : AirData
+
+    Returns
+    -------
+    DataFrame
+        Columns named as the row's tags (``RLL`` ... ``throts``) and ``t_s``, the arrival of the
+        row at the PC, which the row itself does not carry.
+    """
+    rng = np.random.default_rng([record.seed, 21])
+    at = row_times(record)
+    counts = convert(analog(record, data), record.t_s, at + VANE_AT_S, rng)
+    start = convert(analog(record, data), record.t_s, np.array([0.05]), rng)[0]
+
+    sample_at = np.arange(0.02, record.t_s[-1] - 0.02, 1.0 / IMU_RATE_HZ)
+    sample = imu(record, data, sample_at, 4, rng)
+    raw_rates = np.degrees(sample.rates_radps) * GYRO_COUNTS_PER_DEGPS
+    raw_force = -sample.force_mps2 / GRAVITY_MPS2 * GRAVITY_COUNTS
+    rest = sample_at < record.card.flight.ground_s
+    if rest.any():
+        # startup_ground() zeroes all six axes where the aircraft stands, and puts 1 g back on z.
+        raw_rates = raw_rates - raw_rates[rest].mean(axis=0)
+        raw_force = raw_force - raw_force[rest].mean(axis=0) + np.array([0.0, 0.0, GRAVITY_COUNTS])
+    newest = np.searchsorted(sample_at, at, side="right") - 1
+    row = np.arange(len(at))
+    # D4: the slave address alternates; packet 1 arrives in even rows, packet 2 in odd ones.
+    first = newest[np.maximum(row - row % 2 - 1, 0)]
+    second = newest[np.maximum(row - 1 + row % 2 - 1, 0)]
+    angles = np.degrees(sample.attitude_rad)
+
+    kpa = _kpa(counts[:, 4])
+    reference = _boot_reference(record, data, rng)
+    filtered = np.empty_like(kpa)
+    state = reference
+    for i, value in enumerate(kpa):
+        state = 0.25 * value + 0.75 * state
+        filtered[i] = state
+    clipped = np.maximum(filtered - reference, 0.0)
+    speed_kmh = np.sqrt(clipped * 1000.0 * 1.633) * 18.0 / 5.0
+
+    altitude = _altitude(record, data, at, rng)
+    pulses = record.pulses_us[
+        np.maximum(np.searchsorted(record.pulse_starts_s + 0.012, at, side="right") - 1, 0)
+    ]
+    aileron, elevator, rudder, throttle = (_map_us(pulses[:, k], k) for k in range(4))
+    return pd.DataFrame(
+        {
+            "t_s": at + 0.03,
+            "RLL": np.round(angles[first, 0], 2),
+            "PCH": np.round(angles[first, 1], 2),
+            "YAW": np.round(angles[first, 2], 2),
+            "altitude": altitude,
+            "velocity": np.round(speed_kmh, 2),
+            "alpha": overflowed_vane(counts[:, 0]) - overflowed_vane(start[:1])[0],
+            "beta": overflowed_vane(counts[:, 2]) - overflowed_vane(start[2:3])[0],
+            "AN0": np.round(raw_rates[first, 0], 2),
+            "AN1": np.round(raw_rates[first, 1], 2),
+            "AN2": np.round(raw_rates[first, 2], 2),
+            "AN3": np.round(raw_force[first, 0], 2),
+            "AN4": np.round(raw_force[first, 1], 2),
+            "AN5": np.round(raw_force[second, 2], 2),
+            "elevs": np.round(0.0756 * elevator - 108.72, 2),
+            "ails": np.round(0.0738 * aileron - 112.29, 2),
+            "rdrs": np.round(
+                np.where(rudder < 1348, 0.0555 * rudder - 73.335, 0.0333 * rudder - 45.434), 2
+            ),
+            "throts": throttle - 1009,
+        }
+    )
+
+
+def _boot_reference(record: FlightRecord, data: AirData, rng: np.random.Generator) -> float:
+    """Return the zero of the pressure (kPa): 200 readings in 4 s of boot through the same filter.
+
+    D3; a shorter stand leaves less time for the same 200.
+    """
+    last_s = max(0.05, min(4.05, record.card.flight.ground_s - 0.1))
+    at = np.linspace(0.05, last_s, BOOT_READINGS)
+    counts = convert(analog(record, data), record.t_s, at, rng)[:, 4]
+    state = float(_kpa(counts)[0])
+    for value in _kpa(counts)[1:].tolist():
+        state = 0.25 * value + 0.75 * state
+    return state
+
+
+def _kpa(count: Array) -> Array:
+    return np.asarray(((count * 5.0 / 1024.0 - 0.0625 * 4.0) / 5.0 - 0.5) / 0.2)
+
+
+def _altitude(record: FlightRecord, data: AirData, at: Array, rng: np.random.Generator) -> Array:
+    """Whole metres above sea-level standard, a 2 m dead band, locked beyond 100 m: D8, D9."""
+    pressure = np.interp(at + PRESSURE_AT_S, record.t_s, data.static_pa)
+    pressure = pressure + rng.normal(0.0, 3.0, len(at)) + record.draws.scalar("baro_offset_pa")
+    metres = np.trunc(44330.0 * (1.0 - (pressure / 101325.0) ** 0.1903))
+    out = np.empty(len(at))
+    kept, start = 0.0, metres[0]
+    for i, value in enumerate(metres):
+        change = abs(value - kept)
+        if 2.0 <= change <= 100.0:
+            kept = value
+        out[i] = kept - start
+    return out
+
+
+def table(printed: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows in SI and in this house's signs, as well as they can be read.
+
+    Parameters
+    ----------
+    printed : DataFrame
+        From `rows`.
+
+    Returns
+    -------
+    DataFrame
+        ``t_s``, ``airspeed_mps``, ``alpha_rad`` ... as far as the rows carry them. Vanes are
+        undone only within the linear range around their start value; jumps of the overflow stay
+        visible.
+    """
+    radians = np.pi / 180.0
+    # 90/27 printed for 27/90: one printed unit is 0.3 * 27/90 count; the encoder turns 360/1024
+    # deg.
+    per_unit = 27.0 / 90.0 * 360.0 / 1024.0 * radians
+    return pd.DataFrame(
+        {
+            "t_s": printed["t_s"],
+            "airspeed_mps": printed["velocity"] / 3.6,
+            "alpha_rad": printed["alpha"] * per_unit,
+            "beta_rad": printed["beta"] * per_unit,
+            **{
+                f"{a}_radps": printed[f"AN{i}"] / GYRO_COUNTS_PER_DEGPS * radians
+                for i, a in enumerate("pqr")
+            },
+            **{
+                f"a{a}_mps2": -printed[f"AN{3 + i}"] / GRAVITY_COUNTS * GRAVITY_MPS2
+                for i, a in enumerate("xyz")
+            },
+            "phi_rad": printed["RLL"] * radians,
+            "theta_rad": printed["PCH"] * radians,
+            "psi_rad": np.unwrap(printed["YAW"].to_numpy() * radians),
+            "elevator_rad": printed["elevs"] * radians,
+            "aileron_rad": printed["ails"] * radians,
+            "rudder_rad": printed["rdrs"] * radians,
+            "throttle": printed["throts"] / 991.0,
+            "height_m": printed["altitude"],
+        }
+    )
+
+
+def write_rows(printed: pd.DataFrame, path: Path) -> None:
+    """Write the rows as text, variant B of the thesis (appendix C); raises OSError."""
+    with path.open("w", encoding="ascii", newline="") as out:
+        for row in printed.to_dict("records"):
+            out.write(
+                f"RLL:{row['RLL']:.2f},PCH:{row['PCH']:.2f},YAW:{row['YAW']:.2f},"
+                f"altitude:{int(row['altitude'])},velocity:{row['velocity']:.2f},"
+                f"alpha:{int(row['alpha'])},beta:{int(row['beta'])},"
+                + ",".join(f"AN{i}:{row[f'AN{i}']:.2f}" for i in range(6))
+                + ",lat:30.00000,lon:31.00000,gpsgc:0.00,gpsgs:0.00,fix:1,numsat:9,"
+                f"elevs:{row['elevs']:.2f},ails:{row['ails']:.2f},rdrs:{row['rdrs']:.2f},"
+                f"throts:{int(row['throts'])},000000000000000\r\n"
+            )

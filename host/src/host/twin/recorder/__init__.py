@@ -1,0 +1,1 @@
+"""The firmware flown: as a library of this computer or in the chip simulator."""

@@ -1,0 +1,295 @@
+"""The recorder itself, as a shared library in simulated time.
+
+What a flight does to it and what a card is afterwards; the C interface is `sitl_library`.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from host.errors import UsageError
+from host.twin.flight.fly import IDLE_US, NEUTRAL_US
+from host.twin.recorder.fat32 import CARD_BYTES, CardImageError, CardReader, format_card
+from host.twin.recorder.sitl_library import LIBRARY, TICKS_PER_US, CardFault, Port, Sitl
+from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli
+from host.twin.sensors.mega_clock import TICKS_PER_S
+from host.twin.testcard.faults import Action, Fault, recorder_actions
+
+RATES_HZ = (25, 50, 100, 200)
+PRESS_S, LET_GO_S = 3.6, 3.9  # start button; preparing 64 MiB takes the Mega 2.8 s
+CLOSE_S = 20.0  # the next power-on, throttle idle for 10 s: the recorder closes the file
+# Room on the card per second of flight at 100 Hz: about 18 blocks are used.
+BLOCKS_PER_S = 40
+CARD_ID = b"\x03VIRT\x15card\x10\x00\x00\x01\x00\xf0"
+CARD_EVENTS = {
+    "card_busy": CardFault.BUSY,
+    "card_reject": CardFault.REJECT,
+    "card_removed": CardFault.REMOVE,
+    "card_inserted": CardFault.INSERT,
+}
+# storage::VolumeStatus of the recorder.
+VOLUMES = ("a good card", "no card", "a card without a file system", "a card it cannot read",
+           "a full card", "a card without room in one piece")  # fmt: skip
+NO_FILE = {"card_absent": "no card", "card_full": "a full card",
+           "card_unformatted": "a card without a file system"}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What the recorder left on the card.
+
+    Attributes
+    ----------
+    log : bytes
+        The flight file, as long as the recorder's last boot made it; empty where it rightly made
+        none.
+    name : str
+        Its name on the card; without a file, why there is none.
+    lost_edges, lost_packets, lost_gps_bytes : int
+        Stimuli the hardware model had no room for.
+    """
+
+    log: bytes
+    name: str
+    lost_edges: int
+    lost_packets: int
+    lost_gps_bytes: int
+
+
+def library_path() -> Path:
+    """Return the library: HOST_SITL if set, else the one of the clone.
+
+    Raises
+    ------
+    UsageError
+        It is not there.
+    """
+    given = os.environ.get("HOST_SITL")
+    path = Path(given) if given else LIBRARY
+    if not path.is_file():
+        raise UsageError(
+            f"no recorder library at {path}: build it with"
+            " `python firmware/toolchain/build_sitl.py`, or use --firmware none"
+        )
+    return path
+
+
+def recorder_rate_hz(wanted_hz: float) -> int:
+    """Return the recorder's rate for a card: the card's if it knows it, else 100 Hz."""
+    return int(wanted_hz) if wanted_hz in RATES_HZ else 100
+
+
+def record(
+    given: Stimuli,
+    *,
+    rate_hz: int,
+    aircraft: str,
+    faults: Sequence[Fault] = (),
+    seed: int = 0,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Recording:
+    """Let the recorder live through a flight.
+
+    Parameters
+    ----------
+    given : Stimuli
+    rate_hz : int
+        One of `RATES_HZ`.
+    aircraft : str
+        Name for the log's configuration, at most 15 characters are kept.
+    faults : sequence of Fault
+        Those of card, barometer and supply act here; the others are in the stimuli already.
+    seed : int
+        Of the garbage that a power cut leaves in a block being programmed.
+    progress : callable
+        Called with the share done.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    UsageError
+        No library, or the recorder did not make a file.
+    """
+    check_duration(given)
+    sitl = Sitl(library_path())
+    image = card_image(faults)
+    try:
+        return _record(sitl, image, given, rate_hz, aircraft, faults, seed, progress)
+    finally:
+        sitl.close()
+
+
+def check_duration(given: Stimuli) -> None:
+    """Raise UsageError if the flight is over before the recorder is told to start."""
+    duration_s = given.duration / TICKS_PER_S
+    if duration_s < LET_GO_S:
+        raise UsageError(
+            f"the flight ends after {duration_s:.1f} s: its recorder is started {PRESS_S} s after"
+            " power-on, expected a longer one, or --firmware none"
+        )
+
+
+def eeprom(rate_hz: int, aircraft: str, *, damaged: bool = False) -> bytes:
+    """Return the EEPROM (4096 bytes) of a recorder with these settings; raises UsageError."""
+    sitl = Sitl(library_path())
+    _configure(sitl, rate_hz, aircraft, damaged=damaged)
+    return sitl.eeprom()
+
+
+def _record(
+    sitl: Sitl,
+    image: mmap.mmap,
+    given: Stimuli,
+    rate_hz: int,
+    aircraft: str,
+    faults: Sequence[Fault],
+    seed: int,
+    progress: Callable[[float], None],
+) -> Recording:
+    kinds = {fault.kind for fault in faults}
+    if "card_absent" not in kinds:
+        sitl.insert_card(image, CARD_ID)
+    room_s = given.duration / TICKS_PER_S + 30.0
+    blocks = round(room_s * BLOCKS_PER_S * max(rate_hz / 100.0, 0.5))
+    sitl.set_file_blocks(blocks)
+    _configure(sitl, rate_hz, aircraft, damaged="settings_damaged" in kinds)
+    for fault in faults:
+        if fault.kind == "clock_wrap":
+            offset_us = (1 << 32) - round(fault.at_s * 1e6)
+            sitl.set_clock_offset(offset_us & 0xFFFFFFFF)
+    cuts = [round(f.at_s * TICKS_PER_S) for f in faults if f.kind == "power_cut"]
+    end = min([given.duration, *cuts])
+    _give(sitl, given, end)
+    if "telemetry_flood" in kinds:
+        raise UsageError("telemetry_flood: here an interrupt takes no time; use --firmware avr")
+    actions = [(round(a.at_s * TICKS_PER_S), a) for a in recorder_actions(faults)]
+    sitl.power_on()
+    marks = {*range(TICKS_PER_S, end, TICKS_PER_S), *(at for at, _ in actions if at < end), end}
+    for mark in sorted(marks):
+        sitl.run_until(mark)
+        for at, action in actions:
+            if at == mark:
+                _act(sitl, given, at, action)
+        progress(mark / end)
+    state = sitl.state()
+
+    # The pilot pulls the battery; at the bench the next power-on closes the file.
+    sitl.power_cut(seed & 0xFFFFFFFF)
+    later = end + TICKS_PER_S
+    sitl.run_until(later)
+    sitl.add_edges(*_idle_receiver(later, later + round(CLOSE_S * TICKS_PER_S)))
+    sitl.power_on()
+    sitl.run_until(later + round(CLOSE_S * TICKS_PER_S))
+
+    log, name = file_of(image, faults)
+    if not log:
+        name = VOLUMES[state.volume]
+    return Recording(log, name, state.lost_edges, state.lost_packets, state.lost_gps_bytes)
+
+
+def file_of(image: mmap.mmap, faults: Sequence[Fault]) -> tuple[bytes, str]:
+    """Return the flight's file and its name; no bytes and why, where a fault lets be none."""
+    reasons = [NO_FILE[fault.kind] for fault in faults if fault.kind in NO_FILE]
+    try:
+        files = CardReader(image).files()
+    except CardImageError:
+        files = []
+    flights = sorted((f for f in files if f.name.startswith("FLT")), key=lambda f: f.name)
+    if reasons and not flights:
+        return b"", reasons[0]
+    if not flights:
+        raise UsageError("the recorder made no file on the card: was the flight shorter than 5 s?")
+    # The reboot may have prepared the next file already: the flight is the first one.
+    return CardReader(image).read(flights[0]), flights[0].name
+
+
+def card_image(faults: Sequence[Fault]) -> mmap.mmap:
+    """Return the card the flight begins with: empty and formatted, unless a fault says else."""
+    kinds = {fault.kind for fault in faults}
+    if "card_unformatted" in kinds:
+        return mmap.mmap(-1, CARD_BYTES)
+    return format_card(full="card_full" in kinds)
+
+
+def _act(sitl: Sitl, given: Stimuli, at: int, action: Action) -> None:
+    """Do something to the recorder's world now."""
+    if action.what in CARD_EVENTS:
+        # Milliseconds to microseconds for a busy card, else a count.
+        value = round(action.value * (1000.0 if action.what == "card_busy" else 1.0))
+        sitl.add_card_fault(at, CARD_EVENTS[action.what], value)
+    elif action.what == "reset":
+        sitl.reset(round(action.value))
+    elif action.what == "supply":
+        sitl.set_supply(round(action.value * 1000.0))
+    elif action.what == "baro_off":
+        sitl.remove_pressure()
+    elif action.what == "baro_on":
+        _give_pressure(sitl, given)
+    elif action.what == "telemetry_blocked":
+        until = min(action.value, given.duration / TICKS_PER_S)
+        sitl.hold_port(Port.TELEMETRY, round(until * TICKS_PER_S))
+    else:
+        sitl.hold_pressure_bus(action.what == "baro_bus_stuck")
+
+
+def _configure(sitl: Sitl, rate_hz: int, aircraft: str, *, damaged: bool = False) -> None:
+    """Change rate and aircraft in the default settings; both places are fixed by frame `config`."""
+    config = sitl.default_config()
+    struct.pack_into("<H", config, 4, rate_hz)
+    config[-16:] = aircraft.encode("ascii", "replace")[:15].ljust(16, b"\0")
+    try:
+        sitl.set_config(config)
+    except ValueError as error:
+        raise UsageError(
+            f"the recorder refuses {rate_hz} Hz, expected one of {RATES_HZ}"
+        ) from error
+    if damaged:
+        content = bytearray(sitl.eeprom())
+        place = content.find(bytes(config[-16:]))  # the aircraft's name
+        content[place] ^= 0x20
+        sitl.set_eeprom(bytes(content))
+
+
+def _give(sitl: Sitl, given: Stimuli, end: int) -> None:
+    """Hand over what reaches the pins before `end`: the next power-on is at the bench."""
+    edges, gps = given.edges[given.edges["at"] < end], given.gps[given.gps["at"] < end]
+    sitl.add_edges(edges["at"], edges["levels"])
+    sitl.add_gps(gps["at"], gps["levels"])
+    packets = [p for p in given.packets if p.start < end]
+    if packets:
+        ticks = (packets[0].end - packets[0].start) / (len(packets[0].data) + 1)
+        sitl.add_packets(
+            [p.start for p in packets],
+            [p.address for p in packets],
+            [p.data for p in packets],
+            byte_us=round(ticks) / TICKS_PER_US,
+        )
+    sitl.set_analog(0, SAMPLE_STEP_TICKS, given.analog)
+    _give_pressure(sitl, given)
+    sitl.press(round(PRESS_S * TICKS_PER_S), LET_GO_S - PRESS_S)
+
+
+def _give_pressure(sitl: Sitl, given: Stimuli) -> None:
+    sitl.set_pressure(given.coefficients, 0, SAMPLE_STEP_TICKS, given.pressure)
+
+
+def _idle_receiver(first: int, last: int) -> tuple[list[int], list[int]]:
+    """Return edges of a receiver with neutral sticks and idle throttle."""
+    at, levels = [], []
+    widths = (NEUTRAL_US, NEUTRAL_US, NEUTRAL_US, IDLE_US, 1100.0)
+    for frame in range(first + 2000, last, TICKS_PER_S // 50):
+        rise = frame
+        for k, width in enumerate(widths):
+            fall = rise + round(width * 2)
+            at += [rise, fall]
+            levels += [1 << k, 0]
+            rise = fall + 600
+    return at, levels

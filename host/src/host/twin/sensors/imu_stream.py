@@ -1,0 +1,181 @@
+"""The IMU's packets on its bus, as its firmware sends them, and how they fail."""
+
+from __future__ import annotations
+
+import binascii
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from host.twin.aircraft.airframe import Array
+from host.twin.flight.fly import FlightRecord
+from host.twin.sensors.airdata import AirData
+from host.twin.sensors.delays import dlpf_for
+from host.twin.sensors.imu import Imu, imu
+from host.twin.sensors.mega_clock import TICKS_PER_S, ticks
+from host.twin.testcard.faults import Fault
+
+RATE_HZ = 200.0
+ADDRESS = 43
+# Sample to START of the transfer: filter turn and packing on the 328P, estimate from hardware
+# facts 6.2.
+AGE_S = 0.9e-3
+AGE_JITTER_S = 0.15e-3
+BYTE_S = 9.0 / 400_000.0
+# Packet "imu" of protocol/frames.toml, without its CRC.
+PACKET = np.dtype(
+    [("kind", "u1"), ("seq", "u1"), ("flags", "u1"), ("aux_kind", "u1"), ("t_us", "<u4"),
+     ("age", "<u2"), ("raw", "<i2", 9), ("aux", "<i2", 3)]
+)  # fmt: skip
+CRC_BYTES = 2
+GYRO_SATURATED, ACCEL_SATURATED, ATTITUDE_VALID, MAG_VALID, OFFSETS_VALID, RESTARTED = (
+    1 << bit for bit in range(6)
+)
+# The IMU's firmware keeps its restart flag for 2 s, its attitude is not settled for 3 s.
+RESTARTED_S, UNSETTLED_S = 2.0, 3.0
+REPEATED_AFTER_S = 1.2e-3  # a packet takes 0.83 ms
+FULL_SCALE = 32767
+
+
+@dataclass(frozen=True, slots=True)
+class ImuPacket:
+    """One transfer on the IMU's bus, ticks of its START and of its STOP."""
+
+    start: int
+    end: int
+    address: int
+    data: bytes
+
+
+def imu_packets(
+    record: FlightRecord, data: AirData, rng: np.random.Generator
+) -> tuple[Imu, list[ImuPacket]]:
+    """Return the samples the IMU took, and the packets that leave it.
+
+    Parameters
+    ----------
+    record : FlightRecord
+    data : AirData
+    rng : numpy Generator
+
+    Returns
+    -------
+    Imu, list of ImuPacket
+        Without faults one packet per sample.
+    """
+    own_clock = 1.0
+    if record.card.sensors.clock_error:
+        own_clock += record.draws.scalar("imu_clock_share")
+    at = np.arange(0.05, record.t_s[-1] - 0.02, 1.0 / RATE_HZ / own_clock)
+    sample = imu(record, data, at, dlpf_for(record.card.flight.rate_hz), rng)
+    age_s = AGE_S + AGE_JITTER_S * rng.random(len(at))
+    rows = _rows(sample, at, age_s, own_clock)
+    # A stream of its own: a fault changes nothing else.
+    chance = np.random.default_rng([record.seed, 12])
+    sent = np.ones(len(at), dtype=bool)
+    for fault in record.card.faults:
+        sent &= _fail(fault, at, rows, own_clock, chance)
+    starts = ticks(record, at + age_s)
+    body = rows.tobytes()
+    size = PACKET.itemsize
+    packets = [
+        _packet(start, body[i * size : (i + 1) * size])
+        for i, start in enumerate(starts.tolist())
+        if sent[i]
+    ]
+    for fault in record.card.faults:
+        packets = _damage(fault, at[sent], packets, chance)
+    return sample, packets
+
+
+def _rows(sample: Imu, at: Array, age_s: Array, own_clock: float) -> NDArray[np.void]:
+    count = np.arange(len(at))
+    aux = np.zeros((len(at), 3), dtype=np.int64)
+    kinds = count % 12  # magnetometer at 16.7 Hz, bias and status at the same pace
+    aux[kinds == 0] = np.round(sample.magnetic_t[kinds == 0] / 9.174311926606e-8)
+    aux[kinds == 4] = np.round(sample.bias_radps[kinds == 4] / 2.664624812204e-4)
+    aux[kinds == 8] = (3150, 0x54 + 256 * sample.dlpf, 1)
+    # Between their turns the magnetometer is repeated, as the IMU keeps its last reading.
+    held = np.maximum.accumulate(np.where(kinds == 0, count, 0))
+    repeat = ~np.isin(kinds, (0, 4, 8))
+    aux[repeat] = aux[held[repeat]]
+    gyro_full = np.abs(sample.raw[:, :3]).max(axis=1) >= FULL_SCALE
+    accel_full = np.abs(sample.raw[:, 3:6]).max(axis=1) >= FULL_SCALE
+    rows = np.zeros(len(at), dtype=PACKET)
+    rows["kind"] = 0xA6
+    rows["seq"] = count & 0xFF
+    rows["flags"] = (
+        GYRO_SATURATED * gyro_full
+        + ACCEL_SATURATED * accel_full
+        + (ATTITUDE_VALID | MAG_VALID | OFFSETS_VALID)
+    )
+    rows["aux_kind"] = np.where(kinds == 4, 1, np.where(kinds == 8, 2, 0))
+    rows["t_us"] = np.round(at * own_clock * 1e6).astype(np.int64) & 0xFFFFFFFF
+    rows["age"] = np.round(age_s * own_clock / 4e-6).astype(np.int64)
+    rows["raw"], rows["aux"] = sample.raw, np.clip(aux, -32768, 32767)
+    return rows
+
+
+def _fail(
+    fault: Fault, at: Array, rows: NDArray[np.void], own_clock: float, rng: np.random.Generator
+) -> NDArray[np.bool_]:
+    """Change what the IMU itself makes in a fault; return which packets it sends."""
+    inside = fault.inside(at)
+    sent = np.ones(len(at), dtype=bool)
+    if not inside.any():
+        return sent
+    first = int(np.argmax(inside))
+    if fault.kind == "imu_off":
+        sent[inside] = False
+    elif fault.kind == "imu_stuck":
+        rows["raw"][inside] = rows["raw"][first]
+    elif fault.kind == "imu_lost_packets":
+        sent[inside & (rng.random(len(at)) < fault.amount)] = False
+    elif fault.kind == "imu_slow":
+        sent[inside & (np.arange(len(at)) % 2 == 1)] = False
+        rows["seq"] = (np.cumsum(sent) - 1) & 0xFF
+    elif fault.kind == "gyro_saturated":
+        rows["raw"][inside, fault.place] = FULL_SCALE
+        rows["flags"][inside] |= GYRO_SATURATED
+    elif fault.kind == "imu_reset":
+        again_s = fault.at_s + fault.amount
+        sent[(at >= fault.at_s) & (at < again_s)] = False
+        after = at >= again_s
+        rows["seq"][after] = np.arange(int(after.sum())) & 0xFF
+        rows["t_us"][after] = np.round((at[after] - fault.at_s) * own_clock * 1e6).astype(np.int64)
+        rows["flags"][after & (at < again_s + RESTARTED_S)] |= RESTARTED
+        rows["flags"][after & (at < again_s + UNSETTLED_S)] &= 0xFF - ATTITUDE_VALID
+    return sent
+
+
+def _packet(start: int, body: bytes) -> ImuPacket:
+    crc = binascii.crc_hqx(body, 0xFFFF)
+    transfer_s = (len(body) + CRC_BYTES + 1) * BYTE_S
+    return ImuPacket(
+        start, start + round(transfer_s * TICKS_PER_S), ADDRESS, body + crc.to_bytes(2, "little")
+    )
+
+
+def _damage(
+    fault: Fault, at: Array, packets: list[ImuPacket], rng: np.random.Generator
+) -> list[ImuPacket]:
+    """Change what becomes of packets on their way."""
+    if fault.kind not in ("imu_garbage", "imu_short", "imu_repeated"):
+        return packets
+    hit = fault.inside(at) & (rng.random(len(at)) < fault.amount)
+    twice = []
+    for i in np.flatnonzero(hit).tolist():
+        p = packets[i]
+        if fault.kind == "imu_repeated":
+            later = round(REPEATED_AFTER_S * TICKS_PER_S)
+            twice.append(replace(p, start=p.start + later, end=p.end + later))
+        elif fault.kind == "imu_short":
+            size = int(rng.integers(1, len(p.data)))
+            end = p.start + round((size + 1) * BYTE_S * TICKS_PER_S)
+            packets[i] = replace(p, end=end, data=p.data[:size])
+        else:
+            broken = bytearray(p.data)
+            broken[int(rng.integers(len(broken)))] ^= 1 << int(rng.integers(8))
+            packets[i] = replace(p, data=bytes(broken))
+    return sorted([*packets, *twice], key=lambda p: p.start)

@@ -1,0 +1,1 @@
+"""Bytes to frames: schema, blocks and their proof, sessions chosen, telemetry envelopes."""
