@@ -6,6 +6,7 @@
 #include "core/session_record.h"
 #include "core/settings.h"
 #include "core/supply.h"
+#include "hal/eeprom.h"
 
 namespace app {
 
@@ -13,7 +14,7 @@ class Store {
  public:
   static constexpr uint16_t kSettingsAddress = 0;
   static constexpr uint16_t kSlotsAddress = 64;
-  static constexpr uint16_t kReferenceAddress = 4096U - core::kReferenceRecordSize;
+  static constexpr uint16_t kReferenceAddress = hal::kEepromBytes - core::kReferenceRecordSize;
   static_assert(core::kSettingsRecordSize <= kSlotsAddress, "the records do not overlap");
 
   // Reads everything; a boot is counted. Writing goes on in poll().

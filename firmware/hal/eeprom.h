@@ -5,7 +5,7 @@
 
 namespace hal {
 
-constexpr uint16_t kEepromBytes = 4096;
+constexpr uint16_t kEepromBytes = 4096;  // of the Mega; the IMU's chip has 1024
 
 uint8_t read_eeprom(uint16_t address);
 

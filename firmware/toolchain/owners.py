@@ -30,8 +30,9 @@ ROOMS = {
     "drivers": "firmware/drivers",
     "storage": "firmware/storage",
     "app": "firmware/app",
+    "avr": "firmware/boards/avr",
     "mega": "firmware/boards/mega2560",
-    "hal": "firmware/boards/mega2560",
+    "hal": "firmware/boards",
     "frames": "protocol/generated",
 }
 _STAB = re.compile(r"^\d+ +(\w+) +\d+ +\d+ +([0-9a-f]+) +\d+ *(.*)$")
@@ -119,7 +120,7 @@ def flash_by_owner(elf: Path, sources: Sources | None = None) -> Counter[str]:
     result: Counter[str] = Counter()
     placed: dict[int, int] = {}
     for file, start, size in _line_ranges(elf):
-        ours = "/avr/" not in file and not file.endswith((".o", "/"))
+        ours = "/avr/include/" not in file and not file.endswith((".o", "/"))
         result[known.short(file) if ours else LIBRARY] += size
         placed[start] = size
     covered = sorted(placed)

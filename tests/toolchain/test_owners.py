@@ -41,12 +41,20 @@ class Thing {
 };
 }
 """,
+    "firmware/boards/avr/pins.h": """
+#pragma once
+#include <avr/io.h>
+namespace avr {
+inline uint8_t both() { return uint8_t(PINA ^ (PINB << 3)); }
+}
+""",
     "firmware/boards/mega2560/main.cpp": """
 #include "app/thing.h"
+#include "boards/avr/pins.h"
 #include <avr/io.h>
 namespace { app::Thing g_thing; volatile uint8_t g_flag[7]; }
 int main() {
-  for (;;) { g_flag[2] = PINA; PORTB = uint8_t(g_thing.step(g_flag[PINA & 3])); }
+  for (;;) { g_flag[2] = avr::both(); PORTB = uint8_t(g_thing.step(g_flag[PINA & 3])); }
 }
 """,
 }
@@ -84,6 +92,7 @@ def test_inlined_code_counts_where_it_is_written(tmp_path: Path, elf: Path) -> N
     assert sum(flash.values()) == text
     assert flash["firmware/core/filter.h"] > flash["firmware/app/thing.h"] > 0
     assert flash["firmware/boards/mega2560/main.cpp"] > 0
+    assert flash["firmware/boards/avr/pins.h"] > 0  # not the C library's folder of that name
 
 
 def test_a_member_is_found_in_its_object(elf: Path) -> None:

@@ -21,17 +21,8 @@ bool take_ready(uint32_t& at_us, uint8_t& edges);
 // Ends the sleep at an instant at most 32 ms away, once.
 void wake_at(uint32_t at_us);
 
-// Set by interrupts that the main loop has to look at.
-extern volatile bool g_awake;
-void sleep_until_interrupt();
-
-// Restarts the program after 0.5 s without feed_watchdog(); the count outlives it.
+// Restarts the program after 0.5 s without hal::feed_watchdog(); the count outlives it.
 void start_watchdog();
-void feed_watchdog();
 uint16_t resets();
-
-uint8_t read_eeprom(uint16_t address);
-bool eeprom_ready();
-void write_eeprom(uint16_t address, uint8_t value);  // only when ready
 
 }  // namespace arduimu

@@ -1,10 +1,10 @@
 // Timer 1 stamps the samples; timer 0 wakes the main loop every millisecond.
 #include <avr/interrupt.h>
 #include <avr/io.h>
-#include <avr/sleep.h>
-#include <util/atomic.h>
 
 #include "boards/arduimu/board.h"
+#include "boards/avr/awake.h"
+#include "boards/avr/interrupts_off.h"
 
 namespace {
 
@@ -34,11 +34,11 @@ ISR(TIMER1_OVF_vect) {
 
 ISR(TIMER1_COMPA_vect) {
   TIMSK1 = _BV(TOIE1);
-  arduimu::g_awake = true;
+  avr::g_awake = true;
 }
 
 ISR(TIMER0_COMPA_vect) {
-  arduimu::g_awake = true;
+  avr::g_awake = true;
 }
 
 // Late by the time of another interrupt if one runs: 7 us at most.
@@ -47,12 +47,10 @@ ISR(INT0_vect) {
   g_ready_turns = turns_at(ticks);
   g_ready_ticks = ticks;
   ++g_edges;
-  arduimu::g_awake = true;
+  avr::g_awake = true;
 }
 
 namespace arduimu {
-
-volatile bool g_awake = false;
 
 void start_clock() {
   TCCR1A = 0;
@@ -67,7 +65,8 @@ void start_clock() {
 uint32_t now_us() {
   uint32_t turns;
   uint16_t ticks;
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+  {
+    const avr::InterruptsOff guard;
     ticks = TCNT1;
     turns = turns_at(ticks);
   }
@@ -75,11 +74,10 @@ uint32_t now_us() {
 }
 
 void wake_at(const uint32_t at_us) {
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    OCR1A = uint16_t(at_us << 1);
-    TIFR1 = _BV(OCF1A);
-    TIMSK1 = _BV(TOIE1) | _BV(OCIE1A);
-  }
+  const avr::InterruptsOff guard;
+  OCR1A = uint16_t(at_us << 1);
+  TIFR1 = _BV(OCF1A);
+  TIMSK1 = _BV(TOIE1) | _BV(OCIE1A);
 }
 
 void start_ready() {
@@ -92,7 +90,8 @@ void start_ready() {
 bool take_ready(uint32_t& at_us, uint8_t& edges) {
   uint32_t turns;
   uint16_t ticks;
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+  {
+    const avr::InterruptsOff guard;
     turns = g_ready_turns;
     ticks = g_ready_ticks;
     edges = g_edges;
@@ -100,21 +99,6 @@ bool take_ready(uint32_t& at_us, uint8_t& edges) {
   }
   at_us = us_of(turns, ticks) - kEntryTicks / 2;
   return edges != 0;
-}
-
-void sleep_until_interrupt() {
-  SMCR = _BV(SE);  // idle
-  for (;;) {
-    cli();
-    if (g_awake) {
-      break;
-    }
-    sei();  // takes effect behind the next instruction: no interrupt can slip in between
-    sleep_cpu();
-  }
-  g_awake = false;
-  sei();
-  SMCR = 0;
 }
 
 }  // namespace arduimu

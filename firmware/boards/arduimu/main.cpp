@@ -12,6 +12,8 @@
 #include "drivers/hmc5883l.h"
 #include "drivers/mpu6000.h"
 #include "drivers/ublox.h"
+#include "hal/eeprom.h"
+#include "hal/system.h"
 
 namespace {
 
@@ -48,7 +50,7 @@ bool g_chip_found;  // since boot: no reason to look at the other bus any more
 // A record that is not whole leaves the defaults, without offsets; every packet says so.
 void read_settings() {
   for (uint8_t i = 0; i < sizeof(g_record); ++i) {
-    g_record[i] = arduimu::read_eeprom(i);
+    g_record[i] = hal::read_eeprom(i);
   }
   static_cast<void>(core::read_imu_record(g_record, g_settings));
 }
@@ -220,10 +222,10 @@ void serve_field(const uint32_t now_us) {
 }
 
 void serve_record() {
-  if (g_record_left != 0 && arduimu::eeprom_ready()) {
+  if (g_record_left != 0 && hal::eeprom_ready()) {
     // The CRC stands at the end: a record cut off by the supply does not count.
     const uint8_t at = uint8_t(core::kImuRecordSize - g_record_left);
-    arduimu::write_eeprom(at, g_record[at]);
+    hal::write_eeprom(at, g_record[at]);
     --g_record_left;
   }
 }
@@ -263,7 +265,7 @@ int main() {
     }
     serve_serial(now_us);
     serve_record();
-    arduimu::feed_watchdog();
-    arduimu::sleep_until_interrupt();
+    hal::feed_watchdog();
+    hal::sleep_until_interrupt();
   }
 }

@@ -3,6 +3,8 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
+#include "boards/avr/usart.h"
+
 namespace {
 
 constexpr uint8_t kInSize = 64;   // 16 ms at 38400 baud
@@ -42,7 +44,7 @@ namespace arduimu {
 
 void SerialPort::set_baud(uint32_t baud) {
   UCSR0A = _BV(U2X0);
-  UBRR0 = uint16_t((F_CPU / 4 / baud - 1) / 2);
+  UBRR0 = avr::usart_divider(baud);
   UCSR0B = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0) | _BV(UDRIE0);
 }
 

@@ -1,10 +1,10 @@
-// Watchdog, restart, EEPROM.
+// Watchdog and restart.
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/wdt.h>
-#include <util/atomic.h>
 
 #include "boards/arduimu/board.h"
+#include "boards/avr/interrupts_off.h"
 
 namespace {
 
@@ -45,43 +45,14 @@ void start_watchdog() {
   } else {
     ++g_resets;
   }
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    wdt_reset();
-    WDTCSR = _BV(WDCE) | _BV(WDE);
-    WDTCSR = _BV(WDIE) | _BV(WDP2) | _BV(WDP0);  // interrupt only, 0.5 s
-  }
-}
-
-void feed_watchdog() {
+  const avr::InterruptsOff guard;
   wdt_reset();
+  WDTCSR = _BV(WDCE) | _BV(WDE);
+  WDTCSR = _BV(WDIE) | _BV(WDP2) | _BV(WDP0);  // interrupt only, 0.5 s
 }
 
 uint16_t resets() {
   return g_resets;
-}
-
-uint8_t read_eeprom(const uint16_t address) {
-  while (!eeprom_ready()) {  // 3.4 ms, and only when a write was just begun
-  }
-  EEAR = address;
-  EECR |= _BV(EERE);
-  return EEDR;
-}
-
-bool eeprom_ready() {
-  return (EECR & _BV(EEPE)) == 0;
-}
-
-void write_eeprom(const uint16_t address, const uint8_t value) {
-  if (read_eeprom(address) == value) {
-    return;
-  }
-  EEAR = address;
-  EEDR = value;
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {  // EEPE must follow EEMPE within four cycles
-    EECR = _BV(EEMPE);
-    EECR = _BV(EEMPE) | _BV(EEPE);
-  }
 }
 
 }  // namespace arduimu

@@ -7,6 +7,8 @@
 #include <util/twi.h>
 
 #include "boards/arduimu/board.h"
+#include "boards/avr/awake.h"
+#include "hal/system.h"
 
 namespace {
 
@@ -35,7 +37,7 @@ uint16_t g_stuck;
 void end(const TwiStatus status) {
   TWCR = kStop;
   g_status = status;
-  arduimu::g_awake = true;
+  avr::g_awake = true;
 }
 
 void put_next() {
@@ -186,13 +188,13 @@ TwiStatus poll_transfer() {
 
 TwiStatus transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size) {
   while (poll_transfer() == TwiStatus::kBusy) {
-    sleep_until_interrupt();
+    hal::sleep_until_interrupt();
   }
   begin_transfer(address, buffer, out_size, in_size);
   while (poll_transfer() == TwiStatus::kBusy) {
-    sleep_until_interrupt();
+    hal::sleep_until_interrupt();
   }
-  g_awake = true;  // something for the main loop may have ended these sleeps
+  avr::g_awake = true;  // something for the main loop may have ended these sleeps
   return poll_transfer();
 }
 

@@ -7,9 +7,10 @@
 #include <avr/io.h>
 #include <util/delay.h>
 
+#include "boards/avr/awake.h"
+#include "boards/avr/interrupts_off.h"
 #include "boards/mega2560/board.h"
 #include "boards/mega2560/generated/pins.h"
-#include "boards/mega2560/interrupts.h"
 #include "core/progmem.h"
 #include "hal/clock.h"
 
@@ -183,7 +184,7 @@ ISR(ADC_vect, ISR_NAKED) {
       [again] "M"(kOnce | _BV(ADSC)),
       [bandgap] "M"(kReference | kBandgapMux),
       [taken] "i"(&mega::g_packet_taken),
-      [awake] "i"(&mega::g_awake));
+      [awake] "i"(&avr::g_awake));
 }
 
 namespace mega {
@@ -204,7 +205,7 @@ uint16_t begin_scan() {
   select(selection(0));
   uint16_t started_ticks;
   {
-    const InterruptsOff guard;
+    const avr::InterruptsOff guard;
     started_ticks = TCNT5;
   }
   ADCSRA = kFree | _BV(ADSC) | _BV(ADIF);
@@ -284,7 +285,7 @@ uint16_t scan_sum(const uint8_t slot) {
 uint16_t avcc_mv() {
   uint16_t counts;
   {
-    const mega::InterruptsOff guard;
+    const avr::InterruptsOff guard;
     counts = adc_bandgap;
   }
   return counts == 0 ? 0 : uint16_t(uint32_t(kBandgapMv) * 1024U / counts);

@@ -1,4 +1,10 @@
-// What the composition root starts, in this order.
+// What the composition root starts, and what the files of this board offer each other.
+//
+// Whatever else runs, an edge on port K is stamped within 2 us, so longer interrupts let others in.
+// One whose flag stays set until its cause is served (RXC, UDRE, TWINT) would enter itself again as
+// soon as interrupts are on, until the RAM is gone. So such an interrupt (serial.cpp, imu_bus.cpp)
+// clears its own enable bit first, and only then turns interrupts on: an edge of the receiver waits
+// 24 cycles at most, entry included.
 #pragma once
 
 #include <stdint.h>
@@ -6,10 +12,6 @@
 namespace mega {
 
 void start_clock();
-
-// Set by what the main loop has to look at: the millisecond, a scan's end that a packet waits for.
-// Other interrupts (10 000 a second) let it sleep on.
-extern volatile bool g_awake;
 
 // A packet of the IMU that started no scan was taken since the last one began: it may wait for that
 // scan's end, which then ends the sleep.

@@ -4,8 +4,9 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
+#include "boards/avr/awake.h"
+#include "boards/avr/interrupts_off.h"
 #include "boards/mega2560/board.h"
-#include "boards/mega2560/interrupts.h"
 
 // Counts turns of the timer, 32.768 ms each; 17 bits of it reach now_us(). Shared with the assembly
 // below, hence a C name, kept by the linker.
@@ -29,7 +30,7 @@ inline __attribute__((always_inline)) Now now() {
   Now at;
   bool uncounted;
   {
-    const mega::InterruptsOff guard;  // the timer's bytes share TEMP with the receiver's interrupt
+    const avr::InterruptsOff guard;  // the timer's bytes share TEMP with the receiver's interrupt
     at.ticks = TCNT5;
     uncounted = (TIFR5 & _BV(TOV5)) != 0;
     at.turns = clock_turns.low;
@@ -75,7 +76,7 @@ ISR(TIMER5_OVF_vect, ISR_NAKED) {
 // stormed.
 extern "C" void __vector_millisecond(void) __attribute__((signal, used, externally_visible));
 void __vector_millisecond(void) {
-  mega::g_awake = true;
+  avr::g_awake = true;
   mega::tick_pulse_capture();
 }
 

@@ -6,8 +6,8 @@
 #include <avr/io.h>
 #include <util/twi.h>
 
+#include "boards/avr/interrupts_off.h"
 #include "boards/mega2560/board.h"
-#include "boards/mega2560/interrupts.h"
 #include "core/ident_trigger.h"
 #include "hal/clock.h"
 
@@ -49,7 +49,7 @@ void begin_packet() {
   hal::ImuPacket& packet = g_packets[next];
   {
     // The low half of now_ticks(): a call here would make the interrupt save every register.
-    const mega::InterruptsOff guard;
+    const avr::InterruptsOff guard;
     g_start_ticks[next] = uint16_t(TCNT5 - kSinceStartTicks);
   }
   packet.address = uint8_t(TWDR >> 1);
@@ -82,7 +82,7 @@ void end_packet() {
     start_scan_of(filling);
     // Stamped, and its scan begun: it may wait for the next millisecond. A turn of the main loop of
     // its own, 200 times a second, was 1.6 % of the chip.
-    const mega::InterruptsOff guard;
+    const avr::InterruptsOff guard;
     ++g_full;
   }
 }
@@ -116,7 +116,7 @@ void __vector_imu_bus_event(void) {
 
 // The bus waits (SCL low) from the flag to the write of TWINT, so no byte is lost, only slowed. A
 // byte of a packet, 36 times of 38, is stored here in 60 cycles; the compiler's way took 119. As
-// interrupts.h says, the own enable bit goes off first, then interrupts on.
+// board.h says, the own enable bit goes off first, then interrupts on.
 ISR(TWI_vect, ISR_NAKED) {
   __asm__ __volatile__(
       "push r24 \n\t"
@@ -191,18 +191,18 @@ void release_imu_packet() {
   } else {
     mega::g_packet_taken = true;
   }
-  const mega::InterruptsOff guard;
+  const avr::InterruptsOff guard;
   g_first = (g_first + 1U) & 1U;
   --g_full;
 }
 
 uint16_t lost_imu_packets() {
-  const mega::InterruptsOff guard;
+  const avr::InterruptsOff guard;
   return g_lost;
 }
 
 void restart_imu_bus() {
-  const mega::InterruptsOff guard;
+  const avr::InterruptsOff guard;
   TWCR = 0;  // lets go of SDA and SCL whatever the state
   g_filling = kNone;
   imu_bus_room = 0;

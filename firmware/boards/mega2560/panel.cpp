@@ -3,14 +3,14 @@
 
 #include <avr/io.h>
 
+#include "boards/avr/interrupts_off.h"
 #include "boards/mega2560/generated/pins.h"
-#include "boards/mega2560/interrupts.h"
 
 namespace {
 
 template <typename Pin>
 void drive(const bool high) {
-  const mega::InterruptsOff guard;
+  const avr::InterruptsOff guard;
   Pin::direction() |= Pin::kMask;
   if (high) {
     Pin::port() |= Pin::kMask;

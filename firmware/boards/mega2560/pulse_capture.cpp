@@ -4,9 +4,9 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
+#include "boards/avr/interrupts_off.h"
 #include "boards/mega2560/board.h"
 #include "boards/mega2560/generated/pins.h"
-#include "boards/mega2560/interrupts.h"
 #include "core/storm_guard.h"
 
 namespace {
@@ -170,7 +170,7 @@ uint8_t edge_storm() {
 }
 
 uint16_t lost_edges() {
-  const mega::InterruptsOff guard;
+  const avr::InterruptsOff guard;
   return capture_lost;
 }
 

@@ -4,7 +4,8 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
-#include "boards/mega2560/interrupts.h"
+#include "boards/avr/interrupts_off.h"
+#include "boards/avr/usart.h"
 
 namespace {
 
@@ -60,11 +61,6 @@ Fifo<10> g_gps_out;
 Fifo<96> g_radio_out;  // the longest envelope has 77
 volatile uint16_t g_gps_lost;
 
-// UBRR for double speed, rounded to the nearest rate; 111111 and 250000 come out exactly.
-uint16_t divider(const uint32_t baud) {
-  return uint16_t((F_CPU / 4 / baud - 1) / 2);
-}
-
 constexpr uint8_t kSends = _BV(TXEN0);
 constexpr uint8_t kBoth = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0);
 
@@ -73,7 +69,7 @@ constexpr uint8_t kBoth = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0);
 static_assert(sizeof g_gps_in == 34 && sizeof g_radio_out == 98, "bytes, head, tail: no gaps");
 
 // In assembly: 66 cycles for a byte in instead of 111, 58 for a byte out instead of 99; there are
-// 1200 and 2200 a second. The own enable bit goes off first (interrupts.h), then interrupts on; at
+// 1200 and 2200 a second. The own enable bit goes off first (board.h), then interrupts on; at
 // the end they are off for 20 cycles, so that setting the bit again enters only behind RETI.
 // Bit positions are the same for all USARTs of this chip.
 ISR(USART2_RX_vect, ISR_NAKED) {
@@ -203,7 +199,7 @@ SEND_INTERRUPT(3, g_radio_out)
 namespace hal {
 
 void open_port(const Port port, const uint32_t baud) {
-  const uint16_t ubrr = divider(baud);
+  const uint16_t ubrr = avr::usart_divider(baud);
   switch (port) {
     case Port::kUsb:
       UCSR0A = _BV(U2X0);
@@ -243,19 +239,19 @@ void send_byte(const Port port, const uint8_t byte) {
   switch (port) {
     case Port::kUsb: {
       g_usb_out.put(byte);
-      const mega::InterruptsOff guard;
+      const avr::InterruptsOff guard;
       UCSR0B |= _BV(UDRIE0);
       break;
     }
     case Port::kGps: {
       g_gps_out.put(byte);
-      const mega::InterruptsOff guard;
+      const avr::InterruptsOff guard;
       UCSR2B |= _BV(UDRIE0);
       break;
     }
     case Port::kTelemetry: {
       g_radio_out.put(byte);
-      const mega::InterruptsOff guard;
+      const avr::InterruptsOff guard;
       UCSR3B |= _BV(UDRIE0);
       break;
     }
@@ -263,7 +259,7 @@ void send_byte(const Port port, const uint8_t byte) {
 }
 
 uint16_t lost_bytes(const Port port) {
-  const mega::InterruptsOff guard;
+  const avr::InterruptsOff guard;
   return port == Port::kGps ? g_gps_lost : uint16_t{0};
 }
 

@@ -4,8 +4,8 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 
+#include "boards/avr/interrupts_off.h"
 #include "boards/mega2560/generated/pins.h"
-#include "boards/mega2560/interrupts.h"
 
 namespace {
 
@@ -87,7 +87,7 @@ void set_servo_pulse(const uint8_t output, const uint16_t width_ticks) {
   const Output out = output_of(output);
   const bool connected = (out.control & out.connect) != 0;
   if (width_ticks == 0) {
-    const mega::InterruptsOff guard;
+    const avr::InterruptsOff guard;
     if (connected && (out.interrupts & out.match) == 0) {
       out.flags = out.match;
       out.interrupts = uint8_t(out.interrupts | out.match);
@@ -95,7 +95,7 @@ void set_servo_pulse(const uint8_t output, const uint16_t width_ticks) {
     return;
   }
   out.compare = uint16_t(width_ticks - 1U);
-  const mega::InterruptsOff guard;
+  const avr::InterruptsOff guard;
   out.interrupts = uint8_t(out.interrupts & ~out.match);
   out.control = uint8_t(out.control | out.connect);
 }

@@ -1,13 +1,12 @@
-// Reset cause, watchdog with a crash record, sleep, stack high-water.
+// Reset cause, watchdog with a crash record, stack high-water.
 #include "hal/system.h"
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
-#include <avr/sleep.h>
 #include <avr/wdt.h>
 
+#include "boards/avr/interrupts_off.h"
 #include "boards/mega2560/board.h"
-#include "boards/mega2560/interrupts.h"
 
 namespace {
 
@@ -95,7 +94,6 @@ ISR(WDT_vect, ISR_NAKED) {
 
 namespace mega {
 
-volatile bool g_awake = false;
 volatile bool g_packet_taken = false;
 
 }  // namespace mega
@@ -142,32 +140,13 @@ bool flight_mark() {
 }
 
 void start_watchdog() {
-  const mega::InterruptsOff guard;
+  const avr::InterruptsOff guard;
   wdt_reset();
   WDTCSR = _BV(WDCE) | _BV(WDE);
   // 32 ms to the interrupt, which notes the address and resets; as much again if it cannot run. A
   // runaway stack may have turned receiver lines into outputs and interrupts off: no pulse passes
   // until that reset, and with a frame before and behind it 110 ms must do.
   WDTCSR = _BV(WDE) | _BV(WDIE) | _BV(WDP0);
-}
-
-void feed_watchdog() {
-  wdt_reset();
-}
-
-void sleep_until_interrupt() {
-  SMCR = _BV(SE);  // idle
-  for (;;) {
-    cli();
-    if (mega::g_awake) {
-      break;
-    }
-    sei();  // takes effect behind the next instruction: no interrupt can slip in between
-    sleep_cpu();
-  }
-  mega::g_awake = false;
-  sei();
-  SMCR = 0;
 }
 
 uint16_t stack_free_bytes() {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/ident_trigger.h"
+#include "hal/eeprom.h"
 
 namespace sitl {
 
@@ -39,7 +40,7 @@ World& world() {
   return the_world;
 }
 
-World::World() : eeprom(4096, 0xFF) {}
+World::World() : eeprom(hal::kEepromBytes, 0xFF) {}
 
 double Grid::at(Tick when, size_t channel) const {
   if (channels == 0 || values.empty()) return 0;

@@ -7,14 +7,16 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
-BOARD = ROOT / "firmware" / "boards" / "mega2560"
+BOARDS = ROOT / "firmware" / "boards"
+BOARD = BOARDS / "mega2560"
+SHARED = BOARDS / "avr"
+HAL = ROOT / "firmware" / "hal"
 PARTS = [
     "clock",
     "pulse_capture",
     "servo_output",
     "relay",
     "panel",
-    "eeprom",
     "imu_bus",
     "baro_bus",
     "analog_input",
@@ -29,7 +31,7 @@ FLAGS = [
 
 
 def build_probe() -> Path:
-    """Compile probe.cpp with the files of boards/mega2560, servo and relay pins enabled.
+    """Compile probe.cpp with the files of boards/mega2560 and boards/avr.
 
     Returns
     -------
@@ -43,7 +45,9 @@ def build_probe() -> Path:
     """
     target = ROOT / "build" / "simavr" / "hal" / "probe.elf"
     sources = [HERE / "probe.cpp", *(BOARD / f"{part}.cpp" for part in PARTS)]
-    inputs = [*sources, *BOARD.glob("*.h"), *(ROOT / "firmware" / "hal").glob("*.h")]
+    sources += sorted(SHARED.glob("*.cpp"))
+    headers = [path for room in (BOARD, SHARED, HAL) for path in room.glob("*.h")]
+    inputs = [*sources, *headers]
     made = target.stat().st_mtime if target.exists() else 0.0
     if any(path.stat().st_mtime > made for path in inputs):
         target.parent.mkdir(parents=True, exist_ok=True)

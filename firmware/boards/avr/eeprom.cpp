@@ -3,7 +3,7 @@
 
 #include <avr/io.h>
 
-#include "boards/mega2560/interrupts.h"
+#include "boards/avr/interrupts_off.h"
 
 namespace hal {
 
@@ -25,7 +25,7 @@ void write_eeprom(const uint16_t address, const uint8_t value) {
   }
   EEAR = address;
   EEDR = value;
-  const mega::InterruptsOff guard;  // EEPE must follow EEMPE within four cycles
+  const avr::InterruptsOff guard;  // EEPE must follow EEMPE within four cycles
   EECR = _BV(EEMPE);
   EECR = _BV(EEMPE) | _BV(EEPE);
 }
