@@ -66,10 +66,10 @@ void Panel::step(const Recorder& recorder, uint32_t now_us) {
     }
     hal::set_led(flash_ == 0);
   }
-  sound(state, now_us);
+  sound(now_us);
 }
 
-void Panel::sound(Recorder::State, uint32_t now_us) {
+void Panel::sound(uint32_t now_us) {
   if (tones_ > 0 && now_us - tone_us_ >= kHalfSlowUs) {
     tone_us_ = now_us;
     --tones_;

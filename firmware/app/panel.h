@@ -14,7 +14,7 @@ class Panel {
   void step(const Recorder& recorder, uint32_t now_us);
 
  private:
-  void sound(Recorder::State state, uint32_t now_us);
+  void sound(uint32_t now_us);
 
   uint32_t turned_us_ = 0;
   uint32_t tone_us_ = 0;

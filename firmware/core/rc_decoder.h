@@ -4,8 +4,8 @@
 // A pulse is accepted when both edges were stamped in time, its width is 800 to 2200 us, the line
 // was low for 2 ms before and 300 us after it (a dropout inside a pulse would else leave two short
 // ones), and since the last accepted pulse rose the measured frame time less 4.5 ms passed (9 ms
-// while it is not known). Frame times from 14 to 22.5 ms and
-// receivers that send channels one after the other or all at once pass without being told.
+// while it is not known). Frame times from 14 to 22.5 ms and receivers that send channels one after
+// the other or all at once pass without being told.
 #pragma once
 
 #include <stdint.h>

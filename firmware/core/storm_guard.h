@@ -16,7 +16,7 @@ class StormGuard {
     ++edges_;
     return edges_ <= kMaxEdgesPerMs;
   }
-  // Every millisecond. True: unmask the bank.
+  // Every millisecond, with the interrupt of edge() kept out. True: unmask the bank.
   bool tick() {
     if (edges_ <= kMaxEdgesPerMs) {
       edges_ = 0;

@@ -55,6 +55,7 @@ def test_converter_reads_sixteen_channels_exactly(make_chip: MakeChip) -> None:
     expected = np.floor(volts * 1024 / 5.0).astype(int)
     assert list(chip.read_array("code", "<u2")[:16]) == list(expected)
     assert chip.read("by_interrupt") == expected[13]
+    assert chip.read("unsettled") == expected[15]  # the capacitor still has the channel before
     assert chip.read_array("code", "<u2")[16] == int(1.1 * 1024 / 5.0)
     assert chip.read_array("code", "<u2")[17] == 0
 

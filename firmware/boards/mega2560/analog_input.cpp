@@ -154,15 +154,17 @@ ISR(ADC_vect, ISR_NAKED) {
       // even inside this one: no register of the converter is written behind it.
       "9: sts adc_left, r18 \n\t"
       "rjmp 4f \n\t"
-      "3: sts adc_bandgap, r24 \n\t"
-      "sts adc_bandgap+1, r25 \n\t"
-      "lds r24, adc_supply \n\t"
-      "subi r24, 1 \n\t"
+      // Of the supply only the last is kept: one before it is of a reference that had not settled.
+      "3: lds r18, adc_supply \n\t"
+      "subi r18, 1 \n\t"
       "brcs 4f \n\t"
       "breq 6f \n\t"
-      "ldi r25, %[again] \n\t"
-      "sts %[control_a], r25 \n\t"
-      "6: sts adc_supply, r24 \n\t"
+      "ldi r24, %[again] \n\t"
+      "sts %[control_a], r24 \n\t"
+      "rjmp 10f \n\t"
+      "6: sts adc_bandgap, r24 \n\t"
+      "sts adc_bandgap+1, r25 \n\t"
+      "10: sts adc_supply, r18 \n\t"
       "4: pop r31 \n\t"
       "pop r30 \n\t"
       "pop r19 \n\t"
@@ -264,8 +266,9 @@ bool start_scan(uint32_t* const started_us) {
   clear_next_sums();
   const uint16_t started_ticks = mega::begin_scan();
   mega::take_scan();
-  const uint16_t since_ticks = uint16_t(uint16_t(now_ticks()) - started_ticks);
-  *started_us = now_us() - (since_ticks >> 1);
+  const uint32_t at_us = now_us();
+  const uint16_t since_ticks = uint16_t(uint16_t(at_us << 1) - started_ticks);
+  *started_us = at_us - (since_ticks >> 1);
   return true;
 }
 

@@ -176,9 +176,10 @@ const ImuPacket* imu_packet() {
   // Stamps are extended here: within 32 ms of the packet, or they are that much too late.
   const uint8_t first = g_first;
   hal::ImuPacket& packet = g_packets[first];
-  const uint32_t now_ticks = hal::now_ticks();
-  const uint16_t age_ticks = uint16_t(uint16_t(now_ticks) - g_start_ticks[first]);
-  packet.start_us = now_us() - (age_ticks >> 1);
+  // One look at the clock for both: between two an interrupt would make the packet younger.
+  const uint32_t at_us = now_us();
+  const uint16_t age_ticks = uint16_t(uint16_t(at_us << 1) - g_start_ticks[first]);
+  packet.start_us = at_us - (age_ticks >> 1);
   return &packet;
 }
 

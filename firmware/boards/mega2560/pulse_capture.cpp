@@ -135,6 +135,9 @@ ISR(PCINT2_vect, ISR_NAKED) {
 namespace mega {
 
 void tick_pulse_capture() {
+  // Off for 10 cycles, 30 when the bank comes back: an edge between the look at the count and its
+  // reset would mask the bank, and nothing would ever let it back in.
+  const avr::InterruptsOff guard;
   if (capture_guard.tick()) {
     PCIFR = _BV(PCIF2);
     PCICR |= _BV(PCIE2);

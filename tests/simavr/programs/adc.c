@@ -3,6 +3,7 @@
 #include "common.h"
 
 volatile uint16_t code[18];
+volatile uint16_t unsettled;  // the reference, just chosen
 volatile uint16_t first_cycles, next_cycles;
 volatile uint16_t latched, after_write, still_set;
 volatile uint16_t by_interrupt;
@@ -40,6 +41,7 @@ int main(void) {
     code[i] = convert();
   }
   channel(0x1E);
+  unsettled = convert();
   code[16] = convert();
   channel(0x1F);
   code[17] = convert();

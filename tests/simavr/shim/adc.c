@@ -1,12 +1,15 @@
 // Converter (datasheet section 26): 16 channels and the bandgap, channel and
 // reference latched when the conversion starts, sample held 1.5 clocks later,
 // 13 clocks per conversion (25 for the first), result locked between the reads
-// of ADCL and ADCH, ADIF cleared by writing one.
+// of ADCL and ADCH, ADIF cleared by writing one. The bandgap wants 70 us before
+// it is there (electrical characteristics, tBG); until then the sampling
+// capacitor keeps what the last conversion left.
 #include <math.h>
 #include <stdlib.h>
 
 #include "chip.h"
 
+enum { kReferenceMux = 0x1E, kReferenceCycles = 70 * 16 };
 enum { kEnable = 0x80, kStart = 0x40, kAuto = 0x20, kFlag = 0x10 };
 
 static uint32_t divider(const chip* c) {
@@ -45,11 +48,13 @@ static uint16_t convert(chip* c, uint64_t cycle) {
     const uint8_t number = (uint8_t)(mux < 8 ? mux : mux - 0x20 + 8);
     volt = adc_channel_volt(c, number, cycle);
     noise = c->adc.channel[number].noise_lsb;
-  } else if (mux == 0x1E) {
-    volt = c->adc.bandgap_volt;
+  } else if (mux == kReferenceMux) {
+    const bool settled = cycle - c->adc.reference_from >= kReferenceCycles;
+    volt = settled ? c->adc.bandgap_volt : c->adc.held_volt;
   } else if (mux != 0x1F) {
     fault_add(c, kFaultAdc, mux);
   }
+  c->adc.held_volt = volt;
   double code = volt * 1024.0 / reference_volt(c);
   if (noise > 0.0) {
     double sum = -6.0;  // twelve uniforms: standard deviation one
@@ -64,7 +69,9 @@ static void begin(chip* c, uint64_t clock_edge, bool triggered) {
   const uint32_t d = divider(c);
   c->adc.busy = true;
   c->adc.admux = c->avr->data[REG_ADMUX];
-  c->adc.mux = (uint8_t)((c->adc.admux & 0x1F) | ((c->avr->data[REG_ADCSRB] & 0x08) << 2));
+  const uint8_t mux = (uint8_t)((c->adc.admux & 0x1F) | ((c->avr->data[REG_ADCSRB] & 0x08) << 2));
+  if (mux == kReferenceMux && c->adc.mux != mux) c->adc.reference_from = clock_edge;
+  c->adc.mux = mux;
   const uint32_t half_clocks = c->adc.first ? 50 : triggered ? 27 : 26;
   const uint32_t hold = c->adc.first ? 27 : triggered ? 4 : 3;
   c->adc.first = false;

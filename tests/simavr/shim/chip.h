@@ -257,6 +257,8 @@ struct chip {
     bool busy, first, locked;
     uint8_t mux;
     uint8_t admux;
+    uint64_t reference_from;  // the conversion that began to look at the bandgap
+    double held_volt;         // by the last conversion
     uint16_t result;
     adc_channel channel[16];
     double avcc_volt, aref_volt, bandgap_volt;
