@@ -8,7 +8,7 @@ import pytest
 from host.cli import main
 from host.sysid.aircraft.aircraft_file import airframe_data
 from host.sysid.aircraft.airframe import AirframeData
-from host.sysid.answer.pictures import interval_bars
+from host.sysid.answer.panels import Bar, interval_bars
 from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.coefficients.flight import CoefficientAnswer, identify_coefficients, joined
 from host.sysid.coefficients.modes import coefficient_modes
@@ -166,7 +166,22 @@ def test_aileron_and_rudder_flown_together_are_one_window() -> None:
 
 def test_bars_wider_than_the_value_are_red(tmp_path: Path) -> None:
     path = tmp_path / "bars.svg"
-    known = [("Y_v", -0.9, 0.1, False), ("Y_p", 0.1, 0.09, False)]
-    assert RED not in interval_bars(known, "refused", path).read_text()
-    assert RED in interval_bars([*known, ("Y_da", 0.1, 0.12, False)], "refused", path).read_text()
-    assert RED in interval_bars([("Z_q", 1.0, 0.1, True)], "refused", path).read_text()
+    known = [Bar("Y_v", -0.9, 0.1, 0.9, marked=False), Bar("Y_p", 0.1, 0.09, 0.1, marked=False)]
+    wide = Bar("Y_da", 0.1, 0.12, 0.1, marked=False)
+    assert RED not in interval_bars(known, "refused", "of it", path).read_text()
+    assert RED in interval_bars([*known, wide], "refused", "of it", path).read_text()
+    assert (
+        RED
+        in interval_bars([Bar("Z_q", 1.0, 0.1, 1.0, marked=True)], "x", "of it", path).read_text()
+    )
+
+
+def test_the_truth_of_a_simulated_flight_is_a_diamond(tmp_path: Path) -> None:
+    def words(bar: Bar) -> str:
+        return interval_bars([bar], "flagged", "of it", tmp_path / "bars.svg").read_text()
+
+    plain = words(Bar("Cm_q", -11.0, 1.4, 11.0, marked=False))
+    assert "simulated" not in plain
+    assert words(Bar("Cm_q", -11.0, 1.4, 11.0, marked=False, truth=-10.8)).count("<use") > (
+        plain.count("<use")
+    )

@@ -131,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
     if direct and args.plots:
         from host.sysid.answer.pictures import draw_coefficients
 
-        draw_coefficients(direct, columns, args.plots)
+        draw_coefficients(direct, columns, args.plots, truth)
     if args.json:
         from host.sysid.answer.json import answer_document, coefficient_document
 
@@ -285,10 +285,9 @@ def _write(
     direct: CoefficientAnswer | None,
 ) -> None:
     if args.plots:
-        from host.sysid.answer.pictures import draw
+        from host.sysid.answer.pictures import draw_all
 
-        for answer in answers:
-            draw(answer, args.plots)
+        draw_all(answers, args.plots)
     if args.mat:
         _write_mat(args.mat, answers, direct)
     for path in (args.save_aircraft, args.save_model):

@@ -1,0 +1,238 @@
+"""The kinds of picture an answer is drawn with: histories, poles, intervals, spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MEASURED, MODEL, RESIDUAL, REFUSED, TRUTH = "0.45", "C3", "C0", "C3", "black"
+SHOWN_HZ = (0.05, 20.0)  # of the spectra
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """A stretch of one signal, each (n,): time, what was measured, what the model says."""
+
+    t_s: Array
+    measured: Array
+    model: Array
+    title: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Cloud:
+    """A pole and where it may be: real and imaginary parts of its draws, each (n,)."""
+
+    name: str
+    pole: complex
+    real: Array
+    imaginary: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A parameter with its 95 % half-width; `scale` is what both are drawn against.
+
+    `truth` is known of simulated flights only.
+    """
+
+    name: str
+    value: float
+    half_width: float
+    scale: float
+    marked: bool
+    truth: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Excitation:
+    """One input of one maneuver, (n,), to be shown as a spectrum."""
+
+    label: str
+    dt_s: float
+    values: Array
+
+
+def histories(signals: dict[str, list[Trace]], title: str, path: Path) -> Path:
+    """Draw each signal measured and by the model, the difference beneath."""
+    rows = len(signals)
+    with _figure(path, (9.0, 2.2 * rows)) as figure:
+        panels = figure.subplots(2 * rows, 1, squeeze=False, height_ratios=[3, 1] * rows)
+        axes = list(panels[:, 0])
+        for k, (name, traces) in enumerate(signals.items()):
+            over, under = axes[2 * k], axes[2 * k + 1]
+            for trace in traces:
+                over.plot(trace.t_s, trace.measured, color=MEASURED, lw=1.4)
+                over.plot(trace.t_s, trace.model, color=MODEL, lw=0.8)
+                under.plot(trace.t_s, trace.measured - trace.model, color=RESIDUAL, lw=0.6)
+            under.axhline(0.0, color="0.8", lw=0.6, zorder=0)
+            over.set_ylabel(name, fontsize=8)
+            under.set_ylabel("difference", fontsize=6)
+            for axis in (over, under):
+                axis.tick_params(labelsize=7)
+                axis.set_xlim(over.get_xlim())
+            over.tick_params(labelbottom=False)
+            for trace in traces:
+                over.annotate(
+                    trace.title,
+                    (float(trace.t_s[0]), 1.0),
+                    xycoords=("data", "axes fraction"),
+                    xytext=(0, 2),
+                    textcoords="offset points",
+                    fontsize=6,
+                )
+        figure.suptitle(title, fontsize=10)
+        axes[-1].set_xlabel("time, maneuvers one behind the other, s", fontsize=8)
+        figure.align_ylabels(axes)
+    return path
+
+
+def pole_map(clouds: Sequence[Cloud], title: str, path: Path) -> Path:
+    """Draw all poles, and each mode with its scatter in a panel of its own scale."""
+    rows = (len(clouds) + 1) // 2
+    with _figure(path, (8.0, 3.4 + 2.4 * rows)) as figure:
+        grid = figure.add_gridspec(1 + rows, 2, height_ratios=[3] + [2] * rows)
+        whole = figure.add_subplot(grid[0, :])
+        for cloud in clouds:
+            _cloud(whole, cloud)
+            whole.annotate(
+                cloud.name,
+                (cloud.pole.real, abs(cloud.pole.imag)),
+                xytext=(6, 6),
+                textcoords="offset points",
+                fontsize=8,
+            )
+        whole.axvline(0.0, color="0.7", lw=0.8)
+        whole.axhline(0.0, color="0.9", lw=0.8, zorder=0)
+        whole.margins(x=0.08, y=0.12)
+        whole.set_xlabel("real, 1/s")
+        whole.set_ylabel("imaginary, rad/s")
+        whole.set_title(title, fontsize=10)
+        for k, cloud in enumerate(clouds):
+            near = figure.add_subplot(grid[1 + k // 2, k % 2])
+            if cloud.pole.imag:
+                _cloud(near, cloud, mirrored=False)
+                near.set_ylabel("imaginary, rad/s", fontsize=7)
+            else:
+                near.hist(cloud.real, bins=24, color=RESIDUAL, alpha=0.5)
+                near.axvline(cloud.pole.real, color=MODEL, lw=1.6)
+                near.set_ylabel("draws", fontsize=7)
+            near.set_title(cloud.name, fontsize=8)
+            near.set_xlabel("real, 1/s", fontsize=7)
+            near.tick_params(labelsize=7)
+            if near.get_xlim()[1] > 0.0:
+                near.axvline(0.0, color="0.7", lw=0.8)
+    return path
+
+
+def interval_bars(bars: Sequence[Bar], marked: str, against: str, path: Path) -> Path:
+    """Draw each parameter's interval as a share of its scale; red where marked or wider.
+
+    `marked` says what the mark means, `against` what the scale is.
+    """
+    with _figure(path, (8.5, 0.32 * len(bars) + 1.4)) as figure:
+        axis = figure.subplots()
+        widest = max((100.0 * b.half_width / b.scale for b in bars), default=0.0)
+        reach = float(np.clip(1.15 * widest, 15.0, 150.0))
+        for position, bar in enumerate(reversed(bars)):
+            share = 100.0 * bar.half_width / bar.scale
+            colour = REFUSED if bar.marked or share > 100.0 else RESIDUAL
+            axis.errorbar(0.0, position, xerr=min(share, reach), color=colour, fmt="o", ms=4)
+            if share > reach:
+                for side in (-reach, reach):
+                    axis.plot(side, position, "<" if side < 0.0 else ">", color=colour, ms=5)
+            if bar.truth is not None:
+                off = 100.0 * (bar.truth - bar.value) / bar.scale
+                axis.plot(np.clip(off, -reach, reach), position, "D", color=TRUTH, ms=4, mfc="none")
+            axis.annotate(
+                f"{bar.value:.4g} ± {bar.half_width:.2g}",
+                (1.01, position),
+                xycoords=("axes fraction", "data"),
+                fontsize=7,
+                va="center",
+            )
+        axis.set_xlim(-1.05 * reach, 1.05 * reach)
+        axis.set_ylim(-0.7, len(bars) - 0.3)
+        axis.set_yticks(range(len(bars)), [b.name for b in reversed(bars)], fontsize=8)
+        axis.axvline(0.0, color="0.85", lw=0.8, zorder=0)
+        known = any(bar.truth is not None for bar in bars)
+        axis.set_xlabel(
+            f"95 % interval about the estimate, % {against}\n"
+            f"red: {marked}, or wider than that; arrows: beyond the scale"
+            + ("; diamonds: the simulated aircraft" if known else ""),
+            fontsize=8,
+        )
+    return path
+
+
+def spectra(inputs: Sequence[Excitation], modes: Sequence[tuple[str, float]], path: Path) -> Path:
+    """Draw the spectra of inputs and the modes, name and Hz, that they should excite."""
+    with _figure(path, (8.0, 4.0)) as figure:
+        axis = figure.subplots()
+        for item in inputs:
+            series = item.values - item.values.mean()
+            padded = 8 * len(series)
+            size = np.abs(np.fft.rfft(series, padded)) * item.dt_s
+            axis.semilogx(
+                np.fft.rfftfreq(padded, item.dt_s)[1:], size[1:], lw=0.9, label=item.label
+            )
+        low, high = SHOWN_HZ
+        for name, hertz in modes:
+            if low < hertz < high:
+                axis.axvline(hertz, color="0.5", lw=0.8, ls="--")
+                axis.annotate(
+                    name,
+                    (hertz, 1.0),
+                    xycoords=("data", "axes fraction"),
+                    xytext=(3, -3),
+                    textcoords="offset points",
+                    rotation=90,
+                    fontsize=7,
+                    va="top",
+                )
+        axis.set_xlim(low, high)
+        axis.set_ylim(bottom=0.0)
+        axis.set_xlabel("frequency, Hz")
+        axis.set_ylabel("input spectrum, rad s")
+        if inputs:
+            axis.legend(fontsize=7, frameon=False)
+    return path
+
+
+def _cloud(axis: Axes, cloud: Cloud, *, mirrored: bool = True) -> None:
+    for side in (1.0, -1.0) if mirrored and cloud.pole.imag else (1.0,):
+        axis.plot(cloud.real, side * cloud.imaginary, ".", color=RESIDUAL, ms=1.5, alpha=0.4)
+        axis.plot(cloud.pole.real, side * cloud.pole.imag, "x", color=MODEL, ms=8, mew=1.6)
+
+
+@contextmanager
+def _figure(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
+    """Give an empty figure, save it at the end.
+
+    Raises
+    ------
+    IdentificationError
+        If matplotlib is missing.
+    """
+    try:
+        from matplotlib.backends.backend_svg import FigureCanvasSVG
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise IdentificationError("pictures need the extra: pip install './host[plot]'") from error
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasSVG(figure)
+    yield figure
+    figure.savefig(path)
