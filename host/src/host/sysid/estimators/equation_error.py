@@ -8,7 +8,7 @@ The Total Least Squares Problem, sec. 3.5 (exact columns); Huber, Robust Statist
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
@@ -24,6 +24,7 @@ from host.sysid.numerics.differentiation import (
     smooth,
     smooth_and_differentiate,
 )
+from host.sysid.numerics.inverse import covariance_of
 from host.sysid.numerics.problem import check_shapes
 
 HUBER_LIMIT = 1.345  # 95 % efficiency on normal residuals (Huber 1981)
@@ -244,10 +245,10 @@ def fit_equation_error(
         raise IdentificationError(
             f"equation error '{variant}' unknown; use ordinary, weighted, robust or total"
         )
-    scales = _equation_scales(rows, theta, robust=False, dof=len(names))
-    used = _weighted(rows, sample_weights)
+    used = _pseudo_rows(rows, theta, sample_weights) if variant == "robust" else rows
+    scales = _equation_scales(used, theta, robust=False, dof=len(names))
     normal, _ = normal_equations(used, len(names), scales**-2.0)
-    white = np.linalg.pinv(normal, hermitian=True)
+    white = covariance_of(normal)
     coloured = coloured_covariance(used, theta, white, scales)
     labels = sorted({row.equation for row in rows})
     residuals, fitted = [], []
@@ -291,6 +292,31 @@ def _weighted(rows: Sequence[Row], weights: Sequence[Array]) -> list[Row]:
             )
         )
     return result
+
+
+def _pseudo_rows(rows: Sequence[Row], theta: Array, weights: Sequence[Array]) -> list[Row]:
+    """Return rows whose residuals are what an M-estimate takes of the true ones.
+
+    Ordinary least squares on them gives the same estimate and Huber's covariance: the residual,
+    clipped, over the mean slope of the clipping, with the first-order correction for the number of
+    unknowns (Annals of Statistics 1, 1973). One outlier then counts as much as its clipped value.
+    """
+    slope: dict[int, float] = {}
+    for equation in {row.equation for row in rows}:
+        mine = [k for k, row in enumerate(rows) if row.equation == equation]
+        share = float(np.mean(np.concatenate([weights[k] for k in mine]) >= 1.0))
+        unknowns = len(np.flatnonzero(rows[mine[0]].regressors.any(axis=0)))
+        samples = sum(len(weights[k]) for k in mine)
+        correction = 1.0 + unknowns / samples * (1.0 - share) / max(share, 1e-12)
+        slope[equation] = max(share, 1e-12) / correction
+    return [
+        replace(
+            row,
+            target=row.regressors @ theta
+            + weight * (row.target - row.regressors @ theta) / slope[row.equation],
+        )
+        for row, weight in zip(rows, weights, strict=True)
+    ]
 
 
 def _equation_scales(rows: Sequence[Row], theta: Array, *, robust: bool, dof: int = 0) -> Array:

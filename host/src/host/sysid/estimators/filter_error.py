@@ -20,6 +20,7 @@ from host.sysid.estimators.start import start_values
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
+from host.sysid.numerics.inverse import covariance_of
 from host.sysid.numerics.kernels import transition
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.problem import OutputProblem
@@ -279,7 +280,7 @@ def fit_filter_error(
         scale = np.minimum(np.maximum(bound, 1e-8 * (1.0 + np.abs(theta))), 1.0 + np.abs(theta))
         parts, scores = _scoring(problem, theta, point, scale)
         information, gradient = _summed(problem, theta, parts, scores)
-    covariance = np.linalg.pinv(information, hermitian=True)
+    covariance = covariance_of(information)
     kept = problem.n_model
     warnings = [] if converged else [f"no convergence: last step {size:.3g} bounds long"]
     return FitResult(

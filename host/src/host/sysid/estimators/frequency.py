@@ -23,6 +23,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 from host.sysid.numerics.differentiation import signal_bandwidth_hz
+from host.sysid.numerics.inverse import covariance_of
 from host.sysid.numerics.kernels import transition
 from host.sysid.numerics.problem import check_shapes
 
@@ -132,8 +133,8 @@ def fit_frequency_equation_error(
             power[key][0] += float(miss @ miss)
             power[key][1] += max(len(y) - free, 1)
         weights = np.array([power[key][1] / max(power[key][0], 1e-300) for key in keys])
-    covariance = np.linalg.pinv(
-        np.asarray(sum(w * X.T @ X for w, X in zip(weights, X_rows, strict=True))), hermitian=True
+    covariance = covariance_of(
+        np.asarray(sum(w * X.T @ X for w, X in zip(weights, X_rows, strict=True)))
     )
     residuals = [y - X @ theta for X, y in zip(X_rows, y_rows, strict=True)]
     per = len(active)
@@ -278,7 +279,7 @@ def fit_frequency_output_error(
         trial_ends = [end + move[count + k * n : count + (k + 1) * n] for k, end in enumerate(ends)]
     if accepted is None:
         raise IdentificationError(f"model {model.name}: no finite response at the start")
-    covariance = np.linalg.pinv(accepted[2], hermitian=True)[:count, :count]
+    covariance = covariance_of(accepted[2])[:count, :count]
     residuals = tuple(np.vstack([r.real, r.imag]) for r in accepted[4])
     return FitResult(
         method="frequency output error",
@@ -305,7 +306,7 @@ def _small(
     ends: list[Array],
 ) -> bool:
     theta, old_ends, information, _, _ = accepted
-    bound = np.sqrt(np.abs(np.diag(np.linalg.pinv(information, hermitian=True))))
+    bound = np.sqrt(np.abs(np.diag(covariance_of(information))))
     step = np.concatenate([trial - theta, *[a - b for a, b in zip(ends, old_ends, strict=True)]])
     return bool(np.all(np.abs(step) <= STEP_LIMIT * bound + 1e-300))
 

@@ -23,6 +23,7 @@ from host.sysid.estimators.equation_error import (
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
+from host.sysid.numerics.inverse import covariance_of
 
 Spectrum = NDArray[np.complexfloating]
 START_VARIANCE = 1e8  # of scaled regressors: a start that weighs nothing
@@ -169,7 +170,7 @@ def fit_recursive_fourier(
     for lines, y in last.values():
         miss = y - lines @ theta
         middle += (lines.conj().T @ lines).real * float(np.mean(np.abs(miss) ** 2))
-    inverse = np.linalg.pinv(normal, hermitian=True)
+    inverse = covariance_of(normal)
     covariance = batch.covariance.copy()
     covariance[:count, :count] = inverse @ middle @ inverse
     names, rows = regression_rows(model, maneuvers)
