@@ -23,10 +23,6 @@ void put_block_header(uint8_t* to, const BlockHeader& header) {
   to[27] = 0;
 }
 
-bool block_begins(const uint8_t* block, uint32_t file_id) {
-  return get_le<uint32_t>(block) == kMagic && get_le<uint32_t>(block + 4) == file_id;
-}
-
 BlockVerdict check_block(const uint8_t* block, BlockHeader& header) {
   if (get_le<uint32_t>(block) != kMagic) {
     return BlockVerdict::kMagic;

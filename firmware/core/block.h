@@ -30,9 +30,6 @@ void put_block_header(uint8_t* to, const BlockHeader& header);
 // The first check that fails, in the order of the enum. `header` is filled only for kOk.
 BlockVerdict check_block(const uint8_t* block, BlockHeader& header);
 
-// Only the magic and the header of a block, without its CRC: a cheap first look while mounting.
-bool block_begins(const uint8_t* block, uint32_t file_id);
-
 // The next whole frame of a frame block: returns its size with the id, 0 at the end or at an id
 // that the schema does not have. `offset` counts from the start of the payload.
 uint8_t frame_at(const uint8_t* block, uint16_t used, uint16_t offset);

@@ -17,18 +17,12 @@ class Every {
     next_us_ += period_us;
     if (static_cast<uint32_t>(late_us) >= period_us) {
       next_us_ = now_us + period_us;
-      if (overruns_ != 0xFF) {
-        ++overruns_;
-      }
     }
     return true;
   }
 
-  uint8_t overruns() const { return overruns_; }
-
  private:
   uint32_t next_us_ = 0;
-  uint8_t overruns_ = 0;
 };
 
 }  // namespace core

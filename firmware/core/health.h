@@ -24,8 +24,6 @@ class HealthGate {
     reported_ = 0;
     return true;
   }
-  // Bit per task that has not run since the last beat.
-  uint8_t missing() const { return static_cast<uint8_t>(required_ & ~reported_); }
 
  private:
   const uint8_t required_;

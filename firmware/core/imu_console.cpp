@@ -46,7 +46,7 @@ bool number(const char* text, int16_t least, int16_t most, int16_t& out) {
 bool iron(const char* text, ImuSettings& out) {
   for (uint8_t axis = 0; axis < 3; ++axis) {
     int16_t value = 0;
-    if ((axis != 0 && *text++ != ' ') || !take_number(text, -2048, 2048, value)) {
+    if ((axis != 0 && *text++ != ' ') || !take_number(text, -kMostIron, kMostIron, value)) {
       return false;
     }
     out.field_offset[axis] = value;
@@ -88,9 +88,10 @@ ImuReply ImuConsole::line(ImuNode& node, ImuSettings& settings) {
   if (behind(command, "level") != nullptr) {
     return node.level() ? ImuReply::kChanged : ImuReply::kMoving;
   }
-  if ((text = behind(command, "declination")) != nullptr && number(text, -18000, 18000, value)) {
+  if ((text = behind(command, "declination")) != nullptr &&
+      number(text, -kMostDeclinationCdeg, kMostDeclinationCdeg, value)) {
     wanted.declination_cdeg = value;
-  } else if ((text = behind(command, "dlpf")) != nullptr && number(text, 0, 6, value)) {
+  } else if ((text = behind(command, "dlpf")) != nullptr && number(text, 0, kMostDlpf, value)) {
     wanted.dlpf = static_cast<uint8_t>(value);
   } else if ((text = behind(command, "compat")) != nullptr && number(text, 0, 1, value)) {
     wanted.compat = static_cast<uint8_t>(value);

@@ -61,9 +61,6 @@ ImuResult ImuReceiver::own_packet(const uint8_t* bytes, uint8_t size, uint32_t s
   const bool restart = (in.flags & frames::kImuFlagsRestarted) != 0;
   const bool was_restart = (sample_.flags & frames::kImuFlagsRestarted) != 0;
   if (heard_ && !sample_.original && in.seq == sample_.seq && in.t_us == sample_.imu_t_us) {
-    if (duplicates_ != 0xFF) {
-      ++duplicates_;
-    }
     return ImuResult::kDuplicate;
   }
   if (restart && !was_restart) {

@@ -50,7 +50,6 @@ class ImuReceiver {
   uint16_t good() const { return good_; }
   uint16_t bad() const { return bad_; }
   uint16_t lost() const { return lost_; }
-  uint8_t duplicates() const { return duplicates_; }
   uint8_t dlpf() const { return dlpf_; }
 
  private:
@@ -69,7 +68,6 @@ class ImuReceiver {
   uint16_t good_ = 0;
   uint16_t bad_ = 0;
   uint16_t lost_ = 0;
-  uint8_t duplicates_ = 0;
   uint8_t product_id_ = 0;
   uint8_t dlpf_ = frames::kAttitudeDlpfInvalid;
   bool half_waits_ = false;

@@ -14,7 +14,6 @@ constexpr uint8_t kHead = 4;
 constexpr uint8_t kCrcOffset = kHead + sizeof(ImuSettings);
 constexpr int16_t kMostRate = 1638;   // 25 deg/s; the datasheet allows 20
 constexpr int16_t kMostForce = 1638;  // 0.2 g; the datasheet allows 0.08
-constexpr int16_t kMostDeclination = 18000;
 
 uint32_t record_crc(const uint8_t* record) {
   Crc32 crc;
@@ -30,17 +29,17 @@ bool within(int16_t value, int16_t limit) {
 
 void default_imu_settings(ImuSettings& out) {
   memset(&out, 0, sizeof(out));
-  out.declination_cdeg = 413;
+  out.declination_cdeg = 413;  // 4.13 deg east: the thesis's field
   out.dlpf = 2;
 }
 
 bool imu_settings_in_range(const ImuSettings& settings) {
-  bool good = within(settings.declination_cdeg, kMostDeclination) && settings.offsets_valid <= 1 &&
-              settings.compat <= 1 && settings.dlpf <= 6;
+  bool good = within(settings.declination_cdeg, kMostDeclinationCdeg) &&
+              settings.offsets_valid <= 1 && settings.compat <= 1 && settings.dlpf <= kMostDlpf;
   for (uint8_t axis = 0; axis < 3; ++axis) {
     good = good && within(settings.rate_offset[axis], kMostRate) &&
            within(settings.force_offset[axis], kMostForce) &&
-           within(settings.field_offset[axis], 2048);
+           within(settings.field_offset[axis], kMostIron);
   }
   return good;
 }

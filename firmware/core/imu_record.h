@@ -17,6 +17,10 @@ struct __attribute__((packed)) ImuSettings {
   uint8_t compat;  // 1: the two original packets at 50 Hz instead of ours at 200 Hz
 };
 
+constexpr int16_t kMostDeclinationCdeg = 18000;
+constexpr int16_t kMostIron = 2048;  // the span of the HMC5883L
+constexpr uint8_t kMostDlpf = 6;     // 7 is reserved
+
 constexpr uint8_t kImuRecordSize =
     4 + sizeof(ImuSettings) + 4;  // magic, version, size, ..., CRC-32
 

@@ -101,12 +101,6 @@ class SdCard {
     release();
     return good;
   }
-  // Until nothing is being programmed.
-  bool sync() {
-    const bool good = idle_for_command();
-    release();
-    return good;
-  }
 
   // ---- in flight: a multi-block write that never waits ----
   // After it, call `ready` until true, then begin_block, put 512 bytes, end_block.
@@ -116,7 +110,6 @@ class SdCard {
     state_ = State::kReopening;
     spi_.select();
   }
-  bool streaming() const { return state_ == State::kStreaming; }
   // One byte on the bus while the card is busy. True: a block may begin.
   bool ready() {
     if (state_ != State::kStreaming && state_ != State::kReopening && state_ != State::kStopping) {
@@ -162,14 +155,6 @@ class SdCard {
       state_ = State::kReopening;
     }
     return result;
-  }
-  // The next block goes to another sector; `ready` moves there.
-  void seek(uint32_t sector) {
-    if (state_ == State::kStreaming) {
-      stop_token();
-    }
-    next_sector_ = sector;
-    state_ = State::kReopening;
   }
   // Ends the write; poll `closing` until false before any call that waits.
   void close_stream() {

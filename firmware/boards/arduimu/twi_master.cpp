@@ -32,7 +32,6 @@ volatile TwiStatus g_status = TwiStatus::kDone;
 uint8_t g_steps_seen;
 uint32_t g_step_us;
 uint32_t g_begin_us;
-uint16_t g_stuck;
 
 void end(const TwiStatus status) {
   TWCR = kStop;
@@ -181,7 +180,6 @@ TwiStatus poll_transfer() {
     free_lines();
     TWCR = _BV(TWEN);
     g_status = TwiStatus::kStuck;
-    ++g_stuck;
   }
   return g_status;
 }
@@ -196,10 +194,6 @@ TwiStatus transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t i
   }
   avr::g_awake = true;  // something for the main loop may have ended these sleeps
   return poll_transfer();
-}
-
-uint16_t twi_stuck() {
-  return g_stuck;
 }
 
 }  // namespace arduimu

@@ -27,7 +27,4 @@ TwiStatus poll_transfer();
 // Both in one, for registers of a sensor; 4.5 ms at most.
 TwiStatus transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size);
 
-// Transfers ended for time since boot.
-uint16_t twi_stuck();
-
 }  // namespace arduimu

