@@ -7,6 +7,7 @@ from host.compiled import Array
 from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
+from host.sysid.coefficients.model import standard_model
 from host.sysid.coefficients.rows import KINEMATIC, Equation, Flown, equations
 from host.sysid.coefficients.windows import Window
 from host.sysid.compatibility.signals import Record
@@ -32,10 +33,10 @@ def seen_with(phi_rad: Array, theta_rad: Array) -> dict[str, Equation]:
     signals = {name: 1.0 + 0.1 * random.standard_normal(SAMPLES) for name in SIGNALS}
     thrust, spin, drive = (random.standard_normal(SAMPLES) for _ in range(3))
     return equations(
-        Record(0.01, dict(signals)), signals, dict.fromkeys(ERRORS, 0.01),
-        Flown(thrust, spin, drive, phi_rad, theta_rad),
+        standard_model(), Record(0.01, dict(signals)), signals, dict.fromkeys(ERRORS, 0.01),
+        Flown(thrust, spin, drive, phi_rad, theta_rad, signals["V"] - 1.0),
         airframe_data(NAME), powerplant(NAME), 0.05,
-    )  # fmt: skip
+    ).rows  # fmt: skip
 
 
 def test_force_and_moment_equations_hold_no_attitude() -> None:

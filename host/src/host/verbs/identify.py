@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from host.sysid.aircraft.airframe import CoefficientTable
     from host.sysid.coefficients.flight import CoefficientAnswer
+    from host.sysid.coefficients.model import CoefficientModel
     from host.sysid.flight.finder import Found
     from host.sysid.flight.linear import Answer
 
@@ -31,7 +32,8 @@ def add_parser(subparsers: Any) -> None:
         action="append",
         metavar="NAME",
         help="longitudinal, lateral, short-period, phugoid, roll, dutch-roll or a TOML file;"
-        " 'coefficients' (with --aircraft) fits lift, drag, side force and moments directly;"
+        " 'coefficients' (with --aircraft) fits lift, drag, side force and moments directly,"
+        " a TOML file of kind 'coefficients' with terms of its own;"
         " repeatable (default: longitudinal and lateral)",
     )
     parser.add_argument(
@@ -108,9 +110,8 @@ def run(args: argparse.Namespace) -> int:
     windows = _windows(args, columns)
     agreement = _agreement(columns, args.aircraft, airframe, notes)
     answers: list[Answer] = []
-    direct = (
-        _direct(args, columns, windows, notes) if "coefficients" in (args.model or ()) else None
-    )
+    terms = _coefficient_model(args.model)
+    direct = _direct(args, columns, windows, notes, terms) if terms else None
     for method in chosen:
         for name, user_model in _models(args.model):
             try:
@@ -176,17 +177,35 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _models(names: list[str] | None) -> list[tuple[str, Any]]:
+    from host.sysid.coefficients.model import is_coefficient_model
     from host.sysid.models.model_file import read_model
 
     result: list[tuple[str, Any]] = []
     for name in names or ["longitudinal", "lateral"]:
-        if name == "coefficients":
+        if name == "coefficients" or is_coefficient_model(Path(name)):
             continue
         if name.endswith(".toml"):
             result.append((name, read_model(Path(name))))
         else:
             result.append((name, None))
     return result
+
+
+def _coefficient_model(names: list[str] | None) -> CoefficientModel | None:
+    """Return the terms of the coefficients that were asked for; None if none were."""
+    from host.sysid.coefficients.model import (
+        is_coefficient_model,
+        read_coefficient_model,
+        standard_model,
+    )
+    from host.sysid.errors import IdentificationError
+
+    own = [name for name in names or () if is_coefficient_model(Path(name))]
+    if len(own) + ("coefficients" in (names or ())) > 1:
+        raise IdentificationError("one model of the coefficients at a time; --model names several")
+    if own:
+        return read_coefficient_model(Path(own[0]))
+    return standard_model() if "coefficients" in (names or ()) else None
 
 
 def _agreement(
@@ -211,6 +230,7 @@ def _direct(
     columns: dict[str, Any],
     windows: list[Found] | None,
     notes: list[str],
+    terms: CoefficientModel,
 ) -> CoefficientAnswer | None:
     """Fit coefficients directly; None with a note if that cannot be done."""
     from host.sysid.errors import IdentificationError
@@ -220,7 +240,7 @@ def _direct(
     from host.sysid.coefficients.flight import identify_coefficients
 
     try:
-        return identify_coefficients(columns, args.aircraft, windows=windows)
+        return identify_coefficients(columns, args.aircraft, windows=windows, model=terms)
     except IdentificationError as error:
         notes.append(f"coefficients: {error}")
         return None

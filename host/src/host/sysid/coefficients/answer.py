@@ -16,6 +16,7 @@ import numpy as np
 
 from host.compiled import Array, IntArray
 from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.coefficients.local import Local
 
 METHOD = "equation error with instrument errors"
 QUANTILE = 1.96
@@ -99,32 +100,34 @@ class CoefficientFit:
 
 
 def informed(
-    state: Array, covariance: Array, position: Mapping[str, int], airframe: AirframeData
+    state: Array, covariance: Array, told: Local, airframe: AirframeData
 ) -> tuple[Array, Array]:
     """Return state and covariance once the airframe's drawing has been heard.
 
     Parameters
     ----------
     state, covariance : (n,) and (n, n) Array
-        Of the fit; coefficients at `position`.
-    position : mapping
+        Of the fit.
+    told : dict
+        Of `local_derivatives`: what the drawing says nothing of may be absent.
     airframe : AirframeData
         Arms of 0 are not known and say nothing.
     """
     a = airframe
     chord, span = a.chord_m, a.span_m
     known: list[tuple[dict[str, float], float]] = []
-    if a.elevator_arm_m > 0.0:
-        sd = a.arm_share * abs(state[position["Cm_de"]])
+    if a.elevator_arm_m > 0.0 and {"CL_de", "Cm_de"} <= told.keys():
+        sd = a.arm_share * abs(told["Cm_de"][0])
         known.append(({"CL_de": a.elevator_arm_m / chord, "Cm_de": 1.0}, sd))
-    if a.rudder_arm_m > 0.0:
-        sd = a.arm_share * abs(state[position["Cn_dr"]])
+    if a.rudder_arm_m > 0.0 and {"CY_dr", "Cn_dr"} <= told.keys():
+        sd = a.arm_share * abs(told["Cn_dr"][0])
         known.append(({"CY_dr": a.rudder_arm_m / span, "Cn_dr": 1.0}, sd))
-    known.append(({"CY_da": 1.0}, SIDEWASH_SHARE * abs(state[position["CY_beta"]])))
+    if {"CY_da", "CY_beta"} <= told.keys():
+        known.append(({"CY_da": 1.0}, SIDEWASH_SHARE * abs(told["CY_beta"][0])))
     for weights, sd in known:
         row = np.zeros(len(state))
         for name, weight in weights.items():
-            row[position[name]] = weight
+            row += weight * told[name][1]
         gain = covariance @ row / (row @ covariance @ row + sd**2)
         state = state - gain * (row @ state)
         keep = np.eye(len(state)) - np.outer(gain, row)

@@ -10,7 +10,7 @@ error in the frequency domain.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,9 @@ from host.sysid.coefficients.answer import (
     trace,
 )
 from host.sysid.coefficients.gust_free import gust_free
+from host.sysid.coefficients.joint import told_inverse
+from host.sysid.coefficients.local import Local, Mean, local_derivatives, zero_lift_drag
+from host.sysid.coefficients.model import CoefficientModel, standard_model
 from host.sysid.coefficients.rows import (
     GRAVITY_MPS2,
     KINEMATIC,
@@ -61,7 +64,6 @@ GUST_MPS, GUST_LENGTH_M = 0.4, 100.0
 # Not estimated, only carried into the intervals: a vane's lag of 0.5 ms looks like an arm of 8 mm,
 # and estimating the arm drew CL_de 15 % and CY_beta 11 % off (simulated flights, seeds 300-303).
 CONSIDERED = ("cg_x_m", "imu_x_m", "ixx_share", "iyy_share", "izz_share")
-CURVATURE = ("CD_alpha2", "CD_alpha_de", "CD_de2")  # of the polar; not told
 HELD = 1e30
 COLUMNS = (
     "alpha_rad", "beta_rad", "p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2",
@@ -83,6 +85,7 @@ class _Rows:
 
 @dataclass(slots=True)
 class _Search:
+    model: CoefficientModel
     record: Record
     flown: Flown
     airframe: AirframeData
@@ -112,10 +115,10 @@ class _Search:
         """
         table = dict(zip(names, errors.tolist(), strict=True))
         s = corrected(record, table, self.data, self.condition[0])
-        full = equations(
-            record, s, table, flown, self.airframe, self.plant, self.condition[2]
-        )  # fmt: skip
-        lift, drag = full["CL"].left, full["CD"].left
+        found = equations(
+            self.model, record, s, table, flown, self.airframe, self.plant, self.condition[2]
+        )
+        full = found.rows
         if own is not None:
             full = {
                 name: Equation(
@@ -124,7 +127,7 @@ class _Search:
                 )
                 for name, e in full.items()
             }
-        return _Rows(s, full, transformed(full, self.blocks), lift, drag)
+        return _Rows(s, full, transformed(full, self.blocks), found.lift, found.drag)
 
 
 def fit_coefficients(
@@ -133,6 +136,7 @@ def fit_coefficients(
     airframe: AirframeData,
     data: InstrumentData,
     plant: Powerplant,
+    model: CoefficientModel | None = None,
 ) -> CoefficientFit:
     """Find the coefficients of lift, drag, side force and moments.
 
@@ -144,11 +148,14 @@ def fit_coefficients(
         Maneuvers; at least one with the elevator and one with aileron and rudder.
     airframe, data, plant
         Of the aircraft file.
+    model : CoefficientModel, optional
+        The terms of every coefficient; `standard_model` by default.
 
     Raises
     ------
     IdentificationError
-        If a column or an axis is missing, or the search meets an unstable aircraft.
+        If a column or an axis is missing, the search meets an unstable aircraft, or a term cannot
+        be told from others at all.
     """
     missing = [c for c in ("t_s", *COLUMNS) if c not in columns]
     if missing:
@@ -167,11 +174,12 @@ def fit_coefficients(
     t = t[0] + np.arange(record.samples) * record.dt_s
     prior = deviations(data, airframe)
     names = tuple(prior)
-    search = _prepare(record, t, windows, airframe, data, plant, names)
+    search = _prepare(model or standard_model(), record, t, windows, airframe, data, plant, names)
     return _solve(search, names, np.array(list(prior.values())))
 
 
 def _prepare(
+    model: CoefficientModel,
     record: Record,
     t: Array,
     windows: Sequence[Window],
@@ -189,6 +197,7 @@ def _prepare(
     flown = Flown(
         *plant.run(record.columns["throttle"], flying, _density(record), record.dt_s),
         *attitude(record, s),
+        s["V"] / float(s["V"][every].mean()) - 1.0,
     )
     along = np.concatenate([k for k, w in zip(picked, windows, strict=True) if w.longitudinal])
     condition = (
@@ -197,10 +206,10 @@ def _prepare(
         float(s["alpha"][along].mean()),
     )
     blocks = [
-        window_block(samples, record.dt_s, window)
+        window_block(samples, record.dt_s, window, model.forces)
         for samples, window in zip(picked, windows, strict=True)
     ]
-    return _Search(record, flown, airframe, data, plant, condition, blocks)
+    return _Search(model, record, flown, airframe, data, plant, condition, blocks)
 
 
 def _density(record: Record) -> Array:
@@ -209,10 +218,7 @@ def _density(record: Record) -> Array:
 
 def _solve(search: _Search, names: tuple[str, ...], sd: Array) -> CoefficientFit:
     rows = search.rows(search.record, search.flown, np.zeros(len(sd)), names)
-    position: dict[str, int] = {}
-    for name, equation in rows.equations.items():
-        for term in equation.terms:
-            position[f"{name}_{term}"] = len(position)
+    position = {name: k for k, (name, _, _) in enumerate(search.model.named())}
     theta, errors = np.zeros(len(position)), np.zeros(len(sd))
     noise: dict[str, tuple[Array, Array]] = {}
     slopes: dict[Key, Spectrum] = {}
@@ -228,9 +234,9 @@ def _solve(search: _Search, names: tuple[str, ...], sd: Array) -> CoefficientFit
         terms = {n: tuple(e.terms) for n, e in rows.equations.items()}
         left = rows
         if round_ > 0:
-            found = {name: float(theta[k]) for name, k in position.items()}
+            found = _local(search, rows, theta, position)
             calm = gust_free(
-                search.record, rows.signals, search.flown, found.__getitem__,
+                search.record, rows.signals, search.flown, _reader(found),
                 search.airframe, search.data, search.condition,
             )  # fmt: skip
             left = search.rows(*calm, errors, names)
@@ -266,7 +272,7 @@ def _solve(search: _Search, names: tuple[str, ...], sd: Array) -> CoefficientFit
             meat += np.outer(balance, balance)
             right -= balance * (_levels(search, rows)[0] / search.balance_mps2)
         scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(normal)), 1e-30))
-        inverse = np.linalg.inv(normal * np.outer(scale, scale)) * np.outer(scale, scale)
+        inverse = told_inverse(normal * np.outer(scale, scale), position) * np.outer(scale, scale)
         step = inverse @ right
         covariance = inverse @ meat @ inverse.T
         drawn = -inverse @ (Z.T @ A[:, held])  # Schmidt: what the considered errors do
@@ -275,6 +281,27 @@ def _solve(search: _Search, names: tuple[str, ...], sd: Array) -> CoefficientFit
         theta, errors = theta + step[: len(theta)], errors + step[-len(sd) :]
         noise = noise_spectra(search.blocks, y - A @ step, owner, noise)
     return _answer(search, names, theta, errors, covariance, position, levels)
+
+
+def _reader(found: Local) -> Callable[[str], float]:
+    """Return slopes by name, 0 where no term makes one."""
+    return lambda name: found[name][0] if name in found else 0.0
+
+
+def _local(
+    search: _Search,
+    rows: _Rows,
+    state: Array,
+    position: Mapping[str, int],
+    levels: Array | None = None,
+) -> Local:
+    """Return told terms and what follows from them: value, slope with the state."""
+    _, drag, lift = _levels(search, rows)
+    moved = np.zeros((3, len(state)))
+    if levels is not None:
+        moved[:, -levels.shape[1] :] = levels
+    mean = Mean(search.condition[2], lift, drag, moved[2], moved[1])
+    return local_derivatives(search.model, state, position, mean)
 
 
 def _slopes(
@@ -312,7 +339,7 @@ def _levels(search: _Search, rows: _Rows) -> Array:
     along = plane * np.cos(s["beta"]) + s["ay"] * np.sin(s["beta"])
     gain = (s["V"][-1] - s["V"][0]) / span
     balance = float(np.mean(along)) - gain - GRAVITY_MPS2 * climb / search.condition[0]
-    inside = np.concatenate([b.samples for b in search.blocks if "CD" in b.names])
+    inside = np.concatenate([b.samples for b in search.blocks if search.model.forces[0] in b.names])
     return np.array([balance, *(float(x[inside].mean()) for x in (rows.drag, rows.lift))])
 
 
@@ -328,23 +355,16 @@ def _answer(
     """Add what geometry says, then drag at zero lift."""
     rows = search.rows(search.record, search.flown, errors, names)
     state = np.concatenate([theta, np.zeros(len(covariance) - len(theta) - len(errors)), errors])
-    state, covariance = informed(state, covariance, position, search.airframe)
+    before = _local(search, rows, state, position)
+    state, covariance = informed(state, covariance, before, search.airframe)
+    found = _local(search, rows, state, position, levels)
     _, drag, lift = _levels(search, rows)
-    inside = np.concatenate([b.samples for b in search.blocks if "CD" in b.names])
-    terms = rows.equations["CD"].terms
-    spread = {n: float(np.mean(terms[n.removeprefix("CD_")][inside])) for n in CURVATURE}
-    values = {name: float(state[k]) for name, k in position.items() if name not in CURVATURE}
-    slopes = np.eye(len(state))[[position[name] for name in values]]
-    share = values["CD_alpha"] / (2.0 * values["CL_alpha"])
-    curved = sum(float(state[position[name]]) * size for name, size in spread.items())
-    values["CD_0"] = drag - curved - share * lift
-    slope = np.zeros(len(state))
-    for name, size in spread.items():
-        slope[position[name]] = -size
-    slope[position["CD_alpha"]] = -lift / (2.0 * values["CL_alpha"])
-    slope[position["CL_alpha"]] = share * lift / values["CL_alpha"]
-    slope[-len(names) :] = levels[1] - share * levels[2]
-    slopes = np.vstack([slopes, slope, np.eye(len(state))[-len(names) :]])
+    if "CL_alpha" in found and "CD_alpha" in found:
+        mean = Mean(search.condition[2], lift, drag, levels[2], levels[1])
+        means = _force_means(search, rows)
+        found["CD_0"] = zero_lift_drag(search.model, state, position, mean, means, found)
+    values = {name: value for name, (value, _) in found.items()}
+    slopes = np.vstack([*(slope for _, slope in found.values()), np.eye(len(state))[-len(names) :]])
     own = slopes @ covariance @ slopes.T
     left = np.sqrt(np.maximum(np.diag(covariance)[-len(names) :], 0.0))
     air, plant = float(np.mean(_density(search.record))), search.plant
@@ -373,6 +393,17 @@ def _answer(
             if name not in KINEMATIC
         },
     )
+
+
+def _force_means(search: _Search, rows: _Rows) -> dict[str, float]:
+    """Return the mean of every regressor of the forces over the elevator's maneuvers."""
+    model = search.model
+    inside = np.concatenate([b.samples for b in search.blocks if model.forces[0] in b.names])
+    return {
+        name: float(np.mean(rows.equations[row].terms[term.label][inside]))
+        for name, row, term in model.named()
+        if row in model.forces
+    }
 
 
 def _sizes(search: _Search, rows: _Rows) -> dict[str, float]:

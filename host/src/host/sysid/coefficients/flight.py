@@ -13,6 +13,7 @@ from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
 from host.sysid.aircraft.instrument_errors import InstrumentData
 from host.sysid.coefficients.answer import METHOD, QUANTILE, CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
+from host.sysid.coefficients.model import BODY, WIND, CoefficientModel
 from host.sysid.coefficients.modes import System, coefficient_modes, dimensional
 from host.sysid.coefficients.windows import LEAST_S, Window
 from host.sysid.errors import IdentificationError
@@ -22,7 +23,7 @@ from host.sysid.models.modes import Mode
 NAME = "coefficients"
 LEAD_S = 0.5  # of trim before a maneuver
 SETTLED_S = 3.0  # after the launch
-LONGITUDINAL = ("CL", "CD", "Cm")
+LONGITUDINAL = (*WIND, *BODY, "Cm")
 NAMED_SHARE = 0.25  # of the variance: a smaller part is not worth naming
 CAUSES = {
     "mass": ("mass_share",),
@@ -85,7 +86,11 @@ class CoefficientAnswer:
 
 
 def identify_coefficients(
-    columns: Mapping[str, Array], aircraft: str, *, windows: Sequence[Found] | None = None
+    columns: Mapping[str, Array],
+    aircraft: str,
+    *,
+    windows: Sequence[Found] | None = None,
+    model: CoefficientModel | None = None,
 ) -> CoefficientAnswer:
     """Find the maneuvers of a flight and fit coefficients to all of them at once.
 
@@ -97,6 +102,8 @@ def identify_coefficients(
         Name or path of the aircraft file.
     windows : sequence of Found, optional
         Use these instead of finding them.
+    model : CoefficientModel, optional
+        The terms of every coefficient; `standard_model` by default.
 
     Raises
     ------
@@ -121,6 +128,7 @@ def identify_coefficients(
         airframe,
         data,
         powerplant(aircraft),
+        model,
     )
     return CoefficientAnswer(
         fit=fit,

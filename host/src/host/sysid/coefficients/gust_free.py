@@ -55,7 +55,7 @@ def gust_free(
     record, s, flown
         The flight as measured and corrected.
     value : callable
-        Coefficient found so far, by name.
+        Slope at the trim found so far, by name.
     airframe, data
         Nominal.
     condition : tuple
@@ -131,5 +131,6 @@ def gust_free(
         np.full(n, float(np.mean(flown.drive_nm))),
         phi,
         theta,
+        flown.faster,  # of the flight: slow, and nothing else tells how speed changed
     )
     return Record(record.dt_s, columns), calm

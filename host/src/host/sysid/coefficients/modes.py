@@ -23,6 +23,11 @@ SIGNALS = {
     "longitudinal": (("airspeed_mps", "alpha_rad", "q_radps", "theta_rad"), ("elevator_rad",)),
     "lateral": (("beta_rad", "p_radps", "r_radps", "phi_rad"), ("aileron_rad", "rudder_rad")),
 }
+# What the linear motion is made of; a model need not have all of it.
+MOTION = (
+    *(f"{row}_{k}" for row in ("CL", "CD", "Cm") for k in ("alpha", "q", "de", "V")),
+    *(f"{row}_{k}" for row in ("CY", "Cl", "Cn") for k in ("beta", "p", "r", "da", "dr")),
+)
 
 
 def coefficient_modes(fit: CoefficientFit, airframe: AirframeData) -> tuple[Mode, ...]:
@@ -97,10 +102,11 @@ def _moved(
 ) -> tuple[tuple[Matrices, Matrices], list[tuple[Matrices, Matrices]], Array]:
     """Return both systems, and with each unknown moved by a step; the steps."""
     names = [d.name for d in fit.derivatives] + list(fit.errors)
+    absent = dict.fromkeys(MOTION, 0.0)
     state = np.array([d.value for d in fit.derivatives] + [e for e, _ in fit.errors.values()])
 
     def systems(values: Array) -> tuple[Matrices, Matrices]:
-        table = dict(zip(names, values.tolist(), strict=True))
+        table = absent | dict(zip(names, values.tolist(), strict=True))
         return longitudinal(table, fit, airframe), lateral(table, fit, airframe)
 
     steps = 1e-3 * np.maximum(np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)), 1e-9)
@@ -123,15 +129,16 @@ def longitudinal(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -
     A = np.array(
         [
             [
-                (f.pull.slope_npmps - 2.0 * force * f.drag / V) / mass,
+                (f.pull.slope_npmps - 2.0 * force * f.drag / V) / mass
+                - force * v["CD_V"] / (mass * V),
                 g - force * v["CD_alpha"] / mass, 0.0, -g,
             ],
             [
-                -2.0 * g / V**2,
+                -2.0 * g / V**2 - force * v["CL_V"] / (mass * V**2),
                 -force * (v["CL_alpha"] + f.drag) / (mass * V),
                 1.0 - force * v["CL_q"] * hat / (mass * V), 0.0,
             ],
-            [by_speed, pitch * v["Cm_alpha"], pitch * v["Cm_q"] * hat, 0.0],
+            [by_speed + pitch * v["Cm_V"] / V, pitch * v["Cm_alpha"], pitch * v["Cm_q"] * hat, 0.0],
             [0.0, 0.0, 1.0, 0.0],
         ]
     )  # fmt: skip

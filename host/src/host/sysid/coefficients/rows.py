@@ -14,24 +14,27 @@ import numpy as np
 from host.compiled import Array
 from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.aircraft.powerplant import Powerplant
+from host.sysid.coefficients.model import CoefficientModel
 from host.sysid.compatibility.signals import Record
 
 GRAVITY_MPS2 = 9.80665
 # Roll under the elevator: lift beside a CG off the plane of symmetry, its only clear trace.
-LONGITUDINAL = ("CL", "CD", "Cm", "Cl", "w", "u")
+LONGITUDINAL = ("Cm", "Cl", "w", "u")  # behind the model's two forces
 LATERAL = ("CY", "Cl", "Cn", "v")
 KINEMATIC = ("u", "v", "w")
 
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """What goes with the signals of one flight: thrust, spin, motor torque, attitude, each (n,)."""
+    """What goes with the signals of one flight: thrust, spin, motor torque, attitude, and airspeed
+    over that of the maneuvers less one, each (n,)."""
 
     thrust_n: Array
     spin_radps: Array
     drive_nm: Array
     phi_rad: Array
     theta_rad: Array
+    faster: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,17 @@ class Equation:
     terms: dict[str, Array]
 
 
+@dataclass(frozen=True, slots=True)
+class Equations:
+    """All equations of a flight by row; its lift and drag coefficients (n,), rows or not."""
+
+    rows: dict[str, Equation]
+    lift: Array
+    drag: Array
+
+
 def equations(
+    model: CoefficientModel,
     record: Record,
     s: Mapping[str, Array],
     errors: Mapping[str, float],
@@ -50,11 +63,13 @@ def equations(
     airframe: AirframeData,
     plant: Powerplant,
     trim_alpha_rad: float,
-) -> dict[str, Equation]:
+) -> Equations:
     """Return every equation of a flight for assumed instrument errors.
 
     Parameters
     ----------
+    model : CoefficientModel
+        Whose terms the force and moment coefficients are made of.
     record : Record
     s : mapping
         Of `coefficient_signals.corrected`.
@@ -64,7 +79,7 @@ def equations(
     airframe : AirframeData
     plant : Powerplant
     trim_alpha_rad : float
-        Where the drag polar's curvature is taken out.
+        Where products of the angle of attack count from.
     """
     e = errors
     mass = airframe.mass_kg * (1.0 + e["mass_share"])
@@ -92,28 +107,29 @@ def equations(
     # makes Cl_alpha -0.024, which left out drew Cl_r by 4 %.
     roll += e["cg_y_m"] * mass * s["az"]
     yaw -= e["cg_y_m"] * mass * s["ax"]
-    de, alpha = s["de"], s["alpha"]
-    along = {"alpha": alpha, "q": 0.5 * q * c / V, "de": de}
-    bent, moved = alpha - trim_alpha_rad, de - float(np.mean(de))
-    drag = {
-        "alpha": alpha, "de": de, "alpha2": bent**2, "alpha_de": bent * moved, "de2": moved**2,
+    lift, drag = -(Z * ca - X * sa) / force, -(X * ca + Z * sa) / force
+    signals = {
+        "alpha": s["alpha"], "beta": s["beta"],
+        "p": 0.5 * p * b / V, "q": 0.5 * q * c / V, "r": 0.5 * r * b / V,
+        "de": s["de"], "da": s["da"], "dr": s["dr"], "V": flown.faster, "CL": lift,
     }  # fmt: skip
-    across = {
-        "beta": s["beta"], "p": 0.5 * p * b / V, "r": 0.5 * r * b / V, "da": s["da"], "dr": s["dr"],
-    }  # fmt: skip
+    about = {"alpha": trim_alpha_rad, "de": float(np.mean(s["de"]))}
     u, v, w = V * ca * np.cos(s["beta"]), V * np.sin(s["beta"]), V * sa * np.cos(s["beta"])
     phi, theta = flown.phi_rad, flown.theta_rad
     gx = -GRAVITY_MPS2 * np.sin(theta)
     gy = GRAVITY_MPS2 * np.sin(phi) * np.cos(theta)
     gz = GRAVITY_MPS2 * np.cos(phi) * np.cos(theta)
-    return {
-        "CL": Equation(-(Z * ca - X * sa) / force, along),
-        "CD": Equation(-(X * ca + Z * sa) / force, drag),
-        "Cm": Equation(pitch / (force * c), along),
-        "CY": Equation(Y / force, across),
-        "Cl": Equation(roll / (force * b), across),
-        "Cn": Equation(yaw / (force * b), across),
+    left = {
+        "CL": lift, "CD": drag, "CZ": Z / force, "CX": X / force, "Cm": pitch / (force * c),
+        "CY": Y / force, "Cl": roll / (force * b), "Cn": yaw / (force * b),
+    }  # fmt: skip
+    found = {
+        row: Equation(left[row], {term.label: term.values(signals, about) for term in terms})
+        for row, terms in model.rows.items()
+    }
+    found |= {
         "u": Equation(record.rate(u) - (s["ax"] + gx - q * w + r * v), {}),
         "v": Equation(record.rate(v) - (s["ay"] + gy - r * u + p * w), {}),
         "w": Equation(record.rate(w) - (s["az"] + gz + q * u - p * v), {}),
     }
+    return Equations(found, lift, drag)

@@ -41,8 +41,8 @@ class Block:
     names: tuple[str, ...]
 
 
-def window_block(samples: IntArray, dt_s: float, window: Window) -> Block:
-    """Return the transform of one window.
+def window_block(samples: IntArray, dt_s: float, window: Window, forces: tuple[str, str]) -> Block:
+    """Return the transform of one window; `forces` are compared under the elevator.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def window_block(samples: IntArray, dt_s: float, window: Window) -> Block:
     cosines, sines = (f(2.0 * np.pi * phase) / np.sqrt(n) for f in (np.cos, np.sin))
     trend = np.linspace(-1.0, 1.0, n)[:, None] ** np.arange(TRENDS)
     trends = cosines @ trend - 1j * (sines @ trend)
-    names = LONGITUDINAL if window.longitudinal else LATERAL
+    names = (*forces, *LONGITUDINAL) if window.longitudinal else LATERAL
     return Block(samples, hertz, cosines, sines, trends, names)
 
 

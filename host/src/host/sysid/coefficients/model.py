@@ -1,0 +1,175 @@
+"""Which terms each force and moment coefficient is made of: data, read from TOML.
+
+`standard.toml` holds the equations used when nothing is given, and the words a term is made of.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+
+SIGNALS = ("alpha", "beta", "p", "q", "r", "de", "da", "dr", "V")
+LIFT = "CL"  # as a signal: the polar's
+WIND, BODY = ("CL", "CD"), ("CZ", "CX")
+MOMENTS_AND_SIDE = ("Cm", "CY", "Cl", "Cn")
+KIND = "coefficients"
+KEYS = ("kind", "name", "rows", "beside")
+_FACTOR = re.compile(
+    r"(?P<bar>\|)?\s*(?P<signal>[A-Za-z]+)(?:_hat)?\s*(?(bar)\|)\s*(?:\^\s*(?P<power>[23]))?"
+)
+SYNTAX = "products of " + ", ".join(SIGNALS) + " with ^2, ^3 or between bars"
+
+
+@dataclass(frozen=True, slots=True)
+class CoefficientTerm:
+    """A product of signals: (signal, power, absolute) each, in the order of `SIGNALS`."""
+
+    factors: tuple[tuple[str, int, bool], ...]
+
+    @property
+    def label(self) -> str:
+        """What follows the row in a coefficient's name: ``alpha``, ``alpha2``, ``abs_beta``."""
+        return "_".join(
+            f"{'abs_' if bars else ''}{signal}{power if power > 1 else ''}"
+            for signal, power, bars in self.factors
+        )
+
+    @property
+    def linear(self) -> bool:
+        """Whether it is one signal as it stands."""
+        return len(self.factors) == 1 and self.factors[0][1:] == (1, False)
+
+    def values(self, signals: Mapping[str, Array], about: Mapping[str, float]) -> Array:
+        """Return the regressor (n,); in a product signals count from where `about` says."""
+        if self.linear:
+            return signals[self.factors[0][0]]
+        product: Array | None = None
+        for name, power, bars in self.factors:
+            factor = signals[name] - about[name] if name in about else signals[name]
+            factor = np.abs(factor) if bars else factor
+            factor = factor**power if power > 1 else factor
+            product = factor if product is None else product * factor
+        assert product is not None
+        return product
+
+
+@dataclass(frozen=True, slots=True)
+class CoefficientModel:
+    """Terms of every row, in the order of the fit; those at `beside` are fitted and not told."""
+
+    name: str
+    rows: Mapping[str, tuple[CoefficientTerm, ...]]
+    beside: frozenset[str]
+
+    @property
+    def forces(self) -> tuple[str, str]:
+        """Rows of normal and axial force: CL and CD, or CZ and CX."""
+        return WIND if WIND[0] in self.rows else BODY
+
+    def named(self) -> Iterator[tuple[str, str, CoefficientTerm]]:
+        """Return coefficient name, row and term of everything fitted."""
+        for row, terms in self.rows.items():
+            for term in terms:
+                yield f"{row}_{term.label}", row, term
+
+
+@cache
+def standard_model() -> CoefficientModel:
+    """Return the equations used when none are given."""
+    return read_coefficient_model(Path(__file__).with_name("standard.toml"))
+
+
+def is_coefficient_model(path: Path) -> bool:
+    """Return whether a TOML file says of itself that it is one of these."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8")).get("kind") == KIND
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return False  # whoever reads it says what is wrong
+
+
+def read_coefficient_model(path: Path) -> CoefficientModel:
+    """Read the terms of every coefficient.
+
+    Raises
+    ------
+    IdentificationError
+        Not TOML, a row absent or unknown, a term unknown or doubled; in one line.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise IdentificationError(f"{path}: cannot be read ({error.strerror})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise IdentificationError(f"{path}: not TOML: {error}") from error
+    strangers = sorted(set(document) - set(KEYS))
+    if strangers:
+        raise IdentificationError(
+            f"{path}: unknown key {', '.join(strangers)}; known are {', '.join(KEYS)}"
+        )
+    told, beside = (_lists(document.get(key, {}), f"{path}: [{key}]") for key in KEYS[2:])
+    forces = BODY if set(BODY) & set(told) else WIND
+    wanted = (*forces, *MOMENTS_AND_SIDE)
+    for row in (*told, *beside):
+        if row not in wanted:
+            raise IdentificationError(
+                f"{path}: unknown row {row}; a model has CL and CD or CZ and CX, and"
+                f" {', '.join(MOMENTS_AND_SIDE)}"
+            )
+    absent = [row for row in wanted if not told.get(row)]
+    if absent:
+        raise IdentificationError(f"{path}: no terms for {', '.join(absent)}; [rows] needs all six")
+    rows, hidden = {}, set()
+    for row in wanted:
+        texts = [*told[row], *beside.get(row, ())]
+        terms = tuple(parse_term(text, row, f"{path}: {row}") for text in texts)
+        for term, count in Counter(terms).items():
+            if count > 1:
+                raise IdentificationError(f"{path}: {row}: {term.label} stands there twice")
+        rows[row] = terms
+        hidden |= {f"{row}_{term.label}" for term in terms[len(told[row]) :]}
+    name = str(document.get("name", path.stem))
+    return CoefficientModel(name, rows, frozenset(hidden))
+
+
+def _lists(value: object, where: str) -> dict[str, list[str]]:
+    if not isinstance(value, dict) or not all(
+        isinstance(terms, list) and all(isinstance(x, str) for x in terms)
+        for terms in value.values()
+    ):
+        raise IdentificationError(f'{where}: expected lines such as Cm = ["alpha", "q", "de"]')
+    return {str(row): list(terms) for row, terms in value.items()}
+
+
+def parse_term(text: str, row: str, where: str) -> CoefficientTerm:
+    """Return the term a text stands for; `row` says where ``CL^2`` may stand.
+
+    Raises
+    ------
+    IdentificationError
+        If it is none.
+    """
+    powers: Counter[tuple[str, bool]] = Counter()
+    for part in text.split("*"):
+        found = _FACTOR.fullmatch(part.strip())
+        signal = found["signal"] if found else ""
+        if found is None or (signal not in SIGNALS and signal != LIFT):
+            raise IdentificationError(f"{where}: unknown term '{text}'; terms are {SYNTAX}")
+        powers[signal, bool(found["bar"])] += int(found["power"] or 1)
+    order = (*SIGNALS, LIFT)
+    factors = tuple(
+        (signal, power, bars)
+        for (signal, bars), power in sorted(powers.items(), key=lambda f: order.index(f[0][0]))
+    )
+    if any(f[0] == LIFT for f in factors) and (row != "CD" or factors != ((LIFT, 2, False),)):
+        raise IdentificationError(f"{where}: '{text}': lift stands in CD only, as CL^2")
+    return CoefficientTerm(factors)
