@@ -10,6 +10,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+from host.sysid.aircraft.aircraft_file import powerplant
 from host.sysid.compatibility.flight_path import strapdown
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import fit_with_gust
@@ -20,7 +21,7 @@ from host.sysid.models.model import DelayGroup, LinearModel
 from host.sysid.models.templates import Trim, longitudinal
 from host.sysid.numerics.problem import OutputProblem
 
-SPEED_MPS = 17.0
+AIRCRAFT, SPEED_MPS = "ultrastick25e", 17.0
 
 
 def example() -> tuple[LinearModel, Maneuver]:
@@ -51,6 +52,7 @@ def build_kernels() -> None:
     iterate_until(W, b, np.zeros(2), 0.1, 200.0, b, 0.5, 3)
     path = np.zeros((3, 3))
     strapdown(path, path, np.eye(3), np.zeros(3), 0.01)
+    powerplant(AIRCRAFT).run(np.full(2, 0.5), np.full(2, SPEED_MPS), np.full(2, 1.2), 0.03)
     update(np.zeros(2), np.eye(2), np.ones((3, 2)), np.ones(3), 1.0)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from host.sysid.aircraft.airframe import AirframeData
@@ -89,7 +91,7 @@ def instrument_data(source: str) -> InstrumentData:
 def powerplant(source: str) -> Powerplant:
     """Return the propeller and motor of an aircraft by name or file."""
     from host.twin.aircraft import file as aircraft
-    from host.twin.motion.propulsion import motor_torque, propeller
+    from host.twin.motion.propulsion import motor_torque, propeller, rotor_history
 
     frame = aircraft.load(source).airframe()
 
@@ -99,4 +101,10 @@ def powerplant(source: str) -> Powerplant:
         thrust, load = propeller(frame, spin_radps, airspeed_mps, density_kgpm3)
         return thrust, load, motor_torque(frame, throttle, spin_radps)
 
-    return Powerplant(step, frame.rotor_inertia_kgm2, frame.thrust_axis, frame.hub_m)
+    return Powerplant(
+        step,
+        partial(rotor_history, frame),
+        frame.rotor_inertia_kgm2,
+        frame.thrust_axis,
+        frame.hub_m,
+    )

@@ -10,18 +10,23 @@ import numpy as np
 from host.compiled import Array
 
 Step = Callable[[float, float, float, float], tuple[float, float, float]]
-STRIDE, SUBSTEPS = 1, 3  # a rotor takes 0.1 s and more to answer; records come at 33 Hz
+History = Callable[[Array, Array, Array, float, float, int], Array]
+SUBSTEPS = 3  # a rotor takes 0.1 s and more to answer; records come at 33 Hz
 START_RADPS = 600.0  # forgotten within half a second
 
 
 @dataclass(frozen=True, slots=True)
 class Powerplant:
-    """How the propeller answers; `step` maps rotor speed, throttle, airspeed and density.
+    """How the propeller answers.
 
     Attributes
     ----------
     step : callable
-        Returns thrust (N), torque of the air and of the motor (N m).
+        From rotor speed, throttle, airspeed and density to thrust (N), torque of the air and of the
+        motor (N m).
+    history : callable
+        From throttle, airspeed and density of a flight, the first rotor speed (rad/s), the length
+        of a step (s) and the steps in a sample to thrust, rotor speed and motor torque, (3, n).
     rotor_kgm2 : float
     axis : (3,) Array
         Unit vector of thrust, body axes.
@@ -30,6 +35,7 @@ class Powerplant:
     """
 
     step: Step
+    history: History
     rotor_kgm2: float
     axis: Array
     hub_m: Array
@@ -38,19 +44,14 @@ class Powerplant:
         self, throttle: Array, airspeed_mps: Array, density_kgpm3: Array, dt_s: float
     ) -> tuple[Array, Array, Array]:
         """Return thrust (N), rotor speed (rad/s) and motor torque (N m), each (n,)."""
-        every = np.arange(0, len(throttle), STRIDE)
-        result = np.empty((3, len(every)))
-        speed, part = START_RADPS, STRIDE * dt_s / SUBSTEPS
-        push = load = torque = 0.0
-        for k, i in enumerate(every):
-            for _ in range(SUBSTEPS):
-                push, load, torque = self.step(
-                    speed, float(throttle[i]), float(airspeed_mps[i]), float(density_kgpm3[i])
-                )
-                speed = max(speed + part * (torque - load) / self.rotor_kgm2, 0.0)
-            result[:, k] = push, speed, torque
-        at = np.arange(len(throttle))
-        thrust, spin, drive = (np.interp(at, every, row) for row in result)
+        thrust, spin, drive = self.history(
+            np.ascontiguousarray(throttle),
+            np.ascontiguousarray(airspeed_mps),
+            np.ascontiguousarray(density_kgpm3),
+            START_RADPS,
+            dt_s / SUBSTEPS,
+            SUBSTEPS,
+        )
         return thrust, spin, drive
 
     def slope(self, spin_radps: float, airspeed_mps: float, density_kgpm3: float) -> float:

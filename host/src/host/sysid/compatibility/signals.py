@@ -6,7 +6,7 @@ same low-pass goes over every signal, so that an equation between them stays one
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,7 @@ PASS_HZ, STOP_HZ = 9.0, 13.0
 THIN_HZ = 33.0  # rate of the fit: nothing is left above 13 Hz, a fit takes a third of the time
 # Over this rate a vane slides for certain; its noise after the low-pass is about 0.015 rad/s.
 SLIDING_RADPS = 0.02
+SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 BLEND_RADPS = 2.0 * np.pi * 0.05  # attitude: filter below, integrated gyro above
 Spectrum = NDArray[np.complex128]
 
@@ -32,6 +33,7 @@ class Record:
     jw: Spectrum = field(init=False)
     low_pass: Array = field(init=False)
     spectra: dict[str, Spectrum] = field(init=False)
+    latest: dict[str, tuple[tuple[float, ...], Array]] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         hertz = np.fft.rfftfreq(self.samples, self.dt_s)
@@ -63,6 +65,12 @@ class Record:
         """Return the time derivative."""
         slope = float(values[-1] - values[0]) / ((self.samples - 1) * self.dt_s)
         return self.passed(values, self.jw * (np.abs(self.jw) < 2.0 * np.pi * STOP_HZ)) + slope
+
+    def made(self, name: str, of: tuple[float, ...], make: Callable[[], Array]) -> Array:
+        """Return `make()`, or what it last gave under this name for the same numbers."""
+        if name not in self.latest or self.latest[name][0] != of:
+            self.latest[name] = of, make()
+        return self.latest[name][1]
 
 
 def usable_length(samples: int) -> int:
@@ -135,30 +143,22 @@ def corrected(
         ``V`` m/s, ``qbar`` Pa, ``alpha beta`` rad, ``p q r`` rad/s, ``pd qd rd`` rad/s2,
         ``ax ay az`` m/s2, ``de da dr`` rad, each (n,).
     """
-    jw, e = record.jw, errors
-    pole = 1.0 / (2.0 * np.pi * data.imu_bandwidth_hz)
-    inertial = (1.0 + jw * pole) * np.exp(jw * (e["imu_delay_s"] - pole))
-    pitot = (1.0 + jw * data.pitot_lag_s) * np.exp(jw * e["pitot_delay_s"])
-    qbar = (record.smooth("qbar_pa", pitot) - e["pitot_drift_pa"]) / (1.0 + e["pitot_scale"])
+    e = errors
+    pitot = e["pitot_delay_s"], data.pitot_lag_s
+    pressure = record.made("qbar_pa", pitot, lambda: _unlagged(record, "qbar_pa", *pitot))
+    qbar = (pressure - e["pitot_drift_pa"]) / (1.0 + e["pitot_scale"])
     density = record.columns["density_kgpm3"] * (1.0 + e["density_share"])
     V = np.sqrt(2.0 * np.maximum(qbar, 1.0) / density)
     tilt = [e[f"tilt_{a}_rad"] for a in "xyz"]
     turned = np.linalg.inv(
         [[1.0, tilt[2], -tilt[1]], [-tilt[2], 1.0, tilt[0]], [tilt[1], -tilt[0], 1.0]]
     )
-    rates = [
-        (record.smooth(f"{k}_radps", inertial) - e[f"gyro_{a}_bias_radps"])
-        / (1.0 + e[f"gyro_{a}_scale"])
-        for k, a in zip("pqr", "xyz", strict=True)
-    ]
-    forces = [
-        (record.smooth(f"a{a}_mps2", inertial) - e[f"accel_{a}_bias_mps2"])
-        / (1.0 + e[f"accel_{a}_scale"])
-        for a in "xyz"
-    ]
-    p, q, r = turned @ np.stack(rates)
-    ax, ay, az = turned @ np.stack(forces)
-    pd, qd, rd = (record.rate(x) for x in (p, q, r))
+    inertial = _inertial(record, e["imu_delay_s"], 1.0 / (2.0 * np.pi * data.imu_bandwidth_hz))
+    spread = np.array([[1.0 + e[f"gyro_{a}_scale"]] for a in "xyz"])
+    stretch = np.array([[1.0 + e[f"accel_{a}_scale"]] for a in "xyz"])
+    p, q, r = turned @ ((inertial[:3] - [[e[f"gyro_{a}_bias_radps"]] for a in "xyz"]) / spread)
+    pd, qd, rd = turned @ (inertial[3:6] / spread)
+    ax, ay, az = turned @ ((inertial[6:] - [[e[f"accel_{a}_bias_mps2"]] for a in "xyz"]) / stretch)
     x, y, z = (
         data.imu_m[k] + e[f"imu_{a}_m"] - e[f"cg_{a}_m"] for k, a in enumerate("xyz")
     )  # fmt: skip
@@ -179,14 +179,31 @@ def corrected(
     w = up * u - (p * y - q * x)
     v = side * u - (r * x - p * z)
     u = u - (q * z - r * y)
+    de, da, dr = record.made("surfaces", (), lambda: np.stack([*map(record.smooth, SURFACES)]))
     return {
         "V": V, "qbar": qbar,
         "alpha": np.arctan2(w, u), "beta": np.arctan2(v, np.hypot(u, w)),
         "p": p, "q": q, "r": r, "pd": pd, "qd": qd, "rd": rd, "ax": ax, "ay": ay, "az": az,
-        "de": record.smooth("elevator_rad") / (1.0 + e["elevator_scale"]),
-        "da": record.smooth("aileron_rad") / (1.0 + e["aileron_scale"]),
-        "dr": record.smooth("rudder_rad") / (1.0 + e["rudder_scale"]),
+        "de": de / (1.0 + e["elevator_scale"]),
+        "da": da / (1.0 + e["aileron_scale"]),
+        "dr": dr / (1.0 + e["rudder_scale"]),
     }  # fmt: skip
+
+
+def _unlagged(record: Record, name: str, delay_s: float, lag_s: float) -> Array:
+    """Return a column without its delay and the lag of the first order behind it."""
+    return record.smooth(name, (1.0 + record.jw * lag_s) * np.exp(record.jw * delay_s))
+
+
+def _inertial(record: Record, delay_s: float, pole_s: float) -> Array:
+    """Return p, q, r, their derivatives and ax, ay, az without delay and low-pass, (9, n)."""
+
+    def make() -> Array:
+        columns = "p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2"
+        rows = [_unlagged(record, name, delay_s - pole_s, pole_s) for name in columns]
+        return np.stack([*rows[:3], *map(record.rate, rows[:3]), *rows[3:]])
+
+    return record.made("inertial", (delay_s, pole_s), make)
 
 
 def _vane(
@@ -194,9 +211,16 @@ def _vane(
 ) -> Array:
     """Return the flow angle a vane was pushed by: inertia, damping and dry friction undone."""
     omega = 2.0 * np.pi * data.vane_hz_per_mps * airspeed_mps * (1.0 + e[f"{name}_lag_share"])
-    inverse = 1.0 + 2.0 * data.vane_damping * record.jw / omega + (record.jw / omega) ** 2
-    moving = record.rate(record.smooth(f"{name}_rad"))
     hold = data.vane_friction_rad * (1.0 + e["friction_share"])
     hold *= (data.friction_speed_mps / airspeed_mps) ** 2
-    sliding = record.passed(np.tanh(moving / SLIDING_RADPS), record.low_pass)
-    return record.smooth(f"{name}_rad", inverse) + hold * sliding
+
+    def pushed() -> Array:
+        inverse = 1.0 + 2.0 * data.vane_damping * record.jw / omega + (record.jw / omega) ** 2
+        return record.smooth(f"{name}_rad", inverse)
+
+    def sliding() -> Array:
+        moving = record.rate(record.smooth(f"{name}_rad"))
+        return record.passed(np.tanh(moving / SLIDING_RADPS), record.low_pass)
+
+    against = record.made(f"{name} friction", (), sliding)
+    return record.made(f"{name}_rad", (omega, data.vane_damping), pushed) + hold * against

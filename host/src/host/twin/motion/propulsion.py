@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from host.compiled import compiled_fast
 from host.twin.aircraft.airframe import Airframe, Array
 
@@ -57,3 +59,28 @@ def motor_torque(frame: Airframe, throttle: float, rotor_radps: float) -> float:
     hold = frame.brake_torque_nm if throttle <= 0.0 else frame.friction_torque_nm
     friction = hold * min(max(rotor_radps, 0.0) / 5.0, 1.0)
     return drive - friction
+
+
+@compiled_fast
+def rotor_history(
+    frame: Airframe,
+    throttle: Array,
+    axial_mps: Array,
+    density_kgpm3: Array,
+    start_radps: float,
+    part_s: float,
+    parts: int,
+) -> Array:
+    """Run the rotor through a flight, each sample as `parts` Euler steps of `part_s`.
+
+    Returns rows of thrust (N), rotor speed (rad/s) and motor torque (N m), shape (3, n).
+    """
+    result = np.empty((3, throttle.shape[0]))
+    speed, push, torque = start_radps, 0.0, 0.0
+    for i in range(throttle.shape[0]):
+        for _ in range(parts):
+            push, load = propeller(frame, speed, axial_mps[i], density_kgpm3[i])
+            torque = motor_torque(frame, throttle[i], speed)
+            speed = max(speed + part_s * (torque - load) / frame.rotor_inertia_kgm2, 0.0)
+        result[0, i], result[1, i], result[2, i] = push, speed, torque
+    return result
