@@ -8,10 +8,11 @@ Names and types come from frame ``config`` of protocol/frames.toml. Exit codes: 
 """
 
 import argparse
+import re
 import sys
 import tomllib
 from pathlib import Path
-from typing import TypeAlias
+from typing import TypeAlias, TypeGuard
 
 FIRMWARE = Path(__file__).resolve().parent
 SETTINGS = FIRMWARE / "settings.toml"
@@ -19,6 +20,10 @@ FRAMES = FIRMWARE.parent / "protocol" / "frames.toml"
 HEADER = FIRMWARE / "generated" / "settings.h"
 RANGES = {"u8": 0xFF, "u16": 0xFFFF, "u32": 0xFFFFFFFF}
 KEYS = {"value", "min", "max", "any_of", "why"}
+INPUTS = ("input_aileron", "input_elevator", "input_rudder", "input_throttle", "input_switch")
+# Between the switch's positions, so that a pulse that trembles at one limit is not at the other.
+LEAST_SWITCH_GAP_US = 100
+NAME = re.compile(r"[A-Za-z0-9_.-]+")  # goes into a C++ literal and names a file of the host
 
 Setting: TypeAlias = "dict[str, int | str | list[int]]"
 
@@ -63,18 +68,24 @@ def checked(settings: dict[str, Setting], fields: dict[str, str]) -> dict[str, S
     Raises
     ------
     SettingsError
-        A name too many or missing, a key that is not known, a value outside its limits or its type.
+        A name too many or missing, a key that is not known, a value outside its limits or its type,
+        values that are good by themselves but not together.
     """
     if set(settings) != set(fields):
         odd = ", ".join(sorted(set(settings) ^ set(fields)))
         raise SettingsError(f"names differ from frame config of frames.toml: {odd}")
     for name, kind in fields.items():
         setting = settings[name]
+        if not isinstance(setting, dict):
+            raise SettingsError(
+                f"{name} is {setting!r}, expected a table [{name}] with value and why"
+            )
         if odd_keys := set(setting) - KEYS:
             raise SettingsError(f"[{name}] has the unknown key {min(odd_keys)}")
         if not setting.get("why"):
             raise SettingsError(f"[{name}] does not say why")
         _check_value(name, kind, setting)
+    _check_together(settings)
     return {name: settings[name] for name in fields}
 
 
@@ -82,26 +93,46 @@ def _check_value(name: str, kind: str, setting: Setting) -> None:
     value = setting.get("value")
     if kind.startswith("char["):
         room = int(kind[5:-1])
-        if not (isinstance(value, str) and value.isascii() and 0 < len(value) < room):
+        if not (isinstance(value, str) and NAME.fullmatch(value) and len(value) < room):
             raise SettingsError(
-                f"[{name}] value is {value!r}, expected 1 to {room - 1} ASCII letters"
+                f"[{name}] value is {value!r}, expected 1 to {room - 1} of letters, digits, _ . -"
             )
         return
     allowed = _allowed(name, setting)
-    if not isinstance(value, int) or value not in allowed:
+    if not _whole(value) or value not in allowed:
         raise SettingsError(f"[{name}] value is {value!r}, expected one of {_text(allowed)}")
     if min(allowed) < 0 or max(allowed) > RANGES[kind]:
         raise SettingsError(f"[{name}] limits do not fit {kind}: {_text(allowed)}")
 
 
+def _check_together(settings: dict[str, Setting]) -> None:
+    """Hold the defaults to what core/settings.cpp asks of a record in EEPROM."""
+    users: dict[object, str] = {}
+    for name in INPUTS:
+        value = settings[name]["value"]
+        if value in users:
+            raise SettingsError(f"[{name}] value is {value}, which [{users[value]}] has already")
+        users[value] = name
+    low, high = (settings[name]["value"] for name in ("switch_direct_max_us", "switch_mega_min_us"))
+    if isinstance(low, int) and isinstance(high, int) and high - low < LEAST_SWITCH_GAP_US:
+        raise SettingsError(
+            f"[switch_mega_min_us] value is {high}, expected at least {low + LEAST_SWITCH_GAP_US}: "
+            f"{LEAST_SWITCH_GAP_US} above [switch_direct_max_us]"
+        )
+
+
+def _whole(value: object) -> TypeGuard[int]:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
 def _allowed(name: str, setting: Setting) -> range | list[int]:
     any_of = setting.get("any_of")
-    if isinstance(any_of, list):
+    if isinstance(any_of, list) and any_of and all(map(_whole, any_of)):
         return any_of
     low, high = setting.get("min"), setting.get("max")
-    if isinstance(low, int) and isinstance(high, int) and low <= high:
+    if any_of is None and _whole(low) and _whole(high) and low <= high:
         return range(low, high + 1)
-    raise SettingsError(f"[{name}] needs min and max, or any_of")
+    raise SettingsError(f"[{name}] needs min and max, or any_of, in whole numbers")
 
 
 def _text(allowed: range | list[int]) -> str:
@@ -155,6 +186,9 @@ def render(settings: dict[str, Setting], fields: dict[str, str]) -> str:
             "",
             "namespace settings {",
             "",
+            "// switch_mega_min_us is at least this much above switch_direct_max_us.",
+            f"constexpr uint16_t kLeastSwitchGapUs = {LEAST_SWITCH_GAP_US};",
+            "",
             "inline void put_defaults(frames::ConfigFrame& config) {",
             "  config = frames::ConfigFrame();",
             *[line.replace("  constexpr char", "  static constexpr char") for line in assign],
@@ -190,7 +224,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         fields = config_fields()
         settings = checked(tomllib.loads(SETTINGS.read_text(encoding="utf-8")), fields)
-    except (SettingsError, tomllib.TOMLDecodeError) as error:
+    except (SettingsError, tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
         print(f"firmware/settings.toml: {error}", file=sys.stderr)
         return 2
     text = render(settings, fields)

@@ -31,7 +31,8 @@ bool settings_in_range(const frames::ConfigFrame& config) {
   const uint8_t inputs = static_cast<uint8_t>(
       1U << config.input_aileron | 1U << config.input_elevator | 1U << config.input_rudder |
       1U << config.input_throttle | 1U << config.input_switch);
-  return inputs == 0b1'1111 && config.switch_mega_min_us >= config.switch_direct_max_us + 100U;
+  return inputs == 0b1'1111 &&
+         config.switch_mega_min_us >= config.switch_direct_max_us + settings::kLeastSwitchGapUs;
 }
 
 SettingsStatus read_settings(const uint8_t* record, frames::ConfigFrame& out) {

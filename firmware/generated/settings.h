@@ -7,6 +7,9 @@
 
 namespace settings {
 
+// switch_mega_min_us is at least this much above switch_direct_max_us.
+constexpr uint16_t kLeastSwitchGapUs = 100;
+
 inline void put_defaults(frames::ConfigFrame& config) {
   config = frames::ConfigFrame();
   config.rate_hz = 100U;

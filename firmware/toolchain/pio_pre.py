@@ -1,4 +1,4 @@
-"""Before a PlatformIO build: FatFs sources and the sanitizers of `native`.
+"""Before a PlatformIO build: settings, FatFs sources, the sanitizers of `native`.
 
 PlatformIO runs this ahead of the platform's own build script.
 """
@@ -55,6 +55,15 @@ def without_sanitizers(build_env: Any, node: Any) -> Any:
 
 
 sys.path.insert(0, env.subst("$PROJECT_DIR/firmware/toolchain"))
+
+if env["PIOENV"] == "mega2560":
+    settings_check = importlib.import_module("settings_check")
+    wrong = settings_check.complaint(
+        Path(env.subst("$PROJECT_DIR/firmware")), python=env.subst("$PYTHONEXE")
+    )
+    if wrong:
+        sys.stderr.write(f"{wrong}\n")
+        env.Exit(1)
 
 if env["PIOENV"] != "arduimu":
     fatfs = importlib.import_module("fatfs")
