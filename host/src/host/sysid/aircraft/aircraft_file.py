@@ -24,7 +24,7 @@ def airframe_data(source: str) -> AirframeData:
     """
     from host.twin.aircraft import file as aircraft
 
-    loaded = aircraft.load(source)
+    loaded = aircraft.load_measured(source)
     drawing = aircraft.read_document(source)["geometry"]
     arms = drawing if isinstance(drawing, dict) else {}
     try:
@@ -65,7 +65,7 @@ def instrument_data(source: str) -> InstrumentData:
     """
     from host.twin.aircraft import file as aircraft
 
-    loaded = aircraft.load(source)
+    loaded = aircraft.load_measured(source)
     try:
         number, vector = loaded.scalar, loaded.vector
         imu = vector("sensors.imu_m") - vector("mass.cg_m")
@@ -89,11 +89,23 @@ def instrument_data(source: str) -> InstrumentData:
 
 
 def powerplant(source: str) -> Powerplant:
-    """Return the propeller and motor of an aircraft by name or file."""
+    """Return the propeller and motor of an aircraft by name or file.
+
+    Raises
+    ------
+    IdentificationError
+        If a measured aircraft does not describe them.
+    """
     from host.twin.aircraft import file as aircraft
     from host.twin.motion.propulsion import motor_torque, propeller, rotor_history
 
-    frame = aircraft.load(source).airframe()
+    loaded = aircraft.load_measured(source)
+    if "propulsion.diameter_m" not in loaded.scalars:
+        raise IdentificationError(
+            f"aircraft {source}: no section [propulsion]; coefficients straight from flight need the"
+            " thrust: add it, or leave '--model coefficients' out"
+        )
+    frame = loaded.airframe()
 
     def step(
         spin_radps: float, throttle: float, airspeed_mps: float, density_kgpm3: float

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +44,12 @@ _VECTORS: Mapping[str, tuple[str, ...]] = {
     "surfaces": (),
     "sensors": ("imu_m", "vane_a_m", "vane_b_m", "pitot_a_m", "pitot_b_m", "gps_m"),
 }
+
+
+# What is known before the first flight: enough to identify an aircraft, not to fly it here.
+MEASURED = ("mass", "geometry", "trim", "sensors")
+MEASURED_IF_THERE = ("propulsion",)
+_MEASURED_TRIM = ("airspeed_mps",)
 
 
 class AircraftError(UsageError):
@@ -179,12 +185,66 @@ def load(source: str | Path) -> Aircraft:
     """
     document = read_document(source)
     kind = document.get("kind")
+    if kind == "measured":
+        raise AircraftError(
+            f"{source}: a measured aircraft has no aerodynamics; expected one of kind 'nonlinear',"
+            " or fly the models that host identify LOG --save-model FILE finds"
+        )
     if kind != "nonlinear":
         raise AircraftError(f"{source}: kind is {kind!r}, expected 'nonlinear'")
+    loaded = _loaded(source, document, _SCALARS)
+    nodes = len(loaded.vectors["aerodynamics.alpha_rad"])
+    for name in COEFFICIENTS:
+        found = len(loaded.vectors[f"aerodynamics.{name}"])
+        if found != nodes:
+            raise AircraftError(
+                f"{source}: aerodynamics.{name} has {found} values, expected {nodes} as alpha_rad"
+            )
+    if np.any(np.diff(loaded.vectors["aerodynamics.alpha_rad"]) <= 0.0):
+        raise AircraftError(f"{source}: aerodynamics.alpha_rad must increase")
+    return loaded
+
+
+def load_measured(source: str | Path) -> Aircraft:
+    """Load what can be measured on the ground: mass, sizes, places of the sensors.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a packaged aircraft, or path of a file; of kind ``measured`` (sections mass,
+        geometry, trim, sensors, and propulsion if it is known) or ``nonlinear``.
+
+    Returns
+    -------
+    Aircraft
+        Of a measured file aerodynamics, servo and surfaces are zeros, and without a section
+        propulsion there is none.
+
+    Raises
+    ------
+    AircraftError
+        A number is missing, is not a number or has no source.
+    """
+    document = read_document(source)
+    if document.get("kind") != "measured":
+        return load(source)
+    there = tuple(name for name in MEASURED_IF_THERE if name in document)
+    wanted = {name: _SCALARS[name] for name in (*MEASURED, *there)}
+    found = _loaded(source, document, wanted | {"trim": _MEASURED_TRIM})
+    scalars, vectors = dict(found.scalars), dict(found.vectors)
+    for section in ("aerodynamics", "servo", "surfaces"):
+        scalars |= {f"{section}.{key}": 0.0 for key in _SCALARS[section]}
+        vectors |= {f"{section}.{key}": np.zeros(2) for key in _VECTORS[section]}
+    return replace(found, scalars=scalars, vectors=vectors)
+
+
+def _loaded(
+    source: str | Path, document: Mapping[str, object], wanted: Mapping[str, tuple[str, ...]]
+) -> Aircraft:
     scalars: dict[str, float] = {}
     vectors: dict[str, Array] = {}
     sources: dict[str, str] = {}
-    for section, keys in _SCALARS.items():
+    for section, keys in wanted.items():
         table = document.get(section)
         if not isinstance(table, dict):
             raise AircraftError(f"{source}: section [{section}] is missing")
@@ -198,15 +258,6 @@ def load(source: str | Path) -> Aircraft:
             if not isinstance(origin, str) or not origin:
                 raise AircraftError(f"{source}: {section}.{key} has no source")
             sources[f"{section}.{key}"] = origin
-    nodes = len(vectors["aerodynamics.alpha_rad"])
-    for name in COEFFICIENTS:
-        found = len(vectors[f"aerodynamics.{name}"])
-        if found != nodes:
-            raise AircraftError(
-                f"{source}: aerodynamics.{name} has {found} values, expected {nodes} as alpha_rad"
-            )
-    if np.any(np.diff(vectors["aerodynamics.alpha_rad"]) <= 0.0):
-        raise AircraftError(f"{source}: aerodynamics.alpha_rad must increase")
     return Aircraft(
         name=str(document.get("name", Path(source).stem)),
         title=str(document.get("title", source)),

@@ -1,0 +1,92 @@
+"""host/IDENTIFY.md: its files are accepted as they stand, its options exist."""
+
+import re
+from pathlib import Path
+
+import pytest
+from host.cli import main
+from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
+from host.sysid.errors import IdentificationError
+from host.sysid.flight.tables import read_columns
+from host.sysid.models.model_file import read_model
+from host.twin.aircraft.file import AircraftError, load, load_measured, read_document
+from host.twin.aircraft.tomlout import dumps
+
+from tests.host.logs import ROOT
+
+TEXT = (ROOT / "host/IDENTIFY.md").read_text(encoding="utf-8")
+AIRCRAFT, MAP, MODEL = re.findall(r"```toml\n(.*?)```", TEXT, re.S)
+
+
+def mine(folder: Path, text: str = AIRCRAFT) -> str:
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def test_a_measured_aircraft_gives_what_identification_needs(tmp_path: Path) -> None:
+    airframe = airframe_data(mine(tmp_path))
+    assert (airframe.mass_kg, airframe.izz_kgm2, airframe.elevator_arm_m) == (1.793, 0.1193, 0.632)
+    assert airframe.imu_m == (0.02, 0.0, 0.01)
+    assert instrument_data(mine(tmp_path)).friction_speed_mps == 17.0
+
+
+def test_it_is_that_of_a_flyable_file_with_the_same_numbers(tmp_path: Path) -> None:
+    document = read_document("ultrastick25e")
+    for section in ("aerodynamics", "servo", "surfaces"):
+        del document[section]
+    less = dumps(document | {"kind": "measured"})
+    assert airframe_data(mine(tmp_path, less)) == airframe_data("ultrastick25e")
+    assert instrument_data(mine(tmp_path, less)) == instrument_data("ultrastick25e")
+    ours, theirs = powerplant(mine(tmp_path, less)), powerplant("ultrastick25e")
+    assert ours.slope(700.0, 17.0, 1.2) == theirs.slope(700.0, 17.0, 1.2)
+
+
+def test_without_a_propeller_coefficients_are_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(IdentificationError, match=r"\[propulsion\]"):
+        powerplant(mine(tmp_path))
+
+
+def test_a_measured_aircraft_is_not_flown(tmp_path: Path) -> None:
+    with pytest.raises(AircraftError, match="no aerodynamics"):
+        load(mine(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("find", "put", "words"),
+    [
+        ("[geometry]", "[geometri]", r"section \[geometry\] is missing"),
+        ("iyy_kgm2 = 0.0838", "", "mass.iyy_kgm2 is None"),
+        ("chord_m = 0.253", 'chord_m = "25 cm"', "geometry.chord_m is '25 cm'"),
+        ('source = "where it was flown"', "", "trim.airspeed_mps has no source"),
+    ],
+)
+def test_what_is_missing_in_it_is_named(tmp_path: Path, find: str, put: str, words: str) -> None:
+    with pytest.raises(AircraftError, match=words):
+        load_measured(mine(tmp_path, AIRCRAFT.replace(find, put)))
+
+
+def test_the_map_brings_foreign_columns_to_ours(tmp_path: Path) -> None:
+    names = re.findall(r'from = "(\w+)"', MAP)
+    rows = [f"{k * 10000},30,5,10,{1.0},-2" for k in range(50)]
+    source, mapping = tmp_path / "theirs.csv", tmp_path / "map.toml"
+    source.write_text("\n".join([",".join(names), *rows]) + "\n", encoding="utf-8")
+    mapping.write_text(MAP, encoding="utf-8")
+    columns, _ = read_columns(source, mapping)
+    assert columns["t_s"][1] - columns["t_s"][0] == pytest.approx(0.01)
+    assert columns["airspeed_mps"][0] == pytest.approx(15.4333, abs=1e-4)
+    assert columns["az_mps2"][0] == pytest.approx(-9.80665)
+
+
+def test_the_model_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(MODEL, encoding="utf-8")
+    model = read_model(path)
+    assert [p.name for p in model.parameters] == ["Z_alpha", "M_alpha", "M_q", "Z_de", "M_de"]
+
+
+def test_every_option_is_documented(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["identify", "--help"])
+    helped = set(re.findall(r"--[a-z-]+", capsys.readouterr().out)) - {"--help"}
+    assert helped <= set(re.findall(r"--[a-z-]+", TEXT))
