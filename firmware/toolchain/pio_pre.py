@@ -1,4 +1,4 @@
-"""Before a PlatformIO build: settings, FatFs sources, the sanitizers of `native`.
+"""Before a PlatformIO build: board there? settings, FatFs sources, sanitizers of `native`.
 
 PlatformIO runs this ahead of the platform's own build script.
 """
@@ -12,7 +12,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from SCons.Script import DefaultEnvironment
+from SCons.Script import COMMAND_LINE_TARGETS, DefaultEnvironment
+from serial.tools import list_ports
 
 env = DefaultEnvironment()
 SANITIZERS = [
@@ -55,6 +56,13 @@ def without_sanitizers(build_env: Any, node: Any) -> Any:
 
 
 sys.path.insert(0, env.subst("$PROJECT_DIR/firmware/toolchain"))
+
+if "upload" in COMMAND_LINE_TARGETS and not env.subst("$UPLOAD_PORT"):
+    upload_port = importlib.import_module("upload_port")
+    absent = upload_port.complaint(port.vid for port in list_ports.comports())
+    if absent:
+        sys.stderr.write(f"{absent}\n")
+        env.Exit(1)
 
 if env["PIOENV"] == "mega2560":
     settings_check = importlib.import_module("settings_check")
