@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 from host.compiled import Array
-from host.sysid.estimators.equation_error import solve_normal
 from host.sysid.estimators.hopfield import iterate_until, largest_stable_gain, network
+from host.sysid.estimators.rows import solve_normal
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.study.aircraft import FOOT_M, navion_free
 from host.sysid.study.data import with_rates

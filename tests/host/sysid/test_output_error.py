@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from host.sysid import Maneuver, Parameter, fit
 from host.sysid.errors import IdentificationError
+from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.estimators.start import start_values
 from host.sysid.numerics.output_error import covariance_of, minimise
 from host.sysid.numerics.problem import OutputProblem
@@ -127,4 +128,6 @@ def test_unidentifiable_pair_is_refused_as_singular() -> None:
     both = dataclasses.replace(model, state_biases=("q_radps",), output_biases=model.outputs)
     stuck = Maneuver(0.05, np.zeros((200, 1)), np.ones((200, 4)))
     with pytest.raises(IdentificationError, match=r"singular information|not act|told apart"):
+        fit_output_error(both, [stuck])
+    with pytest.raises(IdentificationError, match="never moved"):
         fit("output-error", both, [stuck])

@@ -8,192 +8,27 @@ The Total Least Squares Problem, sec. 3.5 (exact columns); Huber, Robust Statist
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy import linalg
 
 from host.compiled import Array, IntArray
 from host.sysid.errors import IdentificationError
+from host.sysid.estimators.rows import (
+    NEVER_MOVED,
+    Row,
+    normal_equations,
+    regression_rows,
+    solve_rows,
+)
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 from host.sysid.numerics.colour import coloured_middle
-from host.sysid.numerics.differentiation import (
-    signal_bandwidth_hz,
-    smooth,
-    smooth_and_differentiate,
-)
 from host.sysid.numerics.inverse import covariance_of
-from host.sysid.numerics.problem import check_shapes
 
 HUBER_LIMIT = 1.345  # 95 % efficiency on normal residuals (Huber 1981)
 MAD_TO_SIGMA = 1.4826
-COLLINEAR = 1e12  # condition number of scaled regressors at which double precision gives up
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One regression: `target` = `regressors` @ theta + residual, in one maneuver.
-
-    `equation` numbers the equation across maneuvers, `noisy` marks regressors made of measured
-    states (inputs and constants are exact).
-    """
-
-    equation: int
-    label: str
-    maneuver: int
-    target: Array
-    regressors: Array
-    noisy: Array
-
-
-def regression_rows(
-    model: LinearModel,
-    maneuvers: Sequence[Maneuver],
-    *,
-    bandwidth: float | None = None,
-    use_rates: bool = True,
-) -> tuple[tuple[str, ...], list[Row]]:
-    """Write the model as regressions.
-
-    Parameters
-    ----------
-    model : LinearModel
-        Every state must be measured.
-    maneuvers : sequence of Maneuver
-        Data; measured rates are used as they are, others come from differentiation.
-    bandwidth : float, optional
-        Half-power frequency of smoothing and differentiation, Hz; found from the data without.
-    use_rates : bool
-        Use measured rates where a maneuver has them.
-
-    Returns
-    -------
-    names : tuple of str
-        Parameters: the common ones, then rate biases and output biases per maneuver.
-    rows : list of Row
-        State equations, then outputs that are no state, where anything is free.
-    """
-    measured = model.measured_states()
-    n_common = len(model.parameters)
-    extra = [j for j in range(len(model.outputs)) if j not in set(measured.tolist())]
-    extra_biases = [y for y in model.output_biases if model.outputs.index(y) in extra]
-    names = [p.name for p in model.parameters]
-    for number in range(1, len(maneuvers) + 1):
-        names += [f"bias_rate.{s}@{number}" for s in model.state_biases]
-        names += [f"bias.{y}@{number}" for y in extra_biases]
-    n_local = len(model.state_biases) + len(extra_biases)
-    state_entries, output_entries = model.entries("AB"), model.entries("CD")
-    rows: list[Row] = []
-    for number, maneuver in enumerate(maneuvers):
-        check_shapes(model, maneuver)
-        states, inputs, rates, outputs = _signals(model, maneuver, measured, bandwidth, use_rates)
-        z = np.hstack([states, inputs])
-        place = n_common + number * n_local
-        for entries, fixed, left, indices, biases, offset in (
-            (state_entries, np.hstack([model.A, model.B]), rates, range(len(model.states)),
-             [model.states.index(s) for s in model.state_biases], place),
-            (output_entries, np.hstack([model.C, model.D]), outputs, extra,
-             [model.outputs.index(y) for y in extra_biases], place + len(model.state_biases)),
-        ):  # fmt: skip
-            for i in indices:
-                regressors = np.zeros((len(z), len(names)))
-                noisy = np.zeros(len(names))
-                for k in np.flatnonzero(entries.row == i):
-                    column, parameter = entries.column[k], entries.parameter[k]
-                    regressors[:, parameter] += entries.gain[k] * z[:, column]
-                    noisy[parameter] = float(column < len(model.states))
-                if i in biases:
-                    regressors[:, offset + biases.index(i)] = 1.0
-                if not regressors.any():
-                    continue
-                is_state = left is rates
-                rows.append(
-                    Row(
-                        equation=i if is_state else len(model.states) + i,
-                        label=model.states[i] if is_state else model.outputs[i],
-                        maneuver=number,
-                        target=left[:, i] - z @ fixed[i],
-                        regressors=regressors,
-                        noisy=noisy,
-                    )
-                )
-    return tuple(names), rows
-
-
-def _signals(
-    model: LinearModel,
-    maneuver: Maneuver,
-    measured: IntArray,
-    bandwidth: float | None,
-    use_rates: bool,
-) -> tuple[Array, Array, Array, Array]:
-    """Return states, inputs, rates and outputs, all with the same smoothing."""
-    raw = maneuver.outputs[:, measured]
-    if use_rates and maneuver.rates is not None:
-        return raw, maneuver.inputs, maneuver.rates, maneuver.outputs
-    edge = bandwidth if bandwidth is not None else signal_bandwidth_hz(raw, maneuver.dt_s)
-    states, rates = smooth_and_differentiate(raw, maneuver.dt_s, edge)
-    inputs = maneuver.inputs
-    if model.hold == "zoh":
-        # A held input jumps at its sample; seen at that instant it is the mean of both sides.
-        inputs = 0.5 * (inputs + np.vstack([inputs[:1], inputs[:-1]]))
-    outputs = maneuver.outputs
-    if outputs.shape[1] > len(measured):
-        outputs = smooth(outputs, maneuver.dt_s, edge)
-    return states, smooth(inputs, maneuver.dt_s, edge), rates, outputs
-
-
-def solve_rows(rows: Sequence[Row], n_parameters: int, weights: Array | None = None) -> Array:
-    """Solve the stacked regressions by normal equations, columns scaled first.
-
-    Parameters
-    ----------
-    rows : sequence of Row
-        Regressions.
-    n_parameters : int
-        Length of the solution.
-    weights : Array, optional
-        One weight per row of `rows`.
-
-    Raises
-    ------
-    IdentificationError
-        If the regressors are collinear to working precision.
-    """
-    normal, right = normal_equations(rows, n_parameters, weights)
-    return solve_normal(normal, right)
-
-
-def normal_equations(
-    rows: Sequence[Row], n_parameters: int, weights: Array | None = None
-) -> tuple[Array, Array]:
-    """Return X'WX and X'Wy over all rows."""
-    normal = np.zeros((n_parameters, n_parameters))
-    right = np.zeros(n_parameters)
-    for k, row in enumerate(rows):
-        weight = 1.0 if weights is None else float(weights[k])
-        active = np.flatnonzero(row.regressors.any(axis=0))
-        block = row.regressors[:, active]
-        normal[np.ix_(active, active)] += weight * (block.T @ block)
-        right[active] += weight * (block.T @ row.target)
-    return normal, right
-
-
-def solve_normal(normal: Array, right: Array) -> Array:
-    """Solve symmetric normal equations after scaling; refuse singular ones."""
-    scale = np.sqrt(np.diag(normal))
-    if np.any(scale == 0.0):
-        raise IdentificationError("a parameter has no regressor: its state or input never moved")
-    scaled = normal / np.outer(scale, scale)
-    try:
-        factor = linalg.cho_factor(scaled)
-    except linalg.LinAlgError as error:
-        raise IdentificationError(
-            "collinear regressors: the data do not tell the free entries apart"
-        ) from error
-    return np.asarray(linalg.cho_solve(factor, right / scale) / scale, dtype=np.float64)
 
 
 def fit_equation_error(
@@ -376,7 +211,9 @@ def _total(
         noisy = mine[0].noisy[active] > 0.0
         exact_columns, noisy_columns = X[:, active[~noisy]], X[:, active[noisy]]
         block = np.column_stack([noisy_columns, y])
-        noise = np.sqrt(np.mean(np.diff(block, n=3, axis=0) ** 2, axis=0) / 20.0)
+        ends = np.cumsum([len(row.target) for row in mine])[:-1]
+        thirds = np.vstack([np.diff(part, n=3, axis=0) for part in np.split(block, ends)])
+        noise = np.sqrt(np.mean(thirds**2, axis=0) / 20.0)
         if deviations is not None and equation < len(model.states):
             noise = np.append(_noise_of_columns(model, active[noisy], deviations[0]), 0.0)
             noise[-1] = deviations[1][equation]
@@ -397,6 +234,8 @@ def _total(
             rest = y - noisy_columns @ solution[noisy]
             solution[~noisy] = np.linalg.lstsq(exact_columns, rest, rcond=None)[0]
         theta[active] = solution
+    if np.isnan(theta).any():
+        raise IdentificationError(NEVER_MOVED)
     return theta
 
 

@@ -290,7 +290,7 @@ def fit_filter_error(
         estimate=theta,
         covariance=covariance,
         covariance_white=covariance,
-        degrees_of_freedom=np.full(len(theta), float(problem.inner.samples - kept)),
+        degrees_of_freedom=np.full(len(theta), float(max(problem.inner.samples - kept, 1))),
         residuals=tuple(point.e),
         fitted=tuple(m.outputs - e for m, e in zip(maneuvers, point.e, strict=True)),
         residual_kind="innovation",

@@ -10,10 +10,15 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+
 from host.sysid.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
+from host.sysid.numerics.problem import check_shapes
+
+STILL = 1e-30  # in any unit: an output that moves less holds nothing, and its square underflows
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +120,8 @@ def fit(
     Raises
     ------
     IdentificationError
-        If the method is unknown, or the data cannot carry the fit.
+        If the method is unknown, columns do not fit the model, an output never moved, the data
+        cannot carry the fit or its answer is not finite.
 
     Examples
     --------
@@ -130,5 +136,34 @@ def fit(
     function: Callable[..., Any] = getattr(
         import_module(f"host.sysid.estimators.{entry.module}"), entry.function
     )
-    result: FitResult = function(model, maneuvers, **{**dict(entry.options), **options})
+    _check(model, maneuvers)
+    try:
+        # Every number that comes back is looked at below; on the way there trials may overflow.
+        with np.errstate(all="ignore"):
+            result: FitResult = function(model, maneuvers, **{**dict(entry.options), **options})
+    except (np.linalg.LinAlgError, ZeroDivisionError) as error:
+        raise IdentificationError(
+            f"{method}: the equations are singular ({str(error).lower().rstrip('.')}); these data"
+            f" do not determine {model.name}"
+        ) from error
+    for label in ("estimate", "covariance", "covariance_white"):
+        if not np.isfinite(getattr(result, label)).all():
+            raise IdentificationError(
+                f"{method}: the {label.split('_')[0]} is not finite; these data do not determine"
+                f" {model.name}"
+            )
     return result
+
+
+def _check(model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:
+    """Refuse what no method can fit: columns that do not fit the model, outputs that never move."""
+    if not model.parameter_names:
+        raise IdentificationError(f"model {model.name} has no free parameter: nothing to fit")
+    for maneuver in maneuvers:
+        check_shapes(model, maneuver)
+    moved = np.max([np.ptp(m.outputs, axis=0) for m in maneuvers], axis=0)
+    still = [y for y, size in zip(model.outputs, moved, strict=True) if size < STILL]
+    if still:
+        raise IdentificationError(
+            f"{maneuvers[0].name}: {', '.join(still)} never moved: a dead sensor, or not connected"
+        )

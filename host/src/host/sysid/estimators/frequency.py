@@ -17,7 +17,7 @@ from scipy import signal
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
-from host.sysid.estimators.equation_error import solve_normal
+from host.sysid.estimators.rows import solve_normal
 from host.sysid.estimators.start import start_values_of
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel

@@ -21,11 +21,8 @@ import numpy as np
 
 from host.compiled import Array, compiled
 from host.sysid.errors import IdentificationError
-from host.sysid.estimators.equation_error import (
-    fit_equation_error,
-    normal_equations,
-    regression_rows,
-)
+from host.sysid.estimators.equation_error import fit_equation_error
+from host.sysid.estimators.rows import normal_equations, regression_rows
 from host.sysid.models.diagnostics import thesis_program_error_percent
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
@@ -107,7 +104,7 @@ def network(
     Parameters
     ----------
     model, maneuvers, bandwidth
-        See `equation_error.regression_rows`.
+        See `rows.regression_rows`.
     """
     names, rows = regression_rows(model, maneuvers, bandwidth=bandwidth)
     normal, right = normal_equations(rows, len(names))

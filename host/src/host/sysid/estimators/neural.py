@@ -16,7 +16,8 @@ from scipy import optimize
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
-from host.sysid.estimators.equation_error import Row, fit_equation_error, regression_rows
+from host.sysid.estimators.equation_error import fit_equation_error
+from host.sysid.estimators.rows import Row, regression_rows
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult

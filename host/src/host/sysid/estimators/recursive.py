@@ -14,16 +14,13 @@ from numpy.typing import NDArray
 
 from host.compiled import Array, compiled
 from host.sysid.errors import IdentificationError
-from host.sysid.estimators.equation_error import (
-    Row,
-    fit_equation_error,
-    regression_rows,
-    solve_normal,
-)
+from host.sysid.estimators.equation_error import fit_equation_error
+from host.sysid.estimators.rows import Row, regression_rows, solve_normal
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 from host.sysid.numerics.inverse import covariance_of
+from host.sysid.numerics.problem import check_shapes
 
 Spectrum = NDArray[np.complexfloating]
 START_VARIANCE = 1e8  # of scaled regressors: a start that weighs nothing
@@ -137,8 +134,10 @@ def fit_recursive_fourier(
     past = (np.zeros((count, count)), np.zeros(count))
     history: list[Array] = []
     normal, right = past
-    last: dict[int, tuple[Spectrum, Spectrum]] = {}
+    whole: dict[int, list[tuple[Spectrum, Spectrum]]] = {}
     for maneuver in maneuvers:
+        last: dict[int, tuple[Spectrum, Spectrum]] = {}
+        check_shapes(model, maneuver)
         signals = np.hstack([maneuver.outputs[:, measured], maneuver.inputs])
         signals = signals - signals[0]
         time_s = maneuver.time_s
@@ -163,13 +162,16 @@ def fit_recursive_fourier(
             except IdentificationError:
                 continue  # before the first input there is nothing to estimate
         past = (normal, right)
+        for row, lines in last.items():
+            whole.setdefault(row, []).append(lines)
     theta = solve_normal(normal, right)
     batch = fit_equation_error(model, maneuvers)
     # Equations have unlike residuals: the sandwich weighs each with its own power.
     middle = np.zeros_like(normal)
-    for lines, y in last.values():
-        miss = y - lines @ theta
-        middle += (lines.conj().T @ lines).real * float(np.mean(np.abs(miss) ** 2))
+    for parts in whole.values():
+        power = float(np.mean([np.mean(np.abs(y - X @ theta) ** 2) for X, y in parts]))
+        for X, _ in parts:
+            middle += (X.conj().T @ X).real * power
     inverse = covariance_of(normal)
     covariance = batch.covariance.copy()
     covariance[:count, :count] = inverse @ middle @ inverse

@@ -8,7 +8,7 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
-from host.sysid.estimators.equation_error import regression_rows, solve_rows
+from host.sysid.estimators.rows import regression_rows, solve_rows
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.numerics.problem import OutputProblem

@@ -12,7 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from host.compiled import Array, BoolArray
-from host.sysid.estimators.equation_error import fit_equation_error, regression_rows
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.equation_error import fit_equation_error
+from host.sysid.estimators.rows import regression_rows
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
@@ -93,6 +95,10 @@ def fit_stepwise(
         forced = np.array([name.startswith("bias") for name in names]) & X.any(axis=0)
         kept |= {names[k] for k in choose_terms(X, y, forced, f_in=f_in)}
     dropped = [p.name for p in model.parameters if p.name not in kept]
+    if not kept & {p.name for p in model.parameters}:
+        raise IdentificationError(
+            "no term of the model is significant: these data hold nothing of this aircraft"
+        )
     smaller = replace(
         model,
         terms=tuple(t for t in model.terms if t.parameter in kept),

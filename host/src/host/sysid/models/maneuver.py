@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from host.sysid.models.model import LinearModel
 
+LARGEST = 1e30  # in any unit: beyond it lies no quantity of flight, and its powers overflow
 JITTER_LIMIT = 0.02  # of one sample: beyond it the record is not on a uniform grid
 
 
@@ -38,7 +39,8 @@ class Maneuver:
     Raises
     ------
     IdentificationError
-        If the arrays do not match in length, are empty or hold a value that is not finite.
+        If the arrays do not match in length, are empty or hold a value that is not finite or
+        absurd.
     """
 
     dt_s: float
@@ -62,6 +64,12 @@ class Maneuver:
                 raise IdentificationError(
                     f"{self.name}: {label} column {column} is not a finite number at sample {row};"
                     " cut the gap out or fill it before fitting"
+                )
+            if np.max(np.abs(array), initial=0.0) > LARGEST:
+                row, column = np.argwhere(np.abs(array) > LARGEST)[0]
+                raise IdentificationError(
+                    f"{self.name}: {label} column {column} is {array[row, column]:.3g} at sample"
+                    f" {row}, which is no quantity of flight in any unit"
                 )
             if len(array) != len(self.outputs):
                 raise IdentificationError(

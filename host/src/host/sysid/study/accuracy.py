@@ -16,8 +16,8 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
-from host.sysid.estimators.equation_error import regression_rows, solve_rows
 from host.sysid.estimators.hopfield import network
+from host.sysid.estimators.rows import regression_rows, solve_rows
 from host.sysid.estimators.start import start_values
 from host.sysid.models.diagnostics import references
 from host.sysid.models.maneuver import Maneuver
