@@ -69,10 +69,12 @@ void Instrument::step() {
   sensors_.step(config_, pilot_, outlet_, now_us);
   const bool made_frame = ring_.used() != stored;
   pilot_.ran(kTaskSensors);
+  // A receiver pulse that ends behind the pilot's step waits for the next, and 2 ms is all it may:
+  // making a frame takes more than half of that, and the card's portion comes on top.
+  if (made_frame) pilot_.step(config_, self_test_, outlet_, hal::now_us());
   recorder_.step(now_us);
   pilot_.ran(kTaskRecorder);
-  // A turn that made a frame leaves the rest to the next: a receiver pulse that ends behind the
-  // pilot's step waits for the end of the turn, and 2 ms is all it may.
+  // A turn that made a frame leaves the rest to the next, for the same reason.
   if (!made_frame) {
     // A reading per turn: a row is 30 ms long, and no turn is.
     ascii_row_.step(sensors_, pilot_.channels(), telemetry_, now_us);
