@@ -16,7 +16,9 @@ import numpy as np
 
 from host.compiled import Array, IntArray
 from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.coefficients.joint import Prediction
 from host.sysid.coefficients.local import Local
+from host.sysid.numerics.repeats import Repeats
 
 METHOD = "equation error with instrument errors"
 QUANTILE = 1.96
@@ -89,7 +91,8 @@ class CoefficientFit:
     """Coefficients, and the instrument's errors as value and deviation left.
 
     `covariance` is of all derivatives and behind them all errors, in their order; `traces` are the
-    six force and moment coefficients in time, measured and by the derivatives.
+    six force and moment coefficients in time, measured and by the derivatives; `prediction` is that
+    of single maneuvers by all others, `repeats` how they scatter, both of the last step.
     """
 
     derivatives: tuple[Derivative, ...]
@@ -97,12 +100,14 @@ class CoefficientFit:
     errors: dict[str, tuple[float, float]]
     flight: Flight
     traces: dict[str, Trace]
+    prediction: Prediction | None
+    repeats: Repeats
 
 
 def informed(
     state: Array, covariance: Array, told: Local, airframe: AirframeData
-) -> tuple[Array, Array]:
-    """Return state and covariance once the airframe's drawing has been heard.
+) -> tuple[Array, Array, Array]:
+    """Return state and covariance once the airframe's drawing has been heard, and what is kept.
 
     Parameters
     ----------
@@ -110,12 +115,19 @@ def informed(
         Of the fit.
     told : dict
         Of `local_derivatives`: what the drawing says nothing of may be absent.
+
+    Returns
+    -------
+    state, covariance : (n,) and (n, n) Array
+    kept : (n, n) Array
+        How both move with what the flight alone said.
     airframe : AirframeData
         Arms of 0 are not known and say nothing.
     """
     a = airframe
     chord, span = a.chord_m, a.span_m
     known: list[tuple[dict[str, float], float]] = []
+    kept = np.eye(len(state))
     if a.elevator_arm_m > 0.0 and {"CL_de", "Cm_de"} <= told.keys():
         sd = a.arm_share * abs(told["Cm_de"][0])
         known.append(({"CL_de": a.elevator_arm_m / chord, "Cm_de": 1.0}, sd))
@@ -132,7 +144,8 @@ def informed(
         state = state - gain * (row @ state)
         keep = np.eye(len(state)) - np.outer(gain, row)
         covariance = keep @ covariance @ keep.T + np.outer(gain, gain) * sd**2
-    return state, covariance
+        kept = keep @ kept
+    return state, covariance, kept
 
 
 def derivatives(

@@ -28,7 +28,7 @@ from host.sysid.coefficients.answer import (
     trace,
 )
 from host.sysid.coefficients.gust_free import gust_free
-from host.sysid.coefficients.joint import told_inverse
+from host.sysid.coefficients.joint import LastStep, prediction, pulls, told_inverse
 from host.sysid.coefficients.local import Local, Mean, local_derivatives, zero_lift_drag
 from host.sysid.coefficients.model import CoefficientModel, standard_model
 from host.sysid.coefficients.rows import (
@@ -56,6 +56,7 @@ from host.sysid.compatibility.signals import (
     usable_length,
 )
 from host.sysid.errors import IdentificationError
+from host.sysid.numerics.repeats import scatter
 
 STEP = 0.3  # of a standard deviation: width of the numeric slopes
 PLAIN_ROUNDS, FULL_ROUNDS = 3, 2
@@ -279,8 +280,11 @@ def _solve(search: _Search, names: tuple[str, ...], sd: Array) -> CoefficientFit
         drawn[held] = np.eye(len(held))
         covariance += (drawn * sd[held] ** 2) @ drawn.T
         theta, errors = theta + step[: len(theta)], errors + step[-len(sd) :]
+        last = LastStep(
+            A, Z, y, normal, right, inverse, tuple(owner), noise, rows.spectra, len(theta), len(sd)
+        )
         noise = noise_spectra(search.blocks, y - A @ step, owner, noise)
-    return _answer(search, names, theta, errors, covariance, position, levels)
+    return _answer(search, names, theta, errors, covariance, position, levels, last)
 
 
 def _reader(found: Local) -> Callable[[str], float]:
@@ -351,12 +355,13 @@ def _answer(
     covariance: Array,
     position: Mapping[str, int],
     levels: Array,
+    last: LastStep,
 ) -> CoefficientFit:
     """Add what geometry says, then drag at zero lift."""
     rows = search.rows(search.record, search.flown, errors, names)
     state = np.concatenate([theta, np.zeros(len(covariance) - len(theta) - len(errors)), errors])
     before = _local(search, rows, state, position)
-    state, covariance = informed(state, covariance, before, search.airframe)
+    state, covariance, kept = informed(state, covariance, before, search.airframe)
     found = _local(search, rows, state, position, levels)
     _, drag, lift = _levels(search, rows)
     if "CL_alpha" in found and "CD_alpha" in found:
@@ -366,6 +371,8 @@ def _answer(
     values = {name: value for name, (value, _) in found.items()}
     slopes = np.vstack([*(slope for _, slope in found.values()), np.eye(len(state))[-len(names) :]])
     own = slopes @ covariance @ slopes.T
+    agreement = scatter(tuple(values), *pulls(last, search.blocks, slopes[: len(values)] @ kept))
+    own[np.diag_indices(len(values))] += agreement.extra_variance
     left = np.sqrt(np.maximum(np.diag(covariance)[-len(names) :], 0.0))
     air, plant = float(np.mean(_density(search.record))), search.plant
     spin, thrust = (float(np.mean(x)) for x in (search.flown.spin_radps, search.flown.thrust_n))
@@ -392,6 +399,8 @@ def _answer(
             for name, equation in rows.equations.items()
             if name not in KINEMATIC
         },
+        prediction(last, search.blocks),
+        agreement,
     )
 
 

@@ -86,6 +86,18 @@ def used(block: Block, name: str) -> BoolArray:
     return block.hertz >= (KINEMATIC_LOW_HZ if name in KINEMATIC else LOW_HZ)
 
 
+def degree(name: str) -> int:
+    """Return how many powers of time are taken out of an equation."""
+    return TRENDS if name in KINEMATIC else 2
+
+
+def row_weight(hertz: Array, noise: tuple[Array, Array] | None) -> Array:
+    """Return the weight of real and imaginary parts from the spectrum of residuals, (F,)."""
+    if noise is None:
+        return np.full(len(hertz), np.sqrt(2.0))
+    return np.asarray(np.sqrt(2.0 / np.interp(hertz, *noise)), dtype=np.float64)
+
+
 def stacked(
     blocks: Sequence[Block],
     spectra: Mapping[Key, Spectrum],
@@ -100,7 +112,7 @@ def stacked(
 ) -> tuple[Array, Array, Array, list[tuple[str, int]]]:
     """Return slopes, left factors and residuals, real and imaginary parts weighted."""
     keys = [(name, k) for k, block in enumerate(blocks) for name in block.names]
-    degrees = [TRENDS if name in KINEMATIC else 2 for name, _ in keys]
+    degrees = [degree(name) for name, _ in keys]
     begin = len(position) + np.concatenate([[0], np.cumsum(degrees)])
     width = int(begin[-1]) + n_errors
     A: list[Array] = []
@@ -108,9 +120,7 @@ def stacked(
     y: list[Array] = []
     for n, (name, k) in enumerate(keys):
         block, kept = blocks[k], used(blocks[k], name)
-        weight = np.sqrt(2.0) / np.ones(int(kept.sum()))
-        if name in noise:
-            weight = np.sqrt(2.0 / np.interp(block.hertz[kept], *noise[name]))
+        weight = row_weight(block.hertz[kept], noise.get(name))
         places = [position[f"{name}_{term}"] for term in terms[name]]
         spectrum = spectra[name, k]
         for source, its_slopes, target in ((spectra, slopes, A), (left, left_slopes, Z)):

@@ -35,6 +35,8 @@ class Repeats:
         NaN where fewer than `LEAST_REPEATS` tell of it.
     factor : Array, shape (P,)
         By which the interval was widened, 1 where the maneuvers agree.
+    variance : Array, shape (P,)
+        Against which they were judged.
     """
 
     names: tuple[str, ...]
@@ -42,6 +44,15 @@ class Repeats:
     chi_square: Array
     p_value: Array
     factor: Array
+    variance: Array
+
+    @property
+    def extra_variance(self) -> Array:
+        """What the scatter adds to a variance of normal quantiles, (P,): 0 where it is fair."""
+        wide = self.factor > 1.0
+        freedom = np.where(wide, np.maximum(self.maneuvers - 1.0, 1.0), np.inf)
+        stretch = special.stdtrit(freedom, 0.975) / special.ndtri(0.975)
+        return np.where(wide, ((self.factor * stretch) ** 2 - 1.0) * self.variance, 0.0)
 
 
 def pulls(
@@ -68,25 +79,40 @@ def repeats(result: FitResult) -> Repeats | None:
     count = len(result.model.parameter_names)
     if not isinstance(pull, np.ndarray) or not isinstance(share, np.ndarray) or len(pull) < 2:
         return None
-    total = np.maximum(np.sum(share[:, :count], axis=0), 1e-12)
-    weight = np.clip(share[:, :count] / total, 0.0, 1.0)
+    variance = np.diag(result.covariance)[:count]
+    return scatter(result.names[:count], pull[:, :count], share[:, :count], variance)
+
+
+def scatter(names: tuple[str, ...], pull: Array, share: Array, variance: Array) -> Repeats:
+    """Return how maneuvers scatter about their joint answer against its variance.
+
+    Parameters
+    ----------
+    names : tuple of str
+    pull, share : Array, shape (maneuvers, P)
+        How far each maneuver pulls the answer, and its share of what is known of it.
+    variance : Array, shape (P,)
+        Of the answer, as far as it comes from what differs between maneuvers.
+    """
+    total = np.maximum(np.sum(share, axis=0), 1e-12)
+    weight = np.clip(share / total, 0.0, 1.0)
     squares = np.sum(weight**2, axis=0)
     number = 1.0 / np.maximum(squares, 1e-12)
-    own = pull[:, :count] - weight * np.sum(pull[:, :count], axis=0)
-    scatter = np.sum(own**2, axis=0) / np.maximum(1.0 - squares, 1e-12)
-    variance = np.diag(result.covariance)[:count]
+    own = pull - weight * np.sum(pull, axis=0)
+    spread = np.sum(own**2, axis=0) / np.maximum(1.0 - squares, 1e-12)
     testable = (number >= LEAST_REPEATS) & (variance > 0.0)
-    ratio = np.where(testable, scatter / np.where(testable, variance, 1.0), np.nan)
+    ratio = np.where(testable, spread / np.where(testable, variance, 1.0), np.nan)
     chi_square = (number - 1.0) * ratio
-    p_value = np.full(count, np.nan)
+    p_value = np.full(len(names), np.nan)
     p_value[testable] = special.chdtrc(number[testable] - 1.0, chi_square[testable])
     wide = testable & (np.nan_to_num(p_value, nan=1.0) < SIGNIFICANCE)
     return Repeats(
-        names=result.names[:count],
+        names=names,
         maneuvers=number,
         chi_square=chi_square,
         p_value=p_value,
         factor=np.where(wide, np.sqrt(np.where(wide, ratio, 1.0)), 1.0),
+        variance=variance,
     )
 
 

@@ -1,0 +1,156 @@
+"""Single maneuvers of a fit of coefficients: predicted by the others, held to each other."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from host.compiled import Array
+from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
+from host.sysid.coefficients.answer import CoefficientFit
+from host.sysid.coefficients.fit import fit_coefficients
+from host.sysid.coefficients.joint import LastStep, prediction, pulls
+from host.sysid.coefficients.windows import Block, Key, Window, stacked, window_block
+from host.sysid.compatibility.signals import Spectrum
+from host.sysid.flight.tables import even_columns
+from host.sysid.numerics.repeats import scatter
+from host.twin.testcard.cards import load
+from host.twin.virtual import virtual_flight
+
+NAME = "ultrastick25e"
+TERMS = ("alpha", "q")
+TRUE = np.array([-1.6, 3.0])
+NOISE = {"Cm": (np.array([0.1, 4.5]), np.array([0.5, 2.0]))}
+SD = 0.3
+
+
+def problem(seed: int, sizes: tuple[float, ...], bias: float = 0.4) -> tuple[list[Block], LastStep]:
+    """One equation with two terms, one instrument error, a line of its own in every window."""
+    rng = np.random.default_rng(seed)
+    blocks, spectra, slopes = [], {}, {}
+    for k, size in enumerate(sizes):
+        at = np.arange(300)
+        block = window_block(at, 0.03, Window(0.0, 9.0, longitudinal=True), ("CL", "CD"))
+        F = len(block.hertz)
+        terms = size * (rng.standard_normal((F, 2)) + 1j * rng.standard_normal((F, 2)))
+        noise = 0.3 * (rng.standard_normal(F) + 1j * rng.standard_normal(F))
+        error = rng.standard_normal(F) + 1j * rng.standard_normal(F)
+        left = terms @ TRUE + block.trends[:, :2] @ np.array([3.0, -2.0]) + noise + bias * error
+        spectra["Cm", k] = np.column_stack([left, terms])
+        slopes["Cm", k] = -error[:, None]
+        blocks.append(replace(block, names=("Cm",)))
+    return blocks, solved(blocks, spectra, slopes)
+
+
+def solved(
+    blocks: list[Block], spectra: dict[Key, Spectrum], slopes: dict[Key, Spectrum]
+) -> LastStep:
+    own = {"Cm": np.zeros(2)}
+    A, Z, y, keys = stacked(
+        blocks, spectra, spectra, {"Cm": TERMS}, slopes, slopes, own,
+        {"Cm_alpha": 0, "Cm_q": 1}, 1, NOISE,
+    )  # fmt: skip
+    prior = np.zeros(A.shape[1])
+    prior[-1] = SD**-2
+    normal = Z.T @ A + np.diag(prior)
+    scale = np.diag(normal) ** -0.5
+    inverse = np.linalg.inv(normal * np.outer(scale, scale)) * np.outer(scale, scale)
+    return LastStep(A, Z, y, normal, Z.T @ y, inverse, tuple(keys), NOISE, spectra, 2, 1)
+
+
+def without_line(values: Array, trends: Spectrum) -> Array:
+    line = np.concatenate([trends.real, trends.imag])
+    answer: Array = values - line @ np.linalg.pinv(line, rcond=1e-9) @ values
+    return answer
+
+
+def test_leaving_one_out_is_fitting_the_others() -> None:
+    blocks, last = problem(3, (1.0, 0.7, 1.3))
+    found = prediction(last, blocks)
+    assert found is not None
+    assert found.windows == (0, 1, 2)
+    top = bottom = 0.0
+    for k, block in enumerate(blocks):
+        rest = [j for j in range(3) if j != k]
+        again = solved(
+            [blocks[j] for j in rest],
+            {("Cm", n): last.spectra["Cm", j] for n, j in enumerate(rest)},
+            {("Cm", n): -error_of(last, blocks, j) for n, j in enumerate(rest)},
+        )
+        step = again.inverse @ again.right
+        spectrum = last.spectra["Cm", k]
+        missed = (
+            spectrum[:, 0] - spectrum[:, 1:] @ step[:2] - error_of(last, blocks, k)[:, 0] * step[-1]
+        )
+        rest_of = [
+            without_line(np.concatenate([values.real, values.imag]), block.trends[:, :2])
+            for values in (missed, spectrum[:, 0])
+        ]
+        top, bottom = top + float(rest_of[0] @ rest_of[0]), bottom + float(rest_of[1] @ rest_of[1])
+    assert found.unseen["Cm"] == pytest.approx(np.sqrt(top / bottom), rel=1e-6)
+    assert found.unseen["Cm"] > found.fitted["Cm"]
+
+
+def error_of(last: LastStep, blocks: list[Block], k: int) -> Spectrum:
+    """Return what one unit of the instrument's error adds to the left side of a window."""
+    part = last.rows(blocks)["Cm", k]
+    weight = np.sqrt(2.0 / np.interp(blocks[k].hertz, *NOISE["Cm"]))
+    real, imaginary = last.A[part, -1].reshape(2, -1) / weight
+    return np.asarray(real + 1j * imaginary)[:, None]
+
+
+def test_a_maneuver_that_alone_tells_a_term_stays() -> None:
+    blocks, last = problem(3, (1.0, 0.1, 0.1))
+    found = prediction(last, blocks)
+    assert found is not None
+    assert found.windows == (1, 2)
+    blocks, last = problem(3, (1.0,))
+    assert prediction(last, blocks) is None
+
+
+def test_maneuvers_of_one_aircraft_agree_as_often_as_chance_says() -> None:
+    p = []
+    for seed in range(200):
+        blocks, last = problem(seed, (1.0, 1.0, 0.8, 1.2), bias=0.0)
+        pull, share, variance = pulls(last, blocks, np.eye(2, last.A.shape[1]))
+        # Spectra of this problem are five times its noise: 0.18 of 1 by variance.
+        level = 2.0 * 0.3**2 / 2.0 * np.mean(2.0 / np.interp(blocks[0].hertz, *NOISE["Cm"]))
+        p += scatter(("Cm_alpha", "Cm_q"), pull, share, level * variance).p_value.tolist()
+        np.testing.assert_allclose(pull.sum(axis=0), 0.0, atol=0.02)
+    assert 0.40 < np.mean(np.array(p) < 0.5) < 0.60
+    assert 0.05 < np.mean(np.array(p) < 0.1) < 0.17
+
+
+def slipped(share: float) -> CoefficientFit:
+    """A flight of orthogonal multisines; in its last third the elevator's pot reads too much."""
+    card = load("multisine")
+    flight = virtual_flight(
+        replace(card, sensors=replace(card.sensors, tolerances=False)), 7, chain="none"
+    )
+    columns, _ = even_columns(flight.table)
+    windows = [
+        Window(float(str(m["start_s"])) - 0.5, float(str(m["end_s"])), m["axes"] == ["elevator"])
+        for m in flight.maneuvers
+    ]
+    last = [w for w in windows if w.longitudinal][-1]
+    t, moved = columns["t_s"], columns["elevator_rad"].copy()
+    inside = (t >= last.first_s) & (t <= last.last_s)
+    mean = float(moved[inside].mean())
+    moved[inside] = mean + (1.0 + share) * (moved[inside] - mean)
+    kept = {k: v[t > 8.0] for k, v in (columns | {"elevator_rad": moved}).items()}
+    return fit_coefficients(
+        kept, windows, airframe_data(NAME), instrument_data(NAME), powerplant(NAME)
+    )
+
+
+def test_a_pot_that_slips_between_maneuvers_is_named_and_predicted_worse() -> None:
+    fair, wrong = slipped(0.0), slipped(0.4)
+    k = fair.repeats.names.index("Cm_de")
+    assert fair.repeats.factor[k] == 1.0
+    assert wrong.repeats.factor[k] > 2.0
+    half = [f.derivatives[k].half_width for f in (fair, wrong)]
+    assert half[1] > 2.0 * half[0]
+    assert fair.prediction is not None
+    assert wrong.prediction is not None
+    assert len(fair.prediction.windows) == 6
+    assert fair.prediction.unseen["Cm"] < 1.1 * fair.prediction.fitted["Cm"]
+    assert wrong.prediction.unseen["Cm"] > 1.25 * wrong.prediction.fitted["Cm"]
