@@ -45,6 +45,18 @@ def test_line_shows_every_sensor(make_rig: MakeRig) -> None:
     assert last_line(rig).state("imu") == "stale"
 
 
+@pytest.mark.parametrize("baud", [4800, 19200, 38400, 57600, 115200])
+def test_gps_is_found_at_whatever_baud_it_speaks(make_rig: MakeRig, baud: int) -> None:
+    """Every other test starts at 9600, as delivered."""
+    rig = make_rig()
+    rig.gps.baud = baud
+    rig.power_on()
+    rig.chip.run_s(11.0)  # six bauds of 1.45 s, and two seconds until the line shows it
+    assert rig.gps.baud == 38400
+    assert last_line(rig).state("gps") == "ok"
+    assert last_line(rig).fields["gps"].startswith("fix 3")
+
+
 def test_host_status_shows_the_line_of_the_real_image(make_rig: MakeRig) -> None:
     """The command as a user types it, on the image's USB port as a pseudo-terminal."""
     from simavr_bench.pty_bridge import PtyBridge
