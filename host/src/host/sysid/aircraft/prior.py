@@ -1,70 +1,120 @@
 """What a handbook or a vortex lattice said before the flight, beside what the flight says.
 
-TOML: `[coefficients]` with names as in the answer (`CL_alpha = 4.1`), per radian; the text that AVL
-writes with its command ST; or Digital Datcom's output (`datcom`). Both give moments about
-stability axes, ours are about body axes: at a few degrees of alpha they differ by that angle times
-the other moment, which is not turned here.
+TOML (`[coefficients]` with names as in the answer, per radian, body axes; with `alpha_deg = [...]`
+each may be a list, a table over the angle of attack), text that AVL writes with ST or SB (`avl`),
+or Digital Datcom's output (`datcom`). Tables are read between their rows at the flight's angle of
+attack, lateral derivatives turned from stability to body axes there. Signs are the house's: body
+axes x forward, y right, z down; elevator and aileron as in the answer. Coefficients are referred
+to the file's own area, chord and span, which are printed beside them where the file has them.
 """
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from host.sysid.aircraft.airframe import Coefficient
+from host.sysid.aircraft.avl import is_avl, read_avl
 from host.sysid.aircraft.datcom import is_datcom, read_datcom
+from host.sysid.aircraft.prior_table import Points, PriorTable
 from host.sysid.errors import IdentificationError
 
-_AVL = re.compile(r"\b(CL|CY|Cl|Cm|Cn)([abpqr])\s*=\s*([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)")
-_LABELS = {"a": "alpha", "b": "beta", "p": "p", "q": "q", "r": "r"}
+SOUND_MPS = 340.3  # standard atmosphere, sea level: chooses between Mach numbers of a handbook
 
 
-def read_prior(path: Path, alpha_rad: float = 0.0) -> dict[str, float]:
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """Coefficients by name at one angle of attack, and in words where they are from."""
+
+    coefficients: dict[str, float]
+    source: tuple[str, ...] = ()
+
+
+def read_prior(path: Path, alpha_rad: float = 0.0, airspeed_mps: float = 0.0) -> Prior:
     """Return coefficients by name.
 
     Parameters
     ----------
     path : Path
-        TOML, AVL's ST output, or Datcom's output.
+        TOML, AVL's ST or SB output, or Datcom's output.
     alpha_rad : float
-        Where a table over the angle of attack is read.
+        Where a table over the angle of attack is read; beyond its ends the last row stands.
+    airspeed_mps : float
+        Of the flight: which Mach number of several.
 
     Raises
     ------
     IdentificationError
-        If the file cannot be read or holds no coefficient.
+        If the file cannot be read, holds no coefficient, or one that is no number.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8", errors="replace")
+        table: PriorTable | None = None
         if path.suffix == ".toml":
-            table = tomllib.loads(text).get("coefficients", {})
-            found = {str(k): float(v) for k, v in dict(table).items()}
+            table = _from_toml(text)
         elif is_datcom(text):
-            found = read_datcom(text, alpha_rad)
-        else:
-            # The line of the spiral figure, "Clb Cnr / Clr Cnb = ...", is no derivative.
-            text = "\n".join(line for line in text.splitlines() if "/" not in line)
-            found = {f"{c}_{_LABELS[x]}": float(v) for c, x, v in _AVL.findall(text)}
-    except (OSError, ValueError, TypeError) as error:
+            table = read_datcom(text, airspeed_mps / SOUND_MPS)
+        elif is_avl(text):
+            table = read_avl(text)
+    except (OSError, ValueError, TypeError, IdentificationError) as error:
         raise IdentificationError(f"{path}: {error}") from error
-    if not found:
+    if table is None or not table.points:
         raise IdentificationError(
-            f"{path}: no coefficient; expected TOML with [coefficients], or output of AVL (ST) or"
-            " Datcom"
+            f"{path}: no coefficient; expected TOML with [coefficients], or output of AVL (ST, SB)"
+            " or Datcom"
         )
-    return found
+    found = table.at(alpha_rad)
+    wrong = sorted(name for name, value in found.items() if not np.isfinite(value))
+    if wrong:
+        raise IdentificationError(f"{path}: {', '.join(wrong)} not a finite number")
+    source = [*table.source, *_place(table, float(np.degrees(alpha_rad)))]
+    return Prior(found, tuple(line for line in source if line))
 
 
-def prior_lines(coefficients: Sequence[Coefficient], prior: dict[str, float]) -> list[str]:
-    """Return a table: identified with its interval, prior, and whether they disagree."""
-    lines = [f"{'coefficient':12s} {'identified':>12s} {'95 %':>10s} {'prior':>10s}"]
+def _place(table: PriorTable, alpha_deg: float) -> list[str]:
+    """Say where a table was read and how it was turned; nothing where neither was done."""
+    least, most = np.degrees(table.limits_rad)
+    words = []
+    if least < most:
+        words.append(f"read at alpha {alpha_deg:.1f} deg of a table from {least:g} to {most:g} deg")
+        if not least <= alpha_deg <= most:
+            words.append("beyond its end, whose row stands")
+    if table.stability_axes:
+        turn_deg = float(np.clip(alpha_deg, least, most))
+        words.append(f"turned from stability to body axes by {turn_deg:.1f} deg")
+    return [", ".join(words)]
+
+
+def _from_toml(text: str) -> PriorTable:
+    document = tomllib.loads(text)
+    angles = [float(x) for x in document.get("alpha_deg", [0.0])]
+    if not angles or np.any(np.diff(angles) <= 0.0):
+        raise ValueError(f"alpha_deg {angles}, expected rising angles")
+    points: Points = {}
+    for name, value in dict(document.get("coefficients", {})).items():
+        values = value if isinstance(value, list) else [value] * len(angles)
+        if len(values) != len(angles):
+            raise ValueError(f"{name} has {len(values)} values, alpha_deg {len(angles)}")
+        points[str(name)] = [
+            (float(np.radians(a)), float(v)) for a, v in zip(angles, values, strict=True)
+        ]
+    return PriorTable(points, stability_axes=False)
+
+
+def prior_lines(coefficients: Sequence[Coefficient], prior: Prior) -> list[str]:
+    """Return where the prior is from, and a table: identified, interval, prior, agreement."""
+    lines = [f"prior: {line}" for line in prior.source]
+    lines.append(f"{'coefficient':12s} {'identified':>12s} {'95 %':>10s} {'prior':>10s}")
     for c in coefficients:
-        if c.name in prior:
-            outside = abs(c.value - prior[c.name]) > c.half_width
+        if c.name in prior.coefficients:
+            expected = prior.coefficients[c.name]
+            outside = abs(c.value - expected) > c.half_width
             lines.append(
-                f"{c.name:12s} {c.value:12.4g} {c.half_width:10.2g} {prior[c.name]:10.4g}"
+                f"{c.name:12s} {c.value:12.4g} {c.half_width:10.2g} {expected:10.4g}"
                 f"  {'outside the interval' if outside else 'inside'}"
             )
     return lines
