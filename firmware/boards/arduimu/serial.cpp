@@ -20,6 +20,7 @@ volatile uint8_t g_out_tail;
 
 }  // namespace
 
+// 60 cycles at most, seen in flight (tests/simavr/imu).
 ISR(USART_RX_vect) {
   const uint8_t byte = UDR0;
   const uint8_t head = g_in_head;

@@ -101,7 +101,7 @@ bool prepare(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size
 
 }  // namespace
 
-// About 3 us a byte, of 22.5 us on the wire.
+// About 3 us a byte, of 22.5 us on the wire; 139 cycles at most, seen in flight (tests/simavr/imu).
 ISR(TWI_vect) {
   ++g_steps;
   switch (TW_STATUS) {
