@@ -37,7 +37,8 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert main(["simulate", "calm", *quiet, "--seed", "4", "-o", str(folder / "one")]) == 0
     again, xml = folder / "again.toml", folder / "aircraft/identified/identified.xml"
     xml.parent.mkdir(parents=True)
-    flags = ["--aircraft", "ultrastick25e", "--save-aircraft", str(again), "--save-model", str(xml)]
+    flags = ["--aircraft", "ultrastick25e", "--no-corrections"]
+    flags += ["--save-aircraft", str(again), "--save-model", str(xml)]
     assert main(["identify", str(folder / "one/flight.csv"), *flags]) == 0
     card = folder / "card.toml"
     card.write_text(

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from host.sysid.aircraft.airframe import CoefficientTable
     from host.sysid.coefficients.flight import CoefficientAnswer
     from host.sysid.coefficients.model import CoefficientModel
+    from host.sysid.compatibility.reconstruction import Compatibility
     from host.sysid.flight.finder import Found
     from host.sysid.flight.linear import Answer
 
@@ -52,6 +53,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the fit")
     parser.add_argument("--maneuver", type=int, action="append", metavar="N",
                         help="use only maneuver N of `host maneuvers`; repeatable")  # fmt: skip
+    parser.add_argument("--no-corrections", action="store_true",
+                        help="leave sensor errors that the flight tells in the data")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--mat", type=Path, metavar="FILE", help="write a MAT file")
     parser.add_argument("--plots", type=Path, metavar="DIR", help="write pictures")
@@ -75,6 +78,8 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
     from host.sysid.answer.verdict import coefficient_lines, coefficient_words, model_lines, words
+    from host.sysid.compatibility.reconstruction import document
+    from host.sysid.compatibility.reconstruction import words as agreement_words
     from host.sysid.errors import IdentificationError
     from host.sysid.estimators.fit import methods as single_methods
     from host.sysid.flight.linear import DEFAULT_METHOD, STAGED, identify
@@ -109,6 +114,8 @@ def run(args: argparse.Namespace) -> int:
             raise IdentificationError("--prior compares coefficients; they need --aircraft")
     windows = _windows(args, columns)
     agreement = _agreement(columns, args.aircraft, airframe, notes)
+    # Without the places of the sensors a vane ahead of the CG passes for a late one.
+    known_errors = agreement if airframe is not None and not args.no_corrections else None
     answers: list[Answer] = []
     terms = _coefficient_model(args.model)
     direct = _direct(args, columns, windows, notes, terms) if terms else None
@@ -122,6 +129,7 @@ def run(args: argparse.Namespace) -> int:
                     airframe=airframe,
                     windows=windows,
                     user_model=user_model,
+                    compatibility=known_errors,
                 )
             except IdentificationError as error:
                 notes.append(f"{name}, {method}: {error}")
@@ -144,7 +152,7 @@ def run(args: argparse.Namespace) -> int:
                 {
                     "source": str(args.source),
                     "notes": notes,
-                    "data_compatibility": agreement[1],
+                    "data_compatibility": document(agreement) if agreement else None,
                     "answers": documents,
                 },
                 indent=2,
@@ -162,8 +170,8 @@ def run(args: argparse.Namespace) -> int:
             lines += ["", *model_lines(answer)]
     if direct:
         lines += ["", *coefficient_lines(direct)]
-    if agreement[0]:
-        lines += ["", *agreement[0]]
+    if agreement:
+        lines += ["", *agreement_words(agreement)]
     if prior is not None:
         from host.sysid.aircraft.prior import prior_lines
 
@@ -210,19 +218,18 @@ def _coefficient_model(names: list[str] | None) -> CoefficientModel | None:
 
 def _agreement(
     columns: dict[str, Any], aircraft: str | None, airframe: Any, notes: list[str]
-) -> tuple[list[str], dict[str, object] | None]:
-    """Return lines and document of the data's compatibility; a note where it cannot be told."""
+) -> Compatibility | None:
+    """Return what sensors are wrong by; None with a note where it cannot be told."""
     from host.sysid.aircraft.aircraft_file import instrument_data
-    from host.sysid.compatibility.reconstruction import document, reconstruct, words
+    from host.sysid.compatibility.reconstruction import reconstruct
     from host.sysid.errors import IdentificationError
 
     try:
         instrument = instrument_data(aircraft) if aircraft else None
-        found = reconstruct(columns, airframe, instrument)
+        return reconstruct(columns, airframe, instrument)
     except IdentificationError as error:
         notes.append(str(error))
-        return [], None
-    return words(found), document(found)
+        return None
 
 
 def _direct(

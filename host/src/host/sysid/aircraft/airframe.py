@@ -6,7 +6,7 @@ pressure and reference sizes is carried into the intervals beside that of the fi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,8 +75,24 @@ class Condition:
     qbar_pa: float
 
 
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """An estimate (P,) with one deviation of a sensor's error in it, and its condition then.
+
+    `airspeed_gain` and `qbar_gain` are over those of the answer.
+    """
+
+    error: str
+    estimate: Array
+    airspeed_gain: float
+    qbar_gain: float
+
+
 def coefficients(
-    result: FitResult, airframe: AirframeData, condition: Condition
+    result: FitResult,
+    airframe: AirframeData,
+    condition: Condition,
+    moved: Sequence[Moved] = (),
 ) -> tuple[Coefficient, ...]:
     """Convert dimensional derivatives of the templates to coefficients.
 
@@ -88,11 +104,14 @@ def coefficients(
         Mass properties and sizes.
     condition : Condition
         Airspeed and dynamic pressure of the maneuvers.
+    moved : sequence of Moved
+        By errors of sensors.
 
     Returns
     -------
     tuple of Coefficient
-        The interval adds mass, inertia, dynamic pressure and upwash to the fit's own.
+        The interval adds mass, inertia, dynamic pressure, upwash and what moved it to the fit's
+        own. Errors of pitot and vanes are what pressure and upwash allow for: the larger counts.
     """
     values = {name: k for k, name in enumerate(result.names)}
     known = np.array(
@@ -115,6 +134,15 @@ def coefficients(
             airframe.upwash * airframe.upwash_share,
         ]
     )
+    elsewhere = [
+        (
+            SHARED.get(m.error, OWN),
+            _rules(airframe, condition.airspeed_mps * m.airspeed_gain),
+            m.estimate,
+            np.where(np.arange(len(known)) == QBAR, m.qbar_gain * known, known),
+        )
+        for m in moved
+    ]
     quantile = result.half_width() / np.maximum(result.standard_error, 1e-300)
     found = []
     for name, rule in _rules(airframe, condition.airspeed_mps).items():
@@ -137,11 +165,15 @@ def coefficients(
             down[k] -= step
             slope[k] = (evaluate(up, known) - evaluate(down, known)) / (2.0 * step)
         fit_variance = float(slope @ result.covariance @ slope)
-        extra = 0.0
+        parts = np.zeros(len(shares) + 1)
         for k, share in enumerate(shares):
-            moved = known.copy()
-            moved[k] *= 1.0 + 1e-4
-            extra += ((evaluate(result.estimate, moved) - value) / 1e-4 * share) ** 2
+            other = known.copy()
+            other[k] *= 1.0 + 1e-4
+            parts[k] = ((evaluate(result.estimate, other) - value) / 1e-4 * share) ** 2
+        by_sensors = np.zeros(len(parts))
+        for k, rules, estimate, numbers in elsewhere:
+            by_sensors[k] += (evaluate(estimate, numbers, rules[name]) - value) ** 2
+        extra = float(np.sum(np.maximum(parts, by_sensors)))
         main = values[rule.uses[0]]
         total = float(np.sqrt(fit_variance + extra))
         half = float(np.hypot(quantile[main] * np.sqrt(fit_variance), 1.96 * np.sqrt(extra)))
@@ -155,7 +187,8 @@ class _Rule:
     formula: Callable[[dict[str, float], Array], float]
 
 
-MASS, IXX, IYY, IZZ, QBAR, VANE = range(6)
+MASS, IXX, IYY, IZZ, QBAR, VANE, OWN = range(7)
+SHARED = {"pitot_scale": QBAR, "pitot_zero_pa": QBAR, "alpha_scale": VANE, "beta_scale": VANE}
 
 
 def _rules(airframe: AirframeData, speed: float) -> dict[str, _Rule]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from host.sysid.coefficients.answer import METHOD
+from host.sysid.compatibility.corrections import correction_document
 from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer
 from host.sysid.models.modes import Mode
@@ -78,6 +79,8 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
             name: {"value": value, "half_width": width}
             for name, (value, width) in answer.delays.items()
         },
+        "at_bound": list(answer.at_bound),
+        "corrections": correction_document(answer.corrections),
         "refused": [
             {"name": r.name, "relative_bound": r.relative_bound, "reason": r.reason}
             for r in answer.refused

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from host.sysid.coefficients.answer import FLAG_SHARE
+from host.sysid.compatibility.corrections import correction_words
 from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer
 
@@ -44,6 +45,8 @@ def maneuver_lines(graded: Sequence[tuple[Found, Grade]]) -> list[str]:
 def words(answers: Sequence[Answer], notes: Sequence[str]) -> list[str]:
     """Return the verdict: notes first, then per model what to trust and what to re-fly."""
     lines = [f"note: {note}" for note in notes]
+    if answers:
+        lines += correction_words(answers[0].corrections)
     for answer in answers:
         lines += _verdict(answer)
     return lines
@@ -83,6 +86,10 @@ def _verdict(answer: Answer) -> list[str]:
     if answer.together.severe:
         pairs = ", ".join(f"{a} with {b}" for a, b, _ in answer.together.pairs[:3])
         lines.append(f"  the data are close to collinear ({pairs})")
+    for name in answer.at_bound:
+        lines.append(
+            f"  {name} is at its bound: no delay of that sensor, but what the model lacks there"
+        )
     for warning in result.warnings:
         lines.append(f"  warning: {warning}")
     poor = [f.name for f in answer.validation if not f.nrmse < 0.5]
@@ -105,9 +112,11 @@ def model_lines(answer: Answer) -> list[str]:
     refused = {r.name for r in answer.refused if not r.name.startswith("imu_")}
     for k, name in enumerate(answer.model.parameter_names):
         mark = "  refused" if name in refused else ""
+        mark += "  at its bound" if name in answer.at_bound else ""
         lines.append(f"  {name:16s} {result.estimate[k]:11.5g}  +- {half[k]:9.3g}{mark}")
     for name, (value, width) in answer.delays.items():
-        lines.append(f"  {name:16s} {value:11.5g}  +- {width:9.3g}")
+        mark = "  at its bound" if name in answer.at_bound else ""
+        lines.append(f"  {name:16s} {value:11.5g}  +- {width:9.3g}{mark}")
     if answer.coefficients:
         lines.append("  coefficients (mass, inertia, pressure and upwash in the half-width)")
         lines += [

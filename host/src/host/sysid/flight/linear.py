@@ -13,13 +13,23 @@ from host.sysid.aircraft.airframe import (
     Coefficient,
     CoefficientTable,
     Condition,
+    Moved,
     coefficients,
     corrected,
     trim_of,
 )
+from host.sysid.compatibility.corrections import (
+    Correction,
+    corrections,
+    pressure_part,
+    without_delays,
+    without_errors,
+)
+from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import VANES, fit_with_gust
+from host.sysid.flight.carried import carried, moved_by
 from host.sysid.flight.finder import Found, Grade, find, grade
 from host.sysid.models.diagnostics import (
     Collinearity,
@@ -93,6 +103,19 @@ class Answer:
     coefficients: tuple[Coefficient, ...]
     still: tuple[str, ...]
     delays: dict[str, tuple[float, float]]
+    corrections: tuple[Correction, ...] = ()
+
+    @property
+    def at_bound(self) -> tuple[str, ...]:
+        """Delays that the search wanted larger than a sensor can be late."""
+        limits = {d.name: d.limit_s for d in (*DELAYS, *self.model.delays)}
+        values = {name: value for name, (value, _) in self.delays.items()}
+        values |= {
+            d.name: self.result.value(d.name)
+            for d in self.model.delays
+            if d.name in self.result.names
+        }
+        return tuple(n for n, v in values.items() if abs(v) >= limits[n] * (1.0 - 1e-9))
 
     @property
     def table(self) -> CoefficientTable:
@@ -114,6 +137,7 @@ def identify(
     windows: Sequence[Found] | None = None,
     user_model: LinearModel | None = None,
     with_delays: bool = True,
+    compatibility: Compatibility | None = None,
 ) -> list[Answer]:
     """Fit every model that has maneuvers.
 
@@ -133,6 +157,9 @@ def identify(
         Fit this instead of templates, to every window.
     with_delays : bool
         Estimate residual delays and accelerometer offsets where the method can.
+    compatibility : Compatibility, optional
+        What reconstruction found: told errors are taken out of the columns, and what stays open
+        of all errors is carried into the intervals.
 
     Raises
     ------
@@ -146,6 +173,10 @@ def identify(
         )
     if airframe is not None:
         columns = corrected(columns, airframe)
+    if compatibility is not None:
+        told = {c.name: c.value for c in corrections(compatibility)}
+        columns = without_errors(columns, told, pressure_part(compatibility))
+        columns = without_delays(columns, told)
     found = list(windows) if windows is not None else find(columns)
     if not found:
         raise IdentificationError(
@@ -156,7 +187,11 @@ def identify(
     for name in names:
         mine = [f for f in found if user_model is not None or f.axis in AXIS_OF[name]]
         if mine:
-            answers.append(_answer(columns, name, method, airframe, mine, user_model, with_delays))
+            answers.append(
+                _answer(
+                    columns, name, method, airframe, mine, user_model, with_delays, compatibility
+                )
+            )
     if not answers:
         raise IdentificationError(
             f"no maneuver for {', '.join(names)}; found only"
@@ -173,6 +208,7 @@ def _answer(
     found: list[Found],
     user_model: LinearModel | None,
     with_delays: bool,
+    compatibility: Compatibility | None,
 ) -> Answer:
     graded = [(f, grade(columns, f)) for f in found]
     good = [f for f, g in graded if g.score >= WEAK_GRADE] or found
@@ -199,6 +235,11 @@ def _answer(
     else:
         result = fit("output-error-white" if method == GUST else method, model, fitted)
     result = widened(result, repeats(result))
+    alone = result
+    moved: tuple[Moved, ...] = ()
+    if compatibility is not None:
+        moved = moved_by(result, fitted, [_inside(columns, f) for f in used], compatibility, trim)
+        result = carried(result, moved)
     outputs = result.fitted if result.residual_kind == "output" else ()
     simulated = outputs if len(outputs) else _simulated(model, result, fitted)
     residuals = [m.outputs - y for m, y in zip(fitted, simulated, strict=True)]
@@ -215,11 +256,12 @@ def _answer(
         fits=signal_fits(model.outputs, [m.outputs for m in fitted], residuals),
         validation=_validate(model, result, unseen),
         refused=refusals(result, fitted),
-        together=collinearity(result),
+        together=collinearity(alone),
         modes=modes(result),
-        coefficients=() if airframe is None else coefficients(result, airframe, condition),
+        coefficients=(() if airframe is None else coefficients(alone, airframe, condition, moved)),
         still=constant_inputs(model, fitted),
         delays=delays,
+        corrections=() if compatibility is None else corrections(compatibility),
     )
 
 
@@ -278,15 +320,20 @@ def _cut(columns: Mapping[str, Array], model: LinearModel, item: Found) -> Maneu
         raise IdentificationError(
             f"model {model.name} needs {', '.join(missing)}, which the data do not have"
         )
+    cut = _inside(columns, item)
+    return Maneuver(
+        dt_s=float(cut["t_s"][1] - cut["t_s"][0]),
+        inputs=np.column_stack([cut[c] for c in model.inputs]),
+        outputs=np.column_stack([cut[c] for c in model.outputs]),
+        name=f"{item.kind} on {item.axis.split('_')[0]} at {item.start_s:.1f} s",
+    )
+
+
+def _inside(columns: Mapping[str, Array], item: Found) -> dict[str, Array]:
     t = columns["t_s"]
     first, last = item.fit_window()
     inside = (t >= first) & (t <= last)
-    return Maneuver(
-        dt_s=float(t[1] - t[0]),
-        inputs=np.column_stack([columns[c][inside] for c in model.inputs]),
-        outputs=np.column_stack([columns[c][inside] for c in model.outputs]),
-        name=f"{item.kind} on {item.axis.split('_')[0]} at {item.start_s:.1f} s",
-    )
+    return {name: values[inside] for name, values in columns.items()}
 
 
 def _constants_only(model: LinearModel, result: FitResult) -> tuple[LinearModel, Array]:

@@ -1,0 +1,148 @@
+"""Take out of a flight's columns what its reconstruction told, and say what stays open.
+
+Signals obey s = (1 + scale) x + bias in the IMU's own, turned axes; V squared of a pitot likewise.
+What reconstruction does not tell is left as the calibration has it: its value is the
+calibration's word, and its uncertainty stays in the intervals.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, INERTIAL, PITOT
+from host.sysid.compatibility.path_data import DENSITY_SHARE
+from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
+
+RATES = tuple(f"{a}_radps" for a in "pqr")
+FORCES = tuple(f"a{a}_mps2" for a in "xyz")
+IN_COLUMNS = (*INERTIAL, *FLOW, *PITOT)  # errors of single instants
+CORRECTED = (*IN_COLUMNS, *DELAYS)
+LATE = dict(zip(DELAYS, (AIR[1:], AIR[:1]), strict=True))
+LEAST_PRESSURE_SHARE = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """One error taken out: value, 95 % half-width left, and what the calibration left open."""
+
+    name: str
+    value: float
+    half_width: float
+    calibration_half_width: float
+
+
+def corrections(found: Compatibility) -> tuple[Correction, ...]:
+    """Return what the data tell and the columns can be rid of."""
+    return tuple(
+        Correction(f.name, f.value, f.half_width, f.prior_half_width)
+        for f in found.findings
+        if f.told and f.name in CORRECTED
+    )
+
+
+def deviations(found: Compatibility) -> dict[str, float]:
+    """Return what stays open of every error: told ones as found, others as calibrated."""
+    return {
+        f.name: (f.half_width if f.told else f.prior_half_width) / NORMAL
+        for f in found.findings
+        if f.name in CORRECTED
+    }
+
+
+def pressure_part(found: Compatibility) -> float:
+    """Return the part of an error of V squared that is the pitot's, not the density's."""
+    total = found["pitot_scale"].prior_half_width / NORMAL
+    return max(1.0 - (DENSITY_SHARE / max(total, DENSITY_SHARE)) ** 2, LEAST_PRESSURE_SHARE)
+
+
+def without_errors(
+    columns: Mapping[str, Array], errors: Mapping[str, float], part: float = 1.0
+) -> dict[str, Array]:
+    """Return columns without errors of single instants.
+
+    Parameters
+    ----------
+    columns : mapping of (n,) arrays
+        SI, already at the CG.
+    errors : mapping
+        Names of `IN_COLUMNS` to values; others are not looked at.
+    part : float
+        Of ``pitot_scale`` that is dynamic pressure; the rest is density.
+    """
+    result = dict(columns)
+    at = errors.get
+    tilt = np.array([at(f"imu_tilt_{a}_rad", 0.0) for a in "xyz"])
+    for names, bias, scale in (
+        (RATES, "gyro_bias_{}_radps", "gyro_scale_{}"),
+        (FORCES, "accel_bias_{}_mps2", "accel_scale_{}"),
+    ):
+        if not all(name in columns for name in names):
+            continue
+        plain = np.stack(
+            [
+                (columns[name] - at(bias.format(a), 0.0)) / (1.0 + at(scale.format(a), 0.0))
+                for name, a in zip(names, "xyz", strict=True)
+            ]
+        )
+        result |= zip(names, plain + np.cross(tilt, plain, axisb=0, axisc=0), strict=True)
+    for name in ("alpha", "beta"):
+        if f"{name}_rad" in columns:
+            zero, scale = at(f"{name}_zero_rad", 0.0), at(f"{name}_scale", 0.0)
+            result[f"{name}_rad"] = (columns[f"{name}_rad"] - zero) / (1.0 + scale)
+    return result | _pitot(columns, at("pitot_scale", 0.0), at("pitot_zero_pa", 0.0), part)
+
+
+def _pitot(
+    columns: Mapping[str, Array], scale: float, zero: float, part: float
+) -> dict[str, Array]:
+    density = columns.get("density_kgpm3", np.array(1.225))
+    fixed = {}
+    if AIR[0] in columns:
+        square = columns[AIR[0]] ** 2 - 2.0 * zero / density
+        fixed[AIR[0]] = np.sqrt(np.maximum(square, 0.0) / (1.0 + scale))
+    if "qbar_pa" in columns:
+        fixed["qbar_pa"] = (columns["qbar_pa"] - zero) / (1.0 + part * scale)
+    if "density_kgpm3" in columns:
+        fixed["density_kgpm3"] = density * (1.0 + scale) / (1.0 + part * scale)
+    return fixed
+
+
+def without_delays(columns: Mapping[str, Array], delays: Mapping[str, float]) -> dict[str, Array]:
+    """Return columns read later by their sensors' delays (s) behind the IMU."""
+    result = dict(columns)
+    for delay, names in LATE.items():
+        for name in names:
+            if name in columns and delay in delays:
+                t = columns["t_s"]
+                result[name] = np.interp(t + delays[delay], t, columns[name])
+    return result
+
+
+def correction_words(taken: Sequence[Correction]) -> list[str]:
+    """Return what was taken out of the columns, for a verdict."""
+    if not taken:
+        return []
+    parts = ", ".join(f"{c.name} {c.value:.3g} +- {c.half_width:.2g}" for c in taken)
+    return textwrap.wrap(
+        f"taken out of the columns before the linear fits: {parts}",
+        100,
+        subsequent_indent="  ",
+        break_on_hyphens=False,
+    )
+
+
+def correction_document(taken: Sequence[Correction]) -> dict[str, dict[str, float]]:
+    """Return the same for JSON."""
+    return {
+        c.name: {
+            "value": c.value,
+            "half_width": c.half_width,
+            "calibration_half_width": c.calibration_half_width,
+        }
+        for c in taken
+    }

@@ -1,0 +1,285 @@
+"""What reconstruction tells is taken out before the linear fits; what stays open is carried."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.cli import main
+from host.sysid import Maneuver, fit
+from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data
+from host.sysid.aircraft.airframe import AirframeData, Condition, Moved, coefficients
+from host.sysid.answer.truth import true_coefficients
+from host.sysid.answer.verdict import model_lines, words
+from host.sysid.compatibility.corrections import (
+    IN_COLUMNS,
+    corrections,
+    deviations,
+    pressure_part,
+    without_delays,
+    without_errors,
+)
+from host.sysid.compatibility.reconstruction import Compatibility, Finding, reconstruct
+from host.sysid.flight import linear
+from host.sysid.flight.carried import carried, moved_by
+from host.sysid.flight.linear import identify
+from host.sysid.flight.tables import even_columns
+from host.sysid.models.templates import Trim, template
+from host.sysid.numerics.problem import OutputProblem
+from host.twin.virtual import virtual_flight
+
+NAME = "ultrastick25e"
+Columns = dict[str, np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def flown() -> tuple[Columns, list[dict[str, Any]], Compatibility]:
+    """One recorded flight in light turbulence, its maneuvers, what its sensors are wrong by."""
+    flight = virtual_flight("demo", 901)
+    columns, _ = even_columns(flight.table)
+    found = reconstruct(columns, airframe_data(NAME), instrument_data(NAME))
+    return columns, flight.maneuvers, found
+
+
+def finding(name: str, value: float, half: float, prior: float) -> Finding:
+    """Return a finding that is told if its interval says so."""
+    return Finding(name, value, half, prior, half < 0.7 * prior, "")
+
+
+def motion(samples: int = 200) -> Columns:
+    """Return made-up true signals."""
+    t = np.arange(samples) * 0.01
+    columns = {"t_s": t}
+    names = ("p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2")
+    for k, name in enumerate(names):
+        columns[name] = (0.3 + k) * np.sin((1.0 + 0.3 * k) * t + k)
+    columns |= {"alpha_rad": 0.1 * np.cos(t), "beta_rad": 0.05 * np.sin(2.0 * t)}
+    columns["density_kgpm3"] = np.full(samples, 1.2)
+    columns["airspeed_mps"] = 17.0 + np.sin(t)
+    return columns | {"qbar_pa": 0.6 * columns["airspeed_mps"] ** 2}
+
+
+def test_an_instrument_that_errs_is_put_right_to_the_digit() -> None:
+    """Sensors by their own formula: turned axes, then scale and bias; V squared for the pitot."""
+    true = motion()
+    rng = np.random.default_rng(3)
+    errors = {name: float(rng.uniform(-0.02, 0.02)) for name in IN_COLUMNS}
+    errors["pitot_zero_pa"] = 3.0
+    measured = dict(true)
+    x, y, z = (errors[f"imu_tilt_{a}_rad"] for a in "xyz")
+    turned = np.linalg.inv(np.eye(3) + np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]))
+    for kind, sensor, unit in (("pqr", "gyro", "radps"), (("ax", "ay", "az"), "accel", "mps2")):
+        body = turned @ np.stack([true[f"{k}_{unit}"] for k in kind])
+        for row, k, a in zip(body, kind, "xyz", strict=True):
+            scale, bias = errors[f"{sensor}_scale_{a}"], errors[f"{sensor}_bias_{a}_{unit}"]
+            measured[f"{k}_{unit}"] = (1.0 + scale) * row + bias
+    for name in ("alpha", "beta"):
+        angle = (1.0 + errors[f"{name}_scale"]) * true[f"{name}_rad"] + errors[f"{name}_zero_rad"]
+        measured[f"{name}_rad"] = angle
+    part = 0.6
+    pitot, thin = 1.0 + part * errors["pitot_scale"], 1.0 + (1.0 - part) * errors["pitot_scale"]
+    measured["qbar_pa"] = pitot * true["qbar_pa"] + errors["pitot_zero_pa"]
+    measured["density_kgpm3"] = true["density_kgpm3"] / thin
+    measured["airspeed_mps"] = np.sqrt(2.0 * measured["qbar_pa"] / measured["density_kgpm3"])
+    back = without_errors(measured, errors, part)
+    for name, values in true.items():
+        tolerance = 2e-4 if name in ("airspeed_mps", "qbar_pa", "density_kgpm3") else 1e-12
+        np.testing.assert_allclose(back[name], values, rtol=tolerance, atol=1e-12, err_msg=name)
+
+
+def test_only_what_is_told_is_taken_out() -> None:
+    found = Compatibility(
+        (
+            finding("gyro_scale_x", 0.01, 0.003, 0.0113),
+            finding("alpha_scale", -0.02, 0.03, 0.0288),
+            finding("pitot_scale", 0.01, 0.03, 0.031),
+            finding("wind_north_mps", -3.0, 0.1, 19.6),
+        ),
+        {},
+        (),
+        gps=True,
+    )
+    assert [c.name for c in corrections(found)] == ["gyro_scale_x"]
+    left = deviations(found)
+    assert left["gyro_scale_x"] == pytest.approx(0.003 / 1.96, rel=1e-3)
+    assert left["alpha_scale"] == pytest.approx(0.0288 / 1.96, rel=1e-3)
+    assert "wind_north_mps" not in left
+    # 3 % of pitot, evenly, two of them, against 1 % of density.
+    assert pressure_part(found) == pytest.approx(0.6, abs=0.01)
+
+
+def test_a_late_vane_is_read_later() -> None:
+    t = np.arange(0.0, 2.0, 0.01)
+    columns = {"t_s": t, "alpha_rad": np.sin(3.0 * (t - 0.012)), "airspeed_mps": np.cos(t)}
+    back = without_delays(columns, {"vane_delay_s": 0.012})
+    np.testing.assert_allclose(back["alpha_rad"][:-3], np.sin(3.0 * t)[:-3], atol=2e-4)
+    np.testing.assert_array_equal(back["airspeed_mps"], columns["airspeed_mps"])
+
+
+def short_period() -> tuple[Columns, Maneuver, Any]:
+    """Return a noisy short period with its columns and its model."""
+    trim = Trim(17.0, 0.08, 0.08)
+    model = template("short-period", trim)
+    names = [p.name for p in model.parameters]
+    values = {"Z_alpha": -5.0, "Z_de": -0.6, "Z_q": -0.1, "M_alpha": -60.0, "M_q": -6.0}
+    theta = np.array([values.get(n, -70.0) for n in names])
+    u = np.zeros((500, 1))
+    u[60:90], u[90:110], u[110:120], u[120:130] = 0.05, -0.05, 0.05, -0.05
+    problem = OutputProblem(model, [Maneuver(0.01, u, np.zeros((500, len(model.outputs))))])
+    response = problem.respond(np.concatenate([theta, np.zeros(len(problem.names) - len(theta))]))
+    assert response is not None
+    y = response[0].y.T
+    y = y + 0.02 * y.std(axis=0) * np.random.default_rng(2).standard_normal(y.shape)
+    columns = motion(500) | {"elevator_rad": u[:, 0]}
+    columns |= dict(zip(model.outputs, y.T, strict=True))
+    columns["airspeed_mps"], columns["qbar_pa"] = np.full(500, 17.0), np.full(500, 173.4)
+    columns["alpha_rad"] = columns["alpha_rad"] + 0.08
+    columns["theta_rad"] = np.full(500, 0.08)
+    maneuver = Maneuver(0.01, u, np.column_stack([columns[c] for c in model.outputs]))
+    return columns, maneuver, model
+
+
+def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
+    """A gyro's scale, a vane's, and the pitot's that moves the trim of the model as well."""
+    columns, maneuver, model = short_period()
+    result = fit("output-error-white", model, [maneuver])
+    trim = Trim(17.0, float(columns["alpha_rad"].mean()), 0.08)
+    model = template("short-period", trim)
+    result = fit("output-error-white", model, [maneuver])
+    size = {"gyro_scale_y": 0.01, "alpha_scale": 0.01, "pitot_scale": 0.02}
+    found = Compatibility(
+        tuple(finding(n, 0.0, 1.96 * s, 1.96 * s) for n, s in size.items()), {}, (), gps=True
+    )
+    moved = {m.error: m for m in moved_by(result, [maneuver], [columns], found, trim)}
+    assert set(moved) == set(size)
+    for error, deviation in size.items():
+        other = without_errors(columns, {error: deviation}, pressure_part(found))
+        bent = Trim(
+            float(other["airspeed_mps"].mean()), float(other["alpha_rad"].mean()), trim.theta_rad
+        )
+        data = Maneuver(0.01, maneuver.inputs, np.column_stack([other[c] for c in model.outputs]))
+        again = fit("output-error-white", template("short-period", bent), [data])
+        expected = again.estimate[:6] - result.estimate[:6]
+        step = moved[error].estimate[:6] - result.estimate[:6]
+        largest = np.max(np.abs(expected / result.estimate[:6]))
+        assert largest > 0.004, error
+        np.testing.assert_allclose(
+            step / result.estimate[:6], expected / result.estimate[:6], atol=0.1 * largest
+        )
+    assert moved["pitot_scale"].qbar_gain == pytest.approx(1.0 - 0.02 * pressure_part(found), 1e-3)
+    wide = carried(result, tuple(moved.values()))
+    k = result.index("M_alpha")
+    expected_half = np.hypot(
+        result.half_width()[k],
+        1.96 * np.linalg.norm([m.estimate[k] - result.estimate[k] for m in moved.values()]),
+    )
+    assert wide.half_width()[k] == pytest.approx(expected_half, rel=1e-3)
+
+
+def test_a_coefficient_carries_the_larger_of_airframe_and_sensor() -> None:
+    columns, maneuver, model = short_period()
+    result = fit("output-error-white", model, [maneuver])
+    airframe = AirframeData("a", 2.0, 0.04, 0.08, 0.12, 0.0, 0.3, 1.2, 0.25, pressure_share=0.02)
+    condition = Condition(17.0, float(columns["qbar_pa"].mean()))
+
+    def half(*moved: Moved) -> float:
+        table = coefficients(result, airframe, condition, moved)
+        return next(c.half_width / abs(c.value) for c in table if c.name == "Cm_alpha")
+
+    def pitot(share: float) -> Moved:
+        return Moved("pitot_scale", result.estimate, 1.0, 1.0 + share)
+
+    turned = result.estimate.copy()
+    turned[result.index("M_alpha")] *= 1.03
+    plain = half()
+    assert half(pitot(0.01)) == pytest.approx(plain, rel=1e-9)
+    assert half(pitot(0.05)) == pytest.approx(
+        np.sqrt(plain**2 + 1.96**2 * ((1.0 - 1.0 / 1.05) ** 2 - 0.02**2)), rel=1e-3
+    )
+    assert half(Moved("imu_tilt_y_rad", turned, 1.0, 1.0)) == pytest.approx(
+        np.hypot(plain, 1.96 * 0.03), rel=1e-3
+    )
+
+
+def test_equation_error_no_longer_takes_late_vanes_for_damping(
+    flown: tuple[Columns, list[dict[str, Any]], Compatibility],
+) -> None:
+    columns, maneuvers, found = flown
+    airframe = airframe_data(NAME)
+    for axis, name in (("longitudinal", "Cm_q"), ("lateral", "Cn_r")):
+        truth = true_coefficients({"maneuver": maneuvers}, axis)[name]
+        errors = []
+        for known in (None, found):
+            answer = identify(
+                columns,
+                names=(axis,),
+                method="equation-error",
+                airframe=airframe,
+                compatibility=known,
+            )[0]
+            value = next(c.value for c in answer.coefficients if c.name == name)
+            errors.append(abs(value / truth - 1.0))
+        assert errors[0] > 0.2
+        assert errors[1] < 0.5 * errors[0]
+
+
+def test_told_errors_are_not_taken_out_twice(
+    flown: tuple[Columns, list[dict[str, Any]], Compatibility],
+) -> None:
+    """The fit finds what is left of the vanes' delay; both together are the same as before."""
+    columns, _, found = flown
+    airframe = airframe_data(NAME)
+    before, after = (
+        identify(columns, names=("longitudinal",), airframe=airframe, compatibility=known)[0]
+        for known in (None, found)
+    )
+    taken = {c.name: c.value for c in after.corrections}
+    assert not before.corrections
+    assert taken["vane_delay_s"] > 0.003
+    total = after.delays["delay_vanes_s"][0] + taken["vane_delay_s"]
+    assert total == pytest.approx(before.delays["delay_vanes_s"][0], abs=0.001)
+
+
+def test_a_delay_at_its_bound_is_called_so(
+    flown: tuple[Columns, list[dict[str, Any]], Compatibility], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    columns, _, _ = flown
+    tight = tuple(
+        replace(d, limit_s=0.001) if d.name == "delay_vanes_s" else d for d in linear.DELAYS
+    )
+    monkeypatch.setattr(linear, "DELAYS", tight)
+    answers = identify(columns, airframe=airframe_data(NAME))
+    for answer in answers:
+        assert "delay_vanes_s" in answer.at_bound
+        assert any("delay_vanes_s is at its bound" in line for line in words([answer], []))
+        assert any(
+            "delay_vanes_s" in line and "at its bound" in line for line in model_lines(answer)
+        )
+
+
+def test_the_verb_says_what_it_corrected_and_can_leave_it(
+    flown: tuple[Columns, list[dict[str, Any]], Compatibility],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    columns, _, _ = flown
+    source = tmp_path / "flight.csv"
+    pd.DataFrame(columns).to_csv(source, index=False)
+    options = ["identify", str(source), "--model", "short-period", "--aircraft", NAME]
+    assert main([*options, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)["answers"][0]
+    assert answer["corrections"]["gyro_bias_x_radps"]["half_width"] > 0.0
+    assert any("taken out of the columns" in line for line in answer["verdict"])
+    assert main([*options, "--json", "--no-corrections"]) == 0
+    plain = json.loads(capsys.readouterr().out)["answers"][0]
+    assert plain["corrections"] == {}
+    assert not any("taken out" in line for line in plain["verdict"])
+    alone = pd.DataFrame({k: v for k, v in columns.items() if not k.startswith("v_")})
+    alone.to_csv(source, index=False)
+    assert main(options) == 0
+    text = capsys.readouterr().out
+    assert "unobservable without GPS" in text
+    assert "pitot_scale" not in text.split("short-period")[0]
