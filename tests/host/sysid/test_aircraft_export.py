@@ -2,16 +2,31 @@
 
 import subprocess
 import sys
+import tempfile
 import tomllib
+from dataclasses import replace
+from itertools import starmap
 from pathlib import Path
 
+import numpy as np
 import pytest
 from host.cli import main
+from host.compiled import Array
 from host.sysid.aircraft.aircraft_file import airframe_data
-from host.sysid.answer.aircraft_export import AXES, CONTROLS
+from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
+from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document
 from host.sysid.answer.truth import read_truth, true_coefficients
+from host.sysid.coefficients.answer import Flight, Pull
+from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.flight.linear import identify
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.tables import even_columns, read_columns
+from host.twin.aircraft import tomlout
+from host.twin.aircraft.airframe import Airframe
+from host.twin.aircraft.file import load as load_aircraft
+from host.twin.aircraft.file import read_document
+from host.twin.motion.local import coefficients, local_derivatives
+from host.twin.testcard.cards import load
+from host.twin.virtual import virtual_flight
 
 JSBSIM = """
 import sys, jsbsim
@@ -79,6 +94,75 @@ def test_identifying_the_second_flight_gives_the_same_aircraft(saved: Path) -> N
         for c in answer.coefficients:
             if c.name in ("Cm_alpha", "Cm_de", "Cl_p", "Cn_beta", "Cn_dr"):
                 assert c.value == pytest.approx(expected[c.name], rel=0.25), c.name
+
+
+def test_coefficients_alone_are_saved_flown_and_found_again(saved: Path) -> None:
+    """The answer of a first flight is the truth of a second one."""
+    again, xml = saved / "coefficients.toml", saved / "coefficients.xml"
+    source = str(saved / "one/flight.csv")
+    for path in (again, xml):
+        flags = ["--aircraft", "ultrastick25e", "--model", "coefficients"]
+        assert main(["identify", source, *flags, "--save-model", str(path)]) == 0
+    assert "<fdm_config" in xml.read_text()[:400]
+    table = read_document(again)["aerodynamics"]
+    assert isinstance(table, dict)
+    assert "+-" in table["sources"]["cm_q"]
+    assert "+-" in table["sources"]["cd_0"]
+    card = load("multisine")
+    own = replace(card, aircraft=str(again), sensors=replace(card.sensors, tolerances=False))
+    flight = virtual_flight(own, 11, chain="none")
+    columns, _ = even_columns(flight.table)
+    found = {c.name: c for c in identify_coefficients(columns, str(again)).coefficients}
+    missed = []
+    names = [(f"{axis}_{k}", f"{file}_{CONTROLS.get(k, k)}") for axis, file in AXES.items()
+             for k in ("alpha", "q", "beta", "p", "r", "de", "da", "dr")]  # fmt: skip
+    for name, key in names:
+        if key in table and table["sources"].get(key, "").startswith("identified"):
+            gap = abs(found[name].value - table[key][0])
+            missed += [name] if gap > found[name].half_width else []
+    assert len(missed) <= 2
+    # Intervals a quarter as wide would not hold: the bound means something.
+    assert abs(found["CD_0"].value - table["cd_0"]) <= 1.2 * found["CD_0"].half_width
+
+
+def test_bends_have_their_place_in_the_tables() -> None:
+    def known(name: str, value: float) -> Coefficient:
+        return Coefficient(name, value, 0.01, 0.01, 0.02)
+
+    trim, lift = 0.07, 0.3
+    values = {
+        "CL_alpha": 4.0, "CD_alpha": 0.24, "CD_0": 0.03, "CL_de": 0.5, "CD_de": 0.05,
+        "Cm_alpha": -1.6, "Cm_alpha2": -4.0, "Cm_q": -11.0, "Cm_alpha_q": -40.0, "Cm_V": 0.3,
+    }  # fmt: skip
+    flight = Flight(17.0, 170.0, trim, lift, 0.04, Pull(2.0, -0.1, 0.0), (0.02, 0.14))
+    table = CoefficientTable("longitudinal", "by hand", trim, tuple(starmap(known, values.items())))
+    document, replaced = aircraft_document([table], "ultrastick25e", flight)
+    assert set(replaced) == set(values) - {"Cm_V"}
+    assert "Cm_V 0.3" in document["aerodynamics"]["sources"]["not_carried"]
+    before = load_aircraft("ultrastick25e").airframe()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bent.toml"
+        path.write_text(tomlout.dumps(document))
+        after = load_aircraft(path).airframe()
+
+    def at(frame: Airframe, alpha: float, q_hat: float = 0.0, beta: float = 0.0) -> Array:
+        return coefficients(frame, np.array([alpha, beta, 0.0, q_hat, 0.0, 0.0, 0.0, 0.0]))
+
+    for step in (-0.04, 0.03):
+        bend = -1.6 * step - 4.0 * step**2
+        assert at(after, trim + step)[4] - at(after, trim)[4] == pytest.approx(bend, abs=1e-9)
+        damping = (at(after, trim + step, 0.01) - at(after, trim + step))[4] / 0.01
+        assert damping == pytest.approx(-11.0 - 40.0 * step, rel=1e-9)
+        # What was not identified is as it was, between and beyond the old nodes.
+        aside = at(after, trim + step, 0.0, 0.05) - at(before, trim + step, 0.0, 0.05)
+        np.testing.assert_allclose(aside[[2, 3, 5]], 0.0, atol=1e-12)
+    assert at(after, trim)[4] == pytest.approx(at(before, trim)[4], abs=1e-12)
+    # At the lift flown the polar has the slope that was identified, the elevator's part its own.
+    here = (lift - at(after, 0.0)[0]) / 4.0
+    local = local_derivatives(after, np.array([here, 0, 0, 0, 0, 0, 0, 0]), 1e-4)
+    assert local["CD_alpha"] == pytest.approx(0.24, rel=1e-3)
+    assert local["CD_de"] == pytest.approx(0.05, rel=1e-3)
+    assert local["CD_0"] == pytest.approx(0.03, rel=1e-3)
 
 
 def test_jsbsim_reads_and_flies_it(saved: Path) -> None:

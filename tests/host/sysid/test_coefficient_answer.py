@@ -120,6 +120,14 @@ def test_says_what_to_trust_and_why_not(
     assert "tilt" in table["Cn_p"]["widened_by"]
     assert not table["Cm_q"]["flagged"]
     assert any("do not rely on Cn_p" in line for line in document["verdict"])
+    assert any("prediction of unseen maneuvers (9 of 9" in line for line in document["verdict"])
+    unseen = document["unseen"]["nrmse"]
+    assert set(unseen) == {"CL", "CD", "Cm", "CY", "Cl", "Cn"}
+    assert all(s["fitted"] < s["unseen"] < 1.1 * s["fitted"] for s in unseen.values())
+    scattered = {n: r for n, r in document["repeats"].items() if r["widened_by"] > 1.0}
+    assert all(r["p_value"] < 0.01 for r in scattered.values())
+    named = [line for line in document["verdict"] if "do not agree on" in line]
+    assert len(named) == len(scattered)
     more = ["--plots", str(tmp_path / "plots"), "--save-aircraft", str(again)]
     truth = ["--truth", str(folder / "flight.truth.toml"), "--mat", str(tmp_path / "x.mat")]
     assert main(["identify", source, *flags, *more, *truth]) == 0
@@ -131,8 +139,8 @@ def test_says_what_to_trust_and_why_not(
     }
     content = io.loadmat(tmp_path / "x.mat", squeeze_me=True)
     assert content["coefficients_lateral"]["B"].item().shape == (4, 2)
-    assert main(["identify", source, *flags, "--save-model", str(tmp_path / "x.toml")]) == 2
-    assert "--save-aircraft" in capsys.readouterr().err
+    assert main(["identify", source, *flags, "--save-model", str(tmp_path / "x.toml")]) == 0
+    assert (tmp_path / "x.toml").read_text() == again.read_text()
     with again.open("rb") as file:
         saved = tomllib.load(file)["aerodynamics"]
     assert saved["cm_q"][0] == pytest.approx(table["Cm_q"]["value"], rel=1e-6)

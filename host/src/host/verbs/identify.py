@@ -43,7 +43,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="NAME",
         help="estimator, repeatable for a side-by-side table; 'list' shows them",
     )
-    parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: sensor positions, mass;"
+    parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: mass, sizes, sensors;"
                         " gives coefficients")  # fmt: skip
     parser.add_argument("--truth", type=Path, metavar="TOML",
                         help="truth of a simulated flight: compare with it")  # fmt: skip
@@ -318,21 +318,16 @@ def _write(
     if args.mat:
         _write_mat(args.mat, answers, direct)
     for path in (args.save_aircraft, args.save_model):
-        if path and (path is args.save_aircraft or path.suffix == ".xml"):
-            _write_aircraft(args, path, tables)
+        # Coefficients alone are an aircraft, not a linear model.
+        whole = path is args.save_aircraft or not answers
+        if path and path.suffix != ".mat" and (whole or path.suffix == ".xml"):
+            _write_aircraft(args, path, tables, direct)
     if args.save_model and args.save_model.suffix != ".xml":
         from host.sysid.models.model_file import model_text
 
         if args.save_model.suffix == ".mat":
             _write_mat(args.save_model, answers, direct)
             return
-        if not answers:
-            from host.sysid.errors import IdentificationError
-
-            raise IdentificationError(
-                f"{args.save_model}: coefficients are an aircraft; use --save-aircraft, or a name"
-                " that ends in .xml or .mat"
-            )
         for number, answer in enumerate(answers):
             path = args.save_model
             if number:
@@ -340,13 +335,18 @@ def _write(
             path.write_text(model_text(answer.model, answer.result, answer.trim))
 
 
-def _write_aircraft(args: argparse.Namespace, path: Path, tables: list[CoefficientTable]) -> None:
+def _write_aircraft(
+    args: argparse.Namespace,
+    path: Path,
+    tables: list[CoefficientTable],
+    direct: CoefficientAnswer | None,
+) -> None:
     from host.sysid.answer.aircraft_export import save_aircraft
     from host.sysid.errors import IdentificationError
 
     if not args.aircraft:
         raise IdentificationError(f"{path}: an aircraft needs mass and geometry; give --aircraft")
-    save_aircraft(path, tables, args.aircraft)
+    save_aircraft(path, tables, args.aircraft, direct.fit.flight if direct else None)
 
 
 def _write_mat(path: Path, answers: list[Answer], direct: CoefficientAnswer | None) -> None:

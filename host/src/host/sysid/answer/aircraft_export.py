@@ -1,19 +1,23 @@
 """An answer as an aircraft: a file that `host simulate` flies again, and JSBSim's XML of it.
 
 What was identified replaces the coefficients of the aircraft file the answer was made with;
-everything else (mass, propeller, servos, what the data could not tell) stays and says so.
+everything else (mass, propeller, servos, what the data could not tell) stays and says so. Between
+two angles of attack the tables of a file are straight, so a slope that changes with alpha has its
+place in it (Cm_alpha2 in cm_alpha, Cm_alpha_q in cm_q); other bends have none and are named.
 """
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from host.sysid.aircraft.airframe import CoefficientTable
+from host.compiled import Array
+from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
+from host.sysid.coefficients.answer import Flight
 from host.sysid.errors import IdentificationError
 
 # Names of the aircraft file for the names of the answer.
@@ -23,18 +27,21 @@ ROTOR_RADPS = 500.0  # where JSBSim's rotor starts; it finds its own speed withi
 
 
 def aircraft_document(
-    tables: Sequence[CoefficientTable], source: str
+    tables: Sequence[CoefficientTable], source: str, flight: Flight | None = None
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the aircraft file with identified coefficients, and the names that were replaced.
 
     A coefficient whose 95 % half-width exceeds its value is not used. `cl_0` and `cm_0` move so
-    that lift and pitching moment at the trim's angle of attack stay what the file had.
+    that lift and pitching moment at the trim's angle of attack stay what the file had. What is
+    known and has no place in the file stands under ``not_carried`` in its sources.
 
     Parameters
     ----------
     tables : sequence of CoefficientTable
     source : str
         The aircraft they were made with: a name or a file.
+    flight : Flight, optional
+        Of a direct fit of coefficients: gives the drag polar and the range of angles of attack.
 
     Raises
     ------
@@ -47,22 +54,38 @@ def aircraft_document(
     document: dict[str, Any] = dict(aircraft.read_document(source))
     table = dict(document["aerodynamics"])
     origins = dict(table.get("sources", {}))
-    nodes = np.asarray(table["alpha_rad"], dtype=np.float64)
-    replaced = []
+    replaced: list[str] = []
     for found in tables:
-        for c in found.coefficients:
+        known = {c.name: c for c in found.coefficients if c.half_width < abs(c.value)}
+        bent = [n for n in known if n.split("_")[1:2] in (["alpha"], ["alpha2"])]
+        if flight is not None and any(not n.endswith("_alpha") for n in bent):
+            _add_nodes(table, flight.alpha_range_rad)
+        nodes = np.asarray(table["alpha_rad"], dtype=np.float64)
+        for c in known.values():
             axis, _, label = c.name.partition("_")
             key = f"{AXES.get(axis, axis)}_{CONTROLS.get(label, label)}"
-            if axis not in AXES or key not in table or not c.half_width < abs(c.value):
+            if axis not in AXES or key not in table:
                 continue
-            if label == "alpha":
+            of_alpha = label == "alpha"
+            bend = known.get(f"{axis}_alpha2" if of_alpha else f"{axis}_alpha_{label}")
+            steeper = 0.0 if bend is None else bend.value
+            if of_alpha:
                 base = f"{AXES[axis]}_0"
-                kept = np.asarray(table[base]) + np.asarray(table[key]) * found.alpha_rad
-                table[base] = (kept - c.value * found.alpha_rad).tolist()
+                at = found.alpha_rad
+                kept = np.asarray(table[base]) + np.asarray(table[key]) * at
+                there = float(np.interp(at, nodes, kept)) - c.value * at + steeper * at**2
+                table[base] = [there] * len(nodes)
                 origins[base] = f"such that {axis} at the trim stays, after {key} was identified"
-            table[key] = [c.value] * len(nodes)
-            origins[key] = f"identified, {found.method}: {c.value:.5g} +- {c.half_width:.2g} (95 %)"
-            replaced.append(c.name)
+            from_rad = (2.0 if of_alpha else 1.0) * found.alpha_rad
+            table[key] = (c.value + steeper * (nodes - from_rad)).tolist()
+            origins[key] = _origin(found.method, c) + ("" if bend is None else f"; {_said(bend)}")
+            replaced += [c.name] if bend is None else [c.name, bend.name]
+        if flight is not None:
+            replaced += _put_drag(table, origins, known, flight, found.method)
+        left = [c for n, c in known.items() if n not in replaced and n[:2] not in ("CX", "CZ")]
+        if flight is not None and left:
+            before = [origins["not_carried"]] if "not_carried" in origins else []
+            origins["not_carried"] = "; ".join([*before, *map(_said, left)])
     if not replaced:
         raise IdentificationError("no coefficient is known well enough to make an aircraft of")
     table["sources"] = origins
@@ -72,13 +95,61 @@ def aircraft_document(
     return document, replaced
 
 
-def save_aircraft(path: Path, tables: Sequence[CoefficientTable], source: str) -> list[str]:
+def _said(c: Coefficient) -> str:
+    return f"{c.name} {c.value:.5g} +- {c.half_width:.2g} (95 %)"
+
+
+def _origin(method: str, c: Coefficient) -> str:
+    return f"identified, {method}: {c.value:.5g} +- {c.half_width:.2g} (95 %)"
+
+
+def _add_nodes(table: dict[str, Any], range_rad: tuple[float, float]) -> None:
+    """Add the ends of the flown angles of attack to the tables, which stay what they are."""
+    old = np.asarray(table["alpha_rad"], dtype=np.float64)
+    new: Array = np.unique(np.concatenate([old, range_rad]))
+    for key, column in table.items():
+        if isinstance(column, list) and len(column) == len(old) and key != "stall_alpha_rad":
+            table[key] = np.interp(new, old, np.asarray(column)).tolist()
+    table["alpha_rad"] = new.tolist()
+
+
+def _put_drag(
+    table: dict[str, Any],
+    origins: dict[str, str],
+    known: Mapping[str, Coefficient],
+    flight: Flight,
+    method: str,
+) -> list[str]:
+    """Put the parabola in lift that has the slope and the drag at zero lift that were identified.
+
+    The file counts the elevator's drag at the same lift, an answer at the same angle of attack.
+    """
+    if not {"CD_0", "CD_alpha", "CL_alpha"} <= known.keys() or flight.lift <= 0.0:
+        return []
+    induced = known["CD_alpha"].value / (2.0 * flight.lift * known["CL_alpha"].value)
+    table["cd_0"], table["induced_factor"] = known["CD_0"].value, induced
+    origins["cd_0"] = _origin(method, known["CD_0"])
+    origins["induced_factor"] = (
+        f"{_origin(method, known['CD_alpha'])}, over 2 CL CL_alpha at CL {flight.lift:.3f}"
+    )
+    used = [n for n in ("CD_0", "CD_alpha", "CD_CL2") if n in known]
+    if {"CD_de", "CL_de"} <= known.keys():
+        own = known["CD_de"].value - 2.0 * induced * flight.lift * known["CL_de"].value
+        table["cd_elevator"] = [own] * len(table["alpha_rad"])
+        origins["cd_elevator"] = f"{_origin(method, known['CD_de'])}, less what lift makes of it"
+        used.append("CD_de")
+    return used
+
+
+def save_aircraft(
+    path: Path, tables: Sequence[CoefficientTable], source: str, flight: Flight | None = None
+) -> list[str]:
     """Write ``.toml`` for `host simulate` or ``.xml`` for JSBSim; return what was replaced."""
     from host.twin.aircraft import file as aircraft
     from host.twin.aircraft import tomlout
     from host.twin.aircraft.jsbsim_model import aircraft_xml
 
-    document, replaced = aircraft_document(tables, source)
+    document, replaced = aircraft_document(tables, source, flight)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "identified.toml"
         file.write_text(tomlout.dumps(document), encoding="utf-8")

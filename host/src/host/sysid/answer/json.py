@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from host.sysid.coefficients.answer import METHOD
@@ -13,6 +14,8 @@ from host.sysid.models.modes import Mode
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.flight import CoefficientAnswer
+    from host.sysid.coefficients.joint import Prediction
+    from host.sysid.numerics.repeats import Repeats
 
 
 def maneuver_document(graded: Sequence[tuple[Found, Grade]]) -> list[dict[str, Any]]:
@@ -106,6 +109,34 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
     }
 
 
+def _prediction_document(found: Prediction | None) -> dict[str, Any] | None:
+    """Return how well each maneuver is predicted by the others, one-step, below 4.5 Hz."""
+    if found is None:
+        return None
+    return {
+        "by": "leave-one-out in the last step, one-step, measured signals with gusts",
+        "windows": list(found.windows),
+        "nrmse": {
+            name: {"fitted": found.fitted[name], "unseen": unseen}
+            for name, unseen in found.unseen.items()
+        },
+    }
+
+
+def _repeats_document(found: Repeats) -> dict[str, Any]:
+    """Return how the maneuvers scatter about the joint answer, where that can be judged."""
+    return {
+        name: {
+            "maneuvers": float(found.maneuvers[k]),
+            "chi_square": float(found.chi_square[k]),
+            "p_value": float(found.p_value[k]),
+            "widened_by": float(found.factor[k]),
+        }
+        for k, name in enumerate(found.names)
+        if isfinite(found.p_value[k])
+    }
+
+
 def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dict[str, Any]:
     """Return a direct fit of coefficients: verdict, values, modes, delays, instrument errors."""
     flight = answer.fit.flight
@@ -145,6 +176,8 @@ def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dic
             n: {"value": v, "standard_deviation": d} for n, (v, d) in answer.fit.errors.items()
         },
         "fit": {"one_step": {n: {"nrmse": x.nrmse} for n, x in answer.fit.traces.items()}},
+        "unseen": _prediction_document(answer.fit.prediction),
+        "repeats": _repeats_document(answer.fit.repeats),
         "maneuvers": [
             f"{f.kind} on {f.axis.split('_')[0]} at {f.start_s:.1f} s" for f in answer.used
         ],

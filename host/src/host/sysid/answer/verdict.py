@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 TRUST = 0.10  # 95 % half-width over value: good enough to design with
 FAIR = 0.30
+WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
 NEEDS = {
     "alpha": "an elevator 3-2-1-1 at the short-period frequency",
     "q": "a quicker elevator 3-2-1-1",
@@ -170,7 +171,34 @@ def coefficient_words(answer: CoefficientAnswer) -> list[str]:
         )
     if needs:
         lines.append(f"  to learn them, {'; '.join(sorted(needs))}")
-    return lines
+    repeats = answer.fit.repeats
+    lines += [
+        f"  maneuvers do not agree on {name}: they scatter {repeats.factor[k]:.1f} times what noise"
+        f" allows (chi-square {repeats.chi_square[k]:.1f} on {repeats.maneuvers[k] - 1.0:.1f}),"
+        " interval widened to it"
+        for k, name in enumerate(repeats.names)
+        if repeats.factor[k] > 1.0
+    ]
+    return [*lines, _prediction_words(answer)]
+
+
+def _prediction_words(answer: CoefficientAnswer) -> str:
+    """Return whether each maneuver is predicted by a fit to the others."""
+    found, count = answer.fit.prediction, len(answer.windows)
+    if found is None:
+        return (
+            "  no maneuver could be left out to be predicted: each alone tells a term; fly every"
+            " input at least twice"
+        )
+    poor = [
+        f"{name} (NRMSE {100.0 * unseen:.1f} %, fitted {100.0 * found.fitted[name]:.1f} %)"
+        for name, unseen in found.unseen.items()
+        if unseen > WORSE * found.fitted[name]
+    ]
+    return (
+        f"  prediction of unseen maneuvers ({len(found.windows)} of {count}, each by the others): "
+        + ("fails for " + ", ".join(poor) if poor else "holds for every coefficient")
+    )
 
 
 def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
@@ -207,4 +235,11 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
     lines.append(f"  residual delays: {delays}")
     shares = ", ".join(f"{n} {100.0 * x.nrmse:.1f} %" for n, x in answer.fit.traces.items())
     lines.append(f"  NRMSE (one-step, fitted data, gusts in it): {shares}")
+    if answer.fit.prediction is not None:
+        both = answer.fit.prediction.fitted, answer.fit.prediction.unseen
+        shares = ", ".join(
+            f"{name} {100.0 * fitted:.1f} / {100.0 * both[1][name]:.1f} %"
+            for name, fitted in both[0].items()
+        )
+        lines.append(f"  the same below 4.5 Hz, fitted / unseen (leave-one-out): {shares}")
     return lines

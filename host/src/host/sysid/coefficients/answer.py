@@ -62,7 +62,8 @@ class Pull:
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """Mean condition of the maneuvers; angle of attack, CL and CD of the longitudinal ones."""
+    """Mean condition of the maneuvers; angle of attack with its range, CL and CD of the
+    longitudinal ones."""
 
     airspeed_mps: float
     qbar_pa: float
@@ -70,6 +71,7 @@ class Flight:
     lift: float
     drag: float
     pull: Pull
+    alpha_range_rad: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

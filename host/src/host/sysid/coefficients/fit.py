@@ -388,7 +388,7 @@ def _answer(
             n: (float(e), float(d))
             for n, e, d in zip(names, state[-len(names) :], left, strict=True)
         },
-        Flight(*search.condition, lift, drag, pull),
+        Flight(*search.condition, lift, drag, pull, _flown_range(search, rows)),
         {
             name: trace(
                 equation.left,
@@ -402,6 +402,12 @@ def _answer(
         prediction(last, search.blocks),
         agreement,
     )
+
+
+def _flown_range(search: _Search, rows: _Rows) -> tuple[float, float]:
+    """Return the least and the largest angle of attack of the elevator's maneuvers."""
+    own = [rows.signals["alpha"][b.samples] for b in search.blocks if "u" in b.names]
+    return float(min(x.min() for x in own)), float(max(x.max() for x in own))
 
 
 def _force_means(search: _Search, rows: _Rows) -> dict[str, float]:
