@@ -55,7 +55,7 @@ def find(columns: Mapping[str, Array]) -> list[Found]:
     ----------
     columns : mapping
         `t_s` and any of `elevator_rad`, `aileron_rad`, `rudder_rad`, `throttle`; `airspeed_mps`
-        keeps ground handling out.
+        keeps ground handling out; a maneuver where `bridged` is not zero (`tables`) is left out.
     """
     t = np.asarray(columns["t_s"], dtype=np.float64)
     if len(t) < 32:
@@ -70,7 +70,11 @@ def find(columns: Mapping[str, Array]) -> list[Found]:
             series = np.nan_to_num(np.asarray(columns[axis], dtype=np.float64))
             found += _find_axis(axis, t, series, flying)
     found.sort(key=lambda f: f.start_s)
-    return _bounded(found, float(t[-1]))
+    found = _bounded(found, float(t[-1]))
+    if "bridged" not in columns:
+        return found
+    holes = t[np.asarray(columns["bridged"]) > 0.0]
+    return [f for f in found if not np.any((holes > f.start_s) & (holes < f.end_s))]
 
 
 def _find_axis(axis: str, t: Array, series: Array, flying: BoolArray) -> list[Found]:

@@ -1,36 +1,24 @@
-"""Read a flight into an even SI table: log, CSV, Parquet or MAT, foreign names through a map.
+"""Read a flight into an even SI table: log, text table, Parquet or MAT.
 
-The map is TOML, one line per column of ours:
-
-```toml
-[columns]
-alpha_rad = { from = "AOA", unit = "deg" }
-az_mps2 = { from = "Nz", unit = "g", sign = -1 }
-t_s = { from = "TimeUS", unit = "us" }
-```
+Foreign names, units and signs come in through a map (`column_map`).
 """
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.compiled import Array
+from host.compiled import Array, BoolArray, IntArray
 from host.sysid.errors import IdentificationError
+from host.sysid.flight.column_map import listed, mapped, read_map
+from host.sysid.flight.foreign import TEXT_KINDS, Foreign, from_frame, read_foreign, same_length
+from host.sysid.flight.plausible import check
 
 if TYPE_CHECKING:
     import pandas as pd
 
-UNITS = {
-    "": 1.0, "rad": 1.0, "rad/s": 1.0, "m/s": 1.0, "m/s2": 1.0, "s": 1.0, "Pa": 1.0, "m": 1.0,
-    "deg": np.pi / 180.0, "deg/s": np.pi / 180.0, "kt": 1852.0 / 3600.0, "km/h": 1.0 / 3.6,
-    "ft": 0.3048, "ft/s": 0.3048, "ft/s2": 0.3048, "g": 9.80665, "ms": 1e-3, "us": 1e-6,
-    "hPa": 100.0, "percent": 0.01,
-}  # fmt: skip
 ANGLES = ("alpha_rad", "beta_rad", "phi_rad", "theta_rad", "psi_rad")
 USED = (
     "airspeed_mps", "alpha_rad", "beta_rad", "p_radps", "q_radps", "r_radps",
@@ -40,7 +28,19 @@ USED = (
     "v_north_mps", "v_east_mps", "v_down_mps",
 )  # fmt: skip
 WANTED = frozenset(("t_s", *USED))
+# Missing for longer, one of these makes a maneuver useless; others are only looked at.
+FITTED = (
+    "airspeed_mps", "alpha_rad", "beta_rad", "p_radps", "q_radps", "r_radps",
+    "ax_mps2", "ay_mps2", "az_mps2", "phi_rad", "theta_rad",
+    "elevator_rad", "aileron_rad", "rudder_rad",
+)  # fmt: skip
+READ = (*TEXT_KINDS, ".parquet", ".mat")
+BRIDGED = "bridged"  # column of the table: not zero where a line was drawn over a long gap
 LONGEST_GAP_S = 0.25
+FEWEST = 32
+SLOWEST_S, FASTEST_S = 0.5, 1e-4  # between rows: beyond, the unit of time is wrong
+BACKWARD_S = 1.0  # rows may swap places; a step back over more is another recording
+MOST_EMPTY = 20  # rows of the even grid for each row that was recorded
 
 
 def read_columns(
@@ -64,33 +64,54 @@ def read_columns(
     """
     if not source.exists():
         raise IdentificationError(f"{source}: no such file")
-    notes: list[str] = []
     kind = source.suffix.lower()
-    if kind == ".csv":
-        raw = _from_frame(_csv(source))
-    elif kind == ".parquet":
-        raw = _from_frame(_parquet(source))
-    elif kind == ".mat":
-        raw = _mat(source)
+    own_text = kind in TEXT_KINDS[1:] and mapping is None  # rows of the original logger
+    if kind not in READ or own_text:
+        raw, notes = _log(source, calibration)
+        found = Foreign(raw, notes=notes)
     else:
-        from host.log import read_log
-        from host.summary import calibration_note
-
-        log = read_log(source, calibration=calibration)
-        raw = {k: np.asarray(v, dtype=np.float64) for k, v in log.columns().items() if k in WANTED}
-        poor_columns = [c for c in calibration_note(log)["default_columns"] if c in USED]
-        if poor_columns:
-            notes.append(
-                "default calibration, not this instrument's own, under: " + ", ".join(poor_columns)
-            )
-        poor = [f"{name} {how}" for name, how in log.inputs.items() if how != "measured"]
-        if poor:
-            notes.append(f"control inputs: {', '.join(poor)}")
+        found = read_foreign(source)
+    raw, notes = dict(found.columns), found.notes
     if mapping is not None:
-        raw = {**raw, **_mapped(raw, mapping)}
+        lines = read_map(mapping, ("t_s", *USED))
+        raw |= mapped(found.columns, found.unusable, lines, mapping)
+        foreign = {name: line.foreign for name, line in lines.items()}
+    else:
+        foreign = {}
     if "t_s" not in raw:
-        raise IdentificationError(f"{source}: no column t_s; name it in a map (--map)")
-    return _even({k: raw[k] for k in ("t_s", *USED) if k in raw}, notes), notes
+        raise IdentificationError(
+            f"{source}: no column t_s; name it in a map (--map); "
+            + listed(found.columns, found.unusable)
+        )
+    used = {k: raw[k] for k in ("t_s", *USED) if k in raw}
+    for name in used:
+        remark = found.remarks.get(foreign.get(name, name))
+        notes += [f"{name}: {remark}"] if remark else []
+    same_length(used, source)
+    columns = _even(used, notes)
+    if kind in READ and not own_text:
+        notes += check(columns)
+    return columns, notes
+
+
+def _log(source: Path, calibration: Path | None) -> tuple[dict[str, Array], list[str]]:
+    from host.log import read_log
+    from host.summary import calibration_note
+
+    log = read_log(source, calibration=calibration)
+    raw: dict[str, Array] = {
+        k: np.asarray(v, dtype=np.float64) for k, v in log.columns().items() if k in WANTED
+    }
+    notes: list[str] = []
+    poor_columns = [c for c in calibration_note(log)["default_columns"] if c in USED]
+    if poor_columns:
+        notes.append(
+            "default calibration, not this instrument's own, under: " + ", ".join(poor_columns)
+        )
+    poor = [f"{name} {how}" for name, how in log.inputs.items() if how != "measured"]
+    if poor:
+        notes.append(f"control inputs: {', '.join(poor)}")
+    return raw, notes
 
 
 def even_columns(table: pd.DataFrame) -> tuple[dict[str, Array], list[str]]:
@@ -101,123 +122,118 @@ def even_columns(table: pd.DataFrame) -> tuple[dict[str, Array], list[str]]:
     IdentificationError
         If there is no time in it, or too little of it.
     """
-    raw = {k: v for k, v in _from_frame(table).items() if k in WANTED}
+    raw = {k: v for k, v in from_frame(table).columns.items() if k in WANTED}
     if "t_s" not in raw:
         raise IdentificationError("no column t_s in the table")
     notes: list[str] = []
     return _even(raw, notes), notes
 
 
-def _csv(source: Path) -> pd.DataFrame:
-    import pandas as pd
+def _rows(t: Array, notes: list[str]) -> IntArray:
+    """Return which rows are used, in order of time.
 
-    try:
-        return pd.read_csv(source, comment="#")
-    except (ValueError, UnicodeDecodeError) as error:
-        raise IdentificationError(f"{source}: not a CSV table: {error}") from error
-
-
-def _parquet(source: Path) -> pd.DataFrame:
-    import pandas as pd
-
-    try:
-        return pd.read_parquet(source)
-    except ImportError as error:
+    Raises
+    ------
+    IdentificationError
+        If they are too few or from two recordings.
+    """
+    index = np.flatnonzero(np.isfinite(t))
+    steps = np.diff(t[index])
+    if len(index) < FEWEST:
+        raise IdentificationError(f"{len(index)} samples with a time, at least {FEWEST} are needed")
+    if steps.min() < -BACKWARD_S:
+        k = int(np.argmin(steps))
         raise IdentificationError(
-            f"{source}: Parquet needs the extra: pip install './host[parquet]'"
-        ) from error
-    except (ValueError, OSError) as error:
-        raise IdentificationError(f"{source}: not a Parquet file: {error}") from error
+            f"time jumps back from {t[index[k]]:.6g} to {t[index[k + 1]]:.6g} s in row"
+            f" {index[k + 1] + 1}: more than one recording; cut the file there"
+        )
+    if steps.min() > 0.0:
+        return index
+    swapped = int(np.sum(steps < 0.0))
+    order = index[np.argsort(t[index], kind="stable")]
+    kept: IntArray = order[np.concatenate([[True], np.diff(t[order]) > 0.0])]
+    if len(kept) < FEWEST:
+        raise IdentificationError(
+            f"{len(kept)} different instants, at least {FEWEST} are needed: time stands still"
+        )
+    if swapped:
+        notes.append(f"{swapped} rows came before their time and were sorted in")
+    if len(kept) < len(index):
+        notes.append(
+            f"{len(index) - len(kept)} of {len(index)} rows repeat an instant and were left out"
+        )
+    return kept
 
 
-def _from_frame(frame: pd.DataFrame) -> dict[str, Array]:
-    columns: dict[str, Array] = {}
-    for name in frame.columns:
-        values = frame[name]
-        if values.dtype.kind in "fiub":
-            columns[str(name)] = values.to_numpy(dtype=np.float64)
-    return columns
-
-
-def _mat(source: Path) -> dict[str, Array]:
-    from scipy import io
-
-    try:
-        content = io.loadmat(source, squeeze_me=True, struct_as_record=True)
-    except (ValueError, NotImplementedError, OSError) as error:
-        raise IdentificationError(f"{source}: not a MAT file of version 4 to 7: {error}") from error
-    columns: dict[str, Array] = {}
-    for name, value in content.items():
-        array = np.asarray(value)
-        if array.dtype.names:
-            for field in array.dtype.names:
-                inner = np.asarray(array[field].item() if array.shape == () else array[field])
-                if inner.ndim == 1 and inner.dtype.kind in "fiu":
-                    columns[field] = inner.astype(np.float64)
-        elif array.ndim == 1 and array.dtype.kind in "fiu":
-            columns[name] = array.astype(np.float64)
-    return columns
-
-
-def _mapped(raw: Mapping[str, Array], mapping: Path) -> dict[str, Array]:
-    try:
-        with mapping.open("rb") as file:
-            document = tomllib.load(file)
-    except (OSError, tomllib.TOMLDecodeError) as error:
-        raise IdentificationError(f"{mapping}: cannot be used as a map: {error}") from error
-    lines = document.get("columns")
-    if not isinstance(lines, dict):
-        raise IdentificationError(f"{mapping}: no table [columns]")
-    result: dict[str, Array] = {}
-    for name, line in lines.items():
-        if isinstance(line, str):
-            line = {"from": line}
-        foreign = line.get("from") if isinstance(line, dict) else None
-        unit = line.get("unit", "") if isinstance(line, dict) else ""
-        if name not in ("t_s", *USED):
-            raise IdentificationError(f"{mapping}: unknown column {name}")
-        if foreign not in raw:
-            raise IdentificationError(f"{mapping}: {name}: the data have no column '{foreign}'")
-        if unit not in UNITS:
-            raise IdentificationError(
-                f"{mapping}: {name}: unit '{unit}' unknown; use one of {', '.join(UNITS)}"
-            )
-        scale = UNITS[unit] * float(line.get("sign", 1)) * float(line.get("scale", 1))
-        result[name] = raw[str(foreign)] * scale + float(line.get("offset", 0))
-    return result
+def _grid(t: Array, notes: list[str]) -> Array:
+    """Return even instants at the usual rate of the rows."""
+    gaps = np.diff(t)
+    dt_s = float(np.median(gaps))
+    if not FASTEST_S <= dt_s <= SLOWEST_S:
+        raise IdentificationError(
+            f"a row every {dt_s:.3g} s: {FASTEST_S:g} to {SLOWEST_S:g} s can be used; is the unit"
+            " of t_s right?"
+        )
+    count = int((t[-1] - t[0]) / dt_s) + 1
+    if count > MOST_EMPTY * len(t):
+        k = int(np.argmax(gaps))
+        raise IdentificationError(
+            f"time jumps from {t[k]:.6g} to {t[k + 1]:.6g} s: cut the file there"
+        )
+    if float(gaps.max()) > _long_s(t):
+        many = int((gaps > _long_s(t)).sum())
+        notes.append(
+            f"{many} gap{'s' if many > 1 else ''}, the longest {gaps.max():.2f} s;"
+            " maneuvers over one are left out"
+        )
+    return np.asarray(t[0] + dt_s * np.arange(count))
 
 
 def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
-    """Bring the table to an even grid, unwrap angles once, fill short gaps."""
-    t = columns["t_s"]
-    good = np.isfinite(t)
-    t = t[good]
-    if len(t) < 32 or not np.all(np.diff(t) > 0.0):
-        order = np.argsort(t, kind="stable")
-        keep = np.concatenate([[True], np.diff(t[order]) > 0.0]) if len(t) else np.array([])
-        if len(t) < 32 or keep.sum() < 32:
-            raise IdentificationError(f"{len(t)} samples with a time, at least 32 are needed")
-        notes.append("time ran backwards or stood still; samples were sorted")
-        index = np.flatnonzero(good)[order][keep.astype(bool)]
-    else:
-        index = np.flatnonzero(good)
+    """Bring the table to an even grid, unwrap angles once, draw lines over gaps."""
+    index = _rows(columns["t_s"], notes)
     t = columns["t_s"][index]
-    dt_s = float(np.median(np.diff(t)))
-    grid = t[0] + dt_s * np.arange(int((t[-1] - t[0]) / dt_s) + 1)
-    gaps = np.diff(t)
-    if float(gaps.max()) > LONGEST_GAP_S:
-        notes.append(f"{int((gaps > LONGEST_GAP_S).sum())} gaps, the longest {gaps.max():.2f} s")
+    grid = _grid(t, notes)
     result: dict[str, Array] = {"t_s": grid}
+    bridged = _over(grid, t)
+    missing: list[tuple[float, float, str]] = []
     for name, values in columns.items():
         if name == "t_s":
             continue
         series = values[index]
         seen = np.isfinite(series)
-        if seen.sum() < 0.5 * len(series):
+        if seen.sum() < max(0.5 * len(series), 2):
             notes.append(f"{name}: {100.0 * (1.0 - seen.mean()):.0f} % missing, not used")
             continue
         series = series[seen]
         if name in ANGLES:
             series = np.unwrap(series)
         result[name] = np.interp(grid, t[seen], series)
+        if name in FITTED and not seen.all():
+            bridged |= _over(grid, t[seen])
+            gaps = np.diff(t[seen])
+            longest = int(np.argmax(gaps))
+            if gaps[longest] > max(_long_s(t[seen]), 1.01 * float(np.diff(t).max())):
+                missing.append((float(gaps[longest]), float(t[seen][longest]), name))
+    if missing:
+        length_s, at_s, _ = max(missing)
+        names = ", ".join(name for _, _, name in missing)
+        notes.append(
+            f"missing within the flight, for {length_s:.2f} s from {at_s:.2f} s: {names};"
+            " maneuvers over a gap are left out"
+        )
+    if bridged.any():
+        result[BRIDGED] = bridged.astype(np.float64)
     return result
+
+
+def _long_s(t: Array) -> float:
+    """Return from which length a gap between the instants t is no longer the way they come."""
+    return max(LONGEST_GAP_S, 3.0 * float(np.median(np.diff(t))))
+
+
+def _over(grid: Array, t: Array) -> BoolArray:
+    """Return where the grid lies within a long gap between the instants t."""
+    after = np.clip(np.searchsorted(t, grid), 1, len(t) - 1)
+    inside = (grid > t[after - 1]) & (grid < t[after])
+    return np.asarray(inside & (t[after] - t[after - 1] > _long_s(t)))

@@ -1,0 +1,148 @@
+"""Foreign names, units and signs through a small TOML map, one line per column of ours:
+
+```toml
+[columns]
+alpha_rad = { from = "AOA", unit = "deg" }
+az_mps2 = { from = "Nz", unit = "g", sign = -1 }
+t_s = { from = "TimeUS", unit = "us" }
+density_kgpm3 = "rho"
+```
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+
+DEG, FOOT, POUND_PA = np.pi / 180.0, 0.3048, 6894.757
+# What a column of ours may come in, by the end of its name.
+UNITS: dict[str, dict[str, float]] = {
+    "rad": {"rad": 1.0, "deg": DEG, "mrad": 1e-3},
+    "radps": {"rad/s": 1.0, "deg/s": DEG},
+    "mps2": {"m/s2": 1.0, "g": 9.80665, "ft/s2": FOOT, "mg": 9.80665e-3},
+    "mps": {
+        "m/s": 1.0, "kt": 1852.0 / 3600.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "ft/s": FOOT,
+        "ft/min": FOOT / 60.0, "cm/s": 0.01,
+    },
+    "m": {"m": 1.0, "ft": FOOT, "cm": 0.01, "mm": 1e-3},
+    "pa": {
+        "Pa": 1.0, "hPa": 100.0, "mbar": 100.0, "kPa": 1e3, "psi": POUND_PA,
+        "psf": POUND_PA / 144.0, "inHg": 3386.389,
+    },
+    "kgpm3": {"kg/m3": 1.0, "slug/ft3": 515.3788},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "throttle": {"1": 1.0, "percent": 0.01},
+}  # fmt: skip
+KEYS = {"from", "unit", "sign", "scale", "offset"}
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of a map: ours = foreign * gain + offset."""
+
+    foreign: str
+    gain: float
+    offset: float
+
+
+def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
+    """Return the lines of a map by the name of our column.
+
+    Raises
+    ------
+    IdentificationError
+        If it cannot be read or says what nobody understands.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise IdentificationError(f"{path}: cannot be used as a map: {error}") from error
+    lines = document.get("columns")
+    if not isinstance(lines, dict) or not lines:
+        raise IdentificationError(f"{path}: no table [columns]")
+    for name in lines:
+        if name not in known:
+            raise IdentificationError(
+                f"{path}: unknown column {name}{_like(name, known)}; ours are {', '.join(known)}"
+            )
+    return {name: _line(f"{path}: {name}", name, line) for name, line in lines.items()}
+
+
+def _line(where: str, name: str, line: object) -> Line:
+    if isinstance(line, str):
+        line = {"from": line}
+    if not isinstance(line, dict) or not isinstance(line.get("from"), str):
+        raise IdentificationError(f'{where}: expected "name" or {{ from = "name", unit = "..." }}')
+    strange = [key for key in line if key not in KEYS]
+    if strange:
+        raise IdentificationError(
+            f"{where}: unknown key {strange[0]}; a line may say {', '.join(sorted(KEYS))}"
+        )
+    units = UNITS[name.rsplit("_", 1)[-1]]
+    unit = line.get("unit", next(iter(units)))
+    if not isinstance(unit, str) or unit not in units:
+        raise IdentificationError(f"{where}: unit '{unit}' unknown; use one of {', '.join(units)}")
+    for key in ("sign", "scale", "offset"):
+        value = line.get(key, 1)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+            raise IdentificationError(f"{where}: {key} is {value!r}, not a number")
+    sign, scale = line.get("sign", 1), float(line.get("scale", 1.0))
+    if sign not in (1, -1) or scale == 0.0:
+        raise IdentificationError(f"{where}: sign must be 1 or -1, scale not zero")
+    return Line(line["from"], units[unit] * sign * scale, float(line.get("offset", 0.0)))
+
+
+def mapped(
+    raw: Mapping[str, Array], unusable: Mapping[str, str], lines: Mapping[str, Line], path: Path
+) -> dict[str, Array]:
+    """Return our columns made of the foreign ones a map names.
+
+    Parameters
+    ----------
+    raw : mapping
+        Foreign columns.
+    unusable : mapping
+        What else the file holds, and why it is no column.
+    lines, path
+        The map and where it came from.
+
+    Raises
+    ------
+    IdentificationError
+        If a foreign column is not there or not usable.
+    """
+    result: dict[str, Array] = {}
+    for name, line in lines.items():
+        if line.foreign in unusable:
+            raise IdentificationError(
+                f"{path}: {name}: '{line.foreign}' is {unusable[line.foreign]}"
+            )
+        if line.foreign not in raw:
+            raise IdentificationError(
+                f"{path}: {name}: the data have no column '{line.foreign}'"
+                f"{_like(line.foreign, tuple(raw))}; {listed(raw, unusable)}"
+            )
+        result[name] = raw[line.foreign] * line.gain + line.offset
+    return result
+
+
+def listed(raw: Mapping[str, Array], unusable: Mapping[str, str]) -> str:
+    """Return in words which columns a file has."""
+    names = list(raw)
+    words = f"they have {', '.join(names[:40])}" if names else "they have no column of numbers"
+    words += f" and {len(names) - 40} more" if len(names) > 40 else ""
+    return words + "".join(f"; {name} is {why}" for name, why in list(unusable.items())[:5])
+
+
+def _like(name: str, known: Sequence[str]) -> str:
+    lower = {k.lower(): k for k in known}
+    near = difflib.get_close_matches(name.lower(), lower, n=1, cutoff=0.6)
+    return f" (did you mean {lower[near[0]]}?)" if near else ""
