@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from host.sysid.aircraft.airframe import Condition
 from host.sysid.aircraft.in_coefficients import dimensional_gains
-from host.sysid.estimators.filter_error import FilterProblem, discrete_noise, information_at
+from host.sysid.estimators.filter_error import information_at
 from host.sysid.estimators.gust import ROLLING
+from host.sysid.numerics.filter_problem import FilterProblem, discrete_noise
 from host.sysid.study.gusts import AXES, DT_S, fly, gusty_aircraft, spectrum
 from host.sysid.study.turbulence import PROCESS, fitted_model, run_case, true_vector
 from host.twin.aircraft import file as aircraft

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from host.sysid import FitResult, Maneuver, fit, methods
 from host.sysid.errors import IdentificationError
-from host.sysid.estimators.filter_error import FilterProblem
 from host.sysid.estimators.frequency import transform
 from host.sysid.estimators.kalman import inflation
+from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.problem import OutputProblem
 from host.sysid.numerics.riccati import predicted_covariance

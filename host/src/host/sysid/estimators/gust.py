@@ -165,7 +165,7 @@ def fit_with_gust(
     process = ("gust_rad", *(s for s in ALSO if s in model.states))
     plain = replace(model, delays=())
     try:
-        result = fit_filter_error(wide, shifted, process=process, start=start)
+        result = fit_filter_error(wide, shifted, process=process, start=start, rival=False)
         failure = "" if result.converged else result.warnings[0]
     except IdentificationError as error:
         failure = str(error)

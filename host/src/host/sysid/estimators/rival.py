@@ -1,0 +1,75 @@
+"""Is it the air or the sensors? Filter error held against output error with coloured noise.
+
+Sensor noise with memory looks like process noise to filter error: the filter then follows what is
+no motion. Both explanations have an exact likelihood on the same outputs, so the Bayesian
+information criterion tells them apart (Schwarz, Annals of Statistics 6, 1978).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.result import FitResult
+
+DECISIVE = 10.0  # Kass & Raftery, JASA 90 (1995): "very strong" on the scale of 2 log odds
+
+
+def against_coloured_noise(
+    result: FitResult, maneuvers: Sequence[Maneuver], start: Array
+) -> FitResult:
+    """Compare a filter-error result with output error whose noise has a memory.
+
+    Parameters
+    ----------
+    result : FitResult
+        Of filter error, its cost in `details`.
+    maneuvers : sequence of Maneuver
+        What it was fitted to.
+    start : Array
+        Start of output error, the model's own vector.
+
+    Returns
+    -------
+    FitResult
+        With ``bic_over_coloured_noise`` in `details`, positive where the sensors explain the data
+        better. Where they do so decisively a warning says it, and the covariance of the model's
+        parameters becomes that of output error plus the square of the distance between both.
+    """
+    try:
+        rival = fit_output_error(result.model, maneuvers, start=start)
+    except IdentificationError:
+        return result
+    orders = np.asarray(rival.details["noise_orders"])
+    rows, outputs = sum(m.samples for m in maneuvers), len(result.model.outputs)
+    likelihood = float(rival.details["cost"]) + 0.5 * rows * outputs
+    unknown = len(rival.estimate) + outputs + float(np.sum(orders))
+    excess = 2.0 * (float(result.details["cost"]) - likelihood)
+    excess += float(np.log(rows)) * (len(result.estimate) - unknown)
+    details = {**result.details, "bic_over_coloured_noise": excess}
+    if not rival.converged or excess < DECISIVE or not np.any(orders):
+        return replace(result, details=details)
+    count = len(rival.estimate)
+    distance = result.estimate[:count] - rival.estimate
+    covariance = result.covariance.copy()
+    covariance[:count, count:] = covariance[count:, :count] = 0.0
+    covariance[:count, :count] = rival.covariance + np.outer(distance, distance)
+    freedom = result.degrees_of_freedom.copy()
+    freedom[:count] = np.minimum(freedom[:count], rival.degrees_of_freedom)
+    said = (
+        "noise of the sensors with a memory explains the data better than moving air (BIC"
+        f" {excess:.0f} lower): use output-error; intervals widened to hold its answer"
+    )
+    return replace(
+        result,
+        covariance=covariance,
+        degrees_of_freedom=freedom,
+        warnings=(*result.warnings, said),
+        details=details,
+    )
