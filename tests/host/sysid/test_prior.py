@@ -8,19 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.sysid.aircraft.airframe import Coefficient
+from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
 from host.sysid.aircraft.datcom import read_datcom
-from host.sysid.aircraft.prior import Prior, prior_lines, read_prior
-from host.sysid.aircraft.prior_table import about_body_axes
+from host.sysid.aircraft.prior import prior_lines, read_prior
+from host.sysid.aircraft.prior_table import PriorTable, about_body_axes
 from host.sysid.errors import IdentificationError
 
 DEGREE = 180.0 / np.pi
 DATCOM = Path(__file__).with_name("datcom_layout.dat").read_text()
 
 
-def read(tmp_path: Path, name: str, text: str, **where: float) -> Prior:
+def read(tmp_path: Path, name: str, text: str, airspeed_mps: float = 0.0) -> PriorTable:
     (tmp_path / name).write_text(text)
-    return read_prior(tmp_path / name, **where)
+    return read_prior(tmp_path / name, airspeed_mps)
 
 
 STANDARD = "Standard axis orientation,  X fwd, Z down"
@@ -84,12 +84,12 @@ def stability(alpha_deg: float, lift_slope: float = 4.123456) -> str:
 
 
 def test_avl_stability_axes_are_read_and_turned(tmp_path: Path) -> None:
-    level = read(tmp_path, "level.st", stability(0.0)).coefficients
+    level = read(tmp_path, "level.st", stability(0.0)).at(0.0)
     assert level["CL_alpha"] == 4.123456
     assert (level["Cl_beta"], level["Cl_p"], level["Cl_r"]) == (-0.041, -0.44, 0.098)
     assert level["Cn_beta"] == 0.06  # the spiral figure is no derivative
     # One run is turned by its own angle, wherever it is asked for.
-    turned = read(tmp_path, "up.st", stability(6.0), alpha_rad=np.radians(9.0)).coefficients
+    turned = read(tmp_path, "up.st", stability(6.0)).at(np.radians(9.0))
     # The same moments by turning vectors: both the moment and the rate it is taken by.
     a = np.radians(6.0)
     to_stability = np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]])
@@ -106,7 +106,7 @@ def test_avl_stability_axes_are_read_and_turned(tmp_path: Path) -> None:
 
 def test_controls_of_avl_are_per_radian_with_our_signs(tmp_path: Path) -> None:
     """Aileron of this file is positive right edge down; ours rolls to the right."""
-    prior = read(tmp_path, "level.st", stability(0.0)).coefficients
+    prior = read(tmp_path, "level.st", stability(0.0)).at(0.0)
     assert prior["Cl_da"] == pytest.approx(0.004 * DEGREE)
     assert prior["Cn_da"] == pytest.approx(-0.0001 * DEGREE)
     assert prior["Cm_de"] == pytest.approx(-0.016 * DEGREE)
@@ -114,16 +114,16 @@ def test_controls_of_avl_are_per_radian_with_our_signs(tmp_path: Path) -> None:
     assert prior["Cn_dr"] == pytest.approx(-0.001 * DEGREE)
     assert prior["CY_dr"] == pytest.approx(0.003 * DEGREE)
     other = stability(0.0).replace("Cmd02 =  -", "Cmd02 =   ").replace("CLd02 =   ", "CLd02 =  -")
-    opposite = read(tmp_path, "opposite.st", other).coefficients
+    opposite = read(tmp_path, "opposite.st", other).at(0.0)
     assert opposite["Cm_de"] == prior["Cm_de"]
     assert opposite["CL_de"] == prior["CL_de"]
 
 
 def test_several_runs_of_avl_are_a_table_over_alpha(tmp_path: Path) -> None:
     text = stability(-2.0, 4.0) + stability(6.0, 5.0)
-    prior = read(tmp_path, "polar.st", text, alpha_rad=np.radians(2.0))
-    assert prior.coefficients["CL_alpha"] == pytest.approx(4.5)
-    assert any("table from -2 to 6 deg" in line for line in prior.source)
+    prior = read(tmp_path, "polar.st", text)
+    assert prior.at(np.radians(2.0))["CL_alpha"] == pytest.approx(4.5)
+    assert prior.limits_rad == pytest.approx((np.radians(-2.0), np.radians(6.0)))
     assert any("Sref 0.33, Cref 0.26, Bref 1.27" in line for line in prior.source)
 
 
@@ -167,7 +167,7 @@ def test_avl_body_axes_come_to_the_same_lift_slope(tmp_path: Path) -> None:
  y mom.  Cm  |    Cmp =   0.000000    Cmq = -10.500000    Cmr =   0.000000
  z mom.  Cn  |    Cnp =  -0.030000    Cnq =   0.000000    Cnr =  -0.080000
 """
-    prior = read(tmp_path, "body.sb", text, alpha_rad=a).coefficients
+    prior = read(tmp_path, "body.sb", text).at(a)
     assert prior["CL_alpha"] == pytest.approx(4.4, abs=1e-4)
     assert prior["CD_alpha"] == pytest.approx(1.2 * a, abs=1e-4)
     assert prior["CL_q"] == pytest.approx(7.0 * np.cos(a) + 0.5 * np.sin(a))
@@ -184,10 +184,9 @@ def test_datcom_is_read_at_the_angle_of_attack_flown(
     tmp_path: Path, alpha_deg: float, slope: float
 ) -> None:
     """Between rows, across a row where no method tells, and beyond the end."""
-    prior = read(tmp_path, "for006.dat", DATCOM, alpha_rad=np.radians(alpha_deg))
-    assert prior.coefficients["CL_alpha"] == pytest.approx(DEGREE * slope)
-    assert prior.coefficients["CL_q"] == pytest.approx(DEGREE * 0.13)  # printed once
-    assert any("beyond its end" in line for line in prior.source) == (alpha_deg > 10.0)
+    prior = read(tmp_path, "for006.dat", DATCOM).at(np.radians(alpha_deg))
+    assert prior["CL_alpha"] == pytest.approx(DEGREE * slope)
+    assert prior["CL_q"] == pytest.approx(DEGREE * 0.13)  # printed once
 
 
 def test_datcom_tables_are_those_of_the_whole_aircraft(tmp_path: Path) -> None:
@@ -197,12 +196,12 @@ def test_datcom_tables_are_those_of_the_whole_aircraft(tmp_path: Path) -> None:
         "Cl_beta": -0.0011, "CL_q": 0.13, "Cm_q": -0.19, "Cl_p": -0.0072, "CY_p": -0.0011,
         "Cn_p": -0.0004, "Cn_r": -0.0012, "Cl_r": 0.0016,
     }  # fmt: skip
-    assert prior.coefficients == pytest.approx({k: DEGREE * v for k, v in printed.items()})
+    assert prior.at(0.0) == pytest.approx({k: DEGREE * v for k, v in printed.items()})
     source = "\n".join(prior.source)
     assert "wing-body-vertical tail-horizontal tail, Mach 0.05" in source
     assert "reference area 0.33 M**2, chord 0.26, span 1.27" in source
-    assert "turned from stability to body axes" in source
-    pitched = read(tmp_path, "for006.dat", DATCOM, alpha_rad=np.radians(2.0)).coefficients
+    assert prior.stability_axes
+    pitched = read(tmp_path, "for006.dat", DATCOM).at(np.radians(2.0))
     a = np.radians(2.0)
     assert pitched["Cl_beta"] == pytest.approx(DEGREE * (-0.0012 * np.cos(a) - 0.0015 * np.sin(a)))
     assert pitched["CY_p"] == pytest.approx(DEGREE * -0.0012)  # no CY_r to turn it with
@@ -213,21 +212,22 @@ def test_datcom_page_of_the_nearest_mach_number_is_taken(
     tmp_path: Path, airspeed_mps: float, slope: float
 ) -> None:
     prior = read(tmp_path, "for006.dat", DATCOM, airspeed_mps=airspeed_mps)
-    assert prior.coefficients["CL_alpha"] == pytest.approx(DEGREE * slope)
+    assert prior.at(0.0)["CL_alpha"] == pytest.approx(DEGREE * slope)
 
 
 def test_datcom_per_radian_and_in_ground_effect(tmp_path: Path) -> None:
     radian = read(tmp_path, "radian.dat", DATCOM.replace("PER DEGREE", "PER RADIAN"))
-    assert radian.coefficients["Cm_q"] == pytest.approx(-0.19)
+    assert radian.at(0.0)["Cm_q"] == pytest.approx(-0.19)
     grounded = DATCOM.replace("MADE-UP MODEL AIRCRAFT, NO REAL ONE\n \n", "IN GROUND EFFECT\n \n")
     assert read_datcom(grounded) is None
 
 
 def test_toml_holds_numbers_or_a_table_over_alpha(tmp_path: Path) -> None:
-    assert read(tmp_path, "p.toml", "[coefficients]\nCm_q = -10.9\n") == Prior({"Cm_q": -10.9})
+    plain = read(tmp_path, "p.toml", "[coefficients]\nCm_q = -10.9\n")
+    assert plain.at(0.1) == {"Cm_q": -10.9}
     text = "alpha_deg = [-4, 0, 8]\n[coefficients]\nCL_alpha = [4.0, 4.4, 3.6]\nCm_q = -10\n"
-    prior = read(tmp_path, "table.toml", text, alpha_rad=np.radians(2.0))
-    assert prior.coefficients == pytest.approx({"CL_alpha": 4.2, "Cm_q": -10.0})
+    prior = read(tmp_path, "table.toml", text)
+    assert prior.at(np.radians(2.0)) == pytest.approx({"CL_alpha": 4.2, "Cm_q": -10.0})
 
 
 def test_turning_there_and_back_changes_nothing() -> None:
@@ -238,14 +238,27 @@ def test_turning_there_and_back_changes_nothing() -> None:
     assert back == pytest.approx(first)
 
 
-def test_disagreement_is_named() -> None:
-    found = [Coefficient("Cm_q", -9.0, 0.4, 0.5, 1.0), Coefficient("Cl_p", -0.4, 0.0, 0.1, 0.2)]
-    prior = Prior({"Cm_q": -10.9, "Cl_p": -0.5, "CL_q": 1.0}, ("a handbook",))
-    lines = prior_lines(found, prior)
-    assert len(lines) == 4
+def test_disagreement_is_named_at_the_alpha_of_each_answer() -> None:
+    found = (Coefficient("Cm_q", -9.0, 0.4, 0.5, 1.0), Coefficient("Cl_p", -0.4, 0.0, 0.1, 0.2))
+    points = {"Cm_q": [(0.0, -10.9), (0.2, -8.9)], "Cl_p": [(0.0, -0.5)], "CL_q": [(0.0, 1.0)]}
+    prior = PriorTable(points, stability_axes=False, source=("a handbook", ""))
+    tables = [
+        CoefficientTable("all", "slow flight", 0.2, found),
+        CoefficientTable("all", "fast flight", 0.0, found),
+        CoefficientTable("other", "nothing shared", 0.0, ()),
+    ]
+    lines = prior_lines(tables, prior)
     assert lines[0] == "prior: a handbook"
-    assert lines[2].endswith("outside the interval")
-    assert lines[3].endswith("inside")
+    assert lines[1].startswith(
+        "all, slow flight: prior read at alpha 11.5 deg of a table from 0 to"
+    )
+    assert [line.split()[0] for line in lines[2:5]] == ["coefficient", "Cm_q", "Cl_p"]
+    assert lines[3].endswith("  inside")
+    assert lines[5].startswith("all, fast flight")
+    assert lines[7].endswith("outside the interval")
+    assert len(lines) == 9
+    far = prior_lines([CoefficientTable("all", "stalled", 0.5, found)], prior)
+    assert "beyond its end" in far[1]
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--truth", type=Path, metavar="TOML",
                         help="truth of a simulated flight: compare with it")  # fmt: skip
     parser.add_argument("--prior", type=Path, metavar="FILE",
-                        help="coefficients to compare with: TOML, AVL ST, Datcom")  # fmt: skip
+                        help="coefficients to compare with: TOML, AVL, Datcom")  # fmt: skip
     parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="start of the fit")
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the fit")
     parser.add_argument("--maneuver", type=int, action="append", metavar="N",
@@ -108,8 +108,8 @@ def run(args: argparse.Namespace) -> int:
     if args.prior:
         from host.sysid.aircraft.prior import read_prior
 
-        alpha = columns.get("alpha_rad")
-        prior = read_prior(args.prior, 0.0 if alpha is None else sorted(alpha)[len(alpha) // 2])
+        speed = columns.get("airspeed_mps", ())
+        prior = read_prior(args.prior, sorted(speed)[len(speed) // 2] if len(speed) else 0.0)
         if not args.aircraft:
             raise IdentificationError("--prior compares coefficients; they need --aircraft")
     windows = _windows(args, columns)
@@ -175,7 +175,7 @@ def run(args: argparse.Namespace) -> int:
     if prior is not None:
         from host.sysid.aircraft.prior import prior_lines
 
-        lines += ["", *prior_lines([c for table in tables for c in table.coefficients], prior)]
+        lines += ["", *prior_lines(tables, prior)]
     if truth is not None:
         from host.sysid.answer.truth import truth_lines
 

@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from host.sysid.aircraft.airframe import Coefficient
+from host.sysid.aircraft.airframe import CoefficientTable
 from host.sysid.aircraft.avl import is_avl, read_avl
 from host.sysid.aircraft.datcom import is_datcom, read_datcom
 from host.sysid.aircraft.prior_table import Points, PriorTable
@@ -26,23 +25,13 @@ from host.sysid.errors import IdentificationError
 SOUND_MPS = 340.3  # standard atmosphere, sea level: chooses between Mach numbers of a handbook
 
 
-@dataclass(frozen=True, slots=True)
-class Prior:
-    """Coefficients by name at one angle of attack, and in words where they are from."""
-
-    coefficients: dict[str, float]
-    source: tuple[str, ...] = ()
-
-
-def read_prior(path: Path, alpha_rad: float = 0.0, airspeed_mps: float = 0.0) -> Prior:
-    """Return coefficients by name.
+def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
+    """Return coefficients over the angle of attack.
 
     Parameters
     ----------
     path : Path
         TOML, AVL's ST or SB output, or Datcom's output.
-    alpha_rad : float
-        Where a table over the angle of attack is read; beyond its ends the last row stands.
     airspeed_mps : float
         Of the flight: which Mach number of several.
 
@@ -67,26 +56,10 @@ def read_prior(path: Path, alpha_rad: float = 0.0, airspeed_mps: float = 0.0) ->
             f"{path}: no coefficient; expected TOML with [coefficients], or output of AVL (ST, SB)"
             " or Datcom"
         )
-    found = table.at(alpha_rad)
-    wrong = sorted(name for name, value in found.items() if not np.isfinite(value))
+    wrong = sorted(n for n, pairs in table.points.items() if not np.isfinite(pairs).all())
     if wrong:
         raise IdentificationError(f"{path}: {', '.join(wrong)} not a finite number")
-    source = [*table.source, *_place(table, float(np.degrees(alpha_rad)))]
-    return Prior(found, tuple(line for line in source if line))
-
-
-def _place(table: PriorTable, alpha_deg: float) -> list[str]:
-    """Say where a table was read and how it was turned; nothing where neither was done."""
-    least, most = np.degrees(table.limits_rad)
-    words = []
-    if least < most:
-        words.append(f"read at alpha {alpha_deg:.1f} deg of a table from {least:g} to {most:g} deg")
-        if not least <= alpha_deg <= most:
-            words.append("beyond its end, whose row stands")
-    if table.stability_axes:
-        turn_deg = float(np.clip(alpha_deg, least, most))
-        words.append(f"turned from stability to body axes by {turn_deg:.1f} deg")
-    return [", ".join(words)]
+    return table
 
 
 def _from_toml(text: str) -> PriorTable:
@@ -105,16 +78,43 @@ def _from_toml(text: str) -> PriorTable:
     return PriorTable(points, stability_axes=False)
 
 
-def prior_lines(coefficients: Sequence[Coefficient], prior: Prior) -> list[str]:
-    """Return where the prior is from, and a table: identified, interval, prior, agreement."""
-    lines = [f"prior: {line}" for line in prior.source]
-    lines.append(f"{'coefficient':12s} {'identified':>12s} {'95 %':>10s} {'prior':>10s}")
-    for c in coefficients:
-        if c.name in prior.coefficients:
-            expected = prior.coefficients[c.name]
-            outside = abs(c.value - expected) > c.half_width
+def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[str]:
+    """Return where the prior is from, and a table: identified, interval, prior, agreement.
+
+    Parameters
+    ----------
+    tables : sequence of CoefficientTable
+        The answer; the prior is read at the angle of attack of each.
+    prior : PriorTable
+        From `read_prior`.
+    """
+    lines = [f"prior: {line}" for line in prior.source if line]
+    for table in tables:
+        expected = prior.at(table.alpha_rad)
+        shared = [c for c in table.coefficients if c.name in expected]
+        if not shared:
+            continue
+        place = _place(prior, float(np.degrees(table.alpha_rad)))
+        lines += [f"{table.template}, {table.method}" + (f": prior {place}" if place else "")]
+        lines.append(f"{'coefficient':12s} {'identified':>12s} {'95 %':>10s} {'prior':>10s}")
+        for c in shared:
+            outside = abs(c.value - expected[c.name]) > c.half_width
             lines.append(
-                f"{c.name:12s} {c.value:12.4g} {c.half_width:10.2g} {expected:10.4g}"
+                f"{c.name:12s} {c.value:12.4g} {c.half_width:10.2g} {expected[c.name]:10.4g}"
                 f"  {'outside the interval' if outside else 'inside'}"
             )
     return lines
+
+
+def _place(table: PriorTable, alpha_deg: float) -> str:
+    """Say where a table is read and how it is turned; nothing where neither is done."""
+    least, most = np.degrees(table.limits_rad)
+    words = []
+    if least < most:
+        words.append(f"read at alpha {alpha_deg:.1f} deg of a table from {least:g} to {most:g} deg")
+        if not least <= alpha_deg <= most:
+            words.append("beyond its end, whose row stands")
+    if table.stability_axes:
+        turn_deg = float(np.clip(alpha_deg, least, most))
+        words.append(f"turned from stability to body axes by {turn_deg:.1f} deg")
+    return ", ".join(words)
