@@ -6,9 +6,9 @@ import control
 import numpy as np
 import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term, fit
-from host.sysid.estimators.filter_error import FilterProblem, discrete_noise
 from host.sysid.models.model import DelayGroup
 from host.sysid.models.modes import modes_of
+from host.sysid.numerics.filter_problem import FilterProblem, discrete_noise
 from host.sysid.numerics.noise import (
     OutputNoise,
     autocovariance,
