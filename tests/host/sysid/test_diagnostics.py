@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from host.sysid import Maneuver, fit
 from host.sysid.models.diagnostics import (
+    CANNOT,
+    DOUBTFUL,
     collinearity,
     constant_inputs,
     exceedance,
+    judge,
     references,
     refusals,
     signal_fits,
@@ -16,6 +19,7 @@ from host.sysid.models.diagnostics import (
     thesis_sum_of_mean_errors,
     whiteness,
 )
+from host.sysid.models.model import Parameter, Term
 from host.sysid.models.modes import modes, modes_of
 from host.sysid.study.aircraft import navion, navion_free, navion_structured
 from host.sysid.study.data import TRUTH, noisy
@@ -63,21 +67,55 @@ def test_navion_is_answered_and_the_thesis_example_is_refused() -> None:
     assert "M_de" not in named
 
 
-def test_probability_of_exceeding_is_that_of_a_normal_value_over_its_bound() -> None:
+@pytest.mark.parametrize(
+    ("ratio", "grade"), [(0.7, CANNOT), (1.2, DOUBTFUL), (1.6, DOUBTFUL), (3.0, None)]
+)
+def test_probability_of_exceeding_is_that_of_a_normal_value_over_its_bound(
+    ratio: float, grade: str | None
+) -> None:
     """One parameter, far above its floor: P(|theta| < sigma) of a normal theta by its formula."""
-    result = fit("output-error", navion_structured(), [noisy(3, 0.01)])
+    maneuver = noisy(3, 0.01)
+    result = fit("output-error", navion_structured(), [maneuver])
     k = result.index("Z_alpha")
-    for ratio in (0.7, 1.0, 1.6):
-        estimate, covariance = result.estimate.copy(), result.covariance.copy()
-        covariance[k, :] = covariance[:, k] = 0.0
-        covariance[k, k] = (estimate[k] / ratio) ** 2
-        single, any_of_them = exceedance(replace(result, covariance=covariance), [noisy(3, 0.01)])
-        # The prior pulls it a little: three times the whole state rate, here about its own size.
-        expected = stats.norm.cdf(1.0 - ratio) - stats.norm.cdf(-1.0 - ratio)
-        assert single[k] == pytest.approx(expected, abs=0.1)
-        assert any_of_them == pytest.approx(float(single[k]), abs=0.03)
-        named = {r.name for r in refusals(replace(result, covariance=covariance), [noisy(3, 0.01)])}
-        assert ("Z_alpha" in named) == (any_of_them > 0.5)
+    covariance = result.covariance.copy()
+    covariance[k, :] = covariance[:, k] = 0.0
+    covariance[k, k] = (result.estimate[k] / ratio) ** 2
+    doubted = replace(result, covariance=covariance)
+    single, any_of_them = exceedance(doubted, [maneuver])
+    # The prior pulls it a little: three times the whole state rate, here about its own size.
+    expected = stats.norm.cdf(1.0 - ratio) - stats.norm.cdf(-1.0 - ratio)
+    assert single[k] == pytest.approx(expected, abs=0.1)
+    assert any_of_them == pytest.approx(float(single[k]), abs=0.03)
+    found = judge(doubted, [maneuver])
+    assert found.refused == (grade == CANNOT)
+    assert {r.name: r.grade for r in found.named} == ({"Z_alpha": grade} if grade else {})
+    for named in found.named:
+        assert named.probability == pytest.approx(float(single[k]))
+        if ratio > 1.0:
+            assert f"probability of {100.0 * single[k]:.0f} %" not in named.reason
+            assert "of its value" in named.reason
+
+
+def test_collinear_parameters_are_named_with_their_partner_and_grade() -> None:
+    rng = np.random.default_rng(9)
+    maneuver = noisy(9, 0.05)
+    twin = maneuver.inputs + 1e-4 * rng.standard_normal(maneuver.inputs.shape)
+    one = navion_structured()
+    two = replace(
+        one,
+        inputs=(*one.inputs, "tab_rad"),
+        B=np.hstack([one.B, np.zeros((4, 1))]),
+        D=np.zeros((4, 2)),
+        terms=(*one.terms, Term("B", 2, 1, "M_tab")),
+        parameters=(*one.parameters, Parameter("M_tab", 0.0)),
+    )
+    doubled = Maneuver(maneuver.dt_s, np.hstack([maneuver.inputs, twin]), maneuver.outputs)
+    found = judge(fit("output-error", two, [doubled]), [doubled])
+    named = {r.name: r for r in found.named}
+    assert found.refused
+    assert {"M_de", "M_tab"} <= set(found.names(CANNOT))
+    assert "moves together with M_de" in named["M_tab"].reason
+    assert "Z_alpha" not in named
 
 
 def test_small_parameters_are_measured_by_what_would_matter() -> None:
@@ -92,6 +130,8 @@ def test_small_parameters_are_measured_by_what_would_matter() -> None:
         0.05 * largest / spread[4], rel=1e-3
     )
     assert reference[model.parameter_names.index("a33")] == pytest.approx(abs(A[2, 2]))
+    plain = references(model, [maneuver], theta, small_share=0.0)
+    np.testing.assert_array_equal(plain, np.abs(theta))
 
 
 def test_an_input_that_repeats_another_is_named_as_collinear() -> None:

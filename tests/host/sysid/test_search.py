@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators import search as searching
+from host.sysid.estimators.following import following_start, led_model
 from host.sysid.estimators.search import search, white_cost
 from host.sysid.estimators.start import start_values
 from host.sysid.models.maneuver import Maneuver
@@ -13,14 +14,14 @@ from host.sysid.numerics.problem import OutputProblem
 from host.sysid.study.aircraft import navion_free
 from host.sysid.study.data import noisy
 from host.sysid.study.inputs import SHAPES
-from host.sysid.study.thesis import random_system, simulated
+from host.sysid.study.systems import random_system, simulated
 
 DT_S = 0.01
 
 
-def drawn(number: int) -> tuple[OutputProblem, np.ndarray]:
+def drawn(number: int, seed: int = 20260301) -> tuple[OutputProblem, np.ndarray]:
     """Return a random system at SNR 10, every entry free, and the truth."""
-    A, B = random_system(np.random.default_rng([20260301, number]))
+    A, B = random_system(np.random.default_rng([seed, number]))
     u = SHAPES["3-2-1-1"](0.1, DT_S, 20.0)
     y = simulated(A, B, u, DT_S)
     noise = np.sqrt(np.mean(y**2, axis=0) / 10.0)
@@ -48,6 +49,35 @@ def test_wrong_valleys_are_left(number: int) -> None:
     found = search(problem, start_values(problem))
     assert first.cost > reference.cost + 100.0
     assert found.cost < reference.cost + 5.0
+
+
+FALSE_ENDS = (15, 205)  # of seed 7: converged, 42 and 114 likelihood units too high
+
+
+@pytest.mark.parametrize("number", FALSE_ENDS)
+def test_a_converged_search_in_a_flat_valley_is_led_to_a_deeper_one(number: int) -> None:
+    problem, truth = drawn(number, seed=7)
+    first = minimise(problem, start_values(problem))
+    reference = minimise(problem, truth, max_iterations=200)
+    found = search(problem, start_values(problem))
+    assert first.converged
+    assert first.cost > reference.cost + 30.0
+    assert found.converged
+    assert found.cost < reference.cost + 4.0
+
+
+def test_a_led_model_forgets_its_start_and_ends_where_the_free_one_does() -> None:
+    problem, truth = drawn(0)
+    wild = truth.copy()
+    wild[:16] = 50.0 * np.eye(4).ravel()
+    led = following_start(problem, wild, (100.0, 20.0, 5.0, 1.0))
+    found = minimise(problem, led)
+    assert found.cost < white_cost(problem, truth)
+    model = led_model(problem.model, 3.0)
+    A, B, _, _ = model.matrices(truth[:20])
+    np.testing.assert_allclose(A, truth[:16].reshape(4, 4) - 3.0 * np.eye(4))
+    np.testing.assert_allclose(B[:, 1:], 3.0 * np.eye(4))
+    assert model.parameter_names == problem.model.parameter_names
 
 
 def test_a_good_search_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,19 +7,21 @@ import numpy as np
 import pytest
 from host.sysid.estimators.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
 from host.sysid.flight.finder import Found
+from host.sysid.models.diagnostics import CANNOT, GRADES
 from host.sysid.models.model import free_model
 from host.sysid.study.__main__ import main
 from host.sysid.study.accuracy import run_case as accuracy
 from host.sysid.study.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
 from host.sysid.study.flights import overlap
-from host.sysid.study.inputs import SHAPES
-from host.sysid.study.thesis import (
+from host.sysid.study.refusal import (
+    DT_S,
     check_refusal,
-    random_system,
     refusal_agreement,
-    run_hopfield,
-    thesis_data,
+    repeated,
+    standard_input,
 )
+from host.sysid.study.systems import random_system
+from host.sysid.study.thesis import run_hopfield, thesis_data
 
 
 def test_output_error_is_an_order_closer_than_the_network() -> None:
@@ -43,10 +45,28 @@ def test_printed_network_diverges_and_its_figure_hides_the_error() -> None:
 
 
 def test_table_31_at_snr_10_is_refused_with_names() -> None:
-    u = SHAPES["3-2-1-1"](0.1, 0.01, 20.0)
-    check = check_refusal(TABLE_31_A, TABLE_31_B, u, 0.01)
-    assert set(check.expected) <= set(check.refused)
-    assert not {"a33", "b31"} & set(check.refused)
+    check = check_refusal(TABLE_31_A, TABLE_31_B, standard_input(), DT_S)
+    assert check.judgement.refused
+    assert not check.missed
+    assert len(check.expected) == 16
+    assert not {"a33", "b31"} & set(check.judgement.names(CANNOT))
+    assert check.agree
+    assert check.plain_agree
+
+
+def test_navion_is_told_with_nine_free_and_refused_with_twenty() -> None:
+    table, nine, twenty = (one.checks[0] for one in repeated(1))
+    assert not nine.expected
+    assert not nine.judgement.named
+    assert nine.agree
+    # Not for its zeros alone: a12 has a bound of 146 % of 5 % of its row, 170 % of itself.
+    assert set(twenty.expected) == {"a12", "a13", "b11", "b41"}
+    assert twenty.shares[1] == pytest.approx(1.464, abs=0.002)
+    assert twenty.plain_shares[1] == pytest.approx(1.705, abs=0.002)
+    assert np.isinf(twenty.plain_shares[[2, 7, 11, 12, 13, 15, 16, 19]]).all()
+    assert twenty.judgement.refused
+    assert not twenty.missed
+    assert np.sum(table.plain_shares > 1.0) == 16
 
 
 def test_refusal_agrees_with_the_bound_at_the_truth() -> None:
@@ -54,6 +74,11 @@ def test_refusal_agrees_with_the_bound_at_the_truth() -> None:
     assert found.agree >= 0.8 * found.systems
     assert found.clear_agree == len(found.clear)
     assert found.firm_agree == len(found.firm)
+    named, listed = found.named
+    assert named >= 0.9 * listed
+    for grade in GRADES:
+        false, told = found.false(grade)
+        assert false <= 0.3 * told
     assert 0 < found.expected < found.systems
 
 

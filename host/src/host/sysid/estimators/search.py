@@ -1,10 +1,12 @@
 """Search from several starts where the first one may have led into a wrong valley.
 
 Differentiated noise draws equation error far off where the noise is large and the motion fast.
-Where the first search ends without convergence, or leaves more than the sensors' own noise, others
-start from equation error on filtered signals: states, inputs and rates pass one lag, whose
-derivative needs no differentiation (state variable filter; Garnier & Wang (eds.), Identification of
-Continuous-time Models from Sampled Data, 2008), then with the simulated response as instruments.
+Where the first search ends without convergence, leaves more than the sensors' own noise or ends in
+a nearly flat valley, others start where a model that follows the measured states leads
+(`following`). Where those do not settle it, more start from equation error on filtered signals:
+states, inputs and rates pass one lag, whose derivative needs no differentiation (state variable
+filter; Garnier & Wang (eds.), Identification of Continuous-time Models from Sampled Data, 2008),
+then with the simulated response as instruments.
 """
 
 from __future__ import annotations
@@ -15,14 +17,17 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
-from host.sysid.estimators.equation_error import Row, regression_rows, solve_rows
+from host.sysid.estimators.following import following_start
 from host.sysid.estimators.kalman import noise_deviation
+from host.sysid.estimators.rows import Row, regression_rows, solve_rows
+from host.sysid.models.diagnostics import CONDITION_LIMIT
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.numerics.kernels import simulate
 from host.sysid.numerics.output_error import Optimum, minimise
 from host.sysid.numerics.problem import OutputProblem
 
+LADDERS_RADPS = ((2.0, 0.5), (6.0, 1.5, 0.4))  # rates of following, one search each
 CORNERS_RADPS = (0.5, 2.0, 6.0, 20.0)  # of the lag: slow and fast motions of small aircraft
 INSTRUMENT_CORNERS_RADPS = (2.0, 6.0)
 INSTRUMENT_ROUNDS = 3
@@ -41,28 +46,46 @@ def search(problem: OutputProblem, theta: Array) -> Optimum:
     IdentificationError
         If no start is finite over the maneuvers.
     """
-    best: Optimum | None = None
-    failure: IdentificationError | None = None
-    try:
-        best = minimise(problem, theta)
-    except IdentificationError as error:
-        failure = error
-    settled = best if best is not None and best.converged else None
-    if settled is not None and _explained(problem, settled):
-        return settled
-    for start in _starts(problem, theta, settled)[:TRIED]:
+    best, failure = _try(problem, None, theta)
+    settled = best is not None and best.converged and _explained(problem, best)
+    if best is not None and settled and not _flat(best):
+        return best
+    for rates_radps in LADDERS_RADPS:
         try:
-            other = minimise(problem, start)
+            led = following_start(problem, theta, rates_radps)
         except IdentificationError:
             continue
-        if best is None or other.cost < best.cost:
-            best = other
+        best, _ = _try(problem, best, led)
+    settled = best is not None and best.converged and _explained(problem, best)
+    if not settled:
+        known = best if best is not None and best.converged else None
+        for start in _starts(problem, theta, known)[:TRIED]:
+            best, _ = _try(problem, best, start)
     if best is None:
         assert failure is not None
         raise failure
     if not best.converged:
         best = minimise(problem, best.theta, max_iterations=LONG_SEARCH)
     return best
+
+
+def _try(
+    problem: OutputProblem, best: Optimum | None, start: Array
+) -> tuple[Optimum | None, IdentificationError | None]:
+    """Return the better of `best` and a search from `start`, and why that search failed."""
+    try:
+        found = minimise(problem, start)
+    except IdentificationError as error:
+        return best, error
+    return (found if best is None or found.cost < best.cost else best), None
+
+
+def _flat(optimum: Optimum) -> bool:
+    """Whether the information is close to singular: valleys are long there, and many."""
+    information = optimum.information[np.ix_(optimum.free, optimum.free)]
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values = np.linalg.eigvalsh(information / np.outer(scale, scale))
+    return bool(values[-1] > CONDITION_LIMIT * max(values[0], 1e-300))
 
 
 def white_cost(problem: OutputProblem, theta: Array) -> float:

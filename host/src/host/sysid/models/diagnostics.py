@@ -20,10 +20,11 @@ CORRELATED = 0.9
 CONDITION_LIMIT = 1e5  # of the scaled information: correlations beyond all digits of a sensor
 SMALL_SHARE = 0.05  # of the row's largest contribution: below it errors are relative to this share
 REFUSAL_LIMIT = 1.0  # standard error over the reference value: 100 %
-EVEN_ODDS = 0.5  # that some bound exceeds the limit: from here on a fit is refused
-SUSPECT = 0.2  # that a parameter is one of them: from here on it is named
+EVEN_ODDS = 0.5  # of a bound above the limit: more likely than not
+DOUBT = 0.05  # the same: what a 95 % statement leaves over
+GRADES = CANNOT, DOUBTFUL = ("cannot be told", "doubtful")
 PRIOR_WIDTH = 3.0
-DRAWS, DRAW_SEED = 400, 1
+DRAWS, DRAW_SEED = 2000, 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,18 +95,26 @@ def whiteness(residuals: Sequence[Array], lags: int = 25) -> tuple[float, float]
     return outside, float(special.chdtrc(lags, statistic))
 
 
-def references(model: LinearModel, maneuvers: Sequence[Maneuver], theta: Array) -> Array:
+def references(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    theta: Array,
+    *,
+    small_share: float = SMALL_SHARE,
+) -> Array:
     """Return the value each parameter's error is compared with.
 
     |parameter|, or, where its contribution (|parameter| times rms of its regressor) is below 5 % of
     its row's largest, the value that would contribute 5 %. Of a tied parameter the row where it
-    counts most decides. Regressors are taken about their mean: the trim tells nothing.
+    counts most decides. Regressors are taken about their mean: the trim tells nothing. With a
+    `small_share` of zero it is |parameter| whatever it contributes.
     """
-    rows = _references(model, regressor_rms(model, maneuvers), np.asarray(theta)[None])
+    spread = regressor_rms(model, maneuvers)
+    rows = _references(model, spread, np.asarray(theta)[None], small_share)
     return np.asarray(rows[0])
 
 
-def _references(model: LinearModel, spread: Array, theta: Array) -> Array:
+def _references(model: LinearModel, spread: Array, theta: Array, small_share: float) -> Array:
     """Return references of many parameter vectors, (vectors, parameters)."""
     n, count = len(model.states), len(model.parameters)
     place = {p.name: k for k, p in enumerate(model.parameters)}
@@ -122,7 +131,7 @@ def _references(model: LinearModel, spread: Array, theta: Array) -> Array:
     for k, row, column, gain in entries:
         scale = abs(gain) * spread[column]
         if scale > 0.0:
-            floor[:, k] = np.minimum(floor[:, k], SMALL_SHARE * largest[:, row] / scale)
+            floor[:, k] = np.minimum(floor[:, k], small_share * largest[:, row] / scale)
     result = np.abs(theta[:, :count])
     return np.where(np.isfinite(floor), np.maximum(result, floor), result)
 
@@ -148,11 +157,51 @@ def regressor_rms(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A parameter that these data cannot tell, and why."""
+    """A parameter that these data cannot tell, or only doubtfully, and why.
+
+    Attributes
+    ----------
+    name : str
+    relative_bound : float
+        Standard error over the reference value of the (plausible) estimate.
+    probability : float
+        That the bound exceeds 100 % of the value.
+    grade : str
+        `CANNOT` where that is more likely than not, `DOUBTFUL` from `DOUBT` on.
+    reason : str
+    """
 
     name: str
     relative_bound: float
+    probability: float
+    grade: str
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """Whether a fit is refused, and which of its common parameters are in doubt.
+
+    Attributes
+    ----------
+    probability : float
+        That some bound exceeds 100 % of its value.
+    named : tuple of Refusal
+        Both grades, in the order of the model. Of a fit that is not refused they can only be
+        doubtful; of one that is refused, the data cannot tell at least one of them.
+    """
+
+    probability: float
+    named: tuple[Refusal, ...]
+
+    @property
+    def refused(self) -> bool:
+        """Whether more likely than not some bound exceeds its value."""
+        return self.probability > EVEN_ODDS
+
+    def names(self, *grades: str) -> tuple[str, ...]:
+        """Return the names of these grades, of both without any."""
+        return tuple(r.name for r in self.named if not grades or r.grade in grades)
 
 
 def plausible(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, Array]:
@@ -193,14 +242,19 @@ def measured_columns(model: LinearModel) -> list[int]:
     return [model.outputs.index(s) if s in model.outputs else 0 for s in model.states]
 
 
-def relative_bounds(result: FitResult, maneuvers: Sequence[Maneuver]) -> Array:
+def relative_bounds(
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
+) -> Array:
     """Return the standard error of every common parameter over its reference value."""
     count = len(result.model.parameters)
-    reference = references(result.model, maneuvers, plausible(result, maneuvers)[0])
+    mean, _ = plausible(result, maneuvers)
+    reference = references(result.model, maneuvers, mean, small_share=small_share)
     return np.asarray(result.standard_error[:count] / np.maximum(reference, 1e-300))
 
 
-def exceedance(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, float]:
+def exceedance(
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
+) -> tuple[Array, float]:
     """Return the probability that each bound exceeds 100 % of its value, and that any does.
 
     The value is as uncertain as its bound says, so one estimate over its bound decides badly near
@@ -210,40 +264,52 @@ def exceedance(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array,
     mean, covariance = plausible(result, maneuvers)
     value, vector = np.linalg.eigh(covariance)
     root = vector * np.sqrt(np.maximum(value, 0.0))
-    draws = np.random.default_rng(DRAW_SEED).standard_normal((DRAWS, count))
-    values = _references(model, regressor_rms(model, maneuvers), mean + draws @ root.T)
+    draws = mean + np.random.default_rng(DRAW_SEED).standard_normal((DRAWS, count)) @ root.T
+    values = _references(model, regressor_rms(model, maneuvers), draws, small_share)
     over = result.standard_error[:count] > REFUSAL_LIMIT * values
     return np.asarray(np.mean(over, axis=0)), float(np.mean(np.any(over, axis=1)))
 
 
-def refusals(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Refusal, ...]:
-    """Name the common parameters that these data cannot tell; none where all can be told.
+def judge(
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
+) -> Judgement:
+    """Say whether a fit is refused, and name every parameter in doubt with its grade.
 
-    A fit is refused where more likely than not some standard error exceeds its value; then every
-    parameter is named that may well be one of them, at least the likeliest.
+    A single estimate cannot always show that its bound is too large: one with a bound of 500 % lies
+    beyond twice its own bound in one of twenty fits. So there are two grades and two odds, for the
+    fit (`probability` of any) and for each parameter.
     """
+    relative = relative_bounds(result, maneuvers, small_share=small_share)
+    single, any_of_them = exceedance(result, maneuvers, small_share=small_share)
+    named = tuple(
+        _refusal(result, int(k), float(relative[k]), float(single[k]))
+        for k in np.flatnonzero(single > DOUBT)
+    )
+    return Judgement(any_of_them, named)
+
+
+def refusals(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Refusal, ...]:
+    """Name the common parameters that these data cannot tell or tell doubtfully."""
+    return judge(result, maneuvers).named
+
+
+def _refusal(result: FitResult, k: int, relative: float, probability: float) -> Refusal:
     count = len(result.model.parameters)
-    relative = relative_bounds(result, maneuvers)
-    single, any_of_them = exceedance(result, maneuvers)
-    if any_of_them <= EVEN_ODDS:
-        return ()
-    named = np.flatnonzero(single > min(SUSPECT, 0.999 * float(single.max())))
-    correlation = np.abs(result.correlation[:count, :count] - np.eye(count))
-    found = []
-    for k in named:
-        partner = int(np.argmax(correlation[k]))
-        reason = f"its bound is {100.0 * relative[k]:.0f} % of its value"
-        if relative[k] <= REFUSAL_LIMIT:
-            reason += f", above 100 % with a probability of {100.0 * single[k]:.0f} %"
-        if correlation[k, partner] > CORRELATED:
-            reason += (
-                f"; it moves together with {result.names[partner]}"
-                f" (correlation {correlation[k, partner]:.3f})"
-            )
-        else:
-            reason += "; the maneuver excites it too little for this noise"
-        found.append(Refusal(result.names[int(k)], float(relative[k]), reason))
-    return tuple(found)
+    correlation = np.abs(result.correlation[k, :count])
+    correlation[k] = 0.0
+    partner = int(np.argmax(correlation))
+    reason = f"its bound is {100.0 * relative:.0f} % of its value"
+    if (relative > REFUSAL_LIMIT) != (probability > EVEN_ODDS):
+        reason += f", above 100 % with a probability of {100.0 * probability:.0f} %"
+    if correlation[partner] > CORRELATED:
+        reason += (
+            f"; it moves together with {result.names[partner]}"
+            f" (correlation {correlation[partner]:.3f})"
+        )
+    else:
+        reason += "; the maneuver excites it too little for this noise"
+    grade = CANNOT if probability > EVEN_ODDS else DOUBTFUL
+    return Refusal(result.names[k], relative, probability, grade, reason)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,14 +14,22 @@ from pathlib import Path
 from host.errors import ExitCode
 from host.sysid.estimators.fit import METHODS
 from host.sysid.estimators.hopfield import ITERATIONS
-from host.sysid.models.model import free_model
-from host.sysid.study import accuracy, coverage, methods, tables, thesis, turbulence
-from host.sysid.study.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
+from host.sysid.study import (
+    accuracy,
+    coverage,
+    methods,
+    refusal,
+    systems,
+    tables,
+    thesis,
+    turbulence,
+)
 from host.sysid.study.inputs import SHAPES
 from host.sysid.study.report import write
 
 # runs of each study: (small, full)
 ITERATION_COUNT = (20_000, ITERATIONS)
+NOISE_SEEDS = (5, 100)
 SYSTEMS = (25, 200)
 ACCURACY_RUNS = (20, 1000)
 COVERAGE_RUNS = (20, 2000)
@@ -36,11 +44,9 @@ def study_a(stem: Path, size: int) -> list[Path]:
     from host.sysid.study.figures import thesis_figure
 
     runs = thesis.table_32(ITERATION_COUNT[size])
-    u = SHAPES["3-2-1-1"](thesis.AMPLITUDE_RAD, 0.01, thesis.DURATION_S)
-    check = thesis.check_refusal(TABLE_31_A, TABLE_31_B, u, 0.01)
-    found = [thesis.refusal_agreement(SYSTEMS[size], draw=draw) for draw in thesis.DRAWS]
-    names = free_model("table 3.1", STATES, INPUTS).parameter_names
-    table = tables.thesis_table(runs, check, names, found)
+    seeds = refusal.repeated(NOISE_SEEDS[size])
+    found = [refusal.refusal_agreement(SYSTEMS[size], draw=draw) for draw in systems.DRAWS]
+    table = tables.thesis_table(runs, seeds, found)
     return write(table, thesis_figure(runs, found[0]), stem)
 
 

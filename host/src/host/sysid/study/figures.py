@@ -11,7 +11,8 @@ from host.compiled import Array
 from host.sysid.study.accuracy import Accuracy
 from host.sysid.study.coverage import Coverage
 from host.sysid.study.methods import Score
-from host.sysid.study.thesis import SURE, Agreement, HopfieldRun
+from host.sysid.study.refusal import SURE, Agreement
+from host.sysid.study.thesis import HopfieldRun
 from host.sysid.study.turbulence import GustCase
 
 GREY = "0.6"
@@ -40,7 +41,7 @@ def thesis_figure(runs: Sequence[HopfieldRun], found: Agreement) -> Figure:
     ):
         right.semilogx(
             [100.0 * min(c.worst_share, 1e3) for c in checks],
-            [100.0 * c.probability for c in checks],
+            [100.0 * c.judgement.probability for c in checks],
             ".", color=colour, label=f"{label}: {len(checks)}",
         )  # fmt: skip
     right.axvline(100.0, color=GREY, lw=0.8)

@@ -6,25 +6,30 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from host.sysid.models.diagnostics import GRADES
 from host.sysid.study.accuracy import Accuracy
 from host.sysid.study.coverage import Coverage
 from host.sysid.study.methods import Score
+from host.sysid.study.refusal import Agreement, Repeated, agreement_text
 from host.sysid.study.report import Table
-from host.sysid.study.thesis import Agreement, HopfieldRun, RefusalCheck, agreement_text
+from host.sysid.study.thesis import HopfieldRun
 from host.sysid.study.turbulence import GustCase
 
 
 def thesis_table(
     runs: Sequence[HopfieldRun],
-    check: RefusalCheck,
-    names: Sequence[str],
+    seeds: Sequence[Repeated],
     found: Sequence[Agreement],
 ) -> Table:
-    """Return table 3.2 re-run; what is refused of table 3.1 goes below it."""
+    """Return table 3.2 re-run; what is refused of table 3.1 and others goes below it."""
+    first = seeds[0].checks[0]
     over = ", ".join(
         f"{name} {100.0 * share:.0f} %"
-        for name, share in zip(names, check.shares, strict=True)
-        if name in check.expected
+        for name, share in zip(first.names, first.shares, strict=True)
+        if name in first.expected
+    )
+    graded = "; ".join(
+        f"{grade}: {' '.join(first.judgement.names(grade)) or 'none'}" for grade in GRADES
     )
     return Table(
         "Tables 3.1 and 3.2 of the thesis re-run",
@@ -47,8 +52,10 @@ def thesis_table(
             )
             for run in runs
         ),
-        f"Table 3.1 at SNR 10 is refused: {' '.join(check.refused)}.\n\n"
+        f"Table 3.1 at SNR 10, noise seed 1: {graded}.\n\n"
         f"Analytic bounds above 100 %: {over}.\n\n"
+        + "\n\n".join(f"{one.text.capitalize()}." for one in seeds)
+        + "\n\n"
         + "\n\n".join(f"{agreement_text(one).capitalize()}." for one in found),
     )
 
