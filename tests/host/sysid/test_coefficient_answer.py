@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 from host.cli import main
 from host.sysid.aircraft.aircraft_file import airframe_data
-from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.aircraft.airframe import AirframeData, Condition
+from host.sysid.aircraft.conversion import Place, to_derivatives
 from host.sysid.answer.panels import Bar, interval_bars
 from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.coefficients.flight import CoefficientAnswer, identify_coefficients, joined
-from host.sysid.coefficients.modes import coefficient_modes
+from host.sysid.coefficients.modes import coefficient_modes, quantities
 from host.sysid.flight.finder import Found
 from host.sysid.flight.tables import read_columns
 from scipy import io
@@ -98,6 +99,19 @@ def test_the_linear_motion_is_that_of_the_true_aircraft(
         # The coefficient carries 5 % of inertia, the motion does not.
         assert system.A_half[entry] < 0.055 * abs(expected)
     assert answer.systems["lateral"].B.shape == (4, 2)
+
+
+def test_public_conversion_gives_the_same_motion(answer: CoefficientAnswer) -> None:
+    flight, frame = answer.fit.flight, airframe_data(NAME)
+    at = Condition(flight.airspeed_mps, flight.qbar_pa)
+    found = to_derivatives(quantities(answer.fit), Place(frame, at, flight.alpha_rad), {})
+    for name, row, entry in (
+        ("M_alpha", "longitudinal", (2, 1)), ("M_q", "longitudinal", (2, 2)),
+        ("L_p", "lateral", (1, 1)), ("N_beta", "lateral", (2, 0)),
+    ):  # fmt: skip
+        system = answer.systems[row]
+        assert found.value(name) == pytest.approx(system.A[entry], rel=1e-9)
+        assert 1.96 * found.deviation(name) == pytest.approx(system.A_half[entry], rel=1e-3)
 
 
 def test_delays_left_over_are_told(folder: Path, answer: CoefficientAnswer) -> None:

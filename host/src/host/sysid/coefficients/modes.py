@@ -13,6 +13,7 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.aircraft.conversion import Quantities
 from host.sysid.coefficients.answer import QUANTILE, CoefficientFit
 from host.sysid.coefficients.rows import GRAVITY_MPS2
 from host.sysid.models.modes import Mode, mode_of
@@ -28,6 +29,8 @@ MOTION = (
     *(f"{row}_{k}" for row in ("CL", "CD", "Cm") for k in ("alpha", "q", "de", "V")),
     *(f"{row}_{k}" for row in ("CY", "Cl", "Cn") for k in ("beta", "p", "r", "da", "dr")),
 )
+
+BETWEEN = ("mass_share", "ixx_share", "iyy_share", "izz_share", "pitot_scale")
 
 
 def coefficient_modes(fit: CoefficientFit, airframe: AirframeData) -> tuple[Mode, ...]:
@@ -69,6 +72,19 @@ class System:
     B: Array
     A_half: Array
     B_half: Array
+
+
+def quantities(fit: CoefficientFit) -> Quantities:
+    """Return what a fit found as `to_derivatives` takes it, mass, inertia and pitot beside it.
+
+    Moments of a fit are at the CG as it was and angles are true: neither the place of the CG nor a
+    sensor's scale stands between them and the motion.
+    """
+    table = {d.name: d.value for d in fit.derivatives} | {n: e for n, (e, _) in fit.errors.items()}
+    names = [n for n in table if n in MOTION or n in BETWEEN]
+    at = [list(table).index(n) for n in names]
+    values = np.array([table[n] for n in names])
+    return Quantities(tuple(names), values, fit.covariance[np.ix_(at, at)])
 
 
 def dimensional(fit: CoefficientFit, airframe: AirframeData) -> dict[str, System]:
