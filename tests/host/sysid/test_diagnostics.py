@@ -5,6 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.sysid import Maneuver, fit
+from host.sysid.aircraft.airframe import Condition
+from host.sysid.answer.json import answer_document
+from host.sysid.answer.verdict import model_lines, words
+from host.sysid.flight.linear import Answer
 from host.sysid.models.diagnostics import (
     CANNOT,
     DOUBTFUL,
@@ -21,6 +25,7 @@ from host.sysid.models.diagnostics import (
 )
 from host.sysid.models.model import Parameter, Term
 from host.sysid.models.modes import modes, modes_of
+from host.sysid.models.templates import Trim
 from host.sysid.study.aircraft import navion, navion_free, navion_structured
 from host.sysid.study.data import TRUTH, noisy
 from scipy import signal, stats
@@ -116,6 +121,48 @@ def test_collinear_parameters_are_named_with_their_partner_and_grade() -> None:
     assert {"M_de", "M_tab"} <= set(found.names(CANNOT))
     assert "moves together with M_de" in named["M_tab"].reason
     assert "Z_alpha" not in named
+
+
+def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
+    maneuver = noisy(3, 0.01, duration_s=2.0)
+    result = fit("output-error", navion_structured(), [maneuver])
+    found = judge(result, [maneuver])
+    cannot, doubtful = found.names(CANNOT), found.names(DOUBTFUL)
+    assert cannot
+    assert doubtful
+    answer = Answer(
+        template="longitudinal",
+        method="output-error",
+        model=result.model,
+        trim=Trim(17.0),
+        condition=Condition(17.0, 177.0),
+        maneuvers=(maneuver,),
+        used=(),
+        held_out=(),
+        result=result,
+        fits=(),
+        validation=(),
+        refused=found.named,
+        together=collinearity(result),
+        modes=(),
+        coefficients=(),
+        still=(),
+        delays={},
+    )
+    text = words([answer], [])
+    table = model_lines(answer)
+    document = answer_document(answer, text)
+    for named in found.named:
+        warning = "do not use" if named.grade == CANNOT else "doubtful,"
+        assert f"  {warning} {named.name}: {named.reason}" in text
+        assert any(line.split()[0] == named.name and named.grade in line for line in table)
+    told = next(line for line in text if "trust (" in line)
+    assert not set(cannot + doubtful) & {w.strip(",") for w in told.split()}
+    assert {r["name"]: r["grade"] for r in document["refused"]} == {
+        **dict.fromkeys(cannot, CANNOT),
+        **dict.fromkeys(doubtful, DOUBTFUL),
+    }
+    assert all(0.05 < r["probability"] <= 1.0 for r in document["refused"])
 
 
 def test_small_parameters_are_measured_by_what_would_matter() -> None:

@@ -85,7 +85,13 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
         "at_bound": list(answer.at_bound),
         "corrections": correction_document(answer.corrections),
         "refused": [
-            {"name": r.name, "relative_bound": r.relative_bound, "reason": r.reason}
+            {
+                "name": r.name,
+                "grade": r.grade,
+                "probability": r.probability,
+                "relative_bound": r.relative_bound,
+                "reason": r.reason,
+            }
             for r in answer.refused
         ],
         "coefficients": {

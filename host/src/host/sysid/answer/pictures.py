@@ -23,6 +23,7 @@ from host.sysid.answer.panels import (
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.compatibility.signals import THIN_HZ
 from host.sysid.flight.linear import Answer
+from host.sysid.models.diagnostics import CANNOT
 from host.sysid.models.modes import Mode
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def draw(answer: Answer, folder: Path, name: str) -> list[Path]:
     """
     result = answer.result
     title = f"{answer.template}, {answer.method}: measured (grey), {result.residual_kind} fit (red)"
-    refused = {r.name for r in answer.refused}
+    refused = {r.name for r in answer.refused if r.grade == CANNOT}
     half = result.half_width()
     bars = [
         Bar(label, value, width, max(abs(value), 1e-300), label in refused)
@@ -83,7 +84,7 @@ def draw(answer: Answer, folder: Path, name: str) -> list[Path]:
             f"{answer.template}, {answer.method}: poles, scatter from the covariance",
             folder / f"{name}_poles.svg",
         ),
-        interval_bars(bars, "refused", "of it", folder / f"{name}_intervals.svg"),
+        interval_bars(bars, CANNOT, "of it", folder / f"{name}_intervals.svg"),
         spectra(inputs, _hertz(answer.modes), folder / f"{name}_input.svg"),
     ]
 

@@ -9,6 +9,7 @@ from host.sysid.coefficients.answer import FLAG_SHARE
 from host.sysid.compatibility.corrections import correction_words
 from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer
+from host.sysid.models.diagnostics import CANNOT
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.flight import CoefficientAnswer
@@ -76,7 +77,8 @@ def _verdict(answer: Answer) -> list[str]:
         lines.append(f"  use with care (10 to 30 %):  {', '.join(fair)}")
     for refusal in answer.refused:
         if not refusal.name.startswith("imu_"):
-            lines.append(f"  do not use {refusal.name}: {refusal.reason}")
+            warning = "do not use" if refusal.grade == CANNOT else "doubtful,"
+            lines.append(f"  {warning} {refusal.name}: {refusal.reason}")
     flights = {
         NEEDS[r.name.split("_")[-1]] for r in answer.refused if r.name.split("_")[-1] in NEEDS
     }
@@ -110,9 +112,9 @@ def model_lines(answer: Answer) -> list[str]:
         f"{answer.template} at {answer.condition.airspeed_mps:.2f} m/s,"
         f" alpha {answer.trim.alpha_rad * 57.29578:.1f} deg; value and 95 % half-width"
     ]
-    refused = {r.name for r in answer.refused if not r.name.startswith("imu_")}
+    marks = {r.name: r.grade for r in answer.refused if not r.name.startswith("imu_")}
     for k, name in enumerate(answer.model.parameter_names):
-        mark = "  refused" if name in refused else ""
+        mark = f"  {marks[name]}" if name in marks else ""
         mark += "  at its bound" if name in answer.at_bound else ""
         lines.append(f"  {name:16s} {result.estimate[k]:11.5g}  +- {half[k]:9.3g}{mark}")
     for name, (value, width) in answer.delays.items():
