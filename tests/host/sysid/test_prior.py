@@ -87,7 +87,10 @@ def test_avl_stability_axes_are_read_and_turned(tmp_path: Path) -> None:
     level = read(tmp_path, "level.st", stability(0.0)).at(0.0)
     assert level["CL_alpha"] == 4.123456
     assert (level["Cl_beta"], level["Cl_p"], level["Cl_r"]) == (-0.041, -0.44, 0.098)
-    assert level["Cn_beta"] == 0.06  # the spiral figure is no derivative
+    assert level["Cn_beta"] == 0.06
+    silent = "\n".join(x for x in stability(0.0).splitlines() if "Cna" not in x)
+    rest = read(tmp_path, "silent.st", silent).at(0.0)
+    assert "Cn_beta" not in rest  # the spiral figure, "Clb Cnr / Clr Cnb =", is no derivative
     # One run is turned by its own angle, wherever it is asked for.
     turned = read(tmp_path, "up.st", stability(6.0)).at(np.radians(9.0))
     # The same moments by turning vectors: both the moment and the rate it is taken by.
