@@ -28,6 +28,7 @@ LINES = {
     "aileron_rad": 'from = "Ail", unit = "deg"',
     "rudder_rad": 'from = "Rud", unit = "deg"',
     "qbar_pa": 'from = "Qc", unit = "hPa"',
+    "throttle": 'from = "Throttle", unit = ""',
 }
 
 
@@ -54,7 +55,7 @@ def flight() -> dict[str, np.ndarray]:
         "az_mps2": -9.8 - 60.0 * (alpha - 0.1), "phi_rad": phi, "theta_rad": theta, "psi_rad": psi,
         "elevator_rad": -(qd + 60.0 * (alpha - 0.1) + 8.0 * q) / 70.0,
         "aileron_rad": (pd_ + 20.0 * beta + 10.0 * p - r) / 100.0, "rudder_rad": rudder,
-        "qbar_pa": 0.5 * 1.225 * speed**2,
+        "qbar_pa": 0.5 * 1.225 * speed**2, "throttle": np.full(len(t), 0.5),
     }  # fmt: skip
 
 
@@ -62,7 +63,7 @@ def flight() -> dict[str, np.ndarray]:
 def foreign(flight: dict[str, np.ndarray]) -> pd.DataFrame:
     """The same in microseconds, knots, degrees, g, hPa, elevator and Nz turned round."""
     scale = {"us": 1e-6, "kt": 1852 / 3600, "deg": np.pi / 180, "deg/s": np.pi / 180,
-             "g": 9.80665, "hPa": 100.0}  # fmt: skip
+             "g": 9.80665, "hPa": 100.0, "": 1.0}  # fmt: skip
     columns = {}
     for name, line in LINES.items():
         _, label, _, unit, *_ = line.split('"')

@@ -87,7 +87,7 @@ def _line(where: str, name: str, line: object) -> Line:
             f"{where}: unknown key {strange[0]}; a line may say {', '.join(sorted(KEYS))}"
         )
     units = UNITS[name.rsplit("_", 1)[-1]]
-    unit = line.get("unit", next(iter(units)))
+    unit = line.get("unit", "") or next(iter(units))
     if not isinstance(unit, str) or unit not in units:
         raise IdentificationError(f"{where}: unit '{unit}' unknown; use one of {', '.join(units)}")
     for key in ("sign", "scale", "offset"):
