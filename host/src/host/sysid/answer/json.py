@@ -148,6 +148,8 @@ def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dic
     flight = answer.fit.flight
     return {
         "template": "coefficients",
+        "model": answer.model.name,
+        "terms": [name for name, _, _ in answer.model.named()],
         "method": METHOD,
         "verdict": list(lines),
         "airspeed_mps": flight.airspeed_mps,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from host.sysid.coefficients.answer import FLAG_SHARE
+from host.sysid.coefficients.model import standard_model
 from host.sysid.compatibility.corrections import correction_words
 from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer
@@ -149,12 +150,13 @@ def model_lines(answer: Answer) -> list[str]:
 def coefficient_words(answer: CoefficientAnswer) -> list[str]:
     """Return the verdict of a direct fit of coefficients."""
     along = sum(w.longitudinal for w in answer.windows)
+    own = "" if answer.model == standard_model() else f" by the terms of '{answer.model.name}'"
     derivatives = answer.fit.derivatives
     trusted = [d.name for d in derivatives if d.share <= TRUST]
     fair = [d.name for d in derivatives if d.share > TRUST and not d.flagged]
     lines = [
-        f"coefficients: {along} maneuvers of the elevator, {len(answer.windows) - along} of aileron"
-        " and rudder fitted jointly, errors of the instrument beside them",
+        f"coefficients{own}: {along} maneuvers of the elevator, {len(answer.windows) - along} of"
+        " aileron and rudder fitted jointly, errors of the instrument beside them",
         f"  trust (within 10 %):  {', '.join(trusted) or 'nothing'}",
     ]
     if fair:

@@ -13,7 +13,7 @@ from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
 from host.sysid.aircraft.instrument_errors import InstrumentData
 from host.sysid.coefficients.answer import METHOD, QUANTILE, CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
-from host.sysid.coefficients.model import BODY, WIND, CoefficientModel
+from host.sysid.coefficients.model import BODY, WIND, CoefficientModel, standard_model
 from host.sysid.coefficients.modes import System, coefficient_modes, dimensional
 from host.sysid.coefficients.windows import LEAST_S, Window
 from host.sysid.errors import IdentificationError
@@ -55,6 +55,7 @@ class CoefficientAnswer:
     most, with its share of the variance; `delays` are residual (s) with 95 % half-width.
     """
 
+    model: CoefficientModel
     fit: CoefficientFit
     used: tuple[Found, ...]
     windows: tuple[Window, ...]
@@ -131,6 +132,7 @@ def identify_coefficients(
         model,
     )
     return CoefficientAnswer(
+        model=model or standard_model(),
         fit=fit,
         used=tuple(found),
         windows=tuple(spans),
