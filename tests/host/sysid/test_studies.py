@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.sysid.estimators.fit import METHODS
 from host.sysid.estimators.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
 from host.sysid.flight.finder import Found
 from host.sysid.models.diagnostics import CANNOT, GRADES
@@ -13,6 +14,7 @@ from host.sysid.study.__main__ import main
 from host.sysid.study.accuracy import run_case as accuracy
 from host.sysid.study.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
 from host.sysid.study.flights import overlap
+from host.sysid.study.methods import runs_of, score
 from host.sysid.study.refusal import (
     DT_S,
     check_refusal,
@@ -80,6 +82,16 @@ def test_refusal_agrees_with_the_bound_at_the_truth() -> None:
         false, told = found.false(grade)
         assert false <= 0.3 * told
     assert 0 < found.expected < found.systems
+
+
+def test_every_method_is_in_the_table_and_the_line_search_shows_its_start() -> None:
+    """Started 20 % off it stays there: its figure hardly knows the parameters."""
+    assert {runs_of(method, 60) for method in METHODS} == {60, 10, 5}
+    assert runs_of("hopfield-line-search", 12) == 1
+    assert runs_of("filter-error", 12) == 2
+    found = score("hopfield-line-search", "3-2-1-1, 20 Hz", 1)
+    assert found.failed == 0
+    assert found.error == pytest.approx(0.20, abs=0.05)
 
 
 def test_random_systems_are_stable_and_drawn_as_said() -> None:

@@ -34,6 +34,7 @@ SYSTEMS = (25, 200)
 ACCURACY_RUNS = (20, 1000)
 COVERAGE_RUNS = (20, 2000)
 FLIGHTS = (4, 100)
+NONLINEAR_FLIGHTS = (2, 24)
 METHOD_RUNS = (12, 60)  # of cheap methods; dear ones a sixth
 COEFFICIENT_FLIGHTS = (2, 24)
 THESIS_FLIGHTS = (1, 10)
@@ -75,15 +76,19 @@ def study_c(stem: Path, size: int) -> list[Path]:
 
 
 def study_d(stem: Path, size: int) -> list[Path]:
-    """Turbulence."""
+    """Turbulence, on the linear aircraft and on the non-linear one."""
     from host.sysid.study.figures import turbulence_figure
 
-    cases = [
-        turbulence.run_case(intensity, FLIGHTS[size], pilot=pilot)
-        for intensity in turbulence.INTENSITIES_MPS
-        for pilot in (False, True)
-    ]
-    return write(tables.turbulence_table(cases), turbulence_figure(cases), stem)
+    paths = []
+    for nonlinear, flights in ((False, FLIGHTS[size]), (True, NONLINEAR_FLIGHTS[size])):
+        cases = [
+            turbulence.run_case(intensity, flights, pilot=pilot, nonlinear=nonlinear)
+            for intensity in turbulence.INTENSITIES_MPS
+            for pilot in (False, True)
+        ]
+        name = stem.with_name(f"{stem.name}_nonlinear") if nonlinear else stem
+        paths += write(tables.turbulence_table(cases), turbulence_figure(cases), name)
+    return paths
 
 
 def study_e(stem: Path, size: int) -> list[Path]:
@@ -109,10 +114,9 @@ def study_g(stem: Path, size: int) -> list[Path]:
     """Every method on five data sets."""
     from host.sysid.study.figures import methods_figure
 
-    chosen = [m for m in METHODS if m not in methods.SKIPPED]
     scores = [
         methods.score(m, data, methods.runs_of(m, METHOD_RUNS[size]))
-        for m in chosen
+        for m in METHODS
         for data in methods.DATA
     ]
     return write(tables.methods_table(scores), methods_figure(scores), stem)
