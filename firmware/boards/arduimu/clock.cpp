@@ -28,7 +28,7 @@ inline __attribute__((always_inline)) uint32_t us_of(const uint32_t turns, const
 
 }  // namespace
 
-// Cycles, entry included, seen at most in flight (tests/simavr/imu): 58, 31, 29 and 81.
+// Cycles, entry included, seen at most in flight (tests/simavr/imu): 58, 31, 29 and 86.
 ISR(TIMER1_OVF_vect) {
   ++g_turns;
 }

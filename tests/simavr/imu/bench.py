@@ -33,7 +33,6 @@ VECTORS = {
     13: "TIMER1 overflow",
     14: "TIMER0 1 ms",
     18: "USART RX",
-    19: "USART UDRE",
     24: "TWI",
 }
 
