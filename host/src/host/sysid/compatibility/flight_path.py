@@ -128,6 +128,8 @@ class Stretch:
         Sample of the GPS fix in a block, -1 where there is none.
     vane_s2 : float
         One over the square of the vanes' natural frequency (rad/s); 0: a pure delay.
+    vane_m : tuple of float
+        Where the vanes are by the drawing, x and z from the CG.
     """
 
     dt_s: float
@@ -140,6 +142,7 @@ class Stretch:
     velocity_mps: Array
     fixes: IntArray
     vane_s2: float = 0.0
+    vane_m: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,7 +331,7 @@ class PathProblem:
         self._add(slope, "pitot_zero_pa", 1.0 / (s.density_kgpm3 * size))
         self._add(slope, "pitot_delay_s", change)
         result.append((late, slope))
-        arm_x, arm_z = self._value(local, PLACES)
+        arm_x, arm_z = self._value(local, PLACES) + s.vane_m
         by_x, by_z = rates[:, [1, 2]] * [-1.0, 1.0] / u[:, None], -rates[:, 0] / u
         for across, gain, offset, name in (
             (2, alpha_scale, alpha_zero, "alpha"),

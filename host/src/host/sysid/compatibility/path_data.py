@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,6 +36,7 @@ SHORT_STRETCH_S = 6.0  # without GPS nothing holds the path for longer
 # Without GPS a tilt of the IMU, a bias of an accelerometer and the attitude look alike.
 WITHOUT_GPS = (*INERTIAL[0:3], *FLOW, *DELAYS)
 MOST_STRETCHES = 8
+LEAST_LIFE = 0.1  # of the liveliest stretch: what an axis has before any is chosen
 QUADRANTS = 4  # of heading: wind and pitot scale need them
 LAGS = (*range(0, 10), *range(10, 31, 2))  # in blocks: what an answer to a surface lasts
 START_SD = np.array([1.0, 1.0, 1.0, 5.0 * DEGREE, 5.0 * DEGREE, 20.0 * DEGREE])
@@ -83,7 +85,16 @@ def prepare(
     fixes = _fixes(data) if gps else np.zeros(len(data["t_s"]), dtype=bool)
     cuts = _cuts(data, dt_s, block, STRETCH_S if gps else SHORT_STRETCH_S)
     vane = 0.0 if instrument is None else 1.0 / (2.0 * np.pi * instrument.vane_hz_per_mps)
-    stretches = [_stretch(data, cut, outputs, dt_s, block, vane, fixes[cut]) for cut in cuts]
+    place = np.zeros(3)
+    if airframe is not None and airframe.vanes_m:
+        place = np.mean(airframe.vanes_m, axis=0)
+    stretches = [
+        replace(
+            _stretch(data, cut, outputs, dt_s, block, vane, fixes[cut]),
+            vane_m=(float(place[0]), float(place[2])),
+        )
+        for cut in cuts
+    ]
     start_sd = START_SD if gps else np.where(np.arange(len(START)) == 5, 1e-6, START_SD)
     open_now = prior(instrument)
     if not gps:
@@ -142,18 +153,23 @@ def _unfiltered(signal: Array, i: InstrumentData, dt_s: float) -> Array:
 
 
 def _at_cg(data: dict[str, Array], airframe: AirframeData, dt_s: float) -> dict[str, Array]:
-    """Correct for position, upwash and rotation with rates smoothed for their derivative."""
+    """Move accelerometers with rates smoothed for their derivative, take upwash off the vanes.
+
+    The vanes stay where they are: what they feel of a rotation is as late as all they say.
+    """
     smooth = dict(data)
     window = 2 * max(2, round(SMOOTH_S / dt_s)) + 1
     for axis in "pqr":
         name = f"{axis}_radps"
         smooth[name] = local_polynomial(data[name][:, None], window, 2)[:, 0]
-    moved = corrected(smooth, airframe)
-    return {**moved, **{f"{axis}_radps": data[f"{axis}_radps"] for axis in "pqr"}}
+    moved = corrected(smooth, replace(airframe, vanes_m=()))
+    straight = np.arctan(np.tan(data["alpha_rad"]) / (1.0 + airframe.upwash))
+    rates = {f"{axis}_radps": data[f"{axis}_radps"] for axis in "pqr"}
+    return {**moved, **rates, "alpha_rad": straight}
 
 
 def _cuts(data: Mapping[str, Array], dt_s: float, block: int, length_s: float) -> list[slice]:
-    """Return the stretches that tell most: something of every heading, then the liveliest."""
+    """Return the stretches that tell most: something of every heading, then of every axis."""
     samples = max(block, round(length_s / dt_s) // block * block)
     speed = np.nan_to_num(data["airspeed_mps"])
     flying = speed > max(FLYING * float(np.median(speed)), LEAST_SPEED_MPS)
@@ -167,7 +183,10 @@ def _cuts(data: Mapping[str, Array], dt_s: float, block: int, length_s: float) -
             f"data compatibility: no {length_s:.0f} s of flight without interruption"
         )
     rates = np.stack([data[f"{a}_radps"] for a in "pqr"])
-    life = {c.start: float(np.sum(np.var(rates[:, c], axis=1))) for c in candidates}
+    # Each axis by its own liveliest: rolling is quick, and tells nothing of the alpha vane.
+    moving = np.array([np.var(rates[:, c], axis=1) for c in candidates])
+    shares = moving / np.maximum(moving.max(axis=0), 1e-12)
+    life = {c.start: share for c, share in zip(candidates, shares, strict=True)}
     chosen: list[slice] = []
     if "psi_rad" in data:
         middle = np.array([np.median(data["psi_rad"][c]) for c in candidates])
@@ -178,9 +197,13 @@ def _cuts(data: Mapping[str, Array], dt_s: float, block: int, length_s: float) -
                 for c, psi in zip(candidates, np.mod(middle, 2.0 * np.pi), strict=True)
                 if low <= psi < low + 2.0 * np.pi / QUADRANTS
             ]
-            chosen += sorted(own, key=lambda c: -life[c.start])[:1]
-    rest = sorted((c for c in candidates if c not in chosen), key=lambda c: -life[c.start])
-    chosen += rest[: MOST_STRETCHES - len(chosen)]
+            chosen += sorted(own, key=lambda c: -float(np.sum(life[c.start])))[:1]
+    rest = [c for c in candidates if c not in chosen]
+    while rest and len(chosen) < MOST_STRETCHES:
+        known = LEAST_LIFE + sum((life[c.start] for c in chosen), np.zeros(len(rates)))
+        best = max(rest, key=lambda c: float(np.sum(np.log(known + life[c.start]))))
+        chosen.append(best)
+        rest.remove(best)
     return sorted(chosen, key=lambda c: c.start)
 
 

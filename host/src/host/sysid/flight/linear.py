@@ -171,12 +171,12 @@ def identify(
         raise IdentificationError(
             f"no template '{strangers[0]}'; there are {', '.join(AXIS_OF)}, or give a TOML file"
         )
+    told = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
+    columns = without_delays(columns, told)
     if airframe is not None:
         columns = corrected(columns, airframe)
     if compatibility is not None:
-        told = {c.name: c.value for c in corrections(compatibility)}
         columns = without_errors(columns, told, pressure_part(compatibility))
-        columns = without_delays(columns, told)
     found = list(windows) if windows is not None else find(columns)
     if not found:
         raise IdentificationError(
