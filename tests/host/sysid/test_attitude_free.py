@@ -24,7 +24,7 @@ SIGNALS = (
 )  # fmt: skip
 ERRORS = (
     "mass_share", "ixx_share", "iyy_share", "izz_share", "thrust_share", "cg_x_m", "cg_y_m",
-    "cg_z_m",
+    "cg_z_m", "density_share",
 )  # fmt: skip
 
 
@@ -34,7 +34,9 @@ def seen_with(phi_rad: Array, theta_rad: Array) -> dict[str, Equation]:
     thrust, spin, drive = (random.standard_normal(SAMPLES) for _ in range(3))
     return equations(
         standard_model(), Record(0.01, dict(signals)), signals, dict.fromkeys(ERRORS, 0.01),
-        Flown(thrust, spin, drive, phi_rad, theta_rad, signals["V"] - 1.0),
+        Flown(
+            thrust, spin, drive, phi_rad, theta_rad, signals["V"] - 1.0, signals["V"], (0.0, 0.0)
+        ),
         airframe_data(NAME), powerplant(NAME), 0.05,
     ).rows  # fmt: skip
 

@@ -13,6 +13,7 @@ Step = Callable[[float, float, float, float], tuple[float, float, float]]
 History = Callable[[Array, Array, Array, float, float, int], Array]
 SUBSTEPS = 3  # a rotor takes 0.1 s and more to answer; records come at 33 Hz
 START_RADPS = 600.0  # forgotten within half a second
+SETTLED, SETTLING_S = 200, 0.03  # samples until a rotor keeps its speed, and their distance
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +54,20 @@ class Powerplant:
             SUBSTEPS,
         )
         return thrust, spin, drive
+
+    def settled_slopes(
+        self, throttle: float, airspeed_mps: float, density_kgpm3: float
+    ) -> tuple[float, float]:
+        """Return how thrust, the rotor settled, changes with airspeed (N per m/s) and with density
+        (N per unit share)."""
+
+        def thrust(faster: float, denser: float) -> float:
+            around = np.full(SETTLED, airspeed_mps + faster)
+            air = np.full(SETTLED, density_kgpm3 * (1.0 + denser))
+            return float(self.run(np.full(SETTLED, throttle), around, air, SETTLING_S)[0][-1])
+
+        by_speed = thrust(0.5, 0.0) - thrust(-0.5, 0.0)
+        return by_speed, (thrust(0.0, 0.01) - thrust(0.0, -0.01)) / 0.02
 
     def slope(self, spin_radps: float, airspeed_mps: float, density_kgpm3: float) -> float:
         """Return how thrust changes with airspeed (N per m/s) at constant rotor speed."""

@@ -63,7 +63,10 @@ class Pull:
 @dataclass(frozen=True, slots=True)
 class Flight:
     """Mean condition of the maneuvers; angle of attack with its range, CL and CD of the
-    longitudinal ones."""
+    longitudinal ones.
+
+    `faster` is the airspeed of the longitudinal and of the lateral ones over that of all.
+    """
 
     airspeed_mps: float
     qbar_pa: float
@@ -72,6 +75,7 @@ class Flight:
     drag: float
     pull: Pull
     alpha_range_rad: tuple[float, float]
+    faster: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

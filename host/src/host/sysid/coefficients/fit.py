@@ -38,6 +38,7 @@ from host.sysid.coefficients.rows import (
     Flown,
     equations,
 )
+from host.sysid.coefficients.turning import LENGTH_M, gust_information, gust_strength, turned
 from host.sysid.coefficients.windows import (
     Block,
     Key,
@@ -60,11 +61,14 @@ from host.sysid.numerics.repeats import scatter
 
 STEP = 0.3  # of a standard deviation: width of the numeric slopes
 PLAIN_ROUNDS, FULL_ROUNDS = 3, 2
-# Vertical wind of light turbulence and its length scale: averaging leaves some of it in the climb.
-GUST_MPS, GUST_LENGTH_M = 0.4, 100.0
 # Not estimated, only carried into the intervals: a vane's lag of 0.5 ms looks like an arm of 8 mm,
 # and estimating the arm drew CL_de 15 % and CY_beta 11 % off (simulated flights, seeds 300-303).
-CONSIDERED = ("cg_x_m", "imu_x_m", "ixx_share", "iyy_share", "izz_share")
+# Pitot and density stay as calibrated too: the flight tells them no better than that, and what it
+# seems to tell drew CL_alpha 0.5 % and CD_0 off (seeds 900-939).
+CONSIDERED = (
+    "cg_x_m", "imu_x_m", "ixx_share", "iyy_share", "izz_share",
+    "pitot_scale", "pitot_drift_pa", "density_share",
+)  # fmt: skip
 HELD = 1e30
 COLUMNS = (
     "alpha_rad", "beta_rad", "p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2",
@@ -93,14 +97,14 @@ class _Search:
     data: InstrumentData
     plant: Powerplant
     condition: tuple[float, float, float]
+    faster: tuple[float, float]
     blocks: list[Block]
 
-    @property
-    def balance_mps2(self) -> float:
-        """Standard deviation of the mean tangential balance: vertical wind left in the mean."""
+    def balance_mps2(self, gust_mps: float) -> float:
+        """Return the deviation of the mean tangential balance: vertical gusts left in the mean."""
         V = self.condition[0]
-        lengths = V * self.record.samples * self.record.dt_s / GUST_LENGTH_M
-        return float(GRAVITY_MPS2 * GUST_MPS / V * np.sqrt(2.0 / lengths))
+        lengths = V * self.record.samples * self.record.dt_s / LENGTH_M["w"]
+        return float(GRAVITY_MPS2 * gust_mps / V / np.sqrt(lengths))
 
     def rows(
         self,
@@ -195,10 +199,13 @@ def _prepare(
     speed = np.sqrt(2.0 * np.maximum(record.columns["qbar_pa"], 1.0) / _density(record))
     s = corrected(record, zero, data, float(speed[every].mean()))
     flying = s["V"] * np.cos(s["alpha"])
+    driving = (record.columns["throttle"], flying, _density(record))
     flown = Flown(
-        *plant.run(record.columns["throttle"], flying, _density(record), record.dt_s),
+        *plant.run(*driving, record.dt_s),
         *attitude(record, s),
         s["V"] / float(s["V"][every].mean()) - 1.0,
+        flying,
+        plant.settled_slopes(*(float(x[every].mean()) for x in driving)),
     )
     along = np.concatenate([k for k, w in zip(picked, windows, strict=True) if w.longitudinal])
     condition = (
@@ -206,11 +213,14 @@ def _prepare(
         float(s["qbar"][every].mean()),
         float(s["alpha"][along].mean()),
     )
+    across = np.concatenate([k for k, w in zip(picked, windows, strict=True) if not w.longitudinal])
+    own_mps = [float(s["V"][k].mean()) for k in (along, across)]
+    faster = (own_mps[0] / condition[0], own_mps[1] / condition[0])
     blocks = [
         window_block(samples, record.dt_s, window, model.forces)
         for samples, window in zip(picked, windows, strict=True)
     ]
-    return _Search(model, record, flown, airframe, data, plant, condition, blocks)
+    return _Search(model, record, flown, airframe, data, plant, condition, faster, blocks)
 
 
 def _density(record: Record) -> Array:
@@ -257,21 +267,33 @@ def _solve(search: _Search, names: tuple[str, ...], sd: Array) -> CoefficientFit
             position,
             len(sd),
             noise,
+            (turned(rows.signals, search.blocks), turned(left.signals, search.blocks))
+            if full
+            else ({}, {}),
         )
         prior = np.zeros(A.shape[1])
         prior[-len(sd) :] = sd**-2.0 if full else HELD
         prior[held] = HELD
         miss = np.zeros(A.shape[1])
         miss[-len(sd) :] = -prior[-len(sd) :] * errors
-        normal = Z.T @ A + np.diag(prior)
-        meat = Z.T @ Z + np.diag(prior)
+        known = np.diag(prior)
+        strength = gust_strength(noise, search.condition[0], search.record.dt_s) if full else {}
+        if full:
+            gusts = gust_information(
+                search.blocks, strength, search.condition[0], search.record.dt_s
+            )
+            inside = slice(-len(sd) - len(gusts), -len(sd))
+            known[inside, inside] += gusts
+        normal = Z.T @ A + known
+        meat = Z.T @ Z + known
         right = Z.T @ y + miss
         if full:
             balance = np.zeros(A.shape[1])
-            balance[-len(sd) :] = levels[0] / search.balance_mps2
+            left_mps2 = search.balance_mps2(strength["w"])
+            balance[-len(sd) :] = levels[0] / left_mps2
             normal += np.outer(balance, balance)
             meat += np.outer(balance, balance)
-            right -= balance * (_levels(search, rows)[0] / search.balance_mps2)
+            right -= balance * (_levels(search, rows)[0] / left_mps2)
         scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(normal)), 1e-30))
         inverse = told_inverse(normal * np.outer(scale, scale), position) * np.outer(scale, scale)
         step = inverse @ right
@@ -388,7 +410,7 @@ def _answer(
             n: (float(e), float(d))
             for n, e, d in zip(names, state[-len(names) :], left, strict=True)
         },
-        Flight(*search.condition, lift, drag, pull, _flown_range(search, rows)),
+        Flight(*search.condition, lift, drag, pull, _flown_range(search, rows), search.faster),
         {
             name: trace(
                 equation.left,

@@ -132,5 +132,7 @@ def gust_free(
         phi,
         theta,
         flown.faster,  # of the flight: slow, and nothing else tells how speed changed
+        np.full(n, V * np.cos(alpha_0)),
+        flown.pull,
     )
     return Record(record.dt_s, columns), calm

@@ -24,8 +24,8 @@ class LastStep:
 
     `normal` step = `right`, prior included; `owner` is the equation and window of each stretch of
     rows, two for every frequency compared, weighted by `noise`; `spectra` are left sides
-    and regressors; the first `terms` columns are
-    coefficients, the last `errors` those of the instrument, between them lines of each stretch.
+    and regressors; the first `terms` columns are coefficients, the last `errors` those of the
+    instrument, between them lines of each stretch, then slow gusts.
     """
 
     A: Array

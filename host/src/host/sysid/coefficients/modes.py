@@ -135,7 +135,7 @@ def _moved(
 def longitudinal(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -> Matrices:
     """Return the system of airspeed, alpha, q, theta in level flight, and its inputs."""
     f = fit.flight
-    V, force = _moving(v, fit, a)
+    V, force = _moving(v, fit, a, f.faster[0])
     mass = a.mass_kg * (1.0 + v["mass_share"])
     iyy = a.iyy_kgm2 * (1.0 + v["iyy_share"])
     hat, g = 0.5 * a.chord_m / V, GRAVITY_MPS2
@@ -165,7 +165,7 @@ def longitudinal(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -
 def lateral(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -> Matrices:
     """Return the system of beta, p, r, phi in level flight, and its inputs."""
     f = fit.flight
-    V, force = _moving(v, fit, a)
+    V, force = _moving(v, fit, a, f.faster[1])
     mass = a.mass_kg * (1.0 + v["mass_share"])
     ixx, izz = (n * (1.0 + v[k]) for n, k in ((a.ixx_kgm2, "ixx_share"), (a.izz_kgm2, "izz_share")))
     inertia = np.array([[ixx, -a.ixz_kgm2], [-a.ixz_kgm2, izz]])
@@ -184,7 +184,10 @@ def lateral(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -> Mat
     return A, B
 
 
-def _moving(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -> tuple[float, float]:
-    """Return airspeed and dynamic pressure times wing area, the pitot's error taken out."""
-    share = 1.0 / (1.0 + v["pitot_scale"])
-    return fit.flight.airspeed_mps * share**0.5, fit.flight.qbar_pa * share * a.wing_area_m2
+def _moving(
+    v: Mapping[str, float], fit: CoefficientFit, a: AirframeData, faster: float
+) -> tuple[float, float]:
+    """Return airspeed and dynamic pressure times wing area, the errors of pitot and density out."""
+    qbar_pa = (fit.flight.qbar_pa - v["pitot_drift_pa"]) / (1.0 + v["pitot_scale"])
+    share = qbar_pa / fit.flight.qbar_pa / (1.0 + v["density_share"])
+    return fit.flight.airspeed_mps * faster * share**0.5, qbar_pa * faster**2 * a.wing_area_m2

@@ -26,8 +26,9 @@ KINEMATIC = ("u", "v", "w")
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """What goes with the signals of one flight: thrust, spin, motor torque, attitude, and airspeed
-    over that of the maneuvers less one, each (n,)."""
+    """What goes with the signals of one flight: thrust, spin, motor torque, attitude, airspeed over
+    that of the maneuvers less one, airspeed along x behind that thrust, each (n,); how much more
+    thrust it would be with airspeed (N per m/s) and with density (N per unit share)."""
 
     thrust_n: Array
     spin_radps: Array
@@ -35,6 +36,8 @@ class Flown:
     phi_rad: Array
     theta_rad: Array
     faster: Array
+    flying_mps: Array
+    pull: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +91,9 @@ def equations(
     izz = airframe.izz_kgm2 * (1.0 + e["izz_share"])
     ixz = airframe.ixz_kgm2
     S, b, c = airframe.wing_area_m2, airframe.span_m, airframe.chord_m
-    thrust = flown.thrust_n * (1.0 + e["thrust_share"])
+    by_speed, by_density = flown.pull
+    thrust = flown.thrust_n + by_speed * (s["V"] * np.cos(s["alpha"]) - flown.flying_mps)
+    thrust = (thrust + by_density * e["density_share"]) * (1.0 + e["thrust_share"])
     tx, tz = thrust * plant.axis[0], thrust * plant.axis[2]
     spin = plant.rotor_kgm2 * flown.spin_radps
     hx, hz = spin * plant.axis[0], spin * plant.axis[2]

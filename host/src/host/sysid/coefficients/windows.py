@@ -109,12 +109,19 @@ def stacked(
     position: Mapping[str, int],
     n_errors: int,
     noise: Mapping[str, tuple[Array, Array]],
+    gusts: tuple[Mapping[Key, Spectrum], Mapping[Key, Spectrum]],
 ) -> tuple[Array, Array, Array, list[tuple[str, int]]]:
-    """Return slopes, left factors and residuals, real and imaginary parts weighted."""
+    """Return slopes, left factors and residuals, real and imaginary parts weighted.
+
+    Columns: coefficients, lines of each stretch of rows, `gusts` (of slopes and of left factors),
+    errors of the instrument.
+    """
     keys = [(name, k) for k, block in enumerate(blocks) for name in block.names]
     degrees = [degree(name) for name, _ in keys]
     begin = len(position) + np.concatenate([[0], np.cumsum(degrees)])
-    width = int(begin[-1]) + n_errors
+    gusty = {key: values.shape[1] for key, values in gusts[0].items()}
+    after = int(begin[-1])
+    width = after + sum(gusty.values()) + n_errors
     A: list[Array] = []
     Z: list[Array] = []
     y: list[Array] = []
@@ -123,13 +130,19 @@ def stacked(
         weight = row_weight(block.hertz[kept], noise.get(name))
         places = [position[f"{name}_{term}"] for term in terms[name]]
         spectrum = spectra[name, k]
-        for source, its_slopes, target in ((spectra, slopes, A), (left, left_slopes, Z)):
+        aside, after = after, after + gusty.get((name, k), 0)
+        for source, its_slopes, its_gusts, target in (
+            (spectra, slopes, gusts[0], A),
+            (left, left_slopes, gusts[1], Z),
+        ):
             M = np.zeros((len(block.hertz), width), np.complex128)
             M[:, places] = source[name, k][:, 1:]
             M[:, begin[n] : begin[n + 1]] = block.trends[:, : degrees[n]]
+            if after > aside:
+                M[:, aside:after] = its_gusts[name, k]
             if its_slopes:
                 M[:, -n_errors:] = -its_slopes[name, k]
-            target.append(_real(M[kept] * weight[:, None]))
+            target.append(_real(np.asarray(M[kept] * weight[:, None])))
         y.append(_real((spectrum[:, 0] - spectrum[:, 1:] @ own[name])[kept] * weight))
     return np.vstack(A), np.vstack(Z), np.concatenate(y), keys
 
