@@ -179,6 +179,16 @@ def test_filter_error_without_process_noise_is_output_error() -> None:
     np.testing.assert_allclose(point.e[0].T, inner.measured(0) - response[0].y, atol=1e-8)
 
 
+@pytest.mark.parametrize("log_noise", [-400.0, 340.0])
+def test_a_filter_that_has_no_gain_is_no_answer(log_noise: float) -> None:
+    problem = FilterProblem(navion_structured(), [noisy(12)], ("alpha_rad",))
+    theta = np.concatenate([TRUTH, np.zeros(4), [0.0], np.log([1.0, 0.1, 0.1, 0.1])])
+    assert problem.evaluate(theta) is not None
+    theta[-4] = log_noise
+    theta[-5] = abs(log_noise)
+    assert problem.evaluate(theta) is None
+
+
 def test_kalman_filters_agree_with_output_error() -> None:
     maneuver = noisy(13, 0.02)
     reference = fit("output-error", navion_structured(), [maneuver])

@@ -163,13 +163,13 @@ class FilterProblem:
         F, Qd = discrete_noise(A, intensity, dt_s)
         if not np.isfinite(Qd).all() or np.max(np.abs(F)) > 1e6:
             return None
-        solved, P = predicted_covariance(F, np.ascontiguousarray(C), Qd, R)
-        if not solved:
-            return None
-        S = C @ P @ C.T + R
         try:
+            solved, P = predicted_covariance(F, np.ascontiguousarray(C), Qd, R)
+            S = C @ P @ C.T + R
             factor = np.linalg.cholesky(S)
-        except np.linalg.LinAlgError:
+        except np.linalg.LinAlgError:  # of the compiled solver as well
+            return None
+        if not solved:
             return None
         return S, factor, np.ascontiguousarray(np.linalg.solve(S, C @ P).T)
 
