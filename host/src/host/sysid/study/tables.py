@@ -128,7 +128,8 @@ def turbulence_table(cases: Sequence[GustCase]) -> Table:
             )  # fmt: skip
     failed = sum(c.failed for c in cases)
     return Table(
-        "Filter error against output error, Ultra Stick 25e in Dryden gusts",
+        "Filter error against output error, Ultra Stick 25e in Dryden gusts, "
+        + ("non-linear as it is" if cases[0].nonlinear else "linear"),
         (
             "gust", "loop", "coefficient", "rms filter error %", "rms output error %", "bound %",
             "output/filter", "filter/bound", "mean filter error %", "two standard errors %",
@@ -136,9 +137,9 @@ def turbulence_table(cases: Sequence[GustCase]) -> Table:
         ),
         tuple(rows),
         f"{cases[0].flights} flights a case, {failed} failed fits. Bound: of the stochastic model"
-        " with turbulence and sensor noise known. Coverage of 95 % intervals is pooled over the six"
-        " coefficients of a case. Holds: error at most a third of output error's or 1.3 bounds, and"
-        " mean error at most 3 % and two standard errors.",
+        " with turbulence and sensor noise known, on the linear aircraft. Coverage of 95 %"
+        " intervals is pooled over the six coefficients of a case. Holds: error at most a third of"
+        " output error's or 1.3 bounds, and mean error at most 3 % and two standard errors.",
     )  # fmt: skip
 
 

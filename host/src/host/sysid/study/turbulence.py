@@ -1,13 +1,15 @@
 """Filter error against output error in Dryden turbulence, open loop and with a pilot correcting.
 
-Linear Ultra Stick 25e in the twin's gusts (`gusts`); its coefficients are the parameters of the
-fit. The model of filter error has the Dryden form, with the turning and rolling of the air that
-comes with it; intensity and time scale are estimated (the scale within a factor of two or so of
-the one that belongs to the height). Fits start from output error, that from its own equation error.
+Ultra Stick 25e in the twin's gusts, linear (`gusts`) or as it is (`nonlinear_gusts`); its
+coefficients are the parameters of the fit. The model of filter error has the Dryden form, with the
+turning and rolling of the air that comes with it; intensity and time scale are estimated (the scale
+within a factor of two or so of the one that belongs to the height). Fits start from output error,
+that from its own equation error.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +22,7 @@ from host.sysid.estimators.gust import ROLLING, gust_model
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.study.gusts import AXES, NOISE, fly, gusty_aircraft, spectrum
+from host.sysid.study.nonlinear_gusts import fly_nonlinear, varying
 
 SCALE_SHARE = 0.5  # how well the fit knows the length of the gusts beforehand
 PROCESS = {"longitudinal": ("gust_rad", "airspeed_mps"), "lateral": ("gust_rad", ROLLING)}
@@ -35,7 +38,7 @@ class GustCase:
 
     Attributes
     ----------
-    intensity_mps, pilot
+    intensity_mps, pilot, nonlinear
         Of the case.
     names : tuple of str
     flights, failed : int
@@ -43,7 +46,8 @@ class GustCase:
     filter_rms, output_rms : Array
         Root mean square error over the truth.
     bound : Array
-        Cramer-Rao bound of the stochastic model, turbulence and sensor noise known, over the truth.
+        Cramer-Rao bound of the stochastic model, turbulence and sensor noise known, over the truth;
+        for the non-linear aircraft that of the linear one.
     filter_mean, output_mean, filter_scatter : Array
         Mean error over the truth, and the standard error of that mean.
     filter_covered, output_covered : float
@@ -52,6 +56,7 @@ class GustCase:
 
     intensity_mps: float
     pilot: bool
+    nonlinear: bool
     names: tuple[str, ...]
     flights: int
     failed: int
@@ -78,12 +83,26 @@ class GustCase:
 
 
 @dataclass(frozen=True)
+class GustSetup:
+    """What one axis is fitted with: without and with the gust as a state; the second has more."""
+
+    axis: str
+    plain: LinearModel
+    wide: LinearModel
+
+    @property
+    def picked(self) -> list[int]:
+        """Places of the judged coefficients."""
+        return [[p.name for p in self.plain.parameters].index(name) for name in AXES[self.axis]]
+
+
+@dataclass(frozen=True)
 class _Axis:
     filter_error: Array  # (flights, coefficients)
     output_error: Array
     filter_inside: Array
     output_inside: Array
-    information: Array
+    bound: Array
     failed: int
 
 
@@ -115,46 +134,76 @@ def true_vector(axis: str, intensity_mps: float) -> Array:
     )
 
 
-def fit_both(axis: str, maneuver: Maneuver) -> tuple[Array, Array, Array, Array]:
+def linear_setup(axis: str) -> GustSetup:
+    """Return what is fitted to the linear aircraft."""
+    return GustSetup(axis, gusty_aircraft().models[axis], fitted_model(axis))
+
+
+def nonlinear_setup(axis: str) -> GustSetup:
+    """Return what is fitted to the non-linear one: departures from the linear model added."""
+    plane, flown = gusty_aircraft(), varying(axis)
+    wide = gust_model(
+        flown.gusty,
+        plane.airspeed_mps,
+        spectrum(axis, 1.0).length_m,
+        span_m=plane.airframe.span_m,
+        scale_share=SCALE_SHARE,
+    )
+    return GustSetup(axis, flown.model, wide)
+
+
+def fit_both(
+    setup: GustSetup, maneuver: Maneuver, truth: Array
+) -> tuple[Array, Array, Array, Array]:
     """Return errors over truth and half-widths over truth: filter error's two, output error's two.
+
+    Parameters
+    ----------
+    setup : GustSetup
+    maneuver : Maneuver
+    truth : Array
+        Of the judged coefficients.
 
     Raises
     ------
     IdentificationError
         If either method gives no answer, or filter error has not converged.
     """
-    plane = gusty_aircraft()
-    plain, wide = plane.models[axis], fitted_model(axis)
-    count, truth = len(plain.parameters), plane.truth[axis]
+    count = len(setup.plain.parameters)
     # The start values of the model are the truth: the fits must not see them.
-    plain = plain.with_start(np.zeros(count))
+    plain = setup.plain.with_start(np.zeros(count))
     first = fit("output-error-white", plain, [maneuver])
-    start = np.concatenate(
-        [first.estimate[:count], [wide.parameters[-1].start], first.estimate[count:]]
-    )
-    ours = fit("filter-error", wide, [maneuver], process=PROCESS[axis], start=start)
+    more = [p.start for p in setup.wide.parameters[count:]]
+    start = np.concatenate([first.estimate[:count], more, first.estimate[count:]])
+    process = PROCESS[setup.axis]
+    ours = fit("filter-error", setup.wide, [maneuver], process=process, start=start, rival=False)
     if not ours.converged:
         raise IdentificationError(f"{maneuver.name}: {ours.warnings[0]}")
-    picked = [[p.name for p in plain.parameters].index(name) for name in AXES[axis]]
-    size = np.abs(truth[picked])
+    size, picked = np.abs(truth), setup.picked
     return (
-        (ours.estimate[picked] - truth[picked]) / size,
+        (ours.estimate[picked] - truth) / size,
         ours.half_width()[picked] / size,
-        (first.estimate[picked] - truth[picked]) / size,
+        (first.estimate[picked] - truth) / size,
         first.half_width()[picked] / size,
     )
 
 
-def _run_axis(axis: str, intensity_mps: float, flights: int, *, pilot: bool) -> _Axis:
-    wide, truth = fitted_model(axis), true_vector(axis, intensity_mps)
-    known = len(truth) - len(PROCESS[axis]) - len(wide.outputs)
+def _run_axis(
+    axis: str, intensity_mps: float, flights: int, *, pilot: bool, nonlinear: bool
+) -> _Axis:
+    seeds = range(flights)
+    linear = fly(axis, intensity_mps, seeds, with_pilot=pilot)
+    setup = nonlinear_setup(axis) if nonlinear else linear_setup(axis)
+    if nonlinear:
+        flown = fly_nonlinear(axis, intensity_mps, seeds, with_pilot=pilot)
+        data = [(f.maneuver, np.array([f.truth[name] for name in AXES[axis]])) for f in flown]
+    else:
+        data = [(m, gusty_aircraft().truth[axis][setup.picked]) for m in linear]
     rows: list[tuple[Array, Array, Array, Array]] = []
-    information = np.zeros((known, known))
     failed = 0
-    for maneuver in fly(axis, intensity_mps, range(flights), with_pilot=pilot):
-        information += information_at(wide, [maneuver], PROCESS[axis], truth)[:known, :known]
+    for maneuver, truth in data:
         try:
-            rows.append(fit_both(axis, maneuver))
+            rows.append(fit_both(setup, maneuver, truth))
         except IdentificationError:
             failed += 1
     ours, half, plain, plain_half = (np.array(column) for column in zip(*rows, strict=True))
@@ -163,24 +212,33 @@ def _run_axis(axis: str, intensity_mps: float, flights: int, *, pilot: bool) -> 
         plain,
         np.abs(ours) <= half,
         np.abs(plain) <= plain_half,
-        information / flights,
+        _bounds(axis, intensity_mps, linear),
         failed,
     )
 
 
-def _bounds(axis: str, information: Array) -> Array:
+def _bounds(axis: str, intensity_mps: float, linear: Sequence[Maneuver]) -> Array:
     """Return the bounds of the axis's coefficients over the truth; the gusts' scale is known."""
     wide, plane = fitted_model(axis), gusty_aircraft()
+    truth = true_vector(axis, intensity_mps)
+    known = len(truth) - len(PROCESS[axis]) - len(wide.outputs)
+    parts = [information_at(wide, [m], PROCESS[axis], truth)[:known, :known] for m in linear]
+    information = np.sum(parts, axis=0) / len(parts)
     names = [p.name for p in wide.parameters]
-    keep = np.array([k for k in range(len(information)) if k != names.index("gust_rate")])
+    keep = np.array([k for k in range(known) if k != names.index("gust_rate")])
     covariance = np.linalg.pinv(information[np.ix_(keep, keep)], hermitian=True)
     picked = [names.index(name) for name in AXES[axis]]  # before gust_rate: places hold
     return np.asarray(np.sqrt(np.diag(covariance)[picked]) / np.abs(plane.truth[axis][picked]))
 
 
-def run_case(intensity_mps: float, flights: int, *, pilot: bool) -> GustCase:
+def run_case(
+    intensity_mps: float, flights: int, *, pilot: bool, nonlinear: bool = False
+) -> GustCase:
     """Fly and fit one case on both axes."""
-    runs = {axis: _run_axis(axis, intensity_mps, flights, pilot=pilot) for axis in AXES}
+    runs = {
+        axis: _run_axis(axis, intensity_mps, flights, pilot=pilot, nonlinear=nonlinear)
+        for axis in AXES
+    }
 
     def joined(pick: str, how: str) -> Array:
         parts = [getattr(run, pick) for run in runs.values()]
@@ -196,12 +254,13 @@ def run_case(intensity_mps: float, flights: int, *, pilot: bool) -> GustCase:
     return GustCase(
         intensity_mps=intensity_mps,
         pilot=pilot,
+        nonlinear=nonlinear,
         names=tuple(name for axis in AXES for name in AXES[axis]),
         flights=flights,
         failed=sum(run.failed for run in runs.values()),
         filter_rms=joined("filter_error", "rms"),
         output_rms=joined("output_error", "rms"),
-        bound=np.concatenate([_bounds(axis, run.information) for axis, run in runs.items()]),
+        bound=np.concatenate([run.bound for run in runs.values()]),
         filter_mean=joined("filter_error", "mean"),
         output_mean=joined("output_error", "mean"),
         filter_scatter=joined("filter_error", "scatter"),

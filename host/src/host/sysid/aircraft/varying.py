@@ -1,0 +1,277 @@
+"""Constant coefficients in a flight whose airspeed and attitude vary: departures as inputs.
+
+A linear model holds at one airspeed. Flown, forces follow V^2, damping V, gravity turns with the
+attitude and body rates couple. All of that is a product of what was measured and of the model's own
+parameters (or of known numbers), so it is written as further inputs: (V^n / V0^n - 1) times the
+deviation of the column a parameter acts on, with the parameter's own gain, and what kinematics,
+gravity and inertia say beyond their linear part. The model stays linear in its states, its
+parameters become those of V0 exactly, and every estimator can fit it.
+
+Klein & Morelli, Aircraft System Identification, sec. 3.4-3.6, for the equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from host.compiled import Array
+from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.errors import IdentificationError
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel, Parameter, Term
+from host.sysid.models.templates import GRAVITY_MPS2, Trim, template
+
+RATES = ("p_radps", "q_radps", "r_radps")
+MEASURED = (
+    "airspeed_mps", "alpha_rad", "beta_rad", *RATES, "phi_rad", "theta_rad",
+    "ax_mps2", "ay_mps2", "az_mps2",
+)  # fmt: skip
+ANGLES = {"longitudinal": "alpha_rad", "lateral": "beta_rad"}
+SMOOTH_S = 0.1  # of airspeed: its noise would multiply every term
+# Second-order terms with a parameter of their own: name, row, factors. Drag is a parabola in lift;
+# dihedral, roll by yawing and yaw by rolling follow lift, so the angle of attack.
+# Gusts are written in body axes (MIL-F-8785C): one along the path turns with the aircraft, so that
+# an angle of flow follows the rates by 1 + u_gust / V. The share is unknown, with this deviation:
+# 1.8 m/s at 17 m/s.
+ALONG_SHARE = 0.1
+BENDS = {
+    "longitudinal": (("D_alpha_alpha", "airspeed_mps", "alpha_rad"),),
+    "lateral": (
+        ("L_beta_alpha", "p_radps", "beta_rad"),
+        ("L_r_alpha", "p_radps", "r_radps"),
+        ("N_beta_alpha", "r_radps", "beta_rad"),
+        ("N_p_alpha", "r_radps", "p_radps"),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class VaryingModel:
+    """A template with departures from its linear form among its inputs.
+
+    Attributes
+    ----------
+    base : LinearModel
+        Longitudinal or lateral template, in derivatives or coefficients, without delays.
+    axis : str
+        Which of both.
+    trim : Trim
+        What the parameters belong to.
+    airframe : AirframeData
+        Inertia, for what rates do to each other.
+    spin_kgm2ps : tuple of float
+        Angular momentum of the rotor along x and z.
+    """
+
+    base: LinearModel
+    axis: str
+    trim: Trim
+    airframe: AirframeData
+    spin_kgm2ps: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if self.axis not in BENDS:
+            raise IdentificationError(
+                f"departures of '{self.axis}', known are those of {' and '.join(BENDS)}"
+            )
+
+    @property
+    def scaled(self) -> tuple[tuple[str, int], ...]:
+        """Columns that airspeed scales, with the power it does so by."""
+        found: list[tuple[str, int]] = []
+        for term in self.base.terms:
+            key = self._scaling(term)
+            if key[1] > 0 and key not in found:
+                found.append(key)
+        return tuple(found)
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """Outputs that measure a specific force."""
+        return tuple(y for y in self.base.outputs if y in MEASURED[-3:])
+
+    @property
+    def model(self) -> LinearModel:
+        """The template with the departures as inputs, its own parameters first."""
+        return self._build(along=False)
+
+    @property
+    def gusty(self) -> LinearModel:
+        """The same with ``gust_along`` behind its parameters, for filter error."""
+        return self._build(along=True)
+
+    def _build(self, *, along: bool) -> LinearModel:
+        base, scaled, bends = self.base, self.scaled, BENDS[self.axis]
+        n, m, p = len(base.states), len(base.inputs), len(base.outputs)
+        terms = list(base.terms)
+        for term in base.terms:
+            key = self._scaling(term)
+            if key[1] > 0:
+                matrix = "B" if term.matrix in "AB" else "D"
+                place = m + scaled.index(key)
+                terms.append(Term(matrix, term.row, place, term.parameter, term.gain))
+        rests = m + len(scaled) + n + len(self.forces)
+        size = rests + len(bends) + 1
+        B, D = np.zeros((n, size)), np.zeros((p, size))
+        B[:, :m], D[:, :m] = base.B, base.D
+        B[:, m + len(scaled) : m + len(scaled) + n] = np.eye(n)
+        for k, force in enumerate(self.forces):
+            D[base.outputs.index(force), m + len(scaled) + n + k] = 1.0
+        turn = {"ax_mps2": np.cos(self.trim.alpha_rad), "az_mps2": np.sin(self.trim.alpha_rad)}
+        for k, (name, row, _) in enumerate(bends):
+            terms.append(Term("B", base.states.index(row), rests + k, name))
+            for force in self.forces if row == "airspeed_mps" else ():
+                at = base.outputs.index(force)
+                terms.append(Term("D", at, rests + k, name, float(turn[force])))
+        angle = base.states.index(ANGLES[self.axis])
+        more = (Parameter("gust_along", prior_sd=ALONG_SHARE),) if along else ()
+        terms += [Term("B", angle, rests + len(bends), extra.name) for extra in more]
+        return replace(
+            base,
+            name=f"{base.name}, airspeed varying",
+            inputs=(
+                *base.inputs,
+                *(f"{column} by V^{power}" for column, power in scaled),
+                *(f"rest of {name}" for name in (*base.states, *self.forces)),
+                *(f"{column} by alpha on {row}" for _, row, column in bends),
+                "turning of the gust along the path",
+            ),
+            B=B,
+            D=D,
+            terms=tuple(terms),
+            parameters=(
+                *base.parameters,
+                *(Parameter(name) for name, _, _ in bends),
+                *more,
+            ),
+        )
+
+    def maneuver(
+        self, columns: Mapping[str, Array], dt_s: float, name: str = "maneuver"
+    ) -> Maneuver:
+        """Return the samples of one maneuver in the columns of `model`.
+
+        Parameters
+        ----------
+        columns : mapping
+            SI, each (samples,): surfaces, airspeed, flow angles, rates, bank, pitch, specific
+            forces at the CG.
+        dt_s : float
+        name : str
+
+        Raises
+        ------
+        IdentificationError
+            If a column is missing.
+        """
+        missing = [c for c in (*MEASURED, *self.base.inputs) if c not in columns]
+        if missing:
+            raise IdentificationError(f"{name}: departures need {', '.join(missing)}")
+        ratio = ndimage.gaussian_filter1d(
+            columns["airspeed_mps"], SMOOTH_S / dt_s, mode="nearest"
+        ) / (self.trim.airspeed_mps)
+        inputs = [columns[c] for c in self.base.inputs]
+        for column, power in self.scaled:
+            change = (ratio**power - 1.0) * _deviation(columns[column])
+            inputs.append(change if column in self.base.inputs else _between(change))
+        inputs += [_between(_deviation(rest)) for rest in self._rates(columns, ratio)]
+        inputs += [_deviation(rest) for rest in self._forces(columns, ratio)]
+        angle = _deviation(columns["alpha_rad"])
+        inputs += [
+            _between(_deviation(angle * _deviation(columns[column])))
+            for _, _, column in BENDS[self.axis]
+        ]
+        known = self._known()[self.base.states.index(ANGLES[self.axis])]
+        turning = [known[k] * columns[s] for k, s in enumerate(self.base.states) if s in RATES]
+        inputs.append(_between(np.sum(turning, axis=0)))
+        outputs = np.column_stack([columns[y] for y in self.base.outputs])
+        return Maneuver(dt_s, np.column_stack(inputs), outputs, name=name)
+
+    def _known(self) -> Array:
+        """Return kinematics and gravity of the template."""
+        return template(self.axis, self.trim, hold=self.base.hold).A
+
+    def _scaling(self, term: Term) -> tuple[str, int]:
+        """Return the column a term acts on and the power of V it grows with beyond constant."""
+        base = self.base
+        column = (base.states if term.matrix in "AC" else base.inputs)[term.column]
+        if column == "airspeed_mps":
+            return column, 0
+        power = 1 if column in RATES else 2
+        turning = term.matrix in "AB" and base.states[term.row] in ("alpha_rad", "beta_rad")
+        return column, power - 1 if turning else power
+
+    def _rates(self, columns: Mapping[str, Array], ratio: Array) -> list[Array]:
+        """Return, per state, what its rate has beyond aerodynamics and the linear kinematics."""
+        whole = self._kinematics(columns, self.trim.airspeed_mps * ratio)
+        known = self._known()
+        states = np.column_stack([columns[s] for s in self.base.states])
+        return [whole[s] - states @ known[k] for k, s in enumerate(self.base.states)]
+
+    def _kinematics(self, columns: Mapping[str, Array], airspeed: Array) -> dict[str, Array]:
+        alpha, beta, phi, theta = (
+            columns[c] for c in ("alpha_rad", "beta_rad", "phi_rad", "theta_rad")
+        )
+        p, q, r = (columns[c] for c in RATES)
+        ax, az = columns["ax_mps2"], columns["az_mps2"]
+        sa, ca, sb, cb = np.sin(alpha), np.cos(alpha), np.sin(beta), np.cos(beta)
+        gx = -GRAVITY_MPS2 * np.sin(theta)
+        gy = GRAVITY_MPS2 * np.cos(theta) * np.sin(phi)
+        gz = GRAVITY_MPS2 * np.cos(theta) * np.cos(phi)
+        # Of the mean lift the linear model has V^2 through its accelerometer row, turning has V.
+        lift = np.mean(az * ca - ax * sa) * (1.0 - airspeed / self.trim.airspeed_mps)
+        turning = q * np.sin(phi) + r * np.cos(phi)
+        return {
+            "airspeed_mps": (gx * ca + gz * sa) * cb + gy * sb,
+            "alpha_rad": lift / self.trim.airspeed_mps
+            + (gz * ca - gx * sa) / (airspeed * cb)
+            + q
+            - np.tan(beta) * (p * ca + r * sa),
+            "theta_rad": q * np.cos(phi) - r * np.sin(phi),
+            "beta_rad": (gy * cb - sb * ((ax + gx) * ca + (az + gz) * sa)) / airspeed
+            + p * sa
+            - r * ca,
+            "phi_rad": p + np.tan(theta) * turning,
+            **self._inertial(p, q, r),
+        }
+
+    def _inertial(self, p: Array, q: Array, r: Array) -> dict[str, Array]:
+        """Return angular accelerations that rates and the rotor make."""
+        a, (hx, hz) = self.airframe, self.spin_kgm2ps
+        x = -(a.izz_kgm2 - a.iyy_kgm2) * q * r + a.ixz_kgm2 * p * q - q * hz
+        y = (a.izz_kgm2 - a.ixx_kgm2) * p * r - a.ixz_kgm2 * (p**2 - r**2) - r * hx + p * hz
+        z = -(a.iyy_kgm2 - a.ixx_kgm2) * p * q - a.ixz_kgm2 * q * r + q * hx
+        det = a.ixx_kgm2 * a.izz_kgm2 - a.ixz_kgm2**2
+        return {
+            "p_radps": (a.izz_kgm2 * x + a.ixz_kgm2 * z) / det,
+            "q_radps": y / a.iyy_kgm2,
+            "r_radps": (a.ixz_kgm2 * x + a.ixx_kgm2 * z) / det,
+        }
+
+    def _forces(self, columns: Mapping[str, Array], ratio: Array) -> list[Array]:
+        """Return, per specific force, its second order in airspeed and in the turning of lift."""
+        alpha, ax, az = columns["alpha_rad"], columns["ax_mps2"], columns["az_mps2"]
+        along = _deviation(ax * np.cos(alpha) + az * np.sin(alpha))
+        normal = _deviation(az * np.cos(alpha) - ax * np.sin(alpha))
+        angle = _deviation(alpha)
+        sine, cosine = np.sin(self.trim.alpha_rad), np.cos(self.trim.alpha_rad)
+        turned = {
+            "ax_mps2": -angle * (cosine * normal + sine * along),
+            "az_mps2": angle * (cosine * along - sine * normal),
+        }
+        return [(ratio - 1.0) ** 2 * np.mean(columns[y]) + turned.get(y, 0.0) for y in self.forces]
+
+
+def _deviation(values: Array) -> Array:
+    return np.asarray(values - np.mean(values), dtype=np.float64)
+
+
+def _between(values: Array) -> Array:
+    """Return means of neighbours: an input is held over the sample that follows it."""
+    result = np.array(values, dtype=np.float64)
+    result[:-1] = 0.5 * (values[:-1] + values[1:])
+    return result
