@@ -102,7 +102,8 @@ def powerplant(source: str) -> Powerplant:
     loaded = aircraft.load_measured(source)
     if "propulsion.diameter_m" not in loaded.scalars:
         raise IdentificationError(
-            f"aircraft {source}: no section [propulsion]; coefficients straight from flight need the"
+            f"aircraft {source}: no section [propulsion]; coefficients straight from"
+            " flight need the"
             " thrust: add it, or leave '--model coefficients' out"
         )
     frame = loaded.airframe()
