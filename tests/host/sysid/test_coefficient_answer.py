@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -80,6 +81,34 @@ def test_another_inertia_than_the_fit_used_moves_the_modes(answer: CoefficientAn
         for a in (frame, heavy)
     )
     assert other.frequency_radps < 0.95 * same.frequency_radps
+
+
+def test_modes_need_no_zero_of_the_pitot(answer: CoefficientAnswer) -> None:
+    fit, drift_pa = answer.fit, 6.0
+    (was, sd), frame = fit.errors["pitot_drift_pa"], airframe_data(NAME)
+    more = (fit.flight.qbar_pa - was) / (fit.flight.qbar_pa - was - drift_pa)
+    assert more > 1.02
+    rates = tuple(f"_{k}" for k in "pqr")
+    scaled = tuple(
+        replace(d, value=d.value * (more**0.5 if d.name.endswith(rates) else more))
+        for d in fit.derivatives
+    )
+    errors = fit.errors | {"pitot_drift_pa": (was + drift_pa, sd)}
+    other = coefficient_modes(replace(fit, derivatives=scaled, errors=errors), frame)
+    for mode, same in zip(answer.modes, other, strict=True):
+        if mode.name in ("short period", "dutch roll"):
+            assert same.frequency_radps == pytest.approx(mode.frequency_radps, rel=0.003)
+
+
+def test_modes_are_at_the_airspeed_of_their_own_maneuvers(answer: CoefficientAnswer) -> None:
+    fit, frame = answer.fit, airframe_data(NAME)
+    along, across = fit.flight.faster
+    quick = replace(fit, flight=replace(fit.flight, faster=(1.02 * along, across)))
+    before, after = (
+        {m.name: m.frequency_radps for m in coefficient_modes(f, frame)} for f in (fit, quick)
+    )
+    assert after["short period"] == pytest.approx(1.02 * before["short period"], rel=0.002)
+    assert after["dutch roll"] == pytest.approx(before["dutch roll"], rel=1e-9)
 
 
 def test_the_linear_motion_is_that_of_the_true_aircraft(
