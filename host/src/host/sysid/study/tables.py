@@ -54,7 +54,7 @@ def thesis_table(
         ),
         f"Table 3.1 at SNR 10, noise seed 1: {graded}.\n\n"
         f"Analytic bounds above 100 %: {over}.\n\n"
-        + "\n\n".join(f"{one.text.capitalize()}." for one in seeds)
+        + "\n\n".join(f"{one.text[0].upper()}{one.text[1:]}." for one in seeds)
         + "\n\n"
         + "\n\n".join(f"{agreement_text(one).capitalize()}." for one in found),
     )
