@@ -47,7 +47,7 @@ def solved(
     own = {"Cm": np.zeros(2)}
     A, Z, y, keys = stacked(
         blocks, spectra, spectra, {"Cm": TERMS}, slopes, slopes, own,
-        {"Cm_alpha": 0, "Cm_q": 1}, 1, NOISE,
+        {"Cm_alpha": 0, "Cm_q": 1}, 1, NOISE, ({}, {}),
     )  # fmt: skip
     prior = np.zeros(A.shape[1])
     prior[-1] = SD**-2

@@ -78,10 +78,9 @@ def test_drawn_aircraft_scatter_as_the_covariance_says() -> None:
     ixx, iyy, izz = (
         getattr(a, f"{i}_kgm2") * (1.0 + e[f"{i}_share"]) for i in ("ixx", "iyy", "izz")
     )
-    V, force = (
-        at.airspeed_mps / np.sqrt(1.0 + e["pitot_scale"]),
-        at.qbar_pa / (1.0 + e["pitot_scale"]) * a.wing_area_m2,
-    )
+    qbar = (at.qbar_pa - e["pitot_drift_pa"]) / (1.0 + e["pitot_scale"])
+    V = at.airspeed_mps * np.sqrt(qbar / at.qbar_pa / (1.0 + e["density_share"]))
+    force = qbar * a.wing_area_m2
     vane = (
         (1.0 + e["alpha_scale"]) * (1.0 + a.upwash * (1.0 + e["upwash_share"])) / (1.0 + a.upwash)
     )
@@ -119,8 +118,10 @@ def test_coefficients_of_drawn_derivatives_scatter_as_the_covariance_says() -> N
     drawn = rng.multivariate_normal(exact.values, exact.covariance, 200_000).T
     d = dict(zip(exact.names, drawn, strict=True))
     e = {n: sd * rng.standard_normal(drawn.shape[1]) for n, sd in ERRORS.items()}
-    a, at, share = AIRFRAME, PLACE.condition, 1.0 + e["pitot_scale"]
-    V, force = at.airspeed_mps / np.sqrt(share), at.qbar_pa / share * a.wing_area_m2
+    a, at = AIRFRAME, PLACE.condition
+    qbar = (at.qbar_pa - e["pitot_drift_pa"]) / (1.0 + e["pitot_scale"])
+    V = at.airspeed_mps * np.sqrt(qbar / at.qbar_pa / (1.0 + e["density_share"]))
+    force = qbar * a.wing_area_m2
     upwash = (1.0 + a.upwash * (1.0 + e["upwash_share"])) / (1.0 + a.upwash)
     ixx, iyy, izz = (
         getattr(a, f"{i}_kgm2") * (1.0 + e[f"{i}_share"]) for i in ("ixx", "iyy", "izz")

@@ -24,7 +24,7 @@ from host.sysid.errors import IdentificationError
 
 CARRIED = (
     "mass_share", "ixx_share", "iyy_share", "izz_share", "cg_x_m", "cg_z_m",
-    "pitot_scale", "alpha_scale", "beta_scale", "upwash_share",
+    "pitot_scale", "pitot_drift_pa", "density_share", "alpha_scale", "beta_scale", "upwash_share",
     "elevator_scale", "aileron_scale", "rudder_scale",
 )  # fmt: skip
 READ_WITH = {
@@ -168,7 +168,7 @@ def _labels(row: str) -> tuple[str, ...]:
 
 def _really(place: Place, values: Table) -> Place:
     """Return airframe and condition for assumed errors of mass, inertia and pitot."""
-    a, share = place.airframe, 1.0 + values.get("pitot_scale", 0.0)
+    a, at = place.airframe, place.condition
     frame = replace(
         a,
         mass_kg=a.mass_kg * (1.0 + values.get("mass_share", 0.0)),
@@ -177,9 +177,12 @@ def _really(place: Place, values: Table) -> Place:
             for i in ("ixx", "iyy", "izz")
         },
     )
-    at = place.condition
-    condition = Condition(at.airspeed_mps / float(np.sqrt(share)), at.qbar_pa / share)
-    return replace(place, airframe=frame, condition=condition)
+    scale, drift_pa, density = (
+        values.get(n, 0.0) for n in ("pitot_scale", "pitot_drift_pa", "density_share")
+    )
+    qbar_pa = (at.qbar_pa - drift_pa) / (1.0 + scale)
+    share = float(np.sqrt(qbar_pa / at.qbar_pa / (1.0 + density)))
+    return replace(place, airframe=frame, condition=Condition(at.airspeed_mps * share, qbar_pa))
 
 
 def _reading(airframe: AirframeData, values: Table) -> Callable[[str], float]:

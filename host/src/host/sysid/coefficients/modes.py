@@ -30,7 +30,10 @@ MOTION = (
     *(f"{row}_{k}" for row in ("CY", "Cl", "Cn") for k in ("beta", "p", "r", "da", "dr")),
 )
 
-BETWEEN = ("mass_share", "ixx_share", "iyy_share", "izz_share", "pitot_scale")
+BETWEEN = (
+    "mass_share", "ixx_share", "iyy_share", "izz_share",
+    "pitot_scale", "pitot_drift_pa", "density_share",
+)  # fmt: skip
 
 
 def coefficient_modes(fit: CoefficientFit, airframe: AirframeData) -> tuple[Mode, ...]:
