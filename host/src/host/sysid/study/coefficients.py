@@ -2,8 +2,8 @@
 
 Every flight is flown with its own seed, all tolerances drawn, light turbulence; maneuvers as the
 host finds them. The truth is local to the maneuvers. The same flights as the thesis's logger saw
-them (20 rows a second), fitted by its network, stand beside. Seeds below 1000 were looked at while the
-fit was written; the study starts there.
+them (20 rows a second), fitted by its network, stand beside. Seeds below 1000 were looked at while
+the fit was written; the study starts there.
 """
 
 from __future__ import annotations
