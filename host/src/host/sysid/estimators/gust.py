@@ -151,7 +151,7 @@ def fit_with_gust(
     airspeed_mps : float
         Of the trim, for the gust's time scale.
     """
-    first = fit("output-error-white", model, maneuvers)
+    first = fit("output-error-white", model, maneuvers, doubting=False)
     half = first.half_width()
     delays = {d.name: (first.value(d.name), float(half[first.index(d.name)])) for d in model.delays}
     shifts = np.zeros(len(model.outputs))
@@ -171,7 +171,7 @@ def fit_with_gust(
         failure = str(error)
     if failure:
         # Better the plain answer with its wider intervals than a search that has not ended.
-        result = fit("output-error-white", plain, shifted, start=start)
+        result = fit("output-error-white", plain, shifted, start=start, doubting=False)
         result = replace(
             result,
             warnings=(*result.warnings, f"filter error: {failure}; output error stands instead"),

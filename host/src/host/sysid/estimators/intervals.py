@@ -50,6 +50,7 @@ def fit_with_memory(
     *,
     highest_order: int = HIGHEST_ORDER,
     criterion: str = "bic",
+    doubting: bool = True,
 ) -> Interval:
     """Fit output error and the memory of its noise together.
 
@@ -63,8 +64,10 @@ def fit_with_memory(
         Highest AR order considered; 0 keeps the noise white.
     criterion : str
         ``bic`` or ``aicc``.
+    doubting : bool
+        See `search`.
     """
-    optimum = search(problem, theta)
+    optimum = search(problem, theta, doubting=doubting)
     outputs = len(problem.model.outputs)
     noise = [OutputNoise.white() for _ in range(outputs)]
     variance = _innovations(problem, optimum, noise, optimum.variance)

@@ -27,6 +27,7 @@ def fit_output_error(
     start: Array | None = None,
     highest_order: int = HIGHEST_ORDER,
     criterion: str = "bic",
+    doubting: bool = True,
 ) -> FitResult:
     """Fit by output error.
 
@@ -40,7 +41,7 @@ def fit_output_error(
         residual autocorrelation (Morelli & Klein 1997), the standard that covers 87-90 %.
     start : Array, optional
         Whole start vector; equation error gives it without.
-    highest_order, criterion
+    highest_order, criterion, doubting
         See `fit_with_memory`.
 
     Raises
@@ -55,7 +56,11 @@ def fit_output_error(
             f"{len(first)} start values, {len(problem.names)} needed: {', '.join(problem.names)}"
         )
     fit = fit_with_memory(
-        problem, first, highest_order=highest_order if memory else 0, criterion=criterion
+        problem,
+        first,
+        highest_order=highest_order if memory else 0,
+        criterion=criterion,
+        doubting=doubting,
     )
     covariance = fit.covariance if memory else coloured_output_covariance(problem, fit)
     return FitResult(

@@ -38,8 +38,17 @@ LONG_SEARCH = 200  # iterations where none of them has converged
 LEAST_SAMPLES = 50
 
 
-def search(problem: OutputProblem, theta: Array) -> Optimum:
+def search(problem: OutputProblem, theta: Array, *, doubting: bool = True) -> Optimum:
     """Return the best optimum of white-noise output error found from `theta` and other starts.
+
+    Parameters
+    ----------
+    problem : OutputProblem
+    theta : Array, shape (P,)
+        Start.
+    doubting : bool
+        Look further from an optimum that leaves more than white noise or lies in a flat valley
+        (default). In a flight the gusts leave more than noise at every optimum.
 
     Raises
     ------
@@ -47,6 +56,8 @@ def search(problem: OutputProblem, theta: Array) -> Optimum:
         If no start is finite over the maneuvers.
     """
     best, failure = _try(problem, None, theta)
+    if best is not None and best.converged and not doubting:
+        return best
     settled = best is not None and best.converged and _explained(problem, best)
     if best is not None and settled and not _flat(best):
         return best

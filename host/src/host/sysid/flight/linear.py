@@ -233,7 +233,9 @@ def _answer(
             staged.result, staged.model, list(staged.maneuvers), staged.delays,
         )  # fmt: skip
     else:
-        result = fit("output-error-white" if method == GUST else method, model, fitted)
+        single = "output-error-white" if method == GUST else method
+        calm: dict[str, object] = {"doubting": False} if single.startswith("output-error") else {}
+        result = fit(single, model, fitted, **calm)
     result = widened(result, repeats(result))
     alone = result
     moved: tuple[Moved, ...] = ()
@@ -351,7 +353,13 @@ def _simulated(model: LinearModel, result: FitResult, maneuvers: Sequence[Maneuv
     for maneuver in maneuvers:
         try:
             problem = OutputProblem(frozen, [maneuver])
-            best = fit("output-error-white", frozen, [maneuver], start=problem.first_guess())
+            best = fit(
+                "output-error-white",
+                frozen,
+                [maneuver],
+                start=problem.first_guess(),
+                doubting=False,
+            )
             simulated.append(best.fitted[0])
         except IdentificationError:
             simulated.append(np.full_like(maneuver.outputs, np.nan))
