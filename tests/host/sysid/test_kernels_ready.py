@@ -15,8 +15,8 @@ from host.sysid.study.data import TRUTH, with_rates
 
 kernels = {}
 for module in pkgutil.walk_packages(host.sysid.__path__, "host.sysid."):
-    if module.name.endswith("__main__"):
-        continue
+    if module.name.endswith("__main__") or module.name.startswith("host.sysid.study"):
+        continue  # no answer waits for what only a study calls
     for name, thing in vars(importlib.import_module(module.name)).items():
         if hasattr(thing, "signatures") and thing.__module__ == module.name:
             kernels[f"{module.name}.{name}"] = thing
