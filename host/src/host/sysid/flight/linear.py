@@ -29,6 +29,7 @@ from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import VANES, fit_with_gust
+from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.flight.carried import carried, moved_by
 from host.sysid.flight.finder import Found, Grade, find, grade
 from host.sysid.models.diagnostics import (
@@ -353,12 +354,9 @@ def _simulated(model: LinearModel, result: FitResult, maneuvers: Sequence[Maneuv
     for maneuver in maneuvers:
         try:
             problem = OutputProblem(frozen, [maneuver])
-            best = fit(
-                "output-error-white",
-                frozen,
-                [maneuver],
-                start=problem.first_guess(),
-                doubting=False,
+            # Nothing but constants is free here, which the door would refuse.
+            best = fit_output_error(
+                frozen, [maneuver], memory=False, start=problem.first_guess(), doubting=False
             )
             simulated.append(best.fitted[0])
         except IdentificationError:

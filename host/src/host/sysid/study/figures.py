@@ -48,7 +48,7 @@ def thesis_figure(runs: Sequence[HopfieldRun], found: Agreement) -> Figure:
     right.axhline(50.0, color=GREY, lw=0.8)
     right.axhspan(100.0 * (1.0 - SURE), 100.0 * SURE, color="0.9", zorder=0, label="not firm")
     right.set_xlabel("worst bound at the truth, % (refuse right of the line)")
-    right.set_ylabel("probability of a bound above 100 %, % (refused above 50)")
+    right.set_ylabel("P(a bound above 100 %), % (refused above 50)")
     right.set_title(f"refusal of {found.systems} random systems", fontsize=9)
     right.legend(fontsize=7)
     return figure
