@@ -9,18 +9,17 @@ from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data
 from host.sysid.compatibility.flight_path import (
     AIR,
     GPS,
-    GRAVITY_MPS2,
     HEIGHT,
     PathProblem,
     Stretch,
-    rotation,
-    strapdown,
 )
 from host.sysid.compatibility.path_data import prepare
 from host.sysid.compatibility.path_fit import fit_path
 from host.sysid.compatibility.reconstruction import document, reconstruct, words
+from host.sysid.compatibility.strapdown import rotation, strapdown
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.tables import even_columns
+from host.sysid.models.templates import GRAVITY_MPS2
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors.delays import FILTERS, sensor_delays
 from host.twin.virtual import virtual_flight

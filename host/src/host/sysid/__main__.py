@@ -11,7 +11,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from host.sysid.aircraft.aircraft_file import powerplant
-from host.sysid.compatibility.flight_path import strapdown
+from host.sysid.compatibility.strapdown import strapdown
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import fit_with_gust
 from host.sysid.estimators.hopfield import iterate, iterate_until

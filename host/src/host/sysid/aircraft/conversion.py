@@ -21,6 +21,7 @@ from host.sysid.aircraft.airframe import AirframeData, Condition
 from host.sysid.aircraft.in_coefficients import dimensional_gains
 from host.sysid.aircraft.instrument_errors import InstrumentData, deviations
 from host.sysid.errors import IdentificationError
+from host.sysid.models.templates import GRAVITY_MPS2
 
 CARRIED = (
     "mass_share", "ixx_share", "iyy_share", "izz_share", "cg_x_m", "cg_z_m",
@@ -202,7 +203,7 @@ def _moved(found: Table, place: Place, values: Table, *, sign: float) -> Table:
     """Return coefficients with moments from the CG to its nominal place (sign 1) or back (-1)."""
     x, z = (sign * values.get(f"cg_{k}_m", 0.0) for k in "xz")
     a, ca, sa = place.airframe, np.cos(place.alpha_rad), np.sin(place.alpha_rad)
-    lift = a.mass_kg * 9.80665 / (place.condition.qbar_pa * a.wing_area_m2)
+    lift = a.mass_kg * GRAVITY_MPS2 / (place.condition.qbar_pa * a.wing_area_m2)
     result = dict(found)
     for name in found:
         row, _, label = name.partition("_")

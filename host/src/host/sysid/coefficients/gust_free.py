@@ -15,9 +15,10 @@ import numpy as np
 from host.compiled import Array
 from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.aircraft.instrument_errors import InstrumentData
-from host.sysid.coefficients.rows import GRAVITY_MPS2, Flown
+from host.sysid.coefficients.rows import Flown
 from host.sysid.compatibility.signals import BLEND_RADPS, Record
 from host.sysid.errors import IdentificationError
+from host.sysid.models.templates import GRAVITY_MPS2
 from host.sysid.numerics.kernels import simulate, transition
 
 LEVELLING_PERS = 0.3  # the pilot brings the wings back

@@ -15,8 +15,8 @@ from host.compiled import Array
 from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.aircraft.conversion import Quantities
 from host.sysid.coefficients.answer import QUANTILE, CoefficientFit
-from host.sysid.coefficients.rows import GRAVITY_MPS2
 from host.sysid.models.modes import Mode, mode_of
+from host.sysid.models.templates import GRAVITY_MPS2
 
 PAIRS = (("short period", "phugoid"), ("dutch roll", "roll and spiral"))
 SINGLE = ("roll", "spiral")

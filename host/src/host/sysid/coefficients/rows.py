@@ -16,8 +16,8 @@ from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.aircraft.powerplant import Powerplant
 from host.sysid.coefficients.model import CoefficientModel
 from host.sysid.compatibility.signals import Record
+from host.sysid.models.templates import GRAVITY_MPS2
 
-GRAVITY_MPS2 = 9.80665
 # Roll under the elevator: lift beside a CG off the plane of symmetry, its only clear trace.
 LONGITUDINAL = ("Cm", "Cl", "w", "u")  # behind the model's two forces
 LATERAL = ("CY", "Cl", "Cn", "v")

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array, IntArray, compiled
+from host.compiled import Array, IntArray
+from host.sysid.compatibility.strapdown import cross, cross_columns, small_turn, strapdown
 from host.sysid.numerics.problem import Response
 
-GRAVITY_MPS2 = 9.80665
 # Errors of the inertial sensors, in the order of their slopes.
 INERTIAL = (
     *(f"gyro_bias_{a}_radps" for a in "xyz"),
@@ -35,75 +35,6 @@ AIR = ("airspeed_mps", "alpha_rad", "beta_rad")
 GPS = ("v_north_mps", "v_east_mps", "v_down_mps")
 HEIGHT = "altitude_m"
 LEAST_SPEED_MPS = 1.0
-
-
-@compiled
-def strapdown(
-    rates: Array, force: Array, attitude: Array, velocity: Array, dt_s: float
-) -> tuple[Array, Array]:
-    """Integrate attitude (n, 3, 3; body to north-east-down) and velocity (n, 3)."""
-    n = rates.shape[0]
-    turn = np.zeros((n, 3, 3))
-    moved = np.zeros((n, 3))
-    turned = np.zeros((3, 3))
-    for i in range(3):
-        moved[0, i] = velocity[i]
-        for j in range(3):
-            turn[0, i, j] = attitude[i, j]
-    for k in range(n - 1):
-        x = 0.5 * dt_s * (rates[k, 0] + rates[k + 1, 0])
-        y = 0.5 * dt_s * (rates[k, 1] + rates[k + 1, 1])
-        z = 0.5 * dt_s * (rates[k, 2] + rates[k + 1, 2])
-        angle = np.sqrt(x * x + y * y + z * z)
-        s, c = 1.0, 0.5
-        if angle > 1e-9:
-            s = np.sin(angle) / angle
-            c = (1.0 - np.cos(angle)) / (angle * angle)
-        turned[0, 0] = 1.0 - c * (y * y + z * z)
-        turned[0, 1] = c * x * y - s * z
-        turned[0, 2] = c * x * z + s * y
-        turned[1, 0] = c * x * y + s * z
-        turned[1, 1] = 1.0 - c * (x * x + z * z)
-        turned[1, 2] = c * y * z - s * x
-        turned[2, 0] = c * x * z - s * y
-        turned[2, 1] = c * y * z + s * x
-        turned[2, 2] = 1.0 - c * (x * x + y * y)
-        for i in range(3):
-            felt = 0.0
-            for j in range(3):
-                value = 0.0
-                for m in range(3):
-                    value += turn[k, i, m] * turned[m, j]
-                turn[k + 1, i, j] = value
-                felt += turn[k, i, j] * force[k, j] + value * force[k + 1, j]
-            moved[k + 1, i] = moved[k, i] + 0.5 * dt_s * felt
-        moved[k + 1, 2] += GRAVITY_MPS2 * dt_s
-    return turn, moved
-
-
-def rotation(phi: float, theta: float, psi: float) -> Array:
-    """Return the matrix from body axes to north-east-down."""
-    sp, cp, st, ct = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    ss, cs = np.sin(psi), np.cos(psi)
-    return np.array(
-        [
-            [ct * cs, sp * st * cs - cp * ss, cp * st * cs + sp * ss],
-            [ct * ss, sp * st * ss + cp * cs, cp * st * ss - sp * cs],
-            [-st, sp * ct, cp * ct],
-        ]
-    )
-
-
-def small_turn(vector: Array) -> Array:
-    """Return the rotation matrix of a turn (rad) about an axis."""
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if angle < 1e-9:
-        return np.asarray(np.eye(3) + K)
-    return np.asarray(
-        np.eye(3) + np.sin(angle) / angle * K + (1.0 - np.cos(angle)) / angle**2 * (K @ K)
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +161,7 @@ class PathProblem:
         errors = self._value(local, INERTIAL)
         spread, stretch, tilt = 1.0 + errors[3:6], 1.0 + errors[9:12], errors[12:15]
         plain = (s.rates - errors[0:3]) / spread, (s.force - errors[6:9]) / stretch
-        rates, force = (x + _cross(tilt, x) for x in plain)
+        rates, force = (x + cross(tilt, x) for x in plain)
         own = local[common:]
         attitude = small_turn(own[3:6]) @ s.attitude
         C, v = strapdown(rates, force, attitude, s.velocity_mps + own[0:3], s.dt_s)
@@ -248,7 +179,7 @@ class PathProblem:
             wind = np.append(self._value(local, WITH_GPS[1:]), 0.0)
             through = v - wind
             flow = np.einsum("nij,ni->nj", C, through)
-            moving = DV + _cross_columns(self._mean(through), E)
+            moving = DV + cross_columns(self._mean(through), E)
             for k, name in enumerate(WITH_GPS[1:]):
                 if name in self._place:
                     moving[:, k, self._place[name]] -= 1.0
@@ -300,11 +231,11 @@ class PathProblem:
                 if scale in self._place:
                     into[:, axis, self._place[scale]] = -signal[:, axis] / size[axis]
                 if tilt in self._place:
-                    into[:, :, self._place[tilt]] = _cross(unit[axis], signal)
+                    into[:, :, self._place[tilt]] = cross(unit[axis], signal)
         E = self._to_middles(C @ turning, step_s)
         E[:, np.arange(3), common + 3 + np.arange(3)] += 1.0
         felt = np.einsum("nij,nj->ni", C, force)
-        DV = self._to_middles(C @ pushing - _cross_columns(felt, E), step_s)
+        DV = self._to_middles(C @ pushing - cross_columns(felt, E), step_s)
         DV[:, np.arange(3), common + np.arange(3)] += 1.0
         return E, DV
 
@@ -380,26 +311,6 @@ class PathProblem:
     def _mean(self, signal: Array) -> Array:
         shape = (-1, self.block, *signal.shape[1:])
         return np.asarray(signal.reshape(shape).mean(axis=1), dtype=np.float64)
-
-
-def _cross(vector: Array, series: Array) -> Array:
-    """Return vector x series, (n, 3)."""
-    x, y, z = vector
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(series @ K.T)
-
-
-def _cross_columns(series: Array, slopes: Array) -> Array:
-    """Return series (n, 3) x slopes (n, 3, columns)."""
-    a, b = series[:, :, None], slopes
-    return np.stack(
-        [
-            a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
-            a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
-            a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0],
-        ],
-        axis=1,
-    )
 
 
 def _integral(values: Array, dt_s: float) -> Array:

@@ -24,9 +24,9 @@ from host.sysid.compatibility.flight_path import (
     WITH_GPS,
     PathProblem,
     Stretch,
-    rotation,
 )
 from host.sysid.compatibility.signals import SLIDING_RADPS
+from host.sysid.compatibility.strapdown import rotation
 from host.sysid.errors import IdentificationError
 from host.sysid.numerics.differentiation import local_polynomial
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
+from host.sysid.models.templates import GRAVITY_MPS2
 
-GRAVITY_MPS2 = 9.80665
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad", "elevator_rad", "aileron_rad", "rudder_rad")
 DOUBTFUL_RAD = 1.0  # of such an angle in flight
 BLOCK_S = 0.1  # slopes and correlations are those of means over this long

@@ -352,15 +352,6 @@ def constant_inputs(model: LinearModel, maneuvers: Sequence[Maneuver]) -> tuple[
     return tuple(still)
 
 
-def relative_errors(
-    model: LinearModel, maneuvers: Sequence[Maneuver], estimate: Array, truth: Array
-) -> Array:
-    """Return |estimate - truth| over the reference value of the truth, common parameters."""
-    count = len(model.parameters)
-    reference = references(model, maneuvers, truth)
-    return np.asarray(np.abs(estimate[:count] - truth[:count]) / reference, dtype=np.float64)
-
-
 def thesis_sum_of_mean_errors(measured: Array, simulated: Array) -> float:
     """Return the thesis's equation 5.3: sum over states of mean |error|, units mixed."""
     return float(np.sum(np.mean(np.abs(measured - simulated), axis=0)))
