@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.compiled import Array
 from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data
-from host.sysid.aircraft.airframe import Condition
+from host.sysid.aircraft.airframe import Condition, coefficients
 from host.sysid.aircraft.conversion import (
     CARRIED,
     Place,
@@ -16,6 +16,8 @@ from host.sysid.aircraft.conversion import (
     to_derivatives,
 )
 from host.sysid.errors import IdentificationError
+from host.sysid.models.model import free_model
+from host.sysid.models.result import FitResult
 from host.twin.aircraft.airframe import Airframe
 from host.twin.aircraft.file import load
 from host.twin.motion.local import coefficients as about_cg
@@ -172,6 +174,21 @@ def test_moments_go_to_the_nominal_cg_as_the_twin_takes_them_from_it() -> None:
     for name, value in here.items():
         assert back.value(name) == pytest.approx(value, rel=1e-5, abs=1e-7), name
     assert abs(there["Cm_alpha"] - here["Cm_alpha"]) > 0.05
+
+
+def test_the_linear_answer_converts_by_the_same_equations() -> None:
+    out = to_derivatives(given(), PLACE, {})
+    some, none = free_model("pitch", ("q_radps",), ("de",)), np.zeros((0, 0))
+    many = np.full(len(out.values), 100.0)
+    result = FitResult(
+        "by hand", some, out.names, out.values, out.covariance, out.covariance, many,
+        (), (), "simulation", none, 1, True,
+    )  # fmt: skip
+    found = {c.name: c for c in coefficients(result, AIRFRAME, PLACE.condition)}
+    assert set(found) == set(TRUE)
+    for name, value in TRUE.items():
+        assert found[name].value == pytest.approx(value, rel=1e-9), name
+        assert found[name].fit_error == pytest.approx(given().deviation(name), rel=1e-5), name
 
 
 def test_what_is_wrong_is_said() -> None:
