@@ -49,7 +49,10 @@ def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
             table = read_datcom(text, airspeed_mps / SOUND_MPS)
         elif is_avl(text):
             table = read_avl(text)
-    except (OSError, ValueError, TypeError, IdentificationError) as error:
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise IdentificationError(f"{path}: cannot be read as a prior ({reason})") from error
+    except (ValueError, TypeError, IdentificationError) as error:
         raise IdentificationError(f"{path}: {error}") from error
     if table is None or not table.points:
         raise IdentificationError(

@@ -70,7 +70,7 @@ def _verdict(answer: Answer) -> list[str]:
         elif share <= FAIR:
             fair.append(name)
     lines = [
-        f"{answer.template}: {len(answer.used)} maneuvers fitted jointly by"
+        f"{answer.template}: {_fitted(len(answer.used))} by"
         f" {result.method}, {len(answer.held_out)} held out"
     ]
     lines.append(f"  trust (within 10 %):  {', '.join(trusted) or 'nothing'}")
@@ -247,3 +247,7 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
         )
         lines.append(f"  the same below 4.5 Hz, fitted / unseen (leave-one-out): {shares}")
     return lines
+
+
+def _fitted(count: int) -> str:
+    return "1 maneuver fitted" if count == 1 else f"{count} maneuvers fitted jointly"

@@ -51,7 +51,7 @@ METHODS: dict[str, Method] = {
     "output-error": Method(
         "output_error_fit",
         "fit_output_error",
-        "maximum likelihood, memory of the noise estimated (default)",
+        "maximum likelihood, memory of the noise estimated",
     ),
     "output-error-white": Method(
         "output_error_fit",
