@@ -5,7 +5,7 @@ import pytest
 from host.compiled import Array
 from host.sysid.aircraft.aircraft_file import airframe_data, powerplant
 from host.sysid.coefficients.model import standard_model
-from host.sysid.coefficients.rows import GRAVITY_MPS2, Flown, equations
+from host.sysid.coefficients.rows import Flown, equations
 from host.sysid.coefficients.turning import (
     SHAPES,
     TURNED,
@@ -15,6 +15,7 @@ from host.sysid.coefficients.turning import (
 )
 from host.sysid.coefficients.windows import Block, Window, window_block
 from host.sysid.compatibility.signals import Record
+from host.sysid.models.templates import GRAVITY_MPS2
 from host.twin.motion.air import Turbulence, gusts
 from numpy.polynomial import legendre
 
