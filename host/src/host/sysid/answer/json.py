@@ -105,6 +105,7 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
                     "r_squared": f.r_squared,
                     "nrmse": f.nrmse,
                     "theil": f.theil,
+                    "autocorrelation_outside": f.autocorrelation_outside,
                     "ljung_box_p": f.ljung_box_p,
                 }
                 for f in fits

@@ -45,7 +45,6 @@ class Accuracy:
     smoothed_error: float
     output_error: float
     rms_over_bound: Array
-    bound_share: Array
 
     @property
     def ratio(self) -> float:
@@ -115,7 +114,6 @@ def run_case(shape: str, rate_hz: float, runs: int, *, seed: int = 20260201) -> 
         smoothed_error=float(np.median(np.array(smoothed)[:, _shared(free.parameter_names)])),
         output_error=float(np.median(output)),
         rms_over_bound=np.sqrt(np.mean(np.square(ratios), axis=0)),
-        bound_share=bound[:physical] / reference,
     )
 
 
