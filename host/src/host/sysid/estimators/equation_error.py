@@ -71,7 +71,7 @@ def fit_equation_error(
             before = theta
             if variant == "robust":
                 for k, row in enumerate(rows):
-                    size = np.abs(row.target - row.regressors @ theta) / scales[k]
+                    size = np.abs(row.residual(theta)) / scales[k]
                     sample_weights[k] = np.minimum(1.0, HUBER_LIMIT / np.maximum(size, 1e-12))
             theta = solve_rows(_weighted(rows, sample_weights), len(names), scales**-2.0)
             if np.all(np.abs(theta - before) <= 1e-8 * np.abs(theta) + 1e-14):
@@ -89,7 +89,7 @@ def fit_equation_error(
     residuals, fitted = [], []
     for number in range(len(maneuvers)):
         mine = [row for row in rows if row.maneuver == number]
-        fitted.append(np.column_stack([row.regressors @ theta for row in mine]))
+        fitted.append(np.column_stack([row.fitted(theta) for row in mine]))
         residuals.append(np.column_stack([row.target for row in mine]) - fitted[-1])
     stacked = np.vstack(residuals)
     if len(labels) != stacked.shape[1]:
@@ -122,7 +122,8 @@ def _weighted(rows: Sequence[Row], weights: Sequence[Array]) -> list[Row]:
                 row.label,
                 row.maneuver,
                 row.target * root,
-                row.regressors * root[:, None],
+                row.columns,
+                row.block * root[:, None],
                 row.noisy,
             )
         )
@@ -140,15 +141,14 @@ def _pseudo_rows(rows: Sequence[Row], theta: Array, weights: Sequence[Array]) ->
     for equation in {row.equation for row in rows}:
         mine = [k for k, row in enumerate(rows) if row.equation == equation]
         share = float(np.mean(np.concatenate([weights[k] for k in mine]) >= 1.0))
-        unknowns = len(np.flatnonzero(rows[mine[0]].regressors.any(axis=0)))
+        unknowns = len(rows[mine[0]].columns)
         samples = sum(len(weights[k]) for k in mine)
         correction = 1.0 + unknowns / samples * (1.0 - share) / max(share, 1e-12)
         slope[equation] = max(share, 1e-12) / correction
     return [
         replace(
             row,
-            target=row.regressors @ theta
-            + weight * (row.target - row.regressors @ theta) / slope[row.equation],
+            target=row.fitted(theta) + weight * row.residual(theta) / slope[row.equation],
         )
         for row, weight in zip(rows, weights, strict=True)
     ]
@@ -159,11 +159,11 @@ def _equation_scales(rows: Sequence[Row], theta: Array, *, robust: bool, dof: in
     scale: dict[int, float] = {}
     for equation in {row.equation for row in rows}:
         mine = [row for row in rows if row.equation == equation]
-        residual = np.concatenate([row.target - row.regressors @ theta for row in mine])
+        residual = np.concatenate([row.residual(theta) for row in mine])
         if robust:
             value = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
         else:
-            active = len(np.flatnonzero(mine[0].regressors.any(axis=0))) if dof else 0
+            active = len(mine[0].columns) if dof else 0
             value = float(np.sqrt(residual @ residual / max(len(residual) - active, 1)))
         size = max(float(np.max(np.abs(row.target), initial=0.0)) for row in mine)
         scale[equation] = max(value, 1e-12 * size, 1e-150)
@@ -174,10 +174,9 @@ def coloured_covariance(rows: Sequence[Row], theta: Array, white: Array, scales:
     """Correct a covariance for coloured residuals (Klein & Morelli, sec. 5.2)."""
     middle = np.zeros_like(white)
     for row, scale in zip(rows, scales, strict=True):
-        residual = row.target - row.regressors @ theta
-        active = np.flatnonzero(row.regressors.any(axis=0))
-        block = row.regressors[:, active]
-        middle[np.ix_(active, active)] += coloured_middle(residual, block) / scale**4
+        residual = row.residual(theta)
+        part = coloured_middle(residual, row.block) / scale**4
+        middle[np.ix_(row.columns, row.columns)] += part
     result = white @ middle @ white
     result = 0.5 * (result + result.T)
     low = np.diag(result) <= 0.0

@@ -76,7 +76,7 @@ def fit_neural(
     covariance = np.cov(scatter.T) + 1e-300 * np.eye(len(names))
     batch = fit_equation_error(model, maneuvers, bandwidth=bandwidth)
     residuals = tuple(
-        np.column_stack([r.target - r.regressors @ theta for r in rows if r.maneuver == number])
+        np.column_stack([r.residual(theta) for r in rows if r.maneuver == number])
         for number in range(len(maneuvers))
     )
     return FitResult(

@@ -192,13 +192,11 @@ def _like(
 ) -> FitResult:
     """Return a result with the residuals and covariance of the batch regression."""
     residuals = tuple(
-        np.column_stack(
-            [row.target - row.regressors @ theta for row in rows if row.maneuver == number]
-        )
+        np.column_stack([row.residual(theta) for row in rows if row.maneuver == number])
         for number in range(len(batch.residuals))
     )
     fitted = tuple(
-        np.column_stack([row.regressors @ theta for row in rows if row.maneuver == number])
+        np.column_stack([row.fitted(theta) for row in rows if row.maneuver == number])
         for number in range(len(batch.residuals))
     )
     return FitResult(

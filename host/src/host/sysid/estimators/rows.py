@@ -30,16 +30,33 @@ NEVER_MOVED = "a parameter has no regressor: its state or input never moved"
 class Row:
     """One regression: `target` = `regressors` @ theta + residual, in one maneuver.
 
-    `equation` numbers the equation across maneuvers, `noisy` marks regressors made of measured
-    states (inputs and constants are exact).
+    `equation` numbers the equation across maneuvers, `columns` are the parameters whose regressor
+    ever moves and `block` those regressors, (samples, columns); `noisy`, one per parameter, marks
+    regressors made of measured states (inputs and constants are exact).
     """
 
     equation: int
     label: str
     maneuver: int
     target: Array
-    regressors: Array
+    columns: IntArray
+    block: Array
     noisy: Array
+
+    @property
+    def regressors(self) -> Array:
+        """Regressors of every parameter, (samples, parameters)."""
+        dense = np.zeros((len(self.target), len(self.noisy)))
+        dense[:, self.columns] = self.block
+        return dense
+
+    def fitted(self, theta: Array) -> Array:
+        """Return what the regression says at parameter values `theta`."""
+        return np.asarray(self.block @ theta[self.columns], dtype=np.float64)
+
+    def residual(self, theta: Array) -> Array:
+        """Return the target minus `fitted`."""
+        return self.target - self.fitted(theta)
 
 
 def regression_rows(
@@ -92,15 +109,18 @@ def regression_rows(
              [model.outputs.index(y) for y in extra_biases], place + len(model.state_biases)),
         ):  # fmt: skip
             for i in indices:
-                regressors = np.zeros((len(z), len(names)))
                 noisy = np.zeros(len(names))
+                regressors: dict[int, Array] = {}
                 for k in np.flatnonzero(entries.row == i):
-                    column, parameter = entries.column[k], entries.parameter[k]
-                    regressors[:, parameter] += entries.gain[k] * z[:, column]
+                    column, parameter = entries.column[k], int(entries.parameter[k])
+                    regressor = entries.gain[k] * z[:, column]
                     noisy[parameter] = float(column < len(model.states))
+                    other = regressors.get(parameter)
+                    regressors[parameter] = regressor if other is None else other + regressor
                 if i in biases:
-                    regressors[:, offset + biases.index(i)] = 1.0
-                if not regressors.any():
+                    regressors[offset + biases.index(i)] = np.ones(len(z))
+                moving = sorted(p for p, regressor in regressors.items() if regressor.any())
+                if not moving:
                     continue
                 is_state = left is rates
                 rows.append(
@@ -109,7 +129,8 @@ def regression_rows(
                         label=model.states[i] if is_state else model.outputs[i],
                         maneuver=number,
                         target=left[:, i] - z @ fixed[i],
-                        regressors=regressors,
+                        columns=np.array(moving, dtype=np.int64),
+                        block=np.stack([regressors[p] for p in moving]).T,
                         noisy=noisy,
                     )
                 )
@@ -168,10 +189,8 @@ def normal_equations(
     right = np.zeros(n_parameters)
     for k, row in enumerate(rows):
         weight = 1.0 if weights is None else float(weights[k])
-        active = np.flatnonzero(row.regressors.any(axis=0))
-        block = row.regressors[:, active]
-        normal[np.ix_(active, active)] += weight * (block.T @ block)
-        right[active] += weight * (block.T @ row.target)
+        normal[np.ix_(row.columns, row.columns)] += weight * (row.block.T @ row.block)
+        right[row.columns] += weight * (row.block.T @ row.target)
     return normal, right
 
 

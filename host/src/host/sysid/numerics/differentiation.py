@@ -133,8 +133,9 @@ def signal_bandwidth_hz(values: Array, dt_s: float) -> float:
     """
     samples = len(values)
     window = np.hanning(samples)[:, None]
-    ramp = np.column_stack([np.ones(samples), np.linspace(-1.0, 1.0, samples)])
-    detrended = values - ramp @ (np.linalg.pinv(ramp) @ values)
+    ramp = np.linspace(-1.0, 1.0, samples)  # has no mean: the two parts of a trend are apart
+    slope = (ramp @ values) / max(float(ramp @ ramp), 1e-300)
+    detrended = values - np.mean(values, axis=0) - np.outer(ramp, slope)
     power = np.abs(np.fft.rfft(detrended * window, axis=0)) ** 2
     frequency = np.fft.rfftfreq(samples, dt_s)
     lines = max(3, len(frequency) // 100)

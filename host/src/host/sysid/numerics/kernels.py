@@ -12,7 +12,35 @@ from host.compiled import Array, IntArray, compiled
 
 TAYLOR_ORDER = 14  # 0.5^15 / 15! = 2e-17: below double precision for a scaled norm of 0.5
 SCALED_NORM = 0.5
+TAYLOR_END = 1e-17  # norm^k / k!: terms from here on change no bit
+BLOCK = 64  # samples: 64 lines of 96 slopes are 48 kB
 STATE_LIMIT = 1e8  # a trial response beyond it is called divergent
+
+
+@compiled
+def _product(left: Array, slopes: Array, n_states: int, factor: float, out: Array) -> None:
+    """Put factor * left[:n, :n] @ slopes into `out`, for every parameter at once."""
+    for i in range(n_states):
+        for j in range(slopes.shape[1]):
+            for q in range(slopes.shape[2]):
+                out[i, j, q] = 0.0
+            for c in range(n_states):
+                f = left[i, c] * factor
+                if f != 0.0:
+                    for q in range(slopes.shape[2]):
+                        out[i, j, q] += f * slopes[c, j, q]
+
+
+@compiled
+def _square(left: Array, right: Array, factor: float, out: Array) -> None:
+    """Put factor * left @ right into `out`; a call of BLAS costs more than these few products."""
+    size = len(left)
+    for i in range(size):
+        for j in range(size):
+            value = 0.0
+            for c in range(size):
+                value += left[i, c] * right[c, j]
+            out[i, j] = value * factor
 
 
 @compiled
@@ -52,28 +80,42 @@ def transition(
         squarings += 1
     scale = 0.5**squarings
     M *= scale
-    dM = np.zeros((n_parameters, size, size))
-    for t in range(len(row)):
-        dM[parameter[t], row[t], column[t]] += gain[t] * dt_s * scale
     E = np.eye(size)
     power = np.eye(size)
-    dE = np.zeros((n_parameters, size, size))
-    dpower = np.zeros((n_parameters, size, size))
-    for order in range(1, TAYLOR_ORDER + 1):
-        for k in range(n_parameters):
-            dpower[k] = (M @ dpower[k] + dM[k] @ power) / order
-            dE[k] += dpower[k]
-        power = (M @ power) / order
-        E += power
-    for _ in range(squarings):
-        for k in range(n_parameters):
-            dE[k] = dE[k] @ E + E @ dE[k]
-        E = E @ E
+    spare = np.zeros((size, size))
+    # Rows below the states never depend on a parameter, and one entry of [A B b] moves one row:
+    # 0.03 ms for 24 parameters, against 0.25 with a full product for each of them.
     slopes = np.zeros((n_states, size, n_parameters))
-    for k in range(n_parameters):
+    dpower = np.zeros((n_states, size, n_parameters))
+    fresh = np.zeros((n_states, size, n_parameters))
+    term = 1.0
+    for order in range(1, TAYLOR_ORDER + 1):
+        part = 1.0 / order
+        _product(M, dpower, n_states, part, fresh)
+        for t in range(len(row)):
+            f = gain[t] * dt_s * scale * part
+            for j in range(size):
+                fresh[row[t], j, parameter[t]] += f * power[column[t], j]
+        dpower, fresh = fresh, dpower
+        slopes += dpower
+        _square(M, power, part, spare)
+        power, spare = spare, power
+        E += power
+        term *= norm * part
+        if term < TAYLOR_END:
+            break
+    for _ in range(squarings):
+        _product(E, slopes, n_states, 1.0, fresh)
         for i in range(n_states):
             for j in range(size):
-                slopes[i, j, k] = dE[k, i, j]
+                for c in range(size):
+                    f = E[c, j]
+                    if f != 0.0:
+                        for q in range(n_parameters):
+                            fresh[i, j, q] += f * slopes[i, c, q]
+        slopes, fresh = fresh, slopes
+        _square(E, E, 1.0, spare)
+        E, spare = spare, E
     return E[:n_states].copy(), slopes
 
 
@@ -101,15 +143,17 @@ def simulate(step: Array, drive: Array, start: Array) -> tuple[bool, Array]:
 
 
 @compiled
-def propagate(step: Array, push: Array, C: Array, start_slopes: Array) -> Array:
+def propagate(step: Array, step_slopes: Array, z: Array, C: Array, start_slopes: Array) -> Array:
     """Run the state sensitivities and map them to the outputs.
 
     Parameters
     ----------
     step : Array, shape (n, n + w)
         Transition; its first n columns act on sensitivities.
-    push : Array, shape (samples, n, parameters)
-        Derivative of the transition times state and drive, per sample.
+    step_slopes : Array, shape (n, n + w, parameters)
+        Derivatives of the transition.
+    z : Array, shape (samples, n + w)
+        State and drive of each sample.
     C : Array, shape (p, n)
     start_slopes : Array, shape (n, parameters)
         Sensitivities of the start state.
@@ -118,32 +162,53 @@ def propagate(step: Array, push: Array, C: Array, start_slopes: Array) -> Array:
     -------
     Array, shape (p, samples, parameters)
     """
-    samples, n, free = push.shape
+    samples, wide = z.shape
+    n, _, free = step_slopes.shape
     p = C.shape[0]
-    out = np.zeros((p, samples, free))
+    out = np.empty((p, samples, free))
+    flat = np.empty((wide, n * free))
+    for i in range(n):
+        for c in range(wide):
+            for q in range(free):
+                flat[c, i * free + q] = step_slopes[i, c, q]
+    # What drives the sensitivities is made block by block and stays in the cache: 0.23 ms for
+    # 24 parameters and 2000 samples, 0.43 with the whole drive laid down first.
+    push = np.empty((BLOCK, n * free))
     S = start_slopes.copy()
     T = np.zeros((n, free))
-    for k in range(samples):
-        for j in range(p):
-            for i in range(n):
-                c = C[j, i]
-                if c != 0.0:
-                    for q in range(free):
-                        out[j, k, q] += c * S[i, q]
-        if n == 4:  # one pass over memory instead of four: 0.29 ms against 0.49 (24 x 2000)
-            for i in range(4):
-                a, b, c, d = step[i, 0], step[i, 1], step[i, 2], step[i, 3]
+    for begin in range(0, samples, BLOCK):
+        count = min(BLOCK, samples - begin)
+        np.dot(z[begin : begin + count], flat, push[:count])
+        for b in range(count):
+            for j in range(p):
+                line = out[j, begin + b]
                 for q in range(free):
-                    T[i, q] = a * S[0, q] + b * S[1, q] + c * S[2, q] + d * S[3, q] + push[k, i, q]
-        else:
-            for i in range(n):
-                for q in range(free):
-                    T[i, q] = push[k, i, q]
-                for j in range(n):
-                    f = step[i, j]
+                    line[q] = 0.0
+                for i in range(n):
+                    c = C[j, i]
+                    if c != 0.0:
+                        for q in range(free):
+                            line[q] += c * S[i, q]
+            if n == 4:  # one pass over memory instead of four
+                for i in range(4):
+                    s0, s1, s2, s3 = step[i, 0], step[i, 1], step[i, 2], step[i, 3]
                     for q in range(free):
-                        T[i, q] += f * S[j, q]
-        S, T = T, S
+                        T[i, q] = (
+                            s0 * S[0, q]
+                            + s1 * S[1, q]
+                            + s2 * S[2, q]
+                            + s3 * S[3, q]
+                            + push[b, i * free + q]
+                        )
+            else:
+                for i in range(n):
+                    for q in range(free):
+                        T[i, q] = push[b, i * free + q]
+                    for j in range(n):
+                        f = step[i, j]
+                        for q in range(free):
+                            T[i, q] += f * S[j, q]
+            S, T = T, S
     return out
 
 

@@ -194,8 +194,7 @@ class OutputProblem:
                 return None
             y = CD @ z[:, : n + m].T
             y += np.where(self._bias_parameter >= 0, local[self._bias_parameter], 0.0)[:, None]
-            push = (z @ slopes.transpose(1, 0, 2).reshape(z.shape[1], -1)).reshape(len(z), n, -1)
-            slope = propagate(step, push, C, self._start_slopes)
+            slope = propagate(step, slopes, z, C, self._start_slopes)
             for j in np.flatnonzero(self._bias_parameter >= 0):
                 slope[j, :, self._bias_parameter[j]] += 1.0
             for row, output_slope in enumerate(CD_slopes):
