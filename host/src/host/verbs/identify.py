@@ -82,15 +82,16 @@ def run(args: argparse.Namespace) -> int:
     from host.sysid.compatibility.reconstruction import words as agreement_words
     from host.sysid.errors import IdentificationError
     from host.sysid.estimators.fit import methods as single_methods
+    from host.sysid.flight.chosen import chosen
     from host.sysid.flight.linear import DEFAULT_METHOD, STAGED, identify
     from host.sysid.flight.tables import read_columns
 
     known = {**STAGED, **single_methods()}
-    chosen = args.method or [DEFAULT_METHOD]
-    if "list" in chosen:
+    wanted = list(dict.fromkeys(args.method or [DEFAULT_METHOD]))
+    if "list" in wanted:
         print("\n".join(f"{name:26s} {about}" for name, about in known.items()))
         return int(ExitCode.OK)
-    unknown = [m for m in chosen if m not in known]
+    unknown = [m for m in wanted if m not in known]
     if unknown:
         raise IdentificationError(f"unknown method {', '.join(unknown)}; known: {', '.join(known)}")
     columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
@@ -112,14 +113,15 @@ def run(args: argparse.Namespace) -> int:
         prior = read_prior(args.prior, sorted(speed)[len(speed) // 2] if len(speed) else 0.0)
         if not args.aircraft:
             raise IdentificationError("--prior compares coefficients; they need --aircraft")
-    windows = _windows(args, columns)
+    windows = chosen(columns, from_s=args.from_s, to_s=args.to_s, numbers=args.maneuver or ())
     agreement = _agreement(columns, args.aircraft, airframe, notes)
     # Without the places of the sensors a vane ahead of the CG passes for a late one.
     known_errors = agreement if airframe is not None and not args.no_corrections else None
     answers: list[Answer] = []
     terms = _coefficient_model(args.model)
     direct = _direct(args, columns, windows, notes, terms) if terms else None
-    for method in chosen:
+    failed: dict[str, list[str]] = {}  # why, and of which models
+    for method in wanted:
         for name, user_model in _models(args.model):
             try:
                 answers += identify(
@@ -132,9 +134,12 @@ def run(args: argparse.Namespace) -> int:
                     compatibility=known_errors,
                 )
             except IdentificationError as error:
-                notes.append(f"{name}, {method}: {error}")
+                label = name if len(wanted) == 1 else f"{name} by {method}"
+                failed.setdefault(str(error), []).append(label)
+    unfit = [f"{', '.join(labels)}: {error}" for error, labels in failed.items()]
     if not answers and direct is None:
-        raise IdentificationError("; ".join(notes))
+        raise IdentificationError("; ".join([*unfit, *notes]))
+    notes += unfit
     tables = list(direct.tables) if direct else [a.table for a in answers]
     _write(args, answers, tables, direct)
     if direct and args.plots:
@@ -163,7 +168,7 @@ def run(args: argparse.Namespace) -> int:
     lines = words(answers, notes)
     if direct:
         lines += coefficient_words(direct)
-    if len(chosen) > 1:
+    if len(wanted) > 1:
         lines += ["", *_side_by_side(answers)]
     else:
         for answer in answers:
@@ -251,39 +256,6 @@ def _direct(
     except IdentificationError as error:
         notes.append(f"coefficients: {error}")
         return None
-
-
-def _windows(args: argparse.Namespace, columns: dict[str, Any]) -> list[Found] | None:
-    """Return the maneuvers the user asked for; None leaves the choice to identification."""
-    from host.sysid.errors import IdentificationError
-    from host.sysid.flight.finder import Found, find
-
-    if args.from_s is not None or args.to_s is not None:
-        t = columns["t_s"]
-        first = float(t[0]) if args.from_s is None else args.from_s
-        last = float(t[-1]) if args.to_s is None else args.to_s
-        if not first < last:
-            raise IdentificationError(f"--from {first} is not before --to {last}")
-        import numpy as np
-
-        inside = (t >= first) & (t <= last)
-        moving = {
-            axis: float(np.ptp(columns[axis][inside])) if inside.any() else 0.0
-            for axis in ("elevator_rad", "aileron_rad", "rudder_rad")
-            if axis in columns
-        }
-        return [
-            Found(axis, "window", first + 0.3, last, last, size / 2.0, 0)
-            for axis, size in moving.items()
-            if size > 0.5 * max(moving.values())
-        ]
-    if args.maneuver:
-        found = find(columns)
-        wrong = [n for n in args.maneuver if not 1 <= n <= len(found)]
-        if wrong:
-            raise IdentificationError(f"no maneuver {wrong[0]}; there are {len(found)}")
-        return [found[n - 1] for n in args.maneuver]
-    return None
 
 
 def _side_by_side(answers: list[Answer]) -> list[str]:

@@ -263,7 +263,8 @@ def corrected(columns: dict[str, Array], airframe: AirframeData) -> dict[str, Ar
     vanes is corrected for the mean of their positions: roll cancels between two tips.
     """
     result = dict(columns)
-    rates = [columns[f"{a}_radps"] for a in "pqr"]
+    still = np.zeros(len(columns["t_s"]))  # a record of one axis has not all rates
+    rates = [columns.get(f"{a}_radps", still) for a in "pqr"]
     p, q, r = rates
     if airframe.vanes_m:
         x, y, z = np.mean(airframe.vanes_m, axis=0)
@@ -274,17 +275,14 @@ def corrected(columns: dict[str, Array], airframe: AirframeData) -> dict[str, Ar
             )
         if "beta_rad" in columns:
             result["beta_rad"] = columns["beta_rad"] - (r * x - p * z) / speed
-    if any(airframe.imu_m) and all(f"a{a}_mps2" in columns for a in "xyz"):
+    if any(airframe.imu_m):
         x, y, z = airframe.imu_m
         dt_s = float(np.median(np.diff(columns["t_s"])))
         dp, dq, dr = (np.gradient(rate, dt_s) for rate in rates)
-        result["ax_mps2"] = columns["ax_mps2"] - (
-            dq * z - dr * y + q * (p * y - q * x) - r * (r * x - p * z)
-        )
-        result["ay_mps2"] = columns["ay_mps2"] - (
-            dr * x - dp * z + r * (q * z - r * y) - p * (p * y - q * x)
-        )
-        result["az_mps2"] = columns["az_mps2"] - (
-            dp * y - dq * x + p * (r * x - p * z) - q * (q * z - r * y)
-        )
+        felt = {
+            "ax_mps2": dq * z - dr * y + q * (p * y - q * x) - r * (r * x - p * z),
+            "ay_mps2": dr * x - dp * z + r * (q * z - r * y) - p * (p * y - q * x),
+            "az_mps2": dp * y - dq * x + p * (r * x - p * z) - q * (q * z - r * y),
+        }
+        result |= {name: columns[name] - more for name, more in felt.items() if name in columns}
     return result

@@ -246,6 +246,8 @@ RESPONSE_OF = {
 
 def grade(columns: Mapping[str, Array], item: Found) -> Grade:
     """Grade one maneuver: amplitude, trim before, noise, pilot feedback."""
+    if RESPONSE_OF[item.axis] not in columns:
+        return Grade(0.0, 0.0, 0.0, 0.0, (f"no {RESPONSE_OF[item.axis]}: cannot be graded",))
     t = np.asarray(columns["t_s"], dtype=np.float64)
     response = np.nan_to_num(np.asarray(columns[RESPONSE_OF[item.axis]], dtype=np.float64))
     surface = np.nan_to_num(np.asarray(columns[item.axis], dtype=np.float64))

@@ -155,7 +155,7 @@ def identify(
     windows : sequence of Found, optional
         Use these instead of finding them.
     user_model : LinearModel, optional
-        Fit this instead of templates, to every window.
+        Fit this instead of templates, to every window where one of its inputs moved.
     with_delays : bool
         Estimate residual delays and accelerometer offsets where the method can.
     compatibility : Compatibility, optional
@@ -172,6 +172,11 @@ def identify(
         raise IdentificationError(
             f"no template '{strangers[0]}'; there are {', '.join(AXIS_OF)}, or give a TOML file"
         )
+    if "airspeed_mps" not in columns:
+        raise IdentificationError(
+            "identification needs airspeed_mps, which the data do not have; name its column in a"
+            " map (--map)"
+        )
     told = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
     columns = without_delays(columns, told)
     if airframe is not None:
@@ -184,9 +189,12 @@ def identify(
             "no maneuver found: no surface moved by more than 1.4 degrees at once; give --from and"
             " --to, or fly a doublet or 3-2-1-1 of 3 degrees or more"
         )
-    answers = []
+    answers: list[Answer] = []
+    needed: list[str] = []
     for name in names:
-        mine = [f for f in found if user_model is not None or f.axis in AXIS_OF[name]]
+        axes = AXIS_OF[name] if user_model is None else user_model.inputs
+        mine = _once([f for f in found if f.axis in axes])
+        needed += axes
         if mine:
             answers.append(
                 _answer(
@@ -195,8 +203,8 @@ def identify(
             )
     if not answers:
         raise IdentificationError(
-            f"no maneuver for {', '.join(names)}; found only"
-            f" {', '.join(sorted({f.axis for f in found}))}"
+            f"no maneuver of {', '.join(dict.fromkeys(needed))} for {', '.join(names)}; found"
+            f" only {', '.join(sorted({f.axis for f in found}))}"
         )
     return answers
 
@@ -266,6 +274,11 @@ def _answer(
         delays=delays,
         corrections=() if compatibility is None else corrections(compatibility),
     )
+
+
+def _once(found: Sequence[Found]) -> list[Found]:
+    """Leave out what covers the same samples: a stretch where two surfaces moved is one record."""
+    return list({f.fit_window(): f for f in found}.values())
 
 
 def _held_out(found: list[Found]) -> list[Found]:

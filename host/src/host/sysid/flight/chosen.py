@@ -1,0 +1,87 @@
+"""Which part of a flight the user asked for: maneuvers by number, or a stretch of time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.flight.finder import Found, find
+
+SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
+FEWEST = 8  # samples, as a maneuver needs
+STILL_RAD = 1e-3  # a surface that moves less excites nothing: the pots resolve as much
+
+
+def chosen(
+    columns: Mapping[str, Array],
+    *,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    numbers: Sequence[int] = (),
+) -> list[Found] | None:
+    """Return the maneuvers the user asked for; None leaves the choice to identification.
+
+    Parameters
+    ----------
+    columns : mapping
+        SI columns on an even grid.
+    from_s, to_s : float, optional
+        A stretch in the time of the table: one maneuver on each surface that leads in it.
+    numbers : sequence of int
+        Numbers as `host maneuvers` counts them, from 1; one named twice counts once.
+
+    Raises
+    ------
+    IdentificationError
+        If there is no such maneuver, or the stretch holds nothing to fit.
+    """
+    if from_s is None and to_s is None:
+        return _numbered(columns, numbers) if numbers else None
+    if numbers:
+        raise IdentificationError("--maneuver and --from/--to exclude each other: give one of them")
+    return _stretch(columns, from_s, to_s)
+
+
+def _numbered(columns: Mapping[str, Array], numbers: Sequence[int]) -> list[Found]:
+    found = find(columns)
+    wrong = [n for n in numbers if not 1 <= n <= len(found)]
+    if wrong:
+        there = f"there are {len(found)}" if found else "none was found"
+        raise IdentificationError(f"no maneuver {wrong[0]}: {there} (`host maneuvers` lists them)")
+    return [found[n - 1] for n in sorted(set(numbers))]
+
+
+def _stretch(columns: Mapping[str, Array], from_s: float | None, to_s: float | None) -> list[Found]:
+    t = columns["t_s"]
+    first = float(t[0]) if from_s is None else from_s
+    last = float(t[-1]) if to_s is None else to_s
+    asked = f"--from {first:g} --to {last:g}"
+    if not first < last:
+        raise IdentificationError(f"{asked}: the start is not before the end")
+    first, last = max(first, float(t[0])), min(last, float(t[-1]))
+    inside = (t >= first) & (t <= last)
+    if inside.sum() < FEWEST:
+        raise IdentificationError(
+            f"{asked}: {inside.sum()} samples, at least {FEWEST} are needed; the data run from"
+            f" {t[0]:.6g} to {t[-1]:.6g} s"
+        )
+    holes = t[inside & (columns.get("bridged", np.zeros(len(t))) > 0.0)]
+    if len(holes):
+        raise IdentificationError(
+            f"{asked}: the data have a gap there, at {holes[0]:.6g} s; choose a stretch without"
+        )
+    swing = {axis: float(np.ptp(columns[axis][inside])) for axis in SURFACES if axis in columns}
+    if not swing:
+        raise IdentificationError(f"{asked}: the data have none of {', '.join(SURFACES)}")
+    if max(swing.values()) < STILL_RAD:
+        raise IdentificationError(
+            f"{asked}: no surface moved there; `host maneuvers` lists where one did"
+        )
+    return [
+        Found(axis, "window", first + 0.3, last, last, size / 2.0, 0)
+        for axis, size in swing.items()
+        if size > 0.5 * max(swing.values())
+    ]

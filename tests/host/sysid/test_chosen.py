@@ -1,0 +1,118 @@
+"""--maneuver, --from and --to: each sample is fitted once, and what cannot be is said why."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from host.cli import main
+from host.sysid.errors import IdentificationError
+from host.sysid.flight.chosen import chosen
+from host.sysid.flight.finder import find, grade
+from host.sysid.flight.linear import identify
+from host.sysid.flight.tables import read_columns
+from host.sysid.models.model_file import model_from
+
+Columns = dict[str, np.ndarray]
+SHORT_PERIOD = model_from(
+    {
+        "states": ["alpha_rad", "q_radps"],
+        "inputs": ["elevator_rad"],
+        "outputs": ["alpha_rad", "q_radps"],
+        "state_biases": ["alpha_rad", "q_radps"],
+        "initial_states": ["alpha_rad", "q_radps"],
+        "A": [["Z_alpha", 1.0], ["M_alpha", "M_q"]],
+        "B": [["Z_de"], ["M_de"]],
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> Columns:
+    """Calm air: a 3-2-1-1 and a doublet of the elevator, doublets of aileron and rudder."""
+    folder = tmp_path_factory.mktemp("calm")
+    options = ["--seed", "3", "--firmware", "none", "--no-picture", "-o", str(folder)]
+    assert main(["simulate", "calm", *options]) == 0
+    return read_columns(folder / "flight.csv")[0]
+
+
+def fitted(columns: Columns, **options: Any) -> list[tuple[float, float]]:
+    """Return the stretches that one model was fitted to."""
+    [answer] = identify(columns, method="equation-error", **options)
+    return [f.fit_window() for f in answer.used]
+
+
+def test_a_stretch_of_two_surfaces_is_one_record(flight: Columns) -> None:
+    found = find(flight)
+    windows = chosen(flight, from_s=found[2].start_s - 1.0, to_s=found[3].end_s)
+    assert windows is not None
+    assert {f.axis for f in windows} == {"aileron_rad", "rudder_rad"}
+    assert len(fitted(flight, names=("lateral",), windows=windows)) == 1
+
+
+def test_a_maneuver_named_twice_counts_once(flight: Columns) -> None:
+    windows = chosen(flight, numbers=(2, 1, 2))
+    assert windows == find(flight)[:2]
+
+
+def test_a_model_of_ones_own_is_fitted_where_its_input_moved(flight: Columns) -> None:
+    expected = [f.fit_window() for f in find(flight) if f.axis == "elevator_rad"]
+    assert len(expected) == 2
+    assert fitted(flight, names=("own",), user_model=SHORT_PERIOD) == expected
+    with pytest.raises(IdentificationError, match="no maneuver of elevator_rad for own; found"):
+        identify(flight, names=("own",), user_model=SHORT_PERIOD, windows=find(flight)[2:])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"from_s": 100.0, "to_s": 120.0}, "0 samples, at least 8 .* from 0.02 to 39"),
+        ({"from_s": 15.0, "to_s": 15.01}, "samples, at least 8"),
+        ({"from_s": 20.0, "to_s": 10.0}, "start is not before the end"),
+        ({"from_s": float("nan")}, "start is not before the end"),
+        ({"from_s": 12.0, "numbers": [1]}, "exclude each other"),
+        ({"numbers": [5]}, "no maneuver 5: there are 4"),
+        ({"numbers": [0]}, "no maneuver 0: there are 4"),
+    ],
+)
+def test_what_cannot_be_chosen_says_why(
+    options: dict[str, Any], words: str, flight: Columns
+) -> None:
+    with pytest.raises(IdentificationError, match=words):
+        chosen(flight, **options)
+
+
+def test_a_stretch_with_nothing_to_fit_says_why(flight: Columns) -> None:
+    t = flight["t_s"]
+    gap = {**flight, "bridged": ((t > 14.0) & (t < 14.5)).astype(float)}
+    with pytest.raises(IdentificationError, match=r"a gap there, at 14\.0"):
+        chosen(gap, from_s=12.0, to_s=16.0)
+    still = {**flight, **{f"{s}_rad": 0.0 * t for s in ("elevator", "aileron", "rudder")}}
+    with pytest.raises(IdentificationError, match="no surface moved there"):
+        chosen(still, from_s=12.0, to_s=16.0)
+    with pytest.raises(IdentificationError, match="none was found"):
+        chosen(still, numbers=[1])
+    with pytest.raises(IdentificationError, match="the data have none of elevator_rad"):
+        chosen({"t_s": t, "q_radps": flight["q_radps"]}, from_s=12.0, to_s=16.0)
+
+
+def test_missing_columns_are_named_not_stumbled_over(flight: Columns) -> None:
+    few = {k: flight[k] for k in ("t_s", "elevator_rad", "alpha_rad")}
+    mark = grade(few, find(few)[0])
+    assert mark.score == 0.0
+    assert mark.remarks == ("no q_radps: cannot be graded",)
+    with pytest.raises(IdentificationError, match="needs airspeed_mps"):
+        identify(few)
+
+
+def test_one_reason_for_two_models_is_said_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    t = np.arange(0.0, 5.0, 0.02)
+    path = tmp_path / "still.csv"
+    rows = [f"{x:.2f},17.0,0.01,0.0" for x in t]
+    path.write_text("\n".join(["t_s,airspeed_mps,elevator_rad,q_radps", *rows]) + "\n")
+    assert main(["identify", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("host: longitudinal, lateral: no maneuver found")
+    assert said.count("no maneuver found") == 1
