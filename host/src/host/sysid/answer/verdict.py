@@ -59,16 +59,18 @@ def _verdict(answer: Answer) -> list[str]:
     result = answer.result
     half = result.half_width()
     refused = {r.name for r in answer.refused}
-    trusted, fair = [], []
+    trusted, fair, loose = [], [], []
     for k, parameter in enumerate(answer.model.parameters):
         name = parameter.name
-        if name in refused or name.startswith("imu_"):
+        if name in refused or name.startswith("imu_") or half[k] == 0.0:  # on a bound: warned of
             continue
         share = float(half[k]) / max(abs(float(result.estimate[k])), 1e-300)
         if share <= TRUST:
             trusted.append(name)
         elif share <= FAIR:
             fair.append(name)
+        else:
+            loose.append(f"{name} ({100.0 * share:.0f} %)")
     lines = [
         f"{answer.template}: {_fitted(len(answer.used))} by"
         f" {result.method}, {len(answer.held_out)} held out"
@@ -76,6 +78,8 @@ def _verdict(answer: Answer) -> list[str]:
     lines.append(f"  trust (within 10 %):  {', '.join(trusted) or 'nothing'}")
     if fair:
         lines.append(f"  use with care (10 to 30 %):  {', '.join(fair)}")
+    if loose:
+        lines.append(f"  do not rely on (above 30 %):  {', '.join(loose)}")
     for refusal in answer.refused:
         if not refusal.name.startswith("imu_"):
             warning = "do not use" if refusal.grade == CANNOT else "doubtful,"
@@ -89,7 +93,7 @@ def _verdict(answer: Answer) -> list[str]:
         lines.append(f"  {name} never moved: its derivatives are the bias under another name")
     if answer.together.severe:
         pairs = ", ".join(f"{a} with {b}" for a, b, _ in answer.together.pairs[:3])
-        lines.append(f"  the data are close to collinear ({pairs})")
+        lines.append("  the data are close to collinear" + (f" ({pairs})" if pairs else ""))
     for name in answer.at_bound:
         lines.append(
             f"  {name} is at its bound: no delay of that sensor, but what the model lacks there"
