@@ -39,5 +39,7 @@ def test_every_kernel_is_built_in_the_types_that_methods_use() -> None:
     )
     built, used = json.loads(done.stdout)
     assert len(built) >= 11
-    assert min(built.values()) >= 1, built
+    # A private kernel may be part of the kernel that calls it; if Python calls it, the end says so.
+    entered = {name: n for name, n in built.items() if not name.rpartition(".")[2].startswith("_")}
+    assert min(entered.values()) >= 1, built
     assert used == built

@@ -161,8 +161,8 @@ class LinearModel:
             object.__setattr__(self, label, array)
         names = [parameter.name for parameter in self.parameters]
         for group in (self.states, self.inputs, self.outputs, names):
-            twice = sorted({x for x in group if list(group).count(x) > 1})
-            if twice:
+            if len(set(group)) < len(group):
+                twice = sorted({x for x in group if list(group).count(x) > 1})
                 raise IdentificationError(f"model {self.name}: {', '.join(twice)} named twice")
         for term in self.terms:
             if term.matrix not in shapes or term.parameter not in names:

@@ -132,21 +132,26 @@ def signal_bandwidth_hz(values: Array, dt_s: float) -> float:
     The noise floor is the median of the upper half of each periodogram.
     """
     samples = len(values)
-    window = np.hanning(samples)[:, None]
     ramp = np.linspace(-1.0, 1.0, samples)  # has no mean: the two parts of a trend are apart
     slope = (ramp @ values) / max(float(ramp @ ramp), 1e-300)
-    detrended = values - np.mean(values, axis=0) - np.outer(ramp, slope)
-    power = np.abs(np.fft.rfft(detrended * window, axis=0)) ** 2
+    detrended = values.T - np.mean(values, axis=0)[:, None] - slope[:, None] * ramp
+    power = np.abs(np.fft.rfft(detrended * _taper(samples))) ** 2
     frequency = np.fft.rfftfreq(samples, dt_s)
     lines = max(3, len(frequency) // 100)
     kernel = np.ones(lines) / lines
     edge = 4.0 / (samples * dt_s)
-    for column in power.T:
+    for column in power:
         level = np.convolve(column, kernel, mode="same")
-        floor = float(np.median(level[len(level) // 2 :]))
+        upper = level[len(level) // 2 :]
+        floor = float(np.partition(upper, len(upper) // 2)[len(upper) // 2])
         above = np.flatnonzero(level > STANDS_OUT * floor)
         if floor > 0.0 and len(above):
             edge = max(edge, float(frequency[above[-1]]))
         elif floor <= 0.0:
             edge = float(frequency[-1])
     return min(HEADROOM * edge, 0.4 / dt_s)
+
+
+@lru_cache(maxsize=8)
+def _taper(samples: int) -> Array:
+    return np.hanning(samples)

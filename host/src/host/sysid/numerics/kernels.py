@@ -143,7 +143,9 @@ def simulate(step: Array, drive: Array, start: Array) -> tuple[bool, Array]:
 
 
 @compiled
-def propagate(step: Array, step_slopes: Array, z: Array, C: Array, start_slopes: Array) -> Array:
+def propagate(
+    step: Array, step_slopes: Array, z: Array, C: Array, start_slopes: Array, out: Array
+) -> None:
     """Run the state sensitivities and map them to the outputs.
 
     Parameters
@@ -157,15 +159,12 @@ def propagate(step: Array, step_slopes: Array, z: Array, C: Array, start_slopes:
     C : Array, shape (p, n)
     start_slopes : Array, shape (n, parameters)
         Sensitivities of the start state.
-
-    Returns
-    -------
-    Array, shape (p, samples, parameters)
+    out : Array, shape (p, samples, parameters)
+        Overwritten with the sensitivities of the outputs.
     """
     samples, wide = z.shape
     n, _, free = step_slopes.shape
     p = C.shape[0]
-    out = np.empty((p, samples, free))
     flat = np.empty((wide, n * free))
     for i in range(n):
         for c in range(wide):
@@ -209,7 +208,6 @@ def propagate(step: Array, step_slopes: Array, z: Array, C: Array, start_slopes:
                         for q in range(free):
                             T[i, q] += f * S[j, q]
             S, T = T, S
-    return out
 
 
 @compiled

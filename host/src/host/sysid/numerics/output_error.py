@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
+from scipy.linalg import lapack
 
 from host.compiled import Array, BoolArray
 from host.sysid.errors import IdentificationError
@@ -109,6 +109,8 @@ def minimise(
         trial = _evaluate(problem, trial_theta, memory, variance)
         tolerance = 1e-9 * (1.0 + abs(point.cost))
         if trial is None or not trial.cost <= point.cost + tolerance:
+            if trial is not None:
+                problem.release(trial.responses)
             if size < step_limit and damping < DAMPED:
                 converged = True
                 step_size = size
@@ -120,6 +122,7 @@ def minimise(
         iterations += 1
         foreseen = float(gradient @ step - 0.5 * step @ information @ step)
         gain = (point.cost - trial.cost) / foreseen if foreseen > 0.0 else 0.0
+        problem.release(point.responses)
         point = trial
         step_size = size
         accepted_damping = damping
@@ -198,19 +201,11 @@ def _evaluate(
         if not np.isfinite(residual).all():
             return None
         residuals.append(residual)
-        whitened.append(
-            np.stack([n.whiten(residual[j][:, None])[:, 0] for j, n in enumerate(noise)])
-        )
-    squares = np.sum([np.einsum("jk,jk->j", w, w) for w in whitened], axis=0)
+        whitened.append(_whitened(residual, noise))
+    squares = sum((np.einsum("jk,jk->j", w, w) for w in whitened), np.zeros(len(noise)))
     prior = 0.5 * float(np.sum(problem.prior_precision * (theta - problem.prior_mean) ** 2))
     if variance is None:
-        floor = 1e-20 * np.array(
-            [
-                max(float(np.mean(np.square(problem.measured(0)[j]))), 1e-30)
-                for j in range(len(noise))
-            ]
-        )
-        estimated = np.maximum(squares / problem.samples, floor)
+        estimated = np.maximum(squares / problem.samples, problem.least_variance)
         cost = 0.5 * problem.samples * float(np.sum(np.log(estimated)))
     else:
         estimated = variance
@@ -218,6 +213,12 @@ def _evaluate(
     if not np.isfinite(cost):
         return None
     return _Point(theta, responses, residuals, whitened, estimated, cost + prior)
+
+
+def _whitened(residual: Array, noise: Sequence[OutputNoise]) -> Array:
+    if all(n.order == 0 for n in noise):
+        return residual
+    return np.stack([n.whiten(residual[j][:, None])[:, 0] for j, n in enumerate(noise)])
 
 
 def _normal(
@@ -259,19 +260,16 @@ def _step(
     scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
     scaled = block / np.outer(scale, scale)
     ridge = max(damping, 1e-14)
-    while True:
-        try:
-            factor = linalg.cho_factor(scaled + ridge * np.eye(len(block)), lower=True)
-            break
-        except linalg.LinAlgError:
-            ridge *= 10.0
-            if ridge > MAX_DAMPING:
-                raise IdentificationError(
-                    "the information matrix is not finite; scale or bound the parameters"
-                ) from None
-    move = linalg.cho_solve(factor, gradient[free] / scale)
-    lower = factor[0]
-    inverse = linalg.solve_triangular(lower, np.eye(len(block)), lower=True)
+    factor, failed = lapack.dpotrf(scaled + ridge * np.eye(len(block)), lower=1)
+    while failed:
+        ridge *= 10.0
+        if not ridge <= MAX_DAMPING:
+            raise IdentificationError(
+                "the information matrix is not finite; scale or bound the parameters"
+            )
+        factor, failed = lapack.dpotrf(scaled + ridge * np.eye(len(block)), lower=1)
+    inverse = np.tril(lapack.dtrtri(factor, lower=1)[0])
+    move = inverse.T @ (inverse @ (gradient[free] / scale))
     bound = np.sqrt(np.einsum("ij,ij->j", inverse, inverse))
     step[free] = move / scale
     return step, free, float(np.max(np.abs(move) / bound, initial=0.0))
