@@ -1,5 +1,7 @@
 """--maneuver, --from and --to: each sample is fitted once, and what cannot be is said why."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -116,3 +118,24 @@ def test_one_reason_for_two_models_is_said_once(
     said = capsys.readouterr().err
     assert said.startswith("host: longitudinal, lateral: no maneuver found")
     assert said.count("no maneuver found") == 1
+
+
+@pytest.mark.parametrize(
+    ("model", "words"),
+    [
+        ("longitudnal", r"no model 'longitudnal' \(did you mean longitudinal\?\); there are"),
+        ("missing.TOML", "missing.TOML: cannot be read"),
+        (".", "cannot be read"),
+    ],
+)
+def test_a_wrong_model_is_said_before_the_data_are_read(
+    model: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(tmp_path / "no.csv"), "--model", model]) == 2
+    assert re.search(words, capsys.readouterr().err)
+
+
+def test_a_misspelt_signal_of_a_model_is_guessed(flight: Columns) -> None:
+    model = replace(SHORT_PERIOD, outputs=("alpha_rad", "q_rad"))
+    with pytest.raises(IdentificationError, match=r"needs q_rad \(did you mean q_radps\?\)"):
+        identify(flight, names=("own",), user_model=model)

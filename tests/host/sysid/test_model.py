@@ -90,10 +90,8 @@ def test_entries_are_parsed() -> None:
         [("Z_alpha", 17.0), ("x", 1.0)],
     )
     assert parse_entry("-1e-3*k", "here") == (0.0, [("k", -1e-3)])
-    for wrong in ("a b", "3 *", "", "2*3*x", "a,b", True):
-        if wrong == "":
-            assert parse_entry(wrong, "here") == (0.0, [])
-            continue
+    wrongs = ("a b", "3 *", "", " ", "2*3*x", "a,b", "1.2.3*x", "x*2", True, float("nan"), None)
+    for wrong in wrongs:
         with pytest.raises(IdentificationError, match="here"):
             parse_entry(wrong, "here")
 
@@ -104,7 +102,21 @@ def test_entries_are_parsed() -> None:
         ({"states": "x"}, "list of signal names"),
         ({"A": [[1.0]]}, "rows of 2"),
         ({"speed": 3}, "unknown key speed"),
-        ({"parameters": {"k": {"begin": 1}}}, "parameter k"),
+        ({"parameters": {"k": {"begin": 1}}}, "parameter k: unknown key begin; known are start"),
+        ({"parameters": {"kk": 1}}, "parameter kk enters no matrix; those that do are k"),
+        ({"parameters": {"k": "fast"}}, "parameter k is 'fast', expected a number"),
+        ({"parameters": {"k": {"start": True}}}, "k: start is True, expected a number"),
+        ({"parameters": {"k": {"start": float("inf")}}}, "start is inf, expected a number"),
+        ({"parameters": {"k": {"prior_sd": 0}}}, "prior_sd is 0, expected a number above zero"),
+        ({"parameters": {"k": {"lower": 1, "upper": -1}}}, "lower 1 is not below upper -1"),
+        ({"parameters": {"k": {"start": 3, "upper": 2}}}, "start 3 is not between .* upper 2"),
+        ({"delays": [{"name": "d", "outputs": "a"}]}, "delay d: outputs must be a list"),
+        ({"delays": [{"name": "d", "outputs": ["a"], "prior_sd": 1}]}, "unknown key prior_sd;"),
+        ({"delays": [{"name": "d", "outputs": ["a"], "limit_s": -1}]}, "limit_s is -1"),
+        ({"delays": [{"name": "k", "outputs": ["a"]}]}, "delay k: another parameter"),
+        ({"delays": [{"name": n, "outputs": ["a"]} for n in "de"]}, "e: a has a delay already"),
+        ({"levers": [{"output": "a", "state": "b"}]}, "a lever needs output, state and parameter"),
+        ({"A": [["k", float("nan")], [0, 0]]}, "nan, expected a number"),
         ({"hold": "cubic"}, "use zoh or foh"),
         ({"state_biases": ["zeta"]}, "state bias on zeta"),
     ],
@@ -121,6 +133,37 @@ def test_a_wrong_file_is_one_clear_line(change: dict[str, object], message: str)
     with pytest.raises(IdentificationError, match=message) as caught:
         model_from({**document, **change}, "file.toml")
     assert "\n" not in str(caught.value)
+
+
+def test_constants_left_out_are_freed_where_records_need_them() -> None:
+    document: dict[str, object] = {
+        "states": ["q", "theta"],
+        "inputs": ["u"],
+        "outputs": ["q", "theta", "az"],
+        "A": [["k", 0], [1, 0]],
+        "B": [["b"], [0]],
+        "C": [[1, 0], [0, 1], ["k", 0]],
+        "parameters": {"k": {"upper": -1.0}},
+    }
+    model = model_from(document)
+    assert model.initial_states == ("q", "theta")
+    assert model.state_biases == ("q",)
+    assert model.output_biases == ("az",)
+    assert model.parameters[0].start == -1.0
+    none: dict[str, object] = {"initial_states": [], "state_biases": [], "output_biases": []}
+    bare = model_from({**document, **none})
+    assert bare.local_names(1) == ()
+
+
+def test_names_of_any_letters_survive_a_file(tmp_path: Path) -> None:
+    model = LinearModel(
+        'say "hi"', ("α",), ("u",), ("α",), np.zeros((1, 1)), np.ones((1, 1)), np.eye(1),
+        np.zeros((1, 1)), (Term("A", 0, 0, "Z_α"),), (Parameter("Z_α", -1.0),),
+    )  # fmt: skip
+    path = tmp_path / "model.toml"
+    path.write_text(model_text(model), encoding="utf-8")
+    back = read_model(path)
+    assert (back.name, back.states, back.parameters) == (model.name, ("α",), model.parameters)
 
 
 def test_model_refuses_contradictions() -> None:

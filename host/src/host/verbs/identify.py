@@ -94,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
     unknown = [m for m in wanted if m not in known]
     if unknown:
         raise IdentificationError(f"unknown method {', '.join(unknown)}; known: {', '.join(known)}")
+    models = _models(args.model)
     columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
     airframe = None
     if args.aircraft:
@@ -122,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
     direct = _direct(args, columns, windows, notes, terms) if terms else None
     failed: dict[str, list[str]] = {}  # why, and of which models
     for method in wanted:
-        for name, user_model in _models(args.model):
+        for name, user_model in models:
             try:
                 answers += identify(
                     columns,
@@ -191,16 +192,24 @@ def run(args: argparse.Namespace) -> int:
 
 def _models(names: list[str] | None) -> list[tuple[str, Any]]:
     from host.sysid.coefficients.model import is_coefficient_model
+    from host.sysid.errors import IdentificationError
+    from host.sysid.flight.column_map import like
+    from host.sysid.flight.linear import AXIS_OF
     from host.sysid.models.model_file import read_model
 
     result: list[tuple[str, Any]] = []
     for name in names or ["longitudinal", "lateral"]:
         if name == "coefficients" or is_coefficient_model(Path(name)):
             continue
-        if name.endswith(".toml"):
+        if name in AXIS_OF:
+            result.append((name, None))
+        elif Path(name).exists() or name.lower().endswith(".toml"):
             result.append((name, read_model(Path(name))))
         else:
-            result.append((name, None))
+            raise IdentificationError(
+                f"no model '{name}'{like(name, tuple(AXIS_OF))}; there are {', '.join(AXIS_OF)},"
+                " coefficients, or a TOML file"
+            )
     return result
 
 
@@ -304,7 +313,8 @@ def _write(
             path = args.save_model
             if number:
                 path = path.with_name(f"{path.stem}_{answer.template}{path.suffix}")
-            path.write_text(model_text(answer.model, answer.result, answer.trim))
+            text = model_text(answer.model, answer.result, answer.trim)
+            path.write_text(text, encoding="utf-8")
 
 
 def _write_aircraft(

@@ -71,7 +71,7 @@ def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
     for name in lines:
         if name not in known:
             raise IdentificationError(
-                f"{path}: unknown column {name}{_like(name, known)}; ours are {', '.join(known)}"
+                f"{path}: unknown column {name}{like(name, known)}; ours are {', '.join(known)}"
             )
     return {name: _line(f"{path}: {name}", name, line) for name, line in lines.items()}
 
@@ -128,7 +128,7 @@ def mapped(
         if line.foreign not in raw:
             raise IdentificationError(
                 f"{path}: {name}: the data have no column '{line.foreign}'"
-                f"{_like(line.foreign, tuple(raw))}; {listed(raw, unusable)}"
+                f"{like(line.foreign, tuple(raw))}; {listed(raw, unusable)}"
             )
         result[name] = raw[line.foreign] * line.gain + line.offset
     return result
@@ -142,7 +142,8 @@ def listed(raw: Mapping[str, Array], unusable: Mapping[str, str]) -> str:
     return words + "".join(f"; {name} is {why}" for name, why in list(unusable.items())[:5])
 
 
-def _like(name: str, known: Sequence[str]) -> str:
+def like(name: str, known: Sequence[str]) -> str:
+    """Return in brackets which of the known names may have been meant; empty if none."""
     lower = {k.lower(): k for k in known}
     near = difflib.get_close_matches(name.lower(), lower, n=1, cutoff=0.6)
     return f" (did you mean {lower[near[0]]}?)" if near else ""

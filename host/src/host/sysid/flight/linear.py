@@ -31,6 +31,7 @@ from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import VANES, fit_with_gust
 from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.flight.carried import carried, moved_by
+from host.sysid.flight.column_map import like
 from host.sysid.flight.finder import Found, Grade, find, grade
 from host.sysid.models.diagnostics import (
     Collinearity,
@@ -333,8 +334,9 @@ def _without_attitude(
 def _cut(columns: Mapping[str, Array], model: LinearModel, item: Found) -> Maneuver:
     missing = [c for c in (*model.inputs, *model.outputs) if c not in columns]
     if missing:
+        meant = like(missing[0], tuple(columns))
         raise IdentificationError(
-            f"model {model.name} needs {', '.join(missing)}, which the data do not have"
+            f"model {model.name} needs {', '.join(missing)}{meant}, which the data do not have"
         )
     cut = _inside(columns, item)
     return Maneuver(

@@ -26,14 +26,17 @@ gain = -1.0
 ```
 
 An entry is a number, a parameter, ``gain*parameter`` or a sum of those; parameters without a line
-of their own start at zero.
+of their own start at zero. Left out, `initial_states` are all, `state_biases` those of rows with
+a parameter, `output_biases` those of outputs that are no state: records hold total quantities, and
+without a constant of its own the trim would pass for a derivative. An empty list frees none.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import cast
 
@@ -46,25 +49,13 @@ from host.sysid.models.result import FitResult
 from host.sysid.models.templates import Trim
 
 _PIECE = re.compile(
-    r"\s*(?P<sign>[+-]?)\s*(?:(?P<gain>[0-9.]+(?:[eE][+-]?\d+)?)(?:\s*\*\s*(?P<scaled>[A-Za-z_]\w*))?"
+    r"\s*(?P<sign>[+-]?)\s*(?:(?P<gain>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s*\*\s*(?P<scaled>[A-Za-z_]\w*))?"
     r"|(?P<name>[A-Za-z_]\w*))\s*"
 )
 KEYS = {
-    "name",
-    "states",
-    "inputs",
-    "outputs",
-    "hold",
-    "state_biases",
-    "output_biases",
-    "initial_states",
-    "parameters",
-    "delays",
-    "levers",
-    "fit",
-    "trim",
-    *MATRICES,
-}
+    "name", "states", "inputs", "outputs", "hold", "state_biases", "output_biases",
+    "initial_states", "parameters", "delays", "levers", "fit", "trim", *MATRICES,
+}  # fmt: skip
 
 
 def read_model(path: Path) -> LinearModel:
@@ -128,7 +119,9 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         fixed[label], found = _matrix(document.get(label), label, shape, signals, source)
         terms += found
     levers = _levers(document.get("levers", []), source)
+    _constants(document, signals, terms)
     used = list(dict.fromkeys([t.parameter for t in terms] + [x.parameter for x in levers]))
+    parameters = _parameters(document.get("parameters", {}), used, source)
     return LinearModel(
         name=str(document.get("name", Path(source).stem)),
         states=signals["states"],
@@ -139,11 +132,11 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         C=fixed["C"],
         D=fixed["D"],
         terms=tuple(terms),
-        parameters=_parameters(document.get("parameters", {}), used, source),
+        parameters=parameters,
         state_biases=signals["state_biases"],
         output_biases=signals["output_biases"],
         initial_states=signals["initial_states"],
-        delays=_delays(document.get("delays", []), source),
+        delays=_delays(document.get("delays", []), used, source),
         hold=str(document.get("hold", "foh")),
         levers=levers,
     )
@@ -191,9 +184,9 @@ def parse_entry(entry: object, where: str) -> tuple[float, list[tuple[str, float
     if isinstance(entry, bool) or not isinstance(entry, int | float | str):
         raise IdentificationError(f"{where}: {entry!r}, expected a number or a sum of parameters")
     if not isinstance(entry, str):
-        return float(entry), []
+        return _number(entry, where), []
     constant, pieces, position = 0.0, [], 0
-    while position < len(entry):
+    while position < max(len(entry), 1):
         found = _PIECE.match(entry, position)
         if found is None or found.end() == position or (position > 0 and not found["sign"]):
             raise IdentificationError(
@@ -210,50 +203,107 @@ def parse_entry(entry: object, where: str) -> tuple[float, list[tuple[str, float
     return constant, pieces
 
 
+def _constants(
+    document: Mapping[str, object], signals: dict[str, tuple[str, ...]], terms: list[Term]
+) -> None:
+    """Free the constants of keys that are left out."""
+    free = {term.row for term in terms if term.matrix in "AB"}
+    usual = {
+        "initial_states": signals["states"],
+        "state_biases": tuple(s for k, s in enumerate(signals["states"]) if k in free),
+        "output_biases": tuple(y for y in signals["outputs"] if y not in signals["states"]),
+    }
+    signals.update({key: names for key, names in usual.items() if key not in document})
+
+
+def _table(value: object, allowed: Collection[str], where: str) -> dict[str, object]:
+    if not isinstance(value, dict):
+        raise IdentificationError(f"{where}: {value!r}, expected a table of {', '.join(allowed)}")
+    strangers = sorted(set(value) - set(allowed))
+    if strangers:
+        raise IdentificationError(
+            f"{where}: unknown key {', '.join(strangers)}; known are {', '.join(allowed)}"
+        )
+    return value
+
+
+def _number(value: object, where: str, *, positive: bool = False) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise IdentificationError(f"{where} is {value!r}, expected a number")
+    if positive and value <= 0.0:
+        raise IdentificationError(f"{where} is {value!r}, expected a number above zero")
+    return float(value)
+
+
 def _parameters(value: object, used: list[str], source: str) -> tuple[Parameter, ...]:
     if not isinstance(value, dict):
         raise IdentificationError(f"{source}: [parameters] must be a table")
     unknown = sorted(set(value) - set(used))
     if unknown:
-        raise IdentificationError(f"{source}: parameter {', '.join(unknown)} enters no matrix")
-    result = []
-    for name in used:
-        settings = value.get(name, {})
-        if isinstance(settings, int | float):
-            settings = {"start": settings}
-        allowed = {"start", "lower", "upper", "prior_sd"}
-        if not isinstance(settings, dict) or set(settings) - allowed:
-            raise IdentificationError(
-                f"{source}: parameter {name}: expected start, lower, upper or prior_sd"
-            )
-        numbers = {k: float(v) for k, v in settings.items()}
-        result.append(Parameter(name, **numbers))
-    return tuple(result)
+        raise IdentificationError(
+            f"{source}: parameter {', '.join(unknown)} enters no matrix; those that do are"
+            f" {', '.join(used)}"
+        )
+    return tuple(_parameter(name, value.get(name, {}), source) for name in used)
 
 
-def _delays(value: object, source: str) -> tuple[DelayGroup, ...]:
+def _parameter(name: str, value: object, source: str) -> Parameter:
+    where = f"{source}: parameter {name}"
+    if not isinstance(value, dict):
+        return Parameter(name, _number(value, where))
+    settings = _table(value, ("start", "lower", "upper", "prior_sd"), where)
+    numbers = {
+        k: _number(v, f"{where}: {k}", positive=k == "prior_sd") for k, v in settings.items()
+    }
+    lower, upper = numbers.get("lower", -np.inf), numbers.get("upper", np.inf)
+    if not lower < upper:
+        raise IdentificationError(f"{where}: lower {lower:g} is not below upper {upper:g}")
+    start = numbers.setdefault("start", min(max(0.0, lower), upper))
+    if not lower <= start <= upper:
+        raise IdentificationError(
+            f"{where}: start {start:g} is not between lower {lower:g} and upper {upper:g}"
+        )
+    return Parameter(name, **numbers)
+
+
+def _delays(value: object, used: list[str], source: str) -> tuple[DelayGroup, ...]:
     if not isinstance(value, list):
         raise IdentificationError(f"{source}: [[delays]] must be a list of tables")
-    result = []
+    result: list[DelayGroup] = []
     for item in value:
-        if not isinstance(item, dict) or "name" not in item or "outputs" not in item:
+        table = _table(item, ("name", "outputs", "prior_sd_s", "limit_s"), f"{source}: a delay")
+        name = table.get("name")
+        if not isinstance(name, str):
             raise IdentificationError(f"{source}: a delay needs name and outputs")
-        numbers = {k: float(item[k]) for k in ("prior_sd_s", "limit_s") if k in item}
-        result.append(DelayGroup(str(item["name"]), tuple(item["outputs"]), **numbers))
+        where = f"{source}: delay {name}"
+        outputs = _names(table, "outputs", where, needed=True)
+        if name in used or name in (d.name for d in result):
+            raise IdentificationError(f"{where}: another parameter has this name")
+        twice = [y for y in outputs if any(y in d.outputs for d in result)]
+        if twice:
+            raise IdentificationError(f"{where}: {twice[0]} has a delay already")
+        numbers = {
+            k: _number(table[k], f"{where}: {k}", positive=True)
+            for k in ("prior_sd_s", "limit_s")
+            if k in table
+        }
+        result.append(DelayGroup(name, outputs, **numbers))
     return tuple(result)
 
 
 def _levers(value: object, source: str) -> tuple[Lever, ...]:
     needed = ("output", "state", "parameter")
-    if not isinstance(value, list) or any(
-        not isinstance(item, dict) or any(not isinstance(item.get(k), str) for k in needed)
-        for item in value
-    ):
-        raise IdentificationError(f"{source}: a lever needs output, state and parameter")
-    return tuple(
-        Lever(item["output"], item["state"], item["parameter"], float(item.get("gain", 1.0)))
-        for item in value
-    )
+    if not isinstance(value, list):
+        raise IdentificationError(f"{source}: [[levers]] must be a list of tables")
+    result = []
+    for item in value:
+        table = _table(item, (*needed, "gain"), f"{source}: a lever")
+        names = [str(table[k]) for k in needed if isinstance(table.get(k), str)]
+        if len(names) < len(needed):
+            raise IdentificationError(f"{source}: a lever needs output, state and parameter")
+        gain = _number(table.get("gain", 1.0), f"{source}: lever on {names[0]}: gain")
+        result.append(Lever(names[0], names[1], names[2], gain))
+    return tuple(result)
 
 
 def model_text(
@@ -270,7 +320,7 @@ def model_text(
     trim : Trim, optional
         Gives a [trim] table: what the model is about, for flying it again.
     """
-    lines = [f'name = "{model.name}"']
+    lines = [f"name = {_text(model.name)}"]
     for key in ("states", "inputs", "outputs"):
         lines.append(f"{key} = {_list(getattr(model, key))}")
     lines.append(f'hold = "{model.hold}"')
@@ -291,13 +341,13 @@ def model_text(
             value = getattr(parameter, key)
             if np.isfinite(value):
                 parts.append(f"{key} = {value!r}")
-        lines.append(f"{parameter.name} = {{ {', '.join(parts)} }}")
+        lines.append(f"{_text(parameter.name)} = {{ {', '.join(parts)} }}")
     if result is not None:
         lines.append("[fit]")
         lines.append(f'method = "{result.method}"')
         half = result.half_width()
         for k, name in enumerate(result.names):
-            lines.append(f'"{name}" = [{float(result.estimate[k])!r}, {float(half[k])!r}]')
+            lines.append(f"{_text(name)} = [{float(result.estimate[k])!r}, {float(half[k])!r}]")
     if trim is not None:
         lines.append("[trim]")
         for key in ("airspeed_mps", "alpha_rad", "theta_rad"):
@@ -305,7 +355,7 @@ def model_text(
     for delay in model.delays:
         lines += [
             "[[delays]]",
-            f'name = "{delay.name}"',
+            f"name = {_text(delay.name)}",
             f"outputs = {_list(delay.outputs)}",
             f"prior_sd_s = {delay.prior_sd_s!r}",
             f"limit_s = {delay.limit_s!r}",
@@ -321,8 +371,12 @@ def model_text(
     return "\n".join(lines) + "\n"
 
 
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)  # what JSON escapes, TOML does the same way
+
+
 def _list(names: tuple[str, ...]) -> str:
-    return "[" + ", ".join(f'"{name}"' for name in names) + "]"
+    return "[" + ", ".join(_text(name) for name in names) + "]"
 
 
 def _entry(model: LinearModel, label: str, row: int, column: int) -> str:
