@@ -3,8 +3,10 @@
 import errno
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -381,3 +383,28 @@ def test_python_m_host() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "file id" in done.stdout
+
+
+@pytest.mark.parametrize("kind", ["KeyboardInterrupt", "ValueError"])
+def test_an_interrupt_that_comes_as_another_error_is_one(kind: str) -> None:
+    """Compiled extensions turn the exception of Ctrl-C into one of their own."""
+    program = (
+        "import sys, time, host.cli as cli\n"
+        "def stuck(_):\n"
+        "    print('ready', flush=True)\n"
+        "    try:\n"
+        "        time.sleep(20)\n"
+        "    except KeyboardInterrupt:\n"
+        f"        raise {kind}('matrix') from None\n"
+        "cli._run = stuck\n"
+        "sys.exit(cli.main(['identify']))\n"
+    )
+    child = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "ready\n"
+    time.sleep(0.05)
+    child.send_signal(signal.SIGINT)
+    _, said = child.communicate(timeout=20)
+    assert (child.returncode, said.strip()) == (130, "host: interrupted")

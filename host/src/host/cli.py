@@ -7,9 +7,12 @@ import contextlib
 import importlib
 import json
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from types import FrameType
 
 from host.errors import ExitCode, HostError
 
@@ -41,31 +44,64 @@ def main(argv: Sequence[str] | None = None) -> int:
         Arguments without the program's name; those of the process without it.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    seen: list[int] = []
     try:
-        return _run(arguments)
-    except HostError as error:
-        return _end(arguments, str(error), error.exit_code)
+        with _interrupts_noted(seen):
+            return _run(arguments)
     except KeyboardInterrupt:
-        print("\nhost: interrupted", file=sys.stderr)
-        return int(ExitCode.INTERRUPTED)
-    except BrokenPipeError:
+        return _interrupted()
+    except Exception as error:
+        # Compiled extensions hand Ctrl-C on as an error of their own.
+        return _interrupted() if seen else _failed(arguments, error)
+
+
+@contextlib.contextmanager
+def _interrupts_noted(seen: list[int]) -> Iterator[None]:
+    """Append to `seen` whenever Ctrl-C comes, and let it do what it does."""
+
+    def note(number: int, frame: FrameType | None) -> None:
+        seen.append(number)
+        signal.default_int_handler(number, frame)
+
+    ours = (
+        threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    )
+    if ours:
+        signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        if ours:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _interrupted() -> int:
+    print("\nhost: interrupted", file=sys.stderr)
+    return int(ExitCode.INTERRUPTED)
+
+
+def _failed(arguments: list[str], error: Exception) -> int:
+    """Say in one line what went wrong; return the exit code."""
+    if isinstance(error, HostError):
+        return _end(arguments, str(error), error.exit_code)
+    if isinstance(error, BrokenPipeError):
         # The reader (`head`, a pager) left: nothing more to say, and nothing to flush at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return int(ExitCode.OK)
-    except OSError as error:
+    if isinstance(error, OSError):
         where = f"{error.filename}: " if error.filename else ""
         return _end(arguments, f"{where}{error.strerror or error}", ExitCode.USAGE)
-    except MemoryError:
+    if isinstance(error, MemoryError):
         text = "out of memory; try --to parquet, which works in pieces"
         return _end(arguments, text, ExitCode.INTERNAL)
-    except Exception as error:
-        if os.environ.get("HOST_TRACEBACK"):
-            raise
-        text = (
-            f"internal error: {type(error).__name__}: {error}"
-            " (HOST_TRACEBACK=1 shows where; please report it)"
-        )
-        return _end(arguments, text, ExitCode.INTERNAL)
+    if os.environ.get("HOST_TRACEBACK"):
+        raise error
+    text = (
+        f"internal error: {type(error).__name__}: {error}"
+        " (HOST_TRACEBACK=1 shows where; please report it)"
+    )
+    return _end(arguments, text, ExitCode.INTERNAL)
 
 
 def _end(arguments: list[str], text: str, code: ExitCode) -> int:
