@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from host.sysid.aircraft.airframe import CoefficientTable
+    from host.sysid.answer.save import Places
     from host.sysid.coefficients.flight import CoefficientAnswer
     from host.sysid.coefficients.model import CoefficientModel
     from host.sysid.compatibility.reconstruction import Compatibility
@@ -77,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
+    from host.sysid.answer.save import check, write
     from host.sysid.answer.verdict import coefficient_lines, coefficient_words, model_lines, words
     from host.sysid.compatibility.reconstruction import document
     from host.sysid.compatibility.reconstruction import words as agreement_words
@@ -95,6 +96,8 @@ def run(args: argparse.Namespace) -> int:
     if unknown:
         raise IdentificationError(f"unknown method {', '.join(unknown)}; known: {', '.join(known)}")
     models = _models(args.model)
+    places = _places(args)
+    check(places)
     columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
     airframe = None
     if args.aircraft:
@@ -142,29 +145,23 @@ def run(args: argparse.Namespace) -> int:
         raise IdentificationError("; ".join([*unfit, *notes]))
     notes += unfit
     tables = list(direct.tables) if direct else [a.table for a in answers]
-    _write(args, answers, tables, direct)
-    if direct and args.plots:
-        from host.sysid.answer.pictures import draw_coefficients
-
-        draw_coefficients(direct, columns, args.plots, truth)
     if args.json:
-        from host.sysid.answer.json import answer_document, coefficient_document
+        from host.sysid.answer.json import answer_document, coefficient_document, json_text
 
         documents = [answer_document(a, words([a], [])) for a in answers]
         if direct:
             documents.append(coefficient_document(direct, coefficient_words(direct)))
-        print(
-            json.dumps(
-                {
-                    "source": str(args.source),
-                    "notes": notes,
-                    "data_compatibility": document(agreement) if agreement else None,
-                    "answers": documents,
-                },
-                indent=2,
-                allow_nan=True,
-            )
+        text = json_text(
+            {
+                "source": str(args.source),
+                "notes": notes,
+                "data_compatibility": document(agreement) if agreement else None,
+                "answers": documents,
+            }
         )
+        # What was written is said before the answer, so that no answer follows an error.
+        _say(write(places, answers, direct, columns, truth))
+        print(text)
         return int(ExitCode.OK)
     lines = words(answers, notes)
     if direct:
@@ -186,8 +183,40 @@ def run(args: argparse.Namespace) -> int:
         from host.sysid.answer.truth import truth_lines
 
         lines += ["", *truth_lines(tables, truth)]
+    try:
+        written = write(places, answers, direct, columns, truth)
+    except IdentificationError:
+        print("\n".join(lines))  # the answer is not lost with its file
+        raise
     print("\n".join(lines))
+    _say(written)
     return int(ExitCode.OK)
+
+
+def _places(args: argparse.Namespace) -> Places:
+    """Return where files go, and every file that the answer is made from."""
+    from host.sysid.answer.save import Places
+
+    given = [args.source, args.map, args.calibration, args.truth, args.prior]
+    given += [Path(name) for name in (args.aircraft, *(args.model or ())) if name]
+    return Places(
+        plots=args.plots,
+        mat=args.mat,
+        model=args.save_model,
+        aircraft=args.save_aircraft,
+        source=args.aircraft,
+        given=tuple(path for path in given if path is not None),
+    )
+
+
+def _say(written: list[Path]) -> None:
+    """Say what was written, pictures by their number."""
+    pictures = [path for path in written if path.suffix == ".svg"]
+    parts = [str(path) for path in written if path not in pictures]
+    if pictures:
+        parts.append(f"{len(pictures)} pictures in {pictures[0].parent}")
+    if parts:
+        print(f"wrote {', '.join(parts)}", file=sys.stderr)
 
 
 def _models(names: list[str] | None) -> list[tuple[str, Any]]:
@@ -284,90 +313,3 @@ def _side_by_side(answers: list[Answer]) -> list[str]:
                     line += f"{'-':>30s}"
             lines.append(line)
     return lines
-
-
-def _write(
-    args: argparse.Namespace,
-    answers: list[Answer],
-    tables: list[CoefficientTable],
-    direct: CoefficientAnswer | None,
-) -> None:
-    if args.plots:
-        from host.sysid.answer.pictures import draw_all
-
-        draw_all(answers, args.plots)
-    if args.mat:
-        _write_mat(args.mat, answers, direct)
-    for path in (args.save_aircraft, args.save_model):
-        # Coefficients alone are an aircraft, not a linear model.
-        whole = path is args.save_aircraft or not answers
-        if path and path.suffix != ".mat" and (whole or path.suffix == ".xml"):
-            _write_aircraft(args, path, tables, direct)
-    if args.save_model and args.save_model.suffix != ".xml":
-        from host.sysid.models.model_file import model_text
-
-        if args.save_model.suffix == ".mat":
-            _write_mat(args.save_model, answers, direct)
-            return
-        for number, answer in enumerate(answers):
-            path = args.save_model
-            if number:
-                path = path.with_name(f"{path.stem}_{answer.template}{path.suffix}")
-            text = model_text(answer.model, answer.result, answer.trim)
-            path.write_text(text, encoding="utf-8")
-
-
-def _write_aircraft(
-    args: argparse.Namespace,
-    path: Path,
-    tables: list[CoefficientTable],
-    direct: CoefficientAnswer | None,
-) -> None:
-    from host.sysid.answer.aircraft_export import save_aircraft
-    from host.sysid.errors import IdentificationError
-
-    if not args.aircraft:
-        raise IdentificationError(f"{path}: an aircraft needs mass and geometry; give --aircraft")
-    save_aircraft(path, tables, args.aircraft, direct.fit.flight if direct else None)
-
-
-def _write_mat(path: Path, answers: list[Answer], direct: CoefficientAnswer | None) -> None:
-    import numpy as np
-    from scipy import io
-
-    content: dict[str, Any] = {}
-    for answer in answers:
-        A, B, C, D = answer.result.matrices()
-        label = answer.template.replace("-", "_")
-        content[label] = {
-            "A": A,
-            "B": B,
-            "C": C,
-            "D": D,
-            "names": np.array(answer.result.names, dtype=object),
-            "estimate": answer.result.estimate,
-            "covariance": answer.result.covariance,
-            "half_width": answer.result.half_width(),
-            "states": np.array(answer.model.states, dtype=object),
-            "inputs": np.array(answer.model.inputs, dtype=object),
-            "outputs": np.array(answer.model.outputs, dtype=object),
-            "method": answer.method,
-        }
-    if direct:
-        derivatives = direct.fit.derivatives
-        content["coefficients"] = {
-            "names": np.array([d.name for d in derivatives], dtype=object),
-            "estimate": np.array([d.value for d in derivatives]),
-            "half_width": np.array([d.half_width for d in derivatives]),
-            "covariance": direct.fit.covariance[: len(derivatives), : len(derivatives)],
-        }
-        for name, system in direct.systems.items():
-            content[f"coefficients_{name}"] = {
-                "A": system.A,
-                "B": system.B,
-                "A_half_width": system.A_half,
-                "B_half_width": system.B_half,
-                "states": np.array(system.states, dtype=object),
-                "inputs": np.array(system.inputs, dtype=object),
-            }
-    io.savemat(path, content)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 from pathlib import Path
 from typing import Any
@@ -28,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
-    from host.sysid.answer.json import maneuver_document
+    from host.sysid.answer.json import json_text, maneuver_document
     from host.sysid.answer.verdict import maneuver_lines
     from host.sysid.flight.linear import maneuvers_of
     from host.sysid.flight.tables import read_columns
@@ -36,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
     graded = maneuvers_of(columns)
     if args.json:
-        print(json.dumps({"notes": notes, "maneuvers": maneuver_document(graded)}, indent=2))
+        print(json_text({"notes": notes, "maneuvers": maneuver_document(graded)}))
     else:
         print("\n".join([*(f"note: {n}" for n in notes), *maneuver_lines(graded)]))
     return int(ExitCode.OK)

@@ -12,17 +12,25 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
 from host.compiled import Array
 from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
+from host.sysid.answer.files import whole
 from host.sysid.coefficients.answer import Flight
 from host.sysid.errors import IdentificationError
 
 # Names of the aircraft file for the names of the answer.
 AXES = {"CL": "cl", "Cm": "cm", "CY": "cy", "Cl": "croll", "Cn": "cn"}
 CONTROLS = {"de": "elevator", "da": "aileron", "dr": "rudder"}
+CONVENTIONS = (
+    "Coefficients per radian, moments at the CG in body axes, rates over 2V/b and 2V/c.",
+    "Surfaces are the inputs: fcs/elevator-pos-rad, trailing edge down; fcs/left-aileron-pos-rad,",
+    "(left - right)/2, each trailing edge down; fcs/rudder-pos-rad, trailing edge left. Motor:",
+    "fcs/throttle-shaft, 0 to 1.",
+)
 ROTOR_RADPS = 500.0  # where JSBSim's rotor starts; it finds its own speed within a second
 
 
@@ -155,5 +163,23 @@ def save_aircraft(
         file.write_text(tomlout.dumps(document), encoding="utf-8")
         loaded = aircraft.load(file)  # whatever is written can be read
         text = file.read_text(encoding="utf-8")
-    path.write_text(aircraft_xml(loaded, ROTOR_RADPS) if path.suffix == ".xml" else text)
+    if path.suffix.lower() == ".xml":
+        text = _with_header(aircraft_xml(loaded, ROTOR_RADPS), document)
+    with whole(path) as part:
+        part.write_text(text, encoding="utf-8")
     return replaced
+
+
+def _with_header(xml: str, document: dict[str, Any]) -> str:
+    """Return JSBSim's XML in lines, with units, signs and intervals at its head."""
+    root = ElementTree.fromstring(xml)
+    header = ElementTree.Element("fileheader")
+    root.insert(0, header)
+    origins = {**document["aerodynamics"]["sources"]}
+    found = [f"{key}: {origin}" for key, origin in origins.items() if "+-" in origin]
+    ElementTree.SubElement(header, "author").text = "host identify"
+    ElementTree.SubElement(header, "description").text = "\n".join(
+        [document["title"], *CONVENTIONS, *found, ""]
+    )
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"

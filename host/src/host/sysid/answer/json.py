@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from host.sysid.answer.units import parameter_unit
 from host.sysid.coefficients.answer import METHOD
 from host.sysid.compatibility.corrections import correction_document
 from host.sysid.flight.finder import Found, Grade
@@ -16,6 +18,19 @@ if TYPE_CHECKING:
     from host.sysid.coefficients.flight import CoefficientAnswer
     from host.sysid.coefficients.joint import Prediction
     from host.sysid.numerics.repeats import Repeats
+
+
+def json_text(document: Mapping[str, Any]) -> str:
+    """Return a document as JSON; what is no finite number is null, which JSON can say."""
+    return json.dumps(_plain(document), indent=2, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def maneuver_document(graded: Sequence[tuple[Found, Grade]]) -> list[dict[str, Any]]:
@@ -45,7 +60,7 @@ def mode_document(modes: Sequence[Mode]) -> list[dict[str, Any]]:
             "name": m.name,
             "eigenvalue": [m.eigenvalue.real, m.eigenvalue.imag],
             "frequency_radps": m.frequency_radps,
-            "frequency_half_width": 1.96 * m.frequency_sd_radps,
+            "frequency_half_width_radps": 1.96 * m.frequency_sd_radps,
             "damping": m.damping,
             "damping_half_width": 1.96 * m.damping_sd,
         }
@@ -75,7 +90,11 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
         "C": C.tolist(),
         "D": D.tolist(),
         "parameters": {
-            name: {"value": float(result.estimate[k]), "half_width": float(half[k])}
+            name: {
+                "value": float(result.estimate[k]),
+                "half_width": float(half[k]),
+                "unit": parameter_unit(answer.model, name),
+            }
             for k, name in enumerate(result.names)
         },
         "delays_s": {
@@ -112,7 +131,14 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
             }
             for kind, fits in (("fitted", answer.fits), ("held_out", answer.validation))
         },
+        "residual_kind": result.residual_kind,
+        "collinear": [
+            {"names": [a, b], "correlation": value} for a, b, value in answer.together.pairs
+        ],
+        "information_condition": answer.together.condition,
+        "constant_inputs": list(answer.still),
         "maneuvers": [m.name for m in answer.maneuvers],
+        "held_out": [found_name(f) for f in answer.held_out],
     }
 
 
@@ -187,7 +213,10 @@ def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dic
         "fit": {"one_step": {n: {"nrmse": x.nrmse} for n, x in answer.fit.traces.items()}},
         "unseen": _prediction_document(answer.fit.prediction),
         "repeats": _repeats_document(answer.fit.repeats),
-        "maneuvers": [
-            f"{f.kind} on {f.axis.split('_')[0]} at {f.start_s:.1f} s" for f in answer.used
-        ],
+        "maneuvers": [found_name(f) for f in answer.used],
     }
+
+
+def found_name(item: Found) -> str:
+    """Return what a maneuver is called in an answer."""
+    return f"{item.kind} on {item.axis.split('_')[0]} at {item.start_s:.1f} s"

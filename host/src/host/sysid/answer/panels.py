@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.compiled import Array
+from host.sysid.answer.files import whole
 from host.sysid.errors import IdentificationError
 
 if TYPE_CHECKING:
@@ -231,8 +232,8 @@ def _figure(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise IdentificationError("pictures need the extra: pip install './host[plot]'") from error
-    path.parent.mkdir(parents=True, exist_ok=True)
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasSVG(figure)
     yield figure
-    figure.savefig(path)
+    with whole(path) as part:
+        figure.savefig(part)

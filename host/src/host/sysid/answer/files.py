@@ -1,0 +1,60 @@
+"""Files of an answer: whole under their own name or not there, and errors that name them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from host.sysid.errors import IdentificationError
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Give a name beside `path`; what is written there gets its own name once it is whole.
+
+    Folders that are missing are made. A device or a pipe has nothing beside it and is written to
+    as it is.
+
+    Parameters
+    ----------
+    path : Path
+        What the user asked for; a file there before is replaced.
+
+    Raises
+    ------
+    IdentificationError
+        If it cannot be written, or there is no room.
+    """
+    plain = path.is_file() or not path.exists()
+    part = path.with_name(f"{path.stem}.part{path.suffix}") if plain else path
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield part
+        if plain:
+            part.replace(path)
+    except BrokenPipeError:  # the reader of our output left; not an error
+        raise
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else error
+        raise IdentificationError(
+            f"{path}: cannot be written: {why}; make room or name another place"
+        ) from error
+    finally:
+        if plain:
+            with suppress(OSError):  # whatever is wrong with the place is said already
+                part.unlink(missing_ok=True)
+
+
+def refuse_place(option: str, path: Path, *, folder: bool) -> None:
+    """Raise IdentificationError where a file, or a folder for files, cannot be at a place."""
+    if folder and path.exists() and not path.is_dir():
+        raise IdentificationError(f"{option} {path}: a file; name a folder")
+    if not folder and path.is_dir():
+        raise IdentificationError(f"{option} {path}: a folder; name a file in it")
+    above = next(p for p in (path, *path.absolute().parents) if p.exists())
+    if above != path and not above.is_dir():
+        raise IdentificationError(f"{option} {path}: {above} is a file, no folder can be in it")
+    if not os.access(above, os.W_OK):
+        raise IdentificationError(f"{option} {path}: no permission to write to {above}")

@@ -1,0 +1,169 @@
+"""The answer for MATLAB and its kin: a structure per model, histories in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.answer.files import whole
+from host.sysid.answer.units import parameter_unit
+from host.sysid.compatibility.signals import THIN_HZ
+from host.sysid.flight.linear import Answer
+from host.sysid.models.modes import Mode
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.flight import CoefficientAnswer
+
+LONGEST = 31  # characters of a name in a MAT file that every reader takes
+
+
+def write_mat(path: Path, answers: Sequence[Answer], direct: CoefficientAnswer | None) -> None:
+    """Write the answers, a structure each: matrices, estimates, covariance, modes, histories.
+
+    Parameters
+    ----------
+    path : Path
+    answers : sequence of Answer
+        Of one model by several methods the method is in the structure's name.
+    direct : CoefficientAnswer or None
+        Becomes `coefficients` and its linear motion `coefficients_longitudinal`, `_lateral`.
+    """
+    from scipy import io
+
+    content: dict[str, Any] = {}
+    for answer, label in zip(answers, labels(answers), strict=True):
+        content[mat_name(label, content)] = _linear(answer)
+    if direct:
+        content["coefficients"] = _coefficients(direct)
+        for name, system in direct.systems.items():
+            content[f"coefficients_{name}"] = {
+                "A": system.A,
+                "B": system.B,
+                "A_half_width": system.A_half,
+                "B_half_width": system.B_half,
+                "states": _cells(system.states),
+                "inputs": _cells(system.inputs),
+            }
+    with whole(path) as part:
+        io.savemat(str(part), content, appendmat=False)
+
+
+def labels(answers: Sequence[Answer]) -> list[str]:
+    """Return a name for each answer that no other has: template, and method where several."""
+    templates = [a.template for a in answers]
+    found: list[str] = []
+    for answer, template in zip(answers, templates, strict=True):
+        several = templates.count(template) > 1
+        label = f"{template}_{answer.method}" if several else template
+        again = found.count(label)  # two models of one name
+        found.append(f"{label}_{again + 1}" if again else label)
+    return found
+
+
+def mat_name(label: str, taken: Iterable[str]) -> str:
+    """Return a label as MATLAB takes it for a variable, other than those taken."""
+    plain = re.sub(r"\W", "_", label, flags=re.ASCII)
+    plain = plain if re.match(r"[A-Za-z]", plain) else f"model_{plain}"
+    name, number = plain[:LONGEST], 1
+    while name in taken:
+        number += 1
+        name = f"{plain[: LONGEST - len(str(number)) - 1]}_{number}"
+    return name
+
+
+def _linear(answer: Answer) -> dict[str, Any]:
+    A, B, C, D = answer.result.matrices()
+    result = answer.result
+    return {
+        "A": A,
+        "B": B,
+        "C": C,
+        "D": D,
+        "names": _cells(result.names),
+        "units": _cells(parameter_unit(answer.model, name) for name in result.names),
+        "estimate": result.estimate,
+        "covariance": result.covariance,
+        "half_width": result.half_width(),
+        "states": _cells(answer.model.states),
+        "inputs": _cells(answer.model.inputs),
+        "outputs": _cells(answer.model.outputs),
+        "method": answer.method,
+        "airspeed_mps": answer.condition.airspeed_mps,
+        "qbar_pa": answer.condition.qbar_pa,
+        "alpha_rad": answer.trim.alpha_rad,
+        "theta_rad": answer.trim.theta_rad,
+        "refused": _cells(r.name for r in answer.refused),
+        "delays": _pairs(answer.delays),
+        "coefficients": _pairs({c.name: (c.value, c.half_width) for c in answer.coefficients}),
+        "modes": _modes(answer.modes),
+        "residual_kind": result.residual_kind,
+        "maneuvers": _cells(
+            {
+                "name": maneuver.name,
+                "t_s": maneuver.time_s,
+                "input": maneuver.inputs,
+                "measured": maneuver.outputs,
+                "fitted": fitted,
+                "residual": residual,
+            }
+            for maneuver, fitted, residual in zip(
+                answer.maneuvers, result.fitted, result.residuals, strict=True
+            )
+        ),
+    }
+
+
+def _coefficients(answer: CoefficientAnswer) -> dict[str, Any]:
+    found, flight = answer.fit.derivatives, answer.fit.flight
+    traces = answer.fit.traces
+    return {
+        "names": _cells(d.name for d in found),
+        "estimate": np.array([d.value for d in found]),
+        "half_width": np.array([d.half_width for d in found]),
+        "flagged": np.array([d.flagged for d in found]),
+        "covariance": answer.fit.covariance[: len(found), : len(found)],
+        "airspeed_mps": flight.airspeed_mps,
+        "qbar_pa": flight.qbar_pa,
+        "alpha_rad": flight.alpha_rad,
+        "delays": _pairs(answer.delays),
+        "modes": _modes(answer.modes),
+        "histories": {
+            name: {
+                "t_s": np.arange(len(trace.model)) / THIN_HZ,
+                "measured": trace.measured,
+                "fitted": trace.model,
+            }
+            for name, trace in traces.items()
+        },
+    }
+
+
+def _pairs(values: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+    """Return a table of values with their 95 % half-widths."""
+    table: Array = np.array(list(values.values()), dtype=np.float64).reshape(-1, 2)
+    return {"names": _cells(values), "value": table[:, 0], "half_width": table[:, 1]}
+
+
+def _modes(modes: Sequence[Mode]) -> dict[str, Any]:
+    return {
+        "names": _cells(m.name for m in modes),
+        "eigenvalue": np.array([m.eigenvalue for m in modes]),
+        "frequency_radps": np.array([m.frequency_radps for m in modes]),
+        "frequency_half_width_radps": np.array([1.96 * m.frequency_sd_radps for m in modes]),
+        "damping": np.array([m.damping for m in modes]),
+        "damping_half_width": np.array([1.96 * m.damping_sd for m in modes]),
+    }
+
+
+def _cells(values: Iterable[Any]) -> Any:
+    """Return a cell array, a column even of equal lengths."""
+    listed = list(values)
+    cells = np.empty(len(listed), dtype=object)
+    for k, value in enumerate(listed):
+        cells[k] = value
+    return cells

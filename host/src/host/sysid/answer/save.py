@@ -1,0 +1,168 @@
+"""What an answer is written to: every place checked before the work, every file whole."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from host.compiled import Array
+from host.sysid.aircraft.airframe import CoefficientTable
+from host.sysid.answer.files import refuse_place, whole
+from host.sysid.answer.mat import labels, write_mat
+from host.sysid.errors import IdentificationError
+from host.sysid.flight.linear import Answer
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.flight import CoefficientAnswer
+
+ENDINGS = {
+    "--mat": (".mat",),
+    "--save-model": (".toml", ".mat", ".xml"),
+    "--save-aircraft": (".toml", ".xml"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where the user wants files, and the aircraft that the answer is made with.
+
+    `given` are the files the answer is made from, which no output may replace.
+    """
+
+    plots: Path | None
+    mat: Path | None
+    model: Path | None
+    aircraft: Path | None
+    source: str | None
+    given: tuple[Path, ...]
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """Every file asked for, by its option."""
+        asked = {"--mat": self.mat, "--save-model": self.model, "--save-aircraft": self.aircraft}
+        return {option: path for option, path in asked.items() if path is not None}
+
+
+def check(places: Places) -> None:
+    """Refuse what cannot be written while it costs nothing: before the flight is read.
+
+    Raises
+    ------
+    IdentificationError
+        A place that is none, an ending that says nothing, a file that would replace its own
+        source, an aircraft without what it is made of, pictures without matplotlib.
+    """
+    taken: dict[Path, str] = {}
+    for option, path in places.files.items():
+        known = ENDINGS[option]
+        if path.suffix.lower() not in known:
+            raise IdentificationError(
+                f"{option} {path}: ends in '{path.suffix}', expected {' or '.join(known)}"
+            )
+        refuse_place(option, path, folder=False)
+        if any(path.exists() and given.exists() and path.samefile(given) for given in places.given):
+            raise IdentificationError(
+                f"{option} {path} is what the answer is made from; name another file"
+            )
+        other = taken.setdefault(path.absolute(), option)
+        if other != option:
+            raise IdentificationError(f"{other} and {option} both name {path}; name two files")
+    made = [p for p in (places.model, places.aircraft) if p is not None]
+    whole_ones = [p for p in made if p is places.aircraft or p.suffix.lower() == ".xml"]
+    if whole_ones:
+        if not places.source:
+            raise IdentificationError(
+                f"{whole_ones[0]}: an aircraft needs mass and geometry; give --aircraft"
+            )
+        from host.twin.aircraft import file as aircraft
+
+        aircraft.load(places.source)  # one that was only measured has no tables to put answers in
+    if places.plots is not None:
+        refuse_place("--plots", places.plots, folder=True)
+        if importlib.util.find_spec("matplotlib") is None:
+            raise IdentificationError("pictures need the extra: pip install './host[plot]'")
+
+
+def write(
+    places: Places,
+    answers: Sequence[Answer],
+    direct: CoefficientAnswer | None,
+    columns: Mapping[str, Array],
+    truth: dict[str, Any] | None,
+) -> list[Path]:
+    """Write everything asked for and return the files.
+
+    Parameters
+    ----------
+    places : Places
+        Looked at by `check` before.
+    answers : sequence of Answer
+        Linear models.
+    direct : CoefficientAnswer or None
+        A direct fit of coefficients.
+    columns : mapping
+        The flight, whose surfaces give the spectrum of the inputs.
+    truth : dict or None
+        Of a simulated flight, for the pictures.
+
+    Raises
+    ------
+    IdentificationError
+        If a file cannot be written, or holds nothing that is known.
+    """
+    written: list[Path] = []
+    if places.mat is not None:
+        write_mat(places.mat, answers, direct)
+        written.append(places.mat)
+    tables = list(direct.tables) if direct else [a.table for a in answers]
+    for path in (places.aircraft, places.model):
+        # Coefficients alone are an aircraft, not a linear model.
+        plain = path is places.model and bool(answers)
+        if path is None or path.suffix.lower() == ".mat":
+            continue
+        if not plain or path.suffix.lower() == ".xml":
+            written.append(_write_aircraft(path, tables, places.source, direct))
+    if places.model is not None and places.model.suffix.lower() == ".mat":
+        write_mat(places.model, answers, direct)
+        written.append(places.model)
+    elif places.model is not None and places.model.suffix.lower() == ".toml":
+        written += _write_models(places.model, answers)
+    if places.plots is not None:
+        from host.sysid.answer.pictures import draw_all, draw_coefficients
+
+        written += draw_all(answers, places.plots)
+        if direct:
+            written += draw_coefficients(direct, columns, places.plots, truth)
+    return written
+
+
+def _write_aircraft(
+    path: Path,
+    tables: Sequence[CoefficientTable],
+    source: str | None,
+    direct: CoefficientAnswer | None,
+) -> Path:
+    from host.sysid.answer.aircraft_export import save_aircraft
+
+    if not source:
+        raise IdentificationError(f"{path}: an aircraft needs mass and geometry; give --aircraft")
+    save_aircraft(path, tables, source, direct.fit.flight if direct else None)
+    return path
+
+
+def _write_models(path: Path, answers: Sequence[Answer]) -> list[Path]:
+    """Write the first answer under the name given, the others with theirs behind it."""
+    from host.sysid.models.model_file import model_text
+
+    written = []
+    for number, (answer, label) in enumerate(zip(answers, labels(answers), strict=True)):
+        behind = label.replace(" ", "_").replace("/", "_")
+        own = path.with_name(f"{path.stem}_{behind}{path.suffix}") if number else path
+        text = model_text(answer.model, answer.result, answer.trim)
+        with whole(own) as part:
+            part.write_text(text, encoding="utf-8")
+        written.append(own)
+    return written

@@ -1,0 +1,194 @@
+"""What an answer leaves behind: whole files where asked, one line where that cannot be."""
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from host.cli import main
+from host.sysid.answer.files import whole
+from host.sysid.answer.mat import labels, mat_name, write_mat
+from host.sysid.answer.save import Places, check
+from host.sysid.errors import IdentificationError
+from host.sysid.flight.linear import Answer, identify
+from host.sysid.flight.tables import read_columns
+from scipy import io
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("files")
+    quiet = ["--firmware", "none", "--no-picture"]
+    assert main(["simulate", "calm", *quiet, "--seed", "4", "-o", str(folder)]) == 0
+    return folder / "flight.csv"
+
+
+@pytest.fixture(scope="module")
+def answers(flight: Path) -> list[Answer]:
+    columns, _ = read_columns(flight)
+    return identify(columns, names=("short-period",), method="equation-error")
+
+
+Line = Callable[[], str]
+
+
+@pytest.fixture
+def line(capsys: pytest.CaptureFixture[str]) -> Line:
+    """Give the single line of stderr."""
+
+    def read() -> str:
+        said = capsys.readouterr().err.strip()
+        assert said.count("\n") == 0
+        return said
+
+    return read
+
+
+QUICK = ("--model", "short-period", "--method", "equation-error")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--plots", "FILE"], "FILE: a file; name a folder"),
+        (["--plots", "FILE/in"], "no folder can be in it"),
+        (["--mat", "FOLDER.mat"], "a folder; name a file in it"),
+        (["--mat", "FILE"], "expected .mat"),
+        (["--save-model", "x.txt"], "expected .toml or .mat or .xml"),
+        (["--save-model", "x.xml"], "give --aircraft"),
+        (["--save-aircraft", "x.toml"], "give --aircraft"),
+        (["--save-aircraft", "x.mat", "--aircraft", "ultrastick25e"], "expected .toml or .xml"),
+        (["--mat", "x.mat", "--save-model", "x.mat"], "both name"),
+    ],
+)
+def test_a_place_that_is_none_is_refused_before_the_flight_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: Line, options: list[str], words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("FILE").write_text("x")
+    Path("FOLDER.mat").mkdir()
+    # The source does not exist: the place is looked at first.
+    assert main(["identify", "none.csv", *options]) == 2
+    assert words in line()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["FILE", "FOLDER.mat"]
+
+
+def test_an_output_does_not_replace_what_it_is_made_from(
+    tmp_path: Path, flight: Path, line: Line
+) -> None:
+    own = tmp_path / "own.mat"
+    own.write_bytes(flight.read_bytes())
+    assert main(["identify", str(own), "--mat", str(own)]) == 2
+    assert "is what the answer is made from" in line()
+    assert own.read_bytes() == flight.read_bytes()
+    model = tmp_path / "mine.toml"
+    model.write_text("# mine\n")
+    with pytest.raises(IdentificationError, match="made from"):
+        check(Places(None, None, tmp_path / "../" / tmp_path.name / "mine.toml", None, None,
+                     (flight, model)))  # fmt: skip
+
+
+def test_without_room_the_answer_is_said_and_nothing_is_left(
+    tmp_path: Path,
+    flight: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    target = tmp_path / "new" / "model.toml"
+
+    def full(_self: Path, text: str, **_: object) -> int:
+        with _self.open("w") as file:
+            file.write(text[:40])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    assert main(["identify", str(flight), *QUICK, "--save-model", str(target)]) == 2
+    said = capsys.readouterr()
+    assert said.err == (
+        f"host: {target}: cannot be written: No space left on device; make room or name another"
+        " place\n"
+    )
+    assert "M_alpha" in said.out
+    assert list(target.parent.iterdir()) == []
+
+
+def test_several_methods_of_one_model_are_several_files(
+    tmp_path: Path, flight: Path, line: Line
+) -> None:
+    methods = ["--method", "equation-error", "--method", "output-error"]
+    model, mat = tmp_path / "m.toml", tmp_path / "m.mat"
+    places = ["--save-model", str(model), "--mat", str(mat)]
+    assert main(["identify", str(flight), "--model", "short-period", *methods, *places]) == 0
+    second = tmp_path / "m_short-period_output-error.toml"
+    assert line() == f"wrote {mat}, {model}, {second}"
+    assert 'method = "equation' in model.read_text()
+    assert 'method = "output' in second.read_text()
+    names = [n for n in io.loadmat(mat) if not n.startswith("__")]
+    assert names == ["short_period_equation_error", "short_period_output_error"]
+
+
+def test_a_mat_file_holds_what_is_printed_and_the_histories(
+    tmp_path: Path, answers: list[Answer]
+) -> None:
+    path = tmp_path / "a.mat"
+    write_mat(path, answers, None)
+    loaded = io.loadmat(path, simplify_cells=True)["short_period"]
+    answer = answers[0]
+    result = answer.result
+    np.testing.assert_array_equal(loaded["A"], result.matrices()[0])
+    units = dict(zip(loaded["names"], loaded["units"], strict=True))
+    assert (units["Z_alpha"], units["M_alpha"], units["M_q"]) == ("1/s", "1/s2", "1/s")
+    poles = np.linalg.eigvals(loaded["A"])
+    wanted = loaded["modes"]["frequency_radps"]
+    np.testing.assert_allclose(np.unique(np.abs(poles).round(9)), np.unique(np.round(wanted, 9)))
+    first = loaded["maneuvers"] if isinstance(loaded["maneuvers"], dict) else loaded["maneuvers"][0]
+    np.testing.assert_allclose(first["measured"], answer.maneuvers[0].outputs)
+    np.testing.assert_allclose(first["t_s"], answer.maneuvers[0].time_s)
+    np.testing.assert_allclose(first["fitted"], result.fitted[0])
+
+
+def test_names_are_those_of_variables(answers: list[Answer]) -> None:
+    assert mat_name("short-period with tail lag", ()) == "short_period_with_tail_lag"
+    assert mat_name("2-state Nick-Modell ä", ()) == "model_2_state_Nick_Modell__"
+    long = mat_name("x" * 80, ("x" * 31,))
+    assert len(long) == 31
+    assert long.endswith("_2")
+    twice = [answers[0], replace(answers[0]), replace(answers[0], template="other")]
+    assert labels(twice) == [
+        "short-period_equation-error",
+        "short-period_equation-error_2",
+        "other",
+    ]
+
+
+def test_interrupted_writing_leaves_the_file_that_was_there(tmp_path: Path) -> None:
+    path = tmp_path / "a.svg"
+    path.write_text("before")
+    with pytest.raises(KeyboardInterrupt), whole(path) as part:
+        part.write_text("half")
+        raise KeyboardInterrupt
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_device_is_written_to_as_it_is(answers: list[Answer]) -> None:
+    with whole(Path(os.devnull)) as part:
+        assert part == Path(os.devnull)
+    with (
+        pytest.raises(IdentificationError, match="No space left"),
+        whole(Path("/dev/full")) as part,
+    ):
+        part.write_text("x")
+    assert Path("/dev/full").exists()
+
+
+def test_json_has_one_document_and_no_nan(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def refuse(token: str) -> None:
+        raise AssertionError(token)
+
+    assert main(["identify", str(flight), *QUICK, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out, parse_constant=refuse)
+    assert document["answers"][0]["parameters"]["M_alpha"]["unit"] == "1/s2"
