@@ -189,6 +189,13 @@ def test_json_has_one_document_and_no_nan(flight: Path, capsys: pytest.CaptureFi
     def refuse(token: str) -> None:
         raise AssertionError(token)
 
-    assert main(["identify", str(flight), *QUICK, "--json"]) == 0
+    prior = flight.with_name("prior.toml")
+    prior.write_text("[coefficients]\nCm_alpha = -1.6\n")
+    beside = ["--aircraft", "ultrastick25e", "--truth", str(flight.with_name("flight.truth.toml"))]
+    assert main(["identify", str(flight), *QUICK, *beside, "--prior", str(prior), "--json"]) == 0
     document = json.loads(capsys.readouterr().out, parse_constant=refuse)
     assert document["answers"][0]["parameters"]["M_alpha"]["unit"] == "1/s2"
+    (told,) = document["truth"].values()
+    assert told["Cm_alpha"].keys() >= {"value", "half_width", "truth", "relative_error", "inside"}
+    (expected,) = document["prior"].values()
+    assert expected["Cm_alpha"]["prior"] == -1.6

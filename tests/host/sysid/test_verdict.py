@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.sysid.aircraft.airframe import Condition
-from host.sysid.answer.verdict import words
+from host.sysid.answer.verdict import model_lines, unpredicted, words
 from host.sysid.estimators.fit import fit
 from host.sysid.flight.linear import Answer
-from host.sysid.models.diagnostics import collinearity
+from host.sysid.models.diagnostics import SignalFit, collinearity, references
+from host.sysid.models.modes import modes
 from host.sysid.models.templates import Trim
 from host.sysid.study.aircraft import navion_structured
 from host.sysid.study.data import noisy
@@ -47,3 +48,39 @@ def test_a_wide_interval_is_named_and_a_bound_is_not_trusted(answer: Answer) -> 
 def test_collinear_data_without_a_pair_are_no_empty_brackets(answer: Answer) -> None:
     severe = replace(answer.together, condition=1e9, pairs=())
     assert "  the data are close to collinear" in words([replace(answer, together=severe)], [])
+
+
+def test_what_is_not_predicted_is_not_trusted(answer: Answer) -> None:
+    """An interval counts noise: of an equation that does not carry over it says nothing."""
+    names = answer.model.parameter_names
+    sure = replace(answer.result, covariance=1e-12 * np.eye(len(answer.result.names)))
+    speed = answer.model.states[0]
+    failing = SignalFit(speed, 0.0, 0.8, 0.5, 0.0, 0.5)
+    lost = replace(answer, result=sure, validation=(failing,), modes=modes(sure))
+    assert unpredicted(lost) == [speed]
+    lines = words([lost], [])
+    trusted = next(line for line in lines if "trust" in line).split(":  ")[1].split(", ")
+    told = next(line for line in lines if "whatever the interval" in line)
+    row = {t.parameter for t in answer.model.terms if t.row == 0 and t.matrix in "AB"}
+    column = {t.parameter for t in answer.model.terms if t.column == 0 and t.matrix == "A"}
+    assert row | column
+    assert not (row | column) & set(trusted)
+    assert all(name in told for name in row | column)
+    assert set(trusted) <= set(names) - row - column
+    marked = [line for line in model_lines(lost) if "not to be relied on" in line]
+    assert [line.split(":")[0].strip() for line in marked] == ["phugoid"]
+    assert words([replace(lost, validation=())], []) != lines
+
+
+def test_a_small_entry_is_not_called_trustworthy(answer: Answer) -> None:
+    """Its interval is within 5 % of the row, not of its own size."""
+    estimate = answer.result.estimate.copy()
+    estimate[1] = 0.0
+    floor = references(answer.model, answer.maneuvers, estimate)[1]
+    estimate[1] = 0.01 * floor
+    half = np.full(len(estimate), 1e-9)
+    half[1] = 0.1 * floor / 1.96
+    result = replace(answer.result, estimate=estimate, covariance=np.diag(half**2))
+    lines = words([replace(answer, result=result)], [])
+    little = next(line for line in lines if "less than 5 % of their row" in line)
+    assert answer.model.parameter_names[1] in little.split(":  ")[1].split(", ")

@@ -78,7 +78,13 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
     from host.sysid.answer.save import check, write
-    from host.sysid.answer.verdict import coefficient_lines, coefficient_words, model_lines, words
+    from host.sysid.answer.verdict import (
+        coefficient_lines,
+        coefficient_words,
+        model_lines,
+        taken_out,
+        words,
+    )
     from host.sysid.compatibility.reconstruction import document
     from host.sysid.compatibility.reconstruction import words as agreement_words
     from host.sysid.errors import IdentificationError
@@ -146,7 +152,9 @@ def run(args: argparse.Namespace) -> int:
     notes += unfit
     tables = list(direct.tables) if direct else [a.table for a in answers]
     if args.json:
+        from host.sysid.aircraft.prior import prior_document
         from host.sysid.answer.json import answer_document, coefficient_document, json_text
+        from host.sysid.answer.truth import truth_document
 
         documents = [answer_document(a, words([a], [])) for a in answers]
         if direct:
@@ -157,6 +165,8 @@ def run(args: argparse.Namespace) -> int:
                 "notes": notes,
                 "data_compatibility": document(agreement) if agreement else None,
                 "answers": documents,
+                "truth": truth_document(answers, direct, truth) if truth else None,
+                "prior": prior_document(tables, prior) if prior else None,
             }
         )
         # What was written is said before the answer, so that no answer follows an error.
@@ -166,6 +176,7 @@ def run(args: argparse.Namespace) -> int:
     lines = words(answers, notes)
     if direct:
         lines += coefficient_words(direct)
+    lines += taken_out(answers)
     if len(wanted) > 1:
         lines += ["", *_side_by_side(answers)]
     else:
@@ -180,9 +191,9 @@ def run(args: argparse.Namespace) -> int:
 
         lines += ["", *prior_lines(tables, prior)]
     if truth is not None:
-        from host.sysid.answer.truth import truth_lines
+        from host.sysid.answer.truth import against_truth
 
-        lines += ["", *truth_lines(tables, truth)]
+        lines += ["", *against_truth(answers, direct, truth)]
     try:
         written = write(places, answers, direct, columns, truth)
     except IdentificationError:

@@ -109,6 +109,26 @@ def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[s
     return lines
 
 
+def prior_document(
+    tables: Sequence[CoefficientTable], prior: PriorTable
+) -> dict[str, dict[str, dict[str, float | bool]]]:
+    """Return the same for JSON, by template and method."""
+    found: dict[str, dict[str, dict[str, float | bool]]] = {}
+    for table in tables:
+        expected = prior.at(table.alpha_rad)
+        found[f"{table.template}, {table.method}"] = {
+            c.name: {
+                "value": c.value,
+                "half_width": c.half_width,
+                "prior": expected[c.name],
+                "inside": abs(c.value - expected[c.name]) <= c.half_width,
+            }
+            for c in table.coefficients
+            if c.name in expected
+        }
+    return found
+
+
 def _place(table: PriorTable, alpha_deg: float) -> str:
     """Say where a table is read and how it is turned; nothing where neither is done."""
     least, most = np.degrees(table.limits_rad)

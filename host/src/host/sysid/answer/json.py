@@ -7,7 +7,10 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from host.sysid.answer.units import parameter_unit
+from host.sysid.answer.verdict import unpredicted
 from host.sysid.coefficients.answer import METHOD
 from host.sysid.compatibility.corrections import correction_document
 from host.sysid.flight.finder import Found, Grade
@@ -30,7 +33,8 @@ def _plain(value: Any) -> Any:
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not isfinite(value) else value
+    number = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(number, float) and not isfinite(number) else number
 
 
 def maneuver_document(graded: Sequence[tuple[Found, Grade]]) -> list[dict[str, Any]]:
@@ -102,6 +106,7 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
             for name, (value, width) in answer.delays.items()
         },
         "at_bound": list(answer.at_bound),
+        "unpredicted": unpredicted(answer),
         "corrections": correction_document(answer.corrections),
         "refused": [
             {

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import textwrap
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from host.sysid.aircraft.airframe import CoefficientTable
+from host.sysid.answer.mat import labels
 from host.sysid.errors import IdentificationError
-from host.sysid.flight.linear import AXIS_OF
+from host.sysid.flight.linear import AXIS_OF, Answer
+from host.sysid.models.modes import Mode
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.flight import CoefficientAnswer
+
+LONGITUDINAL = ("short period", "phugoid")
+LATERAL = ("dutch roll", "roll", "spiral")
 
 
 def read_truth(path: Path) -> dict[str, Any]:
@@ -30,38 +41,223 @@ def read_truth(path: Path) -> dict[str, Any]:
     return document
 
 
+def _of_axes(document: dict[str, Any], template: str, key: str) -> list[dict[str, Any]]:
+    axes = {axis.split("_")[0] for axis in AXIS_OF.get(template, ())}
+    return [m[key] for m in document["maneuver"] if axes & set(m.get("axes", ())) and key in m]
+
+
 def true_coefficients(document: dict[str, Any], template: str) -> dict[str, float]:
     """Return local derivatives averaged over the maneuvers of a template's axes."""
-    axes = {axis.split("_")[0] for axis in AXIS_OF.get(template, ())}
-    tables = [
-        m["derivatives"]
-        for m in document["maneuver"]
-        if axes & set(m.get("axes", ())) and "derivatives" in m
-    ]
+    tables = _of_axes(document, template, "derivatives")
     if not tables:
         return {}
     return {name: sum(t[name] for t in tables) / len(tables) for name in tables[0]}
 
 
-def truth_lines(tables: Sequence[CoefficientTable], document: dict[str, Any]) -> list[str]:
-    """Return a table of coefficients against the truth, errors relative to it."""
-    lines = ["against the truth of the simulated flight (local derivatives, mean of maneuvers)"]
-    inside = total = 0
-    for table in tables:
-        truth = true_coefficients(document, table.template)
-        for c in table.coefficients:
-            if c.name not in truth:
-                continue
-            miss = c.value - truth[c.name]
-            covered = abs(miss) <= c.half_width
-            inside += covered
-            total += 1
-            share = f"{100.0 * miss / abs(truth[c.name]):+7.1f} %" if truth[c.name] else "        -"
-            lines.append(
-                f"  {c.name:9s} {c.value:9.4f} +- {c.half_width:7.4f}  truth {truth[c.name]:9.4f}"
-                f"  error {share}  {'inside' if covered else 'OUTSIDE'}"
-            )
-    if total == 0:
+def true_modes(document: dict[str, Any], template: str) -> dict[str, tuple[float, float]]:
+    """Return frequency (rad/s) and damping of each mode, averaged in the same way."""
+    tables = _of_axes(document, template, "modes")
+    if not tables:
+        return {}
+    shared = [name for name in tables[0] if all(name in t for t in tables)]
+    count = len(tables)
+    return {
+        name.replace("_", " "): (
+            sum(t[name][0] for t in tables) / count,
+            sum(t[name][1] for t in tables) / count,
+        )
+        for name in shared
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """One figure beside the truth; the error is relative to `reference`.
+
+    That is |truth|, or what would contribute 5 % of its row's largest where that is known and more
+    (`small`): a coefficient that is next to nothing is not judged by its own size.
+    """
+
+    name: str
+    value: float
+    half_width: float
+    truth: float
+    reference: float
+    small: bool = False
+
+    @property
+    def covered(self) -> bool:
+        """Whether the 95 % interval holds the truth."""
+        return bool(abs(self.value - self.truth) <= self.half_width)
+
+    @property
+    def error(self) -> float:
+        """Estimate minus truth, over the reference; NaN over nothing."""
+        return (self.value - self.truth) / self.reference if self.reference else float("nan")
+
+
+def compared(
+    table: CoefficientTable, document: dict[str, Any], floors: Mapping[str, float]
+) -> list[Compared]:
+    """Return the coefficients of a table that the truth has.
+
+    Parameters
+    ----------
+    table : CoefficientTable
+    document : dict
+        From `read_truth`.
+    floors : mapping
+        Coefficient to what would contribute 5 % of its row's largest, where it contributes less.
+    """
+    truth = true_coefficients(document, table.template)
+    found = []
+    for c in table.coefficients:
+        if c.name not in truth:
+            continue
+        floor = floors.get(c.name, 0.0)
+        size = abs(truth[c.name])
+        reference, small = max(size, floor), floor > size
+        found.append(Compared(c.name, c.value, c.half_width, truth[c.name], reference, small))
+    return found
+
+
+def compared_modes(
+    modes: Sequence[Mode], document: dict[str, Any], templates: Sequence[str]
+) -> list[Compared]:
+    """Return frequencies, and dampings of those that swing, that the truth has.
+
+    A real mode is its root, 1/s: minus its rate constant where it dies away.
+    """
+    true: dict[str, tuple[float, float]] = {}
+    for template in templates:
+        own = LONGITUDINAL if "elevator_rad" in AXIS_OF.get(template, ()) else LATERAL
+        true |= {n: t for n, t in true_modes(document, template).items() if n in own}
+    found = []
+    for mode in modes:
+        if mode.name not in true:
+            continue
+        frequency, damping = true[mode.name]
+        half = 1.96 * mode.frequency_sd_radps
+        if mode.oscillatory and abs(damping) < 1.0:
+            found.append(Compared(mode.name, mode.frequency_radps, half, frequency, frequency))
+            half = 1.96 * mode.damping_sd
+            label = f"{mode.name}, damping"
+            found.append(Compared(label, mode.damping, half, damping, abs(damping)))
+        elif not mode.oscillatory and abs(damping) == 1.0:
+            root = -damping * frequency
+            found.append(Compared(mode.name, mode.eigenvalue.real, half, root, abs(root)))
+    return found
+
+
+def truth_lines(
+    tables: Sequence[CoefficientTable],
+    document: dict[str, Any],
+    floors: Mapping[str, float] | None = None,
+) -> list[str]:
+    """Return a table of coefficients against the truth."""
+    found = [c for table in tables for c in compared(table, document, floors or {})]
+    if not found:
         return ["no coefficient to compare: name the aircraft (--aircraft)"]
-    lines.append(f"  {inside} of {total} intervals hold the truth")
+    return [
+        "against the truth of the simulated flight (local derivatives, mean of maneuvers)",
+        *map(_line, found),
+        f"  {sum(c.covered for c in found)} of {len(found)} intervals hold the truth",
+    ]
+
+
+def against_truth(
+    answers: Sequence[Answer], direct: CoefficientAnswer | None, document: dict[str, Any]
+) -> list[str]:
+    """Return all answers against the truth: coefficients fitted directly line by line.
+
+    Without such a fit the linear models are; beside one they have a summary each.
+    """
+    lines = []
+    if direct:
+        lines = truth_lines(direct.tables, document, small_references(direct))
+        lines += mode_truth_lines(
+            compared_modes(direct.modes, document, ("longitudinal", "lateral"))
+        )
+    else:
+        lines = truth_lines([a.table for a in answers], document)
+    for answer in answers:
+        own = compared_modes(answer.modes, document, (answer.template,))
+        if direct:
+            label = f"{answer.template}, {answer.result.method}"
+            lines += truth_summary(label, [*compared(answer.table, document, {}), *own])
+        else:
+            lines += mode_truth_lines(own)
     return lines
+
+
+def small_references(direct: CoefficientAnswer) -> dict[str, float]:
+    """Return what would contribute 5 % of the row, of coefficients that contribute less."""
+    return {d.name: d.reference for d in direct.fit.derivatives if d.reference > abs(d.value)}
+
+
+def mode_truth_lines(found: Sequence[Compared]) -> list[str]:
+    """Return the modes against the truth; nothing where there are none."""
+    if not found:
+        return []
+    held = sum(c.covered for c in found)
+    return [*map(_line, found), f"  {held} of {len(found)} intervals of the modes hold the truth"]
+
+
+def truth_summary(label: str, found: Sequence[Compared]) -> list[str]:
+    """Return in a line or two how a model fared, and by how much what is outside."""
+    if not found:
+        return []
+    outside = [
+        f"{c.name} {c.value:.3g} +- {c.half_width:.2g}, truth {c.truth:.3g}"
+        for c in found
+        if not c.covered
+    ]
+    held = f"{label}: {len(found) - len(outside)} of {len(found)} intervals hold the truth"
+    return textwrap.wrap(
+        held + (f"; outside: {'; '.join(outside)}" if outside else ""),
+        100,
+        initial_indent="  ",
+        subsequent_indent="    ",
+        break_on_hyphens=False,
+    )
+
+
+def truth_document(
+    answers: Sequence[Answer], direct: CoefficientAnswer | None, document: dict[str, Any]
+) -> dict[str, dict[str, dict[str, float | bool]]]:
+    """Return the comparison of every answer for JSON, by template."""
+    found = {
+        label: [
+            *compared(a.table, document, {}),
+            *compared_modes(a.modes, document, (a.template,)),
+        ]
+        for a, label in zip(answers, labels(answers), strict=True)
+    }
+    if direct:
+        floors = small_references(direct)
+        found["coefficients"] = [
+            *(c for table in direct.tables for c in compared(table, document, floors)),
+            *compared_modes(direct.modes, document, ("longitudinal", "lateral")),
+        ]
+    return {
+        label: {
+            c.name: {
+                "value": c.value,
+                "half_width": c.half_width,
+                "truth": c.truth,
+                "relative_error": c.error,
+                "inside": c.covered,
+            }
+            for c in own
+        }
+        for label, own in found.items()
+    }
+
+
+def _line(c: Compared) -> str:
+    share = f"{100.0 * c.error:+7.1f} %" if isfinite(c.error) else "        -"
+    small = " of 5 % of the row" if c.small else ""
+    return (
+        f"  {c.name:21s} {c.value:9.4f} +- {c.half_width:7.4f}  truth {c.truth:9.4f}"
+        f"  error {share}{small}  {'inside' if c.covered else 'OUTSIDE'}"
+    )

@@ -5,18 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from host.sysid.answer.units import parameter_unit
 from host.sysid.coefficients.answer import FLAG_SHARE
 from host.sysid.coefficients.model import standard_model
 from host.sysid.compatibility.corrections import correction_words
 from host.sysid.flight.finder import Found, Grade
-from host.sysid.flight.linear import Answer
-from host.sysid.models.diagnostics import CANNOT
+from host.sysid.flight.linear import DELAYS, Answer
+from host.sysid.models.diagnostics import CANNOT, references
+from host.sysid.models.modes import Mode
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.flight import CoefficientAnswer
 
 TRUST = 0.10  # 95 % half-width over value: good enough to design with
 FAIR = 0.30
+UNPREDICTED = 0.5  # NRMSE of an output of an unseen maneuver
+PART = 0.25  # of a mode's participation: a state that makes it what it is
 WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
 NEEDS = {
     "alpha": "an elevator 3-2-1-1 at the short-period frequency",
@@ -48,24 +54,34 @@ def maneuver_lines(graded: Sequence[tuple[Found, Grade]]) -> list[str]:
 def words(answers: Sequence[Answer], notes: Sequence[str]) -> list[str]:
     """Return the verdict: notes first, then per model what to trust and what to re-fly."""
     lines = [f"note: {note}" for note in notes]
-    if answers:
-        lines += correction_words(answers[0].corrections)
     for answer in answers:
         lines += _verdict(answer)
     return lines
+
+
+def taken_out(answers: Sequence[Answer]) -> list[str]:
+    """Return which errors of sensors were taken out of the columns of linear fits."""
+    return correction_words(answers[0].corrections) if answers else []
 
 
 def _verdict(answer: Answer) -> list[str]:
     result = answer.result
     half = result.half_width()
     refused = {r.name for r in answer.refused}
-    trusted, fair, loose = [], [], []
+    size = references(answer.model, answer.maneuvers, result.estimate)
+    lost = unpredicted(answer)
+    doubted = _entries_of(answer, lost)
+    trusted, fair, loose, little = [], [], [], []
     for k, parameter in enumerate(answer.model.parameters):
         name = parameter.name
         if name in refused or name.startswith("imu_") or half[k] == 0.0:  # on a bound: warned of
             continue
-        share = float(half[k]) / max(abs(float(result.estimate[k])), 1e-300)
-        if share <= TRUST:
+        if name in doubted:
+            continue
+        share = float(half[k]) / max(float(size[k]), 1e-300)
+        if share <= FAIR and size[k] > abs(float(result.estimate[k])):
+            little.append(name)
+        elif share <= TRUST:
             trusted.append(name)
         elif share <= FAIR:
             fair.append(name)
@@ -80,6 +96,14 @@ def _verdict(answer: Answer) -> list[str]:
         lines.append(f"  use with care (10 to 30 %):  {', '.join(fair)}")
     if loose:
         lines.append(f"  do not rely on (above 30 %):  {', '.join(loose)}")
+    if little:
+        lines.append(f"  less than 5 % of their row, known to be:  {', '.join(little)}")
+    if doubted - refused:
+        names = ", ".join(n for n in answer.model.parameter_names if n in doubted - refused)
+        lines.append(
+            f"  do not rely on {names}, whatever the interval:"
+            f" {' and '.join(lost)} is not predicted"
+        )
     for refusal in answer.refused:
         if not refusal.name.startswith("imu_"):
             warning = "do not use" if refusal.grade == CANNOT else "doubtful,"
@@ -100,13 +124,46 @@ def _verdict(answer: Answer) -> list[str]:
         )
     for warning in result.warnings:
         lines.append(f"  warning: {warning}")
-    poor = [f.name for f in answer.validation if not f.nrmse < 0.5]
+    poor = [f.name for f in answer.validation if not f.nrmse < UNPREDICTED]
     if answer.validation:
         lines.append(
             "  prediction of the unseen maneuver: "
             + ("fails for " + ", ".join(poor) if poor else "holds for every output")
         )
     return lines
+
+
+def unpredicted(answer: Answer) -> list[str]:
+    """Return the states that the model does not carry: unseen maneuvers say so, or a delay.
+
+    A delay at its bound is what a model lacks in that signal. An interval counts noise and gusts,
+    not what is lacking: on a demonstration flight D_V was -0.33 +- 0.02 where -0.61 was true.
+    """
+    failing = {f.name for f in answer.validation if not f.nrmse < UNPREDICTED}
+    for group in (*DELAYS, *answer.model.delays):
+        if group.name in answer.at_bound:
+            failing |= set(group.outputs)
+    return [state for state in answer.model.states if state in failing]
+
+
+def _entries_of(answer: Answer, states: Sequence[str]) -> set[str]:
+    """Return the parameters in the equation of a state, and those it is multiplied by."""
+    at = {answer.model.states.index(state) for state in states}
+    return {
+        term.parameter
+        for term in answer.model.terms
+        if term.matrix in "AB" and (term.row in at or (term.matrix == "A" and term.column in at))
+    }
+
+
+def _carried_by(answer: Answer, mode: Mode, states: Sequence[str]) -> list[str]:
+    """Return those of some states that take a good part in a mode."""
+    values, right = np.linalg.eig(answer.result.matrices()[0])
+    left = np.linalg.inv(right)
+    k = int(np.argmin(np.abs(values - mode.eigenvalue)))
+    part = np.abs(left[k] * right[:, k])
+    shares = dict(zip(answer.model.states, part / part.sum(), strict=True))
+    return [state for state in states if shares[state] > PART]
 
 
 def model_lines(answer: Answer) -> list[str]:
@@ -121,26 +178,23 @@ def model_lines(answer: Answer) -> list[str]:
     for k, name in enumerate(answer.model.parameter_names):
         mark = f"  {marks[name]}" if name in marks else ""
         mark += "  at its bound" if name in answer.at_bound else ""
-        lines.append(f"  {name:16s} {result.estimate[k]:11.5g}  +- {half[k]:9.3g}{mark}")
+        unit = parameter_unit(answer.model, name)
+        lines.append(
+            f"  {name:16s} {result.estimate[k]:11.5g}  +- {half[k]:9.3g}  {unit:7s}{mark}".rstrip()
+        )
     for name, (value, width) in answer.delays.items():
         mark = "  at its bound" if name in answer.at_bound else ""
-        lines.append(f"  {name:16s} {value:11.5g}  +- {width:9.3g}{mark}")
+        lines.append(f"  {name:16s} {value:11.5g}  +- {width:9.3g}  s      {mark}".rstrip())
     if answer.coefficients:
         lines.append("  coefficients (mass, inertia, pressure and upwash in the half-width)")
         lines += [
             f"  {c.name:16s} {c.value:11.5g}  +- {c.half_width:9.3g}" for c in answer.coefficients
         ]
+    lost = unpredicted(answer)
     for mode in answer.modes:
-        if mode.oscillatory:
-            lines.append(
-                f"  {mode.name}: {mode.frequency_radps:.3f} +- {1.96 * mode.frequency_sd_radps:.3f}"
-                f" rad/s, damping {mode.damping:.3f} +- {1.96 * mode.damping_sd:.3f}"
-            )
-        else:
-            lines.append(
-                f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {1.96 * mode.frequency_sd_radps:.3f}"
-                " 1/s"
-            )
+        in_it = _carried_by(answer, mode, lost)
+        mark = f"  not to be relied on: {' and '.join(in_it)} is not predicted" if in_it else ""
+        lines.append(_mode_line(mode) + mark)
     for kind, fits in (
         ("free simulation, fitted data", answer.fits),
         ("free simulation, held-out data", answer.validation),
@@ -224,18 +278,7 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
         line += f"{small}  {cause}" + ("  flagged" if d.flagged else "")
         lines.append(line.rstrip())
     lines.append("  CD_0 is the drag at zero lift, surfaces as flown")
-    for mode in answer.modes:
-        if mode.oscillatory:
-            lines.append(
-                f"  {mode.name}: {mode.frequency_radps:.3f}"
-                f" +- {1.96 * mode.frequency_sd_radps:.3f} rad/s,"
-                f" damping {mode.damping:.3f} +- {1.96 * mode.damping_sd:.3f}"
-            )
-        else:
-            lines.append(
-                f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {1.96 * mode.frequency_sd_radps:.3f}"
-                " 1/s"
-            )
+    lines += [_mode_line(mode) for mode in answer.modes]
     delays = ", ".join(
         f"{name.split('_')[1]} {1e3 * value:+.2f} +- {1e3 * half:.2f} ms"
         for name, (value, half) in answer.delays.items()
@@ -255,3 +298,13 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
 
 def _fitted(count: int) -> str:
     return "1 maneuver fitted" if count == 1 else f"{count} maneuvers fitted jointly"
+
+
+def _mode_line(mode: Mode) -> str:
+    half = 1.96 * mode.frequency_sd_radps
+    if not mode.oscillatory:
+        return f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {half:.3f} 1/s"
+    return (
+        f"  {mode.name}: {mode.frequency_radps:.3f} +- {half:.3f} rad/s,"
+        f" damping {mode.damping:.3f} +- {1.96 * mode.damping_sd:.3f}"
+    )

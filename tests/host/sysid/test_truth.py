@@ -1,0 +1,71 @@
+"""An answer beside the truth: what is averaged, what an error is relative to, what is outside."""
+
+import math
+
+import numpy as np
+import pytest
+from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
+from host.sysid.answer.truth import (
+    compared,
+    compared_modes,
+    mode_truth_lines,
+    truth_lines,
+    truth_summary,
+)
+from host.sysid.models.modes import mode_of
+
+DOCUMENT = {
+    "maneuver": [
+        {"axes": ["elevator"], "derivatives": {"CL_alpha": 4.0, "CD_de": 0.0},
+         "modes": {"short_period": [10.0, 0.5], "phugoid": [0.7, 0.1], "spiral": [9.0, 1.0]}},
+        {"axes": ["elevator"], "derivatives": {"CL_alpha": 4.4, "CD_de": 0.0},
+         "modes": {"short_period": [12.0, 0.7], "spiral": [9.0, 1.0]}},
+        {"axes": ["aileron"], "derivatives": {"CL_alpha": 99.0, "Cl_p": -0.4},
+         "modes": {"roll": [20.0, 1.0], "spiral": [0.1, -1.0], "short_period": [99.0, 0.1]}},
+    ]
+}  # fmt: skip
+
+
+def table(**values: tuple[float, float]) -> CoefficientTable:
+    found = tuple(Coefficient(n, v, h / 2, h / 2, h) for n, (v, h) in values.items())
+    return CoefficientTable("longitudinal", "by hand", 0.1, found)
+
+
+def test_truth_is_the_mean_of_the_maneuvers_of_the_axis() -> None:
+    (lift,) = compared(table(CL_alpha=(4.41, 0.2)), DOCUMENT, {})
+    assert lift.truth == pytest.approx(4.2)
+    assert lift.error == pytest.approx(0.05)
+    assert not lift.covered
+
+
+def test_a_coefficient_next_to_nothing_is_not_judged_by_its_size() -> None:
+    (drag,) = compared(table(CD_de=(0.01, 0.02)), DOCUMENT, {})
+    assert math.isnan(drag.error)
+    (drag,) = compared(table(CD_de=(0.01, 0.02)), DOCUMENT, {"CD_de": 0.04})
+    assert drag.error == pytest.approx(0.25)
+    lines = truth_lines([table(CD_de=(0.01, 0.02))], DOCUMENT, {"CD_de": 0.04})
+    assert "+25.0 % of 5 % of the row  inside" in lines[1]
+    assert lines[-1].strip() == "1 of 1 intervals hold the truth"
+
+
+def test_modes_are_compared_with_those_of_their_axis() -> None:
+    spread = np.diag([0.01, 0.01])
+    modes = (
+        mode_of("short period", complex(-6.0, 9.0), spread),
+        mode_of("phugoid", complex(-0.1, 0.7), spread),  # not in every maneuver's truth
+        mode_of("roll", complex(-21.0, 0.0), spread),
+        mode_of("spiral", complex(0.12, 0.0), spread),
+    )
+    found = compared_modes(modes, DOCUMENT, ("longitudinal", "lateral"))
+    names = {c.name: c for c in found}
+    assert list(names) == ["short period", "short period, damping", "roll", "spiral"]
+    assert names["short period"].truth == pytest.approx(11.0)
+    assert names["roll"].truth == pytest.approx(-20.0)
+    assert names["spiral"].truth == pytest.approx(0.1)
+    assert (names["spiral"].covered, names["roll"].covered) == (True, False)
+    held = sum(c.covered for c in found)
+    assert (
+        mode_truth_lines(found)[-1].strip() == f"{held} of 4 intervals of the modes hold the truth"
+    )
+    (line, *_) = truth_summary("lateral", found[2:])
+    assert line.startswith("  lateral: 1 of 2 intervals hold the truth; outside: roll -21 +- 0.2,")
