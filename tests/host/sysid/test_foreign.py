@@ -38,21 +38,28 @@ def text_of(lines: dict[str, str]) -> str:
 
 @pytest.fixture(scope="module")
 def flight() -> dict[str, np.ndarray]:
-    """A made flight in SI whose forces and moments have the signs of an aircraft."""
+    """A made flight in SI: motion as kinematics has it, forces and moments with our signs."""
     t = np.arange(0.0, 60.0, 0.02)
     phi, theta, psi = 0.3 * np.sin(0.7 * t), 0.1 * np.sin(1.1 * t), 0.1 * t + 0.2 * np.sin(0.5 * t)
     dphi, dtheta, dpsi = (np.gradient(x, t) for x in (phi, theta, psi))
     p = dphi - dpsi * np.sin(theta)
     q = dtheta * np.cos(phi) + dpsi * np.sin(phi) * np.cos(theta)
     r = -dtheta * np.sin(phi) + dpsi * np.cos(phi) * np.cos(theta)
-    alpha, beta = 0.1 + 0.03 * np.sin(2.3 * t), 0.02 * np.sin(1.7 * t)
-    pd_, qd, rd = (np.gradient(x, t) for x in (p, q, r))
     speed = 20.0 + np.sin(0.2 * t)
+    alpha, beta = np.full(len(t), 0.1), np.zeros(len(t))
+    for k in range(len(t) - 1):  # turned by rates, held by forces
+        a, b = alpha[k], beta[k]
+        up = q[k] - b * (p[k] * np.cos(a) + r[k] * np.sin(a)) - 60.0 * (a - 0.1) / speed[k]
+        right = p[k] * np.sin(a) - r[k] * np.cos(a) - 60.0 * b / speed[k]
+        right += 9.80665 * np.cos(theta[k]) * np.sin(phi[k]) / speed[k]
+        alpha[k + 1], beta[k + 1] = a + 0.02 * up, b + 0.02 * right
+    az = -9.80665 * np.cos(theta) * np.cos(phi) - 60.0 * (alpha - 0.1)
+    pd_, qd, rd = (np.gradient(x, t) for x in (p, q, r))
     rudder = (8.0 * beta - r - rd) / 20.0
     return {
         "t_s": t, "airspeed_mps": speed, "alpha_rad": alpha, "beta_rad": beta,
-        "p_radps": p, "q_radps": q, "r_radps": r, "ay_mps2": -8.0 * beta,
-        "az_mps2": -9.8 - 60.0 * (alpha - 0.1), "phi_rad": phi, "theta_rad": theta, "psi_rad": psi,
+        "p_radps": p, "q_radps": q, "r_radps": r, "ay_mps2": -60.0 * beta,
+        "az_mps2": az, "phi_rad": phi, "theta_rad": theta, "psi_rad": psi,
         "elevator_rad": -(qd + 60.0 * (alpha - 0.1) + 8.0 * q) / 70.0,
         "aileron_rad": (pd_ + 20.0 * beta + 10.0 * p - r) / 100.0, "rudder_rad": rudder,
         "qbar_pa": 0.5 * 1.225 * speed**2, "throttle": np.full(len(t), 0.5),

@@ -12,15 +12,16 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
+from host.sysid.flight.consistent import BLOCK_S, FEWEST, HINT, SURE, block_means, consistent
 from host.sysid.models.templates import GRAVITY_MPS2
 
-BOUNDED = ("alpha_rad", "beta_rad", "theta_rad", "elevator_rad", "aileron_rad", "rudder_rad")
-DOUBTFUL_RAD = 1.0  # of such an angle in flight
-BLOCK_S = 0.1  # slopes and correlations are those of means over this long
-SURE = 0.5  # correlation
-FACTOR = 2.0  # between attitude and rate: one of them is in another unit
+BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")
+DOUBTFUL_RAD = 1.0  # of such an angle in flight, and of a surface at any moment
+IDLE_RAD = 0.0035  # a surface that swings less between its ends excites nothing
 STRONG = 10.0  # deviations
 DENSITY = (0.4, 1.6)
+STATIC_PA = (2e4, 1.2e5)
+THROTTLE = (-0.2, 1.2)
 PITOT = (0.5, 2.0)
 # Left side, regressors beside the surface, expected sign: elevator positive trailing edge down.
 SURFACES = {
@@ -30,7 +31,6 @@ SURFACES = {
         "r_radps", ("beta_rad", "p_radps", "r_radps", "aileron_rad"), -1.0, "yaw the nose right",
     ),
 }  # fmt: skip
-HINT = "give its unit or sign in the map (--map)"
 
 
 def check(columns: Mapping[str, Array]) -> list[str]:
@@ -52,17 +52,17 @@ def check(columns: Mapping[str, Array]) -> list[str]:
         speed = columns["airspeed_mps"]
         flying = speed > 0.5 * float(np.median(speed))
     flown = {k: v[flying] for k, v in columns.items()}
-    if len(flown["t_s"]) < 32:
+    if len(flown["t_s"]) < FEWEST:
         return []
     notes = _angles(flown)
     notes += _gravity(flown)
     _air(flown)
-    means = _means(flown, max(1, round(BLOCK_S / dt_s)))
-    if len(means["t_s"]) < 32:
-        return notes
-    _kinematics(means)
-    _forces(means)
-    return notes + _surfaces(means)
+    notes += _surface_sizes(flown)
+    means = block_means(flown, max(1, round(BLOCK_S / dt_s)))
+    if len(means["t_s"]) >= FEWEST:
+        _forces(means)
+        notes += _surfaces(means)
+    return notes + consistent(flown, dt_s)
 
 
 def _angles(flown: Mapping[str, Array]) -> list[str]:
@@ -80,6 +80,28 @@ def _angles(flown: Mapping[str, Array]) -> list[str]:
     return notes
 
 
+def _surface_sizes(flown: Mapping[str, Array]) -> list[str]:
+    """Look at the ends of surfaces: at rest for most of a flight, no quantile shows their unit."""
+    notes = []
+    for name in SURFACES:
+        if name not in flown:
+            continue
+        low, high = np.quantile(flown[name], (0.001, 0.999))
+        size, swing = max(-float(low), float(high)), float(high - low)
+        if size > 0.5 * np.pi:
+            raise IdentificationError(
+                f"{name} reaches {size:.3g} rad in flight: in degrees? {HINT}"
+            )
+        if size > DOUBTFUL_RAD:
+            notes.append(f"{name} reaches {size:.2f} rad in flight: in degrees? {HINT}")
+        elif 0.0 < swing < IDLE_RAD:
+            notes.append(
+                f"{name} moves by {np.rad2deg(swing):.2g} deg in all: idle, or in radians already"
+                f" where the map says degrees?"
+            )
+    return notes
+
+
 def _gravity(flown: Mapping[str, Array]) -> list[str]:
     if "az_mps2" not in flown:
         return []
@@ -87,11 +109,12 @@ def _gravity(flown: Mapping[str, Array]) -> list[str]:
     size = float(np.median(np.sqrt(sum(a**2 for a in axes))))
     down = float(np.median(flown["az_mps2"]))
     for unit, one in (("g", 1.0), ("ft/s2", GRAVITY_MPS2 / 0.3048), ("mg", 1000.0)):
-        if 0.7 * one < size < 1.4 * one:
-            raise IdentificationError(
-                f"specific force is {size:.3g} m/s2 in the median of the flight, not 9.8:"
-                f" in {unit}? {HINT}"
-            )
+        for name, found in (("specific force", size), ("az_mps2", abs(down))):
+            if 0.7 * one < found < 1.4 * one:
+                raise IdentificationError(
+                    f"{name} is {found:.3g} m/s2 in the median of the flight, not 9.8:"
+                    f" in {unit}? {HINT}"
+                )
     if down > 0.5 * GRAVITY_MPS2:
         raise IdentificationError(
             f"az_mps2 is {down:+.3g} m/s2 in the median of the flight: the axis points up, ours"
@@ -106,6 +129,14 @@ def _gravity(flown: Mapping[str, Array]) -> list[str]:
 
 
 def _air(flown: Mapping[str, Array]) -> None:
+    if "airspeed_mps" in flown and float(np.median(flown["airspeed_mps"])) <= 0.0:
+        raise IdentificationError(f"airspeed_mps is not above zero in flight: {HINT}")
+    for name, (least, most), unit in (
+        ("static_pa", STATIC_PA, "Pa"), ("throttle", THROTTLE, "of full"),
+    ):  # fmt: skip
+        middle = float(np.median(flown[name])) if name in flown else least
+        if not least <= middle <= most:
+            raise IdentificationError(f"{name} is {middle:.4g} {unit}: {HINT}")
     density = 1.225
     if "density_kgpm3" in flown:
         density = float(np.median(flown["density_kgpm3"]))
@@ -118,44 +149,6 @@ def _air(flown: Mapping[str, Array]) -> None:
             raise IdentificationError(
                 f"qbar_pa is {ratio:.3g} times what airspeed_mps makes of it: one of them has"
                 f" another unit; {HINT}"
-            )
-
-
-def _means(flown: Mapping[str, Array], block: int) -> dict[str, Array]:
-    count = len(flown["t_s"]) // block
-    return {k: v[: count * block].reshape(count, block).mean(axis=1) for k, v in flown.items()}
-
-
-def _kinematics(means: Mapping[str, Array]) -> None:
-    """Hold rates against the attitude they turn."""
-    zero = np.zeros(len(means["t_s"]))
-    phi, theta = means.get("phi_rad", zero), means.get("theta_rad", zero)
-    p, q, r = (means.get(f"{k}_radps") for k in "pqr")
-    pairs = []
-    if q is not None and "theta_rad" in means:
-        pairs.append(
-            ("q_radps", "theta_rad", q * np.cos(phi) - (0.0 if r is None else r) * np.sin(phi))
-        )
-    if p is not None and "phi_rad" in means:
-        turn = (0.0 if q is None else q) * np.sin(phi) + (0.0 if r is None else r) * np.cos(phi)
-        pairs.append(("p_radps", "phi_rad", p + np.tan(np.clip(theta, -1.2, 1.2)) * turn))
-    if r is not None and "psi_rad" in means:
-        turn = (0.0 if q is None else q) * np.sin(phi) + r * np.cos(phi)
-        pairs.append(("r_radps", "psi_rad", turn / np.cos(np.clip(theta, -1.2, 1.2))))
-    for rate, angle, expected in pairs:
-        step_s = np.diff(means["t_s"])
-        seen, told = np.diff(means[angle]) / step_s, 0.5 * (expected[1:] + expected[:-1])
-        calm = step_s < 2.0 * float(np.median(step_s))
-        agreement, slope = _correlation(told[calm], seen[calm])
-        if agreement < -SURE:
-            raise IdentificationError(
-                f"{rate} and {angle} turn opposite ways (correlation {agreement:.2f}): one of them"
-                f" has the wrong sign; {HINT}"
-            )
-        if agreement > SURE and not 1.0 / FACTOR < slope < FACTOR:
-            raise IdentificationError(
-                f"{angle} turns {slope:.3g} times as fast as {rate} says: one of them has another"
-                f" unit; {HINT}"
             )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from host.compiled import Array, BoolArray, IntArray
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.column_map import listed, mapped, read_map
+from host.sysid.flight.consistent import HINT
 from host.sysid.flight.foreign import TEXT_KINDS, Foreign, from_frame, read_foreign, same_length
 from host.sysid.flight.plausible import check
 
@@ -207,6 +208,7 @@ def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
             continue
         series = series[seen]
         if name in ANGLES:
+            _wraps(name, series)
             series = np.unwrap(series)
         result[name] = np.interp(grid, t[seen], series)
         if name in FITTED and not seen.all():
@@ -225,6 +227,15 @@ def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     if bridged.any():
         result[BRIDGED] = bridged.astype(np.float64)
     return result
+
+
+def _wraps(name: str, series: Array) -> None:
+    """Refuse an angle that jumps by more than a turn: unwrapping would make an angle of it."""
+    largest = float(np.max(np.abs(np.diff(series)), initial=0.0))
+    if largest > 2.0 * np.pi + 0.5:
+        raise IdentificationError(
+            f"{name} jumps by {largest:.3g} rad from one row to the next: in degrees? {HINT}"
+        )
 
 
 def _long_s(t: Array) -> float:

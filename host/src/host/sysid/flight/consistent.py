@@ -1,0 +1,201 @@
+"""Identities of motion that hold for every aircraft: a column in another unit breaks them.
+
+How an angle turns follows from the rates, how the wind angles and the speed change from the rates
+and the specific force. Each column that moves one of them must do so with a factor of one. Noise
+on either side only widens the range of factors that a regression allows, from both directions;
+what lies outside as a whole is a unit, a sign or another clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.errors import IdentificationError
+from host.sysid.models.templates import GRAVITY_MPS2
+
+SURE, SOME = 0.5, 0.25  # partial correlation: less tells nothing about a sign, about a factor
+FACTOR = 1.5
+FOLLOWS = 0.3  # of an angle's rate that the gyro explains: less is another signal
+SOMEHOW = 0.05  # the same of a wind angle, which gusts turn too
+BLOCK_S, SLOW_S = 0.1, 0.5  # slopes are those of means over this long; slow: pitot and GPS
+FEWEST = 32  # means
+HINT = "give its unit or sign in the map (--map)"
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """How fast one column changes, and what of it each other column must account for."""
+
+    name: str
+    rate: Array
+    parts: dict[str, Array]
+    beside: tuple[Array, ...] = ()
+    follows: float = 0.0
+
+
+def consistent(flown: Mapping[str, Array], dt_s: float) -> list[str]:
+    """Return notes about angles that do not follow their rates.
+
+    Parameters
+    ----------
+    flown : mapping
+        SI columns in flight, every `dt_s`.
+
+    Raises
+    ------
+    IdentificationError
+        If a column moves another with a factor far from one.
+    """
+    notes = []
+    duration_s = dt_s * len(flown["t_s"])
+    for length_s, laws in ((BLOCK_S, _fast), (SLOW_S, _slow)):
+        # A record whose clock runs too fast is short, and must not escape by that.
+        block = max(1, round(min(length_s, duration_s / (4 * FEWEST)) / dt_s))
+        means = block_means(flown, block)
+        if len(means["t_s"]) < FEWEST:
+            continue
+        for law in laws(means):
+            notes += _judge(law)
+    return notes
+
+
+def block_means(flown: Mapping[str, Array], block: int) -> dict[str, Array]:
+    """Return the means of successive blocks of samples."""
+    count = len(flown["t_s"]) // block
+    return {k: v[: count * block].reshape(count, block).mean(axis=1) for k, v in flown.items()}
+
+
+def _judge(law: Identity) -> list[str]:
+    own = np.column_stack([np.ones(len(law.rate)), *law.beside])
+    rate = _without(law.rate, own)
+    power = float(rate @ rate)
+    whole = np.column_stack([own, *law.parts.values()])
+    left = _without(law.rate, whole)
+    if power > 0.0 and float(left @ left) > (1.0 - law.follows) * power:
+        return [
+            f"{law.name} does not follow {' and '.join(law.parts)}"
+            f" ({100.0 * (1.0 - float(left @ left) / power):.0f} % of its motion): another column,"
+            f" another clock, or a unit? {HINT}"
+        ]
+    for name, part in law.parts.items():
+        others = [v for k, v in law.parts.items() if k != name]
+        x, y = (_without(v, np.column_stack([own, *others])) for v in (part, law.rate))
+        xx, yy, xy = float(x @ x), float(y @ y), float(x @ y)
+        if xx < 1e-12 * len(x) or xy**2 < SOME**2 * xx * yy:
+            continue
+        low, high = sorted((xy / xx, yy / xy))  # noise on the left side, noise on the right
+        if high < 0.0:
+            if xy**2 < SURE**2 * xx * yy:
+                continue
+            raise IdentificationError(
+                f"{law.name} and {name} turn opposite ways (factor {xy / xx:.2g} where 1 is right):"
+                f" one of them has the wrong sign; {HINT}"
+            )
+        if low > FACTOR or high < 1.0 / FACTOR:
+            raise IdentificationError(
+                f"{law.name} moves {low if low > 1.0 else high:.3g} times as fast as {name} says:"
+                f" one of them has another unit; {HINT}"
+            )
+    return []
+
+
+def _without(values: Array, columns: Array) -> Array:
+    size = np.maximum(np.abs(columns).max(axis=0), 1e-12)
+    beta, *_ = np.linalg.lstsq(columns / size, values, rcond=None)
+    return np.asarray(values - (columns / size) @ beta)
+
+
+def _fast(m: Mapping[str, Array]) -> Iterator[Identity]:
+    """Attitude and wind angles."""
+    zero = np.zeros(len(m["t_s"]))
+    phi, theta = m.get("phi_rad", zero), m.get("theta_rad", zero)
+    alpha, beta = m.get("alpha_rad", zero), m.get("beta_rad", zero)
+    steep = np.clip(theta, -1.2, 1.2)
+    p, q, r = (m.get(f"{k}_radps", zero) for k in "pqr")
+    # What is small in level flight goes beside: too little to be judged itself.
+    roll_yaw = np.sin(phi) * q + np.cos(phi) * r
+    laws: tuple[tuple[str, str, Array, Array], ...] = (
+        ("theta_rad", "q_radps", np.cos(phi) * q, np.sin(phi) * r),
+        ("psi_rad", "r_radps", np.cos(phi) * r / np.cos(steep), np.sin(phi) * q / np.cos(steep)),
+        ("phi_rad", "p_radps", p, np.tan(steep) * roll_yaw),
+    )
+    for name, rate, part, beside in laws:
+        if name in m and rate in m:
+            yield _law(name, m, {rate: part}, (beside,), follows=FOLLOWS)
+    yield from _wind_angles(m, phi, theta, alpha, beta, (p, q, r))
+
+
+def _wind_angles(
+    m: Mapping[str, Array],
+    phi: Array,
+    theta: Array,
+    alpha: Array,
+    beta: Array,
+    rates: tuple[Array, Array, Array],
+) -> Iterator[Identity]:
+    """Return what turns the wind angles: rates, and forces where they were measured."""
+    p, q, r = rates
+    pitch = q - beta * (np.cos(alpha) * p + np.sin(alpha) * r)
+    yaw = np.sin(alpha) * p - np.cos(alpha) * r
+    forces = all(f"a{k}_mps2" in m for k in "yz") and "theta_rad" in m and "airspeed_mps" in m
+    if not forces:
+        # Without the forces stands what makes them: they are about linear in it.
+        zero = np.zeros(len(alpha))
+        if "alpha_rad" in m and "q_radps" in m:
+            made = (alpha, m.get("elevator_rad", zero))
+            yield _law("alpha_rad", m, {"q_radps": pitch}, made)
+        if "beta_rad" in m and "r_radps" in m:
+            yield _law("beta_rad", m, {"r_radps": yaw}, (beta, phi, m.get("rudder_rad", zero)))
+        return
+    # With the weight in one term: alone, the side force drowns in errors of the bank angle.
+    speed = np.maximum(m["airspeed_mps"], 1.0)
+    ax = m.get("ax_mps2", GRAVITY_MPS2 * np.sin(theta))
+    down = m["az_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.cos(phi)
+    along = ax - GRAVITY_MPS2 * np.sin(theta)
+    lift = (np.cos(alpha) * down - np.sin(alpha) * along) / speed
+    side = (m["ay_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.sin(phi)) / speed
+    if "alpha_rad" in m and "q_radps" in m:
+        parts = {"q_radps": pitch, "az_mps2 over airspeed_mps": lift}
+        yield _law("alpha_rad", m, parts, follows=SOMEHOW)
+    if "beta_rad" in m and "r_radps" in m:
+        parts = {"r_radps": yaw, "ay_mps2 over airspeed_mps": side}
+        yield _law("beta_rad", m, parts, follows=SOMEHOW)
+
+
+def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
+    """Speed and height."""
+    if all(f"a{k}_mps2" in m for k in "xz") and "theta_rad" in m and "airspeed_mps" in m:
+        zero = np.zeros(len(m["t_s"]))
+        theta, phi, alpha = m["theta_rad"], m.get("phi_rad", zero), m.get("alpha_rad", zero)
+        fall = np.sin(alpha) * np.cos(theta) * np.cos(phi) - np.cos(alpha) * np.sin(theta)
+        known = GRAVITY_MPS2 * fall + np.sin(alpha) * m["az_mps2"]
+        yield _law("airspeed_mps", m, {"ax_mps2": np.cos(alpha) * m["ax_mps2"]}, known=known)
+    if "altitude_m" in m and "v_down_mps" in m:
+        yield _law("altitude_m", m, {"v_down_mps": -m["v_down_mps"]})
+
+
+def _law(
+    name: str,
+    m: Mapping[str, Array],
+    parts: Mapping[str, Array],
+    beside: tuple[Array, ...] = (),
+    *,
+    known: Array | None = None,
+    follows: float = 0.0,
+) -> Identity:
+    """Return the identity over each step: a difference on the left, an integral on the right."""
+    step_s = np.diff(m["t_s"])
+    calm = step_s < 1.5 * float(np.median(step_s))  # between two stretches of flight is a jump
+    calm = calm[:-2] & calm[1:-1] & calm[2:]
+
+    def over(x: Array) -> Array:
+        """Average over a step by the cubic through four points."""
+        return np.asarray((13.0 * (x[1:-2] + x[2:-1]) - x[:-3] - x[3:]) / 24.0)[calm]
+
+    rate = (np.diff(m[name]) / step_s)[1:-1][calm] - (0.0 if known is None else over(known))
+    here = {k: over(v) for k, v in parts.items()}
+    return Identity(name, rate, here, tuple(over(b) for b in beside), follows)
