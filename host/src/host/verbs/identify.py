@@ -156,7 +156,7 @@ def run(args: argparse.Namespace) -> int:
         from host.sysid.answer.json import answer_document, coefficient_document, json_text
         from host.sysid.answer.truth import truth_document
 
-        documents = [answer_document(a, words([a], [])) for a in answers]
+        documents = [answer_document(a, words([a], []) + taken_out([a])) for a in answers]
         if direct:
             documents.append(coefficient_document(direct, coefficient_words(direct)))
         text = json_text(
