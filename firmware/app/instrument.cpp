@@ -132,7 +132,8 @@ bool Instrument::self_test_passed() const {
 }
 
 void Instrument::put_system(uint32_t now_us) {
-  self_test_ = self_test_passed();  // the supply is measured once a second
+  // The supply is measured once a second.
+  self_test_ = core::supply_still_good(self_test_, hal::avcc_mv(), store_.reference_mv());
   const uint32_t elapsed_us = now_us - system_us_;
   uptime_us_ += elapsed_us;
   while (uptime_us_ >= kSecondUs) {

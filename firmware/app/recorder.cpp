@@ -279,11 +279,11 @@ bool Recorder::stream_ended(uint32_t now_us) {
     hal::end_stream();
     stream_open_ = false;
     stream_closing_ = true;
-    accepted_us_ = hal::now_us();
+    busy_from_us_ = hal::now_us();
     return false;
   }
   if (!stream_closing_) return true;
-  if (hal::poll_stream() == CardStatus::kBusy && now_us - accepted_us_ < kDeadUs) return false;
+  if (hal::poll_stream() == CardStatus::kBusy && now_us - busy_from_us_ < kDeadUs) return false;
   stream_closing_ = false;
   return true;
 }
@@ -326,12 +326,13 @@ void Recorder::stream(uint32_t now_us) {
   }
   switch (hal::poll_stream()) {
     case CardStatus::kBusy:
-      if (programming_ && now_us - accepted_us_ >= kDeadUs) {
+      if (now_us - busy_from_us_ >= kDeadUs) {
         fail(frames::Event::kCardError, static_cast<uint32_t>(CardStatus::kBusy), now_us);
       }
       return;
     case CardStatus::kOk:
       note_busy(now_us);
+      busy_from_us_ = now_us;
       if (!writer_.due(now_us)) {
         tell_stall(now_us);
         return;
@@ -354,6 +355,7 @@ void Recorder::open_stream(uint32_t now_us) {
   const CardStatus status = hal::begin_stream(volume_.file().first_lba + writer_.sequence());
   if (status == CardStatus::kOk) {
     stream_open_ = true;
+    busy_from_us_ = now_us;
   } else if (status == CardStatus::kAbsent) {
     fail(frames::Event::kCardRemoved, 0, now_us);
   } else if (status != CardStatus::kBusy) {
@@ -374,7 +376,7 @@ void Recorder::close_block(uint32_t now_us) {
     writer_.accepted();
     rejects_ = 0;
     programming_ = true;
-    accepted_us_ = hal::now_us();
+    busy_from_us_ = hal::now_us();
     tell_stall(now_us);
     return;
   }
@@ -397,7 +399,7 @@ void Recorder::close_block(uint32_t now_us) {
 void Recorder::note_busy(uint32_t now_us) {
   if (!programming_) return;
   programming_ = false;
-  const uint32_t busy_us = now_us - accepted_us_;
+  const uint32_t busy_us = now_us - busy_from_us_;
   const uint32_t busy_ms = busy_us / 1000U;
   if (busy_ms > busy_max_ms_) busy_max_ms_ = static_cast<uint16_t>(busy_ms);
   if (busy_us >= kStallUs) stall_ms_ = static_cast<uint16_t>(busy_ms > 0xFFFFU ? 0xFFFFU : busy_ms);

@@ -84,7 +84,7 @@ class Recorder {
   core::BootControl boot_;
   const frames::ConfigFrame* config_ = nullptr;
   uint32_t retry_us_ = 0;
-  uint32_t accepted_us_ = 0;
+  uint32_t busy_from_us_ = 0;  // the card was last seen idle, opened, or given a block
   uint32_t marks_ = 0;
   uint32_t ended_us_ = 0;
   uint16_t card_errors_ = 0;

@@ -66,6 +66,7 @@ class Sensors {
   core::Every mag_turn_;
   core::Every attitude_turn_;
   frames::IdentFrame ident_ = {};
+  uint32_t scan_us_ = 0;  // the last scan began
   uint32_t imu_heard_us_ = 0;
   uint32_t gps_heard_us_ = 0;
   uint32_t date_itow_ms_ = 0;

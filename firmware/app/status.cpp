@@ -236,7 +236,7 @@ void Status::analog(const char* name, const Sensors& sensors, uint8_t slot, uint
 
 void Status::rail(uint16_t sum, uint16_t supply_mv) {
   out_.flash(kRailText);
-  if (sum < kLeastRailSum || supply_mv == 0) {
+  if (sum < kLeastRailSum || sum == frames::kSystemRailInvalid || supply_mv == 0) {
     out_.flash(kMissing);
     return;
   }

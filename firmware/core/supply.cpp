@@ -28,4 +28,8 @@ bool supply_good(uint16_t nominal_mv, uint16_t reference_mv) {
   return supply_mv(nominal_mv, at_most) >= kLeastSupplyMv;
 }
 
+bool supply_still_good(bool before, uint16_t nominal_mv, uint16_t reference_mv) {
+  return nominal_mv == 0 ? before : supply_good(nominal_mv, reference_mv);
+}
+
 }  // namespace core

@@ -23,5 +23,8 @@ uint16_t supply_mv(uint16_t nominal_mv, uint16_t reference_mv);
 // False when the supply is below 4.5 V for sure: without a calibration, even by a part of 1.2 V.
 // False while it is not measured: nothing is proven yet.
 bool supply_good(uint16_t nominal_mv, uint16_t reference_mv);
+// The same in flight, where a supply that is no longer measured (its converter failed) is as good
+// as it was `before`: a sensor never releases the relay, and the brown-out detector still does.
+bool supply_still_good(bool before, uint16_t nominal_mv, uint16_t reference_mv);
 
 }  // namespace core

@@ -366,14 +366,14 @@ class SdCard {
 
   bool receive(uint8_t* to, uint16_t size, uint32_t limit_us) {
     const uint32_t from_us = spi_.now_us();
-    uint8_t token = spi_.transfer(0xFF);
-    while (token == 0xFF) {
+    uint8_t token = 0xFF;
+    do {
       if (spi_.now_us() - from_us > limit_us) {
         return fail(CardStatus::kReadToken);
       }
-      spi_.waiting();
+      spi_.waiting();  // at least once: a search reads thousands of blocks of a card that is quick
       token = spi_.transfer(0xFF);
-    }
+    } while (token == 0xFF);
     if (token != kTokenBlock) {
       return fail(CardStatus::kReadToken);
     }

@@ -12,7 +12,8 @@ constexpr uint8_t kAnalogRail = 10;
 constexpr uint16_t kConversionUs = 104;
 constexpr uint16_t kScanUs = kConversionUs * kAnalogSlots * kAnalogRounds;  // 4576
 
-// At boot, and again when a scan is not done long after its time: the converter was disturbed.
+// At boot, and again when a scan is not done long after its time: the converter was disturbed. The
+// sums of that scan are 0, and the supply is unknown until it is measured anew within two seconds.
 void start_analog();
 
 // Conversion n of a scan holds the voltage of 12 us after the scan's start plus n * 104 us.
@@ -23,7 +24,8 @@ void start_analog();
 void arm_scan(uint8_t mask);
 
 // Starts a scan now, when none runs, and gives its instant; nothing is armed afterwards. False: a
-// packet has just started one. Main loop only.
+// packet has just started one. Waits for the supply's measurement, which takes 208 us once a
+// second; one that does not end in 300 us is given up as by start_analog(). Main loop only.
 bool start_scan(uint32_t* started_us);
 
 // The scan of the last start_scan(), or of the last packet released that started one. It is done

@@ -7,6 +7,7 @@ namespace hal {
 
 constexpr uint16_t kEepromBytes = 4096;  // of the Mega; the IMU's chip has 1024
 
+// Waits for a write just begun (3.4 ms); of a memory that stays busy, 0xFF, as of an erased one.
 uint8_t read_eeprom(uint16_t address);
 
 // False while the last byte is still being written (3.4 ms). Main loop only.

@@ -5,6 +5,7 @@
 
 #include "boards/arduimu/board.h"
 #include "boards/arduimu/twi_master.h"
+#include "boards/avr/spi.h"
 
 namespace arduimu {
 namespace {
@@ -20,12 +21,20 @@ class Selected {
   Selected& operator=(const Selected&) = delete;
 };
 
-// The master's own clock ends every byte: nothing to wait for but 8 us.
+constexpr uint8_t kPolls = 40;  // a byte: 128 cycles
+
+void set_control() {
+  SPCR = _BV(SPE) | _BV(MSTR) | _BV(CPOL) | _BV(CPHA) | _BV(SPR0);  // 16 MHz / 16
+  SPSR = 0;
+}
+
 uint8_t exchange(const uint8_t out) {
   SPDR = out;
-  while ((SPSR & _BV(SPIF)) == 0) {
+  if (avr::spi_ended(kPolls)) {
+    return SPDR;
   }
-  return SPDR;
+  set_control();
+  return 0xFF;
 }
 
 bool read_twi(uint8_t address, uint8_t reg, uint8_t* out, uint8_t size) {
@@ -51,8 +60,7 @@ void start_spi() {
   PORTD |= kSelect;
   DDRD |= kSelect;
   DDRB |= _BV(2) | _BV(3) | _BV(5);  // SS as an output, else the SPI may fall to slave; MOSI, SCK
-  SPCR = _BV(SPE) | _BV(MSTR) | _BV(CPOL) | _BV(CPHA) | _BV(SPR0);  // 16 MHz / 16
-  SPSR = 0;
+  set_control();
 }
 
 bool MpuBus::read(uint8_t reg, uint8_t* out, uint8_t size) {

@@ -2,13 +2,24 @@
 #include "hal/eeprom.h"
 
 #include <avr/io.h>
+#include <util/delay.h>
 
 #include "boards/avr/interrupts_off.h"
+
+namespace {
+
+constexpr uint16_t kPolls = 500;  // of 10 us: 5 ms, for the 3.4 ms of a write
+
+}  // namespace
 
 namespace hal {
 
 uint8_t read_eeprom(const uint16_t address) {
-  while (!eeprom_ready()) {  // 3.4 ms, and only when a write was just begun
+  for (uint16_t left = kPolls; !eeprom_ready(); --left) {
+    if (left == 0) {
+      return 0xFF;
+    }
+    _delay_us(10);
   }
   EEAR = address;
   EECR |= _BV(EERE);

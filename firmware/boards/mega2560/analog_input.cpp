@@ -26,6 +26,7 @@ constexpr uint8_t kConversions = hal::kAnalogSlots * hal::kAnalogRounds;
 constexpr uint8_t kScansPerSupply = 128;  // about once a second
 // Of the supply, behind a scan: the first only settles the reference, which wants 70 us.
 constexpr uint8_t kSupplyConversions = 2;
+constexpr uint32_t kSupplyUs = 300;  // of those, with all that interrupts add
 constexpr uint8_t kSumBytes = 2 * hal::kAnalogSlots;
 
 constexpr uint8_t kIdle = _BV(ADEN) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);  // 125 kHz
@@ -239,10 +240,16 @@ namespace hal {
 void start_analog() {
   DIDR0 = 0xFF;  // A0 to A7 are analogue only
   DIDR2 = _BV(ADC13D) | _BV(ADC14D) | _BV(ADC15D);
+  ADCSRA = 0;  // ends the conversion under way, and its interrupt
   ADCSRA = kIdle;
   if (adc_end == 0) {
     adc_end = kSumBytes;
   }
+  for (volatile uint16_t& sum : adc_sums) {
+    sum = 0;
+  }
+  adc_bandgap = 0;
+  adc_wanted = 0;
   adc_supply = 0;
   adc_left = 0;
 }
@@ -261,7 +268,10 @@ bool start_scan(uint32_t* const started_us) {
   if (mega::g_scan_waits) {
     return false;
   }
-  while (mega::adc_busy()) {  // the supply's conversions: 208 us once a second
+  for (const uint32_t from_us = now_us(); mega::adc_busy();) {
+    if (now_us() - from_us > kSupplyUs) {
+      start_analog();
+    }
   }
   clear_next_sums();
   const uint16_t started_ticks = mega::begin_scan();
@@ -273,8 +283,12 @@ bool start_scan(uint32_t* const started_us) {
 }
 
 bool scan_done() {
+  // In this order: a packet may start a scan in between, and that is not the one asked for.
+  if (adc_left == 0) {
+    return true;
+  }
   const uint8_t writing = adc_end == kSumBytes ? 0 : 1;
-  return adc_left == 0 || writing != g_reading;
+  return writing != g_reading;
 }
 
 uint16_t scan_sum(const uint8_t slot) {

@@ -4,6 +4,7 @@
 #include <avr/io.h>
 #include <string.h>
 
+#include "boards/avr/spi.h"
 #include "boards/mega2560/generated/pins.h"
 #include "drivers/sd_card.h"
 #include "hal/clock.h"
@@ -18,9 +19,7 @@ class Spi {
   static uint8_t transfer(const uint8_t byte) {
     finish();
     SPDR = byte;
-    while ((SPSR & _BV(SPIF)) == 0) {
-    }
-    return SPDR;
+    return avr::spi_ended(polls_) ? SPDR : kNoCard;
   }
   // Returns while the byte is shifted out: 16 cycles at 8 MHz, in which a CRC step fits.
   static void send(const uint8_t byte) {
@@ -42,10 +41,12 @@ class Spi {
     start();
     SPCR = _BV(SPE) | _BV(MSTR) | _BV(SPR1);  // 16 MHz / 64 = 250 kHz
     SPSR = 0;
+    polls_ = 120;  // a byte: 512 cycles
   }
   static void fast() {
     SPCR = _BV(SPE) | _BV(MSTR);
     SPSR = _BV(SPI2X);  // 16 MHz / 2
+    polls_ = 12;        // a byte: 16 cycles
   }
   static uint32_t now_us() { return hal::now_us(); }
   static void waiting() {
@@ -57,8 +58,7 @@ class Spi {
  private:
   static void finish() {
     if (shifting_) {
-      while ((SPSR & _BV(SPIF)) == 0) {
-      }
+      avr::spi_ended(polls_);
       shifting_ = false;
     }
   }
@@ -69,14 +69,18 @@ class Spi {
       pins::CardCs::direction() |= pins::CardCs::kMask;
       pins::CardSck::direction() |= pins::CardSck::kMask;
       pins::CardMosi::direction() |= pins::CardMosi::kMask;
-      pins::CardMiso::port() |= pins::CardMiso::kMask;  // no card reads as 0xFF
+      pins::CardMiso::port() |= pins::CardMiso::kMask;  // no card reads as kNoCard
     }
   }
 
+  static constexpr uint8_t kNoCard = 0xFF;
+
   static bool shifting_;
+  static uint8_t polls_;
 };
 
 bool Spi::shifting_ = false;
+uint8_t Spi::polls_ = 0;
 
 Spi g_spi;
 drivers::SdCard<Spi> g_card(g_spi);

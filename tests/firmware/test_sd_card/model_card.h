@@ -17,6 +17,7 @@ class ModelCard {
   bool high_capacity = true;
   bool wrong_voltage = false;
   uint16_t negotiations = 3;  // ACMD41 answers idle this often
+  uint8_t gap_bytes = 2;      // before a block to the host
   uint16_t busy_bytes = 5;    // after each block; 0xFFFF: for ever
   uint32_t base = 0;          // first sector kept
   int16_t flip_byte = -1;     // of the next data block from the host, on the wire
@@ -123,7 +124,7 @@ class ModelCard {
   void send_block(const uint8_t* from, uint16_t size) {
     source_ = from;
     source_size_ = size;
-    sending_ = static_cast<uint16_t>(size + 5);
+    sending_ = static_cast<uint16_t>(size + 3 + gap_bytes);
   }
 
   void take(uint8_t out) {

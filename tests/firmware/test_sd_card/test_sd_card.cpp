@@ -157,6 +157,17 @@ TEST_CASE("a call that waits gives up after a second and calls back meanwhile") 
   CHECK(bench.model.waits > 500);
 }
 
+TEST_CASE("a card that keeps nobody waiting is read with a call back for every block") {
+  Bench bench;
+  REQUIRE(bench.start());
+  bench.model.gap_bytes = 0;
+  const uint16_t before = bench.model.waits;
+  for (uint8_t block = 0; block < 10; ++block) {
+    CHECK(bench.card.read(0, sector_buffer));
+  }
+  CHECK_EQ(bench.model.waits - before, 10);
+}
+
 TEST_CASE("a stream: one block behind the other, one byte per look at a busy card") {
   Bench bench;
   bench.model.busy_bytes = 40;

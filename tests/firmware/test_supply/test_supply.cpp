@@ -16,6 +16,16 @@ TEST_CASE("a healthy board passes whatever its reference, a starved one fails fo
   CHECK(!core::supply_good(0, 0));  // not measured yet
 }
 
+TEST_CASE("a supply no longer measured stays as it was, one measured too low does not") {
+  for (uint8_t before = 0; before < 2; ++before) {
+    const bool good = before != 0;
+    CHECK(core::supply_still_good(good, 0, 0) == good);
+    CHECK(core::supply_still_good(good, 0, 1137) == good);
+    CHECK(core::supply_still_good(good, 5000, 0));
+    CHECK(!core::supply_still_good(good, 4100, 0));
+  }
+}
+
 TEST_CASE("a calibrated measurement is the meter's within 10 mV") {
   for (uint16_t reference_mv = 1000; reference_mv <= 1200; reference_mv += 7) {
     const uint16_t seen_mv = static_cast<uint16_t>(5020UL * 1100U / reference_mv);

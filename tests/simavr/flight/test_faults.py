@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 CHOSEN = (
     "card busy 1.2 s",
+    "card's line low for 4 s",
+    "SPI switched off in its register",
+    "supply's conversion never ends",
+    "no conversion ever ends",
     "block refused twice",
     "every block refused for 3 s",
     "pressure words 0xFFFF",

@@ -19,11 +19,12 @@ extern "C" {
 
 // ---- set by the tests ----
 volatile uint16_t servo_wanted[hal::kServoOutputs];
-volatile uint8_t scan_period_ms;  // 0: no scans
-volatile uint8_t chatter;         // keeps the radio's transmitter busy
-volatile uint8_t hang;            // 1: main loop stops; 2: with interrupts off
-volatile uint8_t watch;           // 1: start the watchdog
-volatile uint8_t wipe_eeprom;     // value to write into byte 7
+volatile uint8_t scan_period_ms;    // 0: no scans
+volatile uint8_t chatter;           // keeps the radio's transmitter busy
+volatile uint8_t hang;              // 1: main loop stops; 2: with interrupts off
+volatile uint8_t watch;             // 1: start the watchdog
+volatile uint8_t read_eeprom_busy;  // 1: read without asking whether it is ready
+volatile uint8_t wipe_eeprom;       // value to write into byte 7
 
 // ---- read by the tests ----
 uint16_t edge_ticks[512];
@@ -167,7 +168,7 @@ int main() {
       hal::write_eeprom(7, wipe_eeprom);
       wipe_eeprom = 0;
     }
-    if (hal::eeprom_ready()) {
+    if (hal::eeprom_ready() || read_eeprom_busy != 0) {
       eeprom_byte = hal::read_eeprom(7);
     }
     if ((turns & 255U) == 0) {

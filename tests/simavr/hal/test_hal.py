@@ -16,6 +16,7 @@ MakeProbe = Callable[[], "Chip"]
 
 MS = 16_000
 US = 16
+EECR = 0x3F
 LINES = [f"PK{bit}" for bit in range(5)]
 
 
@@ -259,6 +260,39 @@ def test_reference_is_shown_only_when_it_has_settled(make_probe: MakeProbe) -> N
         chip.run_until(chip.cycle + 20 * US)
         shown.add(chip.read("adc_bandgap"))
     assert shown == {0, int(1.1 * 1024 / 4.8)}
+
+
+def test_supply_that_never_ends_costs_no_scan(make_probe: MakeProbe) -> None:
+    chip = make_probe()
+    for slot, channel in enumerate(CHANNELS):
+        chip.analog(channel, 5.0 * (60 + 83 * slot + 0.5) / 1024)
+    poke_u8(chip, "scan_period_ms", 5)
+    poke_u8(chip, "watch", 1)
+    chip.run_s(1.4)
+    assert chip.read("supply_mv") == pytest.approx(5000, abs=25)
+    chip.analog_stick(0x1E)
+    before = chip.read("scans")
+    chip.run_s(1.5)
+    assert chip.read("scans") - before >= 295
+    assert chip.read("supply_mv") == 0  # unknown, not the last one for ever
+    assert chip.read("reset_was") == 1  # power-on: the watchdog was fed all the time
+    sums = chip.read_array("scan_sums", "<u2")
+    assert sums.tolist() == [4 * (60 + 83 * slot) for slot in range(11)]
+    chip.analog_stick()
+    chip.run_s(1.4)
+    assert chip.read("supply_mv") == pytest.approx(5000, abs=25)
+
+
+def test_eeprom_that_stays_busy_reads_as_erased(make_probe: MakeProbe) -> None:
+    chip = make_probe()
+    poke_u8(chip, "wipe_eeprom", 0x5A)
+    chip.run_s(0.01)
+    chip.poke(EECR, b"\x02")  # EEPE, and no write that would end
+    chip.poke(chip.symbols["read_eeprom_busy"][0], b"\1")
+    before = chip.read("turns")
+    chip.run_s(0.1)
+    assert chip.read("eeprom_byte") == 0xFF
+    assert chip.read("turns") - before >= 10
 
 
 def test_packets_arrive_whole_with_their_address_and_time(make_probe: MakeProbe) -> None:

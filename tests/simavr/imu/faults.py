@@ -40,6 +40,7 @@ FRESH, UNSATURATED, ATTITUDE = 1 << 10, 1 << 11, 1 << 12
 IMU_WATCHDOG = 6
 LOAD_LIMIT = 0.60  # of the IMU's cycles, whatever happens
 IMU_DATA_READY = 1
+SPCR = 0x4C
 
 
 @dataclass(slots=True)
@@ -178,6 +179,8 @@ FAULTS = (
           lambda r: r.board.mpu.fail(MpuFault.NONE), events=LOST, heard=NONE, recovered_ms=900),
     Fault("MPU resets by itself", "sets it up again", "lost and found",
           lambda r: r.board.mpu.reset(), events=LOST, heard=(0.75, 0.96)),
+    Fault("SPI off in its register", "sets it up again", "loses a sample or two",
+          lambda r: r.board.chip.poke(SPCR, b"\0"), heard=(0.95, 1.0)),
     Fault("MPU stuck", "sends 20, then none", "lost, timer triggers, found",
           lambda r: r.board.mpu.fail(MpuFault.STUCK),
           lambda r: r.board.mpu.fail(MpuFault.NONE), events=LOST, heard=(0.0, 0.04),

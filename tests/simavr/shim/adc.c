@@ -87,6 +87,7 @@ static uint64_t next_edge(const chip* c) {
 
 static void done(chip* c, void* param, uint64_t sampled_at) {
   (void)param;
+  if (c->adc.stuck >> c->adc.mux & 1) return;  // until the converter is switched off
   const uint16_t result = convert(c, sampled_at);
   if (!c->adc.locked) c->adc.result = result;
   c->adc.conversions++;

@@ -199,6 +199,10 @@ void bench_analog_noise(chip* c, uint32_t channel, double lsb) {
   c->adc.channel[channel].noise_lsb = lsb;
 }
 
+void bench_analog_stick(chip* c, uint64_t settings) {
+  c->adc.stuck = settings;
+}
+
 void bench_analog_supply(chip* c, double avcc, double aref, double bandgap) {
   c->adc.avcc_volt = avcc;
   c->adc.aref_volt = aref;

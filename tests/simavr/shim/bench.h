@@ -60,6 +60,7 @@ BENCH_API void bench_analog_set(
     chip* c, uint32_t channel, const double* cycles, const double* volts, uint32_t count);
 BENCH_API void bench_analog_noise(chip* c, uint32_t channel, double lsb);
 BENCH_API void bench_analog_supply(chip* c, double avcc, double aref, double bandgap);
+BENCH_API void bench_analog_stick(chip* c, uint64_t settings);
 BENCH_API uint64_t bench_adc_conversions(const chip* c);
 
 BENCH_API void bench_uart_send(chip* c,
@@ -159,6 +160,7 @@ BENCH_API void bench_sd_reject(sd_card* s, uint64_t from_cycle, uint32_t count, 
 BENCH_API void bench_sd_power_cut(sd_card* s);
 BENCH_API bool bench_sd_busy(const sd_card* s);
 BENCH_API void bench_sd_fail_reads(sd_card* s, bool fail);
+BENCH_API void bench_sd_hold_line(sd_card* s, bool low);
 // Keeps every block that was programmed from now on, in the caller's memory; a power cut at any
 // instant of the run can be told from it. `ended` is UINT64_MAX while the card is busy with it;
 // what a cut spoiled carries the garbage. Records beyond `capacity` are counted, not kept.

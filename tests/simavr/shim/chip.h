@@ -263,6 +263,7 @@ struct chip {
     adc_channel channel[16];
     double avcc_volt, aref_volt, bandgap_volt;
     uint64_t conversions;
+    uint64_t stuck;  // bit per multiplexer setting: its conversions never end
   } adc;
 
   struct {

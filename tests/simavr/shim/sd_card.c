@@ -166,9 +166,7 @@ static bool write_byte(sd_card* s, uint8_t mosi) {
   return false;
 }
 
-static uint8_t exchange(chip* c, void* param, uint8_t mosi, bool selected) {
-  (void)c;
-  sd_card* const s = param;
+static uint8_t answer(sd_card* s, uint8_t mosi, bool selected) {
   if (!s->present) return 0xFF;
   if (!selected) {
     s->clocks_deselected += 8;
@@ -191,6 +189,13 @@ static uint8_t exchange(chip* c, void* param, uint8_t mosi, bool selected) {
     sd_command(s);
   }
   return miso;
+}
+
+static uint8_t exchange(chip* c, void* param, uint8_t mosi, bool selected) {
+  (void)c;
+  sd_card* const s = param;
+  const uint8_t miso = answer(s, mosi, selected);
+  return s->line_low ? 0 : miso;
 }
 
 static void forget(sd_card* s) {
@@ -240,6 +245,9 @@ bool bench_sd_busy(const sd_card* s) {
 }
 void bench_sd_fail_reads(sd_card* s, bool fail) {
   s->reads_fail = fail;
+}
+void bench_sd_hold_line(sd_card* s, bool low) {
+  s->line_low = low;
 }
 void bench_sd_journal(sd_card* s, sd_record* records, uint64_t capacity) {
   s->journal = records;

@@ -53,7 +53,7 @@ struct sd_card {
   uint32_t stall_head, stall_count;
   uint64_t reject_from;
   uint32_t reject_count, reject_token;
-  bool reads_fail;
+  bool reads_fail, line_low;
   sd_record* journal;
   uint64_t journal_count, journal_capacity;
 };

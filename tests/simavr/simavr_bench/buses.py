@@ -54,6 +54,10 @@ class BusAccess(Observation):
         aref = avcc_volt if aref_volt is None else aref_volt
         self._lib.bench_analog_supply(self.handle, avcc_volt, aref, bandgap_volt)
 
+    def analog_stick(self, *settings: int) -> None:
+        """Never end a conversion of these settings of the multiplexer (0x1E: the reference)."""
+        self._lib.bench_analog_stick(self.handle, sum(1 << setting for setting in settings))
+
     @property
     def adc_conversions(self) -> int:
         """Conversions finished so far."""

@@ -138,6 +138,10 @@ class SdCard:
         """Answer reads of blocks with an error token: its own error correction failed."""
         self._lib.bench_sd_fail_reads(self._card, fail)
 
+    def hold_line(self, low: bool) -> None:
+        """Hold the line to the chip low, as a short or a hung card does."""
+        self._lib.bench_sd_hold_line(self._card, low)
+
     @property
     def busy(self) -> bool:
         """Whether it is programming now."""
