@@ -9,7 +9,9 @@ from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, po
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.joint import LastStep, prediction, pulls
-from host.sysid.coefficients.windows import Block, Key, Window, stacked, window_block
+from host.sysid.coefficients.step import Known, stepped
+from host.sysid.coefficients.stretches import Side, Unknowns, stretches, summed
+from host.sysid.coefficients.windows import Block, Key, Window, window_block
 from host.sysid.compatibility.signals import Spectrum
 from host.sysid.flight.tables import even_columns
 from host.sysid.numerics.repeats import scatter
@@ -44,17 +46,14 @@ def problem(seed: int, sizes: tuple[float, ...], bias: float = 0.4) -> tuple[lis
 def solved(
     blocks: list[Block], spectra: dict[Key, Spectrum], slopes: dict[Key, Spectrum]
 ) -> LastStep:
-    own = {"Cm": np.zeros(2)}
-    A, Z, y, keys = stacked(
-        blocks, spectra, spectra, {"Cm": TERMS}, slopes, slopes, own,
-        {"Cm_alpha": 0, "Cm_q": 1}, 1, NOISE, ({}, {}),
-    )  # fmt: skip
-    prior = np.zeros(A.shape[1])
-    prior[-1] = SD**-2
-    normal = Z.T @ A + np.diag(prior)
-    scale = np.diag(normal) ** -0.5
-    inverse = np.linalg.inv(normal * np.outer(scale, scale)) * np.outer(scale, scale)
-    return LastStep(A, Z, y, normal, Z.T @ y, inverse, tuple(keys), NOISE, spectra, 2, 1)
+    unknowns = Unknowns({"Cm": np.arange(2)}, 2, 0, 1)
+    side = Side(spectra, {}, slopes)
+    parts = stretches(blocks, side, side, {"Cm": np.zeros(2)}, unknowns, NOISE)
+    known = Known(np.diag([0.0, 0.0, SD**-2]), np.zeros(3))
+    position = {"Cm_alpha": 0, "Cm_q": 1}
+    none = np.zeros(0, dtype=np.int64)
+    step = stepped(summed(parts, unknowns.count), known, position, none, np.zeros(0))
+    return LastStep(parts, step, unknowns, NOISE, spectra)
 
 
 def without_line(values: Array, trends: Spectrum) -> Array:
@@ -76,7 +75,7 @@ def test_leaving_one_out_is_fitting_the_others() -> None:
             {("Cm", n): last.spectra["Cm", j] for n, j in enumerate(rest)},
             {("Cm", n): -error_of(last, blocks, j) for n, j in enumerate(rest)},
         )
-        step = again.inverse @ again.right
+        step = again.solved.step
         spectrum = last.spectra["Cm", k]
         missed = (
             spectrum[:, 0] - spectrum[:, 1:] @ step[:2] - error_of(last, blocks, k)[:, 0] * step[-1]
@@ -92,9 +91,8 @@ def test_leaving_one_out_is_fitting_the_others() -> None:
 
 def error_of(last: LastStep, blocks: list[Block], k: int) -> Spectrum:
     """Return what one unit of the instrument's error adds to the left side of a window."""
-    part = last.rows(blocks)["Cm", k]
     weight = np.sqrt(2.0 / np.interp(blocks[k].hertz, *NOISE["Cm"]))
-    real, imaginary = last.A[part, -1].reshape(2, -1) / weight
+    real, imaginary = last.parts[k].A[:, -1].reshape(2, -1) / weight
     return np.asarray(real + 1j * imaginary)[:, None]
 
 
@@ -111,7 +109,7 @@ def test_maneuvers_of_one_aircraft_agree_as_often_as_chance_says() -> None:
     p = []
     for seed in range(200):
         blocks, last = problem(seed, (1.0, 1.0, 0.8, 1.2), bias=0.0)
-        pull, share, variance = pulls(last, blocks, np.eye(2, last.A.shape[1]))
+        pull, share, variance = pulls(last, blocks, np.eye(2, last.unknowns.count))
         # Spectra of this problem are five times its noise: 0.18 of 1 by variance.
         level = 2.0 * 0.3**2 / 2.0 * np.mean(2.0 / np.interp(blocks[0].hertz, *NOISE["Cm"]))
         p += scatter(("Cm_alpha", "Cm_q"), pull, share, level * variance).p_value.tolist()

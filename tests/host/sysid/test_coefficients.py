@@ -11,9 +11,11 @@ from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.aircraft.instrument_errors import InstrumentData, deviations
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
+from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.coefficients.windows import Window
 from host.sysid.compatibility.signals import Record, corrected, usable_length
 from host.sysid.errors import IdentificationError
+from host.sysid.flight.finder import Found
 from host.sysid.flight.tables import even_columns
 from host.sysid.study.flights import PRINCIPAL, Tally
 from host.twin.testcard.cards import load
@@ -151,6 +153,13 @@ def test_what_is_missing_is_named() -> None:
     empty: dict[str, np.ndarray] = {"t_s": np.arange(10.0)}
     with pytest.raises(IdentificationError, match="alpha_rad"):
         fit_coefficients(empty, [], airframe_data(NAME), instrument_data(NAME), powerplant(NAME))
+
+
+def test_a_flight_of_two_seconds_is_refused_in_one_line() -> None:
+    t = np.arange(200) * 0.01
+    moved = Found("elevator_rad", "window", 0.5, 1.0, 1.9, 0.1, 0)
+    with pytest.raises(IdentificationError, match="more than the 3 s after the launch"):
+        identify_coefficients({"t_s": t, "airspeed_mps": np.full(200, 17.0)}, NAME, windows=[moved])
 
 
 def test_a_table_counts_wild_cases_without_a_flag() -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array, BoolArray
+from host.compiled import Array
 from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
 from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
 from host.sysid.aircraft.instrument_errors import InstrumentData
@@ -116,6 +116,11 @@ def identify_coefficients(
         raise IdentificationError("coefficients need the columns airspeed_mps and qbar_pa")
     flying = _airborne(columns)
     t = columns["t_s"][flying]
+    if len(t) == 0:
+        raise IdentificationError(
+            f"coefficients need more than the {SETTLED_S:.0f} s after the launch, which are left"
+            " out; the flight ends before"
+        )
     found = [
         f
         for f in (windows if windows is not None else find(columns))
@@ -158,13 +163,12 @@ def joined(found: Sequence[Found]) -> list[Window]:
     return windows
 
 
-def _airborne(columns: Mapping[str, Array]) -> BoolArray:
+def _airborne(columns: Mapping[str, Array]) -> slice:
     """Return from some seconds after the launch to the last moment of flight."""
     t, speed = columns["t_s"], columns["airspeed_mps"]
     up = np.flatnonzero(speed > FLYING_SHARE * float(np.median(speed)))
-    inside = np.zeros(len(t), dtype=bool)
-    inside[up[0] : up[-1] + 1] = True
-    return np.asarray(inside & (t > t[up[0]] + SETTLED_S))
+    first = int(np.searchsorted(t, t[up[0]] + SETTLED_S, side="right"))
+    return slice(first, int(up[-1]) + 1)
 
 
 def _causes(fit: CoefficientFit) -> dict[str, tuple[str, float]]:

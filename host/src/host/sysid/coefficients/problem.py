@@ -11,23 +11,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array
+from host.compiled import Array, IntArray
 from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.aircraft.instrument_errors import InstrumentData
 from host.sysid.aircraft.powerplant import Powerplant
 from host.sysid.coefficients.model import CoefficientModel
-from host.sysid.coefficients.rows import Equation, Flown, equations
+from host.sysid.coefficients.rows import KINEMATIC, Equation, Flown, equations
 from host.sysid.coefficients.turning import LENGTH_M
 from host.sysid.coefficients.windows import Block, Key, Window, transformed, window_block
 from host.sysid.compatibility.signals import Record, Spectrum, attitude, corrected
 from host.sysid.models.templates import GRAVITY_MPS2
 
+STEP = 0.3  # of a standard deviation: width of the numeric slopes
+OF_THE_BODY = ("mass_share", "ixx_share", "iyy_share", "izz_share", "thrust_share")  # no sensor's
+Slopes = dict[Key, Spectrum]
+
 
 @dataclass(slots=True)
 class Rows:
-    """Equations of a flight in time, and transformed per window: left side, then regressors.
+    """Signals of a whole flight; its equations at the samples of all windows, and transformed per
+    window: left side, then regressors.
 
-    `lift` and `drag` are the coefficients, (n,).
+    `lift` and `drag` are the coefficients at these samples; `along_mps2` is the mean specific force
+    along the path of the whole flight.
     """
 
     signals: dict[str, Array]
@@ -35,6 +41,7 @@ class Rows:
     spectra: dict[Key, Spectrum]
     lift: Array
     drag: Array
+    along_mps2: float
 
 
 @dataclass(slots=True)
@@ -53,6 +60,10 @@ class FlightProblem:
         Mean airspeed of the elevator's maneuvers, and of the others, over that of all.
     blocks : list of Block
         One a window.
+    every : (m,) IntArray
+        Samples of all windows.
+    names : tuple of str
+        Errors of the instrument, in their order.
     """
 
     model: CoefficientModel
@@ -64,6 +75,20 @@ class FlightProblem:
     condition: tuple[float, float, float]
     faster: tuple[float, float]
     blocks: list[Block]
+    every: IntArray
+    names: tuple[str, ...]
+
+    @property
+    def position(self) -> dict[str, int]:
+        """Where coefficients stand among the unknowns, by name."""
+        return {name: k for k, (name, _, _) in enumerate(self.model.named())}
+
+    @property
+    def places(self) -> dict[str, IntArray]:
+        """Where those of each equation stand, in the order of its terms."""
+        rows = [row for _, row, _ in self.model.named()]
+        every = (*self.model.rows, *KINEMATIC)
+        return {name: np.flatnonzero([row == name for row in rows]) for name in every}
 
     def balance_mps2(self, gust_mps: float) -> float:
         """Return the deviation of the mean tangential balance: vertical gusts left in the mean."""
@@ -76,28 +101,71 @@ class FlightProblem:
         record: Record,
         flown: Flown,
         errors: Array,
-        names: Sequence[str],
         own: Mapping[str, Array] | None = None,
+        signals: dict[str, Array] | None = None,
     ) -> Rows:
         """Return all equations for given instrument errors, transformed.
 
         With `own`, the coefficients of each equation, only what they leave of the left side.
+        `signals` are those for the same errors of the sensors, where they are known already.
         """
-        table = dict(zip(names, errors.tolist(), strict=True))
-        s = corrected(record, table, self.data, self.condition[0])
+        table = dict(zip(self.names, errors.tolist(), strict=True))
+        s = signals or corrected(record, table, self.data, self.condition[0])
         found = equations(
-            self.model, record, s, table, flown, self.airframe, self.plant, self.condition[2]
-        )
+            self.model, record, s, table, flown, self.airframe, self.plant, self.condition[2],
+            self.every,
+        )  # fmt: skip
         full = found.rows
         if own is not None:
-            full = {
-                name: Equation(
-                    sum((-k * x for k, x in zip(own[name], e.terms.values(), strict=True)), e.left),
-                    {},
-                )
-                for name, e in full.items()
-            }
-        return Rows(s, full, transformed(full, self.blocks), found.lift, found.drag)
+            full = {name: _left_over(e, own[name]) for name, e in full.items()}
+        spectra = transformed(full, self.blocks)
+        return Rows(s, full, spectra, found.lift, found.drag, found.along_mps2)
+
+
+def _left_over(equation: Equation, own: Array) -> Equation:
+    """Return what coefficients leave of the left side."""
+    left = equation.left.copy()
+    for factor, regressor in zip(own, equation.terms.values(), strict=True):
+        left -= factor * regressor
+    return Equation(left, {})
+
+
+def moved_by_errors(
+    problem: FlightProblem,
+    record: Record,
+    flown: Flown,
+    rows: Rows,
+    own: Mapping[str, Array],
+    errors: Array,
+    sd: Array,
+) -> tuple[Slopes, Array]:
+    """Return how residuals and mean levels (3, errors) move with every instrument error.
+
+    Parameters
+    ----------
+    problem : FlightProblem
+    record, flown
+        The flight, or a gust-free one.
+    rows : Rows
+        Its equations at `errors`.
+    own : mapping
+        Coefficients of each equation.
+    errors, sd : (errors,) Array
+        Of the instrument, and their standard deviations before.
+    """
+    start = {k: v[:, 0] - v[:, 1:] @ own[k[0]] for k, v in rows.spectra.items()}
+    slopes = {k: np.zeros((len(v), len(sd)), np.complex128) for k, v in start.items()}
+    base = mean_levels(problem, rows)
+    levels = np.zeros((len(base), len(sd)))
+    for j, (name, width) in enumerate(zip(problem.names, STEP * sd, strict=True)):
+        moved = errors.copy()
+        moved[j] += width
+        same = rows.signals if name in OF_THE_BODY else None
+        other = problem.rows(record, flown, moved, own, same)
+        levels[:, j] = (mean_levels(problem, other) - base) / width
+        for key, spectrum in other.spectra.items():
+            slopes[key][:, j] = (spectrum[:, 0] - start[key]) / width
+    return slopes, levels
 
 
 def prepared(
@@ -138,10 +206,12 @@ def prepared(
     own_mps = [float(s["V"][k].mean()) for k in (along, across)]
     faster = (own_mps[0] / condition[0], own_mps[1] / condition[0])
     blocks = [
-        window_block(samples, record.dt_s, window, model.forces)
+        window_block(samples, record.dt_s, window, model.forces, every)
         for samples, window in zip(picked, windows, strict=True)
     ]
-    return FlightProblem(model, record, flown, airframe, data, plant, condition, faster, blocks)
+    return FlightProblem(
+        model, record, flown, airframe, data, plant, condition, faster, blocks, every, names
+    )
 
 
 def density(record: Record) -> Array:
@@ -155,12 +225,10 @@ def mean_levels(problem: FlightProblem, rows: Rows) -> Array:
     static = record.columns["static_pa"]
     span = record.samples * record.dt_s
     climb = -(static[-1] - static[0]) / (float(np.mean(density(record))) * GRAVITY_MPS2 * span)
-    plane = s["ax"] * np.cos(s["alpha"]) + s["az"] * np.sin(s["alpha"])
-    along = plane * np.cos(s["beta"]) + s["ay"] * np.sin(s["beta"])
     gain = (s["V"][-1] - s["V"][0]) / span
-    balance = float(np.mean(along)) - gain - GRAVITY_MPS2 * climb / problem.condition[0]
+    balance = rows.along_mps2 - gain - GRAVITY_MPS2 * climb / problem.condition[0]
     inside = np.concatenate(
-        [b.samples for b in problem.blocks if problem.model.forces[0] in b.names]
+        [b.places for b in problem.blocks if problem.model.forces[0] in b.names]
     )
     return np.array([balance, *(float(x[inside].mean()) for x in (rows.drag, rows.lift))])
 
@@ -174,7 +242,7 @@ def flown_range(problem: FlightProblem, rows: Rows) -> tuple[float, float]:
 def force_means(problem: FlightProblem, rows: Rows) -> dict[str, float]:
     """Return the mean of every regressor of the forces over the elevator's maneuvers."""
     model = problem.model
-    inside = np.concatenate([b.samples for b in problem.blocks if model.forces[0] in b.names])
+    inside = np.concatenate([b.places for b in problem.blocks if model.forces[0] in b.names])
     return {
         name: float(np.mean(rows.equations[row].terms[term.label][inside]))
         for name, row, term in model.named()
@@ -186,7 +254,7 @@ def regressor_sizes(problem: FlightProblem, rows: Rows) -> dict[str, float]:
     """Return the rms of every regressor about its mean in each window, by name of the term."""
     result = {}
     for name, equation in rows.equations.items():
-        windows = [b.samples for b in problem.blocks if name in b.names]
+        windows = [b.places for b in problem.blocks if name in b.names]
         for term, values in equation.terms.items():
             parts = np.concatenate([values[k] - values[k].mean() for k in windows])
             result[f"{name}_{term}"] = float(np.sqrt(np.mean(parts**2)))

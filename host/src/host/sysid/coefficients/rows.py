@@ -7,11 +7,11 @@ apart. Stevens & Lewis, ch. 1; signs and axes of the house.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from host.compiled import Array
+from host.compiled import Array, IntArray
 from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.aircraft.powerplant import Powerplant
 from host.sysid.coefficients.model import CoefficientModel
@@ -39,6 +39,11 @@ class Flown:
     flying_mps: Array
     pull: tuple[float, float]
 
+    def at(self, samples: IntArray) -> Flown:
+        """Return it at some samples."""
+        cut = {f.name: getattr(self, f.name)[samples] for f in fields(self) if f.name != "pull"}
+        return replace(self, **cut)
+
 
 @dataclass(frozen=True, slots=True)
 class Equation:
@@ -50,11 +55,13 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class Equations:
-    """All equations of a flight by row; its lift and drag coefficients (n,), rows or not."""
+    """All equations by row; lift and drag coefficients (n,), rows or not, at the same samples; mean
+    specific force along the path of the whole flight (m/s2)."""
 
     rows: dict[str, Equation]
     lift: Array
     drag: Array
+    along_mps2: float
 
 
 def equations(
@@ -66,6 +73,7 @@ def equations(
     airframe: AirframeData,
     plant: Powerplant,
     trim_alpha_rad: float,
+    inside: IntArray | None = None,
 ) -> Equations:
     """Return every equation of a flight for assumed instrument errors.
 
@@ -83,8 +91,18 @@ def equations(
     plant : Powerplant
     trim_alpha_rad : float
         Where products of the angle of attack count from.
+    inside : (m,) IntArray, optional
+        Samples at which the equations are wanted; all by default. Speeds are differentiated over
+        the whole flight.
     """
     e = errors
+    about = {"alpha": trim_alpha_rad, "de": float(np.mean(s["de"]))}
+    u, v, w = speeds(s)
+    along = float(np.mean((u * s["ax"] + v * s["ay"] + w * s["az"]) / s["V"]))
+    rising = [record.rate(x) for x in (u, v, w)]
+    if inside is not None:
+        s, flown = {name: values[inside] for name, values in s.items()}, flown.at(inside)
+        u, v, w, *rising = (x[inside] for x in (u, v, w, *rising))
     mass = airframe.mass_kg * (1.0 + e["mass_share"])
     ixx = airframe.ixx_kgm2 * (1.0 + e["ixx_share"])
     iyy = airframe.iyy_kgm2 * (1.0 + e["iyy_share"])
@@ -118,8 +136,6 @@ def equations(
         "p": 0.5 * p * b / V, "q": 0.5 * q * c / V, "r": 0.5 * r * b / V,
         "de": s["de"], "da": s["da"], "dr": s["dr"], "V": flown.faster, "CL": lift,
     }  # fmt: skip
-    about = {"alpha": trim_alpha_rad, "de": float(np.mean(s["de"]))}
-    u, v, w = V * ca * np.cos(s["beta"]), V * np.sin(s["beta"]), V * sa * np.cos(s["beta"])
     phi, theta = flown.phi_rad, flown.theta_rad
     gx = -GRAVITY_MPS2 * np.sin(theta)
     gy = GRAVITY_MPS2 * np.sin(phi) * np.cos(theta)
@@ -133,8 +149,14 @@ def equations(
         for row, terms in model.rows.items()
     }
     found |= {
-        "u": Equation(record.rate(u) - (s["ax"] + gx - q * w + r * v), {}),
-        "v": Equation(record.rate(v) - (s["ay"] + gy - r * u + p * w), {}),
-        "w": Equation(record.rate(w) - (s["az"] + gz + q * u - p * v), {}),
+        "u": Equation(rising[0] - (s["ax"] + gx - q * w + r * v), {}),
+        "v": Equation(rising[1] - (s["ay"] + gy - r * u + p * w), {}),
+        "w": Equation(rising[2] - (s["az"] + gz + q * u - p * v), {}),
     }
-    return Equations(found, lift, drag)
+    return Equations(found, lift, drag, along)
+
+
+def speeds(s: Mapping[str, Array]) -> tuple[Array, Array, Array]:
+    """Return speed through the air along x, y and z (m/s), each (n,)."""
+    plane = s["V"] * np.cos(s["beta"])
+    return plane * np.cos(s["alpha"]), s["V"] * np.sin(s["beta"]), plane * np.sin(s["alpha"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,9 +31,11 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One window: its samples, frequencies, transform, transformed trends."""
+    """One window: its samples, their places among those of all windows, frequencies, transform,
+    transformed trends."""
 
     samples: IntArray
+    places: IntArray
     hertz: Array
     cosines: Array
     sines: Array
@@ -41,8 +43,16 @@ class Block:
     names: tuple[str, ...]
 
 
-def window_block(samples: IntArray, dt_s: float, window: Window, forces: tuple[str, str]) -> Block:
+def window_block(
+    samples: IntArray,
+    dt_s: float,
+    window: Window,
+    forces: tuple[str, str],
+    every: IntArray | None = None,
+) -> Block:
     """Return the transform of one window; `forces` are compared under the elevator.
+
+    `every` are the samples of all windows, sorted; its own by default.
 
     Raises
     ------
@@ -62,18 +72,22 @@ def window_block(samples: IntArray, dt_s: float, window: Window, forces: tuple[s
     trend = np.linspace(-1.0, 1.0, n)[:, None] ** np.arange(TRENDS)
     trends = cosines @ trend - 1j * (sines @ trend)
     names = (*forces, *LONGITUDINAL) if window.longitudinal else LATERAL
-    return Block(samples, hertz, cosines, sines, trends, names)
+    places = np.searchsorted(samples if every is None else every, samples)
+    return Block(samples, places, hertz, cosines, sines, trends, names)
 
 
 def transformed(full: Mapping[str, Equation], blocks: Sequence[Block]) -> dict[Key, Spectrum]:
-    """Return left side and regressors of every equation in every window, (F, 1 + terms) each."""
+    """Return left side and regressors of every equation in every window, (F, 1 + terms) each.
+
+    Equations are given at the samples of all windows.
+    """
     result: dict[Key, Spectrum] = {}
     for number, block in enumerate(blocks):
         columns, ends = [], [0]
         for name in block.names:
             columns += [full[name].left, *full[name].terms.values()]
             ends.append(len(columns))
-        table = np.stack([c[block.samples] for c in columns], axis=1)
+        table = np.stack([c[block.places] for c in columns], axis=1)
         table -= table.mean(axis=0)
         spectra = block.cosines @ table - 1j * (block.sines @ table)
         for k, name in enumerate(block.names):
@@ -98,73 +112,19 @@ def row_weight(hertz: Array, noise: tuple[Array, Array] | None) -> Array:
     return np.asarray(np.sqrt(2.0 / np.interp(hertz, *noise)), dtype=np.float64)
 
 
-def stacked(
-    blocks: Sequence[Block],
-    spectra: Mapping[Key, Spectrum],
-    left: Mapping[Key, Spectrum],
-    terms: Mapping[str, Sequence[str]],
-    slopes: Mapping[Key, Spectrum],
-    left_slopes: Mapping[Key, Spectrum],
-    own: Mapping[str, Array],
-    position: Mapping[str, int],
-    n_errors: int,
-    noise: Mapping[str, tuple[Array, Array]],
-    gusts: tuple[Mapping[Key, Spectrum], Mapping[Key, Spectrum]],
-) -> tuple[Array, Array, Array, list[tuple[str, int]]]:
-    """Return slopes, left factors and residuals, real and imaginary parts weighted.
-
-    Columns: coefficients, lines of each stretch of rows, `gusts` (of slopes and of left factors),
-    errors of the instrument.
-    """
-    keys = [(name, k) for k, block in enumerate(blocks) for name in block.names]
-    degrees = [degree(name) for name, _ in keys]
-    begin = len(position) + np.concatenate([[0], np.cumsum(degrees)])
-    gusty = {key: values.shape[1] for key, values in gusts[0].items()}
-    after = int(begin[-1])
-    width = after + sum(gusty.values()) + n_errors
-    A: list[Array] = []
-    Z: list[Array] = []
-    y: list[Array] = []
-    for n, (name, k) in enumerate(keys):
-        block, kept = blocks[k], used(blocks[k], name)
-        weight = row_weight(block.hertz[kept], noise.get(name))
-        places = [position[f"{name}_{term}"] for term in terms[name]]
-        spectrum = spectra[name, k]
-        aside, after = after, after + gusty.get((name, k), 0)
-        for source, its_slopes, its_gusts, target in (
-            (spectra, slopes, gusts[0], A),
-            (left, left_slopes, gusts[1], Z),
-        ):
-            M = np.zeros((len(block.hertz), width), np.complex128)
-            M[:, places] = source[name, k][:, 1:]
-            M[:, begin[n] : begin[n + 1]] = block.trends[:, : degrees[n]]
-            if after > aside:
-                M[:, aside:after] = its_gusts[name, k]
-            if its_slopes:
-                M[:, -n_errors:] = -its_slopes[name, k]
-            target.append(_real(np.asarray(M[kept] * weight[:, None])))
-        y.append(_real((spectrum[:, 0] - spectrum[:, 1:] @ own[name])[kept] * weight))
-    return np.vstack(A), np.vstack(Z), np.concatenate(y), keys
-
-
-def _real(values: Spectrum) -> Array:
-    return np.concatenate([values.real, values.imag])
-
-
 def noise_spectra(
     blocks: Sequence[Block],
-    residual: Array,
-    keys: Sequence[Key],
+    residuals: Iterable[tuple[Key, Array]],
     before: Mapping[str, tuple[Array, Array]],
 ) -> dict[str, tuple[Array, Array]]:
-    """Return the smoothed residual spectrum of every equation, pooled over maneuvers."""
+    """Return the smoothed residual spectrum of every equation, pooled over maneuvers.
+
+    `residuals` are weighted by the spectra `before`, real parts then imaginary ones.
+    """
     found: dict[str, list[tuple[Array, Array]]] = {}
-    at = 0
-    for name, k in keys:
-        hertz = blocks[k].hertz[used(blocks[k], name)]
-        own = residual[at : at + 2 * len(hertz)].reshape(2, -1)
-        at += 2 * len(hertz)
-        power = 0.5 * np.sum(own**2, axis=0)
+    for (name, window), residual in residuals:
+        hertz = blocks[window].hertz[used(blocks[window], name)]
+        power = 0.5 * np.sum(residual.reshape(2, -1) ** 2, axis=0)
         if name in before:
             power = power * np.interp(hertz, *before[name])
         found.setdefault(name, []).append((hertz, power))

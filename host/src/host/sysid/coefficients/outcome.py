@@ -1,0 +1,113 @@
+"""From where a search ended to a fit: the drawing heard, drag at zero lift, maneuvers compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.coefficients.answer import (
+    CoefficientFit,
+    Flight,
+    Pull,
+    Trace,
+    derivatives,
+    informed,
+    trace,
+)
+from host.sysid.coefficients.joint import LastStep, prediction, pulls
+from host.sysid.coefficients.local import Local, Mean, local_derivatives, zero_lift_drag
+from host.sysid.coefficients.problem import (
+    FlightProblem,
+    Rows,
+    density,
+    flown_range,
+    force_means,
+    mean_levels,
+    regressor_sizes,
+)
+from host.sysid.coefficients.rows import KINEMATIC
+from host.sysid.numerics.repeats import scatter
+
+
+@dataclass(frozen=True, slots=True)
+class Searched:
+    """Coefficients and errors of the instrument found; how mean levels move with the errors."""
+
+    theta: Array
+    errors: Array
+    levels: Array
+    last: LastStep
+
+
+def local(problem: FlightProblem, rows: Rows, state: Array, levels: Array | None = None) -> Local:
+    """Return told terms and what follows from them: value, slope with the state."""
+    _, drag, lift = mean_levels(problem, rows)
+    moved = np.zeros((3, len(state)))
+    if levels is not None:
+        moved[:, -levels.shape[1] :] = levels
+    mean = Mean(problem.condition[2], lift, drag, moved[2], moved[1])
+    return local_derivatives(problem.model, state, problem.position, mean)
+
+
+def outcome(problem: FlightProblem, ended: Searched) -> CoefficientFit:
+    """Add what geometry says, then drag at zero lift."""
+    last, levels, position = ended.last, ended.levels, problem.position
+    rows = problem.rows(problem.record, problem.flown, ended.errors)
+    state = np.concatenate([ended.theta, np.zeros(last.unknowns.gusts), ended.errors])
+    before = local(problem, rows, state)
+    state, covariance, kept = informed(state, last.solved.covariance, before, problem.airframe)
+    found = local(problem, rows, state, levels)
+    _, drag, lift = mean_levels(problem, rows)
+    if "CL_alpha" in found and "CD_alpha" in found:
+        mean = Mean(problem.condition[2], lift, drag, levels[2], levels[1])
+        means = force_means(problem, rows)
+        found["CD_0"] = zero_lift_drag(problem.model, state, position, mean, means, found)
+    values = {name: value for name, (value, _) in found.items()}
+    errors = slice(last.unknowns.first_error, None)
+    slopes = np.vstack([*(slope for _, slope in found.values()), np.eye(len(state))[errors]])
+    own = slopes @ covariance @ slopes.T
+    agreement = scatter(tuple(values), *pulls(last, problem.blocks, slopes[: len(values)] @ kept))
+    own[np.diag_indices(len(values))] += agreement.extra_variance
+    left = np.sqrt(np.maximum(np.diag(covariance)[errors], 0.0))
+    pairs = zip(state[errors].tolist(), left.tolist(), strict=True)
+    return CoefficientFit(
+        derivatives(values, own[: len(values), : len(values)], regressor_sizes(problem, rows)),
+        own,
+        dict(zip(problem.names, pairs, strict=True)),
+        Flight(
+            *problem.condition,
+            lift,
+            drag,
+            _pull(problem),
+            flown_range(problem, rows),
+            problem.faster,
+        ),
+        _traces(problem, rows, state),
+        prediction(last, problem.blocks),
+        agreement,
+    )
+
+
+def _pull(problem: FlightProblem) -> Pull:
+    """Return what thrust does on the mean of the flight."""
+    plant, flown = problem.plant, problem.flown
+    spin, thrust = (float(np.mean(x)) for x in (flown.spin_radps, flown.thrust_n))
+    air = float(np.mean(density(problem.record)))
+    arm_m = plant.hub_m[2] * plant.axis[0] - plant.hub_m[0] * plant.axis[2]
+    return Pull(thrust, plant.slope(spin, problem.condition[0], air), float(arm_m))
+
+
+def _traces(problem: FlightProblem, rows: Rows, state: Array) -> dict[str, Trace]:
+    """Return every force and moment coefficient in time, measured and modelled."""
+    found = {}
+    for name, equation in rows.equations.items():
+        if name in KINEMATIC:
+            continue
+        model = np.zeros_like(equation.left)
+        for place, regressor in zip(problem.places[name], equation.terms.values(), strict=True):
+            model += state[place] * regressor
+        mine = [b.places for b in problem.blocks if name in b.names]
+        found[name] = trace(equation.left, model, mine)
+    return found

@@ -1,0 +1,137 @@
+"""Normal equations summed over stretches of rows: those of the whole matrix, in little memory."""
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from host.compiled import Array
+from host.sysid.coefficients.step import Known, stepped
+from host.sysid.coefficients.stretches import Side, Stretch, Unknowns, stretches, summed
+from host.sysid.coefficients.windows import Block, Key, Window, window_block
+from host.sysid.compatibility.signals import Spectrum
+from host.sysid.errors import IdentificationError
+
+PLACES = {"Cm": np.array([0, 1]), "w": np.zeros(0, dtype=np.int64)}
+TERMS, GUSTS, ERRORS = 2, 3, 4  # gusts of one window
+NOISE = {"Cm": (np.array([0.1, 4.5]), np.array([0.5, 2.0]))}
+POSITION = {"Cm_alpha": 0, "Cm_q": 1}
+
+
+def drawn(windows: int, seed: int = 3) -> tuple[list[Block], Unknowns, list[Stretch]]:
+    """Two equations in every window, one of them with slow gusts; numbers are noise."""
+    random = np.random.default_rng(seed)
+
+    def noise(*shape: int) -> Spectrum:
+        return random.standard_normal(shape) + 1j * random.standard_normal(shape)
+
+    window = Window(0.0, 8.0, longitudinal=True)
+    blocks = [
+        replace(window_block(np.arange(260 + k), 0.03, window, ("CL", "CD")), names=("Cm", "w"))
+        for k in range(windows)
+    ]
+    sides = []
+    for _ in range(2):
+        spectra: dict[Key, Spectrum] = {}
+        gusts: dict[Key, Spectrum] = {}
+        slopes: dict[Key, Spectrum] = {}
+        for k, block in enumerate(blocks):
+            F = len(block.hertz)
+            spectra["Cm", k], spectra["w", k] = noise(F, 1 + TERMS), noise(F, 1)
+            gusts["w", k] = noise(F, GUSTS)
+            slopes["Cm", k], slopes["w", k] = noise(F, ERRORS), noise(F, ERRORS)
+        sides.append(Side(spectra, gusts, slopes))
+    # Left factors are like slopes but not the same.
+    calm = Side(*({k: 0.5 * v + a[k] for k, v in b.items()}
+                  for a, b in ((sides[0].spectra, sides[1].spectra),
+                               (sides[0].gusts, sides[1].gusts),
+                               (sides[0].slopes, sides[1].slopes))))  # fmt: skip
+    unknowns = Unknowns(PLACES, TERMS, windows * GUSTS, ERRORS)
+    own = {"Cm": np.array([0.3, -0.2]), "w": np.zeros(0)}
+    return blocks, unknowns, stretches(blocks, sides[0], calm, own, unknowns, NOISE)
+
+
+def dense(parts: list[Stretch], count: int) -> tuple[Array, Array, Array]:
+    """Return the whole A, Z and y, lines of every stretch as unknowns behind the others."""
+    rows = sum(len(p.y) for p in parts)
+    width = count + sum(p.lines.shape[1] for p in parts)
+    A, Z = np.zeros((rows, width)), np.zeros((rows, width))
+    at, line = 0, count
+    for p in parts:
+        here, lines = slice(at, at + len(p.y)), slice(line, line + p.lines.shape[1])
+        A[here, p.columns], Z[here, p.columns] = p.A, p.Z
+        A[here, lines] = Z[here, lines] = p.lines
+        at, line = here.stop, lines.stop
+    return A, Z, np.concatenate([p.y for p in parts])
+
+
+def test_sums_over_stretches_solve_the_whole_matrix() -> None:
+    _, unknowns, parts = drawn(5)
+    n, considered, sd = unknowns.count, np.array([unknowns.first_error]), np.array([0.1])
+    prior = np.diag(np.r_[np.zeros(TERMS), np.full(n - TERMS, 4.0)])
+    prior[considered, considered] = 1e30
+    pull = np.r_[np.zeros(TERMS), np.full(n - TERMS, 0.2)]
+    found = stepped(summed(parts, n), Known(prior, pull), POSITION, considered, sd)
+    A, Z, y = dense(parts, n)
+    known, right = np.zeros((A.shape[1],) * 2), Z.T @ y
+    known[:n, :n] = prior
+    right[:n] += pull
+    scale = 1.0 / np.sqrt(np.abs(np.diag(Z.T @ A + known)))
+    both = np.outer(scale, scale)
+    inverse = np.linalg.inv((Z.T @ A + known) * both) * both
+    step = inverse @ right
+    drew = -inverse @ (Z.T @ A[:, considered])
+    drew[considered] = np.eye(1)
+    covariance = inverse @ (Z.T @ Z + known) @ inverse.T + (drew * sd**2) @ drew.T
+    np.testing.assert_allclose(found.step, step[:n], rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(found.covariance, covariance[:n, :n], rtol=1e-7, atol=1e-10)
+    left = np.concatenate([p.left(found.step) for p in parts])
+    np.testing.assert_allclose(left, y - A @ step, atol=1e-9)
+    # Every column that a stretch leaves out is nothing in it.
+    assert sum(p.A.shape[1] for p in parts) < 0.6 * len(parts) * n
+
+
+def test_lines_of_a_stretch_move_nothing() -> None:
+    _, unknowns, parts = drawn(3)
+    bent = [replace(p, y=p.y + p.lines @ np.full(p.lines.shape[1], 50.0)) for p in parts]
+    before, after = (summed(x, unknowns.count).right for x in (parts, bent))
+    np.testing.assert_allclose(after, before, atol=1e-9)
+
+
+def test_memory_grows_with_the_flight_and_not_with_its_square() -> None:
+    peaks = []
+    for windows in (20, 80):
+        tracemalloc.start()
+        _, unknowns, parts = drawn(windows)
+        summed(parts, unknowns.count)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    whole = (
+        8 * sum(len(p.y) for p in parts) * (unknowns.count + sum(p.lines.shape[1] for p in parts))
+    )
+    assert peaks[1] < 5.0 * peaks[0]
+    assert peaks[1] < 0.5 * whole
+
+
+def test_a_term_that_never_moves_is_named() -> None:
+    _, unknowns, parts = drawn(3)
+    n = unknowns.count
+    known = Known(np.diag(np.r_[np.zeros(TERMS), np.ones(n - TERMS)]), np.zeros(n))
+    none = np.zeros(0, dtype=np.int64)
+    still = []
+    for p in parts:
+        A, Z = p.A.copy(), p.Z.copy()
+        A[:, p.columns == POSITION["Cm_q"]] = 0.0
+        Z[:, p.columns == POSITION["Cm_q"]] = 0.0
+        still.append(replace(p, A=A, Z=Z))
+    with pytest.raises(IdentificationError, match="cannot tell Cm_q:"):
+        stepped(summed(still, n), known, POSITION, none, np.zeros(0))
+    # So is one that is a line in time in every window.
+    lines = []
+    for p in parts:
+        A, Z = p.A.copy(), p.Z.copy()
+        A[:, p.columns == POSITION["Cm_alpha"]] = p.lines[:, -1:]
+        Z[:, p.columns == POSITION["Cm_alpha"]] = p.lines[:, -1:]
+        lines.append(replace(p, A=A, Z=Z))
+    with pytest.raises(IdentificationError, match="cannot tell Cm_alpha:"):
+        stepped(summed(lines, n), known, POSITION, none, np.zeros(0))
