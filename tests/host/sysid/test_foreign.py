@@ -100,6 +100,24 @@ def preamble(table: pd.DataFrame, path: Path) -> None:
     path.write_text("Logger 7, flight 3\nweather: calm\n\n" + table.to_csv(index=False))
 
 
+def quoted(table: pd.DataFrame, path: Path) -> None:
+    rows = (",".join('"' + str(v).replace(".", ",") + '"' for v in row) for row in table.to_numpy())
+    path.write_text("\n".join([",".join(table.columns), *rows]))
+
+
+def data_end_in_a_comma(table: pd.DataFrame, path: Path) -> None:
+    names, rows = table.to_csv(index=False).split("\n", 1)
+    path.write_text(names + "\n" + rows.replace("\n", ",\n"))
+
+
+def units_and_types(table: pd.DataFrame, path: Path) -> None:
+    width = table.shape[1]
+    names, rows = table.to_csv(index=False).split("\n", 1)
+    path.write_text(
+        "\n".join([names, ",".join(["m/s"] * width), ",".join(["float"] * width), rows])
+    )
+
+
 TEXTS: dict[str, Callable[[pd.DataFrame, Path], object]] = {
     "comma": lambda t, p: t.to_csv(p, index=False),
     "semicolon": lambda t, p: t.to_csv(p, index=False, sep=";"),
@@ -111,7 +129,15 @@ TEXTS: dict[str, Callable[[pd.DataFrame, Path], object]] = {
     "spaces": lambda t, p: t.rename(columns=lambda c: f" {c} ").to_csv(p, index=False),
     "unit row": unit_row,
     "lines before": preamble,
+    "sep=; of a spreadsheet": lambda t, p: p.write_text("sep=;\n" + t.to_csv(index=False, sep=";")),
+    "decimal comma in quotes": quoted,
+    "comma after every row": data_end_in_a_comma,
+    "units and types": units_and_types,
+    "names behind #": lambda t, p: p.write_text("# " + t.to_csv(index=False)),
+    "blanks": lambda t, p: p.write_text(t.to_csv(index=False, sep=" ").replace(" ", "   ")),
+    "carriage returns": lambda t, p: p.write_text(t.to_csv(index=False).replace("\n", "\r")),
 }
+NOTED = ("lines before", "sep=; of a spreadsheet")
 
 
 @pytest.mark.parametrize("dialect", TEXTS)
@@ -125,10 +151,10 @@ def test_every_dialect_of_text_is_the_same_flight(
     TEXTS[dialect](foreign, tmp_path / "x.csv")
     columns, notes = read(tmp_path / "x.csv")
     same(columns, flight)
-    assert bool(notes) == (dialect == "lines before"), notes
+    assert bool(notes) == (dialect in NOTED), notes
 
 
-@pytest.mark.parametrize("shape", ["rows", "columns", "struct", "nested", "index", "text"])
+@pytest.mark.parametrize("shape", ["rows", "columns", "struct", "nested", "index", "text", "clock"])
 def test_every_shape_of_mat_and_parquet_is_the_same_flight(
     shape: str,
     tmp_path: Path,
@@ -137,9 +163,15 @@ def test_every_shape_of_mat_and_parquet_is_the_same_flight(
     read: Callable[[Path], tuple[dict[str, np.ndarray], list[str]]],
 ) -> None:
     data = {str(name): values.to_numpy() for name, values in foreign.items()}
-    path = tmp_path / ("x.parquet" if shape in ("index", "text") else "x.mat")
+    path = tmp_path / ("x.parquet" if shape in ("index", "text", "clock") else "x.mat")
     if shape == "index":
         foreign.set_index("TimeUS").to_parquet(path)
+    elif shape == "clock":  # an index without a name
+        table = foreign.drop(columns="TimeUS")
+        table.index = pd.Timestamp("2026-05-01") + pd.to_timedelta(foreign["TimeUS"], unit="us")
+        table.index.name = None
+        table.to_parquet(path)
+        (tmp_path / "map.toml").write_text(text_of({**LINES, "t_s": 'from = "index"'}))
     elif shape == "text":
         foreign.astype({"Q": "string", "AOA": "Float64"}).to_parquet(path)
     elif shape == "nested":
@@ -234,7 +266,8 @@ def test_a_table_that_cannot_be_used_says_why(
     ("name", "content", "reason"),
     [
         ("x.csv", b"", "the file is empty"),
-        ("x.csv", b"1,2,3\n4,5,6\n", "no line of column names"),
+        ("x.csv", b"1,2,3\n4,5,6\n", "no column 'TimeUS'; they have 1, 2, 3"),
+        ("x.csv", b"<html><body>404</body></html>", "not a CSV table"),
         ("x.csv", b"\0\1\2\0\0\7" * 50, "the file is binary"),
         ("x.parquet", b"PAR1 is not enough", "not a Parquet file"),
         ("x.mat", b"x" * 500, "not a MAT file"),
@@ -274,6 +307,7 @@ def test_columns_of_several_rates_are_refused(
         ("alpha_rad", 'from = "AOA", sign = 2', "sign must be 1 or -1"),
         ("alpha_rad", 'from = ["AOA"]', "expected"),
         ("aplha_rad", 'from = "AOA"', "did you mean alpha_rad"),
+        ("beta_rad", 'from = "AOA", unit = "deg"', "beta_rad both come from 'AOA'"),
         ("alpha_rad", 'from = "AOA"', "alpha_rad reaches .* in degrees"),
         ("az_mps2", 'from = "Nz", sign = -1', "in g"),
         ("az_mps2", 'from = "Nz", unit = "g"', "points up"),
@@ -304,3 +338,101 @@ def test_a_surface_that_works_backwards_is_told(
     _, notes = read_columns(tmp_path / "x.csv", tmp_path / "map.toml")
     assert len(notes) == 1
     assert notes[0].startswith(f"{surface} positive seems to")
+
+
+NUMBERED = {k: line.replace(line.split('"')[1], "{}") for k, line in LINES.items()}
+
+
+@pytest.mark.parametrize("shape", ["text", "matrix", "wide matrix"])
+def test_columns_without_names_go_by_number(
+    shape: str, tmp_path: Path, foreign: pd.DataFrame, flight: dict[str, np.ndarray]
+) -> None:
+    path = tmp_path / ("x.txt" if shape == "text" else "x.mat")
+    if shape == "text":
+        np.savetxt(path, foreign.to_numpy())
+    else:
+        data = foreign.to_numpy()
+        io.savemat(path, {"fdata": data.T if shape == "wide matrix" else data})
+    label = {"text": "{}", "matrix": "fdata(:,{})", "wide matrix": "fdata({},:)"}[shape]
+    lines = {k: s.format(label.format(n)) for n, (k, s) in enumerate(NUMBERED.items(), start=1)}
+    (tmp_path / "map.toml").write_text(text_of(lines))
+    same(read_columns(path, tmp_path / "map.toml")[0], flight)
+
+
+def test_a_name_that_two_columns_have_is_refused(
+    tmp_path: Path,
+    foreign: pd.DataFrame,
+    read: Callable[[Path], tuple[dict[str, np.ndarray], list[str]]],
+) -> None:
+    foreign.assign(more=0.0).rename(columns={"more": "AOA"}).to_csv(tmp_path / "x.csv", index=False)
+    with pytest.raises(IdentificationError, match="several columns 'AOA': rename them"):
+        read(tmp_path / "x.csv")
+
+
+def test_a_line_of_the_map_outside_its_table_is_refused(
+    tmp_path: Path, foreign: pd.DataFrame
+) -> None:
+    foreign.to_csv(tmp_path / "x.csv", index=False)
+    (tmp_path / "map.toml").write_text('q_radps = "Q"\n' + text_of(LINES))
+    with pytest.raises(IdentificationError, match=r"unknown key q_radps; all lines .* \[columns\]"):
+        read_columns(tmp_path / "x.csv", tmp_path / "map.toml")
+
+
+@pytest.mark.parametrize(("ours", "theirs"), [("deg", "Degrees"), ("deg/s", "dps"), ("g", "g")])
+def test_units_as_people_write_them(
+    ours: str, theirs: str, tmp_path: Path, foreign: pd.DataFrame, flight: dict[str, np.ndarray]
+) -> None:
+    foreign.to_csv(tmp_path / "x.csv", index=False)
+    text = text_of(LINES).replace(f'unit = "{ours}"', f'unit = "{theirs}"')
+    (tmp_path / "map.toml").write_text(text)
+    same(read_columns(tmp_path / "x.csv", tmp_path / "map.toml")[0], flight)
+
+
+RATES = {"TAS": 10, "AOA": 2, "Beta": 2, "Pitch": 5, "Roll": 5, "Yaw": 5}  # rows for each value
+
+
+@pytest.mark.parametrize("how", ["empty cells", "rows of their own", "repeated"])
+def test_sensors_of_several_rates_share_a_table(
+    how: str,
+    tmp_path: Path,
+    foreign: pd.DataFrame,
+    flight: dict[str, np.ndarray],
+    read: Callable[[Path], tuple[dict[str, np.ndarray], list[str]]],
+) -> None:
+    table = foreign.astype({"TimeUS": float})
+    for name, rows in RATES.items():
+        table.loc[table.index % rows != 0, name] = np.nan
+    if how == "repeated":
+        table = table.ffill()
+    elif how == "rows of their own":
+        slow = [table[["TimeUS", k]].dropna() for k in RATES]
+        table = pd.concat([table.drop(columns=list(RATES)), *slow])
+        table["TimeUS"] += 3.0 * (np.arange(len(table)) % 7)  # no two stamps alike
+        table = table.sort_values("TimeUS")
+    table.to_csv(tmp_path / "x.csv", index=False)
+    columns, notes = read(tmp_path / "x.csv")
+    assert len(columns["t_s"]) == pytest.approx(len(foreign), abs=2)
+    for name in ("alpha_rad", "theta_rad", "airspeed_mps", "q_radps"):
+        there = np.interp(columns["t_s"], flight["t_s"], flight[name])
+        assert np.std(columns[name] - there) < 0.02 * np.std(there), name
+    assert any("theta_rad 0.1 s" in n for n in notes), notes
+    assert any("theta_rad every 5 rows" in n for n in notes) == (how == "repeated")
+
+
+def test_spikes_and_dropouts_count_as_missing(
+    tmp_path: Path,
+    foreign: pd.DataFrame,
+    flight: dict[str, np.ndarray],
+    read: Callable[[Path], tuple[dict[str, np.ndarray], list[str]]],
+) -> None:
+    table = foreign.copy()
+    table.loc[700, "Q"] = 1e9
+    table.loc[1000:1030, "AOA"] = 0.0
+    table.loc[2000:2030, "Beta"] = -9999.0
+    table.to_csv(tmp_path / "x.csv", index=False)
+    columns, notes = read(tmp_path / "x.csv")
+    np.testing.assert_allclose(columns["q_radps"], flight["q_radps"], atol=1e-3)
+    assert any(n.startswith("q_radps: 1 value far out") for n in notes)
+    assert any(n.startswith("alpha_rad: stands still at 0 for 0.60 s from 20 s") for n in notes)
+    assert any(n.startswith("beta_rad: 31 values far out") for n in notes)
+    assert any("missing within the flight" in n and "beta_rad" in n for n in notes)

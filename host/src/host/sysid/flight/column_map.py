@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,6 +41,17 @@ UNITS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
     "throttle": {"1": 1.0, "percent": 0.01},
 }  # fmt: skip
+# What people write for them.
+ALIASES = {
+    "degree": "deg", "degrees": "deg", "°": "deg", "radian": "rad", "radians": "rad",
+    "deg/sec": "deg/s", "degrees/s": "deg/s", "°/s": "deg/s", "dps": "deg/s", "rad/sec": "rad/s",
+    "m/s/s": "m/s2", "m/sec2": "m/s2", "ft/s/s": "ft/s2", "ft/sec2": "ft/s2",
+    "knots": "kt", "knot": "kt", "kts": "kt", "kn": "kt", "kph": "km/h", "kmh": "km/h",
+    "fps": "ft/s", "ft/sec": "ft/s", "m/sec": "m/s", "mps": "m/s", "fpm": "ft/min",
+    "feet": "ft", "meter": "m", "meters": "m", "metres": "m", "pa": "Pa", "hpa": "hPa",
+    "kpa": "kPa", "mb": "mbar", "lb/ft2": "psf", "inhg": "inHg", "%": "percent",
+    "sec": "s", "seconds": "s", "msec": "ms", "usec": "us", "µs": "us", "μs": "us",
+}  # fmt: skip
 KEYS = {"from", "unit", "sign", "scale", "offset"}
 
 
@@ -64,7 +75,8 @@ def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise IdentificationError(f"{path}: cannot be used as a map: {error}") from error
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise IdentificationError(f"{path}: cannot be used as a map: {reason}") from error
     lines = document.get("columns")
     if not isinstance(lines, dict) or not lines:
         raise IdentificationError(f"{path}: no table [columns]")
@@ -73,7 +85,19 @@ def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
             raise IdentificationError(
                 f"{path}: unknown column {name}{like(name, known)}; ours are {', '.join(known)}"
             )
-    return {name: _line(f"{path}: {name}", name, line) for name, line in lines.items()}
+    strangers = [key for key in document if key != "columns"]
+    if strangers:
+        raise IdentificationError(
+            f"{path}: unknown key {strangers[0]}; all lines of a map stand below [columns]"
+        )
+    result = {name: _line(f"{path}: {name}", name, line) for name, line in lines.items()}
+    for name, line in result.items():
+        others = [k for k, other in result.items() if other.foreign == line.foreign and k != name]
+        if others:
+            raise IdentificationError(
+                f"{path}: {name} and {others[0]} both come from '{line.foreign}'"
+            )
+    return result
 
 
 def _line(where: str, name: str, line: object) -> Line:
@@ -88,6 +112,9 @@ def _line(where: str, name: str, line: object) -> Line:
         )
     units = UNITS[name.rsplit("_", 1)[-1]]
     unit = line.get("unit", "") or next(iter(units))
+    if isinstance(unit, str) and unit not in units:
+        plain = unit.lower().replace("²", "2").replace("^2", "2").replace("**2", "2")
+        unit = plain if plain in units else ALIASES.get(plain, unit)
     if not isinstance(unit, str) or unit not in units:
         raise IdentificationError(f"{where}: unit '{unit}' unknown; use one of {', '.join(units)}")
     for key in ("sign", "scale", "offset"):
@@ -101,7 +128,11 @@ def _line(where: str, name: str, line: object) -> Line:
 
 
 def mapped(
-    raw: Mapping[str, Array], unusable: Mapping[str, str], lines: Mapping[str, Line], path: Path
+    raw: Mapping[str, Array],
+    unusable: Mapping[str, str],
+    lines: Mapping[str, Line],
+    path: Path,
+    twice: Collection[str] = (),
 ) -> dict[str, Array]:
     """Return our columns made of the foreign ones a map names.
 
@@ -113,6 +144,8 @@ def mapped(
         What else the file holds, and why it is no column.
     lines, path
         The map and where it came from.
+    twice : collection of str
+        Names that several foreign columns have.
 
     Raises
     ------
@@ -121,7 +154,11 @@ def mapped(
     """
     result: dict[str, Array] = {}
     for name, line in lines.items():
-        if line.foreign in unusable:
+        if line.foreign in twice:
+            raise IdentificationError(
+                f"{path}: {name}: the data have several columns '{line.foreign}': rename them"
+            )
+        if line.foreign in unusable and line.foreign not in raw:
             raise IdentificationError(
                 f"{path}: {name}: '{line.foreign}' is {unusable[line.foreign]}"
             )

@@ -141,29 +141,28 @@ def _wind_angles(
     p, q, r = rates
     pitch = q - beta * (np.cos(alpha) * p + np.sin(alpha) * r)
     yaw = np.sin(alpha) * p - np.cos(alpha) * r
-    forces = all(f"a{k}_mps2" in m for k in "yz") and "theta_rad" in m and "airspeed_mps" in m
-    if not forces:
-        # Without the forces stands what makes them: they are about linear in it.
-        zero = np.zeros(len(alpha))
-        if "alpha_rad" in m and "q_radps" in m:
+    zero = np.zeros(len(alpha))
+    # Without a force stands what makes it: it is about linear in that. With it the weight is in
+    # one term: alone, the side force drowns in errors of the bank angle.
+    speed = np.maximum(m.get("airspeed_mps", zero), 1.0)
+    known = "theta_rad" in m and "airspeed_mps" in m
+    if "alpha_rad" in m and "q_radps" in m:
+        if known and "az_mps2" in m:
+            along = m.get("ax_mps2", GRAVITY_MPS2 * np.sin(theta)) - GRAVITY_MPS2 * np.sin(theta)
+            down = m["az_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.cos(phi)
+            lift = (np.cos(alpha) * down - np.sin(alpha) * along) / speed
+            parts = {"q_radps": pitch, "az_mps2 over airspeed_mps": lift}
+            yield _law("alpha_rad", m, parts, follows=SOMEHOW)
+        else:
             made = (alpha, m.get("elevator_rad", zero))
             yield _law("alpha_rad", m, {"q_radps": pitch}, made)
-        if "beta_rad" in m and "r_radps" in m:
-            yield _law("beta_rad", m, {"r_radps": yaw}, (beta, phi, m.get("rudder_rad", zero)))
-        return
-    # With the weight in one term: alone, the side force drowns in errors of the bank angle.
-    speed = np.maximum(m["airspeed_mps"], 1.0)
-    ax = m.get("ax_mps2", GRAVITY_MPS2 * np.sin(theta))
-    down = m["az_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.cos(phi)
-    along = ax - GRAVITY_MPS2 * np.sin(theta)
-    lift = (np.cos(alpha) * down - np.sin(alpha) * along) / speed
-    side = (m["ay_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.sin(phi)) / speed
-    if "alpha_rad" in m and "q_radps" in m:
-        parts = {"q_radps": pitch, "az_mps2 over airspeed_mps": lift}
-        yield _law("alpha_rad", m, parts, follows=SOMEHOW)
     if "beta_rad" in m and "r_radps" in m:
-        parts = {"r_radps": yaw, "ay_mps2 over airspeed_mps": side}
-        yield _law("beta_rad", m, parts, follows=SOMEHOW)
+        if known and "ay_mps2" in m:
+            side = (m["ay_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.sin(phi)) / speed
+            parts = {"r_radps": yaw, "ay_mps2 over airspeed_mps": side}
+            yield _law("beta_rad", m, parts, follows=SOMEHOW)
+        else:
+            yield _law("beta_rad", m, {"r_radps": yaw}, (beta, phi, m.get("rudder_rad", zero)))
 
 
 def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -14,25 +12,27 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
+from host.sysid.flight.text_table import HEAD_BYTES, read_text
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TEXT_KINDS = (".csv", ".tsv", ".txt", ".dat")
-HEAD_BYTES = 65536  # a dialect is told from these
-HEAD_LINES = 60
-DELIMITERS = ",;\t|"
-DECIMAL_COMMA = re.compile(r"-?\d+,\d+(e-?\d+)?", re.IGNORECASE)
+MOST_UNIT_ROWS = 2
 
 
 @dataclass(slots=True)
 class Foreign:
-    """Columns of numbers, why others are none, and what was left out of a column."""
+    """Columns of numbers, why others are none, and what was left out of a column.
+
+    `twice` are names that several columns have.
+    """
 
     columns: dict[str, Array] = field(default_factory=dict)
     unusable: dict[str, str] = field(default_factory=dict)
     remarks: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    twice: frozenset[str] = frozenset()
 
 
 def read_foreign(source: Path) -> Foreign:
@@ -55,89 +55,10 @@ def read_foreign(source: Path) -> Foreign:
         return _mat(source, head)
     if kind == ".parquet":
         return from_frame(_parquet(source))
-    frame, notes = _text(source, head)
-    found = from_frame(frame)
-    found.notes = notes
+    text = read_text(source, head)
+    found = from_frame(text.frame)
+    found.notes, found.twice = text.notes, text.twice
     return found
-
-
-def _text(source: Path, head: bytes) -> tuple[pd.DataFrame, list[str]]:
-    import pandas as pd
-
-    encoding = _encoding(source, head)
-    text = head.decode(encoding, errors="ignore")
-    lines = text.splitlines()[:HEAD_LINES]
-    if len(head) == HEAD_BYTES and len(lines) > 1:
-        lines = lines[:-1]  # cut within
-    delimiter, first, fields = _dialect(lines)
-    if not fields or all(_number(f) for f in fields):
-        raise IdentificationError(f"{source}: not a CSV table: no line of column names")
-    rows = [next(csv.reader([line], delimiter=delimiter), []) for line in lines[first + 1 :]]
-    decimal = "."
-    if delimiter != "," and any(DECIMAL_COMMA.fullmatch(f.strip()) for row in rows for f in row):
-        decimal = ","
-    notes = [f"the first {first} lines hold no names and were left out"] if first else []
-    for attempt in (encoding, "cp1252", "latin-1"):
-        try:
-            frame = pd.read_csv(
-                source,
-                sep=delimiter,
-                decimal=decimal,
-                encoding=attempt,
-                skiprows=first,
-                comment="#",
-                skipinitialspace=True,
-                index_col=False,
-                low_memory=False,
-            )
-        except UnicodeDecodeError:
-            continue
-        except (ValueError, OverflowError) as error:
-            reason = str(error).strip().splitlines()[0]
-            raise IdentificationError(f"{source}: not a CSV table: {reason}") from error
-        if frame.empty:
-            raise IdentificationError(f"{source}: column names and no row below them")
-        return frame, notes
-    raise IdentificationError(f"{source}: not a CSV table: no text of a known encoding")
-
-
-def _encoding(source: Path, head: bytes) -> str:
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
-    if b"\0" in head:
-        even, odd = head[0::2].count(0), head[1::2].count(0)
-        if max(even, odd) > 0.3 * len(head) / 2 and min(even, odd) == 0:
-            return "utf-16-le" if odd else "utf-16-be"
-        raise IdentificationError(f"{source}: not a CSV table: the file is binary")
-    return "utf-8-sig"
-
-
-def _dialect(lines: list[str]) -> tuple[str, int, list[str]]:
-    """Return the delimiter, which line holds the names, and the names."""
-    best: tuple[float, int, str, int, list[str]] = (0.0, 0, ",", 0, [])
-    for delimiter in DELIMITERS:
-        split = [
-            (number, next(csv.reader([line], delimiter=delimiter), []))
-            for number, line in enumerate(lines)
-            if line.strip() and not line.startswith("#")
-        ]
-        widths = Counter(len(fields) for _, fields in split)
-        if not widths:
-            continue
-        width, count = max(widths.items(), key=lambda w: (w[1] if w[0] > 1 else 0, w[0]))
-        number, fields = next((n, f) for n, f in split if len(f) == width)
-        score = count / len(split) if width > 1 else 0.0
-        best = max(best, (score, width, delimiter, number, fields), key=lambda b: b[:2])
-    _, _, delimiter, number, fields = best
-    return delimiter, number, [f.strip() for f in fields]
-
-
-def _number(text: str) -> bool:
-    try:
-        float(text.replace(",", "."))
-    except ValueError:
-        return not text.strip()
-    return True
 
 
 def _parquet(source: Path) -> pd.DataFrame:
@@ -151,7 +72,8 @@ def _parquet(source: Path) -> pd.DataFrame:
         ) from error
     except (ValueError, OSError) as error:
         raise IdentificationError(f"{source}: not a Parquet file: {error}") from error
-    return frame.reset_index() if any(frame.index.names) else frame
+    # Of an index without a name pandas makes a column `index`; one that only counts is none.
+    return frame if isinstance(frame.index, pd.RangeIndex) else frame.reset_index()
 
 
 def from_frame(frame: pd.DataFrame) -> Foreign:
@@ -178,14 +100,16 @@ def _from_text(found: Foreign, name: str, values: pd.Series[Any]) -> None:
     odd = np.flatnonzero(np.isnan(numbers) & (text.fillna("") != "").to_numpy(dtype=bool))
     if len(odd) < 0.5 * len(text):
         found.columns[name] = numbers
-        if len(odd) > 1 or (len(odd) == 1 and odd[0] > 0):
+        above = int(np.sum(odd == np.arange(len(odd))))  # units and types below the names
+        odd = odd[above:] if above <= MOST_UNIT_ROWS else odd
+        if len(odd):
             found.remarks[name] = (
                 f"{len(odd)} of {len(text)} cells are text and count as missing"
                 f" (the first is '{text.iloc[odd[0]]}' in row {odd[0] + 1})"
             )
         return
     example = str(text.iloc[odd[0]])
-    instants = pd.to_datetime(text, errors="coerce") if ":" in example else None
+    instants = pd.to_datetime(text, errors="coerce", format="mixed") if ":" in example else None
     if instants is not None and instants.notna().mean() > 0.5:
         found.columns[name] = _seconds(instants)
     else:
@@ -203,8 +127,8 @@ def _mat(source: Path, head: bytes) -> Foreign:
 
     if head.startswith(b"MATLAB 7.3") or b"\x89HDF\r\n" in head[:1024]:
         raise IdentificationError(
-            f"{source}: a MAT file of version 7.3 (HDF5); in MATLAB: save(name, '-struct', 'data',"
-            " '-v7')"
+            f"{source}: a MAT file of version 7.3 (HDF5); in MATLAB: s = load('{source.name}');"
+            " save('as7.mat', '-struct', 's', '-v7')"
         )
     try:
         content = io.loadmat(source, squeeze_me=True, struct_as_record=True)
@@ -224,6 +148,8 @@ def _mat(source: Path, head: bytes) -> Foreign:
             why = _no_column(value)
             if why:
                 found.unusable[label] = why
+                if value.ndim == 2 and value.dtype.kind in "fiub":
+                    found.columns |= _of_matrix(label, value)
             elif value.size > 1:
                 found.columns[label] = value.astype(np.float64)
     return found
@@ -246,6 +172,14 @@ def _leaves(name: str, value: object) -> Iterator[tuple[str, Any]]:
         yield name, array
 
 
+def _of_matrix(label: str, values: Any) -> dict[str, Array]:
+    """Return the columns of a matrix, or the rows of a wide one, under the names MATLAB has."""
+    table = np.asarray(values, dtype=np.float64)
+    if table.shape[0] >= table.shape[1]:
+        return {f"{label}(:,{k})": column for k, column in enumerate(table.T, start=1)}
+    return {f"{label}({k},:)": row for k, row in enumerate(table, start=1)}
+
+
 def _no_column(array: Any) -> str:
     if array.dtype.names or array.dtype.kind == "V":
         return "a MATLAB object (table, timeseries): save table2struct(T, 'ToScalar', true)"
@@ -253,7 +187,10 @@ def _no_column(array: Any) -> str:
         return "a cell array or a MATLAB object, not numbers"
     if array.dtype.kind not in "fiub":
         return "text" if array.dtype.kind in "US" else "not of real numbers"
-    return f"a {' x '.join(map(str, array.shape))} array, not one column" if array.ndim > 1 else ""
+    size = " x ".join(map(str, array.shape))
+    if array.ndim == 2:
+        return f"a {size} array: name one of its columns, as (:,2), or rows, as (2,:)"
+    return f"a {size} array, not one column" if array.ndim > 1 else ""
 
 
 def same_length(columns: Mapping[str, Array], source: Path) -> None:

@@ -15,7 +15,8 @@ from host.sysid.errors import IdentificationError
 from host.sysid.flight.column_map import listed, mapped, read_map
 from host.sysid.flight.consistent import HINT
 from host.sysid.flight.foreign import TEXT_KINDS, Foreign, from_frame, read_foreign, same_length
-from host.sysid.flight.plausible import check
+from host.sysid.flight.measured import measured
+from host.sysid.flight.plausible import SURFACES, check
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,6 +36,7 @@ FITTED = (
     "ax_mps2", "ay_mps2", "az_mps2", "phi_rad", "theta_rad",
     "elevator_rad", "aileron_rad", "rudder_rad",
 )  # fmt: skip
+SENSORS = tuple(name for name in FITTED if name not in SURFACES)  # a command may well stand still
 READ = (*TEXT_KINDS, ".parquet", ".mat")
 BRIDGED = "bridged"  # column of the table: not zero where a line was drawn over a long gap
 LONGEST_GAP_S = 0.25
@@ -75,22 +77,26 @@ def read_columns(
     raw, notes = dict(found.columns), found.notes
     if mapping is not None:
         lines = read_map(mapping, ("t_s", *USED))
-        raw |= mapped(found.columns, found.unusable, lines, mapping)
-        foreign = {name: line.foreign for name, line in lines.items()}
+        raw |= mapped(found.columns, found.unusable, lines, mapping, found.twice)
+        theirs = {name: line.foreign for name, line in lines.items()}
     else:
-        foreign = {}
+        theirs = {}
     if "t_s" not in raw:
         raise IdentificationError(
             f"{source}: no column t_s; name it in a map (--map); "
             + listed(found.columns, found.unusable)
         )
     used = {k: raw[k] for k in ("t_s", *USED) if k in raw}
+    both = [k for k in used if k in found.twice and k not in theirs]
+    if both:
+        raise IdentificationError(f"{source}: several columns '{both[0]}': rename them")
     for name in used:
-        remark = found.remarks.get(foreign.get(name, name))
+        remark = found.remarks.get(theirs.get(name, name))
         notes += [f"{name}: {remark}"] if remark else []
     same_length(used, source)
-    columns = _even(used, notes)
-    if kind in READ and not own_text:
+    foreign_rows = kind in READ and not own_text
+    columns = _even(used, notes, foreign=foreign_rows)
+    if foreign_rows:
         notes += check(columns)
     return columns, notes
 
@@ -127,7 +133,7 @@ def even_columns(table: pd.DataFrame) -> tuple[dict[str, Array], list[str]]:
     if "t_s" not in raw:
         raise IdentificationError("no column t_s in the table")
     notes: list[str] = []
-    return _even(raw, notes), notes
+    return _even(raw, notes, foreign=False), notes
 
 
 def _rows(t: Array, notes: list[str]) -> IntArray:
@@ -160,16 +166,32 @@ def _rows(t: Array, notes: list[str]) -> IntArray:
     if swapped:
         notes.append(f"{swapped} rows came before their time and were sorted in")
     if len(kept) < len(index):
+        few = ": t_s is written with too few digits" if len(kept) < 0.6 * len(index) else ""
         notes.append(
             f"{len(index) - len(kept)} of {len(index)} rows repeat an instant and were left out"
+            + few
         )
     return kept
 
 
-def _grid(t: Array, notes: list[str]) -> Array:
-    """Return even instants at the usual rate of the rows."""
+def _step_s(t: Array) -> float:
+    """Return the usual time between instants; zero of too few."""
+    return float(np.median(np.diff(t))) if len(t) >= FEWEST else 0.0
+
+
+def _covered(t: Array, seen: BoolArray) -> float:
+    """Return the share of the time that the instants seen follow each other as they usually do."""
+    if seen.sum() < FEWEST:
+        return 0.0
+    gaps = np.diff(t[seen])
+    if float(np.median(gaps)) > SLOWEST_S:
+        return 0.0
+    return float(np.sum(gaps[gaps <= _long_s(t[seen])])) / float(t[-1] - t[0])
+
+
+def _grid(t: Array, dt_s: float, notes: list[str]) -> Array:
+    """Return even instants at the rate of the fastest sensor."""
     gaps = np.diff(t)
-    dt_s = float(np.median(gaps))
     if not FASTEST_S <= dt_s <= SLOWEST_S:
         raise IdentificationError(
             f"a row every {dt_s:.3g} s: {FASTEST_S:g} to {SLOWEST_S:g} s can be used; is the unit"
@@ -190,22 +212,32 @@ def _grid(t: Array, notes: list[str]) -> Array:
     return np.asarray(t[0] + dt_s * np.arange(count))
 
 
-def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
+def _even(columns: dict[str, Array], notes: list[str], *, foreign: bool) -> dict[str, Array]:
     """Bring the table to an even grid, unwrap angles once, draw lines over gaps."""
     index = _rows(columns["t_s"], notes)
-    t = columns["t_s"][index]
-    grid = _grid(t, notes)
+    columns = {name: values[index] for name, values in columns.items()}
+    if foreign:
+        columns, told = measured(columns, SENSORS, LONGEST_GAP_S)
+        notes += told
+    t = columns["t_s"]
+    steps = {name: _step_s(t[np.isfinite(columns[name])]) for name in FITTED if name in columns}
+    dt_s = min((step for step in steps.values() if step > 0.0), default=_step_s(t))
+    grid = _grid(t, dt_s, notes)
     result: dict[str, Array] = {"t_s": grid}
     bridged = _over(grid, t)
     missing: list[tuple[float, float, str]] = []
+    slower: list[str] = []
     for name, values in columns.items():
         if name == "t_s":
             continue
-        series = values[index]
+        series = values
         seen = np.isfinite(series)
-        if seen.sum() < max(0.5 * len(series), 2):
-            notes.append(f"{name}: {100.0 * (1.0 - seen.mean()):.0f} % missing, not used")
+        covered = _covered(t, seen)
+        if covered < 0.5:
+            notes.append(f"{name}: {100.0 * (1.0 - covered):.0f} % missing, not used")
             continue
+        if steps.get(name, 0.0) > 1.5 * dt_s:
+            slower.append(f"{name} {steps[name]:.3g} s")
         series = series[seen]
         if name in ANGLES:
             _wraps(name, series)
@@ -217,6 +249,8 @@ def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
             longest = int(np.argmax(gaps))
             if gaps[longest] > max(_long_s(t[seen]), 1.01 * float(np.diff(t).max())):
                 missing.append((float(gaps[longest]), float(t[seen][longest]), name))
+    if slower:
+        notes.append(f"slower than the {dt_s:.3g} s of others, drawn between: {', '.join(slower)}")
     if missing:
         length_s, at_s, _ = max(missing)
         names = ", ".join(name for _, _, name in missing)
