@@ -19,6 +19,15 @@ if TYPE_CHECKING:
 
 TEXT_KINDS = (".csv", ".tsv", ".txt", ".dat")
 MOST_UNIT_ROWS = 2
+# How files of others begin that end up here, and what to do with them.
+OTHERS = (
+    (b"\xa3\x95", "a DataFlash log of ArduPilot: mavlogdump.py --format csv makes a table of it"),
+    (b"ULog", "a log of PX4: ulog2csv makes tables of it"),
+    (b"PK\x03\x04", "a spreadsheet or an archive: save it as CSV, Parquet or MAT"),
+    (b"\xd0\xcf\x11\xe0", "an old spreadsheet: save it as CSV"),
+    (b"\x89HDF", "HDF5: save it as CSV, Parquet or MAT up to version 7"),
+    (b"%PDF", "a PDF: the numbers are needed as CSV"),
+)
 
 
 @dataclass(slots=True)
@@ -59,6 +68,28 @@ def read_foreign(source: Path) -> Foreign:
     found = from_frame(text.frame)
     found.notes, found.twice = text.notes, text.twice
     return found
+
+
+def refuse_other(source: Path) -> None:
+    """Refuse what others write and nobody here reads.
+
+    Raises
+    ------
+    IdentificationError
+        With what it is, and how it becomes a table.
+    """
+    with source.open("rb") as file:
+        head = file.read(8)
+    for begin, words in OTHERS:
+        if head.startswith(begin):
+            raise IdentificationError(f"{source}: {words}")
+
+
+def is_text(source: Path) -> bool:
+    """Return whether a file begins with lines of characters."""
+    with source.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    return b"\0" not in head and head.count(b"\n") + head.count(b"\r") > 1
 
 
 def _parquet(source: Path) -> pd.DataFrame:

@@ -14,7 +14,15 @@ from host.compiled import Array, BoolArray, IntArray
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.column_map import listed, mapped, read_map
 from host.sysid.flight.consistent import HINT
-from host.sysid.flight.foreign import TEXT_KINDS, Foreign, from_frame, read_foreign, same_length
+from host.sysid.flight.foreign import (
+    TEXT_KINDS,
+    Foreign,
+    from_frame,
+    is_text,
+    read_foreign,
+    refuse_other,
+    same_length,
+)
 from host.sysid.flight.measured import measured
 from host.sysid.flight.plausible import SURFACES, check
 
@@ -68,12 +76,14 @@ def read_columns(
     if not source.exists():
         raise IdentificationError(f"{source}: no such file")
     kind = source.suffix.lower()
-    own_text = kind in TEXT_KINDS[1:] and mapping is None  # rows of the original logger
-    if kind not in READ or own_text:
-        raw, notes = _log(source, calibration)
-        found = Foreign(raw, notes=notes)
-    else:
+    found = None
+    if kind not in READ or (kind in TEXT_KINDS[1:] and mapping is None):  # rows of the original
+        found = _recorded(source, calibration, maybe_table=kind != ".bin")
+    recorded = found is not None
+    if found is None:
         found = read_foreign(source)
+        if calibration is not None:
+            found.notes.append("--calibration is for logs: this table is taken as it is")
     raw, notes = dict(found.columns), found.notes
     if mapping is not None:
         lines = read_map(mapping, ("t_s", *USED))
@@ -94,22 +104,52 @@ def read_columns(
         remark = found.remarks.get(theirs.get(name, name))
         notes += [f"{name}: {remark}"] if remark else []
     same_length(used, source)
-    foreign_rows = kind in READ and not own_text
-    columns = _even(used, notes, foreign=foreign_rows)
-    if foreign_rows:
+    columns = _even(used, notes, foreign=not recorded)
+    if not recorded:
         notes += check(columns)
     return columns, notes
 
 
+def _recorded(source: Path, calibration: Path | None, *, maybe_table: bool) -> Foreign | None:
+    """Return the columns of a log; None if it is none but may be a table of text."""
+    from host.errors import NotALogError
+
+    if source.is_file():
+        refuse_other(source)
+    try:
+        columns, notes = _log(source, calibration)
+    except NotALogError:
+        if maybe_table and source.is_file() and is_text(source):
+            return None
+        raise
+    return Foreign(columns, notes=notes)
+
+
 def _log(source: Path, calibration: Path | None) -> tuple[dict[str, Array], list[str]]:
     from host.log import read_log
+    from host.source import find_flights, newest
     from host.summary import calibration_note
 
+    notes: list[str] = []
+    if source.is_dir():
+        flights = find_flights(source)
+        source = newest(source, flights).path
+        if len(flights) > 1:
+            notes.append(f"{source.name} is the newest of {len(flights)} logs in the folder")
     log = read_log(source, calibration=calibration)
     raw: dict[str, Array] = {
         k: np.asarray(v, dtype=np.float64) for k, v in log.columns().items() if k in WANTED
     }
-    notes: list[str] = []
+    if not len(raw.get("t_s", ())):
+        raise IdentificationError(
+            f"{source}: nothing was recorded in it; `host info {source}` says what it is"
+        )
+    if log.complete != "complete":
+        loss = log.loss
+        notes.append(
+            f"the log is {log.complete}: {loss.seconds:.2f} s and {loss.lost_bytes} bytes lost"
+            " (`host decode` names every place)"
+        )
     poor_columns = [c for c in calibration_note(log)["default_columns"] if c in USED]
     if poor_columns:
         notes.append(
