@@ -147,7 +147,7 @@ def test_a_mat_file_holds_what_is_printed_and_the_histories(
     first = loaded["maneuvers"] if isinstance(loaded["maneuvers"], dict) else loaded["maneuvers"][0]
     np.testing.assert_allclose(first["measured"], answer.maneuvers[0].outputs)
     np.testing.assert_allclose(first["t_s"], answer.maneuvers[0].time_s)
-    np.testing.assert_allclose(first["fitted"], result.fitted[0])
+    np.testing.assert_allclose(first["simulated"], answer.simulated[0])
 
 
 def test_names_are_those_of_variables(answers: list[Answer]) -> None:

@@ -108,11 +108,11 @@ def _linear(answer: Answer) -> dict[str, Any]:
                 "t_s": maneuver.time_s,
                 "input": maneuver.inputs,
                 "measured": maneuver.outputs,
-                "fitted": fitted,
+                "simulated": simulated,
                 "residual": residual,
             }
-            for maneuver, fitted, residual in zip(
-                answer.maneuvers, result.fitted, result.residuals, strict=True
+            for maneuver, simulated, residual in zip(
+                answer.maneuvers, answer.simulated, result.residuals, strict=True
             )
         ),
     }

@@ -18,7 +18,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MEASURED, MODEL, RESIDUAL, REFUSED, TRUTH = "0.45", "C3", "C0", "C3", "black"
+MEASURED, MODEL, RESIDUAL, REFUSED, TRUTH = "0.7", "C3", "C0", "C3", "black"
+SHOWN_UNITS = {
+    "_radps": ("deg/s", 57.29578),
+    "_rad": ("deg", 57.29578),
+    "_mps2": ("m/s2", 1.0),
+    "_mps": ("m/s", 1.0),
+}
+IN_A_LINE = 4  # maneuvers whose names fit side by side
+TRUSTED, REACH = 10.0, 60.0  # %, of intervals: trusted, and the end of the scale
+COLOURS, STROKES = 10, ("-", "--", ":", "-.")
 SHOWN_HZ = (0.05, 20.0)  # of the spectra
 
 
@@ -67,27 +76,29 @@ class Excitation:
 
 
 def histories(signals: dict[str, list[Trace]], title: str, path: Path) -> Path:
-    """Draw each signal measured and by the model, the difference beneath."""
+    """Draw each signal measured and by the model, the difference beneath; angles in degrees."""
     rows = len(signals)
-    with _figure(path, (9.0, 2.2 * rows)) as figure:
+    count = max((len(traces) for traces in signals.values()), default=1)
+    with _figure(path, (max(9.0, 1.1 * count), 2.2 * rows)) as figure:
         panels = figure.subplots(2 * rows, 1, squeeze=False, height_ratios=[3, 1] * rows)
         axes = list(panels[:, 0])
         for k, (name, traces) in enumerate(signals.items()):
             over, under = axes[2 * k], axes[2 * k + 1]
+            label, scale = shown(name)
             for trace in traces:
-                over.plot(trace.t_s, trace.measured, color=MEASURED, lw=1.4)
-                over.plot(trace.t_s, trace.model, color=MODEL, lw=0.8)
-                under.plot(trace.t_s, trace.measured - trace.model, color=RESIDUAL, lw=0.6)
+                measured, model = scale * trace.measured, scale * trace.model
+                over.plot(trace.t_s, measured, color=MEASURED, lw=2.4)
+                over.plot(trace.t_s, model, color=MODEL, lw=0.8)
+                under.plot(trace.t_s, measured - model, color=RESIDUAL, lw=0.6)
             under.axhline(0.0, color="0.8", lw=0.6, zorder=0)
-            over.set_ylabel(name, fontsize=8)
+            over.set_ylabel(label, fontsize=8)
             under.set_ylabel("difference", fontsize=6)
             for axis in (over, under):
-                axis.tick_params(labelsize=7)
+                axis.tick_params(labelsize=7, labelbottom=axis is axes[-1])
                 axis.set_xlim(over.get_xlim())
-            over.tick_params(labelbottom=False)
             for trace in traces:
                 over.annotate(
-                    trace.title,
+                    _broken(trace.title) if count > IN_A_LINE else trace.title,
                     (float(trace.t_s[0]), 1.0),
                     xycoords=("data", "axes fraction"),
                     xytext=(0, 2),
@@ -100,6 +111,19 @@ def histories(signals: dict[str, list[Trace]], title: str, path: Path) -> Path:
     return path
 
 
+def shown(name: str) -> tuple[str, float]:
+    """Return what a signal is called in a picture, and the factor to the unit named there."""
+    for ending, (unit, scale) in SHOWN_UNITS.items():
+        if name.endswith(ending):
+            return f"{name.removesuffix(ending)}, {unit}", scale
+    return name, 1.0
+
+
+def _broken(title: str) -> str:
+    """Return '3-2-1-1 on elevator at 8.4 s' in three lines: many maneuvers stand side by side."""
+    return title.replace(" on ", "\n").replace(" at ", "\n")
+
+
 def pole_map(clouds: Sequence[Cloud], title: str, path: Path) -> Path:
     """Draw all poles, and each mode with its scatter in a panel of its own scale."""
     rows = (len(clouds) + 1) // 2
@@ -108,16 +132,10 @@ def pole_map(clouds: Sequence[Cloud], title: str, path: Path) -> Path:
         whole = figure.add_subplot(grid[0, :])
         for cloud in clouds:
             _cloud(whole, cloud)
-            whole.annotate(
-                cloud.name,
-                (cloud.pole.real, abs(cloud.pole.imag)),
-                xytext=(6, 6),
-                textcoords="offset points",
-                fontsize=8,
-            )
         whole.axvline(0.0, color="0.7", lw=0.8)
         whole.axhline(0.0, color="0.9", lw=0.8, zorder=0)
         whole.margins(x=0.08, y=0.12)
+        _name_poles(whole, [(c.name, c.pole) for c in clouds])
         whole.set_xlabel("real, 1/s")
         whole.set_ylabel("imaginary, rad/s")
         whole.set_title(title, fontsize=10)
@@ -133,23 +151,25 @@ def pole_map(clouds: Sequence[Cloud], title: str, path: Path) -> Path:
             near.set_title(cloud.name, fontsize=8)
             near.set_xlabel("real, 1/s", fontsize=7)
             near.tick_params(labelsize=7)
+            near.locator_params(axis="x", nbins=5)
             if near.get_xlim()[1] > 0.0:
                 near.axvline(0.0, color="0.7", lw=0.8)
     return path
 
 
-def interval_bars(bars: Sequence[Bar], marked: str, against: str, path: Path) -> Path:
-    """Draw each parameter's interval as a share of its scale; red where marked or wider.
+def interval_bars(bars: Sequence[Bar], title: str, path: Path) -> Path:
+    """Draw each parameter's interval as a share of its scale; red where it is marked.
 
-    `marked` says what the mark means, `against` what the scale is.
+    The scale is the estimate, or what would contribute 5 % of its row's largest.
     """
-    with _figure(path, (8.5, 0.32 * len(bars) + 1.4)) as figure:
+    with _figure(path, (8.5, 0.32 * len(bars) + 1.8)) as figure:
         axis = figure.subplots()
         widest = max((100.0 * b.half_width / b.scale for b in bars), default=0.0)
-        reach = float(np.clip(1.15 * widest, 15.0, 150.0))
+        reach = float(np.clip(1.15 * widest, 15.0, REACH))
+        axis.axvspan(-TRUSTED, TRUSTED, color="0.93", lw=0.0, zorder=0)
         for position, bar in enumerate(reversed(bars)):
             share = 100.0 * bar.half_width / bar.scale
-            colour = REFUSED if bar.marked or share > 100.0 else RESIDUAL
+            colour = REFUSED if bar.marked else RESIDUAL
             axis.errorbar(0.0, position, xerr=min(share, reach), color=colour, fmt="o", ms=4)
             if share > reach:
                 for side in (-reach, reach):
@@ -167,49 +187,82 @@ def interval_bars(bars: Sequence[Bar], marked: str, against: str, path: Path) ->
         axis.set_xlim(-1.05 * reach, 1.05 * reach)
         axis.set_ylim(-0.7, len(bars) - 0.3)
         axis.set_yticks(range(len(bars)), [b.name for b in reversed(bars)], fontsize=8)
+        axis.tick_params(axis="x", labelsize=7)
         axis.axvline(0.0, color="0.85", lw=0.8, zorder=0)
+        axis.set_title(title, fontsize=10)
         known = any(bar.truth is not None for bar in bars)
         axis.set_xlabel(
-            f"95 % interval about the estimate, % {against}\n"
-            f"red: {marked}, or wider than that; arrows: beyond the scale"
+            "95 % interval about the estimate, % of it, or of what would contribute 5 % of its"
+            " row's largest\ngrey: within 10 %; red: not to be relied on; arrows: beyond the scale"
             + ("; diamonds: the simulated aircraft" if known else ""),
             fontsize=8,
         )
     return path
 
 
-def spectra(inputs: Sequence[Excitation], modes: Sequence[tuple[str, float]], path: Path) -> Path:
+def spectra(
+    inputs: Sequence[Excitation], modes: Sequence[tuple[str, float]], title: str, path: Path
+) -> Path:
     """Draw the spectra of inputs and the modes, name and Hz, that they should excite."""
-    with _figure(path, (8.0, 4.0)) as figure:
+    lines = (len(inputs) + 1) // 2
+    with _figure(path, (8.0, 4.2 + 0.16 * lines)) as figure:
         axis = figure.subplots()
-        for item in inputs:
-            series = item.values - item.values.mean()
+        for number, item in enumerate(inputs):
+            series = np.degrees(item.values - item.values.mean())
             padded = 8 * len(series)
             size = np.abs(np.fft.rfft(series, padded)) * item.dt_s
             axis.semilogx(
-                np.fft.rfftfreq(padded, item.dt_s)[1:], size[1:], lw=0.9, label=item.label
+                np.fft.rfftfreq(padded, item.dt_s)[1:],
+                size[1:],
+                lw=1.1,
+                color=f"C{number % COLOURS}",
+                ls=STROKES[number // COLOURS % len(STROKES)],
+                label=item.label,
             )
         low, high = SHOWN_HZ
         for name, hertz in modes:
             if low < hertz < high:
-                axis.axvline(hertz, color="0.5", lw=0.8, ls="--")
+                axis.axvline(hertz, color="0.5", lw=0.8, ls="--", zorder=0)
                 axis.annotate(
                     name,
                     (hertz, 1.0),
                     xycoords=("data", "axes fraction"),
-                    xytext=(3, -3),
+                    xytext=(0, 3),
                     textcoords="offset points",
                     rotation=90,
                     fontsize=7,
-                    va="top",
+                    ha="center",
+                    va="bottom",
                 )
         axis.set_xlim(low, high)
         axis.set_ylim(bottom=0.0)
-        axis.set_xlabel("frequency, Hz")
-        axis.set_ylabel("input spectrum, rad s")
+        axis.tick_params(labelsize=7)
+        axis.set_xlabel("frequency, Hz", fontsize=8)
+        axis.set_ylabel("spectrum of the input, deg s", fontsize=8)
+        figure.suptitle(title, fontsize=10)
         if inputs:
-            axis.legend(fontsize=7, frameon=False)
+            figure.legend(loc="outside lower center", ncols=2, fontsize=7, frameon=False)
     return path
+
+
+def _name_poles(axis: Axes, poles: Sequence[tuple[str, complex]]) -> None:
+    """Write names beside poles, one below the other where poles are close."""
+    (left, right), (low, high) = axis.get_xlim(), axis.get_ylim()
+    placed: list[tuple[float, float]] = []
+    for name, pole in sorted(poles, key=lambda p: -abs(p[1].imag)):
+        # In widths of a name and heights of a line, about.
+        x, y = (pole.real - left) / (right - left) * 7.0, abs(pole.imag) / (high - low) * 16.0
+        at = y + 0.6
+        while any(abs(x - a) < 1.0 and abs(at - b) < 1.0 for a, b in placed):
+            at -= 1.0
+        placed.append((x, at))
+        axis.annotate(
+            name,
+            (pole.real, abs(pole.imag)),
+            xytext=(8.0, 10.0 * (at - y)),
+            textcoords="offset points",
+            fontsize=8,
+        )
 
 
 def _cloud(axis: Axes, cloud: Cloud, *, mirrored: bool = True) -> None:

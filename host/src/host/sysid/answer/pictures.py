@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.compiled import Array
+from host.sysid.answer.json import found_name
 from host.sysid.answer.panels import (
     Bar,
     Cloud,
@@ -21,9 +22,11 @@ from host.sysid.answer.panels import (
     spectra,
 )
 from host.sysid.answer.truth import true_coefficients
+from host.sysid.answer.units import parameter_unit
+from host.sysid.answer.verdict import not_relied_on
 from host.sysid.compatibility.signals import THIN_HZ
 from host.sysid.flight.linear import Answer
-from host.sysid.models.diagnostics import CANNOT
+from host.sysid.models.diagnostics import references
 from host.sysid.models.modes import Mode
 
 if TYPE_CHECKING:
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
 
 SCATTER = 300
 MOVED_SHARE = 0.2  # of the largest input: less is an answer of the pilot, not the test
-REFERENCE = "of it, or of what would contribute 5 % of its row's largest"
+EXCITED = "inputs (lines) and the modes they should excite (dashed)"
 GAP_S = 0.5  # between the maneuvers of a picture
 
 
@@ -61,31 +64,48 @@ def draw(answer: Answer, folder: Path, name: str) -> list[Path]:
         If matplotlib is missing.
     """
     result = answer.result
-    title = f"{answer.template}, {answer.method}: measured (grey), {result.residual_kind} fit (red)"
-    refused = {r.name for r in answer.refused if r.grade == CANNOT}
+    traces, kind = _linear_traces(answer)
+    title = f"{answer.template}, {answer.method}: measured (grey), {kind} (red)"
+    loose = not_relied_on(answer)
     half = result.half_width()
+    size = references(answer.model, answer.maneuvers, result.estimate)
     bars = [
-        Bar(label, value, width, max(abs(value), 1e-300), label in refused)
-        for label, value, width in zip(
-            result.names, result.estimate.tolist(), half.tolist(), strict=True
+        Bar(
+            f"{label}, {unit}" if (unit := parameter_unit(answer.model, label)) != "1" else label,
+            float(result.estimate[k]),
+            float(half[k]),
+            max(float(size[k]), 1e-300),
+            label in loose,
         )
-        if width > 0.0
-    ][: len(answer.model.parameters)]
+        for k, label in enumerate(p.name for p in answer.model.parameters)
+        if half[k] > 0.0 and not label.startswith("imu_")
+    ]
     inputs = [
-        Excitation(f"{maneuver.name}: {column}", maneuver.dt_s, maneuver.inputs[:, j])
+        Excitation(
+            maneuver.name + (f": {column.split('_')[0]}" if len(answer.model.inputs) > 1 else ""),
+            maneuver.dt_s,
+            maneuver.inputs[:, j],
+        )
         for maneuver in answer.maneuvers
         for j, column in enumerate(answer.model.inputs)
         if np.ptp(maneuver.inputs[:, j]) > MOVED_SHARE * np.max(np.ptp(maneuver.inputs, axis=0))
     ]
     return [
-        histories(_linear_traces(answer), title, folder / f"{name}_fit.svg"),
+        histories(traces, title, folder / f"{name}_fit.svg"),
         pole_map(
             _clouds(answer.modes),
             f"{answer.template}, {answer.method}: poles, scatter from the covariance",
             folder / f"{name}_poles.svg",
         ),
-        interval_bars(bars, CANNOT, "of it", folder / f"{name}_intervals.svg"),
-        spectra(inputs, _hertz(answer.modes), folder / f"{name}_input.svg"),
+        interval_bars(
+            bars, f"{answer.template}, {answer.method}", folder / f"{name}_intervals.svg"
+        ),
+        spectra(
+            inputs,
+            _hertz(answer.modes),
+            f"{answer.template}: {EXCITED}",
+            folder / f"{name}_input.svg",
+        ),
     ]
 
 
@@ -125,7 +145,7 @@ def draw_coefficients(
     t = columns["t_s"]
     inputs = [
         Excitation(
-            f"{f.kind} at {f.start_s:.1f} s: {f.axis}",
+            found_name(f),
             float(t[1] - t[0]),
             columns[f.axis][(t >= f.start_s) & (t <= f.end_s)],
         )
@@ -134,7 +154,7 @@ def draw_coefficients(
     return [
         histories(
             signals,
-            "coefficients: measured (grey), by the derivatives found (red)",
+            "coefficients: measured (grey), one step by the derivatives found (red), fitted data",
             folder / "coefficients_fit.svg",
         ),
         pole_map(
@@ -142,8 +162,13 @@ def draw_coefficients(
             "coefficients: poles, scatter from the covariance",
             folder / "coefficients_poles.svg",
         ),
-        interval_bars(bars, "flagged", REFERENCE, folder / "coefficients_intervals.svg"),
-        spectra(inputs, _hertz(answer.modes), folder / "coefficients_input.svg"),
+        interval_bars(bars, "coefficients", folder / "coefficients_intervals.svg"),
+        spectra(
+            inputs,
+            _hertz(answer.modes),
+            f"coefficients: {EXCITED}",
+            folder / "coefficients_input.svg",
+        ),
     ]
 
 
@@ -155,19 +180,20 @@ def _hertz(modes: Sequence[Mode]) -> list[tuple[str, float]]:
     return [(m.name, m.frequency_radps / (2.0 * np.pi)) for m in modes]
 
 
-def _linear_traces(answer: Answer) -> dict[str, list[Trace]]:
+def _linear_traces(answer: Answer) -> tuple[dict[str, list[Trace]], str]:
+    """Return the outputs measured and by the model, and in words how the model came to them."""
+    one_step = answer.result.residual_kind == "innovation"
+    modelled = answer.result.fitted if one_step else answer.simulated
     signals: dict[str, list[Trace]] = {name: [] for name in answer.model.outputs}
     begin = 0.0
-    for maneuver, fitted in zip(answer.maneuvers, answer.result.fitted, strict=True):
+    for maneuver, outputs in zip(answer.maneuvers, modelled, strict=True):
         t = begin + maneuver.time_s
         begin = float(t[-1]) + GAP_S
-        if fitted.shape[1] != len(answer.model.outputs):
-            continue
         for j, name in enumerate(answer.model.outputs):
             signals[name].append(
-                Trace(t, maneuver.outputs[:, j], fitted[:, j], maneuver.name if j == 0 else "")
+                Trace(t, maneuver.outputs[:, j], outputs[:, j], maneuver.name if j == 0 else "")
             )
-    return {name: traces for name, traces in signals.items() if traces}
+    return signals, f"{'one step' if one_step else 'free simulation'}, fitted data"
 
 
 def _clouds(modes: Sequence[Mode]) -> list[Cloud]:

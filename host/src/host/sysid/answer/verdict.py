@@ -130,6 +130,11 @@ def _verdict(answer: Answer) -> list[str]:
             "  prediction of the unseen maneuver: "
             + ("fails for " + ", ".join(poor) if poor else "holds for every output")
         )
+    else:
+        lines.append(
+            "  nothing was left to be predicted: what the model lacks is in no interval; fly each"
+            " input three times"
+        )
     return lines
 
 
@@ -144,6 +149,15 @@ def unpredicted(answer: Answer) -> list[str]:
         if group.name in answer.at_bound:
             failing |= set(group.outputs)
     return [state for state in answer.model.states if state in failing]
+
+
+def not_relied_on(answer: Answer) -> set[str]:
+    """Return the parameters that the verdict does not let a reader use."""
+    half = answer.result.half_width()
+    size = references(answer.model, answer.maneuvers, answer.result.estimate)
+    wide = {p.name for k, p in enumerate(answer.model.parameters) if half[k] > FAIR * size[k]}
+    refused = {r.name for r in answer.refused if r.grade == CANNOT}
+    return wide | refused | _entries_of(answer, unpredicted(answer))
 
 
 def _entries_of(answer: Answer, states: Sequence[str]) -> set[str]:

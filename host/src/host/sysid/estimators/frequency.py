@@ -291,7 +291,7 @@ def fit_frequency_output_error(
         degrees_of_freedom=np.full(count, float(max(2 * sum(map(len, accepted[4])) - width, 1))),
         residuals=residuals,
         fitted=residuals,
-        residual_kind="output",
+        residual_kind="spectrum",
         noise_covariance=np.diag(variance),
         iterations=iterations,
         converged=converged,

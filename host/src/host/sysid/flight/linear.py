@@ -106,6 +106,7 @@ class Answer:
     still: tuple[str, ...]
     delays: dict[str, tuple[float, float]]
     corrections: tuple[Correction, ...] = ()
+    simulated: tuple[Array, ...] = ()  # outputs of the maneuvers by free simulation
 
     @property
     def at_bound(self) -> tuple[str, ...]:
@@ -274,6 +275,7 @@ def _answer(
         still=constant_inputs(model, fitted),
         delays=delays,
         corrections=() if compatibility is None else corrections(compatibility),
+        simulated=tuple(simulated),
     )
 
 

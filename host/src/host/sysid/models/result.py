@@ -36,7 +36,8 @@ class FitResult:
     fitted : tuple of Array
         Per maneuver the model's side of those residuals.
     residual_kind : str
-        ``output`` (free simulation), ``rate`` (equation error) or ``innovation`` (one step).
+        ``output`` (free simulation), ``rate`` (equation error), ``innovation`` (one step) or
+        ``spectrum`` (lines of output error in frequency, real and imaginary parts).
     noise_covariance : Array
         Covariance of the residual columns.
     iterations : int
