@@ -229,18 +229,38 @@ def test_equation_error_no_longer_takes_late_vanes_for_damping(
 def test_told_errors_are_not_taken_out_twice(
     flown: tuple[Columns, list[dict[str, Any]], Compatibility],
 ) -> None:
-    """The fit finds what is left of the vanes' delay; both together are the same as before."""
+    """Free, the fit finds what is left of the vanes' delay; both together are as before."""
     columns, _, found = flown
     airframe = airframe_data(NAME)
     before, after = (
         identify(columns, names=("longitudinal",), airframe=airframe, compatibility=known)[0]
-        for known in (None, found)
+        for known in (None, replace(found, instrument=None))
     )
     taken = {c.name: c.value for c in after.corrections}
     assert not before.corrections
     assert taken["vane_delay_s"] > 0.003
     total = after.delays["delay_vanes_s"][0] + taken["vane_delay_s"]
     assert total == pytest.approx(before.delays["delay_vanes_s"][0], abs=0.001)
+
+
+def test_with_the_instrument_known_places_and_delays_are_carried_not_freed(
+    flown: tuple[Columns, list[dict[str, Any]], Compatibility],
+) -> None:
+    """In gusts no fit tells the IMU's place from lift of the elevator: to free it is to err."""
+    columns, maneuvers, found = flown
+    airframe = airframe_data(NAME)
+    free, answer = (
+        identify(columns, names=("longitudinal",), airframe=airframe, compatibility=known)[0]
+        for known in (replace(found, instrument=None), found)
+    )
+    assert "imu_x_m" in free.result.names
+    assert not any(n.startswith(("imu_", "delay_")) for n in answer.result.names)
+    truth = true_coefficients({"maneuver": maneuvers}, "longitudinal")
+    for c in answer.coefficients:
+        assert abs(c.value - truth[c.name]) < 1.2 * c.half_width, c.name
+    # A centimetre of arm: the half-width of CL_de is at least what it makes.
+    place = next(c for c in answer.coefficients if c.name == "CL_de")
+    assert place.half_width > 0.15 * abs(place.value)
 
 
 def test_a_delay_at_its_bound_is_called_so(

@@ -75,8 +75,8 @@ def prepare(
     data = {k: v for k, v in columns.items() if k in wanted}
     dt_s = float(data["t_s"][1] - data["t_s"][0])
     if instrument is not None:
-        data |= {name: _unstuck(data, name, instrument, dt_s) for name in AIR[1:]}
-        data |= {name: _unfiltered(data[name], instrument, dt_s) for name in inertial}
+        data |= {name: unstuck(data, name, instrument, dt_s) for name in AIR[1:]}
+        data |= {name: unfiltered(data[name], instrument, dt_s) for name in inertial}
     if airframe is not None:
         data = _at_cg(data, airframe, dt_s)
     block = max(1, round(BLOCK_S / dt_s))
@@ -136,7 +136,7 @@ def prior(instrument: InstrumentData | None) -> dict[str, tuple[float, float]]:
     return {name: (float(mean), float(sd)) for name, (mean, sd) in result.items()}
 
 
-def _unstuck(data: Mapping[str, Array], name: str, i: InstrumentData, dt_s: float) -> Array:
+def unstuck(data: Mapping[str, Array], name: str, i: InstrumentData, dt_s: float) -> Array:
     """Return a vane's angle with its dry friction undone: it hangs back where it moves."""
     angle = data[name]
     window = 2 * max(2, round(SMOOTH_S / dt_s)) + 1
@@ -146,7 +146,7 @@ def _unstuck(data: Mapping[str, Array], name: str, i: InstrumentData, dt_s: floa
     return np.asarray(angle + hold * np.tanh(moving / SLIDING_RADPS))
 
 
-def _unfiltered(signal: Array, i: InstrumentData, dt_s: float) -> Array:
+def unfiltered(signal: Array, i: InstrumentData, dt_s: float) -> Array:
     """Return an inertial signal with the loss of its low-pass and of interpolation undone."""
     lost_s2 = 0.5 / (2.0 * np.pi * i.imu_bandwidth_hz) ** 2 + dt_s**2 / 12.0
     return np.asarray(signal - lost_s2 * np.gradient(np.gradient(signal, dt_s), dt_s))

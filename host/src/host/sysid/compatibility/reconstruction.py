@@ -78,12 +78,15 @@ class Compatibility:
     stretches : tuple of (from, to), s
         What it rests on.
     gps : bool
+    instrument : InstrumentData, optional
+        What the calibration leaves open, as far as it was told.
     """
 
     findings: tuple[Finding, ...]
     rms: dict[str, float]
     stretches: tuple[tuple[float, float], ...]
     gps: bool
+    instrument: InstrumentData | None = None
 
     def __getitem__(self, name: str) -> Finding:
         """Return a finding by name."""
@@ -146,7 +149,7 @@ def reconstruct(
         name: float(np.sqrt(q / problem.counted(name)))
         for name, q in zip(problem.model.outputs, squares, strict=True)
     }
-    return Compatibility(tuple(findings), rms, when, gps)
+    return Compatibility(tuple(findings), rms, when, gps, instrument)
 
 
 def _reason(name: str, *, gps: bool) -> str:

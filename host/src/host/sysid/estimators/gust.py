@@ -16,6 +16,8 @@ from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.filter_error import fit_filter_error
 from host.sysid.estimators.fit import fit
+from host.sysid.estimators.innovations import innovations_of
+from host.sysid.estimators.start import start_values_of
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel, Parameter, Term
 from host.sysid.models.result import FitResult
@@ -151,6 +153,10 @@ def fit_with_gust(
     airspeed_mps : float
         Of the trim, for the gust's time scale.
     """
+    if not model.delays:
+        start = start_values_of(model, maneuvers)
+        result = _second(model, model, list(maneuvers), airspeed_mps, start)
+        return GustFit(result, model, tuple(maneuvers), {})
     first = fit("output-error-white", model, maneuvers, doubting=False)
     half = first.half_width()
     delays = {d.name: (first.value(d.name), float(half[first.index(d.name)])) for d in model.delays}
@@ -161,29 +167,43 @@ def fit_with_gust(
     shifted = [_advanced(m, shifts) for m in maneuvers]
     count = len(model.parameters)
     start = np.concatenate([first.estimate[:count], first.estimate[len(model.parameter_names) :]])
-    wide = gust_model(model, airspeed_mps)
-    process = ("gust_rad", *(s for s in ALSO if s in model.states))
     plain = replace(model, delays=())
+    result = _second(model, plain, shifted, airspeed_mps, start)
+    if result.residual_kind == "innovation":
+        covariance = result.covariance.copy()
+        covariance[:count, :count] += _from_delays(first, model)
+        result = replace(result, covariance=covariance)
+    return GustFit(result=result, model=plain, maneuvers=tuple(shifted), delays=delays)
+
+
+def _second(
+    model: LinearModel,
+    plain: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    airspeed_mps: float,
+    start: Array,
+) -> FitResult:
+    """Return filter error with the gust as a state; output error where that search does not end."""
+    process = ("gust_rad", *(s for s in ALSO if s in model.states))
+    wide = gust_model(model, airspeed_mps)
     try:
-        result = fit_filter_error(wide, shifted, process=process, start=start, rival=False)
+        result = fit_filter_error(wide, maneuvers, process=process, start=start, rival=False)
         failure = "" if result.converged else result.warnings[0]
     except IdentificationError as error:
         failure = str(error)
-    if failure:
-        # Better the plain answer with its wider intervals than a search that has not ended.
-        result = fit("output-error-white", plain, shifted, start=start, doubting=False)
-        result = replace(
+    if not failure:
+        around = innovations_of(result, wide, maneuvers)
+        return replace(
             result,
-            warnings=(*result.warnings, f"filter error: {failure}; output error stands instead"),
+            method="filter error with gust",
+            model=plain,
+            covariance=result.covariance if around is None else around.coloured(),
         )
-        return GustFit(result, plain, tuple(shifted), delays)
-    covariance = result.covariance.copy()
-    covariance[:count, :count] += _from_delays(first, model)
-    return GustFit(
-        result=replace(result, method="filter error with gust", model=plain, covariance=covariance),
-        model=plain,
-        maneuvers=tuple(shifted),
-        delays=delays,
+    # Better the plain answer with its wider intervals than a search that has not ended.
+    result = fit("output-error-white", plain, maneuvers, start=start, doubting=False)
+    return replace(
+        result,
+        warnings=(*result.warnings, f"filter error: {failure}; output error stands instead"),
     )
 
 

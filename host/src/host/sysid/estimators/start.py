@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,19 +22,33 @@ def start_values(problem: OutputProblem) -> Array:
     the result does not diverge over the maneuver; the model's start values stand in otherwise.
     """
     theta = problem.first_guess()
+    told = regressed(problem.model, problem.maneuvers)
+    better = np.array([told.get(name, x) for name, x in zip(problem.names, theta, strict=True)])
+    better = np.asarray(np.clip(better, problem.lower, problem.upper), dtype=np.float64)
+    if problem.outputs(better) is None:
+        return theta
+    return better
+
+
+def regressed(model: LinearModel, maneuvers: Sequence[Maneuver]) -> dict[str, float]:
+    """Return what equation error says of a model's parameters and biases, by name.
+
+    Places of accelerometers and delays enter no regression; they are left out, and all the rest is
+    told as if they were zero. Nothing is told where a state is not measured or two are collinear.
+    """
+    places = {lever.parameter for lever in model.levers}
+    plain = replace(
+        model,
+        levers=(),
+        delays=(),
+        parameters=tuple(p for p in model.parameters if p.name not in places),
+    )
     try:
-        names, rows = regression_rows(problem.model, problem.maneuvers)
+        names, rows = regression_rows(plain, maneuvers)
         estimate = solve_rows(rows, len(names))
     except IdentificationError:
-        return theta
-    regressed = theta.copy()
-    position = {name: k for k, name in enumerate(problem.names)}
-    for name, value in zip(names, estimate, strict=True):
-        regressed[position[name]] = value
-    regressed = np.clip(regressed, problem.lower, problem.upper)
-    if problem.outputs(regressed) is None:
-        return theta
-    return regressed
+        return {}
+    return dict(zip(names, estimate.tolist(), strict=True))
 
 
 def start_values_of(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:

@@ -1,18 +1,20 @@
 """How far an answer moves with errors of sensors that nobody knows: one step for each.
 
 A deviation of every open error changes the data and, through the trim, the model. The estimate
-follows by one Gauss-Newton step of output error about the answer: no fit is repeated.
+follows by one Gauss-Newton step of its own method about the answer, filter error's innovations or
+output error's residuals: no fit is repeated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from host.compiled import Array
 from host.sysid.aircraft.airframe import Condition, Moved, trim_of
+from host.sysid.compatibility.at_cg import open_errors, without_open
 from host.sysid.compatibility.corrections import (
     IN_COLUMNS,
     deviations,
@@ -20,14 +22,18 @@ from host.sysid.compatibility.corrections import (
     without_errors,
 )
 from host.sysid.compatibility.reconstruction import Compatibility
+from host.sysid.estimators.gust import gust_model
+from host.sysid.estimators.innovations import innovations_of
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel, without_outputs
 from host.sysid.models.result import FitResult
 from host.sysid.models.templates import TEMPLATES, Trim, template
-from host.sysid.numerics.problem import OutputProblem, Response
+from host.sysid.numerics.problem import OutputProblem
 
 TRIMMING = ("airspeed_mps", "alpha_rad", "theta_rad", "qbar_pa", "density_kgpm3")
 SINGULAR = 1e-12  # of the largest eigenvalue of the scaled information
+
+Follow = Callable[[LinearModel, Trim, Sequence[Maneuver]], Array]
 
 
 def moved_by(
@@ -55,24 +61,21 @@ def moved_by(
     tuple of Moved
         Empty if the model diverges at the answer.
     """
-    model = result.model
-    problem = OutputProblem(model, maneuvers)
-    theta = problem.first_guess()
-    place = {n: k for k, n in enumerate(result.names)}
-    known = [(k, place[n]) for k, n in enumerate(problem.names) if n in place]
-    for k, source in known:
-        theta[k] = result.estimate[source]
-    responses = problem.respond(theta)
-    if responses is None:
+    follow = follower(result, maneuvers, trim)
+    if follow is None:
         return ()
     part, still = pressure_part(compatibility), _mean_of(cuts)
-    errors = {e: sd for e, sd in deviations(compatibility).items() if e in IN_COLUMNS and sd > 0.0}
-    changes, gains = [], []
-    fresh = _is_template(model, trim)
+    told = {e: sd for e, sd in deviations(compatibility).items() if e in IN_COLUMNS}
+    errors = {e: sd for e, sd in (told | open_errors(compatibility, cuts[0])).items() if sd > 0.0}
+    fresh = _is_template(result.model, trim)
+    steps, gains = [], []
     for error, deviation in errors.items():
-        other = [without_errors(c, {error: deviation}, part) for c in cuts]
-        change = [
-            np.stack([o[y] - c[y] for y in model.outputs]) for o, c in zip(other, cuts, strict=True)
+        if error in told:
+            other = [without_errors(c, {error: deviation}, part) for c in cuts]
+        else:
+            other = [without_open(c, error, deviation, compatibility) for c in cuts]
+        changed = [
+            _changed(result.model, m, c, o) for m, c, o in zip(maneuvers, cuts, other, strict=True)
         ]
         there = _mean_of(other)
         gains.append(
@@ -81,21 +84,13 @@ def moved_by(
                 there[1].qbar_pa / still[1].qbar_pa,
             )
         )
-        if fresh and there[0] != still[0]:
-            bent = _bent(trim, still[0], there[0])
-            turned = OutputProblem(_retrimmed(model, bent), maneuvers).outputs(theta)
-            if turned is not None:
-                pairs = zip(change, turned, responses, strict=True)
-                change = [d - (y - r.y) for d, y, r in pairs]
-        changes.append(change)
-    steps = _steps(problem, responses, changes)
-    moved = []
-    for error, step, gain in zip(errors, steps, gains, strict=True):
-        estimate = result.estimate.copy()
-        for k, target in known:
-            estimate[target] += step[k]
-        moved.append(Moved(error, estimate, *gain))
-    return tuple(moved)
+        bent = _bent(trim, still[0], there[0]) if fresh and there[0] != still[0] else trim
+        model = result.model if bent is trim else _retrimmed(result.model, bent)
+        steps.append(follow(model, bent, changed))
+    return tuple(
+        Moved(error, result.estimate + step, *gain)
+        for error, step, gain in zip(errors, steps, gains, strict=True)
+    )
 
 
 def carried(result: FitResult, moved: Sequence[Moved]) -> FitResult:
@@ -103,7 +98,11 @@ def carried(result: FitResult, moved: Sequence[Moved]) -> FitResult:
     if not moved:
         return result
     shifts = np.stack([m.estimate - result.estimate for m in moved])
-    return replace(result, covariance=result.covariance + shifts.T @ shifts)
+    covariance = result.covariance + shifts.T @ shifts
+    # Welch-Satterthwaite: what is carried is no small sample of maneuvers.
+    own = np.diag(result.covariance) / np.maximum(np.diag(covariance), 1e-300)
+    freedom = result.degrees_of_freedom / np.maximum(own, 1e-6) ** 2
+    return replace(result, covariance=covariance, degrees_of_freedom=freedom)
 
 
 def _mean_of(cuts: Sequence[Mapping[str, Array]]) -> tuple[Trim, Condition]:
@@ -120,26 +119,84 @@ def _bent(trim: Trim, still: Trim, there: Trim) -> Trim:
     )
 
 
-def _steps(
-    problem: OutputProblem, responses: Sequence[Response], changes: Sequence[Sequence[Array]]
-) -> Array:
-    """Return the Gauss-Newton step of every change of the data, (changes, P)."""
-    rest = [np.sum((problem.measured(k) - r.y) ** 2, axis=1) for k, r in enumerate(responses)]
-    weight = problem.samples / np.maximum(np.sum(rest, axis=0), 1e-300)
-    H = np.diag(problem.prior_precision)
-    pull = np.zeros((len(changes), len(problem.names)))
-    for k, r in enumerate(responses):
-        own = problem.columns(k)
-        for w, J, change in zip(
-            weight, r.slopes, np.stack([c[k] for c in changes], axis=1), strict=True
-        ):
-            H[np.ix_(own, own)] += w * J.T @ J
-            pull[:, own] += w * change @ J
-    if not (np.isfinite(H).all() and np.isfinite(pull).all()):
-        return np.zeros_like(pull)
-    size = np.sqrt(np.maximum(np.diag(H), 1e-300))
-    inverse = np.linalg.pinv(H / np.outer(size, size), rcond=SINGULAR, hermitian=True)
-    return np.asarray((pull / size) @ inverse / size)
+def _changed(
+    model: LinearModel, maneuver: Maneuver, still: Mapping[str, Array], other: Mapping[str, Array]
+) -> Maneuver:
+    """Return a maneuver with the difference of two sets of columns in it."""
+
+    def moved(names: Sequence[str], values: Array) -> Array:
+        if all(other[n] is still[n] for n in names):
+            return values
+        return values + np.column_stack([other[n] - still[n] for n in names])
+
+    return replace(
+        maneuver,
+        inputs=moved(model.inputs, maneuver.inputs),
+        outputs=moved(model.outputs, maneuver.outputs),
+    )
+
+
+def follower(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> Follow | None:
+    """Return what tells how far an answer moves with model, trim and data."""
+    if result.residual_kind == "innovation":
+        wide = gust_model(result.model, trim.airspeed_mps)
+        found = innovations_of(result, wide, maneuvers)
+        if found is None:
+            return None
+        return lambda model, bent, data: found.step(gust_model(model, bent.airspeed_mps), data)
+    outputs = _Outputs(result, maneuvers)
+    return (lambda model, _, data: outputs.step(model, data)) if outputs.fine else None
+
+
+class _Outputs:
+    """Gauss-Newton steps of output error about an answer."""
+
+    def __init__(self, result: FitResult, maneuvers: Sequence[Maneuver]) -> None:
+        self.problem = problem = OutputProblem(result.model, maneuvers)
+        theta = problem.first_guess()
+        place = {n: k for k, n in enumerate(result.names)}
+        self.known = [(k, place[n]) for k, n in enumerate(problem.names) if n in place]
+        for k, source in self.known:
+            theta[k] = result.estimate[source]
+        self.theta, self.length = theta, len(result.names)
+        self.responses = problem.respond(theta)
+        self.fine = self.responses is not None
+        if self.responses is None:
+            return
+        rests = [
+            np.sum((problem.measured(k) - r.y) ** 2, axis=1) for k, r in enumerate(self.responses)
+        ]
+        self.weight = problem.samples / np.maximum(np.sum(rests, axis=0), 1e-300)
+        H = np.diag(problem.prior_precision)
+        for k, r in enumerate(self.responses):
+            own = problem.columns(k)
+            for w, J in zip(self.weight, r.slopes, strict=True):
+                H[np.ix_(own, own)] += w * J.T @ J
+        if not np.isfinite(H).all():
+            self.fine = False
+            return
+        held = (theta <= problem.lower) | (theta >= problem.upper)
+        H[held], H[:, held] = 0.0, 0.0
+        size = np.where(held, 1.0, np.sqrt(np.maximum(np.diag(H), 1e-300)))
+        inverse = np.linalg.pinv(H / np.outer(size, size), rcond=SINGULAR, hermitian=True)
+        self.inverse = inverse / np.outer(size, size)
+
+    def step(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
+        """Return by how much the whole estimate moves with model and data, (P,)."""
+        assert self.responses is not None
+        result = np.zeros(self.length)
+        other = OutputProblem(model, changed).outputs(self.theta)
+        if other is None:
+            return result
+        pull = np.zeros(len(self.theta))
+        for k, (r, y, m) in enumerate(zip(self.responses, other, changed, strict=True)):
+            rest = m.outputs.T - self.problem.measured(k) - (y - r.y)
+            for w, J, d in zip(self.weight, r.slopes, rest, strict=True):
+                pull[self.problem.columns(k)] += w * J.T @ d
+        step = self.inverse @ pull
+        for k, target in self.known:
+            result[target] = step[k]
+        return result
 
 
 def _is_template(model: LinearModel, trim: Trim) -> bool:

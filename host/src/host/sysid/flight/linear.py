@@ -18,6 +18,7 @@ from host.sysid.aircraft.airframe import (
     corrected,
     trim_of,
 )
+from host.sysid.compatibility.at_cg import at_cg
 from host.sysid.compatibility.corrections import (
     Correction,
     corrections,
@@ -30,8 +31,10 @@ from host.sysid.errors import IdentificationError
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import VANES, fit_with_gust
 from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.estimators.start import regressed
 from host.sysid.flight.carried import carried, moved_by
 from host.sysid.flight.column_map import like
+from host.sysid.flight.departures import departed
 from host.sysid.flight.finder import Found, Grade, find, grade
 from host.sysid.models.diagnostics import (
     Collinearity,
@@ -71,6 +74,7 @@ DELAYS = (
     DelayGroup("delay_pitot_s", ("airspeed_mps",), prior_sd_s=0.015, limit_s=0.05),
 )
 IMU_SD_M = 0.014  # tape measure and balance, 10 mm each
+FREE = ("output", "innovation")  # residuals of methods that simulate
 WEAK_GRADE = 0.2
 # Output error takes turbulence for sensor noise. Simulated flights of the demonstration card, error
 # of Cm_alpha, Cm_q, Cm_de: 5, 10, 7 % by white output error, 2, 3, 3 % with the gust as a state.
@@ -180,9 +184,13 @@ def identify(
             " map (--map)"
         )
     told = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
-    columns = without_delays(columns, told)
-    if airframe is not None:
-        columns = corrected(columns, airframe)
+    if airframe is not None and compatibility is not None and compatibility.instrument is not None:
+        columns = at_cg(columns, airframe, compatibility)
+        with_delays = False
+    else:
+        columns = without_delays(columns, told)
+        if airframe is not None:
+            columns = corrected(columns, airframe)
     if compatibility is not None:
         columns = without_errors(columns, told, pressure_part(compatibility))
     found = list(windows) if windows is not None else find(columns)
@@ -250,10 +258,14 @@ def _answer(
     result = widened(result, repeats(result))
     alone = result
     moved: tuple[Moved, ...] = ()
+    cuts = [_inside(columns, f) for f in used]
+    if airframe is not None and user_model is None and result.residual_kind in FREE:
+        result, moved = departed(result, fitted, cuts, airframe, trim)
+        alone = result
     if compatibility is not None:
-        moved = moved_by(result, fitted, [_inside(columns, f) for f in used], compatibility, trim)
-        result = carried(result, moved)
-    outputs = result.fitted if result.residual_kind == "output" else ()
+        moved += moved_by(result, fitted, cuts, compatibility, trim)
+    result = carried(result, moved)
+    outputs = result.fitted if result.residual_kind == "output" and not moved else ()
     simulated = outputs if len(outputs) else _simulated(model, result, fitted)
     residuals = [m.outputs - y for m, y in zip(fitted, simulated, strict=True)]
     return Answer(
@@ -318,17 +330,8 @@ def _without_attitude(
     It is made of the same gyro and of accelerometers that take side force for gravity: on the
     recorded demonstration flight 15 of 15 intervals hold the truth without it, 12 with it.
     """
-    try:
-        first = fit("equation-error", model, [_cut(columns, model, f) for f in used])
-        position = {name: k for k, name in enumerate(first.names)}
-        model = model.with_start(
-            [
-                p.start if np.isfinite(p.prior_sd) else float(first.estimate[position[p.name]])
-                for p in model.parameters
-            ]
-        )
-    except IdentificationError:
-        pass  # the template's own start values stand
+    told = regressed(model, [_cut(columns, model, f) for f in used])
+    model = model.with_start([told.get(p.name, p.start) for p in model.parameters])
     reduced = without_outputs(model, ("phi_rad",))
     return replace(reduced, state_biases=tuple(s for s in reduced.state_biases if s != "phi_rad"))
 

@@ -1,0 +1,133 @@
+"""A flight's columns as the air met the CG, for the linear fits, and what one error makes of them.
+
+Vanes stick, swing and lag, the IMU's low-pass takes some of fast motion away, and all of them sit
+beside the CG. What the aircraft file and the reconstruction say of that is undone first. What stays
+open of it no linear fit can tell in gusts, so it is not estimated there but carried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.aircraft.airframe import AirframeData, corrected
+from host.sysid.aircraft.instrument_errors import EVEN, PAIR, InstrumentData
+from host.sysid.aircraft.instrument_errors import deviations as drawn
+from host.sysid.compatibility.flight_path import AIR, DELAYS
+from host.sysid.compatibility.path_data import unfiltered, unstuck
+from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
+
+VANE_DELAY, PITOT_DELAY = DELAYS
+IMU_DELAY = "imu_delay_s"
+FRICTION = "friction_share"
+ANGLES = AIR[1:]
+PRESSURE = (AIR[0], "qbar_pa")
+INERTIAL = (*(f"{a}_radps" for a in "pqr"), *(f"a{a}_mps2" for a in "xyz"))
+LATE = {
+    VANE_DELAY: ANGLES,
+    PITOT_DELAY: PRESSURE,
+    IMU_DELAY: (*INERTIAL, *ANGLES, *PRESSURE, "phi_rad", "theta_rad"),
+}
+POTS = {f"{name}_scale": f"{name}_rad" for name in ("elevator", "aileron", "rudder")}
+PLACES = tuple(f"{what}_{a}_m" for what in ("imu", "cg", "vane") for a in "xyz")
+NOTHING = AirframeData("nothing but places", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
+
+
+def at_cg(
+    columns: Mapping[str, Array], airframe: AirframeData, found: Compatibility
+) -> dict[str, Array]:
+    """Return columns as perfect sensors at the CG would have written them, as far as is known.
+
+    Parameters
+    ----------
+    columns : mapping of (n,) arrays
+        SI, as decoded.
+    airframe : AirframeData
+    found : Compatibility
+        Its instrument must be known; told delays are taken out.
+    """
+    i = found.instrument
+    if i is None:
+        return corrected(dict(columns), airframe)
+    result = dict(columns)
+    dt_s = float(columns["t_s"][1] - columns["t_s"][0])
+    tau_s, _ = vane_delay(found, i, columns)
+    for name in (a for a in ANGLES if a in columns and AIR[0] in columns):
+        result[name] = unswung(unstuck(columns, name, i, dt_s), tau_s, i, columns, dt_s)
+    for name in (n for n in INERTIAL if n in columns):
+        result[name] = unfiltered(columns[name], i, dt_s)
+    result = later(result, PRESSURE, i.pitot_lag_s)
+    return corrected(result, airframe)
+
+
+def unswung(
+    angle: Array, tau_s: float, i: InstrumentData, columns: Mapping[str, Array], dt_s: float
+) -> Array:
+    """Return a vane's angle without its delay, and without what a spring does beyond a delay."""
+    t = columns["t_s"]
+    prompt = np.interp(t + tau_s, t, angle)
+    omega = 2.0 * np.pi * i.vane_hz_per_mps * float(np.median(columns[AIR[0]]))
+    swing = 0.5 * tau_s**2 - 1.0 / omega**2
+    return np.asarray(prompt - swing * np.gradient(np.gradient(prompt, dt_s), dt_s))
+
+
+def vane_delay(
+    found: Compatibility, i: InstrumentData, columns: Mapping[str, Array]
+) -> tuple[float, float]:
+    """Return the vanes' delay and its deviation, s: as told, else of the spring by the file."""
+    told = next((f for f in found.findings if f.name == VANE_DELAY and f.told), None)
+    if told is not None:
+        return told.value, told.half_width / NORMAL
+    omega = 2.0 * np.pi * i.vane_hz_per_mps * float(np.median(columns[AIR[0]]))
+    nominal = 2.0 * i.vane_damping / omega
+    return nominal, max(i.delay_share * nominal, i.delay_least_s) * EVEN * PAIR
+
+
+def open_errors(found: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
+    """Return one deviation of every error beyond those of single instants, by name."""
+    i = found.instrument
+    if i is None:
+        return {}
+    every = drawn(i, NOTHING)
+    wanted = (*PLACES, *POTS, FRICTION, IMU_DELAY, PITOT_DELAY)
+    return {n: every[n] for n in wanted if n in every} | {
+        VANE_DELAY: vane_delay(found, i, columns)[1]
+    }
+
+
+def without_open(
+    columns: Mapping[str, Array], error: str, size: float, found: Compatibility
+) -> dict[str, Array]:
+    """Return columns already at the CG without one more error of `open_errors`."""
+    result = dict(columns)
+    if error in LATE:
+        return later(result, LATE[error], size)
+    if error in POTS:
+        name = POTS[error]
+        return result | ({name: columns[name] / (1.0 + size)} if name in columns else {})
+    i = found.instrument
+    if error == FRICTION and i is not None:
+        dt_s = float(columns["t_s"][1] - columns["t_s"][0])
+        more = replace(i, vane_friction_rad=size * i.vane_friction_rad)
+        return result | {n: unstuck(columns, n, more, dt_s) for n in ANGLES if n in columns}
+    if error in PLACES:
+        what, axis = error.split("_")[:2]
+        size = -size if what == "cg" else size
+        move = tuple(size if a == axis else 0.0 for a in "xyz")
+        here = (move[0], move[1], move[2])
+        frame = replace(
+            NOTHING,
+            imu_m=here if what != "vane" else NOTHING.imu_m,
+            vanes_m=(here,) if what != "imu" else (),
+        )
+        return corrected(result, frame)
+    return result
+
+
+def later(columns: Mapping[str, Array], names: tuple[str, ...], delay_s: float) -> dict[str, Array]:
+    """Return columns with some of them read later by a delay (s)."""
+    t = columns["t_s"]
+    return {k: np.interp(t + delay_s, t, v) if k in names else v for k, v in columns.items()}

@@ -1,0 +1,100 @@
+"""What the innovations of a filter-error answer say beside it: their slopes, their colour.
+
+Filter error takes its innovations for white. Where the model lacks something they are not, and
+their memory stands between the slopes as it does for output error (`numerics/colour.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.result import FitResult
+from host.sysid.numerics.colour import coloured_middle
+from host.sysid.numerics.filter_problem import FilterProblem
+
+SLOPE = 1e-4  # of a standard error: step of the numeric slopes
+PROCESS = "log_process."
+
+
+@dataclass(frozen=True)
+class Innovations:
+    """Whitened innovations of every maneuver and their slopes at an answer.
+
+    Attributes
+    ----------
+    theta : Array, shape (P,)
+    covariance : Array, shape (P, P)
+        Inverse of the information at the answer.
+    process : tuple of str
+    e : list of Array, each (samples, p)
+    white : list of Array, each (p, p)
+        Turns an innovation into whitened ones.
+    slopes : list of Array, each (samples, p, P)
+        Of the whitened innovations.
+    """
+
+    theta: Array
+    covariance: Array
+    process: tuple[str, ...]
+    e: list[Array]
+    white: list[Array]
+    slopes: list[Array]
+
+    def step(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
+        """Return how far the answer moves with another model and other data, (P,).
+
+        One Gauss-Newton step; nothing if the filter fails there.
+        """
+        point = FilterProblem(model, changed, self.process).evaluate(self.theta, costless=True)
+        pull = np.zeros(len(self.theta))
+        if point is None:
+            return pull
+        for e, still, white, slope in zip(point.e, self.e, self.white, self.slopes, strict=True):
+            pull -= np.einsum("nj,njk->k", (e - still) @ white.T, slope)
+        return np.asarray(self.covariance @ pull)
+
+    def coloured(self) -> Array:
+        """Return the covariance with the memory of the innovations in it; never a narrower one."""
+        middle = np.zeros_like(self.covariance)
+        for e, white, slope in zip(self.e, self.white, self.slopes, strict=True):
+            plain = e @ white.T
+            for j in range(plain.shape[1]):
+                middle += coloured_middle(plain[:, j], slope[:, j])
+        wide = self.covariance @ middle @ self.covariance
+        factor = np.sqrt(
+            np.maximum(np.diag(wide) / np.maximum(np.diag(self.covariance), 1e-300), 1.0)
+        )
+        return np.asarray(self.covariance * np.outer(factor, factor))
+
+
+def innovations_of(
+    result: FitResult, model: LinearModel, maneuvers: Sequence[Maneuver]
+) -> Innovations | None:
+    """Return them for a result of filter error on this model; None where the filter fails."""
+    theta, covariance = result.estimate, result.covariance_white
+    process = tuple(n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS))
+    problem = FilterProblem(model, maneuvers, process)
+    point = problem.evaluate(theta)
+    if point is None:
+        return None
+    white = [np.linalg.inv(np.linalg.cholesky(S)) for S in point.S]
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-24))
+    slopes = [np.zeros((*e.shape, len(theta))) for e in point.e]
+    for k in range(len(theta)):
+        there = theta.copy()
+        there[k] += SLOPE * deviation[k]
+        only = problem.owner(k)
+        up = problem.evaluate(there, only, None if only is None else point, costless=True)
+        if up is None:
+            return None
+        for number, e in enumerate(up.e):
+            if len(e):
+                change = (e - point.e[number]) / (SLOPE * deviation[k])
+                slopes[number][:, :, k] = change @ white[number].T
+    return Innovations(theta, covariance, process, point.e, white, slopes)

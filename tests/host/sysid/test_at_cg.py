@@ -1,0 +1,148 @@
+"""Sensors as they are: undone before the linear fits where known, carried where they stay open."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from host.sysid import Maneuver
+from host.sysid.aircraft.aircraft_file import instrument_data
+from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.compatibility.at_cg import IMU_DELAY, at_cg, open_errors, without_open
+from host.sysid.compatibility.reconstruction import Compatibility, Finding
+from host.sysid.estimators.gust import fit_with_gust, gust_model
+from host.sysid.flight.carried import moved_by
+from host.sysid.models.model import LinearModel
+from host.sysid.models.result import FitResult
+from host.sysid.models.templates import Trim, template
+
+NAME = "ultrastick25e"
+Columns = dict[str, np.ndarray]
+SPEED_MPS = 20.0
+
+
+def told(delay_s: float) -> Compatibility:
+    """Return a reconstruction that told the vanes' delay to half a millisecond."""
+    late = Finding("vane_delay_s", delay_s, 0.0005, 0.02, told=True, reason="")
+    pitot = Finding("pitot_scale", 0.0, 0.03, 0.031, told=False, reason="")
+    return Compatibility((late, pitot), {}, (), gps=True, instrument=instrument_data(NAME))
+
+
+def still(samples: int, dt_s: float = 0.01) -> Columns:
+    """Return columns of a flight in which nothing moves."""
+    t = np.arange(samples) * dt_s
+    zero = np.zeros(samples)
+    columns = {"t_s": t, "airspeed_mps": zero + SPEED_MPS, "qbar_pa": zero + 240.0}
+    columns |= {f"{a}_radps": zero for a in "pqr"} | {"ax_mps2": zero, "ay_mps2": zero}
+    return columns | {"az_mps2": zero - 9.8, "alpha_rad": zero, "beta_rad": zero}
+
+
+def test_a_swinging_vane_says_again_what_the_air_said() -> None:
+    """The vane of the aircraft file, without friction, at the frequency of a short period."""
+    found = told(0.0)
+    i = found.instrument
+    assert i is not None
+    i = replace(i, vane_friction_rad=0.0)
+    omega = 2.0 * np.pi * i.vane_hz_per_mps * SPEED_MPS
+    lag_s = 2.0 * i.vane_damping / omega
+    columns = still(1000)
+    t = columns["t_s"]
+    true = 0.05 * np.sin(20.0 * t)
+    jw = 20.0j
+    vane = omega**2 / (jw**2 + 2.0 * i.vane_damping * omega * jw + omega**2)
+    angle = 0.05 * np.imag(vane * np.exp(jw * t))
+    columns["alpha_rad"] = angle
+    # At its own place and without upwash only the spring is to be undone.
+    plain = AirframeData("a", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
+    back = at_cg(columns, plain, replace(told(lag_s), instrument=i))["alpha_rad"]
+    inside = slice(200, -200)
+    late = np.interp(t + lag_s, t, angle)
+    assert np.max(np.abs(back - true)[inside]) < 0.01 * 0.05
+    assert np.max(np.abs(late - true)[inside]) > 0.02 * 0.05
+
+
+def test_what_stays_open_is_what_tolerances_leave() -> None:
+    found = told(0.007)
+    left = open_errors(found, still(10))
+    assert left["vane_delay_s"] == pytest.approx(0.0005 / 1.96, rel=1e-3)
+    assert left["imu_x_m"] == pytest.approx(0.010 / np.sqrt(3.0))
+    assert left["elevator_scale"] == pytest.approx(0.01 / np.sqrt(3.0))
+    assert left[IMU_DELAY] > 0.0005
+    assert not open_errors(replace(found, instrument=None), still(10))
+
+
+def test_a_place_is_felt_by_what_sits_there() -> None:
+    """An IMU ahead of its place feels q' x; a CG behind its place moves vanes and IMU alike."""
+    found = told(0.007)
+    columns = still(400)
+    t = columns["t_s"]
+    columns["q_radps"] = 0.5 * np.sin(4.0 * t)
+    turn = np.gradient(columns["q_radps"], 0.01)
+    imu = without_open(columns, "imu_x_m", 0.01, found)
+    np.testing.assert_allclose(imu["az_mps2"] - columns["az_mps2"], 0.01 * turn, atol=1e-12)
+    np.testing.assert_array_equal(imu["alpha_rad"], columns["alpha_rad"])
+    vane = without_open(columns, "vane_x_m", 0.01, found)
+    np.testing.assert_allclose(vane["alpha_rad"], 0.01 * columns["q_radps"] / SPEED_MPS)
+    np.testing.assert_array_equal(vane["az_mps2"], columns["az_mps2"])
+    cg = without_open(columns, "cg_x_m", 0.01, found)
+    np.testing.assert_allclose(cg["az_mps2"] - columns["az_mps2"], -0.01 * turn, atol=1e-12)
+    np.testing.assert_allclose(cg["alpha_rad"], -0.01 * columns["q_radps"] / SPEED_MPS)
+
+
+def gusty() -> tuple[Columns, Maneuver, LinearModel, FitResult, Trim]:
+    """Return a short period in first-order gusts, flown and fitted by filter error."""
+    trim = Trim(SPEED_MPS, 0.0, 0.0)
+    model = template("short-period", trim)
+    values = {"Z_alpha": -8.0, "Z_de": -1.1, "Z_q": -0.1, "M_alpha": -300.0, "M_q": -15.0}
+    truth = np.array([values.get(p.name, -280.0) for p in model.parameters])
+    samples, dt_s, rng = 1200, 0.01, np.random.default_rng(5)
+    wide = gust_model(model, SPEED_MPS)
+    A, B, C, D = wide.matrices(truth)
+    t = np.arange(samples) * dt_s
+    u = 0.04 * np.sign(np.sin(3.0 * t) + np.sin(7.3 * t + 1.0))[:, None]
+    x, states = np.zeros(len(A)), []
+    F = np.eye(len(A)) + A * dt_s + 0.5 * A @ A * dt_s**2
+    for k in range(samples):
+        states.append(x)
+        x = F @ x + dt_s * (B @ u[k])
+        x[-1] += 0.01 * np.sqrt(dt_s) * rng.standard_normal()
+    y = np.array(states) @ C.T + u @ D.T
+    y = y + 0.04 * y.std(axis=0) * rng.standard_normal(y.shape)
+    columns = still(samples) | {"elevator_rad": u[:, 0]}
+    columns |= dict(zip(model.outputs, y.T, strict=True))
+    maneuver = Maneuver(dt_s, u, y)
+    return columns, maneuver, model, fit_with_gust(model, [maneuver], SPEED_MPS).result, trim
+
+
+def test_one_step_of_filter_error_foretells_the_fit_of_disturbed_data() -> None:
+    """A late IMU, a wrong place, a wrong pot; the model has no delay to hide the first in."""
+    columns, maneuver, model, result, trim = gusty()
+    assert result.residual_kind == "innovation"
+    found = told(0.007)
+    moved = {m.error: m for m in moved_by(result, [maneuver], [columns], found, trim)}
+    sizes = open_errors(found, columns)
+    for error in (IMU_DELAY, "imu_x_m", "elevator_scale"):
+        other = without_open(columns, error, sizes[error], found)
+        data = Maneuver(
+            0.01,
+            np.column_stack([other[c] for c in model.inputs]),
+            np.column_stack([other[c] for c in model.outputs]),
+        )
+        again = fit_with_gust(model, [data], SPEED_MPS).result
+        expected = again.estimate[:6] / result.estimate[:6] - 1.0
+        step = moved[error].estimate[:6] / result.estimate[:6] - 1.0
+        largest = float(np.max(np.abs(expected)))
+        assert largest > 0.004, error
+        np.testing.assert_allclose(step, expected, atol=0.2 * largest, err_msg=error)
+
+
+def test_innovations_with_a_memory_widen_the_interval() -> None:
+    """Filter error calls itself sure; what its own innovations say is never narrower."""
+    _, maneuver, model, result, _ = gusty()
+    own = np.sqrt(np.diag(result.covariance_white))[:6]
+    assert np.all(result.standard_error[:6] >= own * (1.0 - 1e-9))
+    slow = np.convolve(np.random.default_rng(1).standard_normal(1300), np.ones(60) / 60.0)
+    y = maneuver.outputs.copy()
+    y[:, 1] += 0.3 * y[:, 1].std() * slow[: len(y)] / slow.std()
+    disturbed = fit_with_gust(model, [replace(maneuver, outputs=y)], SPEED_MPS).result
+    wide = disturbed.standard_error[:6] / np.sqrt(np.diag(disturbed.covariance_white))[:6]
+    assert np.max(wide) > 1.3
