@@ -16,9 +16,6 @@ namespace {
 
 constexpr uint32_t kRetryUs = 2000000UL;
 constexpr uint32_t kReceiverUs = 150000UL;  // six frames of the slowest receiver
-constexpr uint32_t kDeadUs = 2000000UL;     // no card is busy that long
-constexpr uint32_t kStallUs = 100000UL;     // worth an event
-constexpr uint16_t kPortion = 64;           // bytes of a block per turn: 0.3 ms with its CRCs
 constexpr uint32_t kLowSeconds = 60;
 constexpr uint32_t kLeastSeconds = 1800;  // with less left, the ground prepares a new file
 constexpr uint16_t kTaxiCmps = 300;
@@ -44,10 +41,13 @@ Recorder::Recorder(core::ByteRing& ring,
       store_(store),
       sensors_(sensors),
       writer_(ring, storage::schema_text(), storage::schema_size(), storage::schema_hash()),
+      stream_(writer_, outlet),
       volume_(memory) {}
 
 void Recorder::step(uint32_t now_us) {
-  if (state_ == State::kRecording || state_ == State::kEnding) stream(now_us);
+  if (state_ != State::kRecording && state_ != State::kEnding) return;
+  const CardStatus status = stream_.step(now_us);
+  if (status != CardStatus::kOk) fail(status, now_us);
 }
 
 void Recorder::decide(const core::PilotInputs& in, frames::ConfigFrame& config, uint32_t now_us) {
@@ -81,7 +81,7 @@ void Recorder::decide(const core::PilotInputs& in, frames::ConfigFrame& config, 
     case State::kEnding:
       if (!end_told_) {
         tell_end();
-      } else if (writer_.drained() && !block_open_ && !programming_ && stream_ended(now_us)) {
+      } else if (writer_.drained() && stream_.rests() && stream_.ended(now_us)) {
         finish(now_us);
       }
       break;
@@ -171,11 +171,8 @@ void Recorder::begin(uint32_t why, bool same_session, uint32_t now_us) {
   outlet_.release_waiting();
   boot_.start(false);
   file_low_told_ = false;
-  rejects_ = 0;
   marks_ = 0;
-  stream_open_ = false;
-  block_open_ = false;
-  programming_ = false;
+  stream_.start(file.first_lba);
   state_ = State::kRecording;
   hal::set_flight_mark(true);
 }
@@ -273,21 +270,6 @@ void Recorder::tell_end() {
   end_told_ = true;
 }
 
-// The card is busy for a while with the end of a stream, and takes no other call until then.
-bool Recorder::stream_ended(uint32_t now_us) {
-  if (stream_open_) {
-    hal::end_stream();
-    stream_open_ = false;
-    stream_closing_ = true;
-    busy_from_us_ = hal::now_us();
-    return false;
-  }
-  if (!stream_closing_) return true;
-  if (hal::poll_stream() == CardStatus::kBusy && now_us - busy_from_us_ < kDeadUs) return false;
-  stream_closing_ = false;
-  return true;
-}
-
 void Recorder::finish(uint32_t now_us) {
   if (state_ == State::kEnding && full_) {
     state_ = State::kFileFull;
@@ -303,125 +285,25 @@ void Recorder::finish(uint32_t now_us) {
   if (volume_status_ == VolumeStatus::kReady) prepare_next();
 }
 
-void Recorder::fail(frames::Event code, uint32_t arg, uint32_t now_us) {
+void Recorder::fail(CardStatus status, uint32_t now_us) {
   outlet_.close();
-  outlet_.event(code, arg, now_us);
-  if (card_errors_ != 0xFFFFU) ++card_errors_;
-  stream_open_ = false;
-  block_open_ = false;
-  programming_ = false;
+  if (status == CardStatus::kAbsent) {
+    outlet_.event(frames::Event::kCardRemoved, 0, now_us);
+  } else {
+    outlet_.event(frames::Event::kCardError, static_cast<uint32_t>(status), now_us);
+  }
   state_ = State::kFailed;
   volume_status_ = VolumeStatus::kNoCard;
   retry_us_ = now_us;
 }
 
-void Recorder::stream(uint32_t now_us) {
-  if (block_open_) {
-    next_block(now_us);
-    return;
-  }
-  if (!stream_open_) {
-    if (writer_.due(now_us)) open_stream(now_us);
-    return;
-  }
-  switch (hal::poll_stream()) {
-    case CardStatus::kBusy:
-      if (now_us - busy_from_us_ >= kDeadUs) {
-        fail(frames::Event::kCardError, static_cast<uint32_t>(CardStatus::kBusy), now_us);
-      }
-      return;
-    case CardStatus::kOk:
-      note_busy(now_us);
-      busy_from_us_ = now_us;
-      if (!writer_.due(now_us)) {
-        tell_stall(now_us);
-        return;
-      }
-      hal::open_block();
-      block_open_ = true;
-      next_block(now_us);
-      return;
-    case CardStatus::kAbsent:
-      fail(frames::Event::kCardRemoved, 0, now_us);
-      return;
-    case CardStatus::kRejected:
-    case CardStatus::kError:
-      fail(frames::Event::kCardError, static_cast<uint32_t>(CardStatus::kError), now_us);
-      return;
-  }
-}
-
-void Recorder::open_stream(uint32_t now_us) {
-  const CardStatus status = hal::begin_stream(volume_.file().first_lba + writer_.sequence());
-  if (status == CardStatus::kOk) {
-    stream_open_ = true;
-    busy_from_us_ = now_us;
-  } else if (status == CardStatus::kAbsent) {
-    fail(frames::Event::kCardRemoved, 0, now_us);
-  } else if (status != CardStatus::kBusy) {
-    fail(frames::Event::kCardError, static_cast<uint32_t>(status), now_us);
-  }
-}
-
-void Recorder::next_block(uint32_t now_us) {
-  Sink sink;
-  if (!writer_.stream(sink, kPortion)) return;
-  block_open_ = false;
-  close_block(now_us);
-}
-
-void Recorder::close_block(uint32_t now_us) {
-  const CardStatus status = hal::close_block();
-  if (status == CardStatus::kOk) {
-    writer_.accepted();
-    rejects_ = 0;
-    programming_ = true;
-    busy_from_us_ = hal::now_us();
-    tell_stall(now_us);
-    return;
-  }
-  stream_open_ = false;
-  if (status == CardStatus::kAbsent) {
-    fail(frames::Event::kCardRemoved, 0, now_us);
-    return;
-  }
-  if (card_errors_ != 0xFFFFU) ++card_errors_;
-  if (++rejects_ == 1) {
-    writer_.rejected();
-  } else if (rejects_ <= 4) {
-    outlet_.event(frames::Event::kBlockSkipped, writer_.sequence(), now_us);
-    writer_.skip();
-  } else {
-    fail(frames::Event::kCardError, static_cast<uint32_t>(status), now_us);
-  }
-}
-
-void Recorder::note_busy(uint32_t now_us) {
-  if (!programming_) return;
-  programming_ = false;
-  const uint32_t busy_us = now_us - busy_from_us_;
-  const uint32_t busy_ms = busy_us / 1000U;
-  if (busy_ms > busy_max_ms_) busy_max_ms_ = static_cast<uint16_t>(busy_ms);
-  if (busy_us >= kStallUs) stall_ms_ = static_cast<uint16_t>(busy_ms > 0xFFFFU ? 0xFFFFU : busy_ms);
-}
-
-// After the block that makes room: an event pushed into the reserve of a full ring would tell of
-// the frames dropped so far, with more to come.
-void Recorder::tell_stall(uint32_t now_us) {
-  if (stall_ms_ == 0) return;
-  outlet_.event(frames::Event::kCardStall, stall_ms_, now_us);
-  stall_ms_ = 0;
-}
-
 void Recorder::put_health(frames::SystemFrame* out) {
   out->frames_dropped = ring_.dropped();
   out->blocks_written = writer_.blocks_written();
-  out->card_busy_max_ms = busy_max_ms_;
   out->ring_free_min = ring_.take_free_min();
-  out->card_errors = card_errors_;
+  stream_.put_health(out);
   const bool card = state_ != State::kNoFile && state_ != State::kFailed;
   if (card) out->sensors = static_cast<uint8_t>(out->sensors | frames::kSensorsCard);
-  busy_max_ms_ = 0;
 }
 
 }  // namespace app

@@ -1,9 +1,10 @@
-// The session: which file, when it starts and ends, and its blocks on their way to the card.
+// The session: which file, when it starts and ends. Its blocks go through CardStream.
 // Decisions are made in core (RecordControl, BootControl, BlockWriter) and storage (Volume).
 #pragma once
 
 #include <stdint.h>
 
+#include "app/card_stream.h"
 #include "app/outlet.h"
 #include "app/sensors.h"
 #include "app/store.h"
@@ -47,31 +48,19 @@ class Recorder {
   void put_health(frames::SystemFrame* out);
 
  private:
-  // Hands bytes of a block to the card.
-  struct Sink {
-    void put(const uint8_t* bytes, uint16_t size) { hal::put_block(bytes, size); }
-  };
-
   void open_volume();
   void decide_open_file(const core::PilotInputs& in, bool start_pressed, uint32_t now_us);
   void begin(uint32_t why, bool same_session, uint32_t now_us);
   void record(core::RecordAction action, const core::PilotInputs& in, uint32_t now_us);
   void end(uint32_t why, uint32_t now_us);
   void tell_end();
-  bool stream_ended(uint32_t now_us);
   void finish(uint32_t now_us);
   void prepare_next();
-  void fail(frames::Event code, uint32_t arg, uint32_t now_us);
+  void fail(hal::CardStatus status, uint32_t now_us);
   void put_heads(uint32_t now_us);
   void watch_room(const core::PilotInputs& in, uint32_t now_us);
   bool landed(const core::PilotInputs& in, uint32_t now_us);
   bool room_for(uint32_t seconds, uint32_t next_block) const;
-  void stream(uint32_t now_us);
-  void open_stream(uint32_t now_us);
-  void next_block(uint32_t now_us);
-  void close_block(uint32_t now_us);
-  void note_busy(uint32_t now_us);
-  void tell_stall(uint32_t now_us);
   uint32_t next_session();
 
   core::ByteRing& ring_;
@@ -79,20 +68,16 @@ class Recorder {
   Store& store_;
   Sensors& sensors_;
   core::BlockWriter writer_;
+  CardStream stream_;
   storage::Volume volume_;
   core::RecordControl control_;
   core::BootControl boot_;
   const frames::ConfigFrame* config_ = nullptr;
   uint32_t retry_us_ = 0;
-  uint32_t busy_from_us_ = 0;  // the card was last seen idle, opened, or given a block
   uint32_t marks_ = 0;
   uint32_t ended_us_ = 0;
-  uint16_t card_errors_ = 0;
-  uint16_t stall_ms_ = 0;  // not yet told by an event
-  uint16_t busy_max_ms_ = 0;
   State state_ = State::kNoFile;
   storage::VolumeStatus volume_status_ = storage::VolumeStatus::kNoCard;
-  uint8_t rejects_ = 0;
   bool looked_ = false;
   bool file_wanted_ = false;  // the card is good, a new file waits for the ground
   bool prepared_ = false;     // the file's first block carries this power-on's session
@@ -101,10 +86,6 @@ class Recorder {
   bool file_low_told_ = false;
   bool full_ = false;      // the session ended for want of room
   bool end_told_ = false;  // by its event
-  bool stream_open_ = false;
-  bool stream_closing_ = false;
-  bool block_open_ = false;
-  bool programming_ = false;
 };
 
 }  // namespace app
