@@ -242,7 +242,7 @@ def test_turning_there_and_back_changes_nothing() -> None:
 
 
 def test_disagreement_is_named_at_the_alpha_of_each_answer() -> None:
-    found = (Coefficient("Cm_q", -9.0, 0.4, 0.5, 1.0), Coefficient("Cl_p", -0.4, 0.0, 0.1, 0.2))
+    found = (Coefficient("Cm_q", -9.0, 0.4, 1.0), Coefficient("Cl_p", -0.4, 0.0, 0.2))
     points = {"Cm_q": [(0.0, -10.9), (0.2, -8.9)], "Cl_p": [(0.0, -0.5)], "CL_q": [(0.0, 1.0)]}
     prior = PriorTable(points, stability_axes=False, source=("a handbook", ""))
     tables = [
@@ -306,3 +306,62 @@ def test_geometric_orientation_of_avl_is_refused(tmp_path: Path) -> None:
     text = stability(3.0).replace(STANDARD, "Geometric axis orientation,  X aft, Z up  ")
     with pytest.raises(IdentificationError, match="x forward, z down"):
         read(tmp_path, "level.st", text)
+
+
+@pytest.mark.parametrize("printed", ["***********", "        NaN", "  -Infinity"])
+def test_what_avl_could_not_print_is_named(tmp_path: Path, printed: str) -> None:
+    text = stability(6.0).replace("Cnp =  -0.030000", f"Cnp ={printed}")
+    prior = read(tmp_path, "over.st", text)
+    assert "Cn_p" not in prior.points
+    assert "Cnp printed as no number: left out" in prior.source
+    found = tuple(Coefficient(n, -0.4, 0.0, 0.1, 0.2) for n in ("Cl_p", "Cl_beta"))
+    lines = prior_lines([CoefficientTable("lateral", "by hand", 0.1, found)], prior)
+    # Cl_p turns with Cn_p, which is not there; Cl_beta and Cn_beta are.
+    (apart,) = [line for line in lines if "wholly turned" in line]
+    assert apart.endswith(": Cl_p")
+
+
+def test_a_run_of_avl_without_its_angle_is_refused(tmp_path: Path) -> None:
+    text = stability(6.0).replace("Alpha =   6.00000", "Alpha =**********")
+    with pytest.raises(IdentificationError, match="missing or no number"):
+        read(tmp_path, "over.st", text)
+
+
+def test_elevons_are_what_they_move_and_flaps_are_named(tmp_path: Path) -> None:
+    plain = read(tmp_path, "plain.st", stability(0.0)).at(0.0)
+    text = stability(0.0).replace("aileron      d01", "elevon_diff  d01")
+    text = text.replace("elevator     d02", "elevon_sym   d02")
+    assert read(tmp_path, "wing.st", text).at(0.0) == plain
+    text = stability(0.0).replace("aileron      d01", "flap         d01")
+    prior = read(tmp_path, "flap.st", text)
+    assert "control flap no elevator, aileron or rudder: left out" in prior.source
+    assert "Cl_da" not in prior.points
+    assert "Cm_de" in prior.points
+
+
+def test_what_datcom_does_not_print_is_named(tmp_path: Path) -> None:
+    whole = read(tmp_path, "for006.dat", DATCOM)
+    assert not any("not printed" in line for line in whole.source)
+    cut = read(tmp_path, "cut.dat", DATCOM[: DATCOM.index("DYNAMIC DERIVATIVES")])
+    assert any("CL_q, Cm_q, Cl_p" in line for line in cut.source)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("coefficients = 3", "coefficients is 3, expected a table"),
+        ("alpha_deg = 3\n[coefficients]\nCm_q = 1.0", "alpha_deg is 3, expected a list"),
+        ("[coefficients]\nCm_q = 'a'", "Cm_q is 'a', expected a number"),
+        ("[coefficients]\nCm_q = true", "Cm_q is True, expected a number"),
+    ],
+)
+def test_a_broken_table_says_where(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(IdentificationError, match=words):
+        read(tmp_path, "prior.toml", text)
+
+
+def test_a_prior_of_other_names_says_so(tmp_path: Path) -> None:
+    prior = read(tmp_path, "prior.toml", "\ufeff[coefficients]\nCmq = -10.9\n")
+    found = (Coefficient("Cm_q", -9.0, 0.4, 0.5, 1.0),)
+    (line,) = prior_lines([CoefficientTable("all", "by hand", 0.1, found)], prior)
+    assert line == ("prior: none of its coefficients (Cmq) is in the answer, which has Cm_q")

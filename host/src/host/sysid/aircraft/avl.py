@@ -4,7 +4,9 @@ Several outputs in one file make a table over the angle of attack. Derivatives b
 are per radian, rates are referred to half chord and half span over airspeed, as ours are. SB has
 derivatives by the velocities u, v, w over the airspeed instead of alpha and beta. Controls are per
 unit of AVL's control variable, taken for one degree of surface; their sign is the geometry file's
-choice and is turned to ours (Cm_de < 0, Cl_da > 0, Cn_dr < 0) by the moment they are for.
+choice and is turned to ours (Cm_de < 0, Cl_da > 0, Cn_dr < 0) by the moment they are for. Elevons
+are elevator or aileron by their larger moment. What Fortran had no room for (stars) or could not
+compute, and controls of other names, are named and left out.
 """
 
 from __future__ import annotations
@@ -18,6 +20,9 @@ from host.sysid.errors import IdentificationError
 
 _NUMBER = r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)"
 _DERIVATIVE = re.compile(rf"\b(C[LDYXZlmn])([abpqruvw]|d\d+)\s*=\s*{_NUMBER}")
+_NO_NUMBER = re.compile(
+    r"\b(C[LDYXZlmn](?:[abpqruvw]|d\d+))\s*=\s*(?:\*+|[-+]?(?:nan|inf\w*))", re.IGNORECASE
+)
 _CONTROL = re.compile(r"(\S+)\s+d(\d+)\b(?!\s*=)")
 _TITLE = re.compile(r"^(.*(?:Stability|Geometry)-axis derivatives)", re.MULTILINE)
 _RUN = re.compile(r"Vortex Lattice Output", re.IGNORECASE)
@@ -46,6 +51,8 @@ def read_avl(text: str) -> PriorTable | None:
     points: Points = {}
     kinds = set()
     header = ""
+    left: dict[str, None] = {}
+    strangers: dict[str, None] = {}
     for run in _runs(text):
         if "Geometric axis orientation" in run:
             raise IdentificationError(
@@ -55,7 +62,13 @@ def read_avl(text: str) -> PriorTable | None:
         body = "Geometry-axis" in run
         kinds.add(body)
         alpha_deg = _value(run, "Alpha")
-        alpha = float(np.radians(0.0 if alpha_deg is None else alpha_deg))
+        if alpha_deg is None:
+            raise IdentificationError(
+                "AVL's 'Alpha =' is missing or no number; expected the whole output of ST or SB"
+            )
+        alpha = float(np.radians(alpha_deg))
+        left |= dict.fromkeys(_NO_NUMBER.findall(run))
+        strangers |= dict.fromkeys(x for x in _entries(run) if len(x) > 1 and not _kind(x))
         found = _from_body(run, alpha) if body else _from_stability(run)
         for name, value in found.items():
             points.setdefault(name, []).append((alpha, value))
@@ -68,7 +81,10 @@ def read_avl(text: str) -> PriorTable | None:
     where = f"AVL, {'body' if body else 'stability'} axes"
     sizes = [(label, _value(header, label)) for label in ("Sref", "Cref", "Bref", "Xref", "Zref")]
     references = ", ".join(f"{label} {value:g}" for label, value in sizes if value is not None)
-    return PriorTable(points, stability_axes=not body, source=(where, references))
+    remarks = [f"{', '.join(left)} printed as no number: left out"] if left else []
+    if strangers:
+        remarks.append(f"control {', '.join(strangers)} no elevator, aileron or rudder: left out")
+    return PriorTable(points, stability_axes=not body, source=(where, references, *remarks))
 
 
 def _runs(text: str) -> list[str]:
@@ -129,12 +145,22 @@ def _from_body(run: str, alpha: float) -> dict[str, float]:
     return found
 
 
+def _kind(label: str) -> str:
+    """Return the beginning of `SURFACES` that a control's name has; nothing where none."""
+    return next((start for start in SURFACES if label.lower().startswith(start)), "")
+
+
 def _controls(entries: dict[str, dict[str, float]]) -> dict[str, float]:
     found: dict[str, float] = {}
     for label, values in entries.items():
-        for start, (suffix, moment, sign) in SURFACES.items():
-            if label.lower().startswith(start) and moment in values:
-                turn = np.sign(sign * values[moment]) * 180.0 / np.pi
-                for coefficient, value in values.items():
-                    found.setdefault(f"{coefficient}_{suffix}", float(turn * value))
+        start = _kind(label) if len(label) > 1 else ""
+        if label.lower().startswith("elevon"):
+            rolls = abs(values.get("Cl", 0.0)) > abs(values.get("Cm", 0.0))
+            start = "ail" if rolls else "elev"
+        suffix, moment, sign = SURFACES.get(start, ("", "", 0.0))
+        if moment not in values:
+            continue
+        turn = np.sign(sign * values[moment]) * 180.0 / np.pi
+        for coefficient, value in values.items():
+            found.setdefault(f"{coefficient}_{suffix}", float(turn * value))
     return found

@@ -74,7 +74,9 @@ def read_datcom(text: str, mach: float = 0.0) -> PriorTable | None:
             points |= page.points
             references = page.references
     where = f"Digital Datcom: {name.lower()}, Mach {nearest:g}"
-    return PriorTable(points, stability_axes=True, source=(where, references))
+    lost = [ours for ours in NAMES.values() if ours not in points]
+    remarks = [f"{', '.join(lost)} not printed, or as no number"] if lost else []
+    return PriorTable(points, stability_axes=True, source=(where, references, *remarks))
 
 
 def _split(text: str) -> list[list[str]]:

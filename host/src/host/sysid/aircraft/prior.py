@@ -19,7 +19,7 @@ import numpy as np
 from host.sysid.aircraft.airframe import CoefficientTable
 from host.sysid.aircraft.avl import is_avl, read_avl
 from host.sysid.aircraft.datcom import is_datcom, read_datcom
-from host.sysid.aircraft.prior_table import Points, PriorTable
+from host.sysid.aircraft.prior_table import Points, PriorTable, half_turned
 from host.sysid.errors import IdentificationError
 
 SOUND_MPS = 340.3  # standard atmosphere, sea level: chooses between Mach numbers of a handbook
@@ -41,7 +41,7 @@ def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
         If the file cannot be read, holds no coefficient, or one that is no number.
     """
     try:
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
         table: PriorTable | None = None
         if path.suffix == ".toml":
             table = _from_toml(text)
@@ -67,18 +67,29 @@ def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
 
 def _from_toml(text: str) -> PriorTable:
     document = tomllib.loads(text)
-    angles = [float(x) for x in document.get("alpha_deg", [0.0])]
-    if not angles or np.any(np.diff(angles) <= 0.0):
+    listed, table = document.get("alpha_deg", [0.0]), document.get("coefficients", {})
+    if not isinstance(listed, list) or not listed:
+        raise ValueError(f"alpha_deg is {listed!r}, expected a list of angles")
+    if not isinstance(table, dict):
+        raise ValueError(f"coefficients is {table!r}, expected a table [coefficients]")
+    angles = [_number("alpha_deg", x) for x in listed]
+    if np.any(np.diff(angles) <= 0.0):
         raise ValueError(f"alpha_deg {angles}, expected rising angles")
     points: Points = {}
-    for name, value in dict(document.get("coefficients", {})).items():
+    for name, value in table.items():
         values = value if isinstance(value, list) else [value] * len(angles)
         if len(values) != len(angles):
             raise ValueError(f"{name} has {len(values)} values, alpha_deg {len(angles)}")
         points[str(name)] = [
-            (float(np.radians(a)), float(v)) for a, v in zip(angles, values, strict=True)
+            (float(np.radians(a)), _number(name, v)) for a, v in zip(angles, values, strict=True)
         ]
     return PriorTable(points, stability_axes=False)
+
+
+def _number(name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{name} is {value!r}, expected a number")
+    return float(value)
 
 
 def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[str]:
@@ -92,6 +103,13 @@ def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[s
         From `read_prior`.
     """
     lines = [f"prior: {line}" for line in prior.source if line]
+    names = {c.name for table in tables for c in table.coefficients}
+    if not names & prior.points.keys():
+        return [
+            *lines,
+            f"prior: none of its coefficients ({', '.join(prior.points)}) is in the answer, which"
+            f" has {', '.join(sorted(names)) or 'none'}",
+        ]
     for table in tables:
         expected = prior.at(table.alpha_rad)
         shared = [c for c in table.coefficients if c.name in expected]
@@ -99,6 +117,12 @@ def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[s
             continue
         place = _place(prior, float(np.degrees(table.alpha_rad)))
         lines += [f"{table.template}, {table.method}" + (f": prior {place}" if place else "")]
+        apart = set(half_turned(prior.points)) & {c.name for c in shared}
+        if prior.stability_axes and apart:
+            lines.append(
+                f"not or not wholly turned, what they turn with is not in the prior:"
+                f" {', '.join(sorted(apart))}"
+            )
         lines.append(f"{'coefficient':12s} {'identified':>12s} {'95 %':>10s} {'prior':>10s}")
         for c in shared:
             outside = abs(c.value - expected[c.name]) > c.half_width

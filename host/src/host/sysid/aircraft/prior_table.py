@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,6 +48,21 @@ class PriorTable:
         if not self.stability_axes:
             return found
         return about_body_axes(found, float(np.clip(alpha_rad, *self.limits_rad)))
+
+
+def half_turned(names: Collection[str]) -> list[str]:
+    """Return the names that cannot be turned to other axes, or not wholly: a partner is missing.
+
+    Rolling moments turn together with yawing moments, derivatives by p with those by r.
+    """
+    found = []
+    for name in names:
+        row, _, last = name.partition("_")
+        rows = ("Cl", "Cn") if row in ("Cl", "Cn") else (row,)
+        lasts = RATES if last in RATES else (last,)
+        if any(f"{r}_{x}" not in names for r in rows for x in lasts):
+            found.append(name)
+    return found
 
 
 def about_body_axes(found: dict[str, float], alpha_rad: float) -> dict[str, float]:
