@@ -127,7 +127,7 @@ def test_coefficients_alone_are_saved_flown_and_found_again(saved: Path) -> None
 
 def test_bends_have_their_place_in_the_tables() -> None:
     def known(name: str, value: float) -> Coefficient:
-        return Coefficient(name, value, 0.01, 0.01, 0.02)
+        return Coefficient(name, value, 0.01, 0.02)
 
     trim, lift = 0.07, 0.3
     values = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.sysid.aircraft.airframe import Condition
-from host.sysid.aircraft.in_coefficients import dimensional_gains
+from host.sysid.aircraft.gains import dimensional_gains
 from host.sysid.estimators.filter_error import information_at
 from host.sysid.estimators.gust import ROLLING
 from host.sysid.numerics.filter_problem import FilterProblem, discrete_noise

@@ -27,7 +27,7 @@ DOCUMENT = {
 
 
 def table(**values: tuple[float, float]) -> CoefficientTable:
-    found = tuple(Coefficient(n, v, h / 2, h / 2, h) for n, (v, h) in values.items())
+    found = tuple(Coefficient(n, v, h / 2, h) for n, (v, h) in values.items())
     return CoefficientTable("longitudinal", "by hand", 0.1, found)
 
 

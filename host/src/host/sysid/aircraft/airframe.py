@@ -6,12 +6,13 @@ pressure and reference sizes is carried into the intervals beside that of the fi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from host.compiled import Array
+from host.sysid.aircraft.gains import dimensional_name, from_dimensional
 from host.sysid.models.result import FitResult
 from host.sysid.models.templates import Trim
 
@@ -48,12 +49,12 @@ class AirframeData:
 
 @dataclass(frozen=True, slots=True)
 class Coefficient:
-    """A non-dimensional derivative: value, standard error of the fit alone, and in total."""
+    """A non-dimensional derivative: value, standard error of the fit alone, 95 % half-width with
+    everything."""
 
     name: str
     value: float
     fit_error: float
-    total_error: float
     half_width: float
 
 
@@ -113,135 +114,58 @@ def coefficients(
         The interval adds mass, inertia, dynamic pressure, upwash and what moved it to the fit's
         own. Errors of pitot and vanes are what pressure and upwash allow for: the larger counts.
     """
-    values = {name: k for k, name in enumerate(result.names)}
-    known = np.array(
-        [
-            airframe.mass_kg,
-            airframe.ixx_kgm2,
-            airframe.iyy_kgm2,
-            airframe.izz_kgm2,
-            condition.qbar_pa,
-            1.0,  # scale of the vanes
-        ]
-    )
-    shares = np.array(
-        [
-            airframe.mass_share,
-            airframe.inertia_share,
-            airframe.inertia_share,
-            airframe.inertia_share,
-            airframe.pressure_share,
-            airframe.upwash * airframe.upwash_share,
-        ]
-    )
-    elsewhere = [
-        (
-            SHARED.get(m.error, OWN),
-            _rules(airframe, condition.airspeed_mps * m.airspeed_gain),
-            m.estimate,
-            np.where(np.arange(len(known)) == QBAR, m.qbar_gain * known, known),
-        )
-        for m in moved
-    ]
+
+    def converted(derivatives: Array, a: AirframeData, at: Condition) -> dict[str, float]:
+        return from_dimensional(dict(zip(result.names, derivatives.tolist(), strict=True)), a, at)
+
+    found = converted(result.estimate, airframe, condition)
+    # Coefficients go with derivatives in proportion.
+    slopes = [converted(row, airframe, condition) for row in np.eye(len(result.names))]
+    wrong = {
+        cause: (share, converted(result.estimate, a, at))
+        for cause, (share, a, at) in _assumed(airframe, condition).items()
+    }
+    elsewhere = []
+    for m in moved:
+        there = Condition(condition.airspeed_mps * m.airspeed_gain, condition.qbar_pa * m.qbar_gain)
+        elsewhere.append((SHARED.get(m.error, m.error), converted(m.estimate, airframe, there)))
     quantile = result.half_width() / np.maximum(result.standard_error, 1e-300)
-    found = []
-    for name, rule in _rules(airframe, condition.airspeed_mps).items():
-        used = [p for p in rule.uses if p in values]
-        if rule.uses[0] not in values:
-            continue
-
-        def evaluate(
-            theta: Array, numbers: Array, rule: _Rule = rule, used: list[str] = used
-        ) -> float:
-            return rule.formula({p: float(theta[values[p]]) for p in used}, numbers)
-
-        value = evaluate(result.estimate, known)
-        slope = np.zeros(len(result.names))
-        for parameter in used:
-            k = values[parameter]
-            step = 1e-6 * max(abs(result.estimate[k]), 1e-3)
-            up, down = result.estimate.copy(), result.estimate.copy()
-            up[k] += step
-            down[k] -= step
-            slope[k] = (evaluate(up, known) - evaluate(down, known)) / (2.0 * step)
-        fit_variance = float(slope @ result.covariance @ slope)
-        parts = np.zeros(len(shares) + 1)
-        for k, share in enumerate(shares):
-            other = known.copy()
-            other[k] *= 1.0 + 1e-4
-            parts[k] = ((evaluate(result.estimate, other) - value) / 1e-4 * share) ** 2
-        by_sensors = np.zeros(len(parts))
-        for k, rules, estimate, numbers in elsewhere:
-            by_sensors[k] += (evaluate(estimate, numbers, rules[name]) - value) ** 2
-        extra = float(np.sum(np.maximum(parts, by_sensors)))
-        main = values[rule.uses[0]]
-        total = float(np.sqrt(fit_variance + extra))
-        half = float(np.hypot(quantile[main] * np.sqrt(fit_variance), 1.96 * np.sqrt(extra)))
-        found.append(Coefficient(name, value, float(np.sqrt(fit_variance)), total, half))
-    return tuple(found)
+    answer = []
+    for name, value in found.items():
+        slope = np.array([row[name] for row in slopes])
+        fit_error = float(np.sqrt(slope @ result.covariance @ slope))
+        allowed = {
+            cause: ((other[name] - value) / WIGGLE * share) ** 2
+            for cause, (share, other) in wrong.items()
+        }
+        if name.endswith(("_alpha", "_beta")):
+            allowed[VANE] = (value * airframe.upwash * airframe.upwash_share) ** 2
+        by_sensors: dict[str, float] = {}
+        for cause, other in elsewhere:
+            by_sensors[cause] = by_sensors.get(cause, 0.0) + (other[name] - value) ** 2
+        extra = sum(max(part, by_sensors.pop(cause, 0.0)) for cause, part in allowed.items())
+        extra += sum(by_sensors.values())
+        main = float(quantile[result.names.index(dimensional_name(name))])
+        half = float(np.hypot(main * fit_error, 1.96 * np.sqrt(extra)))
+        answer.append(Coefficient(name, value, fit_error, half))
+    return tuple(answer)
 
 
-@dataclass(frozen=True, slots=True)
-class _Rule:
-    uses: tuple[str, ...]
-    formula: Callable[[dict[str, float], Array], float]
-
-
-MASS, IXX, IYY, IZZ, QBAR, VANE, OWN = range(7)
+WIGGLE = 1e-4  # share by which what is known is moved, to see what that does
+QBAR, VANE = "dynamic pressure", "vanes"
 SHARED = {"pitot_scale": QBAR, "pitot_zero_pa": QBAR, "alpha_scale": VANE, "beta_scale": VANE}
 
 
-def _rules(airframe: AirframeData, speed: float) -> dict[str, _Rule]:
-    """Return coefficient name to formula; numbers are mass, Ixx, Iyy, Izz, qbar, vane scale."""
-    S, b, c = airframe.wing_area_m2, airframe.span_m, airframe.chord_m
-    ixz = airframe.ixz_kgm2
-    hat_q, hat_p = 2.0 * speed / c, 2.0 * speed / b
-    rules: dict[str, _Rule] = {}
-
-    def scale_of(label: str) -> float:
-        return {"q": hat_q, "p": hat_p, "r": hat_p}.get(label, 1.0)
-
-    def vane(label: str, numbers: Array) -> float:
-        return float(numbers[VANE]) if label in ("alpha", "beta") else 1.0
-
-    def force(name: str, parameter: str, label: str, sign: float, by_speed: float) -> None:
-        rules[name] = _Rule(
-            (parameter,),
-            lambda v, n: (
-                sign * n[MASS] * by_speed * v[parameter] / (n[QBAR] * S)
-                * scale_of(label) * vane(label, n)
-            ),
-        )  # fmt: skip
-
-    def moment(name: str, label: str, axis: str) -> None:
-        main, other = (f"{axis}_{label}", ("N" if axis == "L" else "L") + f"_{label}")
-        own = IXX if axis == "L" else IZZ
-        rules[name] = _Rule(
-            (main, other),
-            lambda v, n: (
-                (n[own] * v[main] - ixz * v.get(other, 0.0)) / (n[QBAR] * S * b)
-                * scale_of(label) * vane(label, n)
-            ),
-        )  # fmt: skip
-
-    def pitch(label: str) -> None:
-        rules[f"Cm_{label}"] = _Rule(
-            (f"M_{label}",),
-            lambda v, n: (
-                n[IYY] * v[f"M_{label}"] / (n[QBAR] * S * c) * scale_of(label) * vane(label, n)
-            ),
-        )
-
-    for label in ("alpha", "q", "de"):
-        force(f"CL_{label}", f"Z_{label}", label, -1.0, speed)
-        pitch(label)
-    for label in ("alpha", "de"):
-        force(f"CD_{label}", f"D_{label}", label, -1.0, 1.0)
-    for label in ("beta", "p", "r", "da", "dr"):
-        force(f"CY_{label}", f"Y_{label}", label, 1.0, speed)
-        moment(f"Cl_{label}", label, "L")
-        moment(f"Cn_{label}", label, "N")
-    return rules
+def _assumed(a: AirframeData, at: Condition) -> dict[str, tuple[float, AirframeData, Condition]]:
+    """Return what is known to what share, and airframe and condition with it moved."""
+    more = 1.0 + WIGGLE
+    return {
+        "mass": (a.mass_share, replace(a, mass_kg=a.mass_kg * more), at),
+        "Ixx": (a.inertia_share, replace(a, ixx_kgm2=a.ixx_kgm2 * more), at),
+        "Iyy": (a.inertia_share, replace(a, iyy_kgm2=a.iyy_kgm2 * more), at),
+        "Izz": (a.inertia_share, replace(a, izz_kgm2=a.izz_kgm2 * more), at),
+        QBAR: (a.pressure_share, a, replace(at, qbar_pa=at.qbar_pa * more)),
+    }
 
 
 def trim_of(columns: dict[str, Array]) -> tuple[Trim, Condition]:

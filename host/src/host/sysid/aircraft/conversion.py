@@ -18,7 +18,13 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.aircraft.airframe import AirframeData, Condition
-from host.sysid.aircraft.in_coefficients import dimensional_gains
+from host.sysid.aircraft.gains import (
+    DIMENSIONAL_ROWS,
+    coefficient_name,
+    dimensional_gains,
+    dimensional_name,
+    from_dimensional,
+)
 from host.sysid.aircraft.instrument_errors import InstrumentData, deviations
 from host.sysid.errors import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
@@ -32,7 +38,6 @@ READ_WITH = {
     "alpha": "alpha_scale", "beta": "beta_scale", "de": "elevator_scale", "da": "aileron_scale",
     "dr": "rudder_scale",
 }  # fmt: skip
-ROWS = {"Z": "CL", "D": "CD", "M": "Cm", "Y": "CY", "L": "Cl", "N": "Cn"}
 STEP = 1e-4  # of a deviation, at least of 1e-6 of the value
 Table = dict[str, float]
 
@@ -100,21 +105,11 @@ def to_coefficients(
     def convert(values: Table) -> Table:
         own, scale = _really(place, values), _reading(place.airframe, values)
         found = {n: v * scale(n) for n, v in values.items() if n not in CARRIED}
-        gains = dimensional_gains(own.airframe, own.condition)
-        result = {}
-        for name in found:
-            row, _, label = name.partition("_")
-            target = f"{ROWS[row]}_{label}"
-            if row in ("L", "N"):
-                pair = [f"L_{label}", f"N_{label}"]
-                matrix = np.array([[gains[d][f"{c}_{label}"] for c in ("Cl", "Cn")] for d in pair])
-                both = np.linalg.solve(matrix, [found.get(d, 0.0) for d in pair])
-                result[target] = float(both["LN".index(row)])
-            else:
-                result[target] = found[name] / gains[name][target]
+        table = from_dimensional(found, own.airframe, own.condition)
+        result = {coefficient_name(n): table[coefficient_name(n)] for n in found}
         return _moved(result, own, values, sign=1.0)
 
-    known = {f"{d}_{label}" for d in ROWS for label in _labels(d)}
+    known = {f"{d}_{label}" for d in DIMENSIONAL_ROWS.values() for label in _labels(d)}
     return _converted(derivatives, known, errors, convert)
 
 
@@ -142,7 +137,6 @@ def to_derivatives(
     IdentificationError
         If there is nothing to convert, or an error is not one of these.
     """
-    rows = {c: d for d, c in ROWS.items()}
 
     def convert(values: Table) -> Table:
         own, scale = _really(place, values), _reading(place.airframe, values)
@@ -151,13 +145,12 @@ def to_derivatives(
         gains = dimensional_gains(own.airframe, own.condition)
         result = {}
         for name in found:
-            row, _, label = name.partition("_")
-            target = f"{rows[row]}_{label}"
+            target = dimensional_name(name)
             total = sum(gain * found.get(c, 0.0) for c, gain in gains[target].items())
             result[target] = total / scale(target)
         return result
 
-    known = {f"{c}_{label}" for d, c in ROWS.items() for label in _labels(d)}
+    known = {f"{c}_{label}" for c, d in DIMENSIONAL_ROWS.items() for label in _labels(d)}
     return _converted(coefficients, known, errors, convert)
 
 

@@ -12,48 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from host.sysid.aircraft.airframe import AirframeData, Condition
+from host.sysid.aircraft.gains import dimensional_gains
 from host.sysid.models.model import LinearModel, Parameter, Term
-
-
-def dimensional_gains(airframe: AirframeData, condition: Condition) -> dict[str, dict[str, float]]:
-    """Return, per dimensional derivative of the templates, the coefficients it is made of.
-
-    Parameters
-    ----------
-    airframe : AirframeData
-        Mass, inertia, reference sizes.
-    condition : Condition
-        Airspeed and dynamic pressure.
-
-    Returns
-    -------
-    dict
-        ``{"L_p": {"Cl_p": gain, "Cn_p": gain}, ...}`` in SI; rates against p_hat, q_hat, r_hat.
-    """
-    a, V = airframe, condition.airspeed_mps
-    force = condition.qbar_pa * a.wing_area_m2
-    det = a.ixx_kgm2 * a.izz_kgm2 - a.ixz_kgm2**2
-    hat = {"q": 0.5 * a.chord_m / V, "p": 0.5 * a.span_m / V, "r": 0.5 * a.span_m / V}
-    found: dict[str, dict[str, float]] = {}
-    for label in ("alpha", "q", "de"):
-        scale = force * hat.get(label, 1.0)
-        found[f"Z_{label}"] = {f"CL_{label}": -scale / (a.mass_kg * V)}
-        found[f"M_{label}"] = {f"Cm_{label}": scale * a.chord_m / a.iyy_kgm2}
-        if label != "q":
-            found[f"D_{label}"] = {f"CD_{label}": -scale / a.mass_kg}
-    for label in ("beta", "p", "r", "da", "dr"):
-        scale = force * hat.get(label, 1.0)
-        moment = scale * a.span_m / det
-        found[f"Y_{label}"] = {f"CY_{label}": scale / (a.mass_kg * V)}
-        found[f"L_{label}"] = {
-            f"Cl_{label}": moment * a.izz_kgm2,
-            f"Cn_{label}": moment * a.ixz_kgm2,
-        }
-        found[f"N_{label}"] = {
-            f"Cl_{label}": moment * a.ixz_kgm2,
-            f"Cn_{label}": moment * a.ixx_kgm2,
-        }
-    return found
 
 
 def in_coefficients(

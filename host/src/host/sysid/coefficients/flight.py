@@ -68,9 +68,7 @@ class CoefficientAnswer:
     def coefficients(self) -> tuple[Coefficient, ...]:
         """The derivatives as the rest of the package takes them."""
         return tuple(
-            Coefficient(
-                d.name, d.value, d.half_width / QUANTILE, d.half_width / QUANTILE, d.half_width
-            )
+            Coefficient(d.name, d.value, d.half_width / QUANTILE, d.half_width)
             for d in self.fit.derivatives
         )
 

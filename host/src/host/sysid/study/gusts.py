@@ -17,7 +17,8 @@ from scipy import linalg
 from host.compiled import Array
 from host.sysid.aircraft.aircraft_file import airframe_data
 from host.sysid.aircraft.airframe import AirframeData, Condition
-from host.sysid.aircraft.in_coefficients import dimensional_gains, in_coefficients
+from host.sysid.aircraft.gains import dimensional_gains
+from host.sysid.aircraft.in_coefficients import in_coefficients
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import MATRICES, LinearModel
 from host.sysid.models.templates import Trim, template
