@@ -314,7 +314,7 @@ def test_what_avl_could_not_print_is_named(tmp_path: Path, printed: str) -> None
     prior = read(tmp_path, "over.st", text)
     assert "Cn_p" not in prior.points
     assert "Cnp printed as no number: left out" in prior.source
-    found = tuple(Coefficient(n, -0.4, 0.0, 0.1, 0.2) for n in ("Cl_p", "Cl_beta"))
+    found = tuple(Coefficient(n, -0.4, 0.1, 0.2) for n in ("Cl_p", "Cl_beta"))
     lines = prior_lines([CoefficientTable("lateral", "by hand", 0.1, found)], prior)
     # Cl_p turns with Cn_p, which is not there; Cl_beta and Cn_beta are.
     (apart,) = [line for line in lines if "wholly turned" in line]
@@ -362,6 +362,6 @@ def test_a_broken_table_says_where(tmp_path: Path, text: str, words: str) -> Non
 
 def test_a_prior_of_other_names_says_so(tmp_path: Path) -> None:
     prior = read(tmp_path, "prior.toml", "\ufeff[coefficients]\nCmq = -10.9\n")
-    found = (Coefficient("Cm_q", -9.0, 0.4, 0.5, 1.0),)
+    found = (Coefficient("Cm_q", -9.0, 0.4, 1.0),)
     (line,) = prior_lines([CoefficientTable("all", "by hand", 0.1, found)], prior)
     assert line == ("prior: none of its coefficients (Cmq) is in the answer, which has Cm_q")
