@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -178,7 +179,9 @@ def run(args: argparse.Namespace) -> int:
         lines += coefficient_words(direct)
     lines += taken_out(answers)
     if len(wanted) > 1:
-        lines += ["", *_side_by_side(answers)]
+        from host.sysid.answer.side_by_side import side_by_side
+
+        lines += ["", *side_by_side(answers, shutil.get_terminal_size().columns)]
     else:
         for answer in answers:
             lines += ["", *model_lines(answer)]
@@ -305,22 +308,3 @@ def _direct(
     except IdentificationError as error:
         notes.append(f"coefficients: {error}")
         return None
-
-
-def _side_by_side(answers: list[Answer]) -> list[str]:
-    lines = []
-    for template in dict.fromkeys(a.template for a in answers):
-        mine = [a for a in answers if a.template == template]
-        names = [p.name for p in mine[0].model.parameters]
-        lines.append(f"{template:16s}" + "".join(f"{a.method:>30s}" for a in mine))
-        for name in names:
-            line = f"  {name:14s}"
-            for answer in mine:
-                result = answer.result
-                if name in result.names:
-                    k = result.index(name)
-                    line += f"{result.estimate[k]:17.5g} +- {result.half_width()[k]:9.2g}"
-                else:
-                    line += f"{'-':>30s}"
-            lines.append(line)
-    return lines

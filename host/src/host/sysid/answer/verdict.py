@@ -91,6 +91,9 @@ def _verdict(answer: Answer) -> list[str]:
         f"{answer.template}: {_fitted(len(answer.used))} by"
         f" {result.method}, {len(answer.held_out)} held out"
     ]
+    if not result.converged:
+        lines.append("  no convergence: estimates and intervals mean nothing, use another method")
+        trusted, fair, loose, little = [], [], [], []
     lines.append(f"  trust (within 10 %):  {', '.join(trusted) or 'nothing'}")
     if fair:
         lines.append(f"  use with care (10 to 30 %):  {', '.join(fair)}")

@@ -205,7 +205,8 @@ def _total(
         active = np.flatnonzero(X.any(axis=0))
         if not np.all(np.isnan(theta[active])):
             raise IdentificationError(
-                "total least squares cannot tie entries across equations; use weighted"
+                "total least squares takes one equation at a time, and this"
+                " model ties entries of several: use equation-error-weighted"
             )
         noisy = mine[0].noisy[active] > 0.0
         exact_columns, noisy_columns = X[:, active[~noisy]], X[:, active[noisy]]

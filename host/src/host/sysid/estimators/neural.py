@@ -67,7 +67,10 @@ def fit_neural(
         y = np.concatenate([row.target for row in mine])
         active = np.flatnonzero(X.std(axis=0) > 0.0)
         if theta[active].any():
-            raise IdentificationError("the neural delta method cannot tie entries of equations")
+            raise IdentificationError(
+                "the neural delta method takes one equation at a time, and this"
+                " model ties entries of several: use equation-error-weighted"
+            )
         theta[active] = _derivatives(X[:, active], y, neurons, rng)
         edges = np.array_split(np.arange(len(y)), BLOCKS)
         for k in range(repeats):

@@ -89,7 +89,10 @@ def fit_recursive_least_squares(
         y = np.concatenate([row.target for row in mine])
         active = np.flatnonzero(X.any(axis=0))
         if theta[active].any():
-            raise IdentificationError("recursive least squares cannot tie entries of equations")
+            raise IdentificationError(
+                "recursive least squares takes one equation at a time, and this"
+                " model ties entries of several: use recursive-fourier"
+            )
         scale = np.sqrt(np.mean(X[:, active] ** 2, axis=0))
         estimate = np.zeros(len(active))
         P = START_VARIANCE * np.eye(len(active))

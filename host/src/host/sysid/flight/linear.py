@@ -82,6 +82,8 @@ WEAK_GRADE = 0.2
 # and rate filters are modelled worst: Cl_p 18 % low against 13 %, 6 of 15 intervals hold, not 12.
 GUST = "filter-error-gust"
 DEFAULT_METHOD = "flight"
+# One equation at a time: accelerations repeat the entries of others, and are left out.
+UNTIED = ("equation-error-total", "recursive", "neural-delta")
 STAGED = {
     "flight": "gust filter where alpha is a state, white output error else (default)",
     GUST: "delays by output error, then filter error with the gust as a state",
@@ -265,8 +267,11 @@ def _answer(
     if compatibility is not None:
         moved += moved_by(result, fitted, cuts, compatibility, trim)
     result = carried(result, moved)
-    outputs = result.fitted if result.residual_kind == "output" and not moved else ()
-    simulated = outputs if len(outputs) else _simulated(model, result, fitted)
+    # Of frequencies the residuals are not those of samples.
+    ours = result.residual_kind == "output" and all(
+        y.shape == m.outputs.shape for y, m in zip(result.fitted, fitted, strict=True)
+    )
+    simulated = list(result.fitted) if ours and not moved else _simulated(model, result, fitted)
     residuals = [m.outputs - y for m, y in zip(fitted, simulated, strict=True)]
     return Answer(
         template=name if user_model is None else model.name,
@@ -316,7 +321,7 @@ def _template(
     return template(
         name,
         trim,
-        accelerometers=all(c in columns for c in forces),
+        accelerometers=method not in UNTIED and all(c in columns for c in forces),
         delays=DELAYS if able and with_delays else (),
         imu_sd_m=IMU_SD_M if able and with_delays else 0.0,
     )

@@ -1,0 +1,60 @@
+"""Every quick method on one flight: none stumbles, and the table fits the terminal."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from host.cli import main
+from host.sysid.answer.side_by_side import side_by_side
+from host.sysid.answer.verdict import words
+from host.sysid.estimators.fit import methods
+from host.sysid.flight.chosen import chosen
+from host.sysid.flight.linear import STAGED, Answer, identify
+from host.sysid.flight.tables import read_columns
+
+SLOW = {"hopfield-line-search", "genetic", "unscented-kalman", "filter-error"}
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
+    """Every quick method on one 3-2-1-1 in light turbulence."""
+    folder = tmp_path_factory.mktemp("demo")
+    options = ["--seed", "3", "--firmware", "none", "--no-picture", "-o", str(folder)]
+    assert main(["simulate", "demo", *options]) == 0
+    columns = read_columns(Path(folder / "flight.csv"))[0]
+    windows = chosen(columns, numbers=[1])
+    found = {}
+    for method in dict.fromkeys((*STAGED, *methods())):
+        if method in SLOW:
+            continue
+        [found[method]] = identify(columns, names=("short-period",), method=method, windows=windows)
+    return found
+
+
+def test_every_method_of_the_list_answers(answers: dict[str, Answer]) -> None:
+    for method, answer in answers.items():
+        assert "M_alpha" in answer.result.names, method
+        assert [f.name for f in answer.fits] == list(answer.model.outputs), method
+
+
+@pytest.mark.parametrize(("width", "room"), [(80, 3), (120, 4), (30, 1)])
+def test_the_table_fits(width: int, room: int, answers: dict[str, Answer]) -> None:
+    lines = side_by_side(list(answers.values()), width)
+    assert max(len(line) for line in lines[:-1]) <= max(width, 36)
+    heads = [line for line in lines if line.startswith("short-period")]
+    assert len(heads) == -(-len(answers) // room)
+    for method in ("equation-error-total", "neural-delta"):
+        assert any(method in line for line in lines)
+    assert sum(line.startswith("  M_alpha ") for line in lines) == len(heads)
+
+
+def test_what_did_not_converge_is_not_trusted(answers: dict[str, Answer]) -> None:
+    stopped = answers["hopfield"]
+    assert not stopped.result.converged
+    lines = words([stopped], [])
+    assert "  trust (within 10 %):  nothing" in lines
+    assert "  no convergence: estimates and intervals mean nothing, use another method" in lines
+    table = side_by_side([stopped], 80)
+    assert all(line.endswith("*") for line in table[1:-1])
+    settled = replace(stopped, result=replace(stopped.result, converged=True))
+    assert not any("no convergence" in line for line in words([settled], []))
