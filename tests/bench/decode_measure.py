@@ -132,9 +132,9 @@ def parquet_pymavlink(path: Path) -> Made:
 
 
 def _decode(path: Path, kind: str) -> Made:
-    from host.decoding import decode
+    from host.decode.decoding import decode
+    from host.decode.writing import Request
     from host.physical.columns import COLUMNS
-    from host.writing import Request
 
     with tempfile.TemporaryDirectory() as folder:
         done = decode(Request(path, output=str(Path(folder) / f"table.{kind}")))
@@ -197,7 +197,7 @@ def _csv_size(path: Path) -> Made:
 
 # What is imported before the clock starts.
 IMPORTS = {
-    "ours": ("host.log", "host.decoding", "host.export.csv", "host.export.parquet", "pandas"),
+    "ours": ("host.log", "host.decode.decoding", "host.export.csv", "host.export.parquet", "pandas"),
     "numpy": (),
     "pyulog": ("pyulog", "pyulog.ulog2csv", "pandas", "pyarrow.parquet"),
     "pymavlink": ("pymavlink.DFReader", "pymavlink.mavutil", "pandas", "pyarrow.parquet"),

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.decode.summary import calibration_note
 from host.errors import CalibrationError
 from host.physical.calibration import load_calibration
 from host.physical.columns import ANALOGUE, INERTIAL
-from host.summary import calibration_note
 
 from tests.host.logs import flight, read, written
 

@@ -135,7 +135,7 @@ def test_a_full_disk_is_one_line(
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("host.writing.open_writer", full)
+    monkeypatch.setattr("host.decode.writing.open_writer", full)
     assert main(["decode", "flight.bin", "--to", kind]) == 2
     err = capsys.readouterr().err
     assert f"flight.{kind}: cannot be written: No space left" in err
@@ -326,11 +326,11 @@ def test_internal_errors_are_one_line(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put("flight.bin", GOOD)
-    monkeypatch.setattr("host.decoding.summarise", lambda log: 1 // 0)
+    monkeypatch.setattr("host.decode.decoding.summarise", lambda log: 1 // 0)
     monkeypatch.delenv("HOST_TRACEBACK", raising=False)
     assert main(["decode", "flight.bin"]) == 1
     assert "internal error: ZeroDivisionError" in capsys.readouterr().err
-    monkeypatch.setattr("host.decoding.summarise", interrupted)
+    monkeypatch.setattr("host.decode.decoding.summarise", interrupted)
     assert main(["decode", "flight.bin"]) == 130
     assert capsys.readouterr().err.strip() == "host: interrupted"
 
@@ -340,7 +340,7 @@ def test_interrupted_decode_leaves_no_half_table(
     kind: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     put("flight.bin", GOOD)
-    monkeypatch.setattr("host.log.SessionTable.pieces", half_a_table)
+    monkeypatch.setattr("host.log.flight_log.SessionTable.pieces", half_a_table)
     assert main(["decode", "flight.bin", "--to", kind]) == 130
     assert [path.name for path in Path().iterdir()] == ["flight.bin"]
 

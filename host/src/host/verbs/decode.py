@@ -79,8 +79,8 @@ def hexadecimal(text: str) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Decode, print, write; return the exit code."""
-    from host.decoding import decode
-    from host.writing import Request
+    from host.decode.decoding import decode
+    from host.decode.writing import Request
 
     request = Request(
         source=args.source,

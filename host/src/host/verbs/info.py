@@ -29,8 +29,8 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print what the head of a log says."""
     from host.errors import ExitCode
-    from host.head import describe, describe_folder, head_lines
-    from host.source import check_source
+    from host.log.head import describe, describe_folder, head_lines
+    from host.log.source import check_source
 
     source = check_source(args.source)
     if source.is_dir():

@@ -126,9 +126,9 @@ def _recorded(source: Path, calibration: Path | None, *, maybe_table: bool) -> F
 
 
 def _log(source: Path, calibration: Path | None) -> tuple[dict[str, Array], list[str]]:
+    from host.decode.summary import calibration_note
     from host.log import read_log
-    from host.source import find_flights, newest
-    from host.summary import calibration_note
+    from host.log.source import find_flights, newest
 
     notes: list[str] = []
     if source.is_dir():

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from host.log import FlightLog
+from host.log.quality import Quality, judge
 from host.physical.channels import constant_delay_us
 from host.physical.columns import ANALOGUE, COLUMNS, INERTIAL, RESTS_ON
 from host.physical.session import Session
-from host.quality import Quality, judge
 
 Json = dict[str, Any]
 

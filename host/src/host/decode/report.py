@@ -10,7 +10,7 @@ _WIDTH = 13
 
 
 def lines(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of a summary made by `host.summary.summarise`."""
+    """Yield the lines of a summary made by `host.decode.summary.summarise`."""
     yield _row("log", f"{summary['file']}  file id {summary['file_id']}, {summary['complete']}")
     yield _row("duration", f"{summary['duration_s']:.2f} s, {summary['rows']} rows")
     frames = summary["frames"]

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from host.log import read_log
+from host.log.source import find_flights
 from host.original.rows import looks_like_rows, parse_rows
-from host.source import find_flights
 
 HEAD_BYTES = 256 << 10
 

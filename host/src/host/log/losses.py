@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from host.ledger import Ledger, Loss
+from host.log.ledger import Ledger, Loss
 from host.physical.session import Session
 from host.wire.blocks import MAGIC, Blocks, Scan, read_at
 from host.wire.extents import BLOCK_BYTES

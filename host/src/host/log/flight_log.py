@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.errors import LogError
-from host.ledger import Ledger
-from host.losses import make_ledger
+from host.log.ledger import Ledger
+from host.log.losses import make_ledger
 from host.physical.calibration import Calibration, load_calibration
 from host.physical.columns import CHANNELS, COLUMNS
 from host.physical.session import Session, surface_sources
