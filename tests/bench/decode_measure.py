@@ -197,7 +197,10 @@ def _csv_size(path: Path) -> Made:
 
 # What is imported before the clock starts.
 IMPORTS = {
-    "ours": ("host.log", "host.decode.decoding", "host.export.csv", "host.export.parquet", "pandas"),
+    "ours": (
+        *("host.log", "host.decode.decoding", "host.export.csv", "host.export.parquet"),
+        "pandas",
+    ),
     "numpy": (),
     "pyulog": ("pyulog", "pyulog.ulog2csv", "pandas", "pyarrow.parquet"),
     "pymavlink": ("pymavlink.DFReader", "pymavlink.mavutil", "pandas", "pyarrow.parquet"),
