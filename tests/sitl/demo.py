@@ -135,9 +135,9 @@ def run(folder: Path) -> None:
     card = folder / "card.img"
     new_card_file(card)
     say(f"flying {END_S:.0f} s in simulated time")
-    begin_s = time.monotonic()
+    begin_s = time.process_time()
     fly(card, flight)
-    speed = END_S / (time.monotonic() - begin_s)
+    speed = END_S / (time.process_time() - begin_s)
     files = list_files(card, partitioned=True)
     say("taking flight.bin out of the card: " + ", ".join(f"{n} {s} B" for n, s in files.items()))
     log_path = folder / "flight.bin"
@@ -151,7 +151,7 @@ def run(folder: Path) -> None:
     wrong = [d.channel for d in differences if not d.good]
     if wrong:
         raise DemoError(f"not as scripted: {', '.join(wrong)}")
-    print(f"\nall {len(differences)} channels as scripted; {speed:.0f} times real time")
+    print(f"\nall {len(differences)} channels as scripted; flown at {speed:.0f} times real time")
 
 
 def main() -> int:

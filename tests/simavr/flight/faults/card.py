@@ -103,6 +103,15 @@ def stopped_and_resumed(seen: Seen) -> Sequence[str]:
     ]
 
 
+def hold_line_between_blocks(rig: FlightRig) -> None:
+    """Hold the card's line low once it has programmed a block and was seen to rest."""
+    for busy in (True, False):
+        while rig.card.busy is not busy:
+            rig.chip.run_s(0.0005)
+    rig.chip.run_s(0.01)
+    rig.card.hold_line(True)
+
+
 CARD = (
     Fault("1", "card busy 500 ms", "nothing lost, stall logged", lambda r: r.card.stall(0.5),
           events=("card_stall",), check=stall_is_told),
@@ -111,7 +120,7 @@ CARD = (
     Fault("2", "card busy 4 s", "stops with alarm, resumes", lambda r: r.card.stall(4.0),
           lossless=False, check=stopped_and_resumed, fault_s=4.0, after_s=5.0),
     Fault("2", "card's line low for 4 s", "stops with alarm, resumes",
-          lambda r: r.card.hold_line(True), lambda r: r.card.hold_line(False), lossless=False,
+          hold_line_between_blocks, lambda r: r.card.hold_line(False), lossless=False,
           check=stopped_and_resumed, fault_s=4.0, after_s=5.0),
     Fault("3", "card pulled, put back", "told in 1 s, resumes", lambda r: r.card.remove(),
           lambda r: r.card.insert(), events=("card_removed",), lossless=False, after_s=4.0,
