@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ TRUST = 0.10  # 95 % half-width over value: good enough to design with
 FAIR = 0.30
 UNPREDICTED = 0.5  # NRMSE of an output of an unseen maneuver
 PART = 0.25  # of a mode's participation: a state that makes it what it is
+MIXED = 0.98  # correlation of two inputs
 WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
 NEEDS = {
     "alpha": "an elevator 3-2-1-1 at the short-period frequency",
@@ -116,6 +118,11 @@ def _verdict(answer: Answer) -> list[str]:
     }
     if flights:
         lines.append(f"  to learn them, fly {'; '.join(sorted(flights))}")
+    for one, other in together(answer):
+        lines.append(
+            f"  {one} and {other} move together: fly them one at a time, without a mixer, or leave"
+            " one out of a model of your own"
+        )
     for name in answer.still:
         lines.append(f"  {name} never moved: its derivatives are the bias under another name")
     if answer.together.severe:
@@ -139,6 +146,18 @@ def _verdict(answer: Answer) -> list[str]:
             " input three times"
         )
     return lines
+
+
+def together(answer: Answer) -> list[tuple[str, str]]:
+    """Return inputs that were moved as one, by a mixer or a habit."""
+    moved = np.concatenate([m.inputs - m.inputs.mean(axis=0) for m in answer.maneuvers])
+    power = moved.T @ moved
+    pairs = itertools.combinations(range(len(answer.model.inputs)), 2)
+    return [
+        (answer.model.inputs[i], answer.model.inputs[j])
+        for i, j in pairs
+        if power[i, j] ** 2 > MIXED**2 * power[i, i] * power[j, j] > 0.0
+    ]
 
 
 def unpredicted(answer: Answer) -> list[str]:

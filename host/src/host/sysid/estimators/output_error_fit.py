@@ -14,7 +14,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 from host.sysid.numerics.colour import coloured_middle
-from host.sysid.numerics.output_error import whitened_slopes
+from host.sysid.numerics.output_error import unseen, whitened_slopes
 from host.sysid.numerics.problem import OutputProblem
 from host.sysid.numerics.repeats import pulls
 
@@ -131,4 +131,5 @@ def coloured_output_covariance(problem: OutputProblem, fit: Interval) -> Array:
     result = 0.5 * (result + result.T)
     low = np.diag(result) <= 0.0
     result[low], result[:, low] = white[low], white[:, low]
+    result += unseen(fit.optimum.information, fit.optimum.free)
     return np.asarray(result, dtype=np.float64)

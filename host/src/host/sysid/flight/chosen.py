@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from host.sysid.flight.finder import Found, find
 
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 FEWEST = 8  # samples, as a maneuver needs
+SHARED_S = 0.1  # windows that overlap by more are one
 STILL_RAD = 1e-3  # a surface that moves less excites nothing: the pots resolve as much
 
 
@@ -85,3 +87,17 @@ def _stretch(columns: Mapping[str, Array], from_s: float | None, to_s: float | N
         for axis, size in swing.items()
         if size > 0.5 * max(swing.values())
     ]
+
+
+def once(found: Sequence[Found]) -> list[Found]:
+    """Join windows that share samples: surfaces that moved together are one record."""
+    joined: list[Found] = []
+    for item in sorted(found, key=lambda f: f.start_s):
+        before = joined[-1] if joined else None
+        if before is not None and item.start_s < before.end_s - SHARED_S:
+            last_s = max(before.end_s, item.end_s)
+            input_s = max(before.input_end_s, item.input_end_s)
+            joined[-1] = replace(before, input_end_s=input_s, end_s=last_s)
+        else:
+            joined.append(item)
+    return joined

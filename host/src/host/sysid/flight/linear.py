@@ -33,6 +33,7 @@ from host.sysid.estimators.gust import VANES, fit_with_gust
 from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.estimators.start import regressed
 from host.sysid.flight.carried import carried, moved_by
+from host.sysid.flight.chosen import once
 from host.sysid.flight.column_map import like
 from host.sysid.flight.departures import departed
 from host.sysid.flight.finder import Found, Grade, find, grade
@@ -205,7 +206,7 @@ def identify(
     needed: list[str] = []
     for name in names:
         axes = AXIS_OF[name] if user_model is None else user_model.inputs
-        mine = _once([f for f in found if f.axis in axes])
+        mine = once([f for f in found if f.axis in axes])
         needed += axes
         if mine:
             answers.append(
@@ -294,11 +295,6 @@ def _answer(
         corrections=() if compatibility is None else corrections(compatibility),
         simulated=tuple(simulated),
     )
-
-
-def _once(found: Sequence[Found]) -> list[Found]:
-    """Leave out what covers the same samples: a stretch where two surfaces moved is one record."""
-    return list({f.fit_window(): f for f in found}.values())
 
 
 def _held_out(found: list[Found]) -> list[Found]:

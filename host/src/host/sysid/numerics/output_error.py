@@ -25,6 +25,7 @@ FIRST_DAMPING = 1e-4
 LEAST_DAMPING = 1e-8
 DAMPED = 1e-2  # from here on a short step may be short because it is damped
 SINGULAR = 1e-15  # of the largest eigenvalue of the scaled information
+UNSEEN = 1e-12  # the same: below, a product of two inverses holds no digit
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +184,24 @@ def covariance_of(information: Array, free: BoolArray) -> Array:
     inverse = (vector / value) @ vector.T / np.outer(scale, scale)
     covariance[np.ix_(free, free)] = 0.5 * (inverse + inverse.T)
     return covariance
+
+
+def unseen(information: Array, free: BoolArray) -> Array:
+    """Return the covariance of directions that the data do not see, zero where they see all.
+
+    Corrections for coloured residuals multiply by the inverse twice; along these directions only
+    rounding is left of them, which looks like a narrow interval.
+    """
+    result = np.zeros_like(information)
+    block = information[np.ix_(free, free)]
+    scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
+    value, vector = np.linalg.eigh(block / np.outer(scale, scale))
+    lost = value < UNSEEN * value[-1]
+    if lost.any():
+        value = np.maximum(value[lost], SINGULAR * value[-1])
+        part = (vector[:, lost] / value) @ vector[:, lost].T
+        result[np.ix_(free, free)] = part / np.outer(scale, scale)
+    return result
 
 
 def _evaluate(

@@ -1,0 +1,54 @@
+"""A direction without information has no small variance, and mixed surfaces are refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.sysid.answer.verdict import words
+from host.sysid.flight.linear import identify
+from host.sysid.flight.tables import read_columns
+from host.sysid.numerics.inverse import covariance_of
+from scipy.signal import lsim
+
+
+def test_what_is_not_known_is_not_known_exactly() -> None:
+    rng = np.random.default_rng(1)
+    X = rng.standard_normal((50, 4)) * [1.0, 1e6, 1e-6, 1.0]
+    np.testing.assert_allclose(covariance_of(X.T @ X), np.linalg.inv(X.T @ X), rtol=1e-8)
+    X[:, 3] = 0.5 * X[:, 0]  # the same column twice
+    covariance = covariance_of(X.T @ X)
+    alone = np.linalg.inv(X[:, 1:3].T @ X[:, 1:3])
+    assert np.diag(covariance)[[0, 3]].min() > 1e9
+    np.testing.assert_allclose(np.diag(covariance)[1:3], np.diag(alone), rtol=0.2)
+    X[:, 3] = 0.0  # a parameter that nothing depends on, or one held on its bound
+    assert not covariance_of(X.T @ X)[3].any()
+    assert not covariance_of(np.zeros((2, 2))).any()
+
+
+@pytest.mark.parametrize("method", ["flight", "output-error"])
+def test_surfaces_that_the_transmitter_mixes_are_not_told_apart(
+    method: str, tmp_path: Path
+) -> None:
+    rng, t = np.random.default_rng(1), np.arange(0.0, 12.0, 0.01)
+    A = np.array([[-0.24, 0.09, -1, 0.57], [-85, -25, 5.4, 0], [33, -0.75, -1.44, 0], [0, 1, 0, 0]])
+    B = np.array([[0, 0.12], [400, 8], [7, -28], [0, 0]])
+    aileron = 0.07 * (((t > 2.0) & (t < 2.4)) * 1.0 - ((t > 2.4) & (t < 2.8)))
+    surfaces = np.column_stack([aileron, 0.5 * aileron])
+    states = lsim((A, B, np.eye(4), np.zeros((4, 2))), surfaces, t)[1]
+    states += [0.002, 0.01, 0.01, 0.003] * rng.standard_normal(states.shape)
+    names = ["beta_rad", "p_radps", "r_radps", "phi_rad", "aileron_rad", "rudder_rad"]
+    table = pd.DataFrame(np.hstack([states, surfaces]), columns=names)
+    table = table.assign(t_s=t, airspeed_mps=17.0 + 0.02 * rng.standard_normal(len(t)))
+    table.to_csv(tmp_path / "mixed.csv", index=False)
+    columns, _ = read_columns(tmp_path / "mixed.csv")
+    [answer] = identify(columns, names=("lateral",), method=method)
+    assert len(answer.used) == 1  # both surfaces moved in the same record
+    refused = {r.name for r in answer.refused}
+    assert {"L_da", "L_dr", "N_da", "N_dr"} <= refused
+    mixed = "  aileron_rad and rudder_rad move together: fly them one at a time"
+    assert any(line.startswith(mixed) for line in words([answer], []))
+    [trusted] = [line for line in words([answer], []) if "trust (" in line]
+    assert "L_p" in trusted
+    assert "_da" not in trusted
+    assert "_dr" not in trusted
