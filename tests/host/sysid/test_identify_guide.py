@@ -1,8 +1,10 @@
 """host/IDENTIFY.md: its files are accepted as they stand, its options exist."""
 
+import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from host.cli import main
 from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
@@ -42,6 +44,29 @@ def test_it_is_that_of_a_flyable_file_with_the_same_numbers(tmp_path: Path) -> N
     assert ours.slope(700.0, 17.0, 1.2) == theirs.slope(700.0, 17.0, 1.2)
 
 
+def test_places_count_from_the_cg_wherever_it_is(tmp_path: Path) -> None:
+    """What is measured from a mark on the fuselage: the same aircraft, places and CG moved."""
+    here = read_document("ultrastick25e")
+    there = json.loads(json.dumps(here))
+    off = [0.03, -0.002, 0.01]
+    there["mass"]["cg_m"] = off
+    for section, names in (
+        ("sensors", ("imu_m", "vane_a_m", "vane_b_m", "pitot_a_m", "pitot_b_m", "gps_m")),
+        ("propulsion", ("hub_m",)),
+    ):
+        for name in names:
+            pairs = zip(there[section][name], off, strict=True)
+            there[section][name] = [place + more for place, more in pairs]
+    plain, moved = mine(tmp_path, dumps(here)), tmp_path / "moved.toml"
+    moved.write_text(dumps(there), encoding="utf-8")
+    for of in (airframe_data, instrument_data):
+        ours, theirs = of(str(moved)), of(plain)
+        for places in ("imu_m", "vanes_m"):
+            np.testing.assert_allclose(getattr(ours, places), getattr(theirs, places), atol=1e-12)
+    hubs = [powerplant(source).hub_m for source in (plain, str(moved))]
+    np.testing.assert_allclose(hubs[0], hubs[1], atol=1e-12)
+
+
 def test_without_a_propeller_coefficients_are_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(IdentificationError, match=r"\[propulsion\]"):
         powerplant(mine(tmp_path))
@@ -59,6 +84,8 @@ def test_a_measured_aircraft_is_not_flown(tmp_path: Path) -> None:
         ("iyy_kgm2 = 0.0838", "", "mass.iyy_kgm2 is None"),
         ("chord_m = 0.253", 'chord_m = "25 cm"', "geometry.chord_m is '25 cm'"),
         ('source = "where it was flown"', "", "trim.airspeed_mps has no source"),
+        ("elevator_arm_m = 0.632", 'elevator_arm_m = "long"', "elevator_arm_m is 'long'"),
+        ("imu_m = [0.02, 0.0, 0.01]", "imu_m = [0.02, 0.0]", "imu_m has 2 numbers, expected 3"),
     ],
 )
 def test_what_is_missing_in_it_is_named(tmp_path: Path, find: str, put: str, words: str) -> None:

@@ -37,6 +37,8 @@ def test_signs_are_those_of_the_house(name: str) -> None:
         ("[servo]", "[servos]", r"section \[servo\] is missing"),
         ('source = "UASLab OpenFlight actuator model: 25 deg"', "", "has no source"),
         ("alpha_rad = [0.08", "alpha_rad = [0.98", "must increase"),
+        ("cl_0 = [0.0016, 0.0033]", "cl_0 = [0.0016, nan]", r"cl_0\[1\] is nan, expected a number"),
+        ("cg_m = [0.0, 0.0, 0.0]", "cg_m = [0.0, 0.0]", "mass.cg_m has 2 numbers, expected 3"),
     ],
 )
 def test_broken_files_say_what_is_wrong(

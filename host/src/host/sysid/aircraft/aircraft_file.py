@@ -1,4 +1,7 @@
-"""What identification needs out of an aircraft file of the package."""
+"""What identification needs out of an aircraft file of the package.
+
+The file's reader has checked every number: whatever is wrong with one is said there, in one line.
+"""
 
 from __future__ import annotations
 
@@ -6,86 +9,81 @@ from functools import partial
 
 import numpy as np
 
+from host.compiled import Array
 from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.aircraft.instrument_errors import InstrumentData
 from host.sysid.aircraft.powerplant import Powerplant
 from host.sysid.errors import IdentificationError
 
 RECTANGLE = 1.0 / np.sqrt(3.0)  # standard deviation of an even distribution over its half width
+Place = tuple[float, float, float]
 
 
 def airframe_data(source: str) -> AirframeData:
-    """Read an aircraft by name or file.
+    """Return mass, sizes and places of the sensors of an aircraft by name or file.
 
     Raises
     ------
-    IdentificationError
-        If the file has no mass properties (a linear aircraft).
+    host.errors.UsageError
+        If there is no such file, or it does not say all of that (a linear aircraft).
     """
     from host.twin.aircraft import file as aircraft
 
     loaded = aircraft.load_measured(source)
-    drawing = aircraft.read_document(source)["geometry"]
-    arms = drawing if isinstance(drawing, dict) else {}
-    try:
-        number, vector = loaded.scalar, loaded.vector
-        vanes = tuple(tuple(map(float, vector(f"sensors.vane_{k}_m"))) for k in "ab")
-        imu = tuple(map(float, vector("sensors.imu_m") - vector("mass.cg_m")))
-        return AirframeData(
-            name=loaded.title,
-            mass_kg=number("mass.mass_kg"),
-            ixx_kgm2=number("mass.ixx_kgm2"),
-            iyy_kgm2=number("mass.iyy_kgm2"),
-            izz_kgm2=number("mass.izz_kgm2"),
-            ixz_kgm2=number("mass.ixz_kgm2"),
-            wing_area_m2=number("geometry.wing_area_m2"),
-            span_m=number("geometry.span_m"),
-            chord_m=number("geometry.chord_m"),
-            mass_share=number("mass.mass_tolerance") * RECTANGLE,
-            inertia_share=number("mass.inertia_tolerance") * RECTANGLE,
-            imu_m=(imu[0], imu[1], imu[2]),
-            vanes_m=tuple((v[0], v[1], v[2]) for v in vanes),
-            upwash=number("sensors.upwash"),
-            upwash_share=number("sensors.upwash_tolerance"),
-            elevator_arm_m=float(arms.get("elevator_arm_m", 0.0)),
-            rudder_arm_m=float(arms.get("rudder_arm_m", 0.0)),
-            arm_share=float(arms.get("arm_tolerance", 0.10)) * RECTANGLE,
-        )
-    except KeyError as error:
-        raise IdentificationError(f"aircraft {source}: no {error.args[0]} in its file") from error
+    number, vector, cg = loaded.scalar, loaded.vector, loaded.vector("mass.cg_m")
+    return AirframeData(
+        name=loaded.title,
+        mass_kg=number("mass.mass_kg"),
+        ixx_kgm2=number("mass.ixx_kgm2"),
+        iyy_kgm2=number("mass.iyy_kgm2"),
+        izz_kgm2=number("mass.izz_kgm2"),
+        ixz_kgm2=number("mass.ixz_kgm2"),
+        wing_area_m2=number("geometry.wing_area_m2"),
+        span_m=number("geometry.span_m"),
+        chord_m=number("geometry.chord_m"),
+        mass_share=number("mass.mass_tolerance") * RECTANGLE,
+        inertia_share=number("mass.inertia_tolerance") * RECTANGLE,
+        imu_m=_place(vector("sensors.imu_m") - cg),
+        vanes_m=tuple(_place(vector(f"sensors.vane_{k}_m") - cg) for k in "ab"),
+        upwash=number("sensors.upwash"),
+        upwash_share=number("sensors.upwash_tolerance"),
+        elevator_arm_m=number("geometry.elevator_arm_m"),
+        rudder_arm_m=number("geometry.rudder_arm_m"),
+        arm_share=number("geometry.arm_tolerance") * RECTANGLE,
+    )
 
 
 def instrument_data(source: str) -> InstrumentData:
-    """Read the sensors' places and dynamics of an aircraft by name or file.
+    """Return the sensors' places and dynamics of an aircraft by name or file.
 
     Raises
     ------
-    IdentificationError
-        If the file does not describe its sensors.
+    host.errors.UsageError
+        If there is no such file, or it does not describe its sensors.
     """
     from host.twin.aircraft import file as aircraft
 
     loaded = aircraft.load_measured(source)
-    try:
-        number, vector = loaded.scalar, loaded.vector
-        imu = vector("sensors.imu_m") - vector("mass.cg_m")
-        vanes = 0.5 * (vector("sensors.vane_a_m") + vector("sensors.vane_b_m"))
-        vanes -= vector("mass.cg_m")
-        return InstrumentData(
-            imu_m=(float(imu[0]), float(imu[1]), float(imu[2])),
-            vanes_m=(float(vanes[0]), float(vanes[1]), float(vanes[2])),
-            upwash=number("sensors.upwash"),
-            upwash_share=number("sensors.upwash_tolerance"),
-            vane_hz_per_mps=number("sensors.vane_frequency_hz_per_mps"),
-            vane_damping=number("sensors.vane_damping"),
-            vane_friction_rad=number("sensors.vane_friction_rad"),
-            friction_speed_mps=number("trim.airspeed_mps"),
-            pitot_lag_s=number("sensors.pitot_lag_s"),
-            position_m=number("sensors.position_tolerance_m"),
-            cg_m=number("mass.cg_tolerance_m"),
-        )
-    except KeyError as error:
-        raise IdentificationError(f"aircraft {source}: no {error.args[0]} in its file") from error
+    number, vector, cg = loaded.scalar, loaded.vector, loaded.vector("mass.cg_m")
+    between = 0.5 * (vector("sensors.vane_a_m") + vector("sensors.vane_b_m"))
+    return InstrumentData(
+        imu_m=_place(vector("sensors.imu_m") - cg),
+        vanes_m=_place(between - cg),
+        upwash=number("sensors.upwash"),
+        upwash_share=number("sensors.upwash_tolerance"),
+        vane_hz_per_mps=number("sensors.vane_frequency_hz_per_mps"),
+        vane_damping=number("sensors.vane_damping"),
+        vane_friction_rad=number("sensors.vane_friction_rad"),
+        friction_speed_mps=number("trim.airspeed_mps"),
+        pitot_lag_s=number("sensors.pitot_lag_s"),
+        position_m=number("sensors.position_tolerance_m"),
+        cg_m=number("mass.cg_tolerance_m"),
+    )
+
+
+def _place(from_cg: Array) -> Place:
+    x, y, z = from_cg.tolist()
+    return x, y, z
 
 
 def powerplant(source: str) -> Powerplant:
@@ -103,8 +101,7 @@ def powerplant(source: str) -> Powerplant:
     if "propulsion.diameter_m" not in loaded.scalars:
         raise IdentificationError(
             f"aircraft {source}: no section [propulsion]; coefficients straight from"
-            " flight need the"
-            " thrust: add it, or leave '--model coefficients' out"
+            " flight need the thrust: add it, or leave '--model coefficients' out"
         )
     frame = loaded.airframe()
 
@@ -119,5 +116,5 @@ def powerplant(source: str) -> Powerplant:
         partial(rotor_history, frame),
         frame.rotor_inertia_kgm2,
         frame.thrust_axis,
-        frame.hub_m,
+        frame.hub_m - frame.cg_m,
     )

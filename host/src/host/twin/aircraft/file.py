@@ -4,7 +4,6 @@ from."""
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from host.errors import UsageError
+from host.twin.aircraft import tomlin
 from host.twin.aircraft.airframe import COEFFICIENTS, GRAVITY_MPS2, Airframe, Array
 from host.twin.aircraft.straight import Straight
 
@@ -45,6 +45,10 @@ _VECTORS: Mapping[str, tuple[str, ...]] = {
     "sensors": ("imu_m", "vane_a_m", "vane_b_m", "pitot_a_m", "pitot_b_m", "gps_m"),
 }
 
+# May be left out of a file: what it then counts as.
+_OPTIONAL: Mapping[str, Mapping[str, float]] = {
+    "geometry": {"elevator_arm_m": 0.0, "rudder_arm_m": 0.0, "arm_tolerance": 0.10},
+}
 
 # What is known before the first flight: enough to identify an aircraft, not to fly it here.
 MEASURED = ("mass", "geometry", "trim", "sensors")
@@ -134,7 +138,7 @@ class Aircraft:
 
 def names() -> list[str]:
     """Return the names of the aircraft that come with the package, linear ones too, sorted."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+    return tomlin.names(FOLDER)
 
 
 def read_document(source: str | Path) -> dict[str, object]:
@@ -150,19 +154,8 @@ def read_document(source: str | Path) -> dict[str, object]:
     AircraftError
         No such file, not TOML, or of another format.
     """
-    path = Path(source)
-    if path.suffix != ".toml":
-        path = FOLDER / f"{source}.toml"
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        known = ", ".join(names())
-        raise AircraftError(f"no aircraft {source!r}: expected a file or one of {known}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise AircraftError(f"{path.name}: not TOML: {error}") from None
-    if document.get("format") != 1:
-        found = document.get("format")
-        raise AircraftError(f"{path.name}: format is {found!r}, expected 1")
+    document = tomlin.read(source, FOLDER, "aircraft", AircraftError)
+    tomlin.check_format(document, Path(source).name, AircraftError)
     return document
 
 
@@ -248,12 +241,19 @@ def _loaded(
         table = document.get(section)
         if not isinstance(table, dict):
             raise AircraftError(f"{source}: section [{section}] is missing")
-        for key in keys:
-            scalars[f"{section}.{key}"] = _number(source, section, table, key)
+        optional = _OPTIONAL.get(section, {})
+        for key in (*keys, *optional):
+            where = f"{source}: {section}.{key}"
+            value = table.get(key, optional.get(key))
+            scalars[f"{section}.{key}"] = tomlin.number(where, value, AircraftError)
         for key in _VECTORS[section]:
-            vectors[f"{section}.{key}"] = _numbers(source, section, table, key)
+            where = f"{source}: {section}.{key}"
+            listed = tomlin.numbers(where, table.get(key), AircraftError)
+            if key.endswith("_m") and len(listed) != 3:  # a place
+                raise AircraftError(f"{where} has {len(listed)} numbers, expected 3: x, y, z")
+            vectors[f"{section}.{key}"] = np.array(listed, dtype=np.float64)
         own = table.get("sources", {})
-        for key in (*keys, *_VECTORS[section]):
+        for key in (*keys, *optional, *_VECTORS[section]):
             origin = own.get(key, table.get("source", ""))
             if not isinstance(origin, str) or not origin:
                 raise AircraftError(f"{source}: {section}.{key} has no source")
@@ -265,17 +265,3 @@ def _loaded(
         vectors=vectors,
         sources=sources,
     )
-
-
-def _number(source: str | Path, section: str, table: Mapping[str, object], key: str) -> float:
-    value = table.get(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise AircraftError(f"{source}: {section}.{key} is {value!r}, expected a number")
-    return float(value)
-
-
-def _numbers(source: str | Path, section: str, table: Mapping[str, object], key: str) -> Array:
-    value = table.get(key)
-    if not isinstance(value, list) or not all(isinstance(x, (int, float)) for x in value):
-        raise AircraftError(f"{source}: {section}.{key} is {value!r}, expected a list of numbers")
-    return np.array(value, dtype=np.float64)

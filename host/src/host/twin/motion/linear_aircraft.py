@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from host.twin.aircraft import file as aircraft
+from host.twin.aircraft import tomlin
 from host.twin.aircraft.airframe import GRAVITY_MPS2, Array
 from host.twin.aircraft.file import Aircraft, AircraftError, read_document
 from host.twin.aircraft.straight import Straight
@@ -57,7 +58,7 @@ def load(source: str | Path) -> Aircraft:
         raise AircraftError(f"{source}: the matrices have no source")
     base = aircraft.load(str(document.get("base", "")))
     numbers = {
-        key: _number(source, document, key)
+        key: tomlin.number(f"{source}: {key}", document.get(key), AircraftError)
         for key in ("u_mps", "w_mps", "elevator_rad", "throttle")
     }
     shapes = {"longitudinal_a": (4, 4), "longitudinal_b": (4, 1), "lateral_a": (4, 4),
@@ -197,13 +198,6 @@ def _with(base: Aircraft, straight: Straight, *, name: str, title: str) -> Aircr
         scalars={**base.scalars, "trim.airspeed_mps": speed},
         straight=straight,
     )
-
-
-def _number(source: str | Path, document: dict[str, object], key: str) -> float:
-    value = document.get(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise AircraftError(f"{source}: {key} is {value!r}, expected a number")
-    return float(value)
 
 
 def _matrix(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
 from host.errors import UsageError
+from host.twin.aircraft import tomlin
 from host.twin.testcard.faults import FAULTS, Fault
 from host.twin.testcard.maneuvers import KINDS, STEPS, harmonics
 
@@ -143,7 +142,7 @@ Section = TypeVar("Section", Flight, Air, Pilot, Sensors)
 
 def names() -> list[str]:
     """Return the names of the cards that come with the package, sorted."""
-    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+    return tomlin.names(FOLDER)
 
 
 def load(source: str | Path) -> Card:
@@ -163,25 +162,13 @@ def load(source: str | Path) -> Card:
     CardError
         What was found and what was expected, in one line.
     """
-    path = Path(source)
-    if path.suffix != ".toml":
-        path = FOLDER / f"{source}.toml"
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        known = ", ".join(names())
-        raise CardError(
-            f"no flight card {str(source)!r}: expected a file or one of {known}"
-        ) from None
-    except tomllib.TOMLDecodeError as error:
-        raise CardError(f"{path.name}: not TOML: {error}") from None
-    return parse(document, path.stem)
+    document = tomlin.read(source, FOLDER, "flight card", CardError)
+    return parse(document, Path(source).stem)
 
 
 def parse(document: Mapping[str, object], name: str) -> Card:
     """Make a card of a parsed document; raises CardError."""
-    if document.get("format") != 1:
-        raise CardError(f"{name}: format is {document.get('format')!r}, expected 1")
+    tomlin.check_format(document, name, CardError)
     known = {"format", "title", "aircraft", "flight", "air", "pilot", "sensors", "segment", "fault"}
     for key in document:
         if key not in known:
@@ -225,9 +212,7 @@ def _table(where: str, value: object) -> dict[str, object]:
 
 
 def _number(where: str, key: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise CardError(f"{where}: {key} is {value!r}, expected a number")
-    return float(value)
+    return tomlin.number(f"{where}: {key}", value, CardError)
 
 
 def _section(name: str, document: Mapping[str, object], key: str, kind: type[Section]) -> Section:

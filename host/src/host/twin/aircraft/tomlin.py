@@ -1,0 +1,76 @@
+"""Read what a person wrote as TOML: by name or path, every mistake one line.
+
+Aircraft, linear aircraft and flight cards come through here: each packaged under a name or a file
+of the user's, `format = 1`, numbers that are finite numbers. Which error class a mistake is, the
+caller says.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+from host.errors import UsageError
+
+FORMAT = 1
+
+
+def read(source: str | Path, folder: Path, what: str, error: type[UsageError]) -> dict[str, object]:
+    """Return a document.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a packaged file, or path of one that ends in ``.toml``.
+    folder : Path
+        Where the packaged ones are.
+    what : str
+        What it should be, in words: ``aircraft``.
+    error : type
+        What to raise.
+
+    Raises
+    ------
+    UsageError
+        As `error`: no such file, one that cannot be read, or not TOML.
+    """
+    path = Path(source)
+    if path.suffix != ".toml":
+        path = folder / f"{source}.toml"
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        known = ", ".join(names(folder))
+        raise error(f"no {what} {str(source)!r}: expected a file or one of {known}") from None
+    except OSError as reason:
+        raise error(f"{path}: cannot be read ({reason.strerror or reason})") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
+        raise error(f"{path.name}: not TOML: {reason}") from None
+    return document
+
+
+def check_format(document: Mapping[str, object], name: str, error: type[UsageError]) -> None:
+    """Raise `error` if the format of a document is not ours."""
+    if document.get("format") != FORMAT:
+        raise error(f"{name}: format is {document.get('format')!r}, expected {FORMAT}")
+
+
+def names(folder: Path) -> list[str]:
+    """Return the names of the packaged files, sorted."""
+    return sorted(path.stem for path in folder.glob("*.toml"))
+
+
+def number(where: str, value: object, error: type[UsageError]) -> float:
+    """Return a finite number; raise `error`, which names the place, if it is none."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise error(f"{where} is {value!r}, expected a number")
+    return float(value)
+
+
+def numbers(where: str, value: object, error: type[UsageError]) -> list[float]:
+    """Return a list of finite numbers; raise `error` if it is none."""
+    if not isinstance(value, list):
+        raise error(f"{where} is {value!r}, expected a list of numbers")
+    return [number(f"{where}[{k}]", x, error) for k, x in enumerate(value)]
