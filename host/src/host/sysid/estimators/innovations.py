@@ -17,8 +17,8 @@ from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 from host.sysid.numerics.colour import coloured_middle
 from host.sysid.numerics.filter_problem import FilterProblem
+from host.sysid.numerics.filter_scoring import whitened_slopes
 
-SLOPE = 1e-4  # of a standard error: step of the numeric slopes
 PROCESS = "log_process."
 
 
@@ -51,7 +51,7 @@ class Innovations:
 
         One Gauss-Newton step; nothing if the filter fails there.
         """
-        point = FilterProblem(model, changed, self.process).evaluate(self.theta, costless=True)
+        point = FilterProblem(model, changed, self.process).evaluate(self.theta)
         pull = np.zeros(len(self.theta))
         if point is None:
             return pull
@@ -83,18 +83,6 @@ def innovations_of(
     point = problem.evaluate(theta)
     if point is None:
         return None
-    white = [np.linalg.inv(np.linalg.cholesky(S)) for S in point.S]
-    deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-24))
-    slopes = [np.zeros((*e.shape, len(theta))) for e in point.e]
-    for k in range(len(theta)):
-        there = theta.copy()
-        there[k] += SLOPE * deviation[k]
-        only = problem.owner(k)
-        up = problem.evaluate(there, only, None if only is None else point, costless=True)
-        if up is None:
-            return None
-        for number, e in enumerate(up.e):
-            if len(e):
-                change = (e - point.e[number]) / (SLOPE * deviation[k])
-                slopes[number][:, :, k] = change @ white[number].T
+    white = [point.gains[m.dt_s].whitener for m in maneuvers]
+    slopes = whitened_slopes(problem, theta, point)
     return Innovations(theta, covariance, process, point.e, white, slopes)

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
@@ -22,14 +21,39 @@ from host.sysid.numerics.problem import OutputProblem
 from host.sysid.numerics.riccati import innovations, predicted_covariance
 
 
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """Steady filter of one sample period.
+
+    Attributes
+    ----------
+    F : Array, shape (n, n)
+        Transition over a sample.
+    P : Array, shape (n, n)
+        Covariance of the predicted state.
+    S : Array, shape (p, p)
+        Covariance of innovations.
+    whitener : Array, shape (p, p)
+        Lower triangular; makes innovations white, of unit variance.
+    K : Array, shape (n, p)
+    """
+
+    F: Array
+    P: Array
+    S: Array
+    whitener: Array
+    K: Array
+
+
 @dataclass(slots=True)
 class Likelihood:
-    """Innovations (maneuvers, samples, p) and their covariance per maneuver's sample period."""
+    """Rows of `innovations` and innovations (samples, p) with covariance per maneuver, cost."""
 
+    z: list[Array]
     e: list[Array]
     S: list[Array]
+    gains: dict[float, Gain]  # per sample period
     cost: float
-    gains: dict[float, tuple[Array, Array, Array]]
 
 
 class FilterProblem:
@@ -65,113 +89,87 @@ class FilterProblem:
                 columns.append(np.diff(maneuver.inputs, axis=0, append=maneuver.inputs[-1:]))
             self._drives.append(np.ascontiguousarray(np.hstack(columns)))
 
-    def owner(self, parameter: int) -> int | None:
-        """Return the only maneuver a parameter acts on, None if it acts on all."""
-        if self.inner.n_common <= parameter < self.n_model and self.inner.n_local:
-            return (parameter - self.inner.n_common) // self.inner.n_local
-        return None
+    def noise(self, theta: Array) -> tuple[Array, Array]:
+        """Return power of every state's process noise per second, and of every output's noise."""
+        split = self.n_model + len(self.process)
+        intensity = np.zeros(len(self.model.states))
+        with np.errstate(over="ignore"):
+            intensity[self.process_index] = np.exp(2.0 * theta[self.n_model : split])
+            return intensity, np.exp(2.0 * theta[split:])
 
-    def evaluate(
-        self,
-        theta: Array,
-        only: int | None = None,
-        near: Likelihood | None = None,
-        *,
-        costless: bool = False,
-    ) -> Likelihood | None:
-        """Return innovations and cost; None where the filter or the model fails.
+    def constants(self, theta: Array, maneuver: int) -> tuple[Array, Array, Array]:
+        """Return biases of states and outputs, and start states of a maneuver."""
+        model = self.model
+        local = iter(theta[self.inner.columns(maneuver)[self.inner.n_common :]])
+        names = model.states, model.outputs, model.states
+        which = model.state_biases, model.output_biases, model.initial_states
+        found = []
+        for every, own in zip(names, which, strict=True):
+            values = np.zeros(len(every))
+            for name in own:
+                values[every.index(name)] = next(local)
+            found.append(values)
+        return found[0], found[1], found[2]
 
-        Parameters
-        ----------
-        theta : Array
-            All unknowns.
-        only : int, optional
-            Run this maneuver alone; the others give empty arrays.
-        near : Likelihood, optional
-            Of the same model: its gains are taken.
-        costless : bool
-            Leave the cost at zero.
-        """
+    def evaluate(self, theta: Array) -> Likelihood | None:
+        """Return innovations and cost; None where the filter or the model fails."""
         model = self.model
         n, m = len(model.states), len(model.inputs)
         A, B, C, D = model.matrices(theta)
         AB = np.zeros((n, n + m + 1))
         AB[:, :n], AB[:, n : n + m] = A, B
         CD = np.ascontiguousarray(np.hstack([C, D]))
-        split = self.n_model + len(self.process)
-        with np.errstate(over="ignore"):
-            intensity = np.zeros(n)
-            intensity[self.process_index] = np.exp(2.0 * theta[self.n_model : split])
-            R = np.diag(np.exp(2.0 * theta[split:]))
-        if not (np.isfinite(intensity).all() and np.isfinite(R).all()):
+        intensity, power = self.noise(theta)
+        if not (np.isfinite(intensity).all() and np.isfinite(power).all()):
             return None
         none = np.zeros(0, dtype=np.int64)
+        gains: dict[float, Gain] = {}
+        found = Likelihood([], [], [], gains, 0.0)
         cost = 0.0
-        all_e: list[Array] = []
-        all_S: list[Array] = []
-        n_common = self.inner.n_common
-        solutions = {} if near is None else near.gains
         for number, maneuver in enumerate(self.maneuvers):
-            if only is not None and number != only:
-                all_e.append(np.zeros((0, 0)))
-                all_S.append(np.zeros((0, 0)))
-                continue
-            local = theta[self.inner.columns(number)]
-            AB[:, -1] = 0.0
-            position = n_common
-            for state in model.state_biases:
-                AB[model.states.index(state), -1] = local[position]
-                position += 1
-            bias = np.zeros(len(model.outputs))
-            for output in model.output_biases:
-                bias[model.outputs.index(output)] = local[position]
-                position += 1
-            start = np.zeros(n)
-            for state in model.initial_states:
-                start[model.states.index(state)] = local[position]
-                position += 1
+            rate, bias, start = self.constants(theta, number)
+            AB[:, -1] = rate
             step, _ = transition(
                 AB, n, m, model.hold == "foh", maneuver.dt_s, none, none, none, np.zeros(0), 0
             )
-            if maneuver.dt_s not in solutions:
-                gain = self._gain(A, C, intensity, R, maneuver.dt_s)
+            if maneuver.dt_s not in gains:
+                gain = _gain(A, C, intensity, np.diag(power), maneuver.dt_s)
                 if gain is None:
                     return None
-                solutions[maneuver.dt_s] = gain
-            S, factor, K = solutions[maneuver.dt_s]
-            finite, e = innovations(
-                step, CD, K, self._drives[number], maneuver.outputs, start, bias
+                gains[maneuver.dt_s] = gain
+            gain = gains[maneuver.dt_s]
+            finite, z = innovations(
+                step, CD, gain.K, self._drives[number], maneuver.outputs, start, bias
             )
             if not finite:
                 return None
-            all_e.append(e)
-            all_S.append(S)
-            if costless:
-                continue
-            white = linalg.solve_triangular(factor, e.T, lower=True)
+            found.z.append(z)
+            found.e.append(z[:, -len(C) :])
+            found.S.append(gain.S)
+            white = found.e[-1] @ gain.whitener.T
             cost += 0.5 * float(np.sum(white**2))
-            cost += len(e) * float(np.sum(np.log(np.diag(factor))))
+            cost -= len(z) * float(np.sum(np.log(np.diag(gain.whitener))))
         prior = self.inner.prior_precision
         miss = theta[: self.n_model] - self.inner.prior_mean
         cost += 0.5 * float(np.sum(prior * miss**2))
-        return Likelihood(all_e, all_S, cost, solutions) if np.isfinite(cost) else None
+        found.cost = cost
+        return found if np.isfinite(cost) else None
 
-    def _gain(
-        self, A: Array, C: Array, intensity: Array, R: Array, dt_s: float
-    ) -> tuple[Array, Array, Array] | None:
-        """Return innovation covariance, its Cholesky factor and the steady Kalman gain."""
-        F, Qd = discrete_noise(A, intensity, dt_s)
-        if not np.isfinite(Qd).all() or np.max(np.abs(F)) > 1e6:
-            return None
-        try:
-            solved, P = predicted_covariance(F, np.ascontiguousarray(C), Qd, R)
-            S = C @ P @ C.T + R
-            factor = np.linalg.cholesky(S)
-        except np.linalg.LinAlgError:  # of the compiled solver as well
-            return None
+
+def _gain(A: Array, C: Array, intensity: Array, R: Array, dt_s: float) -> Gain | None:
+    F, Qd = discrete_noise(A, intensity, dt_s)
+    if not np.isfinite(Qd).all() or np.max(np.abs(F)) > 1e6:
+        return None
+    try:
+        solved, P = predicted_covariance(F, C, Qd, R)
+        S = C @ P @ C.T + R
+        factor = np.linalg.cholesky(S)
         if not solved:
             return None
-        return S, factor, np.ascontiguousarray(np.linalg.solve(S, C @ P).T)
+        K = np.ascontiguousarray(np.linalg.solve(S, C @ P).T)
+        return Gain(F, P, S, np.linalg.inv(factor), K)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def discrete_noise(A: Array, intensity: Array, dt_s: float) -> tuple[Array, Array]:
@@ -188,12 +186,20 @@ def discrete_noise(A: Array, intensity: Array, dt_s: float) -> tuple[Array, Arra
     dt_s : float
     """
     n = len(A)
+    none = np.zeros(0, dtype=np.int64)
+    E, _ = transition(
+        van_loan(A, intensity), 2 * n, 0, False, dt_s, none, none, none, np.zeros(0), 0
+    )
+    F = np.ascontiguousarray(E[n:, n : 2 * n].T)
+    Qd = F @ E[:n, n : 2 * n]
+    return F, 0.5 * (Qd + Qd.T)
+
+
+def van_loan(A: Array, intensity: Array) -> Array:
+    """Return [-A Q; 0 A'] and a column of zeros: its exponential holds the covariance."""
+    n = len(A)
     block = np.zeros((2 * n, 2 * n + 1))
     block[:n, :n] = -A
     block[:n, n : 2 * n] = np.diag(intensity)
     block[n:, n : 2 * n] = A.T
-    none = np.zeros(0, dtype=np.int64)
-    E, _ = transition(block, 2 * n, 0, False, dt_s, none, none, none, np.zeros(0), 0)
-    F = np.ascontiguousarray(E[n:, n : 2 * n].T)
-    Qd = F @ np.ascontiguousarray(E[:n, n : 2 * n])
-    return F, 0.5 * (Qd + Qd.T)
+    return block

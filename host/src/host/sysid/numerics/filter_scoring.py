@@ -6,56 +6,143 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from host.compiled import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.numerics.filter_problem import FilterProblem, Likelihood
-
-DIFFERENCE = 1e-5  # of a standard error (or of the size): step of the numeric slopes
+from host.compiled import Array, IntArray
+from host.sysid.numerics.filter_problem import FilterProblem, Gain, Likelihood
+from host.sysid.numerics.filter_slopes import GainSlopes, gain_slopes, matrix_slopes
+from host.sysid.numerics.kernels import transition
+from host.sysid.numerics.riccati import innovation_slopes
 
 
 def scoring(
-    problem: FilterProblem, theta: Array, point: Likelihood, scale: Array
+    problem: FilterProblem, theta: Array, point: Likelihood
 ) -> tuple[list[Array], list[Array]]:
     """Return Fisher information and minus the cost's gradient of every maneuver.
 
-    From one-sided differences: their width is 1e-5 standard errors. Biases and start values of a
-    maneuver leave the gains as they are.
+    Parameters
+    ----------
+    problem : FilterProblem
+    theta : Array
+        All unknowns.
+    point : Likelihood
+        There.
     """
     size = len(theta)
-    slopes_e: list[dict[int, Array]] = []
-    slopes_S: list[dict[int, Array]] = []
-    for k in range(size):
-        width = max(DIFFERENCE * scale[k], 1e-9 * (1.0 + abs(theta[k])))
-        other = theta.copy()
-        other[k] += width
-        only = problem.owner(k)
-        up = problem.evaluate(other, only, None if only is None else point, costless=True)
-        if up is None:
-            raise IdentificationError("filter error: the likelihood is not smooth at the estimate")
-        runs = [number for number, e in enumerate(up.e) if len(e)]
-        slopes_e.append({i: (up.e[i] - point.e[i]) / width for i in runs})
-        slopes_S.append({i: (up.S[i] - point.S[i]) / width for i in runs})
+    matrices = matrix_slopes(problem.model, theta)
+    gains = _gain_slopes(problem, theta, point, matrices)
     parts: list[Array] = []
     scores: list[Array] = []
-    for number, (e, S) in enumerate(zip(point.e, point.S, strict=True)):
+    for number, maneuver in enumerate(problem.maneuvers):
+        gain, by = point.gains[maneuver.dt_s], gains[maneuver.dt_s]
+        active = _active(problem, number)
+        J = _innovation_slopes(problem, theta, point, number, by, matrices)
+        white = point.e[number] @ gain.whitener.T
         information, gradient = np.zeros((size, size)), np.zeros(size)
-        active = [k for k in range(size) if problem.owner(k) in (None, number)]
-        moving = [k for k in active if np.any(slopes_S[k][number])]
-        factor = np.linalg.cholesky(S)
-        inner = np.linalg.inv(factor)
-        white = inner @ e.T
-        J = np.stack([(inner @ slopes_e[k][number].T).ravel() for k in active], axis=1)
-        information[np.ix_(active, active)] += J.T @ J
-        gradient[active] -= J.T @ white.ravel()
-        outer = white @ white.T
-        spread = {k: inner @ slopes_S[k][number] @ inner.T for k in moving}
-        for a in moving:
-            gradient[a] -= 0.5 * (len(e) * np.trace(spread[a]) - np.sum(spread[a] * outer))
-        flat = np.array([spread[a].ravel() for a in moving])
-        information[np.ix_(moving, moving)] += 0.5 * len(e) * (flat @ flat.T)
+        information[np.ix_(active, active)] = J.T @ J
+        gradient[active] = -(J.T @ white.ravel())
+        # Only what all maneuvers share moves the gain.
+        moving = _shared(problem)
+        spread = gain.whitener @ by.S @ gain.whitener.T
+        trace = np.trace(spread, axis1=1, axis2=2)
+        outer = white.T @ white
+        gradient[moving] -= 0.5 * (len(white) * trace - np.sum(spread * outer, axis=(1, 2)))
+        flat = spread.reshape(len(moving), -1)
+        information[np.ix_(moving, moving)] += 0.5 * len(white) * (flat @ flat.T)
         parts.append(information)
         scores.append(gradient)
     return parts, scores
+
+
+def whitened_slopes(problem: FilterProblem, theta: Array, point: Likelihood) -> list[Array]:
+    """Return slopes of the whitened innovations of every maneuver, (samples, p, P)."""
+    matrices = matrix_slopes(problem.model, theta)
+    gains = _gain_slopes(problem, theta, point, matrices)
+    found: list[Array] = []
+    for number, (e, maneuver) in enumerate(zip(point.e, problem.maneuvers, strict=True)):
+        slopes = np.zeros((e.size, len(theta)))
+        slopes[:, _active(problem, number)] = _innovation_slopes(
+            problem, theta, point, number, gains[maneuver.dt_s], matrices
+        )
+        found.append(slopes.reshape(*e.shape, -1))
+    return found
+
+
+def _gain_slopes(
+    problem: FilterProblem, theta: Array, point: Likelihood, matrices: tuple[Array, Array, Array]
+) -> dict[float, GainSlopes]:
+    AB_slopes, _, CD_slopes = matrices
+    return {
+        dt_s: gain_slopes(problem, theta, gain, dt_s, AB_slopes, CD_slopes)
+        for dt_s, gain in point.gains.items()
+    }
+
+
+def _active(problem: FilterProblem, number: int) -> IntArray:
+    """Return which unknowns the innovations of a maneuver depend on."""
+    noise = np.arange(problem.n_model, len(problem.names))
+    return np.concatenate([problem.inner.columns(number), noise])
+
+
+def _shared(problem: FilterProblem) -> IntArray:
+    return np.concatenate(
+        [np.arange(problem.inner.n_common), np.arange(problem.n_model, len(problem.names))]
+    )
+
+
+def _innovation_slopes(
+    problem: FilterProblem,
+    theta: Array,
+    point: Likelihood,
+    number: int,
+    by: GainSlopes,
+    matrices: tuple[Array, Array, Array],
+) -> Array:
+    """Return slopes of the whitened innovations, (samples x p, `_active`)."""
+    _, CD, CD_slopes = matrices
+    model, inner = problem.model, problem.inner
+    n, m, p = len(model.states), len(model.inputs), len(model.outputs)
+    gain: Gain = point.gains[problem.maneuvers[number].dt_s]
+    common, local = inner.n_common, inner.n_local
+    width = common + local + len(theta) - problem.n_model
+    noise = slice(common + local, width)
+    A, B, _, _ = model.matrices(theta)
+    rate, _, _ = problem.constants(theta, number)
+    entries = model.entries("AB")
+    rates = np.array([model.states.index(s) for s in model.state_biases], dtype=np.int64)
+    step, step_slopes = transition(
+        np.column_stack([A, B, rate]),
+        n,
+        m,
+        model.hold == "foh",
+        problem.maneuvers[number].dt_s,
+        np.concatenate([entries.row, rates]),
+        np.concatenate([entries.column, np.full(len(rates), n + m)]),
+        np.concatenate([entries.parameter, common + np.arange(len(rates))]),
+        np.concatenate([entries.gain, np.ones(len(rates))]),
+        common + len(rates),
+    )
+    w = step.shape[1] - n
+    known = common + len(rates)
+    tap = np.zeros((n + w, p, width))
+    tap[: n + m, :, :common] = CD_slopes.transpose(1, 0, 2)
+    for k, output in enumerate(model.output_biases):
+        tap[n + m, model.outputs.index(output), known + k] = 1.0
+    start = np.zeros((n, width))
+    for k, state in enumerate(model.initial_states):
+        start[model.states.index(state), known + len(model.output_biases) + k] = 1.0
+    push = np.zeros((n + w + p, n, width))
+    push[: n + w, :, :known] = step_slopes.transpose(1, 0, 2)
+    FK = gain.F @ gain.K
+    push[: n + w] -= FK @ tap
+    push[n + w :, :, :common] = np.einsum("iaq,aj->jiq", step_slopes[:, :n, :common], gain.K)
+    for part, own in ((slice(0, common), slice(0, common)), (noise, slice(common, None))):
+        push[n + w :, :, part] += np.einsum("ia,qaj->jiq", gain.F, by.K[own])
+    # A row of z drives all sensitivities by one product; only what depends on the last is a loop.
+    z = point.z[number]
+    drive = (z @ push.reshape(len(push), -1)).reshape(len(z), n, width)
+    seen = -(gain.whitener @ tap).reshape(n + w, -1)
+    out = (z[:, : n + w] @ seen).reshape(len(z), p, width)
+    innovation_slopes(gain.F - FK @ CD[:, :n], gain.whitener @ CD[:, :n], start, drive, out)
+    return out.reshape(-1, width)
 
 
 def summed(

@@ -1,0 +1,104 @@
+"""How a steady-state Kalman filter moves with the model and both kinds of noise: exact slopes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.compiled import Array
+from host.sysid.models.model import LinearModel
+from host.sysid.numerics.filter_problem import FilterProblem, Gain, van_loan
+from host.sysid.numerics.kernels import transition
+
+
+@dataclass(frozen=True, slots=True)
+class GainSlopes:
+    """Slopes of S (shared, p, p) and K (shared, n, p) by common unknowns, process and noise."""
+
+    S: Array
+    K: Array
+
+
+def matrix_slopes(model: LinearModel, theta: Array) -> tuple[Array, Array, Array]:
+    """Return slopes of [A B], [C D] itself and its slopes, by every common unknown, last axis."""
+    A, B, C, D = model.matrices(theta)
+    names = [p.name for p in model.parameters]
+    AB, CD = (
+        np.stack([np.hstack([model.gradient(x, name) for x in pair]) for name in names], axis=2)
+        for pair in ("AB", "CD")
+    )
+    for lever in model.levers:
+        # The arm carries a whole state row into an output.
+        row, state = model.outputs.index(lever.output), model.states.index(lever.state)
+        arm = names.index(lever.parameter)
+        CD[row] += lever.gain * theta[arm] * AB[state]
+        CD[row, :, arm] += lever.gain * np.concatenate([A[state], B[state]])
+    return AB, np.hstack([C, D]), CD
+
+
+def gain_slopes(
+    problem: FilterProblem,
+    theta: Array,
+    gain: Gain,
+    dt_s: float,
+    AB_slopes: Array,
+    CD_slopes: Array,
+) -> GainSlopes:
+    """Return slopes of the filter at one sample period.
+
+    The Riccati equation in Joseph's form does not feel the gain to first order, so that slopes of
+    the covariance obey a Lyapunov equation, one for all unknowns.
+    """
+    A, _, C, _ = problem.model.matrices(theta)
+    n, p = len(A), len(C)
+    common, process = problem.inner.n_common, len(problem.process)
+    count = common + process + p
+    intensity, power = problem.noise(theta)
+    F, Q = _noise_slopes(problem, A, intensity, dt_s, AB_slopes[:, :n])
+    dC = np.zeros((count, p, n))
+    dC[:common] = CD_slopes[:, :n].transpose(2, 0, 1)
+    dR = np.zeros((count, p, p))
+    dR[common + process + np.arange(p), np.arange(p), np.arange(p)] = 2.0 * power
+    dF, dQ = np.zeros((2, count, n, n))
+    dF[: common + process], dQ[: common + process] = F, Q
+    keep = np.eye(n) - gain.K @ C
+    seen = keep @ gain.P  # covariance after the measurement
+    closed = gain.F @ keep
+    change = dF @ seen @ gain.F.T - closed @ gain.P @ dC.transpose(0, 2, 1) @ gain.K.T @ gain.F.T
+    change = change + change.transpose(0, 2, 1)
+    change += dQ + gain.F @ gain.K @ dR @ gain.K.T @ gain.F.T
+    system = np.eye(n * n) - np.kron(closed, closed)
+    dP = np.linalg.solve(system, change.reshape(count, n * n).T).T.reshape(count, n, n)
+    across = dC @ gain.P @ C.T
+    dS = across + across.transpose(0, 2, 1) + C @ dP @ C.T + dR
+    inverse = gain.whitener.T @ gain.whitener
+    dK = (dP @ C.T + gain.P @ dC.transpose(0, 2, 1) - gain.K @ dS) @ inverse
+    return GainSlopes(dS, dK)
+
+
+def _noise_slopes(
+    problem: FilterProblem, A: Array, intensity: Array, dt_s: float, A_slopes: Array
+) -> tuple[Array, Array]:
+    """Return slopes of transition and process noise of a sample, (common and process, n, n)."""
+    n = len(A)
+    row, column, parameter = np.nonzero(A_slopes)
+    gain = A_slopes[row, column, parameter]
+    driven = np.array(problem.process_index, dtype=np.int64)
+    common = A_slopes.shape[2]
+    E, slopes = transition(
+        van_loan(A, intensity),
+        2 * n,
+        0,
+        False,
+        dt_s,
+        np.concatenate([row, n + column, driven]),
+        np.concatenate([column, n + row, n + driven]),
+        np.concatenate([parameter, parameter, common + np.arange(len(driven))]),
+        np.concatenate([-gain, gain, 2.0 * intensity[driven]]),
+        common + len(driven),
+    )
+    slopes = slopes.transpose(2, 0, 1)
+    F, dF = E[n:, n : 2 * n].T, slopes[:, n:, n : 2 * n].transpose(0, 2, 1)
+    dQ = dF @ E[:n, n : 2 * n] + F @ slopes[:, :n, n : 2 * n]
+    return dF, 0.5 * (dQ + dQ.transpose(0, 2, 1))

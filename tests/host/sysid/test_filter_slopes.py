@@ -1,0 +1,101 @@
+"""Slopes of filter error against differences, and where its search may end."""
+
+import numpy as np
+import pytest
+from host.sysid.estimators.filter_error import fit_filter_error
+from host.sysid.estimators.gust import gust_model
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.templates import Trim, template
+from host.sysid.numerics.filter_problem import FilterProblem, Likelihood
+from host.sysid.numerics.filter_scoring import scoring, summed, whitened_slopes
+from host.sysid.numerics.problem import OutputProblem
+
+KNOWN = {"Z_alpha": -8.0, "M_alpha": -60.0, "M_q": -8.0, "M_de": -70.0, "Z_de": -0.5}
+KNOWN |= {"D_V": -0.2, "D_alpha": -5.0, "Z_V": -0.07, "imu_x_m": 0.02, "imu_z_m": -0.01}
+
+
+def gusty_aircraft() -> LinearModel:
+    """Return an aircraft with accelerometers on arms, biases and a gust."""
+    trim = Trim(17.0, 0.05, 0.05)
+    base = template("longitudinal", trim, accelerometers=True, delays=(), imu_sd_m=0.02)
+    base = base.with_start([KNOWN.get(p.name, 0.0) for p in base.parameters])
+    return gust_model(base, 17.0)
+
+
+def flown(model: LinearModel, seeds: tuple[int, ...]) -> list[Maneuver]:
+    """Return doublets with noise that remembers, so that both kinds of noise are there."""
+    result = []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        t = np.arange(0.0, 4.0, 0.02)
+        u = 0.05 * (np.sign(t - 1.0) - 2.0 * np.sign(t - 1.5) + np.sign(t - 2.0))[:, None]
+        empty = Maneuver(0.02, u, np.zeros((len(t), len(model.outputs))))
+        problem = OutputProblem(model, [empty])
+        y = problem.outputs(problem.first_guess())
+        assert y is not None
+        drift = np.cumsum(rng.standard_normal(y[0].shape), axis=1)
+        noise = rng.standard_normal(y[0].shape) + 0.2 * drift
+        outputs = y[0] + 0.05 * np.std(y[0], axis=1)[:, None] * noise
+        result.append(Maneuver(0.02, u, outputs.T))
+    return result
+
+
+def vector(problem: FilterProblem) -> np.ndarray:
+    """Return unknowns away from any optimum."""
+    rng = np.random.default_rng(3)
+    theta = problem.inner.first_guess()
+    theta += 0.03 * (np.abs(theta) + 0.01) * rng.standard_normal(len(theta))
+    deviation = np.std(np.vstack([m.outputs for m in problem.maneuvers]), axis=0)
+    return np.concatenate([theta, np.log([0.03, 0.3]), np.log(0.1 * deviation)])
+
+
+def known(point: Likelihood | None) -> Likelihood:
+    """Return a point that must be there."""
+    assert point is not None
+    return point
+
+
+def test_gradient_and_information_are_those_of_differences() -> None:
+    model = gusty_aircraft()
+    problem = FilterProblem(model, flown(model, (1, 2)), ("gust_rad", "airspeed_mps"))
+    theta = vector(problem)
+    here = known(problem.evaluate(theta))
+    information, gradient = summed(problem, theta, *scoring(problem, theta, here))
+    size = np.sqrt(np.diag(information))
+    white, spread, slope = [], [], []
+    for k in range(len(theta)):
+        width = np.zeros(len(theta))
+        width[k] = 1e-4 / max(size[k], 1e-3)
+        up, down = (known(problem.evaluate(theta + s * width)) for s in (1.0, -1.0))
+        slope.append((down.cost - up.cost) / (2.0 * width[k]))
+        W = here.gains[0.02].whitener
+        moved = [(a - b) / (2.0 * width[k]) @ W.T for a, b in zip(up.e, down.e, strict=True)]
+        white.append(np.concatenate(moved).ravel())
+        spread.append((W @ (up.S[0] - down.S[0]) @ W.T / (2.0 * width[k])).ravel())
+    J, L = np.array(white), np.array(spread)
+    exact = np.vstack([s.reshape(-1, len(theta)) for s in whitened_slopes(problem, theta, here)])
+    np.testing.assert_allclose(exact / size, J.T / size, atol=1e-6)
+    expected = J @ J.T + 0.5 * problem.inner.samples * L @ L.T
+    expected[: problem.n_model, : problem.n_model] += np.diag(problem.inner.prior_precision)
+    np.testing.assert_allclose(gradient / size, np.array(slope) / size, atol=1e-3)
+    assert np.max(np.abs(gradient / size)) > 10.0
+    np.testing.assert_allclose(
+        information / np.outer(size, size), expected / np.outer(size, size), atol=1e-5
+    )
+
+
+@pytest.mark.parametrize("share", [0.3, 3.0])
+def test_the_answer_does_not_hang_on_the_start(share: float) -> None:
+    model = gusty_aircraft()
+    maneuvers = flown(model, (4, 5))
+    process = ("gust_rad", "airspeed_mps")
+    start = OutputProblem(model, maneuvers).first_guess()
+    reference = fit_filter_error(model, maneuvers, process=process, start=start, rival=False)
+    start[: len(model.parameters)] *= 1.0 + 0.1 * share
+    other = fit_filter_error(model, maneuvers, process=process, start=start, rival=False)
+    assert reference.converged
+    assert other.converged
+    common = slice(0, len(model.parameters))
+    step = (other.estimate - reference.estimate)[common] / reference.standard_error[common]
+    assert np.max(np.abs(step)) < 0.1
