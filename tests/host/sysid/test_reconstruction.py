@@ -183,6 +183,18 @@ def test_gusts_do_not_pass_for_vanes_that_under_read() -> None:
     assert abs(np.mean(faults)) > 2.0 * abs(np.mean(errors))
 
 
+def test_a_surface_that_stands_still_tells_nothing_and_spoils_nothing() -> None:
+    columns, _ = flown(2)
+    moving = {k: v for k, v in columns.items() if k != "throttle"}
+    bare = reconstruct(moving, AIRFRAME, INSTRUMENT)
+    for still in (0.0, 0.4):
+        held = {**moving, "throttle": np.full(len(columns["t_s"]), still)}
+        found = reconstruct(held, AIRFRAME, INSTRUMENT)
+        for before, after in zip(bare.findings, found.findings, strict=True):
+            assert after.value == pytest.approx(before.value, abs=1e-4 * before.half_width)
+            assert after.half_width == pytest.approx(before.half_width, rel=1e-4)
+
+
 def test_every_axis_has_stretches_of_its_own() -> None:
     """Rolling is quick: judged by rates alone the elevator's minute is left out."""
     columns, _ = flown(1)

@@ -11,7 +11,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from host.sysid.aircraft.aircraft_file import powerplant
-from host.sysid.compatibility.strapdown import strapdown
+from host.sysid.compatibility.strapdown import path_slopes, strapdown
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import fit_with_gust
 from host.sysid.estimators.hopfield import iterate, iterate_until
@@ -51,7 +51,11 @@ def build_kernels() -> None:
     iterate(W, b, np.zeros(2), 0.1, 200.0, 3, 1e6)
     iterate_until(W, b, np.zeros(2), 0.1, 200.0, b, 0.5, 3)
     path = np.zeros((3, 3))
-    strapdown(path, path, np.eye(3), np.zeros(3), 0.01)
+    turn, _ = strapdown(path, path, np.eye(3), np.zeros(3), 0.01)
+    signals = (path, path, path, path, np.ones((2, 3)))
+    known = np.full((2, 3, 3), -1)
+    slopes = (np.zeros((3, 3, 6)), np.zeros((3, 6)), np.zeros((3, 3, 6)))
+    path_slopes(turn, *signals, known, known[0, 0, :2], 0, 0.05, 0.1, *slopes)
     powerplant(AIRCRAFT).run(np.full(2, 0.5), np.full(2, SPEED_MPS), np.full(2, 1.2), 0.03)
     update(np.zeros(2), np.eye(2), np.ones((3, 2)), np.ones(3), 1.0)
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.compiled import Array, IntArray
-from host.sysid.compatibility.strapdown import cross, cross_columns, small_turn, strapdown
+from host.sysid.compatibility.strapdown import cross, path_slopes, small_turn, strapdown
 from host.sysid.numerics.problem import Response
 
 # Errors of the inertial sensors, in the order of their slopes.
@@ -111,8 +111,14 @@ class PathProblem:
         self.stretches = tuple(stretches)
         self.model = PathModel("flight path", outputs)
         self.block = block
+        self._weights = np.full(block, 1.0 / block)
         self.common = tuple(prior)
         self._place = {name: k for k, name in enumerate(self.common)}
+        places = np.array([self._place.get(n, -1) for n in (*INERTIAL, *WITH_GPS[1:])])
+        # Bias, scale and tilt of gyro and accelerometer, in the order of `INERTIAL`.
+        kinds = np.array([[0, 3, 12], [6, 9, 12]])
+        self._inertial_place = places[kinds[:, None, :] + np.arange(3)[:, None]]
+        self._wind_place = places[-2:]
         local = START + (("height_m",) if HEIGHT in outputs else ())
         names = list(self.common)
         self._index: list[IntArray] = []
@@ -166,29 +172,36 @@ class PathProblem:
         attitude = small_turn(own[3:6]) @ s.attitude
         C, v = strapdown(rates, force, attitude, s.velocity_mps + own[0:3], s.dt_s)
         step_s = self.block * s.dt_s
-        E, DV = self._path_slopes(
-            self._mean(C),
-            tuple(self._mean(x) for x in plain),
-            self._mean(force),
-            (spread, stretch),
+        through = v - np.append(self._value(local, WITH_GPS[1:]), 0.0)
+        mean_C = self._mean(C)
+        width = common + len(own)
+        ground, air = np.empty((2, len(mean_C), 3, width))
+        fall = np.empty((len(mean_C), width))
+        path_slopes(
+            mean_C,
+            self._mean(plain[0]),
+            self._mean(plain[1]),
+            np.einsum("nij,nj->ni", mean_C, self._mean(force)),
+            self._mean(through),
+            np.stack([spread, stretch]),
+            self._inertial_place,
+            self._wind_place,
+            common,
             step_s,
+            0.5 / self.block,  # the first block begins half a sample early
+            ground,
+            fall,
+            air,
         )
 
         y, slopes = [], []
         if AIR[0] in self.model.outputs:
-            wind = np.append(self._value(local, WITH_GPS[1:]), 0.0)
-            through = v - wind
             flow = np.einsum("nij,ni->nj", C, through)
-            moving = DV + cross_columns(self._mean(through), E)
-            for k, name in enumerate(WITH_GPS[1:]):
-                if name in self._place:
-                    moving[:, k, self._place[name]] -= 1.0
-            x = self._mean(C).transpose(0, 2, 1) @ moving
-            for late, slope in self._air(s, local, flow, x, rates):
+            for late, slope in self._air(s, local, flow, air, rates):
                 y.append(late)
                 slopes.append(slope)
         if HEIGHT in self.model.outputs:
-            slope = -self._to_middles(DV[:, 2], step_s)
+            slope = -fall
             slope[:, -1] += 1.0
             y.append(self._mean(own[-1] - _integral(v[:, 2], s.dt_s)))
             slopes.append(slope)
@@ -198,46 +211,14 @@ class PathProblem:
                 # GPS hops over the motion of a multisine: only its fixes count, one by one.
                 t = np.arange(len(v)) * s.dt_s
                 late = np.interp(t - delay, t, v[:, axis])
-                back = np.clip(np.arange(len(DV)) - round(delay / step_s), 0, len(DV) - 1)
-                slope = DV[back, axis]
+                back = np.clip(np.arange(len(ground)) - round(delay / step_s), 0, len(ground) - 1)
+                slope = ground[back, axis]
                 self._add(slope, WITH_GPS[0], -np.gradient(late, s.dt_s)[s.fixes])
                 slope[s.fixes < 0] = 0.0
                 row = self.model.outputs.index(GPS[axis])
                 y.append(np.where(s.fixes < 0, s.measured[row], late[s.fixes]))
                 slopes.append(slope)
         return Response(np.stack(y), np.ascontiguousarray(np.stack(slopes)))
-
-    def _path_slopes(
-        self,
-        C: Array,
-        plain: tuple[Array, ...],
-        force: Array,
-        sizes: tuple[Array, Array],
-        step_s: float,
-    ) -> tuple[Array, Array]:
-        """Return slopes of attitude (small turns) and velocity, (blocks, 3, unknowns)."""
-        common = len(self.common)
-        width = common + len(START) + (HEIGHT in self.model.outputs)
-        turning, pushing = np.zeros((2, len(C), 3, width))
-        unit = np.eye(3)
-        for into, signal, size, first in (
-            (turning, plain[0], sizes[0], 0),
-            (pushing, plain[1], sizes[1], 6),
-        ):
-            for axis in range(3):
-                bias, scale, tilt = (INERTIAL[k + axis] for k in (first, first + 3, 12))
-                if bias in self._place:
-                    into[:, axis, self._place[bias]] = -1.0 / size[axis]
-                if scale in self._place:
-                    into[:, axis, self._place[scale]] = -signal[:, axis] / size[axis]
-                if tilt in self._place:
-                    into[:, :, self._place[tilt]] = cross(unit[axis], signal)
-        E = self._to_middles(C @ turning, step_s)
-        E[:, np.arange(3), common + 3 + np.arange(3)] += 1.0
-        felt = np.einsum("nij,nj->ni", C, force)
-        DV = self._to_middles(C @ pushing - cross_columns(felt, E), step_s)
-        DV[:, np.arange(3), common + np.arange(3)] += 1.0
-        return E, DV
 
     def _air(
         self, s: Stretch, local: Array, flow: Array, x: Array, rates: Array
@@ -303,14 +284,9 @@ class PathProblem:
         rate = np.gradient(late, dt_s)
         return self._mean(late), -self._mean(rate)
 
-    def _to_middles(self, means: Array, step_s: float) -> Array:
-        """Integrate means of blocks from the first sample to the middle of each block."""
-        before = 0.5 / self.block * means[0]  # the first block begins half a sample early
-        return np.asarray(step_s * (np.cumsum(means, axis=0) - 0.5 * means - before))
-
     def _mean(self, signal: Array) -> Array:
-        shape = (-1, self.block, *signal.shape[1:])
-        return np.asarray(signal.reshape(shape).mean(axis=1), dtype=np.float64)
+        blocks = signal.reshape(-1, self.block, *signal.shape[1:])
+        return np.asarray(np.einsum("nb...,b->n...", blocks, self._weights), dtype=np.float64)
 
 
 def _integral(values: Array, dt_s: float) -> Array:

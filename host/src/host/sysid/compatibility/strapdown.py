@@ -1,4 +1,4 @@
-"""Attitude and velocity from angular rates and specific force, and the vector algebra of turns.
+"""Attitude and velocity from angular rates and specific force, their slopes, algebra of turns.
 
 Titterton & Weston, Strapdown Inertial Navigation Technology, ch. 3 and 11.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.compiled import Array, compiled
+from host.compiled import Array, IntArray, compiled
 from host.sysid.models.templates import GRAVITY_MPS2
 
 
@@ -66,6 +66,108 @@ def strapdown(
     return turn, moved
 
 
+@compiled
+def path_slopes(
+    C: Array,
+    rates: Array,
+    force: Array,
+    felt: Array,
+    through: Array,
+    size: Array,
+    place: IntArray,
+    wind: IntArray,
+    own: int,
+    step_s: float,
+    early: float,
+    velocity: Array,
+    fall: Array,
+    air: Array,
+) -> None:
+    """Integrate how errors of the inertial sensors turn and move the path, block by block.
+
+    Parameters
+    ----------
+    C : Array, shape (blocks, 3, 3)
+        Body to north-east-down.
+    rates, force : Array, shape (blocks, 3)
+        Without errors of bias and scale, not yet turned by the tilt.
+    felt, through : Array, shape (blocks, 3)
+        Specific force and velocity through the air, north-east-down.
+    size : Array, shape (2, 3)
+        One plus scale error of gyro and accelerometer.
+    place : IntArray, shape (2, 3, 3)
+        Columns of bias, scale and tilt of the axes of gyro and accelerometer, -1 if known.
+    wind : IntArray, shape (2,)
+        Columns of the wind to north and east, -1 if known.
+    own : int
+        First column of the errors of the start: of velocity, then of attitude.
+    step_s, early : float
+        Length of a block, and the share of the first that lies before the first sample.
+    velocity, air : Array, shape (blocks, 3, unknowns)
+        Overwritten: slopes over the ground, and through the air in body axes.
+    fall : Array, shape (blocks, unknowns)
+        Overwritten: slopes of the way downwards, m.
+    """
+    free = velocity.shape[2]
+    turned, moved, fallen = np.zeros((3, free)), np.zeros((3, free)), np.zeros((1, free))
+    E, by_rates, by_force = np.zeros((3, free)), np.zeros((3, free)), np.zeros((3, free))
+    for k in range(C.shape[0]):
+        _shares(C[k], rates[k], size[0], place[0], by_rates)
+        _to_middle(by_rates, step_s, early if k == 0 else 0.0, turned, E)
+        for i in range(3):
+            E[i, own + 3 + i] += 1.0
+        _shares(C[k], force[k], size[1], place[1], by_force)
+        V = velocity[k]
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            for q in range(free):
+                by_force[i, q] -= felt[k, a] * E[b, q] - felt[k, b] * E[a, q]
+        _to_middle(by_force, step_s, early if k == 0 else 0.0, moved, V)
+        for i in range(3):
+            V[i, own + i] += 1.0
+        _to_middle(V[2:], step_s, early if k == 0 else 0.0, fallen, fall[k : k + 1])
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            for q in range(free):
+                by_force[i, q] = V[i, q] + through[k, a] * E[b, q] - through[k, b] * E[a, q]
+        for i in range(2):
+            if wind[i] >= 0:
+                by_force[i, wind[i]] -= 1.0
+        for i in range(3):
+            for q in range(free):
+                air[k, i, q] = (
+                    C[k, 0, i] * by_force[0, q]
+                    + C[k, 1, i] * by_force[1, q]
+                    + C[k, 2, i] * by_force[2, q]
+                )
+
+
+@compiled
+def _shares(C: Array, signal: Array, size: Array, place: IntArray, out: Array) -> None:
+    """Put what errors of a triple of sensors make of its signal, turned by C, into `out`."""
+    for i in range(3):
+        for q in range(out.shape[1]):
+            out[i, q] = 0.0
+        for axis in range(3):
+            a, b = (axis + 1) % 3, (axis + 2) % 3
+            if place[axis, 0] >= 0:
+                out[i, place[axis, 0]] -= C[i, axis] / size[axis]
+            if place[axis, 1] >= 0:
+                out[i, place[axis, 1]] -= C[i, axis] * signal[axis] / size[axis]
+            if place[axis, 2] >= 0:  # a turn about the axis
+                out[i, place[axis, 2]] += C[i, b] * signal[a] - C[i, a] * signal[b]
+
+
+@compiled
+def _to_middle(mean: Array, step_s: float, early: float, total: Array, out: Array) -> None:
+    """Integrate a block's mean to its middle into `out`, to its end into `total`."""
+    for i in range(mean.shape[0]):
+        for q in range(mean.shape[1]):
+            total[i, q] -= early * mean[i, q]
+            out[i, q] = step_s * (total[i, q] + 0.5 * mean[i, q])
+            total[i, q] += mean[i, q]
+
+
 def rotation(phi: float, theta: float, psi: float) -> Array:
     """Return the matrix (3, 3) from body axes to north-east-down; angles in rad."""
     sp, cp, st, ct = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
@@ -96,16 +198,3 @@ def cross(vector: Array, series: Array) -> Array:
     x, y, z = vector
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(series @ K.T)
-
-
-def cross_columns(series: Array, slopes: Array) -> Array:
-    """Return series (n, 3) x slopes (n, 3, columns), column by column."""
-    a, b = series[:, :, None], slopes
-    return np.stack(
-        [
-            a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
-            a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
-            a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0],
-        ],
-        axis=1,
-    )
