@@ -6,6 +6,7 @@ that only set-up (`python -m host.twin`, `python -m host.sysid`) pays for the co
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -16,6 +17,7 @@ Array = NDArray[np.floating[Any]]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+DIRECT_WITH = ("0.68.",)
 
 
 def _load_compiler() -> Callable[..., Any] | None:
@@ -62,5 +64,32 @@ def compiled_fast(function: Kernel) -> Kernel:
 def _compile(function: Kernel, *, reordered: bool) -> Kernel:
     if _COMPILER is None:
         return function
-    kernel: Kernel = _COMPILER(cache=True, error_model="numpy", fastmath=reordered)(function)
-    return kernel
+    kernel = _COMPILER(cache=True, error_model="numpy", fastmath=reordered)(function)
+    _load_directly(kernel)
+    compiled_kernel: Kernel = kernel
+    return compiled_kernel
+
+
+def _load_directly(kernel: Any) -> None:
+    """Let a kernel take its machine code from the cache without waking the compiler.
+
+    numba readies the types and code of all it can compile before it looks into its cache: 0.15 s
+    of a process that finds everything there. All such code needs is its runtime, by name. This goes
+    through inner doors of numba: versions it was not tried with load as they always do.
+    """
+    import numba
+
+    if not numba.__version__.startswith(DIRECT_WITH):
+        return
+    binding = importlib.import_module("llvmlite.binding")
+    runtime = importlib.import_module("numba.core.runtime._nrt_python")
+    inner = kernel._cache
+    wake = inner.load_overload
+
+    def load(signature: Any, target: Any) -> Any:
+        for name, address in runtime.c_helpers.items():
+            binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+        found = inner._load_overload(signature, target)
+        return wake(signature, target) if found is None else found
+
+    inner.load_overload = load

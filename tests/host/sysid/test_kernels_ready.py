@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 SCRIPT = """
 import importlib, json, pkgutil
@@ -43,3 +44,29 @@ def test_every_kernel_is_built_in_the_types_that_methods_use() -> None:
     entered = {name: n for name, n in built.items() if not name.rpartition(".")[2].startswith("_")}
     assert min(entered.values()) >= 1, built
     assert used == built
+
+
+AGAIN = """
+import numpy as np
+from host.sysid.numerics.kernels import ar_filter
+from numba.core.runtime import rtsys
+
+x = np.arange(8.0).reshape(4, 2)
+print(ar_filter(x, np.array([0.5, -0.2]), np.eye(2)).sum(), rtsys._init)
+"""
+
+
+def test_machine_code_from_the_cache_does_not_wake_the_compiler(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    seen = [
+        subprocess.run(
+            [sys.executable, "-c", AGAIN],
+            capture_output=True,
+            text=True,
+            env=environment,
+            check=True,
+        ).stdout.split()
+        for _ in range(2)
+    ]
+    assert seen[0][0] == seen[1][0]
+    assert [awake for _, awake in seen] == ["True", "False"]
