@@ -70,6 +70,12 @@ class Bench:
         """Change the identification rate in the settings."""
         self.configure(rate_hz=rate_hz)
 
+    def power_on_and_record(self, seconds: float) -> None:
+        """Power on, let it boot, start recording and let it run."""
+        self.sitl.power_on()
+        self.sitl.run_for(START_S)
+        self.record(seconds)
+
     def record(self, seconds: float) -> None:
         """Start recording with the button and let it run."""
         self.sitl.press(self.sitl.now() + 2000, 0.2)

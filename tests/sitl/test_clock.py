@@ -12,9 +12,7 @@ from tests.sitl.compare import NAMES, compare
 
 def fly(bench: Bench, seconds: float = 20.0) -> None:
     flight(34.0).give(bench.sitl)
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(seconds - 0.5)
+    bench.power_on_and_record(seconds - 0.5)
     bench.sitl.run_until(round(20.5 * TICKS_PER_S))
     bench.stop()
 

@@ -23,9 +23,7 @@ Damage = Callable[[NDArray[np.void], int], None]
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Frames:
     bench = Bench()
     flight(34.0).give(bench.sitl)
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(18.0)
+    bench.power_on_and_record(18.0)
     bench.sitl.run_until(round(20.0 * TICKS_PER_S))
     bench.stop()
     log = bench.log(tmp_path_factory.mktemp("demo"))

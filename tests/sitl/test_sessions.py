@@ -22,9 +22,7 @@ def power_cycle(bench: Bench) -> None:
 
 
 def short_flight(bench: Bench, seconds: float = 3.0) -> None:
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(seconds)
+    bench.power_on_and_record(seconds)
     bench.stop()
 
 
@@ -52,9 +50,7 @@ def test_pulled_battery_is_closed_when_throttle_has_been_idle_for_ten_seconds(
 ) -> None:
     bench = Bench()
     idle_receiver(bench.sitl, 6.0, 30.0)
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(4.0)
+    bench.power_on_and_record(4.0)
     power_cycle(bench)
     assert bench.state() == Recorder.UNDECIDED
     written = bench.sitl.state().ground_writes
@@ -88,9 +84,7 @@ def test_reset_in_flight_resumes_within_two_seconds_without_metadata(tmp_path: P
     bench = Bench()
     plan = flight(40.0)
     plan.give(bench.sitl)
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(5.0)
+    bench.power_on_and_record(5.0)
     written = bench.sitl.state().ground_writes
     reset_at = bench.sitl.now()
     bench.sitl.reset(BROWN_OUT)
@@ -155,9 +149,7 @@ def test_old_blocks_behind_the_end_are_known_to_be_stale(tmp_path: Path) -> None
     bench.sitl.power_cut()
     bench.sitl.set_eeprom(ERASED)
     format_fat32(memoryview(bench.image), 1)
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(3.0)
+    bench.power_on_and_record(3.0)
     bench.sitl.power_cut(3)
     found = decoded(bench)
     assert len(found.foreign) > 50

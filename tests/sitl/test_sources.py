@@ -31,9 +31,7 @@ def test_bmp280_end_to_end(tmp_path: Path) -> None:
     rows[50:150, 1] += np.arange(100) * 40.0
     rows[150:, 1] += 4000.0
     bench.sitl.set_bmp280(BMP280_WORDS, 0, step, rows)
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(12.0)
+    bench.power_on_and_record(12.0)
     bench.stop()
     log = bench.log(tmp_path)
     baro = log.frames["baro"]
@@ -71,9 +69,7 @@ def test_position_from_the_original_imus_packet(tmp_path: Path) -> None:
     for at, (first, second, _) in zip(start.tolist(), rows, strict=True):
         bench.sitl.add_packets([at], scripted.ORIGINAL_1, [first], byte_us=90.0)
         bench.sitl.add_packets([at + 8000], scripted.ORIGINAL_2, [second], byte_us=90.0)
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(6.0)
+    bench.power_on_and_record(6.0)
     bench.stop()
     gps = bench.log(tmp_path).frames["gps"]
     assert len(gps) > 20
@@ -101,9 +97,7 @@ def test_files_carry_the_date_of_gps() -> None:
     bench = Bench()
     plan = flight(34.0)
     plan.give(bench.sitl)
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(19.0)
+    bench.power_on_and_record(19.0)
     bench.stop()
     ended_s = bench.sitl.now() / TICKS_PER_S
     date, time = fat_stamp(bench.image, b"FLT00001BIN")
@@ -121,8 +115,6 @@ def test_files_carry_the_date_of_gps() -> None:
 def test_without_gps_the_date_says_so() -> None:
     bench = Bench()
     idle_receiver(bench.sitl, 0.1, 10.0)
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(2.0)
+    bench.power_on_and_record(2.0)
     bench.stop()
     assert fat_stamp(bench.image, b"FLT00001BIN")[0] == (2026 - 1980) << 9 | 1 << 5 | 1
