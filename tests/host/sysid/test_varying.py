@@ -30,7 +30,10 @@ def test_coefficients_of_a_flight_that_changes_speed_come_back(
     )
     assert np.ptp(flight.columns["airspeed_mps"]) > 1.0
     errors = []
-    for model, maneuver in ((base, plain), (varying(axis).model, flight.maneuver)):
+    for model, maneuver in (
+        (base, plain),
+        (varying(axis, flight.airspeed_mps).model, flight.maneuver),
+    ):
         result = fit("output-error-white", model, [maneuver])
         found = np.array([result.value(name) for name in AXES[axis]])
         errors.append(np.abs(found / truth - 1.0))
@@ -69,7 +72,9 @@ def test_missing_signals_and_axes_are_named(calm: tuple[str, NonlinearFlight]) -
 def test_filter_error_beats_output_error_on_the_aircraft_as_it_is() -> None:
     flight = fly_nonlinear("longitudinal", 0.5, [0], with_pilot=True)[0]
     truth = np.array([flight.truth[name] for name in AXES["longitudinal"]])
-    ours, half, plain, _ = fit_both(nonlinear_setup("longitudinal"), flight.maneuver, truth)
+    ours, half, plain, _ = fit_both(
+        nonlinear_setup("longitudinal", flight.airspeed_mps), flight.maneuver, truth
+    )
     assert np.all(np.abs(ours) < 0.04)
     assert np.all(half < 0.03)
     assert np.max(np.abs(plain)) > np.max(np.abs(ours))

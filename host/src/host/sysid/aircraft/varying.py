@@ -20,6 +20,7 @@ from scipy import ndimage
 
 from host.compiled import Array
 from host.sysid.aircraft.airframe import AirframeData
+from host.sysid.aircraft.turning_air import AXES, gust_motion, turning
 from host.sysid.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel, Parameter, Term
@@ -30,14 +31,9 @@ MEASURED = (
     "airspeed_mps", "alpha_rad", "beta_rad", *RATES, "phi_rad", "theta_rad",
     "ax_mps2", "ay_mps2", "az_mps2",
 )  # fmt: skip
-ANGLES = {"longitudinal": "alpha_rad", "lateral": "beta_rad"}
 SMOOTH_S = 0.1  # of airspeed: its noise would multiply every term
 # Second-order terms with a parameter of their own: name, row, factors. Drag is a parabola in lift;
 # dihedral, roll by yawing and yaw by rolling follow lift, so the angle of attack.
-# Gusts are written in body axes (MIL-F-8785C): one along the path turns with the aircraft, so that
-# an angle of flow follows the rates by 1 + u_gust / V. The share is unknown, with this deviation:
-# 1.8 m/s at 17 m/s.
-ALONG_SHARE = 0.1
 BENDS = {
     "longitudinal": (("D_alpha_alpha", "airspeed_mps", "alpha_rad"),),
     "lateral": (
@@ -47,6 +43,17 @@ BENDS = {
         ("N_p_alpha", "r_radps", "p_radps"),
     ),
 }
+# What airspeed does to a motion it is no state of: the propeller's torque does not grow with V^2,
+# what holds against it in trim does (left out, Cn_r is 4 % off in still air).
+PULLS: dict[str, tuple[tuple[str, str], ...]] = {
+    "longitudinal": (),
+    "lateral": (("Y_V", "beta_rad"), ("L_V", "p_radps"), ("N_V", "r_radps")),
+}
+# Rows that feel the air turn with the aircraft.
+TURNED = {"longitudinal": ("airspeed_mps", "alpha_rad"), "lateral": ("beta_rad",)}
+# Whether it does, 1, or stays with the ground, 0: mean and deviation beforehand.
+TURNS = (0.5, 0.5)
+STEADY_SHARE = 0.1  # of the airspeed: deviation of the gust reckoning cannot tell
 
 
 @dataclass(frozen=True)
@@ -97,15 +104,19 @@ class VaryingModel:
     @property
     def model(self) -> LinearModel:
         """The template with the departures as inputs, its own parameters first."""
-        return self._build(along=False)
+        return self._build(turning_air=False)
 
     @property
     def gusty(self) -> LinearModel:
-        """The same with ``gust_along`` behind its parameters, for filter error."""
-        return self._build(along=True)
+        """The same with ``gust_turns`` and ``gust_x``, ``_y``, ``_z`` (m/s) behind its parameters.
 
-    def _build(self, *, along: bool) -> LinearModel:
-        base, scaled, bends = self.base, self.scaled, BENDS[self.axis]
+        For filter error, to which the fast part of the gusts is process noise.
+        """
+        return self._build(turning_air=True)
+
+    def _build(self, *, turning_air: bool) -> LinearModel:
+        base, scaled = self.base, self.scaled
+        bends, airspeed = BENDS[self.axis], PULLS[self.axis]
         n, m, p = len(base.states), len(base.inputs), len(base.outputs)
         terms = list(base.terms)
         for term in base.terms:
@@ -115,7 +126,8 @@ class VaryingModel:
                 place = m + scaled.index(key)
                 terms.append(Term(matrix, term.row, place, term.parameter, term.gain))
         rests = m + len(scaled) + n + len(self.forces)
-        size = rests + len(bends) + 1
+        turned, gusts = TURNED[self.axis], rests + len(bends) + (len(airspeed) > 0)
+        size = gusts + len(turned) * (1 + len(AXES))
         B, D = np.zeros((n, size)), np.zeros((p, size))
         B[:, :m], D[:, :m] = base.B, base.D
         B[:, m + len(scaled) : m + len(scaled) + n] = np.eye(n)
@@ -127,9 +139,23 @@ class VaryingModel:
             for force in self.forces if row == "airspeed_mps" else ():
                 at = base.outputs.index(force)
                 terms.append(Term("D", at, rests + k, name, float(turn[force])))
-        angle = base.states.index(ANGLES[self.axis])
-        more = (Parameter("gust_along", prior_sd=ALONG_SHARE),) if along else ()
-        terms += [Term("B", angle, rests + len(bends), extra.name) for extra in more]
+        for name, row in airspeed:
+            terms.append(Term("B", base.states.index(row), gusts - 1, name))
+            if row == "beta_rad" and "ay_mps2" in self.forces:
+                side = base.outputs.index("ay_mps2")
+                terms.append(Term("D", side, gusts - 1, name, self.trim.airspeed_mps))
+        more: tuple[Parameter, ...] = ()
+        if turning_air:
+            share = STEADY_SHARE * self.trim.airspeed_mps
+            more = (
+                Parameter("gust_turns", TURNS[0], prior_sd=TURNS[1]),
+                *(Parameter(f"gust_{axis}", prior_sd=share) for axis in AXES),
+            )
+            # Per row the gust reckoned, behind it the constants it is known but for.
+            for k, row in enumerate(turned):
+                first = gusts + k * len(more)
+                at = base.states.index(row)
+                terms += [Term("B", at, first + j, extra.name) for j, extra in enumerate(more)]
         return replace(
             base,
             name=f"{base.name}, airspeed varying",
@@ -138,14 +164,15 @@ class VaryingModel:
                 *(f"{column} by V^{power}" for column, power in scaled),
                 *(f"rest of {name}" for name in (*base.states, *self.forces)),
                 *(f"{column} by alpha on {row}" for _, row, column in bends),
-                "turning of the gust along the path",
+                *(("airspeed over its trim",) if airspeed else ()),
+                *(f"turning {of} on {row}" for row in turned for of in ("gust", *AXES)),
             ),
             B=B,
             D=D,
             terms=tuple(terms),
             parameters=(
                 *base.parameters,
-                *(Parameter(name) for name, _, _ in bends),
+                *(Parameter(name) for name, *_ in (*bends, *airspeed)),
                 *more,
             ),
         )
@@ -185,9 +212,12 @@ class VaryingModel:
             _between(_deviation(angle * _deviation(columns[column])))
             for _, _, column in BENDS[self.axis]
         ]
-        known = self._known()[self.base.states.index(ANGLES[self.axis])]
-        turning = [known[k] * columns[s] for k, s in enumerate(self.base.states) if s in RATES]
-        inputs.append(_between(np.sum(turning, axis=0)))
+        if PULLS[self.axis]:
+            inputs.append(_between(ratio - 1.0))
+        gust, steady = gust_motion(columns, dt_s)
+        motions = [gust, *(steady[:, :, k] for k in range(len(AXES)))]
+        turns = [turning(columns, motion) for motion in motions]
+        inputs += [_between(turn[row]) for row in TURNED[self.axis] for turn in turns]
         outputs = np.column_stack([columns[y] for y in self.base.outputs])
         return Maneuver(dt_s, np.column_stack(inputs), outputs, name=name)
 

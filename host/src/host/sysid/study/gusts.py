@@ -92,11 +92,11 @@ class GustyAircraft:
 
 
 @cache
-def gusty_aircraft() -> GustyAircraft:
-    """Return the Ultra Stick 25e at its trim speed."""
+def gusty_aircraft(airspeed_mps: float | None = None) -> GustyAircraft:
+    """Return the Ultra Stick 25e at an airspeed, that of its trim without."""
     plane = aircraft.load(AIRCRAFT)
     frame = plane.airframe()
-    V = plane.scalar("trim.airspeed_mps")
+    V = plane.scalar("trim.airspeed_mps") if airspeed_mps is None else airspeed_mps
     steady = trim.solve(frame, V)
     alpha, theta = steady.alpha_rad, float(euler(steady.state[6:10])[1])
     at = np.zeros(8)

@@ -57,9 +57,13 @@ TRUTH_EVERY = 10  # samples between two looks at the local derivatives
 
 @dataclass(frozen=True)
 class NonlinearFlight:
-    """One maneuver, and the derivatives that are its truth: their mean along the flight."""
+    """One maneuver, its mean airspeed as measured, and the derivatives that are its truth.
+
+    Those are the mean of the local ones along the flight.
+    """
 
     maneuver: Maneuver
+    airspeed_mps: float
     columns: dict[str, Array]
     truth: dict[str, float]
 
@@ -72,10 +76,20 @@ def _steady() -> tuple[Airframe, trim.Trim]:
 
 
 @cache
-def varying(axis: str) -> VaryingModel:
-    """Return the model of one axis with the departures a flight has from it."""
+def varying(axis: str, airspeed_mps: float | None = None) -> VaryingModel:
+    """Return the model of one axis with the departures a flight has from it.
+
+    Parameters
+    ----------
+    axis : str
+    airspeed_mps : float, optional
+        Where departures are none: the nearer to the flight's mean the less they leave to the terms
+        of second order. That of the trim without.
+    """
     frame, steady = _steady()
-    plane = gusty_aircraft()
+    if airspeed_mps is not None:
+        steady = trim.solve(frame, airspeed_mps)
+    plane = gusty_aircraft(airspeed_mps)
     spin = frame.rotor_inertia_kgm2 * float(steady.state[ROTOR])
     theta = float(euler(steady.state[Q0 : Q0 + 4])[1])
     return VaryingModel(
@@ -211,6 +225,7 @@ def fly_nonlinear(
         for name, deviation in NOISE.items():
             columns[name] = columns[name] + deviation * rng.standard_normal(len(columns[name]))
         label = f"{axis}, gusts of {intensity_mps} m/s, seed {seed}"
-        maneuver = varying(axis).maneuver(columns, DT_S, label)
-        result.append(NonlinearFlight(maneuver, columns, truth))
+        mean = float(np.mean(columns["airspeed_mps"]))
+        maneuver = varying(axis, mean).maneuver(columns, DT_S, label)
+        result.append(NonlinearFlight(maneuver, mean, columns, truth))
     return result

@@ -139,9 +139,16 @@ def linear_setup(axis: str) -> GustSetup:
     return GustSetup(axis, gusty_aircraft().models[axis], fitted_model(axis))
 
 
-def nonlinear_setup(axis: str) -> GustSetup:
-    """Return what is fitted to the non-linear one: departures from the linear model added."""
-    plane, flown = gusty_aircraft(), varying(axis)
+def nonlinear_setup(axis: str, airspeed_mps: float) -> GustSetup:
+    """Return what is fitted to the non-linear one: departures from the linear model added.
+
+    Parameters
+    ----------
+    axis : str
+    airspeed_mps : float
+        Mean of the flight: gusts come quicker and turn the air less when it is higher.
+    """
+    plane, flown = gusty_aircraft(airspeed_mps), varying(axis, airspeed_mps)
     wide = gust_model(
         flown.gusty,
         plane.airspeed_mps,
@@ -193,15 +200,22 @@ def _run_axis(
 ) -> _Axis:
     seeds = range(flights)
     linear = fly(axis, intensity_mps, seeds, with_pilot=pilot)
-    setup = nonlinear_setup(axis) if nonlinear else linear_setup(axis)
     if nonlinear:
         flown = fly_nonlinear(axis, intensity_mps, seeds, with_pilot=pilot)
-        data = [(f.maneuver, np.array([f.truth[name] for name in AXES[axis]])) for f in flown]
+        data = [
+            (
+                nonlinear_setup(axis, f.airspeed_mps),
+                f.maneuver,
+                np.array([f.truth[name] for name in AXES[axis]]),
+            )
+            for f in flown
+        ]
     else:
-        data = [(m, gusty_aircraft().truth[axis][setup.picked]) for m in linear]
+        setup = linear_setup(axis)
+        data = [(setup, m, gusty_aircraft().truth[axis][setup.picked]) for m in linear]
     rows: list[tuple[Array, Array, Array, Array]] = []
     failed = 0
-    for maneuver, truth in data:
+    for setup, maneuver, truth in data:
         try:
             rows.append(fit_both(setup, maneuver, truth))
         except IdentificationError:
