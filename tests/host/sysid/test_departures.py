@@ -6,16 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host.sysid.aircraft.aircraft_file import airframe_data
-from host.sysid.aircraft.airframe import AirframeData, Moved
+from host.sysid.aircraft.aircraft_file import airframe_data, powerplant
+from host.sysid.aircraft.airframe import AirframeData, Condition, Moved, coefficients
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.estimators.start import regressed, start_values
 from host.sysid.flight import linear
+from host.sysid.flight.departures import spin_of
 from host.sysid.flight.finder import Found
 from host.sysid.flight.linear import DELAYS, IMU_SD_M, identify
 from host.sysid.flight.tables import even_columns
+from host.sysid.models.result import FitResult
 from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.problem import OutputProblem
+from host.sysid.study.linear import derivatives
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 
@@ -107,3 +110,48 @@ def test_equation_error_gives_the_start_though_places_and_delays_are_free(
     assert begun["L_da"] == told["L_da"]
     assert begun["N_beta"] == told["N_beta"]
     assert begun["imu_z_m"] == 0.0
+
+
+def test_the_rotor_turns_as_fast_as_its_polynomials_say() -> None:
+    """At a steady throttle the motor's torque is the propeller's; momentum is along the shaft."""
+    plant = powerplant(NAME)
+    still = np.ones(600)
+    cut = {
+        "t_s": 0.01 * np.arange(600),
+        "throttle": 0.5 * still,
+        "airspeed_mps": 20.0 * still,
+        "density_kgpm3": 1.2 * still,
+    }
+    along, down = spin_of(plant, [cut, cut])
+    speed = along / (plant.rotor_kgm2 * float(plant.axis[0]))
+    _, load, drive = plant.step(speed, 0.5, 20.0, 1.2)
+    assert drive == pytest.approx(load, rel=0.01)
+    assert down == pytest.approx(along * float(plant.axis[2]) / float(plant.axis[0]))
+    assert spin_of(None, [cut]) == (0.0, 0.0)
+    assert spin_of(plant, [{k: v for k, v in cut.items() if k != "throttle"}]) == (0.0, 0.0)
+
+
+def test_truth_in_derivatives_is_what_conversion_turns_back() -> None:
+    """What the study takes for true comes back from the product's own conversion."""
+    airframe = airframe_data(NAME)
+    names = ("beta", "p", "r", "da", "dr")
+    local = {f"{k}_{n}": 0.1 + 0.03 * j for j, n in enumerate(names) for k in ("CY", "Cl", "Cn")}
+    at = {"airspeed_mps": 19.0, "qbar_pa": 220.0}
+    flown = (
+        airframe.mass_kg,
+        airframe.ixx_kgm2,
+        airframe.iyy_kgm2,
+        airframe.izz_kgm2,
+        airframe.ixz_kgm2,
+    )
+    maneuvers = [{"axes": ["rudder"], "condition": at}, {"axes": ["aileron"], "condition": at}]
+    found = derivatives(local, maneuvers, "lateral", airframe, flown)
+    model = template("lateral", Trim(19.0))
+    estimate = np.array([found[p.name] for p in model.parameters])
+    size = len(estimate)
+    result = FitResult(
+        "test", model, model.parameter_names, estimate, np.eye(size), np.eye(size),
+        np.full(size, np.inf), (), (), "output", np.eye(1), 1, True,
+    )  # fmt: skip
+    table = coefficients(result, airframe, Condition(19.0, 220.0))
+    assert {c.name: c.value for c in table} == pytest.approx(local)

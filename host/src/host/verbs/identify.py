@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from host.sysid.aircraft.powerplant import Powerplant
     from host.sysid.answer.save import Places
     from host.sysid.coefficients.flight import CoefficientAnswer
     from host.sysid.coefficients.model import CoefficientModel
@@ -128,6 +129,7 @@ def run(args: argparse.Namespace) -> int:
     agreement = _agreement(columns, args.aircraft, airframe, notes)
     # Without the places of the sensors a vane ahead of the CG passes for a late one.
     known_errors = agreement if airframe is not None and not args.no_corrections else None
+    rotor = _rotor(args.aircraft)
     answers: list[Answer] = []
     terms = _coefficient_model(args.model)
     direct = _direct(args, columns, windows, notes, terms) if terms else None
@@ -143,6 +145,7 @@ def run(args: argparse.Namespace) -> int:
                     windows=windows,
                     user_model=user_model,
                     compatibility=known_errors,
+                    powerplant=rotor,
                 )
             except IdentificationError as error:
                 label = name if len(wanted) == 1 else f"{name} by {method}"
@@ -271,6 +274,17 @@ def _coefficient_model(names: list[str] | None) -> CoefficientModel | None:
     if own:
         return read_coefficient_model(Path(own[0]))
     return standard_model() if "coefficients" in (names or ()) else None
+
+
+def _rotor(aircraft: str | None) -> Powerplant | None:
+    """Return the propeller; None where the file, if any, does not describe it."""
+    from host.sysid.aircraft.aircraft_file import powerplant
+    from host.sysid.errors import IdentificationError
+
+    try:
+        return powerplant(aircraft) if aircraft else None
+    except IdentificationError:
+        return None
 
 
 def _agreement(

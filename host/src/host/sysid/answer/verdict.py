@@ -13,7 +13,7 @@ from host.sysid.coefficients.answer import FLAG_SHARE
 from host.sysid.coefficients.model import standard_model
 from host.sysid.compatibility.corrections import correction_words
 from host.sysid.flight.finder import Found, Grade
-from host.sysid.flight.linear import DELAYS, Answer
+from host.sysid.flight.linear import DELAYS, Answer, from_zero
 from host.sysid.models.diagnostics import CANNOT, references
 from host.sysid.models.modes import Mode
 
@@ -222,9 +222,13 @@ def model_lines(answer: Answer) -> list[str]:
         mark = "  at its bound" if name in answer.at_bound else ""
         lines.append(f"  {name:16s} {value:11.5g}  +- {width:9.3g}  s      {mark}".rstrip())
     if answer.coefficients:
-        lines.append("  coefficients (mass, inertia, pressure and upwash in the half-width)")
+        lines.append(
+            "  coefficients (mass, inertia, pressure, places, pots and delays in the half-width)"
+        )
         lines += [
-            f"  {c.name:16s} {c.value:11.5g}  +- {c.half_width:9.3g}" for c in answer.coefficients
+            f"  {c.name:16s} {c.value:11.5g}  +- {c.half_width:9.3g}"
+            + ("" if from_zero(c) else "  not told from zero")
+            for c in answer.coefficients
         ]
     lost = unpredicted(answer)
     for mode in answer.modes:

@@ -18,6 +18,7 @@ from host.sysid.models.result import FitResult
 from host.sysid.numerics.colour import coloured_middle
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.filter_scoring import whitened_slopes
+from host.sysid.numerics.inverse import covariance_of
 
 PROCESS = "log_process."
 
@@ -31,6 +32,8 @@ class Innovations:
     theta : Array, shape (P,)
     covariance : Array, shape (P, P)
         Inverse of the information at the answer.
+    inverse : Array, shape (P, P)
+        The same of the model alone, both noises held: what a step may use.
     process : tuple of str
     e : list of Array, each (samples, p)
     white : list of Array, each (p, p)
@@ -41,6 +44,7 @@ class Innovations:
 
     theta: Array
     covariance: Array
+    inverse: Array
     process: tuple[str, ...]
     e: list[Array]
     white: list[Array]
@@ -57,7 +61,7 @@ class Innovations:
             return pull
         for e, still, white, slope in zip(point.e, self.e, self.white, self.slopes, strict=True):
             pull -= np.einsum("nj,njk->k", (e - still) @ white.T, slope)
-        return np.asarray(self.covariance @ pull)
+        return np.asarray(self.inverse @ pull)
 
     def coloured(self) -> Array:
         """Return the covariance with the memory of the innovations in it; never a narrower one."""
@@ -85,4 +89,10 @@ def innovations_of(
         return None
     white = [point.gains[m.dt_s].whitener for m in maneuvers]
     slopes = whitened_slopes(problem, theta, point)
-    return Innovations(theta, covariance, process, point.e, white, slopes)
+    count = problem.n_model
+    own = [slope.reshape(-1, len(theta))[:, :count] for slope in slopes]
+    inverse = np.zeros_like(covariance)
+    inverse[:count, :count] = covariance_of(
+        np.diag(problem.inner.prior_precision) + sum(J.T @ J for J in own)
+    )
+    return Innovations(theta, covariance, inverse, process, point.e, white, slopes)

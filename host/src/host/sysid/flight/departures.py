@@ -16,6 +16,7 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.aircraft.airframe import AirframeData, Moved
+from host.sysid.aircraft.powerplant import Powerplant
 from host.sysid.aircraft.varying import BENDS, MEASURED, VaryingModel
 from host.sysid.flight.carried import follower
 from host.sysid.models.maneuver import Maneuver
@@ -32,6 +33,7 @@ def departed(
     cuts: Sequence[Mapping[str, Array]],
     airframe: AirframeData,
     trim: Trim,
+    powerplant: Powerplant | None = None,
 ) -> tuple[FitResult, tuple[Moved, ...]]:
     """Return the result of a template moved to its trim, and what stays open of that.
 
@@ -44,6 +46,8 @@ def departed(
         All columns of each maneuver.
     airframe : AirframeData
     trim : Trim
+    powerplant : Powerplant, optional
+        Tells the rotor's spin, which joins pitch and yaw; without, it is left out.
 
     Returns
     -------
@@ -56,7 +60,7 @@ def departed(
     follow = follower(result, maneuvers, trim)
     if follow is None:
         return result, ()
-    varying = VaryingModel(base, base.name, trim, airframe)
+    varying = VaryingModel(base, base.name, trim, airframe, spin_of(powerplant, cuts))
     count = len(base.parameters)
     bends = {p.name for p in varying.model.parameters[count:]}
     wide = replace(
@@ -75,3 +79,20 @@ def departed(
     estimate = result.estimate + step
     result = replace(result, estimate=estimate)
     return result, (Moved(DEPARTURES, estimate + LEFT * step, 1.0, 1.0),)
+
+
+def spin_of(
+    powerplant: Powerplant | None, cuts: Sequence[Mapping[str, Array]]
+) -> tuple[float, float]:
+    """Return the mean angular momentum of the rotor along x and z, kg m2/s."""
+    wanted = ("throttle", "airspeed_mps", "density_kgpm3")
+    if powerplant is None or not all(name in cuts[0] for name in wanted):
+        return 0.0, 0.0
+    speeds = []
+    for c in cuts:
+        dt_s = float(c["t_s"][1] - c["t_s"][0])
+        throttle, airspeed_mps, density_kgpm3 = (c[name] for name in wanted)
+        _, spin, _ = powerplant.run(throttle, airspeed_mps, density_kgpm3, dt_s)
+        speeds.append(float(np.mean(spin[len(spin) // 4 :])))  # the first of it is settling
+    momentum = powerplant.rotor_kgm2 * float(np.mean(speeds)) * powerplant.axis
+    return float(momentum[0]), float(momentum[2])

@@ -18,6 +18,8 @@ from host.sysid.aircraft.airframe import (
     corrected,
     trim_of,
 )
+from host.sysid.aircraft.instrument_errors import EVEN, InstrumentData
+from host.sysid.aircraft.powerplant import Powerplant
 from host.sysid.compatibility.at_cg import at_cg
 from host.sysid.compatibility.corrections import (
     Correction,
@@ -31,6 +33,7 @@ from host.sysid.errors import IdentificationError
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import VANES, fit_with_gust
 from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.estimators.posterior import closer_look
 from host.sysid.estimators.start import regressed
 from host.sysid.flight.carried import carried, moved_by
 from host.sysid.flight.chosen import once
@@ -43,7 +46,7 @@ from host.sysid.models.diagnostics import (
     SignalFit,
     collinearity,
     constant_inputs,
-    refusals,
+    judge,
     signal_fits,
 )
 from host.sysid.models.maneuver import Maneuver
@@ -148,6 +151,7 @@ def identify(
     user_model: LinearModel | None = None,
     with_delays: bool = True,
     compatibility: Compatibility | None = None,
+    powerplant: Powerplant | None = None,
 ) -> list[Answer]:
     """Fit every model that has maneuvers.
 
@@ -170,6 +174,8 @@ def identify(
     compatibility : Compatibility, optional
         What reconstruction found: told errors are taken out of the columns, and what stays open
         of all errors is carried into the intervals.
+    powerplant : Powerplant, optional
+        Gives the rotor's spin.
 
     Raises
     ------
@@ -211,7 +217,15 @@ def identify(
         if mine:
             answers.append(
                 _answer(
-                    columns, name, method, airframe, mine, user_model, with_delays, compatibility
+                    columns,
+                    name,
+                    method,
+                    airframe,
+                    mine,
+                    user_model,
+                    with_delays,
+                    compatibility,
+                    powerplant,
                 )
             )
     if not answers:
@@ -231,6 +245,7 @@ def _answer(
     user_model: LinearModel | None,
     with_delays: bool,
     compatibility: Compatibility | None,
+    powerplant: Powerplant | None,
 ) -> Answer:
     graded = [(f, grade(columns, f)) for f in found]
     good = [f for f, g in graded if g.score >= WEAK_GRADE] or found
@@ -242,6 +257,9 @@ def _answer(
         cut |= (t >= f.start_s) & (t <= f.end_s)
     trim, condition = trim_of({k: v[cut] for k, v in columns.items() if k != "t_s"})
     model = user_model or _template(columns, name, trim, method, with_delays)
+    known = None if compatibility is None else compatibility.instrument
+    if user_model is None and known is not None and _frees_places(method):
+        model = _drag_arm(model, trim, known)
     if method == DEFAULT_METHOD:
         method = GUST if "alpha_rad" in model.states else "output-error-white"
         if user_model is None and method != GUST and name == "lateral":
@@ -263,7 +281,7 @@ def _answer(
     moved: tuple[Moved, ...] = ()
     cuts = [_inside(columns, f) for f in used]
     if airframe is not None and user_model is None and result.residual_kind in FREE:
-        result, moved = departed(result, fitted, cuts, airframe, trim)
+        result, moved = departed(result, fitted, cuts, airframe, trim, powerplant)
         alone = result
     if compatibility is not None:
         moved += moved_by(result, fitted, cuts, compatibility, trim)
@@ -286,7 +304,7 @@ def _answer(
         result=result,
         fits=signal_fits(model.outputs, [m.outputs for m in fitted], residuals),
         validation=_validate(model, result, unseen),
-        refused=refusals(result, fitted),
+        refused=judge(result, fitted, draws=closer_look(result, fitted)).named,
         together=collinearity(alone),
         modes=modes(result),
         coefficients=(() if airframe is None else coefficients(alone, airframe, condition, moved)),
@@ -295,6 +313,11 @@ def _answer(
         corrections=() if compatibility is None else corrections(compatibility),
         simulated=tuple(simulated),
     )
+
+
+def from_zero(coefficient: Coefficient) -> bool:
+    """Return whether a coefficient is told from zero: its interval does not reach it."""
+    return abs(coefficient.value) > coefficient.half_width
 
 
 def _held_out(found: list[Found]) -> list[Found]:
@@ -312,7 +335,7 @@ def _template(
 ) -> LinearModel:
     if name not in TEMPLATES:
         raise IdentificationError(f"no template '{name}'; there are {', '.join(TEMPLATES)}")
-    able = method.startswith("output-error") or method in STAGED
+    able = _frees_places(method)
     forces = ("ax_mps2", "az_mps2") if "elevator_rad" in AXIS_OF[name] else ("ay_mps2",)
     return template(
         name,
@@ -320,6 +343,30 @@ def _template(
         accelerometers=method not in UNTIED and all(c in columns for c in forces),
         delays=DELAYS if able and with_delays else (),
         imu_sd_m=IMU_SD_M if able and with_delays else 0.0,
+    )
+
+
+def _frees_places(method: str) -> bool:
+    """Return whether a method can estimate delays and places of accelerometers."""
+    return method.startswith("output-error") or method in STAGED
+
+
+def _drag_arm(model: LinearModel, trim: Trim, i: InstrumentData) -> LinearModel:
+    """Free the height of the accelerometers where drag is told: a pitch rate makes none.
+
+    Every other place is carried. This one moves drag by more than its size, and the pitch rate
+    beside angle and elevator tells it.
+    """
+    if "ax_mps2" not in model.outputs:
+        return model
+    sd_m = EVEN * float(np.hypot(i.position_m, i.cg_m))
+    free = template(model.name, trim, accelerometers=True, imu_sd_m=sd_m)
+    kept = [x for x in free.levers if x.output == "ax_mps2"]
+    names = {x.parameter for x in free.levers} - {x.parameter for x in kept}
+    return replace(
+        model,
+        levers=tuple(kept),
+        parameters=tuple(p for p in free.parameters if p.name not in names),
     )
 
 

@@ -48,9 +48,18 @@ class Tally:
     covered: dict[str, list[bool]] = field(default_factory=dict)
     flagged: dict[str, list[bool]] = field(default_factory=dict)
 
-    def add(self, name: str, truth: float, value: float, half: float, *, flagged: bool) -> None:
-        """Count one coefficient of one flight."""
-        size, miss = abs(truth), value - truth
+    def add(
+        self,
+        name: str,
+        truth: float,
+        value: float,
+        half: float,
+        *,
+        flagged: bool,
+        size: float | None = None,
+    ) -> None:
+        """Count one coefficient of one flight; `size` is what its error is relative to."""
+        size, miss = abs(truth) if size is None else size, value - truth
         self.error.setdefault(name, []).append(miss / size)
         self.half.setdefault(name, []).append(half / size)
         self.covered.setdefault(name, []).append(abs(miss) <= half)
