@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, signal
 
 from host.compiled import Array, compiled
 from host.sysid.numerics.kernels import ar_filter
@@ -46,6 +46,16 @@ class OutputNoise:
         if self.order == 0:
             return values
         return ar_filter(np.ascontiguousarray(values), self.coefficient, self.head)
+
+    def colour(self, innovations: Array) -> Array:
+        """Return noise of these innovations, (samples,): `whiten` undone."""
+        if self.order == 0:
+            return innovations
+        polynomial = np.concatenate([[1.0], -self.coefficient])
+        first = np.linalg.solve(self.head, innovations[: self.order])
+        memory = signal.lfiltic([1.0], polynomial, first[::-1])
+        rest, _ = signal.lfilter([1.0], polynomial, innovations[self.order :], zi=memory)
+        return np.concatenate([first, rest])
 
     def log_determinant(self) -> float:
         """Log determinant of the noise covariance of a record, innovation variance one."""
