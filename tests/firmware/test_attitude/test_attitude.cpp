@@ -3,6 +3,7 @@
 #include "core/attitude.h"
 #include "core/fixed_point.h"
 #include "core/rest_detector.h"
+#include "random_numbers.h"
 
 namespace {
 
@@ -229,7 +230,7 @@ TEST_CASE("no input overflows: full scale on every channel, any time step, leave
   uint32_t random = 1;
   for (uint16_t i = 0; i < 400; ++i) {
     for (uint8_t axis = 0; axis < 3; ++axis) {
-      random = random * 1664525U + 1013904223U;
+      next_random(random);
       filter.in.rates[axis] = ends[(random >> 24) & 3];
       filter.in.force[axis] = ends[(random >> 26) & 3];
     }
@@ -290,9 +291,9 @@ TEST_CASE("the rounded upper half of a product, against 64 bits: random factors 
   uint32_t random = 12345;
   uint16_t wrong = 0;
   for (uint16_t i = 0; i < 4000; ++i) {
-    random = random * 1664525U + 1013904223U;
+    next_random(random);
     const int32_t a = i % 5 == 0 ? ends[i % 9] : static_cast<int32_t>(random) >> (i % 31);
-    random = random * 1664525U + 1013904223U;
+    next_random(random);
     const int32_t b = i % 7 == 0 ? ends[i / 7 % 9] : static_cast<int32_t>(random);
     const int64_t product = static_cast<int64_t>(a) * b + 0x80000000LL;
     wrong = static_cast<uint16_t>(

@@ -3,6 +3,7 @@
 #include "check.h"
 #include "core/baro.h"
 #include "core/progmem.h"
+#include "random_numbers.h"
 
 namespace {
 
@@ -94,12 +95,12 @@ TEST_CASE("random coefficients and readings: a plausible value or none, no trap"
   for (uint16_t round = 0; round < 2000; ++round) {
     uint16_t words[core::kBmp280Words];
     for (uint16_t& word : words) {
-      random = random * 1664525U + 1013904223U;
+      next_random(random);
       word = static_cast<uint16_t>(random >> 16);
     }
-    random = random * 1664525U + 1013904223U;
+    next_random(random);
     const uint32_t a = random >> 12;
-    random = random * 1664525U + 1013904223U;
+    next_random(random);
     const uint32_t b = random >> 12;
     const core::BaroValue values[] = {
         core::bmp085_compensate(words, static_cast<uint8_t>(round % 4), a & 0xFFFF, b),

@@ -5,24 +5,13 @@
 #include "core/byte_ring.h"
 #include "core/bytes.h"
 #include "generated/frames.h"
+#include "random_numbers.h"
 
 namespace {
 
 constexpr uint16_t kCapacity = 400;
 constexpr uint16_t kReserve = 40;  // what only events may use
 uint8_t buffer[kCapacity + 2];
-
-class Random {
- public:
-  explicit Random(uint32_t seed) : state_(seed) {}
-  uint8_t byte() {
-    state_ = state_ * 1664525U + 1013904223U;
-    return static_cast<uint8_t>(state_ >> 24);
-  }
-
- private:
-  uint32_t state_;
-};
 
 frames::MagFrame mag(uint32_t t_us) {
   frames::MagFrame frame;

@@ -2,6 +2,7 @@
 #include "check.h"
 #include "core/drive.h"
 #include "core/settings.h"
+#include "random_numbers.h"
 
 namespace {
 
@@ -298,7 +299,7 @@ TEST_CASE("random losses and switch moves: every output is live, or a held surfa
   uint16_t last[core::kServos] = {};
   bool armed = false;  // the switch was at direct since the last release
   for (uint16_t turn = 0; turn < 6000; ++turn) {
-    random = random * 1664525U + 1013904223U;
+    next_random(random);
     const uint8_t dice = static_cast<uint8_t>(random >> 24);
     if (dice < 6) {
       bench.lose(static_cast<uint8_t>(random >> 16 & kAll));

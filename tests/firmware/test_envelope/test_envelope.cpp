@@ -5,20 +5,9 @@
 #include "core/envelope.h"
 #include "generated/cases.h"
 #include "generated/frames.h"
+#include "random_numbers.h"
 
 namespace {
-
-class Random {
- public:
-  explicit Random(uint32_t seed) : state_(seed) {}
-  uint8_t byte() {
-    state_ = state_ * 1664525U + 1013904223U;
-    return static_cast<uint8_t>(state_ >> 24);
-  }
-
- private:
-  uint32_t state_;
-};
 
 // Compares frames as they come with those of a case.
 class Expected {

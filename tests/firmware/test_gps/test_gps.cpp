@@ -4,6 +4,7 @@
 #include "check.h"
 #include "core/bytes.h"
 #include "core/gps_receiver.h"
+#include "random_numbers.h"
 
 namespace {
 
@@ -229,7 +230,7 @@ TEST_CASE("noise and NMEA between messages cost nothing; pure noise makes no fra
   uint32_t random = 9;
   uint8_t invented = 0;
   for (uint16_t i = 0; i < 20000; ++i) {
-    random = random * 1664525U + 1013904223U;
+    next_random(random);
     const uint8_t dice = static_cast<uint8_t>(random >> 24);
     const uint8_t value = dice < 40 ? 0xB5 : dice < 80 ? 0x62 : static_cast<uint8_t>(random >> 16);
     invented = static_cast<uint8_t>(invented + gps.byte(value, 0));

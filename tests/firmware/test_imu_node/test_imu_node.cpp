@@ -6,6 +6,7 @@
 #include "core/imu_console.h"
 #include "core/imu_node.h"
 #include "core/imu_receiver.h"
+#include "random_numbers.h"
 
 namespace {
 
@@ -330,7 +331,7 @@ TEST_CASE("the console changes settings at rest only, and refuses what it does n
   // The stream of a GPS receiver, line ends included, is not for it.
   uint32_t random = 7;
   for (uint16_t i = 0; i < 5000; ++i) {
-    random = random * 1664525U + 1013904223U;
+    next_random(random);
     CHECK(console.byte(static_cast<uint8_t>(random >> 24), imu.node, imu.settings) ==
           ImuReply::kNone);
   }

@@ -6,6 +6,7 @@
 #include "core/crc.h"
 #include "core/float32.h"
 #include "core/imu_receiver.h"
+#include "random_numbers.h"
 
 namespace {
 
@@ -314,7 +315,7 @@ TEST_CASE("random bytes as packets never pass for good ones") {
   for (uint16_t round = 0; round < 500; ++round) {
     uint8_t bytes[36];
     for (uint8_t& byte : bytes) {
-      random = random * 1664525U + 1013904223U;
+      next_random(random);
       byte = static_cast<uint8_t>(random >> 24);
     }
     bytes[0] = frames::kImuPacketKind;

@@ -2,23 +2,12 @@
 // analysis) and of the air between.
 #include "check.h"
 #include "core/rc_decoder.h"
+#include "random_numbers.h"
 
 namespace {
 
 constexpr uint32_t kMs = 2000;  // ticks
 constexpr uint8_t kAll = 0b1'1111;
-
-class Random {
- public:
-  explicit Random(uint32_t seed) : state_(seed) {}
-  uint16_t below(uint16_t limit) {
-    state_ = state_ * 1664525U + 1013904223U;
-    return static_cast<uint16_t>((state_ >> 16) % limit);
-  }
-
- private:
-  uint32_t state_;
-};
 
 // A generated receiver. Edges come from `next`; the clock starts just below its wrap.
 struct Receiver {
