@@ -26,6 +26,7 @@ VERBS = {
     "info": "say what a log is, from its head",
     "maneuvers": "find the test points of a log",
     "identify": "estimate the aircraft's derivatives with their uncertainty",
+    "convert": "turn derivatives into coefficients, and back",
 }
 _EPILOG = """\
 exit codes: 0 ok, 1 internal error, 2 usage, 3 decoded with losses, 4 not a log,

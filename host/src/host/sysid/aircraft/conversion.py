@@ -19,7 +19,6 @@ import numpy as np
 from host.compiled import Array
 from host.sysid.aircraft.airframe import AirframeData, Condition
 from host.sysid.aircraft.gains import (
-    DIMENSIONAL_ROWS,
     coefficient_name,
     dimensional_gains,
     dimensional_name,
@@ -38,6 +37,13 @@ READ_WITH = {
     "alpha": "alpha_scale", "beta": "beta_scale", "de": "elevator_scale", "da": "aileron_scale",
     "dr": "rudder_scale",
 }  # fmt: skip
+LABELS = {
+    "Z": ("alpha", "q", "de"), "D": ("alpha", "de"), "M": ("alpha", "q", "de"),
+    **dict.fromkeys(("Y", "L", "N"), ("beta", "p", "r", "da", "dr")),
+}  # fmt: skip
+# What can be converted, and what it becomes.
+DERIVATIVES = tuple(f"{row}_{label}" for row, labels in LABELS.items() for label in labels)
+COEFFICIENTS = tuple(map(coefficient_name, DERIVATIVES))
 STEP = 1e-4  # of a deviation, at least of 1e-6 of the value
 Table = dict[str, float]
 
@@ -109,8 +115,7 @@ def to_coefficients(
         result = {coefficient_name(n): table[coefficient_name(n)] for n in found}
         return _moved(result, own, values, sign=1.0)
 
-    known = {f"{d}_{label}" for d in DIMENSIONAL_ROWS.values() for label in _labels(d)}
-    return _converted(derivatives, known, errors, convert)
+    return _converted(derivatives, DERIVATIVES, errors, convert)
 
 
 def to_derivatives(
@@ -150,14 +155,7 @@ def to_derivatives(
             result[target] = total / scale(target)
         return result
 
-    known = {f"{c}_{label}" for c, d in DIMENSIONAL_ROWS.items() for label in _labels(d)}
-    return _converted(coefficients, known, errors, convert)
-
-
-def _labels(row: str) -> tuple[str, ...]:
-    if row in ("Z", "D", "M"):
-        return ("alpha", "de") if row == "D" else ("alpha", "q", "de")
-    return ("beta", "p", "r", "da", "dr")
+    return _converted(coefficients, COEFFICIENTS, errors, convert)
 
 
 def _really(place: Place, values: Table) -> Place:
@@ -215,7 +213,7 @@ def _moved(found: Table, place: Place, values: Table, *, sign: float) -> Table:
 
 def _converted(
     given: Quantities,
-    known: set[str],
+    known: tuple[str, ...],
     errors: Mapping[str, float],
     convert: Callable[[Table], Table],
 ) -> Quantities:
@@ -228,10 +226,10 @@ def _converted(
     kept = [k for k, n in enumerate(given.names) if n in known or n in CARRIED]
     added = [n for n in CARRIED if n in errors and n not in given.names]
     names = [given.names[k] for k in kept] + added
-    if not known & set(names):
+    if not set(known) & set(names):
         raise IdentificationError(
             f"nothing to convert among {', '.join(given.names)}; known are such as"
-            f" {', '.join(sorted(known)[:4])}"
+            f" {', '.join(known[:4])}"
         )
     size = len(kept)
     state = np.concatenate([given.values[kept], np.zeros(len(added))])

@@ -1,0 +1,235 @@
+"""Derivatives of one kind as those of the other, for `host convert`: read, converted, printed.
+
+What is read is a model that `host identify --save-model` wrote, a table of a person's own, or what
+AVL or Datcom say; what is known of the aircraft widens the intervals (`aircraft/conversion.py`).
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data
+from host.sysid.aircraft.airframe import Condition
+from host.sysid.aircraft.conversion import (
+    CARRIED,
+    COEFFICIENTS,
+    DERIVATIVES,
+    Place,
+    Quantities,
+    carried_errors,
+    to_coefficients,
+    to_derivatives,
+)
+from host.sysid.aircraft.prior import read_prior
+from host.sysid.answer.units import parameter_unit
+from host.sysid.errors import IdentificationError
+from host.sysid.models.model_file import read_model, read_trim
+from host.sysid.models.templates import Trim, template
+
+QUANTILE = 1.96
+STANDARD_KGPM3 = 1.225  # of the standard atmosphere at sea level
+NAMED_SHARE = 0.25  # of the variance: a smaller part is not worth naming
+IN_WORDS = {
+    "mass_share": "mass", "ixx_share": "Ixx", "iyy_share": "Iyy", "izz_share": "Izz",
+    "cg_x_m": "place of the CG along x", "cg_z_m": "place of the CG along z",
+    "pitot_scale": "scale of the pitot", "pitot_drift_pa": "drift of the pitot",
+    "density_share": "density", "alpha_scale": "scale of the alpha vane",
+    "beta_scale": "scale of the beta vane", "upwash_share": "upwash",
+    "elevator_scale": "pot of the elevator", "aileron_scale": "pot of the ailerons",
+    "rudder_scale": "pot of the rudder",
+}  # fmt: skip
+OTHER = dict(zip(DERIVATIVES, COEFFICIENTS, strict=True))
+OTHER |= {coefficient: derivative for derivative, coefficient in OTHER.items()}
+AXES = ("longitudinal", "lateral")
+EXPECTED = (
+    "a model of host identify --save-model, TOML with [derivatives] or [coefficients], or output of"
+    " AVL (ST, SB) or Datcom"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class At:
+    """Where the aircraft flies; None is what the file or the aircraft says."""
+
+    airspeed_mps: float | None = None
+    alpha_rad: float | None = None
+    density_kgpm3: float = STANDARD_KGPM3
+
+
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """Numbers as they were given and what they became, errors of what is known behind both.
+
+    `left_out` are names of the file that stand for no derivative of the templates.
+    """
+
+    source: str
+    aircraft: str
+    airspeed_mps: float
+    alpha_rad: float
+    density_kgpm3: float
+    dimensional: bool
+    given: Quantities
+    found: Quantities
+    left_out: tuple[str, ...]
+
+    def half_width(self, name: str) -> float:
+        """Return the 95 % half-width of a converted number."""
+        return QUANTILE * self.found.deviation(name)
+
+    def widened_by(self, name: str) -> str:
+        """Return in words what known error widens a converted number most; nothing if little."""
+        own = self.found.deviation(name) ** 2
+        k = self.found.names.index(name)
+        shares = {}
+        for error in CARRIED:
+            j = self.found.names.index(error)
+            part = self.found.covariance[k, j] ** 2 / max(self.found.covariance[j, j], 1e-300)
+            shares[error] = part / max(own, 1e-300)
+        cause = max(shares, key=shares.__getitem__)
+        return IN_WORDS[cause] if shares[cause] >= NAMED_SHARE else ""
+
+
+def convert(path: Path, aircraft: str, at: At) -> Converted:
+    """Convert what a file says at one flight condition.
+
+    Parameters
+    ----------
+    path : Path
+    aircraft : str
+        Name or path of an aircraft file.
+    at : At
+
+    Raises
+    ------
+    IdentificationError
+        If the file cannot be read or holds nothing to convert.
+    """
+    airframe, instrument = airframe_data(aircraft), instrument_data(aircraft)
+    values, trim = _from_toml(path) if path.suffix == ".toml" else ({}, None)
+    speed = at.airspeed_mps or (trim.airspeed_mps if trim else instrument.friction_speed_mps)
+    alpha = at.alpha_rad if at.alpha_rad is not None else trim.alpha_rad if trim else 0.0
+    if not values:
+        table = read_prior(path, speed)  # AVL, Datcom, or a table over the angle of attack
+        values = {name: (value, 0.0) for name, value in table.at(alpha).items()}
+    given = {n: v for n, v in values.items() if n in OTHER}
+    dimensional = given.keys() & set(DERIVATIVES)
+    if dimensional and len(dimensional) < len(given):
+        raise IdentificationError(f"{path}: both derivatives and coefficients, expected one kind")
+    if not given:
+        raise IdentificationError(f"{path}: nothing to convert; expected {EXPECTED}")
+    quantities = Quantities(
+        tuple(given),
+        np.array([value for value, _ in given.values()]),
+        np.diag([(half / QUANTILE) ** 2 for _, half in given.values()]),
+    )
+    place = Place(airframe, Condition(speed, 0.5 * at.density_kgpm3 * speed**2), alpha)
+    turn = to_coefficients if dimensional else to_derivatives
+    return Converted(
+        source=str(path),
+        aircraft=airframe.name,
+        airspeed_mps=speed,
+        alpha_rad=alpha,
+        density_kgpm3=at.density_kgpm3,
+        dimensional=bool(dimensional),
+        given=quantities,
+        found=turn(quantities, place, carried_errors(airframe, instrument)),
+        left_out=tuple(n for n in values if n not in given),
+    )
+
+
+def _from_toml(path: Path) -> tuple[dict[str, tuple[float, float]], Trim | None]:
+    """Return values with half-widths, and what they are about; nothing of a table over alpha."""
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise IdentificationError(f"{path}: cannot be read ({error.strerror})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise IdentificationError(f"{path}: not TOML: {error}") from error
+    if "states" in document:
+        model = read_model(path)
+        fit = document.get("fit", {})
+        values = {p.name: _pair(path, p.name, fit.get(p.name, p.start)) for p in model.parameters}
+        return values, read_trim(path) if "trim" in document else None
+    if "alpha_deg" in document:
+        return {}, None
+    tables = [document.get(key, {}) for key in ("derivatives", "coefficients")]
+    if not any(tables):
+        raise IdentificationError(f"{path}: nothing to convert; expected {EXPECTED}")
+    if not all(isinstance(table, dict) for table in tables):
+        raise IdentificationError(f"{path}: expected lines such as M_q = -12.0 in [derivatives]")
+    return {n: _pair(path, n, x) for table in tables for n, x in table.items()}, None
+
+
+def _pair(path: Path, name: str, entry: object) -> tuple[float, float]:
+    """Return value and half-width of ``4.1`` or ``[4.1, 0.2]``."""
+    listed = entry if isinstance(entry, list) else [entry, 0.0]
+    numbers = [float(x) for x in listed if isinstance(x, int | float) and not isinstance(x, bool)]
+    if len(listed) != 2 or len(numbers) != 2 or not np.isfinite(numbers).all() or numbers[1] < 0.0:
+        raise IdentificationError(
+            f"{path}: {name} is {entry!r}, expected a number or [value, 95 % half-width]"
+        )
+    return numbers[0], numbers[1]
+
+
+def _unit(name: str) -> str:
+    """Return the unit of a derivative of the templates; nothing of a coefficient."""
+    units = (parameter_unit(template(axis, Trim(1.0, 0.0, 0.0)), name) for axis in AXES)
+    return next(filter(None, units), "")
+
+
+def conversion_lines(done: Converted) -> list[str]:
+    """Return the conversion as a table for people."""
+    kinds = ("derivatives", "coefficients")
+    before, after = kinds if done.dimensional else kinds[::-1]
+    lines = [
+        f"{done.source}: {before} to {after} of {done.aircraft} at {done.airspeed_mps:.2f} m/s,"
+        f" alpha {np.degrees(done.alpha_rad):.1f} deg, {done.density_kgpm3:.3f} kg/m3;"
+        " value and 95 % half-width"
+    ]
+    for name in done.given.names:
+        other = OTHER[name]
+        half = QUANTILE * done.given.deviation(name)
+        lines.append(
+            f"  {name:9s} {done.given.value(name):10.4g} +- {half:8.2g} {_unit(name):6s}"
+            f"  {other:9s} {done.found.value(other):10.4g} +- {done.half_width(other):8.2g}"
+            f" {_unit(other):6s}  {done.widened_by(other)}".rstrip()
+        )
+    lines.append(
+        "  half-widths hold mass, inertia, place of the CG and calibration; the file's own count as"
+        " independent of each other; last: what of it widens most"
+    )
+    if done.left_out:
+        lines.append(f"  left out, no derivative of the templates: {', '.join(done.left_out)}")
+    return lines
+
+
+def conversion_document(done: Converted) -> dict[str, Any]:
+    """Return the conversion for programs."""
+    return {
+        "source": done.source,
+        "aircraft": done.aircraft,
+        "airspeed_mps": done.airspeed_mps,
+        "alpha_rad": done.alpha_rad,
+        "density_kgpm3": done.density_kgpm3,
+        "to": "coefficients" if done.dimensional else "derivatives",
+        "given": {
+            n: {"value": done.given.value(n), "half_width": QUANTILE * done.given.deviation(n)}
+            for n in done.given.names
+        },
+        "converted": {
+            n: {
+                "value": done.found.value(n),
+                "half_width": done.half_width(n),
+                "widened_by": done.widened_by(n),
+            }
+            for n in (OTHER[name] for name in done.given.names)
+        },
+        "standard_deviations": {n: done.found.deviation(n) for n in CARRIED},
+        "left_out": list(done.left_out),
+    }
