@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from host.cli import main
 from host.sysid.errors import IdentificationError
-from host.sysid.flight.chosen import chosen
-from host.sysid.flight.finder import find, grade
+from host.sysid.flight.chosen import chosen, moving
+from host.sysid.flight.finder import AXES, find, grade
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import read_columns
 from host.sysid.models.model_file import model_from
@@ -136,6 +136,24 @@ def test_a_wrong_model_is_said_before_the_data_are_read(
 
 
 def test_a_misspelt_signal_of_a_model_is_guessed(flight: Columns) -> None:
-    model = replace(SHORT_PERIOD, outputs=("alpha_rad", "q_rad"))
+    model = replace(SHORT_PERIOD, outputs=("alpha_rad", "q_rad"), delays=())
     with pytest.raises(IdentificationError, match=r"needs q_rad \(did you mean q_radps\?\)"):
         identify(flight, names=("own",), user_model=model)
+
+
+def test_a_model_may_name_columns_of_its_own(tmp_path: Path) -> None:
+    t = np.arange(0.0, 10.0, 0.02)
+    rows = [f"{x:.2f},17.0,{0.1 * np.sin(x):.6f},{np.cos(x):.6f}" for x in t]
+    path, mapping = tmp_path / "own.csv", tmp_path / "map.toml"
+    path.write_text("\n".join(["t_s,airspeed_mps,elevator_pot_rad,Flex 3", *rows]) + "\n")
+    mapping.write_text('[columns]\nflex_3 = { from = "Flex 3", scale = 2.0 }\n')
+    assert "elevator_pot_rad" not in read_columns(path)[0]
+    columns, _ = read_columns(path, mapping, also=("elevator_pot_rad", "flex_3"))
+    t = columns["t_s"]
+    np.testing.assert_allclose(columns["flex_3"], 2.0 * np.cos(t), atol=1e-5)
+    np.testing.assert_allclose(columns["elevator_pot_rad"], 0.1 * np.sin(t), atol=1e-5)
+
+
+def test_maneuvers_of_a_model_are_those_its_inputs_name() -> None:
+    assert moving(("elevator_pot_rad", "rudder_rad")) == ("elevator_rad", "rudder_rad")
+    assert moving(("gust_mps",)) == AXES

@@ -84,6 +84,10 @@ TOLD: dict[str, tuple[Callable[[Columns], Columns], str]] = {
 
 def test_a_flight_as_it_is_passes(flight: Columns) -> None:
     assert check({k: flight[k] for k in SHORT}) == []
+    rng, shape = np.random.default_rng(1), flight["t_s"].shape  # wings level, nothing but noise
+    noise = {"theta_rad": 1e-3, "q_radps": 3e-3}
+    level = {k: s * rng.standard_normal(shape) for k, s in noise.items()}
+    assert check({**{k: flight[k] for k in ("t_s", "airspeed_mps")}, **level}) == []
     slow = {k: v[::10] for k, v in flight.items()}  # 10 Hz
     assert check(slow) == []
 

@@ -7,9 +7,16 @@ import numpy as np
 import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term
 from host.sysid.errors import IdentificationError
+from host.sysid.models.delays import without_usual_delays
 from host.sysid.models.model import without_outputs
 from host.sysid.models.model_file import model_from, model_text, parse_entry, read_model
-from host.sysid.models.templates import GRAVITY_MPS2, TEMPLATES, Trim, longitudinal, template
+from host.sysid.models.templates import (
+    GRAVITY_MPS2,
+    TEMPLATES,
+    Trim,
+    longitudinal,
+    template,
+)
 
 TRIM = Trim(airspeed_mps=17.0, alpha_rad=0.1, theta_rad=0.16)
 
@@ -82,6 +89,7 @@ def test_templates_survive_a_file(name: str, tmp_path: Path) -> None:
     assert back.state_biases == model.state_biases
     assert back.output_biases == model.output_biases
     assert back.levers == model.levers
+    assert back.delays == model.delays == ()
 
 
 def test_entries_are_parsed() -> None:
@@ -153,6 +161,26 @@ def test_constants_left_out_are_freed_where_records_need_them() -> None:
     none: dict[str, object] = {"initial_states": [], "state_biases": [], "output_biases": []}
     bare = model_from({**document, **none})
     assert bare.local_names(1) == ()
+
+
+def test_delays_left_out_are_those_of_the_sensors() -> None:
+    document: dict[str, object] = {
+        "states": ["alpha_rad", "q_radps"],
+        "inputs": ["u"],
+        "outputs": ["alpha_rad", "q_radps"],
+        "A": [["k", 1], [0, 0]],
+        "B": [[0], [1]],
+    }
+    model = model_from(document)
+    assert [(d.name, d.outputs) for d in model.delays] == [
+        ("delay_vanes_s", ("alpha_rad",)),
+        ("delay_imu_s", ("q_radps",)),
+    ]
+    assert without_usual_delays(model).delays == ()
+    assert model_from({**document, "delays": []}).delays == ()
+    own = {"name": "delay_vanes_s", "outputs": ["alpha_rad"], "prior_sd_s": 0.002}
+    kept = model_from({**document, "delays": [own]})
+    assert without_usual_delays(kept).delays == kept.delays
 
 
 def test_names_of_any_letters_survive_a_file(tmp_path: Path) -> None:

@@ -106,7 +106,10 @@ def run(args: argparse.Namespace) -> int:
     models = _models(args.model)
     places = _places(args)
     check(places)
-    columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
+    own = {s for _, model in models if model for s in (*model.inputs, *model.outputs)}
+    columns, notes = read_columns(
+        args.source, args.map, calibration=args.calibration, also=sorted(own)
+    )
     airframe = None
     if args.aircraft:
         from host.sysid.aircraft.aircraft_file import airframe_data

@@ -13,7 +13,8 @@ from host.sysid.coefficients.answer import FLAG_SHARE
 from host.sysid.coefficients.model import standard_model
 from host.sysid.compatibility.corrections import correction_words
 from host.sysid.flight.finder import Found, Grade
-from host.sysid.flight.linear import DELAYS, Answer, from_zero
+from host.sysid.flight.linear import Answer, from_zero
+from host.sysid.models.delays import DELAYS
 from host.sysid.models.diagnostics import CANNOT, references
 from host.sysid.models.modes import Mode
 

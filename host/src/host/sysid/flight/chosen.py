@@ -9,7 +9,7 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
-from host.sysid.flight.finder import Found, find
+from host.sysid.flight.finder import AXES, Found, find
 
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 FEWEST = 8  # samples, as a maneuver needs
@@ -101,3 +101,12 @@ def once(found: Sequence[Found]) -> list[Found]:
         else:
             joined.append(item)
     return joined
+
+
+def moving(inputs: Sequence[str]) -> tuple[str, ...]:
+    """Return on which axes to look for maneuvers of a model: its inputs, or all that they name.
+
+    `elevator_pot_rad` moves with the elevator; of `gust_mps` nobody knows when it moved.
+    """
+    axes = [a for a in AXES if any(name.split("_")[0] == a.split("_")[0] for name in inputs)]
+    return tuple(axes) or AXES

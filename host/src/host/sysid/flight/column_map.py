@@ -110,7 +110,7 @@ def _line(where: str, name: str, line: object) -> Line:
         raise IdentificationError(
             f"{where}: unknown key {strange[0]}; a line may say {', '.join(sorted(KEYS))}"
         )
-    units = UNITS[name.rsplit("_", 1)[-1]]
+    units = UNITS.get(name.rsplit("_", 1)[-1], {"1": 1.0})
     unit = line.get("unit", "") or next(iter(units))
     if isinstance(unit, str) and unit not in units:
         plain = unit.lower().replace("²", "2").replace("^2", "2").replace("**2", "2")

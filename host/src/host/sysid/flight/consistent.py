@@ -21,6 +21,7 @@ SURE, SOME = 0.5, 0.25  # partial correlation: less tells nothing about a sign, 
 FACTOR = 1.5
 FOLLOWS = 0.3  # of an angle's rate that the gyro explains: less is another signal
 SOMEHOW = 0.05  # the same of a wind angle, which gusts turn too
+QUIET_RADPS = 0.02  # noise of a still sensor follows nothing
 BLOCK_S, SLOW_S = 0.1, 0.5  # slopes are those of means over this long; slow: pitot and GPS
 FEWEST = 32  # means
 HINT = "give its unit or sign in the map (--map)"
@@ -75,7 +76,8 @@ def _judge(law: Identity) -> list[str]:
     power = float(rate @ rate)
     whole = np.column_stack([own, *law.parts.values()])
     left = _without(law.rate, whole)
-    if power > 0.0 and float(left @ left) > (1.0 - law.follows) * power:
+    moved = min(float(np.std(law.rate)), max(float(np.std(v)) for v in law.parts.values()))
+    if moved > QUIET_RADPS and power > 0.0 and float(left @ left) > (1.0 - law.follows) * power:
         return [
             f"{law.name} does not follow {' and '.join(law.parts)}"
             f" ({100.0 * (1.0 - float(left @ left) / power):.0f} % of its motion): another column,"

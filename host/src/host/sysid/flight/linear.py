@@ -36,10 +36,11 @@ from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.estimators.posterior import closer_look
 from host.sysid.estimators.start import regressed
 from host.sysid.flight.carried import carried, moved_by
-from host.sysid.flight.chosen import once
+from host.sysid.flight.chosen import moving, once
 from host.sysid.flight.column_map import like
 from host.sysid.flight.departures import departed
 from host.sysid.flight.finder import Found, Grade, find, grade
+from host.sysid.models.delays import DELAYS, without_usual_delays
 from host.sysid.models.diagnostics import (
     Collinearity,
     Refusal,
@@ -50,7 +51,7 @@ from host.sysid.models.diagnostics import (
     signal_fits,
 )
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import DelayGroup, LinearModel, without_outputs
+from host.sysid.models.model import LinearModel, without_outputs
 from host.sysid.models.modes import Mode, modes
 from host.sysid.models.result import FitResult
 from host.sysid.models.templates import TEMPLATES, Trim, template
@@ -65,18 +66,6 @@ AXIS_OF = {
     "roll": ("aileron_rad",),
     "dutch-roll": ("rudder_rad",),
 }
-# Deviation of what is left of each sensor's delay once the nominal one is taken out, s.
-DELAYS = (
-    DelayGroup("delay_vanes_s", ("alpha_rad", "beta_rad"), prior_sd_s=0.010, limit_s=0.03),
-    DelayGroup(
-        "delay_imu_s",
-        ("p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2"),
-        prior_sd_s=0.002,
-        limit_s=0.01,
-    ),
-    DelayGroup("delay_attitude_s", ("phi_rad", "theta_rad"), prior_sd_s=0.010, limit_s=0.03),
-    DelayGroup("delay_pitot_s", ("airspeed_mps",), prior_sd_s=0.015, limit_s=0.05),
-)
 IMU_SD_M = 0.014  # tape measure and balance, 10 mm each
 FREE = ("output", "innovation")  # residuals of methods that simulate
 WEAK_GRADE = 0.2
@@ -211,7 +200,7 @@ def identify(
     answers: list[Answer] = []
     needed: list[str] = []
     for name in names:
-        axes = AXIS_OF[name] if user_model is None else user_model.inputs
+        axes = AXIS_OF[name] if user_model is None else moving(user_model.inputs)
         mine = once([f for f in found if f.axis in axes])
         needed += axes
         if mine:
@@ -256,7 +245,11 @@ def _answer(
     for f in used:
         cut |= (t >= f.start_s) & (t <= f.end_s)
     trim, condition = trim_of({k: v[cut] for k, v in columns.items() if k != "t_s"})
-    model = user_model or _template(columns, name, trim, method, with_delays)
+    able = with_delays and _frees_places(method)
+    if user_model is None:
+        model = _template(columns, name, trim, method, able)
+    else:
+        model = user_model if able else without_usual_delays(user_model)
     known = None if compatibility is None else compatibility.instrument
     if user_model is None and known is not None and _frees_places(method):
         model = _drag_arm(model, trim, known)
@@ -331,18 +324,17 @@ def _held_out(found: list[Found]) -> list[Found]:
 
 
 def _template(
-    columns: Mapping[str, Array], name: str, trim: Trim, method: str, with_delays: bool
+    columns: Mapping[str, Array], name: str, trim: Trim, method: str, able: bool
 ) -> LinearModel:
     if name not in TEMPLATES:
         raise IdentificationError(f"no template '{name}'; there are {', '.join(TEMPLATES)}")
-    able = _frees_places(method)
     forces = ("ax_mps2", "az_mps2") if "elevator_rad" in AXIS_OF[name] else ("ay_mps2",)
     return template(
         name,
         trim,
         accelerometers=method not in UNTIED and all(c in columns for c in forces),
-        delays=DELAYS if able and with_delays else (),
-        imu_sd_m=IMU_SD_M if able and with_delays else 0.0,
+        delays=DELAYS if able else (),
+        imu_sd_m=IMU_SD_M if able else 0.0,
     )
 
 

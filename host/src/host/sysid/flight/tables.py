@@ -5,6 +5,7 @@ Foreign names, units and signs come in through a map (`column_map`).
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,7 +56,11 @@ MOST_EMPTY = 20  # rows of the even grid for each row that was recorded
 
 
 def read_columns(
-    source: Path, mapping: Path | None = None, *, calibration: Path | None = None
+    source: Path,
+    mapping: Path | None = None,
+    *,
+    calibration: Path | None = None,
+    also: Collection[str] = (),
 ) -> tuple[dict[str, Array], list[str]]:
     """Return the columns identification uses, and notes about what was done to them.
 
@@ -67,18 +72,21 @@ def read_columns(
         TOML map of foreign names, units and signs.
     calibration : Path, optional
         Calibration of a log; the default one without.
+    also : collection of str
+        Signals of a model of one's own, beside those that are always looked for.
 
     Raises
     ------
     IdentificationError
         If the file or the map cannot be used.
     """
+    wanted = ("t_s", *USED, *(name for name in also if name not in USED))
     if not source.exists():
         raise IdentificationError(f"{source}: no such file")
     kind = source.suffix.lower()
     found = None
     if kind not in READ or (kind in TEXT_KINDS[1:] and mapping is None):  # rows of the original
-        found = _recorded(source, calibration, maybe_table=kind != ".bin")
+        found = _recorded(source, calibration, wanted, maybe_table=kind != ".bin")
     recorded = found is not None
     if found is None:
         found = read_foreign(source)
@@ -86,7 +94,7 @@ def read_columns(
             found.notes.append("--calibration is for logs: this table is taken as it is")
     raw, notes = dict(found.columns), found.notes
     if mapping is not None:
-        lines = read_map(mapping, ("t_s", *USED))
+        lines = read_map(mapping, wanted)
         raw |= mapped(found.columns, found.unusable, lines, mapping, found.twice)
         theirs = {name: line.foreign for name, line in lines.items()}
     else:
@@ -96,7 +104,7 @@ def read_columns(
             f"{source}: no column t_s; name it in a map (--map); "
             + listed(found.columns, found.unusable)
         )
-    used = {k: raw[k] for k in ("t_s", *USED) if k in raw}
+    used = {k: raw[k] for k in wanted if k in raw}
     both = [k for k in used if k in found.twice and k not in theirs]
     if both:
         raise IdentificationError(f"{source}: several columns '{both[0]}': rename them")
@@ -110,14 +118,16 @@ def read_columns(
     return columns, notes
 
 
-def _recorded(source: Path, calibration: Path | None, *, maybe_table: bool) -> Foreign | None:
+def _recorded(
+    source: Path, calibration: Path | None, wanted: Collection[str], *, maybe_table: bool
+) -> Foreign | None:
     """Return the columns of a log; None if it is none but may be a table of text."""
     from host.errors import NotALogError
 
     if source.is_file():
         refuse_other(source)
     try:
-        columns, notes = _log(source, calibration)
+        columns, notes = _log(source, calibration, wanted)
     except NotALogError:
         if maybe_table and source.is_file() and is_text(source):
             return None
@@ -125,7 +135,9 @@ def _recorded(source: Path, calibration: Path | None, *, maybe_table: bool) -> F
     return Foreign(columns, notes=notes)
 
 
-def _log(source: Path, calibration: Path | None) -> tuple[dict[str, Array], list[str]]:
+def _log(
+    source: Path, calibration: Path | None, wanted: Collection[str]
+) -> tuple[dict[str, Array], list[str]]:
     from host.decode.summary import calibration_note
     from host.log import read_log
     from host.log.source import find_flights, newest
@@ -138,7 +150,7 @@ def _log(source: Path, calibration: Path | None) -> tuple[dict[str, Array], list
             notes.append(f"{source.name} is the newest of {len(flights)} logs in the folder")
     log = read_log(source, calibration=calibration)
     raw: dict[str, Array] = {
-        k: np.asarray(v, dtype=np.float64) for k, v in log.columns().items() if k in WANTED
+        k: np.asarray(v, dtype=np.float64) for k, v in log.columns().items() if k in wanted
     }
     if not len(raw.get("t_s", ())):
         raise IdentificationError(

@@ -28,7 +28,8 @@ gain = -1.0
 An entry is a number, a parameter, ``gain*parameter`` or a sum of those; parameters without a line
 of their own start at zero. Left out, `initial_states` are all, `state_biases` those of rows with
 a parameter, `output_biases` those of outputs that are no state: records hold total quantities, and
-without a constant of its own the trim would pass for a derivative. An empty list frees none.
+without a constant of its own the trim would pass for a derivative. `delays` are those of vanes,
+IMU, attitude and pitot, with the priors of the templates. An empty list frees none.
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
+from host.sysid.models.delays import delays_of
 from host.sysid.models.model import MATRICES, DelayGroup, Lever, LinearModel, Parameter, Term
 from host.sysid.models.result import FitResult
 from host.sysid.models.templates import Trim
@@ -136,7 +138,11 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         state_biases=signals["state_biases"],
         output_biases=signals["output_biases"],
         initial_states=signals["initial_states"],
-        delays=_delays(document.get("delays", []), used, source),
+        delays=(
+            _delays(document["delays"], used, source)
+            if "delays" in document
+            else delays_of(signals["outputs"])
+        ),
         hold=str(document.get("hold", "foh")),
         levers=levers,
     )
@@ -326,6 +332,8 @@ def model_text(
     lines.append(f'hold = "{model.hold}"')
     for key in ("state_biases", "output_biases", "initial_states"):
         lines.append(f"{key} = {_list(getattr(model, key))}")
+    if not model.delays:
+        lines.append("delays = []")
     for label in MATRICES:
         matrix = getattr(model, label)
         rows = []

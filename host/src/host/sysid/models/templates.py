@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from host.sysid.errors import IdentificationError
+from host.sysid.models.delays import delays_of
 from host.sysid.models.model import DelayGroup, Lever, LinearModel, Parameter, Term
 
 GRAVITY_MPS2 = 9.80665
@@ -119,11 +120,7 @@ class _Builder:
             state_biases=self.states,
             output_biases=tuple(y for y in self.outputs if y not in self.states),
             initial_states=self.states,
-            delays=tuple(
-                DelayGroup(d.name, held, d.prior_sd_s, d.limit_s)
-                for d in delays
-                if (held := tuple(y for y in d.outputs if y in self.outputs))
-            ),
+            delays=delays_of(self.outputs, delays),
             hold=hold,
             levers=tuple(self.levers),
         )

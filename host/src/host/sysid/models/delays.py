@@ -1,0 +1,39 @@
+"""Residual delays of each group of sensors: what a model has where it names none of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from host.sysid.models.model import DelayGroup, LinearModel
+
+# Deviation of what is left of each sensor's delay once the nominal one is taken out, s.
+DELAYS = (
+    DelayGroup("delay_vanes_s", ("alpha_rad", "beta_rad"), prior_sd_s=0.010, limit_s=0.03),
+    DelayGroup(
+        "delay_imu_s",
+        ("p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2"),
+        prior_sd_s=0.002,
+        limit_s=0.01,
+    ),
+    DelayGroup("delay_attitude_s", ("phi_rad", "theta_rad"), prior_sd_s=0.010, limit_s=0.03),
+    DelayGroup("delay_pitot_s", ("airspeed_mps",), prior_sd_s=0.015, limit_s=0.05),
+)
+
+
+def delays_of(
+    outputs: Iterable[str], groups: Iterable[DelayGroup] = DELAYS
+) -> tuple[DelayGroup, ...]:
+    """Return the delays that concern these outputs."""
+    there = set(outputs)
+    return tuple(
+        DelayGroup(d.name, held, d.prior_sd_s, d.limit_s)
+        for d in groups
+        if (held := tuple(y for y in d.outputs if y in there))
+    )
+
+
+def without_usual_delays(model: LinearModel) -> LinearModel:
+    """Return a model without the delays it was given for want of its own."""
+    usual = delays_of(model.outputs)
+    return replace(model, delays=tuple(d for d in model.delays if d not in usual))
