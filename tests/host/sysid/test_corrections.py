@@ -27,6 +27,7 @@ from host.sysid.flight import linear
 from host.sysid.flight.carried import carried, moved_by
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns
+from host.sysid.models.delays import DELAYS
 from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.problem import OutputProblem
 from host.twin.virtual import virtual_flight
@@ -269,9 +270,7 @@ def test_a_delay_at_its_bound_is_called_so(
     flown: tuple[Columns, list[dict[str, Any]], Compatibility], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     columns, _, _ = flown
-    tight = tuple(
-        replace(d, limit_s=0.001) if d.name == "delay_vanes_s" else d for d in linear.DELAYS
-    )
+    tight = tuple(replace(d, limit_s=0.001) if d.name == "delay_vanes_s" else d for d in DELAYS)
     monkeypatch.setattr(linear, "DELAYS", tight)
     answers = identify(columns, airframe=airframe_data(NAME))
     for answer in answers:

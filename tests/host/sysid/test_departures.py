@@ -13,8 +13,9 @@ from host.sysid.estimators.start import regressed, start_values
 from host.sysid.flight import linear
 from host.sysid.flight.departures import spin_of
 from host.sysid.flight.finder import Found
-from host.sysid.flight.linear import DELAYS, IMU_SD_M, identify
+from host.sysid.flight.linear import IMU_SD_M, identify
 from host.sysid.flight.tables import even_columns
+from host.sysid.models.delays import DELAYS
 from host.sysid.models.result import FitResult
 from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.problem import OutputProblem
