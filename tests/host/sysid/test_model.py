@@ -10,6 +10,7 @@ from host.sysid.errors import IdentificationError
 from host.sysid.models.delays import without_usual_delays
 from host.sysid.models.model import without_outputs
 from host.sysid.models.model_file import model_from, model_text, parse_entry, read_model
+from host.sysid.models.modes import longitudinal_names
 from host.sysid.models.templates import (
     GRAVITY_MPS2,
     TEMPLATES,
@@ -242,3 +243,20 @@ def test_an_output_left_out_leaves_the_others_alone() -> None:
         np.testing.assert_array_equal(ours, theirs)
     arm = without_outputs(longitudinal(TRIM, imu_sd_m=0.01), ("theta_rad",))
     assert {x.output for x in arm.levers} == {"ax_mps2", "az_mps2"}
+
+
+@pytest.mark.parametrize(
+    ("roots", "names"),
+    [
+        ([-3 + 4j, -0.1 + 0.6j], ["short period", "phugoid"]),
+        ([-70.0, -9.0, -0.2 + 0.6j], ["root of the short period"] * 2 + ["phugoid"]),
+        ([-3 + 4j, -0.4, 0.1], ["short period"] + ["root of the phugoid"] * 2),
+        ([-9.0, -1 + 1j, 0.1], ["root of the short period", "oscillatory mode",
+                                "root of the phugoid"]),
+    ],
+)  # fmt: skip
+def test_a_slow_pair_is_the_phugoid_also_where_the_fast_one_does_not_swing(
+    roots: list[complex], names: list[str]
+) -> None:
+    """An overdamped short period left its name to the phugoid, 96 % off in frequency."""
+    assert longitudinal_names([complex(r).imag > 0.0 for r in roots]) == names

@@ -6,8 +6,8 @@ in the motion it stands for, and the joint covariance of both says so.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,10 +15,10 @@ from host.compiled import Array
 from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.aircraft.conversion import Quantities
 from host.sysid.coefficients.answer import QUANTILE, CoefficientFit
-from host.sysid.models.modes import Mode, mode_of
+from host.sysid.models.modes import Mode, longitudinal_names, mode_of
 from host.sysid.models.templates import GRAVITY_MPS2
 
-PAIRS = (("short period", "phugoid"), ("dutch roll", "roll and spiral"))
+PAIRS = ("dutch roll", "roll and spiral")
 SINGLE = ("roll", "spiral")
 SIGNALS = {
     "longitudinal": (("airspeed_mps", "alpha_rad", "q_radps", "theta_rad"), ("elevator_rad",)),
@@ -47,22 +47,34 @@ def coefficient_modes(fit: CoefficientFit, airframe: AirframeData) -> tuple[Mode
     """
     base, moved, steps = _moved(fit, airframe)
     found = []
-    for k, pair_names in enumerate(PAIRS):
+    for k in range(2):
         values, right = np.linalg.eig(base[k][0])
         left = np.linalg.inv(right)
         slopes = [(m[k][0] - base[k][0]) / step for m, step in zip(moved, steps, strict=True)]
-        own: dict[str, list[Mode]] = {"pair": [], "single": []}
+        own: list[Mode] = []  # fastest first
         for j in np.argsort(-np.abs(values)):
             value = complex(values[j])
             if value.imag < 0.0:
                 continue
             gradient = np.array([left[j] @ slope @ right[:, j] for slope in slopes])
             J = np.vstack([gradient.real, gradient.imag])
-            names_here = pair_names if value.imag > 0.0 else SINGLE if k else pair_names
-            kind = own["pair" if value.imag > 0.0 else "single"]
-            kind.append(mode_of(names_here[min(len(kind), 1)], value, J @ fit.covariance @ J.T))
-        found += [*own["pair"], *own["single"]]
+            own.append(mode_of("", value, J @ fit.covariance @ J.T))
+        swings = [m.eigenvalue.imag > 0.0 for m in own]
+        names = _lateral_names(swings) if k else longitudinal_names(swings)
+        named = [replace(m, name=name) for m, name in zip(own, names, strict=True)]
+        found += sorted(named, key=lambda m: m.eigenvalue.imag <= 0.0)
     return tuple(found)
+
+
+def _lateral_names(swings: Sequence[bool]) -> list[str]:
+    """Return dutch roll, roll and spiral, or what has become of them, fastest first."""
+    pairs, single = list(PAIRS), list(SINGLE)
+    return [
+        (pairs.pop(0) if len(pairs) > 1 else pairs[0])
+        if swing
+        else (single.pop(0) if len(single) > 1 else single[0])
+        for swing in swings
+    ]
 
 
 @dataclass(frozen=True, slots=True)

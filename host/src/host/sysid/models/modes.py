@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,14 +98,30 @@ def mode_of(name: str, value: complex, spread: Array) -> Mode:
     )
 
 
+def longitudinal_names(oscillatory: Sequence[bool]) -> list[str]:
+    """Return the names of longitudinal modes, fastest first, by whether each is a pair.
+
+    The two fastest roots are the short period, the next two the phugoid; one that is damped beyond
+    swinging is two real roots. A pair of one of each has no name of its own.
+    """
+    names, roots = [], 0
+    for pair in oscillatory:
+        label = "short period" if roots < 2 else "phugoid"
+        if pair:
+            names.append("oscillatory mode" if roots % 2 else label)
+        else:
+            names.append(f"root of the {label}")
+        roots += 2 if pair else 1
+    return names
+
+
 def _names(model: LinearModel, found: list[Mode]) -> list[str]:
     pairs = [m for m in found if m.oscillatory]
     single = [m for m in found if not m.oscillatory]
     names: dict[int, str] = {}
     if "q_radps" in model.states:
-        for label, mode in zip(("short period", "phugoid"), pairs, strict=False):
-            names[id(mode)] = label
-    elif "airspeed_mps" in model.states and pairs:
+        return longitudinal_names([m.oscillatory for m in found])
+    if "airspeed_mps" in model.states and pairs:
         names[id(pairs[0])] = "phugoid"
     elif "r_radps" in model.states or "p_radps" in model.states:
         if pairs:

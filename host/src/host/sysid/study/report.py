@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,8 +25,10 @@ class Table:
 
 
 def shown(cell: Cell) -> str:
-    """Return a cell as people read it: four digits of a number."""
-    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
+    """Return a cell as people read it: four digits of a number, a dash for none."""
+    if isinstance(cell, float):
+        return "-" if isnan(cell) else f"{cell:.4g}"
+    return str(cell)
 
 
 def markdown(table: Table) -> str:

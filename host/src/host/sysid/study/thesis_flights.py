@@ -188,6 +188,7 @@ def lines(case: Case, figures: Sequence[Figures], ours: Sequence[tuple[float, fl
     f = figures
     swings = [abs(x.frequency_error) for x in f if not np.isnan(x.frequency_error)]
     mode = case.mode.replace("_", " ")
+    own = [abs(b) for _, b in ours if not np.isnan(b)]
     unseen = [100.0 * x.unseen for x in f if not np.isnan(x.unseen)]
     printed = case.printed_percent
     return [
@@ -199,11 +200,12 @@ def lines(case: Case, figures: Sequence[Figures], ours: Sequence[tuple[float, fl
         f" (thesis {printed * case.rows / len(case.states):.0f} %)",
         f"  NRMSE {100.0 * median([x.nrmse for x in f]):.0f} %"
         + (f", on another maneuver {median(unseen):.0f} %" if unseen else ""),
-        f"  {mode} found in {len(swings)} of {len(f)}, its frequency off by"
-        f" {100.0 * median(swings):.0f} %; the model is unstable in {sum(x.unstable for x in f)}",
+        f"  {mode} found in {len(swings)} of {len(f)}"
+        + (f", its frequency off by {100.0 * median(swings):.0f} %" if swings else "")
+        + f"; the model is unstable in {sum(x.unstable for x in f)}",
         f"  this product on the same flights: NRMSE {100.0 * median([a for a, _ in ours]):.0f} %"
-        f" (free simulation, unseen where three were flown), frequency off by"
-        f" {100.0 * median([abs(b) for _, b in ours]):.1f} %",
+        f" (free simulation, unseen where three were flown), {mode} found in {len(own)} of"
+        f" {len(ours)}" + (f", frequency off by {100.0 * median(own):.1f} %" if own else ""),
     ]
 
 
