@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from host.sysid.aircraft.aircraft_file import airframe_data
+from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
 from host.sysid.answer.truth import read_truth, true_coefficients
+from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import Found, find
 from host.sysid.flight.linear import identify
@@ -120,7 +121,13 @@ def add_flight(tally: Tally, folder: Path, *, fit: bool, aircraft: str = "ultras
     if not fit:
         return
     try:
-        answers = identify(columns, airframe=airframe_data(aircraft))
+        airframe = airframe_data(aircraft)
+        answers = identify(
+            columns,
+            airframe=airframe,
+            compatibility=reconstruct(columns, airframe, instrument_data(aircraft)),
+            powerplant=powerplant(aircraft),
+        )
     except IdentificationError:
         tally.failed += 1
         return
