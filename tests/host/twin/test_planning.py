@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -119,6 +121,22 @@ def test_command_hears_another_aircraft_and_keeps_unlike_inputs_apart(
     assert "1x doublet elevator" in text
     assert main(["plan", "demo", "--airspeed", "-4"]) == 2
     assert "--airspeed is -4, expected above 0" in capsys.readouterr().err
+
+
+def test_a_full_disk_names_the_folder_of_the_flight(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("host.twin.outcome.truth.np.savez", full)
+    arguments = ["simulate", "calm", "-o", str(tmp_path), "--firmware", "none", "--no-picture"]
+    assert main(arguments) == 2
+    error = capsys.readouterr().err.strip()
+    assert error.endswith(
+        f"{tmp_path}: not all files of the flight were written: No space left on device"
+    )
+    assert len(error.splitlines()) == 1
 
 
 def test_simulate_command_lists_flies_and_refuses(

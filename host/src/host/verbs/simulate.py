@@ -72,16 +72,21 @@ def run(args: argparse.Namespace) -> int:
     if args.seed < 0:
         raise UsageError(f"seed is {args.seed}, expected 0 or more")
     bar = _Bar(enabled=sys.stderr.isatty())
-    outcome = report.simulate(
-        card,
-        args.output,
-        seed=args.seed,
-        aircraft=_aircraft(args.aircraft, card.aircraft),
-        firmware=args.firmware,
-        pictures=not args.no_picture,
-        both=args.both,
-        progress=bar.show,
-    )
+    try:
+        outcome = report.simulate(
+            card,
+            args.output,
+            seed=args.seed,
+            aircraft=_aircraft(args.aircraft, card.aircraft),
+            firmware=args.firmware,
+            pictures=not args.no_picture,
+            both=args.both,
+            progress=bar.show,
+        )
+    except OSError as error:
+        if error.filename is None and error.errno is not None:  # a write, which names no file
+            error.filename = f"{args.output}: not all files of the flight were written"
+        raise
     bar.clear()
     record = outcome.record
     duration = float(record.t_s[-1])

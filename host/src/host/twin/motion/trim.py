@@ -129,13 +129,18 @@ def solve(
     )
     if not motor:
         guess[5] = -0.15
-    fit = least_squares(residual, guess, x_scale=[0.1, 0.1, 0.1, 0.1, 0.1, max(abs(guess[5]), 0.1)],
-                        xtol=1e-15, ftol=1e-15, gtol=1e-15)  # fmt: skip
+    scale = [0.1, 0.1, 0.1, 0.1, 0.1, max(abs(guess[5]), 0.1)]
+    try:
+        fit = least_squares(residual, guess, x_scale=scale, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    except ValueError:  # no throttle carries the propeller's load, or a number is none
+        raise TrimError(
+            f"no trim at {airspeed_mps:.1f} m/s: the propeller has no answer there"
+        ) from None
     x, command, load = place(fit.x)
     if motor:
         command[3] = throttle(x[ROTOR], load)
     left = float(np.max(np.abs(residual(fit.x))))
-    if left > 1e-6:
+    if not left <= 1e-6:
         raise TrimError(
             f"no trim at {airspeed_mps:.1f} m/s: {left:.2g} m/s2 or rad/s2 left, expected 1e-6"
         )
