@@ -115,10 +115,9 @@ def _stuck(
 ) -> list[str]:
     """Take out where a sensor stands still for long while others move."""
     notes = []
-    for start, length in zip(starts, lengths, strict=True):
-        last = start + length - 1
-        if t[last] - t[start] <= longest_s or not np.isfinite(values[start]):
-            continue
+    ends = starts + lengths - 1
+    long = (t[ends] - t[starts] > longest_s) & np.isfinite(values[starts])
+    for start, last in zip(starts[long], ends[long], strict=True):
         alone: BoolArray = moving[start + 1 : last + 1] > 0
         if alone.mean() > 0.5:
             notes.append(
