@@ -74,12 +74,13 @@ def _verdict(answer: Answer) -> list[str]:
     size = references(answer.model, answer.maneuvers, result.estimate)
     lost = unpredicted(answer)
     doubted = _entries_of(answer, lost)
+    both = _of_both(answer)
     trusted, fair, loose, little = [], [], [], []
     for k, parameter in enumerate(answer.model.parameters):
         name = parameter.name
         if name in refused or name.startswith("imu_") or half[k] == 0.0:  # on a bound: warned of
             continue
-        if name in doubted:
+        if name in doubted or name in both:
             continue
         share = float(half[k]) / max(float(size[k]), 1e-300)
         if share <= FAIR and size[k] > abs(float(result.estimate[k])):
@@ -124,6 +125,10 @@ def _verdict(answer: Answer) -> list[str]:
             f"  {one} and {other} move together: fly them one at a time, without a mixer, or leave"
             " one out of a model of your own"
         )
+    if both:
+        lines.append(
+            f"  do not rely on {', '.join(sorted(both))}: of both inputs, one was left out"
+        )
     for name in answer.still:
         lines.append(f"  {name} never moved: its derivatives are the bias under another name")
     if answer.together.severe:
@@ -159,6 +164,22 @@ def together(answer: Answer) -> list[tuple[str, str]]:
         for i, j in pairs
         if power[i, j] ** 2 > MIXED**2 * power[i, i] * power[j, j] > 0.0
     ]
+
+
+def _of_both(answer: Answer) -> set[str]:
+    """Return what stands for two inputs, where a regression left the entries of one out."""
+    model, result = answer.model, answer.result
+    out = {
+        p.name for k, p in enumerate(model.parameters)
+        if result.estimate[k] == 0.0 and result.half_width()[k] == 0.0
+    }  # fmt: skip
+    both: set[str] = set()
+    for pair in together(answer):
+        own = {
+            t.parameter for t in model.terms if t.matrix in "BD" and model.inputs[t.column] in pair
+        }
+        both |= own - out if own & out else set()
+    return both
 
 
 def unpredicted(answer: Answer) -> list[str]:
