@@ -13,7 +13,9 @@ from __future__ import annotations
 import argparse
 import csv
 import math
+import os
 import sys
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +25,7 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]
 FACTORS = {"deg": math.pi / 180.0}
 LEAST_POINTS = 5
+DEFAULT = Path(__file__).with_name("default.toml")
 
 
 class PointsError(Exception):
@@ -107,11 +110,11 @@ def read_points(path: Path) -> tuple[Points, Points]:
     PointsError
         A column or a number is missing.
     """
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
     try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
         columns = [np.array([float(row[name]) for row in rows]) for name in ("true", "raw")]
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
         raise PointsError(f"{path}: expected numbers in columns true and raw ({error})") from error
     return columns[0], columns[1]
 
@@ -127,15 +130,33 @@ def as_toml(name: str, unit: str, fit: Fit, source: str) -> str:
     )
 
 
+def lines_known() -> list[str]:
+    """Return the names of all lines that the default calibration has."""
+    tables = tomllib.loads(DEFAULT.read_text(encoding="utf-8"))
+    rooms = {name: table for name, table in tables.items() if isinstance(table, dict)}
+    return [f"{room}.{name}" for room, table in rooms.items() for name in table]
+
+
+def _spread(text: str) -> float:
+    value = float(text)
+    if not (math.isfinite(value) and value >= 0.0):
+        raise ValueError(text)
+    return value
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Print the table; 0 ok, 2 the points cannot be used."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("name", help="channel.alpha_a, pulse.elevator, ...")
+    parser.add_argument(
+        "name", choices=lines_known(), metavar="NAME", help="channel.alpha_a, pulse.elevator, ..."
+    )
     parser.add_argument("points", type=Path, help="CSV with columns true and raw")
     parser.add_argument("--unit", default="rad", help="unit of the value (default rad)")
-    parser.add_argument("--in", dest="given", default="", help="deg, if true is in degrees")
     parser.add_argument(
-        "--reference", type=float, required=True, help="standard deviation of a setting, as true"
+        "--in", dest="given", choices=sorted(FACTORS), help="deg, if true is in degrees"
+    )
+    parser.add_argument(
+        "--reference", type=_spread, required=True, help="standard deviation of a setting, as true"
     )
     parser.add_argument("--source", required=True, help="how, with what, serial, who, when")
     args = parser.parse_args(arguments)
@@ -146,7 +167,13 @@ def main(arguments: list[str] | None = None) -> int:
     except (PointsError, OSError) as error:
         print(f"fit_line: {error}", file=sys.stderr)
         return 2
-    print(as_toml(args.name, args.unit, fit, args.source), end="")
+    try:
+        print(as_toml(args.name, args.unit, fit, args.source), end="", flush=True)
+    except OSError as error:
+        # What it still holds could not be flushed at the end either.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        print(f"fit_line: standard output: {error.strerror}", file=sys.stderr)
+        return 2
     return 0
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import binascii
+import math
 import struct
 import sys
 from pathlib import Path
@@ -54,10 +55,12 @@ def main(argv: list[str] | None = None) -> int:
     )  # fmt: skip
     parser.add_argument("out", type=Path)
     given = parser.parse_args(argv)
+    if not all(0.0 < value < math.inf for value in (given.meter, given.shown, given.was)):
+        parser.error("--meter, --shown and --was are voltages above 0")
     try:
         reference_mv = round(given.was * given.meter / given.shown)
         given.out.write_text(intel_hex(PAGE, record(reference_mv)), encoding="ascii")
-    except (ValueError, ZeroDivisionError, OSError) as error:
+    except (ValueError, OverflowError, OSError) as error:
         print(f"reference_record: {error}", file=sys.stderr)
         return 2
     print(

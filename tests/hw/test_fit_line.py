@@ -92,3 +92,29 @@ def test_points_that_make_no_line(
     path.write_text(text)
     assert FIT.main(["channel.dp_a", str(path), "--reference", "1", "--source", "x"]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_a_log_is_no_table_of_points(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "points.csv"
+    path.write_bytes(b"FLT1\xb3\xff\x00\n\x80")
+    assert FIT.main(["channel.dp_a", str(path), "--reference", "1", "--source", "x"]) == 2
+    assert "columns true and raw" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "reference"),
+    [
+        ("channel.alpha", "deg", "0.2"),
+        ("channel.alpha_a", "degrees", "0.2"),
+        ("channel.alpha_a", "deg", "nan"),
+        ("channel.alpha_a", "deg", "-0.2"),
+    ],
+)
+def test_a_word_that_would_spoil_the_line_is_refused(
+    name: str, given: str, reference: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [name, "points.csv", "--in", given, "--reference", reference, "--source", "x"]
+    with pytest.raises(SystemExit) as ended:
+        FIT.main(words)
+    assert ended.value.code == 2
+    assert "invalid" in capsys.readouterr().err
