@@ -8,9 +8,10 @@ from host.sysid.aircraft.airframe import Condition
 from host.sysid.answer.verdict import model_lines, unpredicted, words
 from host.sysid.estimators.fit import fit
 from host.sysid.flight.linear import Answer
+from host.sysid.models.delays import DELAYS
 from host.sysid.models.diagnostics import SignalFit, collinearity, references
-from host.sysid.models.modes import modes
-from host.sysid.models.templates import Trim
+from host.sysid.models.modes import modes, modes_of
+from host.sysid.models.templates import TEMPLATES, Trim
 from host.sysid.study.aircraft import navion_structured
 from host.sysid.study.data import noisy
 
@@ -86,3 +87,20 @@ def test_a_small_entry_is_not_called_trustworthy(answer: Answer) -> None:
     lines = words([replace(answer, result=result)], [])
     little = next(line for line in lines if "less than 5 % of their row" in line)
     assert answer.model.parameter_names[1] in little.split(":  ")[1].split(", ")
+
+
+def test_a_delay_at_its_bound_is_no_failed_prediction(answer: Answer) -> None:
+    """Nothing was predicted: the words are those of the delay."""
+    speed = answer.model.states[0]
+    bound = replace(DELAYS[3], outputs=(speed,))
+    model = replace(answer.model, delays=(bound,))
+    lost = replace(answer, model=model, delays={bound.name: (bound.limit_s, 0.0)})
+    (line,) = [x for x in words([lost], []) if "whatever the interval" in x]
+    assert line.endswith(f"whatever the interval: the delay of {speed} is at its bound")
+
+
+def test_a_roll_model_has_no_spiral() -> None:
+    model = TEMPLATES["roll"](Trim(17.0, 0.1, 0.1))
+    A = np.array([[-20.0, 0.0], [1.0, 0.0]])
+    found = modes_of(model, A, np.zeros((len(model.parameters),) * 2))
+    assert [m.name for m in found] == ["roll", "bank"]

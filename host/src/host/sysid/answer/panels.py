@@ -135,6 +135,8 @@ def pole_map(clouds: Sequence[Cloud], title: str, path: Path) -> Path:
         whole.axvline(0.0, color="0.7", lw=0.8)
         whole.axhline(0.0, color="0.9", lw=0.8, zorder=0)
         whole.margins(x=0.08, y=0.12)
+        if not any(abs(cloud.pole.imag) > 0.0 for cloud in clouds):
+            whole.set_ylim(-1.0, 1.0)  # else the scale is that of rounding
         _name_poles(whole, [(c.name, c.pole) for c in clouds])
         whole.set_xlabel("real, 1/s")
         whole.set_ylabel("imaginary, rad/s")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -90,7 +91,7 @@ def _verdict(answer: Answer) -> list[str]:
         elif share <= FAIR:
             fair.append(name)
         else:
-            loose.append(f"{name} ({100.0 * share:.0f} %)")
+            loose.append(f"{name} ({ceil(100.0 * share)} %)")
     lines = [
         f"{answer.template}: {_fitted(len(answer.used))} by"
         f" {result.method}, {len(answer.held_out)} held out"
@@ -107,10 +108,7 @@ def _verdict(answer: Answer) -> list[str]:
         lines.append(f"  less than 5 % of their row, known to be:  {', '.join(little)}")
     if doubted - refused:
         names = ", ".join(n for n in answer.model.parameter_names if n in doubted - refused)
-        lines.append(
-            f"  do not rely on {names}, whatever the interval:"
-            f" {' and '.join(lost)} is not predicted"
-        )
+        lines.append(f"  do not rely on {names}, whatever the interval: {_why(answer, lost)}")
     for refusal in answer.refused:
         if not refusal.name.startswith("imu_"):
             warning = "do not use" if refusal.grade == CANNOT else "doubtful,"
@@ -188,11 +186,23 @@ def unpredicted(answer: Answer) -> list[str]:
     A delay at its bound is what a model lacks in that signal. An interval counts noise and gusts,
     not what is lacking: on a demonstration flight D_V was -0.33 +- 0.02 where -0.61 was true.
     """
-    failing = {f.name for f in answer.validation if not f.nrmse < UNPREDICTED}
+    failing = _failing(answer)
     for group in (*DELAYS, *answer.model.delays):
         if group.name in answer.at_bound:
             failing |= set(group.outputs)
     return [state for state in answer.model.states if state in failing]
+
+
+def _failing(answer: Answer) -> set[str]:
+    return {f.name for f in answer.validation if not f.nrmse < UNPREDICTED}
+
+
+def _why(answer: Answer, states: Sequence[str]) -> str:
+    failing = _failing(answer)
+    return ", ".join(
+        f"{s} is not predicted" if s in failing else f"the delay of {s} is at its bound"
+        for s in states
+    )
 
 
 def not_relied_on(answer: Answer) -> set[str]:
@@ -255,7 +265,7 @@ def model_lines(answer: Answer) -> list[str]:
     lost = unpredicted(answer)
     for mode in answer.modes:
         in_it = _carried_by(answer, mode, lost)
-        mark = f"  not to be relied on: {' and '.join(in_it)} is not predicted" if in_it else ""
+        mark = f"  not to be relied on: {_why(answer, in_it)}" if in_it else ""
         lines.append(_mode_line(mode) + mark)
     for kind, fits in (
         ("free simulation, fitted data", answer.fits),

@@ -129,5 +129,6 @@ def _names(model: LinearModel, found: list[Mode]) -> list[str]:
         if "p_radps" in model.states and single:
             names[id(single[0])] = "roll"
             if len(single) > 1:
-                names[id(single[-1])] = "spiral"
+                # Without yaw the second root is the integration of roll rate to bank.
+                names[id(single[-1])] = "spiral" if "r_radps" in model.states else "bank"
     return [names.get(id(m), "oscillatory mode" if m.oscillatory else "real mode") for m in found]
