@@ -20,6 +20,8 @@ from host.sysid.numerics.kernels import transition
 from host.sysid.numerics.problem import OutputProblem
 from host.sysid.numerics.riccati import innovations, predicted_covariance
 
+SAME_PERIOD = 1e-9
+
 
 @dataclass(frozen=True, slots=True)
 class Gain:
@@ -133,7 +135,10 @@ class FilterProblem:
                 AB, n, m, model.hold == "foh", maneuver.dt_s, none, none, none, np.zeros(0), 0
             )
             if maneuver.dt_s not in gains:
-                gain = _gain(A, C, intensity, np.diag(power), maneuver.dt_s)
+                # Rounding of the clock gives one rate several names.
+                near = [t for t in gains if abs(t - maneuver.dt_s) < SAME_PERIOD * t]
+                gain = gains[near[0]] if near else None
+                gain = gain or _gain(A, C, intensity, np.diag(power), maneuver.dt_s)
                 if gain is None:
                     return None
                 gains[maneuver.dt_s] = gain

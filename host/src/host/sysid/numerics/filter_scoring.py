@@ -70,10 +70,11 @@ def _gain_slopes(
     problem: FilterProblem, theta: Array, point: Likelihood, matrices: tuple[Array, Array, Array]
 ) -> dict[float, GainSlopes]:
     AB_slopes, _, CD_slopes = matrices
-    return {
-        dt_s: gain_slopes(problem, theta, gain, dt_s, AB_slopes, CD_slopes)
-        for dt_s, gain in point.gains.items()
-    }
+    known: dict[int, GainSlopes] = {}
+    for dt_s, gain in point.gains.items():
+        if id(gain) not in known:
+            known[id(gain)] = gain_slopes(problem, theta, gain, dt_s, AB_slopes, CD_slopes)
+    return {dt_s: known[id(gain)] for dt_s, gain in point.gains.items()}
 
 
 def _active(problem: FilterProblem, number: int) -> IntArray:
