@@ -199,3 +199,10 @@ def test_json_has_one_document_and_no_nan(flight: Path, capsys: pytest.CaptureFi
     assert told["Cm_alpha"].keys() >= {"value", "half_width", "truth", "relative_error", "inside"}
     (expected,) = document["prior"].values()
     assert expected["Cm_alpha"]["prior"] == -1.6
+
+
+def test_methods_are_listed_without_a_flight(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["identify", "--method", "list"]) == 0
+    assert "output-error-white" in capsys.readouterr().out
+    assert main(["identify"]) == 2
+    assert capsys.readouterr().err == "host: name the flight: a log, CSV, Parquet or MAT file\n"

@@ -27,7 +27,7 @@ def add_parser(subparsers: Any) -> None:
         description="Find the maneuvers of a flight, fit a model to them jointly, check it on"
         " maneuvers it has not seen, and say what of it can be trusted.",
     )
-    parser.add_argument("source", type=Path, help="log, CSV, Parquet or MAT file")
+    parser.add_argument("source", type=Path, nargs="?", help="log, CSV, Parquet or MAT file")
     parser.add_argument("--map", type=Path, metavar="TOML", help="foreign names, units and signs")
     parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
     parser.add_argument(
@@ -100,6 +100,8 @@ def run(args: argparse.Namespace) -> int:
     if "list" in wanted:
         print("\n".join(f"{name:26s} {about}" for name, about in known.items()))
         return int(ExitCode.OK)
+    if args.source is None:
+        raise IdentificationError("name the flight: a log, CSV, Parquet or MAT file")
     unknown = [m for m in wanted if m not in known]
     if unknown:
         raise IdentificationError(f"unknown method {', '.join(unknown)}; known: {', '.join(known)}")
