@@ -13,13 +13,14 @@ import numpy as np
 
 from host.compiled import Array, BoolArray
 from host.sysid.errors import IdentificationError
+from host.sysid.estimators.misfit import misfit_factor, widened_names
 from host.sysid.estimators.rival import against_coloured_noise
 from host.sysid.estimators.start import start_values
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 from host.sysid.numerics.filter_problem import FilterProblem, Likelihood
-from host.sysid.numerics.filter_scoring import scoring, summed
+from host.sysid.numerics.filter_scoring import scoring, summed, whitened_slopes
 from host.sysid.numerics.inverse import covariance_of
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.problem import OutputProblem
@@ -48,6 +49,7 @@ def fit_filter_error(
     process: tuple[str, ...] | None = None,
     start: Array | None = None,
     rival: bool = True,
+    misfit: bool = False,
 ) -> FitResult:
     """Fit by filter error.
 
@@ -61,6 +63,8 @@ def fit_filter_error(
         Start of the model's own vector; output error gives it without.
     rival : bool
         Ask whether sensor noise with a memory explains the data better (`rival`).
+    misfit : bool
+        Widen intervals by what neighbouring scores have in common (`misfit`).
 
     Raises
     ------
@@ -109,14 +113,22 @@ def fit_filter_error(
         parts, scores = scoring(problem, theta, point)
         information, gradient = summed(problem, theta, parts, scores)
     covariance = covariance_of(information)
+    factor: Array = np.ones(len(theta))
+    if misfit:
+        white = [
+            e @ point.gains[m.dt_s].whitener.T for e, m in zip(point.e, maneuvers, strict=True)
+        ]
+        steps_s = [m.dt_s for m in maneuvers]
+        factor = misfit_factor(whitened_slopes(problem, theta, point), white, steps_s, covariance)
     kept = problem.n_model
     warnings = [] if converged else [f"no convergence: last step {size:.3g} bounds long"]
+    warnings += widened_names(model, factor)
     result = FitResult(
         method="filter error",
         model=model,
         names=problem.names,
         estimate=theta,
-        covariance=covariance,
+        covariance=covariance * np.outer(factor, factor),
         covariance_white=covariance,
         degrees_of_freedom=np.full(len(theta), float(max(problem.inner.samples - kept, 1))),
         residuals=tuple(point.e),
@@ -128,6 +140,7 @@ def fit_filter_error(
         warnings=tuple(warnings),
         details={
             "cost": point.cost,
+            "misfit": factor,
             "process_deviation": np.exp(theta[kept : kept + len(process)]),
             "noise_deviation": np.exp(theta[kept + len(process) :]),
             **pulls(parts, scores, covariance),

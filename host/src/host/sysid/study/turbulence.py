@@ -183,7 +183,10 @@ def fit_both(
     more = [p.start for p in setup.wide.parameters[count:]]
     start = np.concatenate([first.estimate[:count], more, first.estimate[count:]])
     process = PROCESS[setup.axis]
-    ours = fit("filter-error", setup.wide, [maneuver], process=process, start=start, rival=False)
+    ours = fit(
+        "filter-error", setup.wide, [maneuver], process=process, start=start, rival=False,
+        misfit=True,
+    )  # fmt: skip
     if not ours.converged:
         raise IdentificationError(f"{maneuver.name}: {ours.warnings[0]}")
     size, picked = np.abs(truth), setup.picked
