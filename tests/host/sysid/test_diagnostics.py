@@ -17,6 +17,7 @@ from host.sysid.models.diagnostics import (
     exceedance,
     judge,
     references,
+    refusals,
     signal_fits,
     thesis_program_error_percent,
     thesis_sum_of_mean_errors,
@@ -63,10 +64,10 @@ def test_thesis_figures_show_what_the_second_division_hides() -> None:
 
 def test_navion_is_answered_and_the_thesis_example_is_refused() -> None:
     result = fit("output-error", navion_structured(), [noisy(3, 0.01)])
-    assert judge(result, [noisy(3, 0.01)]).named == ()
+    assert refusals(result, [noisy(3, 0.01)]) == ()
     still = noisy(3, 0.01, duration_s=2.0)  # one second of motion: too little for the slow mode
     short = fit("output-error", navion_structured(), [still])
-    named = {r.name for r in judge(short, [still]).named}
+    named = {r.name for r in refusals(short, [still])}
     assert "X_alpha" in named
     assert "M_de" not in named
 

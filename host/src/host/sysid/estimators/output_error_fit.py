@@ -83,7 +83,6 @@ def fit_output_error(
             "refits": float(fit.refits),
             "noise_orders": np.array([float(n.order) for n in fit.noise]),
             "innovation_variance": fit.innovation_variance,
-            **({"noise_memory": _memory(fit)} if memory else {}),
             **_pulls(problem, fit),
         },
     )
@@ -104,12 +103,6 @@ def _pulls(problem: OutputProblem, fit: Interval) -> dict[str, float | Array]:
         parts.append(part)
         scores.append(score)
     return pulls(parts, scores, fit.covariance)
-
-
-def _memory(fit: Interval) -> Array:
-    """Return the AR coefficients of every output, (outputs, highest order), zeros behind them."""
-    highest = max(n.order for n in fit.noise)
-    return np.array([np.pad(n.coefficient, (0, highest - n.order)) for n in fit.noise])
 
 
 def _warnings(problem: OutputProblem, fit: Interval) -> tuple[str, ...]:

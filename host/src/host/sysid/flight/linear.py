@@ -33,7 +33,6 @@ from host.sysid.errors import IdentificationError
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import VANES, fit_with_gust
 from host.sysid.estimators.output_error_fit import fit_output_error
-from host.sysid.estimators.posterior import closer_look
 from host.sysid.estimators.start import regressed
 from host.sysid.flight.carried import carried, moved_by
 from host.sysid.flight.chosen import moving, once
@@ -297,7 +296,7 @@ def _answer(
         result=result,
         fits=signal_fits(model.outputs, [m.outputs for m in fitted], residuals),
         validation=_validate(model, result, unseen),
-        refused=judge(result, fitted, draws=closer_look(result, fitted)).named,
+        refused=judge(result, fitted).named,
         together=collinearity(alone),
         modes=modes(result),
         coefficients=(() if airframe is None else coefficients(alone, airframe, condition, moved)),

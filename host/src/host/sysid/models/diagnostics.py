@@ -115,10 +115,7 @@ def references(
 
 
 def _references(model: LinearModel, spread: Array, theta: Array, small_share: float) -> Array:
-    """Return references of many parameter vectors, (vectors, parameters).
-
-    `spread` is common to all of them or has a row for each.
-    """
+    """Return references of many parameter vectors, (vectors, parameters)."""
     n, count = len(model.states), len(model.parameters)
     place = {p.name: k for k, p in enumerate(model.parameters)}
     entries = [
@@ -126,17 +123,15 @@ def _references(model: LinearModel, spread: Array, theta: Array, small_share: fl
         for t in model.terms
         if t.matrix in "AB"
     ]
-    spread = np.broadcast_to(spread, (len(theta), spread.shape[-1]))
     wide = np.repeat(np.hstack([model.A, model.B])[None], len(theta), axis=0)
     for k, row, column, gain in entries:
         wide[:, row, column] += gain * theta[:, k]
-    largest = np.max(np.abs(wide) * spread[:, None], axis=2)
+    largest = np.max(np.abs(wide) * spread, axis=2)
     floor = np.full((len(theta), count), np.inf)
     for k, row, column, gain in entries:
-        scale = abs(gain) * spread[:, column]
-        moved = scale > 0.0
-        share = small_share * largest[moved, row] / scale[moved]
-        floor[moved, k] = np.minimum(floor[moved, k], share)
+        scale = abs(gain) * spread[column]
+        if scale > 0.0:
+            floor[:, k] = np.minimum(floor[:, k], small_share * largest[:, row] / scale)
     result = np.abs(theta[:, :count])
     return np.where(np.isfinite(floor), np.maximum(result, floor), result)
 
@@ -168,7 +163,7 @@ class Refusal:
     ----------
     name : str
     relative_bound : float
-        Standard error over the reference value of the (plausible) estimate, the median of draws.
+        Standard error over the reference value of the (plausible) estimate.
     probability : float
         That the bound exceeds 100 % of the value.
     grade : str
@@ -209,61 +204,31 @@ class Judgement:
         return tuple(r.name for r in self.named if not grades or r.grade in grades)
 
 
-@dataclass(frozen=True, slots=True)
-class Draws:
-    """Parameter vectors that the data may have come from, each with the bound of a fit there.
+def plausible(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, Array]:
+    """Return mean and covariance of the parameters, drawn towards zero where nothing else holds.
 
-    Attributes
-    ----------
-    theta : Array, shape (draws, parameters)
-        Common parameters.
-    standard_error : Array, shape (draws, parameters), or (parameters,) where all share it
-    spread : Array, shape (draws, states + inputs), or (states + inputs,)
-        `regressor_rms` of the motion there.
-    """
-
-    theta: Array
-    standard_error: Array
-    spread: Array
-
-    def relative_bounds(self, model: LinearModel, small_share: float) -> Array:
-        """Return standard errors over reference values, each draw's own."""
-        values = _references(model, self.spread, self.theta, small_share)
-        return np.asarray(self.standard_error / np.maximum(values, 1e-300))
-
-
-def prior_deviation(result: FitResult, maneuvers: Sequence[Maneuver]) -> Array:
-    """Return the width of the prior about zero of each common parameter, infinite for none.
-
-    `PRIOR_WIDTH` times what alone would make up the whole state rate.
+    Where the data cannot tell entries of a row apart, estimates of either sign and any size cancel
+    each other, and comparing a bound with such a value hides that it is worthless. Each entry gets
+    a prior about zero, `PRIOR_WIDTH` times what alone would make up the whole state rate; entries
+    that the data determine do not move.
     """
     model = result.model
+    count = len(model.parameters)
     spread = regressor_rms(model, maneuvers)
     A, B, _, _ = model.matrices(result.estimate)
     z = [np.hstack([m.outputs[:, measured_columns(model)], m.inputs]) for m in maneuvers]
     wide = np.hstack([A, B])
     rates = np.concatenate([(block - block.mean(axis=0)) @ wide.T for block in z])
     rate_rms = np.sqrt(np.mean(rates**2, axis=0))
-    prior = np.full(len(model.parameters), np.inf)
+    n = len(model.states)
+    prior = np.full(count, np.inf)
     for k, parameter in enumerate(model.parameters):
         for term in model.terms:
             if term.parameter == parameter.name and term.matrix in "AB":
-                column = term.column + (len(model.states) if term.matrix == "B" else 0)
+                column = term.column + (n if term.matrix == "B" else 0)
                 scale = abs(term.gain) * spread[column]
                 if scale > 0.0:
                     prior[k] = min(prior[k], PRIOR_WIDTH * rate_rms[term.row] / scale)
-    return prior
-
-
-def plausible(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, Array]:
-    """Return mean and covariance of the parameters, drawn towards zero where nothing else holds.
-
-    Where the data cannot tell entries of a row apart, estimates of either sign and any size cancel
-    each other, and comparing a bound with such a value hides that it is worthless. Each entry gets
-    a prior about zero (`prior_deviation`); entries that the data determine do not move.
-    """
-    count = len(result.model.parameters)
-    prior = prior_deviation(result, maneuvers)
     covariance = result.covariance[:count, :count]
     known = np.isfinite(prior)
     total = covariance + np.diag(np.minimum(prior, 1e100) ** 2) + 1e-300 * np.eye(count)
@@ -288,52 +253,44 @@ def relative_bounds(
 
 
 def exceedance(
-    result: FitResult,
-    maneuvers: Sequence[Maneuver],
-    *,
-    small_share: float = SMALL_SHARE,
-    draws: Draws | None = None,
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
 ) -> tuple[Array, float]:
     """Return the probability that each bound exceeds 100 % of its value, and that any does.
 
     The value is as uncertain as its bound says, so one estimate over its bound decides badly near
-    100 %: values are drawn from what the fit knows of them, and each draw is compared. Without
-    `draws` they come from a normal distribution and are compared with the bound at the estimate.
+    100 %: values are drawn from what the fit knows of them, and each draw is compared.
     """
     model, count = result.model, len(result.model.parameters)
-    if draws is None:
-        mean, covariance = plausible(result, maneuvers)
-        value, vector = np.linalg.eigh(covariance)
-        root = vector * np.sqrt(np.maximum(value, 0.0))
-        theta = mean + np.random.default_rng(DRAW_SEED).standard_normal((DRAWS, count)) @ root.T
-        draws = Draws(theta, result.standard_error[:count], regressor_rms(model, maneuvers))
-    over = draws.relative_bounds(model, small_share) > REFUSAL_LIMIT
+    mean, covariance = plausible(result, maneuvers)
+    value, vector = np.linalg.eigh(covariance)
+    root = vector * np.sqrt(np.maximum(value, 0.0))
+    draws = mean + np.random.default_rng(DRAW_SEED).standard_normal((DRAWS, count)) @ root.T
+    values = _references(model, regressor_rms(model, maneuvers), draws, small_share)
+    over = result.standard_error[:count] > REFUSAL_LIMIT * values
     return np.asarray(np.mean(over, axis=0)), float(np.mean(np.any(over, axis=1)))
 
 
 def judge(
-    result: FitResult,
-    maneuvers: Sequence[Maneuver],
-    *,
-    small_share: float = SMALL_SHARE,
-    draws: Draws | None = None,
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
 ) -> Judgement:
     """Say whether a fit is refused, and name every parameter in doubt with its grade.
 
     A single estimate cannot always show that its bound is too large: one with a bound of 500 % lies
     beyond twice its own bound in one of twenty fits. So there are two grades and two odds, for the
-    fit (`probability` of any) and for each parameter. With `draws` it is they that are judged.
+    fit (`probability` of any) and for each parameter.
     """
-    if draws is None:
-        relative = relative_bounds(result, maneuvers, small_share=small_share)
-    else:
-        relative = np.median(draws.relative_bounds(result.model, small_share), axis=0)
-    single, any_of_them = exceedance(result, maneuvers, small_share=small_share, draws=draws)
+    relative = relative_bounds(result, maneuvers, small_share=small_share)
+    single, any_of_them = exceedance(result, maneuvers, small_share=small_share)
     named = tuple(
         _refusal(result, int(k), float(relative[k]), float(single[k]))
         for k in np.flatnonzero(single > DOUBT)
     )
     return Judgement(any_of_them, named)
+
+
+def refusals(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Refusal, ...]:
+    """Name the common parameters that these data cannot tell or tell doubtfully."""
+    return judge(result, maneuvers).named
 
 
 def _refusal(result: FitResult, k: int, relative: float, probability: float) -> Refusal:

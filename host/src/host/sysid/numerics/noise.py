@@ -47,18 +47,6 @@ class OutputNoise:
             return values
         return ar_filter(np.ascontiguousarray(values), self.coefficient, self.head)
 
-    def colour(self, innovations: Array) -> Array:
-        """Return noise of these innovations, (samples,): `whiten` undone."""
-        if self.order == 0:
-            return innovations
-        from scipy import signal  # 0.2 s that most answers need not wait for
-
-        polynomial = np.concatenate([[1.0], -self.coefficient])
-        first = np.linalg.solve(self.head, innovations[: self.order])
-        memory = signal.lfiltic([1.0], polynomial, first[::-1])
-        rest, _ = signal.lfilter([1.0], polynomial, innovations[self.order :], zi=memory)
-        return np.concatenate([first, rest])
-
     def log_determinant(self) -> float:
         """Log determinant of the noise covariance of a record, innovation variance one."""
         if self.order == 0:

@@ -15,7 +15,6 @@ from scipy import special
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.fit import fit
-from host.sysid.estimators.posterior import closer_look
 from host.sysid.models.diagnostics import (
     CANNOT,
     DOUBTFUL,
@@ -160,9 +159,8 @@ def check_model(
     start = np.concatenate([truth, np.zeros(len(model.states))]) if from_truth else None
     try:
         result = fit("output-error", model, [maneuver], start=start)
-        draws = closer_look(result, [maneuver])
-        judgement = judge(result, [maneuver], draws=draws)
-        plain = exceedance(result, [maneuver], small_share=0.0, draws=draws)[1]
+        judgement = judge(result, [maneuver])
+        plain = exceedance(result, [maneuver], small_share=0.0)[1]
     except IdentificationError as error:
         every = (Refusal(n, np.inf, 1.0, CANNOT, str(error)) for n in model.parameter_names)
         judgement, plain = Judgement(1.0, tuple(every)), 1.0
