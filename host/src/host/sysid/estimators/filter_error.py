@@ -34,7 +34,7 @@ FAR_FROM = 0.5  # bounds
 FARTHEST = 32.0
 VARIANCE = (0.01, 100.0)  # times what it was: most of one step
 MAX_ITERATIONS = 60
-NOISE_FLOOR = 1e-3  # of an output's deviation: an attitude filter's smoothness is not exactness
+NOISE_FLOOR = 1e-3  # of an output's deviation, or of the first guess of process noise
 # First guess of the deviations: sensors share the residuals of output error with process noise.
 # A guess of process noise that is too small starves the gain, and the search ends elsewhere.
 NOISE_SHARE, PROCESS_SHARE = 0.6, 2.7
@@ -80,16 +80,18 @@ def fit_filter_error(
     point = problem.evaluate(theta)
     if point is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
-    floor = np.log(
-        NOISE_FLOOR * np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
+    quiet = np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
+    # Noise that the data do not show would walk to nothing for ever, and the search with it.
+    floor = np.log(NOISE_FLOOR) + np.concatenate(
+        [theta[problem.n_model : problem.n_model + len(process)], np.log(quiet)]
     )
-    split = problem.n_model + len(process)
+    noise = slice(problem.n_model, None)
     damping, converged, iterations, size = 0.0, False, 0, np.inf
     parts, scores = scoring(problem, theta, point)
     information, gradient = summed(problem, theta, parts, scores)
     while iterations < MAX_ITERATIONS:
         held = np.zeros(len(theta), dtype=bool)
-        held[split:] = (theta[split:] <= floor) & (gradient[split:] < 0.0)
+        held[noise] = (theta[noise] <= floor) & (gradient[noise] < 0.0)
         held[: problem.n_model] = ~_free(problem.inner, theta, gradient)
         step, size = _step(information, gradient, damping, ~held)
         trial_theta = _reached(problem, theta, step, floor)
@@ -196,7 +198,7 @@ def _reached(
     goal = theta + far * step
     goal[noise] = theta[noise] + 0.5 * np.log(np.clip(1.0 + 2.0 * far * step[noise], *VARIANCE))
     goal[: problem.n_model] = np.clip(goal[: problem.n_model], inner.lower, inner.upper)
-    goal[-len(floor) :] = np.maximum(goal[-len(floor) :], floor)
+    goal[noise] = np.maximum(goal[noise], floor)
     return goal
 
 
