@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from host.cli import main
 from host.compiled import Array
-from host.sysid.aircraft.aircraft_file import airframe_data
+from host.sysid.aircraft.aircraft_file import airframe_data, powerplant
 from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
 from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document
 from host.sysid.answer.truth import read_truth, true_coefficients
@@ -73,7 +73,8 @@ def test_the_second_aircraft_is_the_first_ones_answer(saved: Path) -> None:
         table = tomllib.load(file)["aerodynamics"]
     columns, _ = read_columns(saved / "one/flight.csv")
     used = 0
-    for answer in identify(columns, airframe=airframe_data("ultrastick25e")):
+    known_of = airframe_data("ultrastick25e"), powerplant("ultrastick25e")
+    for answer in identify(columns, airframe=known_of[0], powerplant=known_of[1]):
         for c in answer.coefficients:
             axis, _, label = c.name.partition("_")
             key = f"{AXES.get(axis, axis)}_{CONTROLS.get(label, label)}"
