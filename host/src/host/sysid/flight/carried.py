@@ -180,6 +180,7 @@ class _Outputs:
         size = np.where(held, 1.0, np.sqrt(np.maximum(np.diag(H), 1e-300)))
         inverse = np.linalg.pinv(H / np.outer(size, size), rcond=SINGULAR, hermitian=True)
         self.inverse = inverse / np.outer(size, size)
+        self.inverse[held], self.inverse[:, held] = 0.0, 0.0  # not rounding: a bound stays one
 
     def step(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
         """Return by how much the whole estimate moves with model and data, (P,)."""

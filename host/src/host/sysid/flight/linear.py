@@ -315,7 +315,7 @@ def from_zero(coefficient: Coefficient) -> bool:
 def _held_out(found: list[Found]) -> list[Found]:
     """Hold out the last maneuver of every axis that was flown at least three times."""
     held = []
-    for axis in {f.axis for f in found}:
+    for axis in dict.fromkeys(f.axis for f in found):
         mine = [f for f in found if f.axis == axis]
         if len(mine) >= 3:
             held.append(mine[-1])
