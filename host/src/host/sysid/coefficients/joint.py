@@ -11,10 +11,9 @@ from host.compiled import Array
 from host.sysid.coefficients.rows import KINEMATIC
 from host.sysid.coefficients.step import STILL, Step
 from host.sysid.coefficients.stretches import Stretch, Unknowns, summed
-from host.sysid.coefficients.windows import Block, Key, row_weight, used
+from host.sysid.coefficients.windows import FLAT, Block, Key, row_weight, used
 from host.sysid.compatibility.signals import Spectrum
 
-FLAT = 1e-9  # a constant has no transform at whole periods but rounding
 LEAST_ELSEWHERE = 0.1  # of what is known of each term: a maneuver that alone tells it must stay
 
 

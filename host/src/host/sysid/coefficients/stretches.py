@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.compiled import Array, IntArray
-from host.sysid.coefficients.windows import Block, Key, degree, row_weight, used
+from host.sysid.coefficients.windows import FLAT, Block, Key, degree, row_weight, used
 from host.sysid.compatibility.signals import Spectrum
 
 
@@ -148,9 +148,10 @@ def _real(values: Spectrum) -> Array:
 
 
 def _basis(lines: Array) -> Array:
-    """Return orthonormal columns, (rows, k)."""
-    sizes = np.maximum(np.sqrt(np.einsum("ij,ij->j", lines, lines)), 1e-300)
-    return np.linalg.qr(lines / sizes)[0]
+    """Return orthonormal columns, (rows, k); what is only rounding spans nothing."""
+    sizes = np.sqrt(np.einsum("ij,ij->j", lines, lines))
+    there = sizes > FLAT * np.max(sizes)
+    return np.linalg.qr(lines[:, there] / sizes[there])[0]
 
 
 def summed(parts: Sequence[Stretch], count: int) -> Sums:

@@ -14,6 +14,7 @@ from host.sysid.errors import IdentificationError
 
 LOW_HZ, HIGH_HZ = 0.1, 4.5
 KINEMATIC_LOW_HZ = 0.4  # below, the attitude filter's own errors rule
+FLAT = 1e-9  # a constant has no transform at whole periods but rounding
 TRENDS = 4  # constant to cubic, taken out of the kinematic equations; constant and slope elsewhere
 SMOOTHING_HZ, GRID = 0.5, 12  # of residual spectra
 LEAST_S = 2.0  # shortest window
