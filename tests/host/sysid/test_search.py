@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators import search as searching
 from host.sysid.estimators.following import following_start, led_model
@@ -10,7 +11,7 @@ from host.sysid.estimators.start import start_values
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel, free_model
 from host.sysid.numerics.output_error import Optimum, minimise
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.problem import OutputProblem, Response
 from host.sysid.study.aircraft import navion_free
 from host.sysid.study.data import noisy
 from host.sysid.study.inputs import SHAPES
@@ -36,6 +37,32 @@ def test_cost_is_that_of_the_search() -> None:
     problem = OutputProblem(navion_free(), [noisy(1, 0.05)])
     optimum = minimise(problem, start_values(problem))
     assert white_cost(problem, optimum.theta) == pytest.approx(optimum.cost, rel=1e-12)
+
+
+def test_slopes_beyond_all_numbers_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, truth = drawn(1)
+    respond = problem.respond
+
+    def steep(theta: Array) -> list[Response] | None:
+        responses = respond(theta)
+        if responses is not None:
+            responses[0].slopes[0, -1, 0] = np.inf
+        return responses
+
+    monkeypatch.setattr(problem, "respond", steep)
+    with pytest.raises(IdentificationError, match="information matrix is not finite"):
+        minimise(problem, truth)
+
+
+def test_with_every_parameter_on_a_bound_nothing_is_said(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    problem, truth = drawn(1)
+    problem.lower, problem.upper = truth.copy(), truth.copy()
+    found = minimise(problem, truth)
+    assert found.converged
+    assert not found.free.any()
+    assert capfd.readouterr() == ("", "")  # LAPACK complains of a matrix without rows
 
 
 WRONG_VALLEYS = (9, 11, 24)  # of sixty, nine; the second's first search 'converges'

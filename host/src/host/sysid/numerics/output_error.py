@@ -26,6 +26,7 @@ LEAST_DAMPING = 1e-8
 DAMPED = 1e-2  # from here on a short step may be short because it is damped
 SINGULAR = 1e-15  # of the largest eigenvalue of the scaled information
 UNSEEN = 1e-12  # the same: below, a product of two inverses holds no digit
+NOT_FINITE = "the information matrix is not finite; scale or bound the parameters"
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,7 +276,11 @@ def _step(
     """Solve for the step over parameters not held by a bound; size is in Cramer-Rao bounds."""
     free = _free(problem, theta, gradient)
     step = np.zeros(len(theta))
+    if not free.any():
+        return step, free, 0.0
     block = information[np.ix_(free, free)]
+    if not np.isfinite(block).all():  # dpotrf factors NaN without a word
+        raise IdentificationError(NOT_FINITE)
     scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
     scaled = block / np.outer(scale, scale)
     ridge = max(damping, 1e-14)
@@ -283,9 +288,7 @@ def _step(
     while failed:
         ridge *= 10.0
         if not ridge <= MAX_DAMPING:
-            raise IdentificationError(
-                "the information matrix is not finite; scale or bound the parameters"
-            )
+            raise IdentificationError(NOT_FINITE)
         factor, failed = lapack.dpotrf(scaled + ridge * np.eye(len(block)), lower=1)
     inverse = np.tril(lapack.dtrtri(factor, lower=1)[0])
     move = inverse.T @ (inverse @ (gradient[free] / scale))
