@@ -64,8 +64,13 @@ def compiled_fast(function: Kernel) -> Kernel:
 def _compile(function: Kernel, *, reordered: bool) -> Kernel:
     if _COMPILER is None:
         return function
-    kernel = _COMPILER(cache=True, error_model="numpy", fastmath=reordered)(function)
-    _load_directly(kernel)
+    how = {"error_model": "numpy", "fastmath": reordered}
+    try:
+        kernel = _COMPILER(cache=True, **how)(function)
+    except RuntimeError:  # neither beside the source nor at home is room for a cache
+        kernel = _COMPILER(**how)(function)
+    else:
+        _load_directly(kernel)
     compiled_kernel: Kernel = kernel
     return compiled_kernel
 

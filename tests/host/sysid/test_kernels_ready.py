@@ -4,7 +4,11 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+from host.compiled import compiled
 
 SCRIPT = """
 import importlib, json, pkgutil
@@ -70,3 +74,10 @@ def test_machine_code_from_the_cache_does_not_wake_the_compiler(tmp_path: Path) 
     ]
     assert seen[0][0] == seen[1][0]
     assert [awake for _, awake in seen] == ["True", "False"]
+
+
+def test_a_kernel_is_compiled_where_no_cache_can_be() -> None:
+    found: dict[str, Callable[[float], Any]] = {}
+    # numba keeps no cache of what stands in no file, as of a file where nobody may write.
+    exec("def kernel(x):\n    return 2.0 * x\n", found)
+    assert compiled(found["kernel"])(3.0) == 6.0
