@@ -91,6 +91,30 @@ def test_an_output_does_not_replace_what_it_is_made_from(
                      (flight, model)))  # fmt: skip
 
 
+def test_models_named_after_the_first_replace_no_source(
+    tmp_path: Path, flight: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "plane_short-period_recursive.toml"
+    source.write_text("[coefficients]\nCm_alpha = -1.6\n")
+    model = tmp_path / "plane.toml"
+    prior = ("--aircraft", "ultrastick25e", "--prior", str(source))
+    both = ("--method", "recursive", *prior, "--save-model", str(model))
+    assert main(["identify", str(flight), *QUICK, *both]) == 2
+    assert f"would replace {source}" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [source]
+    assert source.read_text().startswith("[coefficients]")
+
+
+def test_a_file_in_a_folder_that_takes_none_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text("before")
+    monkeypatch.setattr(os, "access", lambda place, _: Path(place) != tmp_path)
+    with pytest.raises(IdentificationError, match=f"no permission to write to {tmp_path}$"):
+        check(Places(None, None, path, None, None, ()))
+
+
 def test_without_room_the_answer_is_said_and_nothing_is_left(
     tmp_path: Path,
     flight: Path,
@@ -172,6 +196,14 @@ def test_interrupted_writing_leaves_the_file_that_was_there(tmp_path: Path) -> N
         raise KeyboardInterrupt
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_called_part_is_left_alone(tmp_path: Path) -> None:
+    own = tmp_path / "model.part.toml"
+    own.write_text("mine")
+    with whole(tmp_path / "model.toml") as part:
+        part.write_text("x")
+    assert own.read_text() == "mine"
 
 
 def test_a_device_is_written_to_as_it_is(answers: list[Answer]) -> None:

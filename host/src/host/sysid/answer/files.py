@@ -28,7 +28,8 @@ def whole(path: Path) -> Iterator[Path]:
         If it cannot be written, or there is no room.
     """
     plain = path.is_file() or not path.exists()
-    part = path.with_name(f"{path.stem}.part{path.suffix}") if plain else path
+    # With the process in its name it is no file of the user's, nor another run's.
+    part = path.with_name(f"{path.stem}.part{os.getpid()}{path.suffix}") if plain else path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part
@@ -56,5 +57,7 @@ def refuse_place(option: str, path: Path, *, folder: bool) -> None:
     above = next(p for p in (path, *path.absolute().parents) if p.exists())
     if above != path and not above.is_dir():
         raise IdentificationError(f"{option} {path}: {above} is a file, no folder can be in it")
-    if not os.access(above, os.W_OK):
-        raise IdentificationError(f"{option} {path}: no permission to write to {above}")
+    # A file there before is replaced: that is written to its folder.
+    for place in (above, above.parent) if above.is_file() else (above,):
+        if not os.access(place, os.W_OK):
+            raise IdentificationError(f"{option} {path}: no permission to write to {place}")

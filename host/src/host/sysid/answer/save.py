@@ -129,7 +129,7 @@ def write(
         write_mat(places.model, answers, direct)
         written.append(places.model)
     elif places.model is not None and places.model.suffix.lower() == ".toml":
-        written += _write_models(places.model, answers)
+        written += _write_models(places.model, answers, (*places.given, *written))
     if places.plots is not None:
         from host.sysid.answer.pictures import draw_all, draw_coefficients
 
@@ -153,16 +153,23 @@ def _write_aircraft(
     return path
 
 
-def _write_models(path: Path, answers: Sequence[Answer]) -> list[Path]:
-    """Write the first answer under the name given, the others with theirs behind it."""
+def _write_models(path: Path, answers: Sequence[Answer], kept: Sequence[Path]) -> list[Path]:
+    """Write the first answer under the name given, the others with theirs behind it.
+
+    Those names are known only now: none may replace what the answer is made from or just wrote.
+    """
     from host.sysid.models.model_file import model_text
 
-    written = []
+    named = {}
     for number, (answer, label) in enumerate(zip(answers, labels(answers), strict=True)):
         behind = label.replace(" ", "_").replace("/", "_")
         own = path.with_name(f"{path.stem}_{behind}{path.suffix}") if number else path
-        text = model_text(answer.model, answer.result, answer.trim)
+        if own.exists() and any(k.exists() and own.samefile(k) for k in kept):
+            raise IdentificationError(
+                f"--save-model {path}: the model {label} would replace {own}; name another file"
+            )
+        named[own] = answer
+    for own, answer in named.items():
         with whole(own) as part:
-            part.write_text(text, encoding="utf-8")
-        written.append(own)
-    return written
+            part.write_text(model_text(answer.model, answer.result, answer.trim), encoding="utf-8")
+    return list(named)
