@@ -57,6 +57,13 @@ def test_a_maneuver_named_twice_counts_once(flight: Columns) -> None:
     assert windows == find(flight)[:2]
 
 
+def test_a_model_without_constants_is_simulated_as_it_is(flight: Columns) -> None:
+    bare = replace(SHORT_PERIOD, state_biases=(), initial_states=())
+    [answer] = identify(flight, names=("own",), user_model=bare, method="equation-error")
+    assert all(np.isfinite(y).all() and np.ptp(y) > 0.0 for y in answer.simulated)
+    assert [y.shape for y in answer.simulated] == [m.outputs.shape for m in answer.maneuvers]
+
+
 def test_a_model_of_ones_own_is_fitted_where_its_input_moved(flight: Columns) -> None:
     expected = [f.fit_window() for f in find(flight) if f.axis == "elevator_rad"]
     assert len(expected) == 2

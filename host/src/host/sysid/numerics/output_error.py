@@ -175,6 +175,8 @@ def covariance_of(information: Array, free: BoolArray) -> Array:
         If a parameter acts on no output at all.
     """
     covariance = np.zeros_like(information)
+    if not free.any():
+        return covariance
     block = information[np.ix_(free, free)]
     scale = np.sqrt(np.maximum(np.diag(block), 0.0))
     if np.any(scale == 0.0):
@@ -194,6 +196,8 @@ def unseen(information: Array, free: BoolArray) -> Array:
     rounding is left of them, which looks like a narrow interval.
     """
     result = np.zeros_like(information)
+    if not free.any():
+        return result
     block = information[np.ix_(free, free)]
     scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
     value, vector = np.linalg.eigh(block / np.outer(scale, scale))

@@ -177,7 +177,7 @@ class OutputProblem:
         CD_slopes = self._with_levers(AB[:, :-1], theta)
         result = []
         for number, part in enumerate(self._parts):
-            local = theta[part.index]
+            local = np.append(theta[part.index], 0.0)  # the last is what a place of -1 reads
             AB[:, -1] = 0.0
             for k, state in enumerate(model.state_biases):
                 AB[model.states.index(state), -1] = local[self.n_common + k]
@@ -196,12 +196,12 @@ class OutputProblem:
             finite, z = simulate(
                 step,
                 part.drive,
-                np.where(self._start_parameter >= 0, local[self._start_parameter], 0.0),
+                local[self._start_parameter],
             )
             if not finite:
                 return None
             y = CD @ z[:, : n + m].T
-            y += np.where(self._bias_parameter >= 0, local[self._bias_parameter], 0.0)[:, None]
+            y += local[self._bias_parameter][:, None]
             slope = self._room(number, (len(C), len(z), self._width))
             propagate(step, slopes, z, C, self._start_slopes, slope)
             for j in np.flatnonzero(self._bias_parameter >= 0):
@@ -249,19 +249,19 @@ class OutputProblem:
         none = np.zeros(0, dtype=np.int64)
         result: list[Array] = []
         for part in self._parts:
-            local = theta[part.index]
+            local = np.append(theta[part.index], 0.0)  # the last is what a place of -1 reads
             AB[:, -1] = 0.0
             for k, state in enumerate(model.state_biases):
                 AB[model.states.index(state), -1] = local[self.n_common + k]
             step, _ = transition(
                 AB, n, m, model.hold == "foh", part.dt_s, none, none, none, np.zeros(0), 0
             )
-            start = np.where(self._start_parameter >= 0, local[self._start_parameter], 0.0)
+            start = local[self._start_parameter]
             finite, z = simulate(step, part.drive, start)
             if not finite:
                 return None
             y = np.hstack([C, D]) @ z[:, : n + m].T
-            y += np.where(self._bias_parameter >= 0, local[self._bias_parameter], 0.0)[:, None]
+            y += local[self._bias_parameter][:, None]
             self._delay(y, np.zeros((len(y), 0, 0)), local, part.dt_s)
             result.append(y)
         return result
