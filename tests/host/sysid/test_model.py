@@ -1,5 +1,6 @@
 """Model descriptions: templates against a non-linear truth, TOML there and back, refusals."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term
 from host.sysid.errors import IdentificationError
 from host.sysid.models.delays import without_usual_delays
-from host.sysid.models.model import without_outputs
+from host.sysid.models.model import DelayGroup, without_outputs
 from host.sysid.models.model_file import model_from, model_text, parse_entry, read_model
 from host.sysid.models.modes import longitudinal_names
 from host.sysid.models.templates import (
@@ -260,3 +261,19 @@ def test_a_slow_pair_is_the_phugoid_also_where_the_fast_one_does_not_swing(
 ) -> None:
     """An overdamped short period left its name to the phugoid, 96 % off in frequency."""
     assert longitudinal_names([complex(r).imag > 0.0 for r in roots]) == names
+
+
+def test_numbers_of_numpy_are_written_as_numbers(tmp_path: Path) -> None:
+    two = np.float64(2.0)
+    model = template("longitudinal", TRIM, imu_sd_m=two / 100.0)
+    parameters = tuple(replace(p, lower=-two * 1e4, prior_sd=two) for p in model.parameters)
+    delays = (DelayGroup("delay_s", ("q_radps",), prior_sd_s=two, limit_s=two),)
+    levers = tuple(replace(x, gain=two) for x in model.levers)
+    model = replace(model, parameters=parameters, delays=delays, levers=levers)
+    path = tmp_path / "model.toml"
+    path.write_text(model_text(model), encoding="utf-8")
+    again = read_model(path)
+    named = {p.name: p for p in parameters}
+    assert {p.name: p for p in again.parameters} == named
+    assert len(again.levers) == len(levers) > 0
+    assert (again.delays, again.levers) == (delays, levers)

@@ -343,30 +343,30 @@ def model_text(
         lines.append(f"{label} = [" + ", ".join(rows) + "]")
     lines.append("[parameters]")
     for k, parameter in enumerate(model.parameters):
-        start = parameter.start if result is None else float(result.estimate[k])
-        parts = [f"start = {start!r}"]
+        start = parameter.start if result is None else result.estimate[k]
+        parts = [f"start = {_plain(start)}"]
         for key in ("lower", "upper", "prior_sd"):
             value = getattr(parameter, key)
             if np.isfinite(value):
-                parts.append(f"{key} = {value!r}")
+                parts.append(f"{key} = {_plain(value)}")
         lines.append(f"{_text(parameter.name)} = {{ {', '.join(parts)} }}")
     if result is not None:
         lines.append("[fit]")
         lines.append(f'method = "{result.method}"')
         half = result.half_width()
         for k, name in enumerate(result.names):
-            lines.append(f"{_text(name)} = [{float(result.estimate[k])!r}, {float(half[k])!r}]")
+            lines.append(f"{_text(name)} = [{_plain(result.estimate[k])}, {_plain(half[k])}]")
     if trim is not None:
         lines.append("[trim]")
         for key in ("airspeed_mps", "alpha_rad", "theta_rad"):
-            lines.append(f"{key} = {float(getattr(trim, key))!r}")
+            lines.append(f"{key} = {_plain(getattr(trim, key))}")
     for delay in model.delays:
         lines += [
             "[[delays]]",
             f"name = {_text(delay.name)}",
             f"outputs = {_list(delay.outputs)}",
-            f"prior_sd_s = {delay.prior_sd_s!r}",
-            f"limit_s = {delay.limit_s!r}",
+            f"prior_sd_s = {_plain(delay.prior_sd_s)}",
+            f"limit_s = {_plain(delay.limit_s)}",
         ]
     for lever in model.levers:
         lines += [
@@ -374,9 +374,13 @@ def model_text(
             f'output = "{lever.output}"',
             f'state = "{lever.state}"',
             f'parameter = "{lever.parameter}"',
-            f"gain = {lever.gain!r}",
+            f"gain = {_plain(lever.gain)}",
         ]
     return "\n".join(lines) + "\n"
+
+
+def _plain(value: float) -> str:
+    return repr(float(value))  # numpy's numbers call themselves np.float64(...)
 
 
 def _text(text: str) -> str:
@@ -390,12 +394,12 @@ def _list(names: tuple[str, ...]) -> str:
 def _entry(model: LinearModel, label: str, row: int, column: int) -> str:
     known = float(getattr(model, label)[row, column])
     pieces = [
-        f"{term.gain!r}*{term.parameter}"
+        f"{_plain(term.gain)}*{term.parameter}"
         for term in model.terms
         if (term.matrix, term.row, term.column) == (label, row, column)
     ]
     if not pieces:
-        return repr(known)
+        return _plain(known)
     if known != 0.0:
-        pieces.insert(0, repr(known))
+        pieces.insert(0, _plain(known))
     return '"' + " + ".join(pieces).replace("+ -", "- ") + '"'
