@@ -143,6 +143,14 @@ def test_a_full_disk_is_one_line(
     assert [path.name for path in Path().iterdir()] == ["flight.bin"]
 
 
+def test_an_unfinished_table_takes_no_file_of_the_users() -> None:
+    put("flight.bin", GOOD)
+    put("flight.part.csv", b"mine")
+    assert main(["decode", "flight.bin"]) == 0
+    assert Path("flight.part.csv").read_bytes() == b"mine"
+    assert sorted(path.suffix for path in Path().iterdir()) == [".bin", ".csv", ".csv"]
+
+
 def test_unknown_option_and_verb_end_in_2() -> None:
     for arguments in (["decode", "x", "y"], ["decode", "x", "--nonsense"], ["fly"]):
         with pytest.raises(SystemExit) as caught:

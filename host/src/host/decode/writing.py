@@ -75,7 +75,9 @@ def write_table(pieces: Iterable[Columns], kind: str, target: Path, meta: Meta) 
         If the place cannot be written to, or is full.
     """
     plain = target != STDOUT
-    part = target.with_name(f"{target.stem}.part{target.suffix}") if plain else target
+    # With the process in its name it is no file of the user's, nor another run's.
+    unfinished = f"{target.stem}.part{os.getpid()}{target.suffix}"
+    part = target.with_name(unfinished) if plain else target
     try:
         with _blamed_on(target):
             writer = open_writer(kind, part, meta)
