@@ -12,6 +12,7 @@ from typing import Any
 from host.errors import UsageError
 from host.export import FORMATS, open_writer
 from host.export.csv import STDOUT, printable
+from host.export.unfinished import unfinished
 from host.export.writer import Columns, Meta
 from host.log import FlightLog
 
@@ -75,9 +76,7 @@ def write_table(pieces: Iterable[Columns], kind: str, target: Path, meta: Meta) 
         If the place cannot be written to, or is full.
     """
     plain = target != STDOUT
-    # With the process in its name it is no file of the user's, nor another run's.
-    unfinished = f"{target.stem}.part{os.getpid()}{target.suffix}"
-    part = target.with_name(unfinished) if plain else target
+    part = unfinished(target) if plain else target
     try:
         with _blamed_on(target):
             writer = open_writer(kind, part, meta)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from host.export.unfinished import unfinished
 from host.sysid.errors import IdentificationError
 
 
@@ -28,8 +29,7 @@ def whole(path: Path) -> Iterator[Path]:
         If it cannot be written, or there is no room.
     """
     plain = path.is_file() or not path.exists()
-    # With the process in its name it is no file of the user's, nor another run's.
-    part = path.with_name(f"{path.stem}.part{os.getpid()}{path.suffix}") if plain else path
+    part = unfinished(path) if plain else path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part
