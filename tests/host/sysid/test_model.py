@@ -10,7 +10,8 @@ from host.sysid import LinearModel, Maneuver, Parameter, Term
 from host.sysid.errors import IdentificationError
 from host.sysid.models.delays import without_usual_delays
 from host.sysid.models.model import DelayGroup, without_outputs
-from host.sysid.models.model_file import model_from, model_text, parse_entry, read_model
+from host.sysid.models.model_file import model_from, parse_entry, read_model
+from host.sysid.models.model_text import model_text
 from host.sysid.models.modes import longitudinal_names
 from host.sysid.models.templates import (
     GRAVITY_MPS2,

@@ -12,7 +12,7 @@ import pytest
 from host.cli import main
 from host.sysid.errors import IdentificationError
 from host.sysid.models.model import LinearModel
-from host.sysid.models.model_file import model_text
+from host.sysid.models.model_text import model_text
 from host.sysid.models.templates import Trim, template
 from host.twin.aircraft import file as aircraft
 from host.twin.aircraft.airframe import Array

@@ -6,7 +6,6 @@ AVL or Datcom say; what is known of the aircraft widens the intervals (`aircraft
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +27,7 @@ from host.sysid.aircraft.conversion import (
 from host.sysid.aircraft.prior import read_prior
 from host.sysid.answer.units import parameter_unit
 from host.sysid.errors import IdentificationError
+from host.sysid.models.document import read_document
 from host.sysid.models.model_file import read_model, read_trim
 from host.sysid.models.templates import Trim, template
 
@@ -145,12 +145,7 @@ def convert(path: Path, aircraft: str, at: At) -> Converted:
 
 def _from_toml(path: Path) -> tuple[dict[str, tuple[float, float]], Trim | None]:
     """Return values with half-widths, and what they are about; nothing of a table over alpha."""
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise IdentificationError(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise IdentificationError(f"{path}: not TOML: {error}") from error
+    document = read_document(path)
     if "states" in document:
         model = read_model(path)
         fit = document.get("fit", {})

@@ -158,7 +158,7 @@ def _write_models(path: Path, answers: Sequence[Answer], kept: Sequence[Path]) -
 
     Those names are known only now: none may replace what the answer is made from or just wrote.
     """
-    from host.sysid.models.model_file import model_text
+    from host.sysid.models.model_text import model_text
 
     named = {}
     for number, (answer, label) in enumerate(zip(answers, labels(answers), strict=True)):

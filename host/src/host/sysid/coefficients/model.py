@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
+from host.sysid.models.document import read_document
 
 SIGNALS = ("alpha", "beta", "p", "q", "r", "de", "da", "dr", "V")
 LIFT = "CL"  # as a signal: the polar's
@@ -92,8 +92,8 @@ def standard_model() -> CoefficientModel:
 def is_coefficient_model(path: Path) -> bool:
     """Return whether a TOML file says of itself that it is one of these."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8")).get("kind") == KIND
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return bool(read_document(path).get("kind") == KIND)
+    except IdentificationError:
         return False  # whoever reads it says what is wrong
 
 
@@ -105,12 +105,7 @@ def read_coefficient_model(path: Path) -> CoefficientModel:
     IdentificationError
         Not TOML, a row absent or unknown, a term unknown or doubled; in one line.
     """
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise IdentificationError(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise IdentificationError(f"{path}: not TOML: {error}") from error
+    document = read_document(path)
     strangers = sorted(set(document) - set(KEYS))
     if strangers:
         raise IdentificationError(

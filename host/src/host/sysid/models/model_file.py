@@ -1,4 +1,4 @@
-"""Models as TOML: read what a user wrote, write what a fit found.
+"""Models as TOML: what a user wrote, or `model_text.py` of what a fit found.
 
 ```toml
 name = "short-period"
@@ -34,9 +34,7 @@ IMU, attitude and pitot, with the priors of the templates. An empty list frees n
 
 from __future__ import annotations
 
-import json
 import re
-import tomllib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import cast
@@ -46,8 +44,8 @@ import numpy as np
 from host.compiled import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.models.delays import delays_of
+from host.sysid.models.document import read_document
 from host.sysid.models.model import MATRICES, DelayGroup, Lever, LinearModel, Parameter, Term
-from host.sysid.models.result import FitResult
 from host.sysid.models.templates import Trim
 
 _PIECE = re.compile(
@@ -68,14 +66,7 @@ def read_model(path: Path) -> LinearModel:
     IdentificationError
         If the file is no TOML or no model; the line says where.
     """
-    try:
-        with path.open("rb") as file:
-            document = tomllib.load(file)
-    except OSError as error:
-        raise IdentificationError(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise IdentificationError(f"{path}: not TOML: {error}") from error
-    return model_from(document, str(path))
+    return model_from(read_document(path), str(path))
 
 
 def read_trim(path: Path) -> Trim:
@@ -86,7 +77,7 @@ def read_trim(path: Path) -> Trim:
     IdentificationError
         If the file has none: a model that a user wrote.
     """
-    table = tomllib.loads(path.read_text(encoding="utf-8")).get("trim", {})
+    table = read_document(path).get("trim", {})
     try:
         return Trim(*(float(table[key]) for key in ("airspeed_mps", "alpha_rad", "theta_rad")))
     except (KeyError, TypeError, ValueError):
@@ -310,96 +301,3 @@ def _levers(value: object, source: str) -> tuple[Lever, ...]:
         gain = _number(table.get("gain", 1.0), f"{source}: lever on {names[0]}: gain")
         result.append(Lever(names[0], names[1], names[2], gain))
     return tuple(result)
-
-
-def model_text(
-    model: LinearModel, result: FitResult | None = None, trim: Trim | None = None
-) -> str:
-    """Return a model as TOML; with a result, estimates become the start values.
-
-    Parameters
-    ----------
-    model : LinearModel
-        What to write.
-    result : FitResult, optional
-        Gives start values, and a [fit] table with standard errors.
-    trim : Trim, optional
-        Gives a [trim] table: what the model is about, for flying it again.
-    """
-    lines = [f"name = {_text(model.name)}"]
-    for key in ("states", "inputs", "outputs"):
-        lines.append(f"{key} = {_list(getattr(model, key))}")
-    lines.append(f'hold = "{model.hold}"')
-    for key in ("state_biases", "output_biases", "initial_states"):
-        lines.append(f"{key} = {_list(getattr(model, key))}")
-    if not model.delays:
-        lines.append("delays = []")
-    for label in MATRICES:
-        matrix = getattr(model, label)
-        rows = []
-        for i in range(matrix.shape[0]):
-            entries = [_entry(model, label, i, j) for j in range(matrix.shape[1])]
-            rows.append("[" + ", ".join(entries) + "]")
-        lines.append(f"{label} = [" + ", ".join(rows) + "]")
-    lines.append("[parameters]")
-    for k, parameter in enumerate(model.parameters):
-        start = parameter.start if result is None else result.estimate[k]
-        parts = [f"start = {_plain(start)}"]
-        for key in ("lower", "upper", "prior_sd"):
-            value = getattr(parameter, key)
-            if np.isfinite(value):
-                parts.append(f"{key} = {_plain(value)}")
-        lines.append(f"{_text(parameter.name)} = {{ {', '.join(parts)} }}")
-    if result is not None:
-        lines.append("[fit]")
-        lines.append(f'method = "{result.method}"')
-        half = result.half_width()
-        for k, name in enumerate(result.names):
-            lines.append(f"{_text(name)} = [{_plain(result.estimate[k])}, {_plain(half[k])}]")
-    if trim is not None:
-        lines.append("[trim]")
-        for key in ("airspeed_mps", "alpha_rad", "theta_rad"):
-            lines.append(f"{key} = {_plain(getattr(trim, key))}")
-    for delay in model.delays:
-        lines += [
-            "[[delays]]",
-            f"name = {_text(delay.name)}",
-            f"outputs = {_list(delay.outputs)}",
-            f"prior_sd_s = {_plain(delay.prior_sd_s)}",
-            f"limit_s = {_plain(delay.limit_s)}",
-        ]
-    for lever in model.levers:
-        lines += [
-            "[[levers]]",
-            f'output = "{lever.output}"',
-            f'state = "{lever.state}"',
-            f'parameter = "{lever.parameter}"',
-            f"gain = {_plain(lever.gain)}",
-        ]
-    return "\n".join(lines) + "\n"
-
-
-def _plain(value: float) -> str:
-    return repr(float(value))  # numpy's numbers call themselves np.float64(...)
-
-
-def _text(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)  # what JSON escapes, TOML does the same way
-
-
-def _list(names: tuple[str, ...]) -> str:
-    return "[" + ", ".join(_text(name) for name in names) + "]"
-
-
-def _entry(model: LinearModel, label: str, row: int, column: int) -> str:
-    known = float(getattr(model, label)[row, column])
-    pieces = [
-        f"{_plain(term.gain)}*{term.parameter}"
-        for term in model.terms
-        if (term.matrix, term.row, term.column) == (label, row, column)
-    ]
-    if not pieces:
-        return _plain(known)
-    if known != 0.0:
-        pieces.insert(0, _plain(known))
-    return '"' + " + ".join(pieces).replace("+ -", "- ") + '"'
