@@ -32,7 +32,7 @@ OTHER_FILES = {
 }
 
 
-@settings(max_examples=150, deadline=None, derandomize=True, database=None)
+@settings(max_examples=150)
 @given(seed=SEEDS, names=st.lists(st.sampled_from(sorted(DAMAGES)), min_size=1, max_size=4))
 def test_rows_of_every_intact_block_and_no_other(seed: int, names: list[str]) -> None:
     rng = np.random.default_rng(seed)
@@ -55,7 +55,7 @@ def test_log_cut_at_every_eighth_byte_of_a_block() -> None:
         check_rows(FLIGHT, data[:size])
 
 
-@settings(max_examples=60, deadline=None, derandomize=True, database=None)
+@settings(max_examples=60)
 @given(seed=SEEDS, names=st.lists(st.sampled_from(sorted(DAMAGES)), max_size=3))
 def test_agrees_with_the_independent_decoder(seed: int, names: list[str]) -> None:
     rng = np.random.default_rng(seed)

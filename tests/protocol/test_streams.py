@@ -12,7 +12,7 @@ from tests.protocol.oracle import decode_stream
 DAMAGES = (flip_bits, insert_bytes, remove_bytes, truncate)
 
 
-@settings(max_examples=150, deadline=None, derandomize=True, database=None)
+@settings(max_examples=150)
 @given(seed=st.integers(0, 2**32 - 1), damages=st.lists(st.sampled_from(DAMAGES), max_size=3))
 def test_damaged_stream_in_any_portions(seed: int, damages: list[Damage]) -> None:
     rng = np.random.default_rng(seed)

@@ -60,7 +60,7 @@ def largest_difference(folder: Path, axis: str, changed: str = "") -> dict[str, 
     )
     script = Path(__file__).with_name("jsbsim_run.py")
     subprocess.run(
-        [sys.executable, str(script), str(folder)], check=True, timeout=60, capture_output=True
+        [sys.executable, str(script), str(folder)], check=True, timeout=600, capture_output=True
     )
     peer = np.load(folder / "output.npz")["states"]
     phi, theta, _ = euler(ours[:-1, 6:10])
