@@ -3,6 +3,8 @@
 .PHONY: help setup demo test native mega sitl lint format bench study flight-bench imu-bench faults power-cuts clean
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
+# Runs a module of tests/chip in that folder; the simulator's package lies beside it.
+CHIP_PYTHON := PYTHONPATH=../simulator ../../$(PYTHON)
 # mkfs.vfat and fsck.vfat live where only root looks.
 export PATH := $(PATH):/usr/sbin:/sbin
 
@@ -44,16 +46,16 @@ study: setup sitl ## tables and pictures of identification in build/study (SIZE=
 	@$(PYTHON) -m host.sysid.study build/study --size $(or $(SIZE),small)
 
 flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
-	@cd tests/simavr && { ../../$(PYTHON) -m flight.bench $(BENCH); bad=$$?; ../../$(PYTHON) -m imu.bench --minutes 1 && exit $$bad; }
+	@cd tests/chip && { $(CHIP_PYTHON) -m flight.bench $(BENCH); bad=$$?; $(CHIP_PYTHON) -m imu.bench --minutes 1 && exit $$bad; }
 
 imu-bench: setup ## the IMU's image and the Mega's on one bus for ten minutes, sample by sample
-	@cd tests/simavr && ../../$(PYTHON) -m imu.bench $(IMU_BENCH)
+	@cd tests/chip && $(CHIP_PYTHON) -m imu.bench $(IMU_BENCH)
 
 faults: setup ## faults in flight on the simulated chip
-	@cd tests/simavr && { ../../$(PYTHON) -m flight.faults $(FAULTS); bad=$$?; ../../$(PYTHON) -m imu.faults && exit $$bad; }
+	@cd tests/chip && { $(CHIP_PYTHON) -m flight.faults $(FAULTS); bad=$$?; $(CHIP_PYTHON) -m imu.faults && exit $$bad; }
 
 power-cuts: setup ## power cuts in flight, of metadata, and the next boot (minutes)
-	@cd tests/simavr && ../../$(PYTHON) -m flight.power_cuts $(CUTS)
+	@cd tests/chip && $(CHIP_PYTHON) -m flight.power_cuts $(CUTS)
 
 clean: ## remove what builds made; .venv and downloads stay
 	rm -rf .pio build/sitl build/logs build/fatfs-*

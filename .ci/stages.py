@@ -122,9 +122,9 @@ def stages() -> list[Stage]:
 
 def pytest_stages() -> Iterator[Stage]:
     """Describe one stage per folder of tests/ that pytest can run."""
-    needs = {"sitl": ("library",), "simavr": ("mega",)}
-    after = {"simavr": ("native", "mega", "avr"), "layering": ("mega",)}
-    order = {"layering": 0, "protocol": 1, "host": 2, "sitl": 3, "simavr": 4}
+    needs = {"sitl": ("library",), "chip": ("mega",)}
+    after = {"chip": ("native", "mega", "avr"), "layering": ("mega",)}
+    order = {"layering": 0, "protocol": 1, "host": 2, "sitl": 3, "chip": 4}
     folders = {path.relative_to(ROOT / "tests").parts[0] for path in _test_files()}
     for name in sorted(folders - {"firmware"}, key=lambda folder: (order.get(folder, 9), folder)):
         command = (PYTHON, "-m", "pytest", f"tests/{name}", f"--junit-xml={report_path(name)}")

@@ -41,7 +41,11 @@ FORBIDDEN_IMPORTS = {
     "protocol": {"host", "tests", "firmware", "hw"},
     "hw": {"host", "tests", "firmware"},
     "firmware": {"host", "tests", "hw"},
+    # A product of its own: it knows no image of ours, nor what flies them.
+    "tests/simulator": {"host", "protocol", "flight", "imu", "hal", "devices", "replay"},
 }
+# Nor does it read what describes them.
+OURS = re.compile(r"frames\.toml|pin_map|settings\.toml|\.pio\b")
 
 # Rooms inside the host package, from the ground up: each may import those before it.
 HOST_FLOORS: dict[str, tuple[str, ...]] = {
@@ -137,6 +141,14 @@ def link_breaches(root: Path) -> Iterator[str]:
             yield f"{path.relative_to(root)}: the simulator is a program of its own, never linked"
 
 
+def simulator_breaches(root: Path) -> Iterator[str]:
+    """Yield a line where the simulator names a file that describes our images."""
+    for path in _files(root / "tests" / "simulator", {".py", ".c", ".h"}):
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+            if found := OURS.search(line):
+                yield f"{path.relative_to(root)}:{number}: the simulator may not know {found[0]}"
+
+
 RULES = (
     include_breaches,
     board_breaches,
@@ -145,6 +157,7 @@ RULES = (
     import_breaches,
     floor_breaches,
     link_breaches,
+    simulator_breaches,
 )
 
 
@@ -213,6 +226,8 @@ PLANTED = [
     ),
     (floor_breaches, "host/src/host/log/head.py", "from host.sysid.models.model import Term"),
     (floor_breaches, "host/src/host/log/head.py", "from host.decode.summary import summarise"),
+    (import_breaches, "tests/simulator/simavr_bench/relay.py", "from flight.rig import make_card"),
+    (simulator_breaches, "tests/simulator/speed.py", 'PINS = "hw/pin_map.toml"'),
     (link_breaches, "host/src/host/twin/recorder/mega.py", 'LIBRARY = "libsimavr.so"'),
 ]
 

@@ -34,7 +34,7 @@ from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli
 from host.twin.sensors.mega_clock import TICKS_PER_S
 from host.twin.testcard.faults import Fault, recorder_actions
 
-REPLAY = CLONE / "tests" / "simavr" / "replay.py"
+REPLAY = CLONE / "tests" / "chip" / "replay.py"
 ELF = CLONE / ".pio" / "build" / "mega2560" / "firmware.elf"
 PACKET_ROOM = 40
 DEFAULT_RATE_HZ = 100
@@ -65,7 +65,7 @@ def record(
     check_duration(given)
     elf = Path(os.environ.get("HOST_ELF", ELF))
     replay = Path(os.environ.get("HOST_REPLAY", REPLAY))
-    for path, how in ((elf, "`pio run`"), (replay, "a clone with tests/simavr")):
+    for path, how in ((elf, "`pio run`"), (replay, "a clone with tests/chip")):
         if not path.is_file():
             raise UsageError(f"no {path}: --firmware avr needs {how}; --firmware sitl does not")
     with tempfile.TemporaryDirectory() as name:

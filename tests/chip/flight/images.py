@@ -1,0 +1,75 @@
+"""The images a user builds and uploads, by the commands a user types."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from simavr_bench.pty_bridge import PtyBridge
+
+ROOT = Path(__file__).resolve().parents[3]
+# A build folder of its own: other work may be building the same image.
+BUILD = ROOT / "build" / "chip" / "flight" / "pio"
+
+
+def _command(environment: str, *options: str) -> list[str]:
+    return [str(Path(sys.executable).with_name("pio")), "run", "-e", environment, *options]
+
+
+def _variables() -> dict[str, str]:
+    return {**os.environ, "PLATFORMIO_BUILD_DIR": str(BUILD)}
+
+
+def build_image(environment: str) -> Path:
+    """Build the image that `pio run` makes.
+
+    Parameters
+    ----------
+    environment : str
+        Of platformio.ini: ``mega2560`` or ``arduimu``.
+
+    Returns
+    -------
+    Path
+        The ELF.
+
+    Raises
+    ------
+    RuntimeError
+        If the build fails; the text is its last lines.
+    """
+    done = subprocess.run(
+        _command(environment),
+        cwd=ROOT,
+        env=_variables(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        said = f"{done.stdout[-2000:]}{done.stderr}"
+        raise RuntimeError(f"building the image {environment} failed:\n{said}")
+    return BUILD / environment / "firmware.elf"
+
+
+def upload(environment: str, bridge: PtyBridge) -> str:
+    """Run PlatformIO's upload to the terminal of a chip and give what it says."""
+    with subprocess.Popen(
+        _command(environment, "-t", "upload", "--upload-port", bridge.path),
+        cwd=ROOT,
+        env=_variables(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as running:
+        try:
+            bridge.serve(lambda: running.poll() is not None, limit_s=240.0)
+        finally:
+            running.kill()
+        said: str = running.communicate()[0]
+        assert running.returncode == 0, said
+    return said
