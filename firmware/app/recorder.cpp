@@ -184,6 +184,9 @@ void Recorder::put_heads(uint32_t now_us) {
   frames::IdentityFrame who;
   identity(&who, now_us);
   outlet_.put(who);
+  const storage::FlightFile& file = volume_.file();
+  const frames::FileFrame made = {now_us, file.number, file.blocks * hal::kCardBlockBytes};
+  outlet_.put(made);
   frames::BaroCoefficientsFrame words;
   if (sensors_.coefficients(&words, now_us)) outlet_.put(words);
 }

@@ -11,7 +11,7 @@
 namespace frames {
 
 constexpr uint8_t kVersion = 1;
-constexpr uint32_t kSchemaHash = 0xED9C9547u;
+constexpr uint32_t kSchemaHash = 0xA5A6E867u;
 constexpr size_t kMaxWireSize = 68;  // longest frame with its id
 
 // Bits of `valid`.
@@ -89,6 +89,19 @@ enum class ImuAux : uint8_t {
   kStatus = 2,
 };
 
+enum class FileState : uint8_t {
+  kGood = 0,
+  kNotAFile = 1,
+  kReadOnly = 2,
+  kOutOfRange = 3,
+  kChainShort = 4,
+  kChainLong = 5,
+  kNotInOnePiece = 6,
+  kCyclic = 7,
+  kChainBroken = 8,
+  kFolderBroken = 9,
+};
+
 enum class Drive : uint8_t {
   kDirectBoot = 0,
   kDirectSwitch = 1,
@@ -126,6 +139,9 @@ enum class Event : uint8_t {
   kMark = 24,
   kFileLow = 25,
   kReceiverStorm = 26,
+  kFileOdd = 27,
+  kFileMended = 28,
+  kUnrecorded = 29,
 };
 
 // All identification channels at one instant. A new-type IMU packet triggers it (every n-th at lower rates), or the timer 1.5 periods after the last trigger.
@@ -526,6 +542,22 @@ static_assert(offsetof(BaroCoefficientsFrame, sensor) == 4, "offset of BaroCoeff
 static_assert(offsetof(BaroCoefficientsFrame, oversampling) == 5, "offset of BaroCoefficientsFrame::oversampling");
 static_assert(offsetof(BaroCoefficientsFrame, words) == 6, "offset of BaroCoefficientsFrame::words");
 
+// The file this session was written into, as it was made; heads each session and returns about every minute.
+struct __attribute__((packed)) FileFrame {
+  uint32_t t_us;  // us
+  uint32_t number;  // nnnnn of FLTnnnnn.BIN
+  uint32_t preallocated;  // byte; size of the file until it is closed; blocks behind its last may be of older logs. Logs without this frame: 67108864
+
+  static constexpr uint8_t id() { return 11; }
+  static constexpr uint8_t wire_size() { return 13; }
+};
+constexpr uint8_t kFileId = 11;
+constexpr uint8_t kFileWireSize = 13;  // with the id byte
+static_assert(sizeof(FileFrame) == 12, "size of FileFrame");
+static_assert(offsetof(FileFrame, t_us) == 0, "offset of FileFrame::t_us");
+static_assert(offsetof(FileFrame, number) == 4, "offset of FileFrame::number");
+static_assert(offsetof(FileFrame, preallocated) == 8, "offset of FileFrame::preallocated");
+
 // Packet of our own ArduIMU firmware; ends in CRC-16/CCITT-FALSE over all bytes before it. Signs and scales as in frame ident.
 struct __attribute__((packed)) ImuPacket {
   uint8_t kind;  // marks this kind of packet
@@ -637,6 +669,8 @@ constexpr uint8_t wire_size(uint8_t id) {
       return 63;
     case 10:
       return 31;
+    case 11:
+      return 13;
     default:
       return 0;
   }

@@ -10,7 +10,7 @@ import pytest
 from host.wire.blocks import scan
 from host.wire.extents import data_extents
 from host.wire.frames import find_schemas, frame_pieces
-from host.wire.schema import packed_schema
+from host.wire.schema import known_schemas, packed_schema, parse_schema
 
 from tests.host.logs import ROOT
 from tests.protocol.flights import simple_log
@@ -36,7 +36,7 @@ def test_case(tmp_path: Path, case: dict[str, Any]) -> None:
         assert int(getattr(blocks, key)[0]) == case[key], key
     if case["kind"] == 1:
         return
-    schema = packed_schema()
+    schema = parse_schema(known_schemas()[case["schema_hash"]])
     (piece,) = frame_pieces(path, blocks, schema, list(schema.by_name))
     found = [row.tobytes() for frames in piece.frames.values() for row in frames.data]
     assert sorted(found) == sorted(unhex(frame) for frame in case["frames"])

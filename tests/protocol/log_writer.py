@@ -52,6 +52,12 @@ def schema_text() -> bytes:
     return path.read_bytes().split(b"\n")[1]
 
 
+def released_texts() -> list[bytes]:
+    """Return the text of every schema that firmware was released with, today's first."""
+    old = sorted((ROOT / "protocol/released").glob("*.json"))
+    return [schema_text(), *(path.read_bytes().split(b"\n")[1] for path in old)]
+
+
 def layouts(text: bytes) -> dict[str, np.dtype[np.void]]:
     """Return the packed dtype of every frame of a schema text; its first field is the id."""
     frames = json.loads(text)["frames"]

@@ -13,6 +13,14 @@ _FILES = {
     "default.toml": Path("hw/calibration/default.toml"),
 }
 
+# Schemas of released formats that the firmware of today no longer writes, a file each.
+_RELEASED = (PACKED / "released", CLONE / "protocol/released")
+
+
+def released_schemas() -> list[Path]:
+    """Return the files of schemas that logs of earlier firmware follow."""
+    return next((sorted(folder.glob("*.json")) for folder in _RELEASED if folder.is_dir()), [])
+
 
 def resource(name: str) -> Path:
     """Return the path of a packed file.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from host.errors import LogError
 from host.wire.blocks import HEADER_BYTES, KIND_FRAMES, KIND_SCHEMA, Blocks, read_at
 from host.wire.extents import BLOCK_BYTES
-from host.wire.schema import Schema, packed_schema, parse_schema
+from host.wire.schema import Schema, known_schemas, parse_schema
 
 BLOCKS_AT_ONCE = 4096  # 2 MiB: frames and columns of one piece stay in the cache
 SCHEMA_PIECE = Struct("offset" / Int16ul, "total" / Int16ul, "text" / GreedyBytes)
@@ -59,8 +59,8 @@ class Piece:
 def find_schemas(path: Path, blocks: Blocks) -> dict[int, Schema]:
     """Return the schema of each hash that the log's blocks name.
 
-    The log's own text comes first; a log whose copies are all damaged is read with the packed
-    schema if the hash is the same. A hash that stays unknown is absent.
+    The log's own text comes first; a log whose copies are all damaged is read with the schema
+    of that hash that some firmware was released with. A hash that stays unknown is absent.
 
     Parameters
     ----------
@@ -77,8 +77,8 @@ def find_schemas(path: Path, blocks: Blocks) -> dict[int, Schema]:
         for value in np.unique(blocks.schema_hash).tolist():
             pieces = np.flatnonzero((blocks.schema_hash == value) & (blocks.kind == KIND_SCHEMA))
             text = _schema_text(file, blocks, pieces)
-            if text is None and value == packed_schema().hash:
-                text = packed_schema().text
+            if text is None:
+                text = known_schemas().get(value)
             if text is None:
                 continue
             schema = parse_schema(text)

@@ -7,12 +7,13 @@ import re
 import zlib
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from host.errors import LogError
-from host.resources import resource
+from host.resources import released_schemas, resource
 
 _TYPES = {
     "u8": "u1",
@@ -183,13 +184,23 @@ def parse_schema(text: str) -> Schema:
 
 
 @lru_cache(maxsize=1)
+def known_schemas() -> dict[int, str]:
+    """Return the texts of all schemas that firmware was ever released with, by their hash."""
+    texts = [_text_of(path) for path in (resource("schema.json"), *released_schemas())]
+    return {zlib.crc32(text.encode("ascii")): text for text in texts}
+
+
+def _text_of(path: Path) -> str:
+    return path.read_text(encoding="ascii").split("\n")[1]
+
+
+@lru_cache(maxsize=1)
 def packed_schema() -> Schema:
     """Return the schema this host tool was built with.
 
-    Logs that lost their own copy, and writers of synthetic logs, use it.
+    Writers of synthetic logs use it.
     """
-    text = resource("schema.json").read_text(encoding="ascii").split("\n")[1]
-    return parse_schema(text)
+    return parse_schema(_text_of(resource("schema.json")))
 
 
 def _field(columns: list[str], row: list[Any]) -> Field:
