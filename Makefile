@@ -43,7 +43,7 @@ bench: setup ## damage, speed and identification beside their peers
 	@$(PYTHON) tests/bench/identification.py
 
 study: setup sitl ## tables and pictures of identification in build/study (SIZE=full: half an hour)
-	@$(PYTHON) -m host.sysid.study build/study --size $(or $(SIZE),small)
+	@cd host && ../$(PYTHON) -m studies ../build/study --size $(or $(SIZE),small)
 
 flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
 	@cd tests/chip && { $(CHIP_PYTHON) -m flight.bench $(BENCH); bad=$$?; $(CHIP_PYTHON) -m imu.bench --minutes 1 && exit $$bad; }

@@ -123,7 +123,7 @@ fi
 
 # --- compiled kernels ------------------------------------------------------------------------
 
-inputs="$({ find host/src/host/compiled.py host/src/host/twin host/src/host/sysid -name '*.py' |
+inputs="$({ find host/src/host/compiled.py host/src/host/aircraft host/src/host/twin host/src/host/sysid -name '*.py' |
   sort | xargs cat
   .venv/bin/pip --version; pwd; } | sha256sum | cut -c1-64)"
 if ! grep -qsx "$inputs" .cache/kernels-done; then

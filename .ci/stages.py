@@ -33,7 +33,7 @@ WORKERS = min(2, os.cpu_count() or 1)
 TAIL_LINES = 40
 GENERATOR = re.compile(r"/generate(_\w+)?\.py$")
 
-PYTHON_FOLDERS = ("host/src", "protocol", "tests", "hw", "firmware", ".ci")
+PYTHON_FOLDERS = ("host/src", "host/studies", "protocol", "tests", "hw", "firmware", ".ci")
 CPP_FOLDERS = ("firmware", "tests", "protocol")
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from host.twin.aircraft.airframe import DOWN, NORTH, Q0, Q3
+from host.aircraft.airframe import DOWN, NORTH, Q0, Q3
+from host.aircraft.attitude import euler
 from host.twin.flight.fly import STEP_S, FlightRecord, fly
-from host.twin.motion.attitude import euler
 from host.twin.sensors.airdata import AirData, air_data
 from host.twin.sensors.filters import delayed
 from host.twin.sensors.imu import FIELD_NED_T, imu

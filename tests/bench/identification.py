@@ -25,8 +25,8 @@ import numpy as np
 from host.sysid.estimators.start import start_values
 from host.sysid.numerics.output_error import covariance_of, minimise
 from host.sysid.numerics.problem import OutputProblem
-from host.sysid.study.aircraft import navion_free
-from host.sysid.study.data import noisy
+from studies.aircraft import navion_free
+from studies.data import noisy
 
 from tests.bench import identification_hopfield, identify_log
 from tests.bench.identification_peers import aeroid_fit, lsim_s, scipy_distance

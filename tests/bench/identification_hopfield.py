@@ -19,8 +19,8 @@ from host.compiled import Array
 from host.sysid.estimators.hopfield import iterate_until, largest_stable_gain, network
 from host.sysid.estimators.rows import solve_normal
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.study.aircraft import FOOT_M, navion_free
-from host.sysid.study.data import with_rates
+from studies.aircraft import FOOT_M, navion_free
+from studies.data import with_rates
 
 RHO = 200.0
 SHARE = 0.01  # of the norm of the least-squares answer

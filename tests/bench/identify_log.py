@@ -110,7 +110,7 @@ def imports_s() -> float:
     """Return the processor seconds that Python and the imports of the verb take alone."""
     code = "import host.sysid.flight.linear, host.sysid.answer.verdict, host.log"
     code += ", host.sysid.flight.tables, host.sysid.compatibility.reconstruction"
-    code += ", host.sysid.aircraft.aircraft_file"
+    code += ", host.aircraft.mass_properties"
     before = os.times()
     subprocess.run([sys.executable, "-c", code], check=True)
     after = os.times()

@@ -35,9 +35,11 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*(<[^>]+>|"[^"]+"|\S+)', re.MULTILINE)
 BANNED = re.compile(r"\b(virtual|new|malloc|calloc|realloc|throw|float|double)\b|\bstd::")
 COMMENT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 
+OUTSIDE = {"tests", "protocol", "firmware", "hw", "simavr", "pytest", "hypothesis"}
 # Python packages of this tree; a room names those it must not import.
 FORBIDDEN_IMPORTS = {
-    "host/src": {"tests", "protocol", "firmware", "hw", "simavr", "pytest", "hypothesis"},
+    "host/src": {"studies", *OUTSIDE},
+    "host/studies": OUTSIDE,
     "protocol": {"host", "tests", "firmware", "hw"},
     "hw": {"host", "tests", "firmware"},
     "firmware": {"host", "tests", "hw"},
@@ -49,15 +51,24 @@ OURS = re.compile(r"frames\.toml|pin_map|settings\.toml|\.pio\b")
 
 # Rooms inside the host package, from the ground up: each may import those before it.
 HOST_FLOORS: dict[str, tuple[str, ...]] = {
-    "host": ("wire", "physical", "export", "original", "link", "log", "decode"),
-    "host.twin": ("aircraft", "testcard", "motion", "flight", "sensors", "recorder", "outcome"),
+    "host": (
+        *("wire", "physical", "export", "original", "link", "log", "decode"),
+        *("aircraft", "instrument", "twin", "sysid", "planning", "verbs"),
+    ),
+    "host.twin": ("faults", "testcard", "flight", "sensors", "recorder", "outcome"),
     "host.sysid": (
-        *("models", "numerics", "estimators", "aircraft", "compatibility"),
-        *("flight", "coefficients", "answer", "study"),
+        *("models", "numerics", "estimators", "aerodynamics", "compatibility"),
+        *("flight", "coefficients", "answer"),
     ),
 }
-# Reading a log needs neither flight nor identification.
-HOST_ATTICS = {"twin", "sysid", "verbs"}
+# Modules beside the rooms that start programs or give the package its names.
+PROGRAMS = {"__init__", "__main__", "cli", "virtual"}
+# Whatever the order above: the virtual flight and identification meet in `planning` and in the
+# studies only, what is physics knows no test card.
+HOST_NEVERS = (
+    ("host.sysid", "host.twin"),
+    ("host.twin.sensors", "host.twin.testcard"),
+)
 
 
 def include_breaches(root: Path) -> Iterator[str]:
@@ -114,7 +125,7 @@ def import_breaches(root: Path) -> Iterator[str]:
     for folder, forbidden in FORBIDDEN_IMPORTS.items():
         for path in _files(root / folder, {".py"}):
             tree = ast.parse(path.read_text(encoding="utf-8"))
-            for number, module in _imports(tree):
+            for number, module in _imports(tree, path):
                 if module.split(".")[0] in forbidden:
                     yield f"{path.relative_to(root)}:{number}: may not import {module}"
 
@@ -124,14 +135,24 @@ def floor_breaches(root: Path) -> Iterator[str]:
     for package, floors in HOST_FLOORS.items():
         base = root / "host" / "src" / Path(*package.split("."))
         for path in _files(base, {".py"}):
-            room = path.relative_to(base).parts[0]
-            above = set(floors[floors.index(room) + 1 :]) if room in floors else set()
-            if package == "host" and room not in HOST_ATTICS:
-                above |= HOST_ATTICS
-            for number, module in _imports(ast.parse(path.read_text(encoding="utf-8"))):
+            room = _room(path.relative_to(base))
+            # A module beside the rooms (errors, resources) is the ground they stand on, but for
+            # those that start programs.
+            floor = floors.index(room) + 1 if room in floors else 0
+            above = set(floors[floor:]) if room not in PROGRAMS else set()
+            for number, module in _imports(ast.parse(path.read_text(encoding="utf-8")), path):
                 rest = module.removeprefix(f"{package}.")
                 if rest != module and rest.split(".")[0] in above:
                     yield f"{path.relative_to(root)}:{number}: {room} may not import {module}"
+
+
+def never_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every import between rooms that never know each other."""
+    for reader, hidden in HOST_NEVERS:
+        for path in _files(root / "host" / "src" / Path(*reader.split(".")), {".py"}):
+            for number, module in _imports(ast.parse(path.read_text(encoding="utf-8")), path):
+                if module == hidden or module.startswith(f"{hidden}."):
+                    yield f"{path.relative_to(root)}:{number}: {reader} may not import {module}"
 
 
 def link_breaches(root: Path) -> Iterator[str]:
@@ -156,6 +177,7 @@ RULES = (
     suite_breaches,
     import_breaches,
     floor_breaches,
+    never_breaches,
     link_breaches,
     simulator_breaches,
 )
@@ -180,12 +202,29 @@ def _code(path: Path, *, keep_strings: bool = False) -> str:
     return COMMENT.sub(blank, path.read_text(encoding="utf-8"))
 
 
-def _imports(tree: ast.Module) -> Iterator[tuple[int, str]]:
+def _room(inside: Path) -> str:
+    """Return the folder or module a file is, seen from its package."""
+    return inside.parts[0].removesuffix(".py")
+
+
+def _imports(tree: ast.Module, path: Path) -> Iterator[tuple[int, str]]:
+    """Yield line and module of every import: in functions, relative ones and those by name too."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, name.name) for name in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            yield from ((node.lineno, f"{node.module}.{name.name}") for name in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            module = node.module or ""
+            if node.level:
+                inside = path.parts.index("src") + 1 if "src" in path.parts else len(path.parts)
+                folders = path.parts[inside:-1]
+                kept = folders[: len(folders) - node.level + 1]
+                module = ".".join((*kept, *filter(None, [module])))
+            yield from ((node.lineno, f"{module}.{name.name}") for name in node.names)
+        elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+            called = node.func.attr if isinstance(node.func, ast.Attribute) else node.func
+            name = called.id if isinstance(called, ast.Name) else called
+            if name in ("import_module", "__import__"):
+                yield node.lineno, str(node.args[0].value)
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
@@ -221,9 +260,35 @@ PLANTED = [
     (floor_breaches, "host/src/host/sysid/models/model.py", "import host.sysid.flight.finder"),
     (
         floor_breaches,
-        "host/src/host/twin/motion/air.py",
+        "host/src/host/aircraft/air.py",
         "def f():\n    from host.twin.flight import fly",
     ),
+    (floor_breaches, "host/src/host/aircraft/trim.py", "from host.instrument import errors"),
+    (floor_breaches, "host/src/host/instrument/errors.py", "from host.sysid import Maneuver"),
+    (floor_breaches, "host/src/host/twin/flight/fly.py", "import host.sysid.models.model"),
+    (floor_breaches, "host/src/host/twin/flight/fly.py", "from ...sysid.models import model"),
+    (floor_breaches, "host/src/host/twin/flight/fly.py", 'import_module("host.sysid.models")'),
+    (floor_breaches, "host/src/host/sysid/flight/linear.py", "from host.planning import plan"),
+    (floor_breaches, "host/src/host/errors.py", "from host.aircraft.file import AircraftError"),
+    (
+        never_breaches,
+        "host/src/host/sysid/aerodynamics/varying.py",
+        "def f():\n    if True:\n        from host.twin.flight.fly import fly",
+    ),
+    (
+        never_breaches,
+        "host/src/host/sysid/answer/truth.py",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from host import twin",
+    ),
+    (never_breaches, "host/src/host/sysid/models/model.py", "from ... import twin"),
+    (never_breaches, "host/src/host/sysid/models/model.py", 'importlib.import_module("host.twin")'),
+    (
+        never_breaches,
+        "host/src/host/twin/sensors/imu.py",
+        "from host.twin.testcard.cards import Sensors",
+    ),
+    (import_breaches, "host/src/host/sysid/flight/linear.py", "from studies import linear"),
+    (import_breaches, "host/studies/linear.py", "from tests.host import logs"),
     (floor_breaches, "host/src/host/log/head.py", "from host.sysid.models.model import Term"),
     (floor_breaches, "host/src/host/log/head.py", "from host.decode.summary import summarise"),
     (import_breaches, "tests/simulator/simavr_bench/relay.py", "from flight.rig import make_card"),
@@ -252,6 +317,15 @@ ALLOWED = [
     ("tests/firmware/test_a/test_a.cpp", 'TEST_CASE("INFO") { CHECK_EQ(1, 1); REQUIRE(true); }'),
     ("host/src/host/sysid/flight/linear.py", "from host.sysid.models.model import Term"),
     ("host/src/host/decode.py", "import numpy\nfrom host.wire.schema import load"),
+    (
+        "host/src/host/planning/plan.py",
+        "from host.twin.virtual import a\nimport host.sysid.errors",
+    ),
+    ("host/src/host/sysid/models/model.py", "from . import result\nfrom host.aircraft import file"),
+    (
+        "host/studies/linear.py",
+        "from host.twin.virtual import a\nimport studies.gusts",
+    ),
 ]
 
 

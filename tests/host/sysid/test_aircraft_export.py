@@ -10,21 +10,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.aircraft.airframe import Airframe
+from host.aircraft.file import load as load_aircraft
+from host.aircraft.file import read_document
+from host.aircraft.local_derivatives import coefficients, local_derivatives
+from host.aircraft.mass_properties import airframe_data
+from host.aircraft.powerplant import powerplant
 from host.cli import main
 from host.compiled import Array
-from host.sysid.aircraft.aircraft_file import airframe_data, powerplant
-from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
+from host.export import toml as tomlout
+from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document
 from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.coefficients.answer import Flight, Pull
 from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns, read_columns
-from host.twin.aircraft import tomlout
-from host.twin.aircraft.airframe import Airframe
-from host.twin.aircraft.file import load as load_aircraft
-from host.twin.aircraft.file import read_document
-from host.twin.motion.local import coefficients, local_derivatives
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 

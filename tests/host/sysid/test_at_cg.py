@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.aircraft.mass_properties import AirframeData
+from host.instrument.errors import instrument_data
 from host.sysid import Maneuver
-from host.sysid.aircraft.aircraft_file import instrument_data
-from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.compatibility.at_cg import IMU_DELAY, at_cg, open_errors, without_open
 from host.sysid.compatibility.reconstruction import Compatibility, Finding
 from host.sysid.estimators.gust import fit_with_gust, gust_model

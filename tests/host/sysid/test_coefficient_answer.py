@@ -6,10 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
-from host.sysid.aircraft.aircraft_file import airframe_data
-from host.sysid.aircraft.airframe import AirframeData, Condition
-from host.sysid.aircraft.conversion import Place, to_derivatives
+from host.sysid.aerodynamics.conversion import Place, to_derivatives
 from host.sysid.answer.panels import Bar, interval_bars
 from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.coefficients.flight import CoefficientAnswer, identify_coefficients, joined

@@ -7,9 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.aircraft.file import read_document
+from host.aircraft.mass_properties import airframe_data
+from host.aircraft.powerplant import powerplant
 from host.cli import main
 from host.compiled import Array
-from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
+from host.export import toml as tomlout
+from host.instrument.errors import instrument_data
 from host.sysid.coefficients.answer import CoefficientFit, Derivative
 from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.local import Mean, local_derivatives
@@ -22,8 +26,6 @@ from host.sysid.coefficients.model import (
 from host.sysid.coefficients.windows import Window
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.tables import even_columns
-from host.twin.aircraft import tomlout
-from host.twin.aircraft.file import read_document
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 

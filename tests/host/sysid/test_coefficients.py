@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.aircraft.mass_properties import AirframeData, airframe_data
+from host.aircraft.powerplant import powerplant
 from host.compiled import Array
-from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
-from host.sysid.aircraft.airframe import AirframeData
-from host.sysid.aircraft.instrument_errors import InstrumentData, deviations
+from host.instrument.errors import InstrumentData, deviations, instrument_data
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.flight import identify_coefficients
@@ -17,9 +17,9 @@ from host.sysid.compatibility.signals import Record, corrected, usable_length
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import Found
 from host.sysid.flight.tables import even_columns
-from host.sysid.study.flights import PRINCIPAL, Tally
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
+from studies.flights import PRINCIPAL, Tally
 
 NAME = "ultrastick25e"
 # What an instrument without drawn errors leaves; arms and tilts of the real one are not in it.

@@ -4,10 +4,14 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from host.aircraft.airframe import Airframe
+from host.aircraft.file import load
+from host.aircraft.local_derivatives import coefficients as about_cg
+from host.aircraft.mass_properties import Condition, airframe_data
 from host.compiled import Array
-from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data
-from host.sysid.aircraft.airframe import Condition, coefficients
-from host.sysid.aircraft.conversion import (
+from host.instrument.errors import instrument_data
+from host.sysid.aerodynamics.coefficient_table import coefficients
+from host.sysid.aerodynamics.conversion import (
     CARRIED,
     Place,
     Quantities,
@@ -18,9 +22,6 @@ from host.sysid.aircraft.conversion import (
 from host.sysid.errors import IdentificationError
 from host.sysid.models.model import free_model
 from host.sysid.models.result import FitResult
-from host.twin.aircraft.airframe import Airframe
-from host.twin.aircraft.file import load
-from host.twin.motion.local import coefficients as about_cg
 
 NAME = "ultrastick25e"
 AIRFRAME = airframe_data(NAME)

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from host.aircraft.mass_properties import airframe_data
 from host.cli import main
-from host.sysid.aircraft.aircraft_file import airframe_data
 
 NAME = "ultrastick25e"
 SPEED, DENSITY = 16.0, 1.2

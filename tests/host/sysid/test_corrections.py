@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
+from host.instrument.errors import instrument_data
 from host.sysid import Maneuver, fit
-from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data
-from host.sysid.aircraft.airframe import AirframeData, Condition, Moved, coefficients
+from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.answer.verdict import model_lines, words
 from host.sysid.compatibility.corrections import (

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host.sysid.aircraft.aircraft_file import airframe_data, powerplant
-from host.sysid.aircraft.airframe import AirframeData, Condition, Moved, coefficients
+from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
+from host.aircraft.powerplant import powerplant
+from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.estimators.start import regressed, start_values
 from host.sysid.flight import linear
@@ -19,9 +20,9 @@ from host.sysid.models.delays import DELAYS
 from host.sysid.models.result import FitResult
 from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.problem import OutputProblem
-from host.sysid.study.linear import derivatives
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
+from studies.linear import derivatives
 
 NAME = "ultrastick25e"
 Columns = dict[str, np.ndarray]

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from host.aircraft.mass_properties import Condition
 from host.sysid import Maneuver, fit
-from host.sysid.aircraft.airframe import Condition
 from host.sysid.answer.json import answer_document
 from host.sysid.answer.verdict import model_lines, words
 from host.sysid.flight.linear import Answer
@@ -26,9 +26,9 @@ from host.sysid.models.diagnostics import (
 from host.sysid.models.model import Parameter, Term
 from host.sysid.models.modes import modes, modes_of
 from host.sysid.models.templates import Trim
-from host.sysid.study.aircraft import navion, navion_free, navion_structured
-from host.sysid.study.data import TRUTH, noisy
 from scipy import signal, stats
+from studies.aircraft import navion, navion_free, navion_structured
+from studies.data import TRUTH, noisy
 
 
 def test_figures_of_fit_equal_their_definitions() -> None:

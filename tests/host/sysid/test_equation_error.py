@@ -11,9 +11,9 @@ from host.sysid.numerics.differentiation import (
     smooth_and_differentiate,
     window_for,
 )
-from host.sysid.study.aircraft import navion, navion_free, navion_structured
-from host.sysid.study.data import TRUTH, clean, noisy, with_rates
 from scipy import linalg, optimize, signal
+from studies.aircraft import navion, navion_free, navion_structured
+from studies.data import TRUTH, clean, noisy, with_rates
 
 
 @pytest.mark.parametrize("variant", ["", "-weighted", "-robust", "-total"])

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
 from host.sysid import Maneuver, fit
-from host.sysid.aircraft.aircraft_file import airframe_data
-from host.sysid.aircraft.airframe import AirframeData, Condition, coefficients, corrected
+from host.sysid.aerodynamics.coefficient_table import coefficients
+from host.sysid.compatibility.position_correction import corrected
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import find, grade
 from host.sysid.flight.linear import identify

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
-from host.sysid.aircraft.instrument_errors import deviations
-from host.sysid.aircraft.powerplant import START_RADPS, SUBSTEPS
+from host.aircraft.mass_properties import airframe_data
+from host.aircraft.powerplant import START_RADPS, SUBSTEPS, powerplant
+from host.instrument.errors import deviations, instrument_data
 from host.sysid.coefficients.fit import COLUMNS
 from host.sysid.compatibility.signals import Record, corrected
 

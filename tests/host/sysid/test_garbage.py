@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from host.sysid import Maneuver, fit, methods
 from host.sysid.errors import IdentificationError
-from host.sysid.study.aircraft import navion_structured
-from host.sysid.study.data import noisy
+from studies.aircraft import navion_structured
+from studies.data import noisy
 
 OPTIONS: dict[str, dict[str, object]] = {
     "genetic": {"generations": 2},

@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
-from host.sysid.aircraft.airframe import Condition
-from host.sysid.aircraft.gains import dimensional_gains
+from host.aircraft import file as aircraft
+from host.aircraft import trim
+from host.aircraft.gains import dimensional_gains
+from host.aircraft.linearisation import linearise
+from host.aircraft.mass_properties import Condition
 from host.sysid.estimators.filter_error import information_at
 from host.sysid.estimators.gust import ROLLING
 from host.sysid.numerics.filter_problem import FilterProblem, discrete_noise
-from host.sysid.study.gusts import AXES, DT_S, fly, gusty_aircraft, spectrum
-from host.sysid.study.turbulence import PROCESS, fitted_model, run_case, true_vector
-from host.twin.aircraft import file as aircraft
-from host.twin.motion import trim
-from host.twin.motion.linear import linearise
 from scipy import linalg
+from studies.gusts import AXES, DT_S, fly, gusty_aircraft, spectrum
+from studies.turbulence import PROCESS, fitted_model, run_case, true_vector
 
 
 @pytest.mark.parametrize("axis", list(AXES))

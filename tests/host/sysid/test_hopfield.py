@@ -14,8 +14,8 @@ from host.sysid.estimators.hopfield import (
 )
 from host.sysid.models.diagnostics import thesis_program_error_percent
 from host.sysid.numerics.problem import OutputProblem
-from host.sysid.study.aircraft import navion_free
-from host.sysid.study.data import with_rates
+from studies.aircraft import navion_free
+from studies.data import with_rates
 
 
 def test_whitened_network_is_least_squares() -> None:

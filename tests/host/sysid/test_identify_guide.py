@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.aircraft.file import AircraftError, load, load_measured, read_document
+from host.aircraft.mass_properties import airframe_data
+from host.aircraft.powerplant import NoPropulsionError, powerplant
 from host.cli import main
-from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
-from host.sysid.errors import IdentificationError
+from host.export.toml import dumps
+from host.instrument.errors import instrument_data
 from host.sysid.flight.tables import read_columns
 from host.sysid.models.model_file import read_model
-from host.twin.aircraft.file import AircraftError, load, load_measured, read_document
-from host.twin.aircraft.tomlout import dumps
 
 from tests.host.logs import ROOT
 
@@ -68,7 +69,7 @@ def test_places_count_from_the_cg_wherever_it_is(tmp_path: Path) -> None:
 
 
 def test_without_a_propeller_coefficients_are_refused_by_name(tmp_path: Path) -> None:
-    with pytest.raises(IdentificationError, match=r"\[propulsion\]"):
+    with pytest.raises(NoPropulsionError, match=r"\[propulsion\]"):
         powerplant(mine(tmp_path))
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from host.sysid import fit
 from host.sysid.numerics.noise import choose_order, lagged_moments, regress, stabilised
-from host.sysid.study.aircraft import navion_structured
-from host.sysid.study.coverage import NOISES, coloured_noise, run_case
-from host.sysid.study.data import noisy
 from scipy import signal
+from studies.aircraft import navion_structured
+from studies.coverage import NOISES, coloured_noise, run_case
+from studies.data import noisy
 
 
 def test_regression_finds_the_coefficients_of_a_long_record() -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
+from host.aircraft.file import load
+from host.aircraft.local_derivatives import local_derivatives
+from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.aircraft_export import save_aircraft
-from host.twin.aircraft.file import load
-from host.twin.motion.local import local_derivatives
 
 # Forces and moments of the air alone, as coefficients, at one condition and a step to either side.
 JSBSIM_SLOPES = """

@@ -10,18 +10,19 @@ from typing import Any
 
 from host.compiled import compiled
 
+STUDIES = Path(__file__).parents[3] / "host"
 SCRIPT = """
 import importlib, json, pkgutil
 import host.sysid
 from host.sysid.__main__ import build_kernels
 from host.sysid.estimators.fit import fit
-from host.sysid.study.aircraft import navion_structured
-from host.sysid.study.data import TRUTH, with_rates
+from studies.aircraft import navion_structured
+from studies.data import TRUTH, with_rates
 
 kernels = {}
 for module in pkgutil.walk_packages(host.sysid.__path__, "host.sysid."):
-    if module.name.endswith("__main__") or module.name.startswith("host.sysid.study"):
-        continue  # no answer waits for what only a study calls
+    if module.name.endswith("__main__"):
+        continue
     for name, thing in vars(importlib.import_module(module.name)).items():
         if hasattr(thing, "signatures") and thing.__module__ == module.name:
             kernels[f"{module.name}.{name}"] = thing
@@ -38,7 +39,7 @@ print(json.dumps([built, {name: len(kernel.signatures) for name, kernel in kerne
 
 
 def test_every_kernel_is_built_in_the_types_that_methods_use() -> None:
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(STUDIES)}
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=environment, check=True
     )

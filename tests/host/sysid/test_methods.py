@@ -12,9 +12,9 @@ from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.problem import OutputProblem
 from host.sysid.numerics.riccati import predicted_covariance
-from host.sysid.study.aircraft import navion, navion_free, navion_structured
-from host.sysid.study.data import TRUTH, clean, gusty, noisy
 from scipy import linalg, signal
+from studies.aircraft import navion, navion_free, navion_structured
+from studies.data import TRUTH, clean, gusty, noisy
 
 CHEAP = [m for m in methods() if m not in ("hopfield-line-search", "hopfield")]
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 from host.sysid.estimators.misfit import misfit_factor, widened_names
-from host.sysid.study.gusts import fly, gusty_aircraft
-from host.sysid.study.turbulence import fit_both, linear_setup
 from scipy import signal
+from studies.gusts import fly, gusty_aircraft
+from studies.turbulence import fit_both, linear_setup
 
 DT_S, SAMPLES = 0.02, 1500
 

@@ -10,9 +10,9 @@ from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.estimators.start import start_values
 from host.sysid.numerics.output_error import covariance_of, minimise
 from host.sysid.numerics.problem import OutputProblem
-from host.sysid.study.aircraft import navion_free, navion_structured
-from host.sysid.study.data import TRUTH, clean, noisy
 from scipy import optimize
+from studies.aircraft import navion_free, navion_structured
+from studies.data import TRUTH, clean, noisy
 
 
 def test_optimum_equals_scipy_least_squares() -> None:

@@ -18,14 +18,14 @@ from host.sysid.numerics.noise import (
 )
 from host.sysid.numerics.problem import OutputProblem
 from host.sysid.numerics.riccati import predicted_covariance
-from host.sysid.study.aircraft import navion, navion_structured
-from host.sysid.study.data import TRUTH, noisy
 from scipy import signal
 from statsmodels.regression.linear_model import yule_walker
 from statsmodels.tsa.ar_model import AutoReg, ar_select_order
 from statsmodels.tsa.arima_process import arma_acovf
 from statsmodels.tsa.statespace.kalman_filter import KalmanFilter
 from statsmodels.tsa.statespace.sarimax import SARIMAX
+from studies.aircraft import navion, navion_structured
+from studies.data import TRUTH, noisy
 
 RESONANT = np.array([1.6, -0.8])
 

@@ -8,12 +8,12 @@ then its.
 import control
 import numpy as np
 import pytest
-from host.twin.aircraft import file as aircraft
-from host.twin.aircraft.airframe import ELEVATOR, Q0, STATE_COUNT, Airframe
-from host.twin.motion.attitude import euler, quaternion
-from host.twin.motion.linear import linearise, modes
-from host.twin.motion.rigid_body import derivative
-from host.twin.motion.trim import Trim, solve
+from host.aircraft import file as aircraft
+from host.aircraft.airframe import ELEVATOR, Q0, STATE_COUNT, Airframe
+from host.aircraft.attitude import euler, quaternion
+from host.aircraft.linearisation import linearise, modes
+from host.aircraft.rigid_body import derivative
+from host.aircraft.trim import Trim, solve
 
 LONGITUDINAL, LATERAL = [0, 2, 4, 7], [1, 3, 5, 6]
 

@@ -8,12 +8,12 @@ from host.sysid.estimators.recursive import START_VARIANCE, update
 from host.sysid.estimators.rows import regression_rows
 from host.sysid.estimators.stepwise import F_IN, GAIN_LIMIT, choose_terms
 from host.sysid.models.diagnostics import signal_fits, whiteness
-from host.sysid.study.aircraft import navion_free
-from host.sysid.study.data import with_rates
 from scipy import linalg, signal
 from statsmodels.regression.recursive_ls import RecursiveLS
 from statsmodels.stats.diagnostic import acorr_ljungbox
 from statsmodels.tsa import stattools
+from studies.aircraft import navion_free
+from studies.data import with_rates
 
 PITCH = ("a31", "a32", "a33", "a34", "b31")
 

@@ -5,7 +5,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data
+from host.aircraft.mass_properties import airframe_data
+from host.instrument.errors import instrument_data
 from host.sysid.compatibility.flight_path import (
     AIR,
     GPS,

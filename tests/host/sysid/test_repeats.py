@@ -5,8 +5,8 @@ import pytest
 from host.sysid import FitResult, Maneuver, fit
 from host.sysid.numerics.problem import OutputProblem
 from host.sysid.numerics.repeats import repeats, widened
-from host.sysid.study.aircraft import navion_structured
-from host.sysid.study.data import TRUTH, noisy
+from studies.aircraft import navion_structured
+from studies.data import TRUTH, noisy
 
 MODEL = navion_structured()
 PLACE = MODEL.parameter_names.index("M_alpha")

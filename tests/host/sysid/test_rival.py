@@ -2,9 +2,9 @@
 
 import numpy as np
 from host.sysid import Maneuver, fit
-from host.sysid.study.aircraft import navion_structured
-from host.sysid.study.coverage import NOISES, coloured_noise
-from host.sysid.study.data import TRUTH, clean, gusty, noisy
+from studies.aircraft import navion_structured
+from studies.coverage import NOISES, coloured_noise
+from studies.data import TRUTH, clean, gusty, noisy
 
 
 def remembering(seed: int) -> Maneuver:

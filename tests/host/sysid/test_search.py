@@ -12,10 +12,10 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel, free_model
 from host.sysid.numerics.output_error import Optimum, minimise
 from host.sysid.numerics.problem import OutputProblem, Response
-from host.sysid.study.aircraft import navion_free
-from host.sysid.study.data import noisy
-from host.sysid.study.inputs import SHAPES
-from host.sysid.study.systems import random_system, simulated
+from studies.aircraft import navion_free
+from studies.data import noisy
+from studies.inputs import SHAPES
+from studies.systems import random_system, simulated
 
 DT_S = 0.01
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
+from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.truth import (
     compared,
     compared_modes,

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from host.aircraft.air import Turbulence, gusts
+from host.aircraft.mass_properties import airframe_data
+from host.aircraft.powerplant import powerplant
 from host.compiled import Array
-from host.sysid.aircraft.aircraft_file import airframe_data, powerplant
 from host.sysid.coefficients.model import standard_model
 from host.sysid.coefficients.rows import Flown, equations
 from host.sysid.coefficients.turning import (
@@ -16,7 +18,6 @@ from host.sysid.coefficients.turning import (
 from host.sysid.coefficients.windows import Block, Window, window_block
 from host.sysid.compatibility.signals import Record
 from host.sysid.models.templates import GRAVITY_MPS2
-from host.twin.motion.air import Turbulence, gusts
 from numpy.polynomial import legendre
 
 NAME = "ultrastick25e"

@@ -2,12 +2,12 @@
 
 import numpy as np
 from host.compiled import Array
-from host.sysid.aircraft.turning_air import gust_motion, turning
+from host.sysid.aerodynamics.turning_air import gust_motion, turning
 from host.sysid.estimators.fit import fit
-from host.sysid.study.gusts import AXES, DT_S
-from host.sysid.study.nonlinear_gusts import fly_nonlinear, varying
-from host.sysid.study.turbulence import PROCESS, fit_both, nonlinear_setup
 from scipy.spatial.transform import Rotation
+from studies.gusts import AXES, DT_S
+from studies.nonlinear_gusts import fly_nonlinear, varying
+from studies.turbulence import PROCESS, fit_both, nonlinear_setup
 
 
 def _turned(rates: Array, start: Array) -> Array:

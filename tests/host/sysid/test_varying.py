@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from host.sysid import Maneuver, fit
-from host.sysid.aircraft.varying import VaryingModel
+from host.sysid.aerodynamics.varying import VaryingModel
 from host.sysid.errors import IdentificationError
-from host.sysid.study.gusts import AXES, DT_S, gusty_aircraft
-from host.sysid.study.nonlinear_gusts import NonlinearFlight, fly_nonlinear, varying
-from host.sysid.study.turbulence import fit_both, nonlinear_setup
+from studies.gusts import AXES, DT_S, gusty_aircraft
+from studies.nonlinear_gusts import NonlinearFlight, fly_nonlinear, varying
+from studies.turbulence import fit_both, nonlinear_setup
 
 
 @pytest.fixture(scope="module", params=list(AXES))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host.sysid.aircraft.airframe import Condition
+from host.aircraft.mass_properties import Condition
 from host.sysid.answer.verdict import model_lines, unpredicted, words
 from host.sysid.estimators.fit import fit
 from host.sysid.flight.linear import Answer
@@ -12,8 +12,8 @@ from host.sysid.models.delays import DELAYS
 from host.sysid.models.diagnostics import SignalFit, collinearity, references
 from host.sysid.models.modes import modes, modes_of
 from host.sysid.models.templates import TEMPLATES, Trim
-from host.sysid.study.aircraft import navion_structured
-from host.sysid.study.data import noisy
+from studies.aircraft import navion_structured
+from studies.data import noisy
 
 
 @pytest.fixture(scope="module")

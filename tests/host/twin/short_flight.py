@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 from host.log import FlightLog, read_log
+from host.twin.faults import FAULTS, Fault
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import Stimuli, stimuli
 from host.twin.sensors.airdata import air_data
 from host.twin.testcard import cards
 from host.twin.testcard.cards import Card
-from host.twin.testcard.faults import FAULTS, Fault
 from numpy.typing import NDArray
 
 CARD = {

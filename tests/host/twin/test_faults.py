@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.log import read_log
+from host.twin.faults import FAULTS, Fault
 from host.twin.flight.fly import fly
 from host.twin.outcome import compare
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors.airdata import air_data
 from host.twin.testcard import cards
-from host.twin.testcard.faults import FAULTS, Fault
 
 from tests.host.twin.short_flight import AT_S, CARD, FOR_S, Flown, fly_with, make
 

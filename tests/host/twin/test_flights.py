@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.twin.aircraft import handbook
+from host.aircraft import handbook
+from host.aircraft.attitude import euler
+from host.aircraft.local_derivatives import local_derivatives
 from host.twin.flight.fly import NEUTRAL_US, THROW_US, fly
 from host.twin.flight.pilot import duration_s, schedule
-from host.twin.motion.attitude import euler
-from host.twin.motion.local import local_derivatives
 from host.twin.outcome import thesis
 from host.twin.outcome.truth import maneuvers, series, write
 from host.twin.sensors.airdata import air_data

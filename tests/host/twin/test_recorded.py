@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.log import FlightLog, read_log
+from host.twin.faults import FOREVER_S, Fault
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome import compare, instrument
 from host.twin.recorder import sitl
@@ -18,7 +19,6 @@ from host.twin.sensors.airdata import AirData, air_data
 from host.twin.sensors.bmp085 import compensate
 from host.twin.sensors.mega_clock import TICKS_PER_S, clock_share
 from host.twin.testcard import cards
-from host.twin.testcard.faults import FOREVER_S, Fault
 from host.twin.virtual import virtual_flight
 from numpy.typing import NDArray
 

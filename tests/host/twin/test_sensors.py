@@ -6,9 +6,9 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from host.aircraft.attitude import euler
 from host.twin.flight.draws import GROUPS
 from host.twin.flight.fly import FlightRecord, fly
-from host.twin.motion.attitude import euler
 from host.twin.outcome.ideal import measured_table, true_table
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors import bmp085
@@ -67,7 +67,7 @@ def test_deterministic_by_seed_and_different_by_seed(calm: Card, real: FlightRec
 
 
 def test_draws_stay_within_their_stated_ranges(calm: Card) -> None:
-    from host.twin.aircraft.file import load as load_aircraft
+    from host.aircraft.file import load as load_aircraft
     from host.twin.flight.draws import draw
 
     plane = load_aircraft("ultrastick25e")

@@ -13,7 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import host
-from host.sysid.aircraft.aircraft_file import powerplant
+from host.aircraft.powerplant import powerplant
 from host.sysid.compatibility.strapdown import path_slopes, strapdown
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import fit_with_gust

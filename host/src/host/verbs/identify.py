@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from host.sysid.aircraft.powerplant import Powerplant
+    from host.aircraft.powerplant import Powerplant
     from host.sysid.answer.save import Places
     from host.sysid.coefficients.flight import CoefficientAnswer
     from host.sysid.coefficients.model import CoefficientModel
@@ -114,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
     )
     airframe = None
     if args.aircraft:
-        from host.sysid.aircraft.aircraft_file import airframe_data
+        from host.aircraft.mass_properties import airframe_data
 
         airframe = airframe_data(args.aircraft)
     truth = None
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
         truth = read_truth(args.truth)
     prior = None
     if args.prior:
-        from host.sysid.aircraft.prior import read_prior
+        from host.aircraft.prior.prior_file import read_prior
 
         speed = columns.get("airspeed_mps", ())
         prior = read_prior(args.prior, sorted(speed)[len(speed) // 2] if len(speed) else 0.0)
@@ -161,8 +161,8 @@ def run(args: argparse.Namespace) -> int:
     notes += unfit
     tables = list(direct.tables) if direct else [a.table for a in answers]
     if args.json:
-        from host.sysid.aircraft.prior import prior_document
         from host.sysid.answer.json import answer_document, coefficient_document, json_text
+        from host.sysid.answer.prior_comparison import prior_document
         from host.sysid.answer.truth import truth_document
 
         documents = [answer_document(a, words([a], []) + taken_out([a])) for a in answers]
@@ -198,7 +198,7 @@ def run(args: argparse.Namespace) -> int:
     if agreement:
         lines += ["", *agreement_words(agreement)]
     if prior is not None:
-        from host.sysid.aircraft.prior import prior_lines
+        from host.sysid.answer.prior_comparison import prior_lines
 
         lines += ["", *prior_lines(tables, prior)]
     if truth is not None:
@@ -283,12 +283,11 @@ def _coefficient_model(names: list[str] | None) -> CoefficientModel | None:
 
 def _rotor(aircraft: str | None) -> Powerplant | None:
     """Return the propeller; None where the file, if any, does not describe it."""
-    from host.sysid.aircraft.aircraft_file import powerplant
-    from host.sysid.errors import IdentificationError
+    from host.aircraft.powerplant import NoPropulsionError, powerplant
 
     try:
         return powerplant(aircraft) if aircraft else None
-    except IdentificationError:
+    except NoPropulsionError:
         return None
 
 
@@ -296,7 +295,7 @@ def _agreement(
     columns: dict[str, Any], aircraft: str | None, airframe: Any, notes: list[str]
 ) -> Compatibility | None:
     """Return what sensors are wrong by; None with a note where it cannot be told."""
-    from host.sysid.aircraft.aircraft_file import instrument_data
+    from host.instrument.errors import instrument_data
     from host.sysid.compatibility.reconstruction import reconstruct
     from host.sysid.errors import IdentificationError
 

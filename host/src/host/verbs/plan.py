@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from host.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from host.twin.planning import Plan, Point
+    from host.planning.plan import Plan, Point
 
 # A derivative whose predicted half-width is above this is named.
 WEAK_PERCENT = 20.0
@@ -46,8 +46,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Judge or design a card and print it; return an exit code."""
     try:
-        from host.twin import planning
-        from host.twin.aircraft.tomlout import dumps
+        from host.export.toml import dumps
+        from host.planning import plan as planning
         from host.twin.testcard import cards
     except ImportError as error:
         raise UsageError(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from host.errors import CheckError, ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from host.twin.aircraft.file import Aircraft
+    from host.aircraft.file import Aircraft
 
 # Faults that leave every decoded value right.
 HARMLESS = ("motor_cut", "card_busy")
@@ -54,11 +54,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Fly, and print what was written; return an exit code."""
     try:
+        from host.twin.faults import without_recorder
         from host.twin.flight import pilot
         from host.twin.outcome import report
         from host.twin.recorder import sitl
         from host.twin.testcard import cards
-        from host.twin.testcard.faults import without_recorder
     except ImportError as error:
         raise UsageError(
             f"the virtual flight needs {error.name}:"
@@ -152,7 +152,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _aircraft(given: list[str], usual: str) -> Aircraft | None:
-    from host.twin.motion.linear_aircraft import is_model, load, with_models
+    from host.aircraft.linear_aircraft import load
+    from host.planning.identified_aircraft import is_model, with_models
 
     models = [Path(name) for name in given if is_model(name)]
     named = [name for name in given if not is_model(name)]
@@ -178,7 +179,7 @@ def _list(*, as_json: bool) -> int:
 
 
 def _list_faults(*, as_json: bool) -> int:
-    from host.twin.testcard.faults import FAULTS
+    from host.twin.faults import FAULTS
 
     if as_json:
         print(json.dumps([{"name": name, **asdict(kind)} for name, kind in FAULTS.items()]))

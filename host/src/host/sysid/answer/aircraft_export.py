@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from host.compiled import Array
-from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
+from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.files import whole
 from host.sysid.coefficients.answer import Flight
 from host.sysid.errors import IdentificationError
@@ -56,7 +56,7 @@ def aircraft_document(
     IdentificationError
         If no coefficient can be used.
     """
-    from host.twin.aircraft import file as aircraft
+    from host.aircraft import file as aircraft
 
     loaded = aircraft.load(source)
     document: dict[str, Any] = dict(aircraft.read_document(source))
@@ -153,9 +153,9 @@ def save_aircraft(
     path: Path, tables: Sequence[CoefficientTable], source: str, flight: Flight | None = None
 ) -> list[str]:
     """Write ``.toml`` for `host simulate` or ``.xml`` for JSBSim; return what was replaced."""
-    from host.twin.aircraft import file as aircraft
-    from host.twin.aircraft import tomlout
-    from host.twin.aircraft.jsbsim_model import aircraft_xml
+    from host.aircraft import file as aircraft
+    from host.aircraft.jsbsim_model import aircraft_xml
+    from host.export import toml as tomlout
 
     document, replaced = aircraft_document(tables, source, flight)
     with tempfile.TemporaryDirectory() as folder:

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data
-from host.sysid.aircraft.airframe import Condition
-from host.sysid.aircraft.conversion import (
+from host.aircraft.mass_properties import Condition, airframe_data
+from host.aircraft.prior.prior_file import read_prior
+from host.instrument.errors import instrument_data
+from host.sysid.aerodynamics.conversion import (
     CARRIED,
     COEFFICIENTS,
     DERIVATIVES,
@@ -24,7 +25,6 @@ from host.sysid.aircraft.conversion import (
     to_coefficients,
     to_derivatives,
 )
-from host.sysid.aircraft.prior import read_prior
 from host.sysid.answer.units import parameter_unit
 from host.sysid.errors import IdentificationError
 from host.sysid.models.document import read_document

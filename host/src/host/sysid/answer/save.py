@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from host.compiled import Array
-from host.sysid.aircraft.airframe import CoefficientTable
+from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.files import refuse_place, whole
 from host.sysid.answer.mat import labels, write_mat
 from host.sysid.errors import IdentificationError
@@ -77,7 +77,7 @@ def check(places: Places) -> None:
             raise IdentificationError(
                 f"{whole_ones[0]}: an aircraft needs mass and geometry; give --aircraft"
             )
-        from host.twin.aircraft import file as aircraft
+        from host.aircraft import file as aircraft
 
         aircraft.load(places.source)  # one that was only measured has no tables to put answers in
     if places.plots is not None:

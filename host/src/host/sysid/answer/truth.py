@@ -10,7 +10,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from host.sysid.aircraft.airframe import CoefficientTable
+from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.mat import labels
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.linear import AXIS_OF, Answer

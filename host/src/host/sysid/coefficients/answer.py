@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData
 from host.compiled import Array, IntArray
-from host.sysid.aircraft.airframe import AirframeData
 from host.sysid.coefficients.joint import Prediction
 from host.sysid.coefficients.local import Local
 from host.sysid.numerics.repeats import Repeats

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData
+from host.aircraft.powerplant import Powerplant
 from host.compiled import Array
-from host.sysid.aircraft.airframe import AirframeData
-from host.sysid.aircraft.instrument_errors import InstrumentData, deviations
-from host.sysid.aircraft.powerplant import Powerplant
+from host.instrument.errors import InstrumentData, deviations
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.gust_free import gust_free
 from host.sysid.coefficients.joint import LastStep

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.aircraft.mass_properties import airframe_data
+from host.aircraft.powerplant import NoPropulsionError, powerplant
 from host.compiled import Array
-from host.sysid.aircraft.aircraft_file import airframe_data, instrument_data, powerplant
-from host.sysid.aircraft.airframe import Coefficient, CoefficientTable
-from host.sysid.aircraft.instrument_errors import InstrumentData
+from host.instrument.errors import InstrumentData, instrument_data
+from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.coefficients.answer import METHOD, QUANTILE, CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.model import BODY, WIND, CoefficientModel, standard_model
@@ -110,6 +111,10 @@ def identify_coefficients(
         If a column or an axis is missing, or the aircraft file lacks what is needed.
     """
     airframe, data = airframe_data(aircraft), instrument_data(aircraft)
+    try:
+        propulsion = powerplant(aircraft)
+    except NoPropulsionError as error:
+        raise IdentificationError(str(error)) from error
     if "airspeed_mps" not in columns:
         raise IdentificationError("coefficients need the columns airspeed_mps and qbar_pa")
     flying = _airborne(columns)
@@ -131,7 +136,7 @@ def identify_coefficients(
         spans,
         airframe,
         data,
-        powerplant(aircraft),
+        propulsion,
         model,
     )
     return CoefficientAnswer(

@@ -12,9 +12,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData
 from host.compiled import Array
-from host.sysid.aircraft.airframe import AirframeData
-from host.sysid.aircraft.instrument_errors import InstrumentData
+from host.instrument.errors import InstrumentData
 from host.sysid.coefficients.rows import Flown
 from host.sysid.compatibility.signals import BLEND_RADPS, Record
 from host.sysid.errors import IdentificationError

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData
 from host.compiled import Array
-from host.sysid.aircraft.airframe import AirframeData
-from host.sysid.aircraft.conversion import Quantities
+from host.sysid.aerodynamics.conversion import Quantities
 from host.sysid.coefficients.answer import QUANTILE, CoefficientFit
 from host.sysid.models.modes import Mode, longitudinal_names, mode_of
 from host.sysid.models.templates import GRAVITY_MPS2

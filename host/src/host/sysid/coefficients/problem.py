@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData
+from host.aircraft.powerplant import Powerplant
 from host.compiled import Array, IntArray
-from host.sysid.aircraft.airframe import AirframeData
-from host.sysid.aircraft.instrument_errors import InstrumentData
-from host.sysid.aircraft.powerplant import Powerplant
+from host.instrument.errors import InstrumentData
 from host.sysid.coefficients.model import CoefficientModel
 from host.sysid.coefficients.rows import KINEMATIC, Equation, Flown, equations
 from host.sysid.coefficients.turning import LENGTH_M

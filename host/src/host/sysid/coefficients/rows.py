@@ -11,9 +11,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData
+from host.aircraft.powerplant import Powerplant
 from host.compiled import Array, IntArray
-from host.sysid.aircraft.airframe import AirframeData
-from host.sysid.aircraft.powerplant import Powerplant
 from host.sysid.coefficients.model import CoefficientModel
 from host.sysid.compatibility.signals import Record
 from host.sysid.models.templates import GRAVITY_MPS2

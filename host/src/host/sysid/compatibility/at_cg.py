@@ -12,12 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData
 from host.compiled import Array
-from host.sysid.aircraft.airframe import AirframeData, corrected
-from host.sysid.aircraft.instrument_errors import EVEN, PAIR, InstrumentData
-from host.sysid.aircraft.instrument_errors import deviations as drawn
+from host.instrument.errors import EVEN, PAIR, InstrumentData
+from host.instrument.errors import deviations as drawn
 from host.sysid.compatibility.flight_path import AIR, DELAYS
 from host.sysid.compatibility.path_data import unfiltered, unstuck
+from host.sysid.compatibility.position_correction import corrected
 from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
 
 VANE_DELAY, PITOT_DELAY = DELAYS

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData
 from host.compiled import Array, BoolArray
-from host.sysid.aircraft.airframe import AirframeData, corrected
-from host.sysid.aircraft.instrument_errors import DEGREE, EVEN, PAIR, InstrumentData
+from host.instrument.errors import DEGREE, EVEN, PAIR, InstrumentData
 from host.sysid.compatibility.flight_path import (
     AIR,
     DELAYS,
@@ -25,6 +25,7 @@ from host.sysid.compatibility.flight_path import (
     PathProblem,
     Stretch,
 )
+from host.sysid.compatibility.position_correction import corrected
 from host.sysid.compatibility.signals import SLIDING_RADPS
 from host.sysid.compatibility.strapdown import rotation
 from host.sysid.errors import IdentificationError

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData
 from host.compiled import Array
-from host.sysid.aircraft.airframe import AirframeData
-from host.sysid.aircraft.instrument_errors import InstrumentData
+from host.instrument.errors import InstrumentData
 from host.sysid.compatibility.flight_path import FLOW, GPS, INERTIAL
 from host.sysid.compatibility.path_data import prepare, prior
 from host.sysid.compatibility.path_fit import fit_path

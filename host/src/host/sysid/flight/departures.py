@@ -14,10 +14,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData
+from host.aircraft.powerplant import Powerplant
 from host.compiled import Array
-from host.sysid.aircraft.airframe import AirframeData, Moved
-from host.sysid.aircraft.powerplant import Powerplant
-from host.sysid.aircraft.varying import BENDS, MEASURED, VaryingModel
+from host.sysid.aerodynamics.coefficient_table import Moved
+from host.sysid.aerodynamics.varying import BENDS, MEASURED, VaryingModel
 from host.sysid.flight.carried import follower
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.result import FitResult

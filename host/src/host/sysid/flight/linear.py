@@ -7,19 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from host.aircraft.mass_properties import AirframeData, Condition
+from host.aircraft.powerplant import Powerplant
 from host.compiled import Array
-from host.sysid.aircraft.airframe import (
-    AirframeData,
+from host.instrument.errors import EVEN, InstrumentData
+from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
     CoefficientTable,
-    Condition,
     Moved,
     coefficients,
-    corrected,
     trim_of,
 )
-from host.sysid.aircraft.instrument_errors import EVEN, InstrumentData
-from host.sysid.aircraft.powerplant import Powerplant
 from host.sysid.compatibility.at_cg import at_cg
 from host.sysid.compatibility.corrections import (
     Correction,
@@ -28,6 +26,7 @@ from host.sysid.compatibility.corrections import (
     without_delays,
     without_errors,
 )
+from host.sysid.compatibility.position_correction import corrected
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.fit import fit

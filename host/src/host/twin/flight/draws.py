@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.twin.aircraft.airframe import Airframe, Array
-from host.twin.aircraft.file import Aircraft
+from host.aircraft.airframe import Airframe, Array
+from host.aircraft.file import Aircraft
 
 # Half-widths.
 DELAY_SHARE = 0.20

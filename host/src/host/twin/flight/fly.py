@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from host.compiled import compiled_fast
-from host.twin.aircraft.airframe import (
+from host.aircraft import air as air_model
+from host.aircraft.air import GUST_STATES, Atmosphere, Turbulence, density_kgpm3, gust_step
+from host.aircraft.airframe import (
     DOWN,
     Q0,
     Q1,
@@ -23,15 +24,14 @@ from host.twin.aircraft.airframe import (
     Array,
     P,
 )
-from host.twin.aircraft.file import Aircraft
+from host.aircraft.attitude import multiply, quaternion
+from host.aircraft.file import Aircraft, AircraftError
+from host.aircraft.linear_aircraft import load
+from host.aircraft.rigid_body import rotate_to_body, rotate_to_ned, step
+from host.aircraft.trim import Trim, solve
+from host.compiled import compiled_fast
 from host.twin.flight.draws import GROUPS, Draws, draw, flown
 from host.twin.flight.pilot import Schedule, gains, schedule
-from host.twin.motion import air as air_model
-from host.twin.motion.air import GUST_STATES, Atmosphere, Turbulence, density_kgpm3, gust_step
-from host.twin.motion.attitude import multiply, quaternion
-from host.twin.motion.linear_aircraft import load, refuse_unfit
-from host.twin.motion.rigid_body import rotate_to_body, rotate_to_ned, step
-from host.twin.motion.trim import Trim, solve
 from host.twin.testcard.cards import Card
 
 STEP_S = 1e-3
@@ -286,7 +286,7 @@ def fly(
     """
     plane = aircraft or load(card.aircraft)
     if plane.straight is not None:
-        refuse_unfit(plane, card)
+        _refuse_unfit(plane, card)
     # One stream per purpose, so that switching one thing off leaves the others as they were.
     rng_draw, rng_pilot, rng_air, rng_radio = (
         np.random.default_rng([seed, purpose]) for purpose in range(4)
@@ -294,7 +294,9 @@ def fly(
     nominal = [group for group in GROUPS if not getattr(card.sensors, group)]
     draws = draw(plane, rng_draw, tolerances=card.sensors.tolerances, nominal=nominal)
     frame = flown(plane, draws)
-    atmosphere = air_model.atmosphere(card.flight)
+    atmosphere = air_model.atmosphere(
+        card.flight.field_pressure_pa, card.flight.field_temperature_degc
+    )
     wanted = card.flight.airspeed_mps or plane.scalar("trim.airspeed_mps")
     rho = density_kgpm3(atmosphere, card.flight.height_m)
     trim = solve(frame, wanted, density_kgpm3=rho)
@@ -381,3 +383,15 @@ def fly(
         pulses_us=pulses[:rows],
         pulse_starts_s=starts[:rows],
     )
+
+
+def _refuse_unfit(plane: Aircraft, card: Card) -> None:
+    """Raise AircraftError where a card asks a linear aircraft for what it knows nothing of."""
+    speed = plane.scalar("trim.airspeed_mps")
+    if any(fault.kind == "motor_cut" for fault in card.faults):
+        raise AircraftError(f"{plane.name}: linear, it has no motor to cut as {card.name} wants")
+    if card.flight.airspeed_mps and abs(card.flight.airspeed_mps - speed) > 0.1:
+        raise AircraftError(
+            f"{plane.name}: linear about {speed:.1f} m/s, {card.name} wants"
+            f" {card.flight.airspeed_mps:.1f} m/s"
+        )

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from host.twin.aircraft.airframe import Airframe, Array
-from host.twin.motion.linear import linearise
-from host.twin.motion.trim import Trim
+from host.aircraft.airframe import Airframe, Array
+from host.aircraft.linearisation import linearise
+from host.aircraft.trim import Trim
 from host.twin.testcard.cards import AXES, Card, Segment
 from host.twin.testcard.maneuvers import (
     STEPS,

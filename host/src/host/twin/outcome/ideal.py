@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from host.twin.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, Array
+from host.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, Array
+from host.aircraft.attitude import euler
 from host.twin.flight.fly import IDLE_US, NEUTRAL_US, THROW_US, FlightRecord
-from host.twin.motion.attitude import euler
 from host.twin.sensors.airdata import AirData, air_data
 from host.twin.sensors.analog import CHANNELS, analog, convert, nominal
 from host.twin.sensors.delays import FILTERS, dlpf_for

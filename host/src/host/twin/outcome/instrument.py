@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 import tomllib
 
+from host.aircraft.file import Aircraft
+from host.export.toml import dumps
 from host.resources import resource
-from host.twin.aircraft.file import Aircraft
-from host.twin.aircraft.tomlout import dumps
 from host.twin.flight import draws
 from host.twin.flight.fly import IDLE_US, NEUTRAL_US, THROW_US
 from host.twin.sensors.analog import CHANNELS

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from host.twin.aircraft.airframe import Array
-from host.twin.testcard.faults import Fault
+from host.aircraft.airframe import Array
+from host.twin.faults import Fault
 
 COLOURS = {"elevator": "#1f77b4", "aileron": "#ff7f0e", "rudder": "#2ca02c", "throttle": "#9467bd"}
 FAULT_COLOUR = "#d62728"

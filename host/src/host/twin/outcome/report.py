@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from host.aircraft.file import Aircraft
 from host.log import read_log
-from host.twin.aircraft.file import Aircraft
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome import compare, ideal, picture, thesis, truth
 from host.twin.outcome.instrument import calibration

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from host.twin.aircraft.airframe import GRAVITY_MPS2, Array
+from host.aircraft.airframe import GRAVITY_MPS2, Array
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors.airdata import AirData
 from host.twin.sensors.analog import analog, convert

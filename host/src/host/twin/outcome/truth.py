@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from host.twin.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, STATES, Airframe, Array
-from host.twin.aircraft.tomlout import dumps
+from host.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, STATES, Airframe, Array
+from host.aircraft.attitude import euler
+from host.aircraft.linearisation import linearise, modes, straight_derivatives
+from host.aircraft.local_derivatives import local_derivatives
+from host.aircraft.trim import TrimError, solve
+from host.export.toml import dumps
 from host.twin.flight.fly import FlightRecord
 from host.twin.flight.pilot import Window
-from host.twin.motion.attitude import euler
-from host.twin.motion.linear import linearise, modes, straight_derivatives
-from host.twin.motion.local import local_derivatives
-from host.twin.motion.trim import TrimError, solve
 from host.twin.sensors.airdata import AirData
 from host.twin.sensors.delays import dlpf_for, sensor_delays
 

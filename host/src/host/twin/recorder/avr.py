@@ -19,6 +19,7 @@ import numpy as np
 
 from host.errors import UsageError
 from host.resources import CLONE
+from host.twin.faults import Fault, recorder_actions
 from host.twin.recorder import sitl
 from host.twin.recorder.sitl import (
     CLOSE_S,
@@ -32,7 +33,6 @@ from host.twin.recorder.sitl import (
 from host.twin.recorder.sitl_library import LIBRARY
 from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli
 from host.twin.sensors.mega_clock import TICKS_PER_S
-from host.twin.testcard.faults import Fault, recorder_actions
 
 REPLAY = CLONE / "tests" / "chip" / "replay.py"
 ELF = CLONE / ".pio" / "build" / "mega2560" / "firmware.elf"

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from host.errors import UsageError
+from host.twin.faults import Action, Fault, recorder_actions
 from host.twin.flight.fly import IDLE_US, NEUTRAL_US
 from host.twin.recorder.fat32 import CARD_BYTES, CardImageError, CardReader, format_card
 from host.twin.recorder.sitl_library import LIBRARY, TICKS_PER_US, CardFault, Port, Sitl
 from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli
 from host.twin.sensors.mega_clock import TICKS_PER_S
-from host.twin.testcard.faults import Action, Fault, recorder_actions
 
 RATES_HZ = (25, 50, 100, 200)
 PRESS_S, LET_GO_S = 3.6, 3.9  # start button; preparing 64 MiB takes the Mega 2.8 s

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from host.twin.aircraft.airframe import Array
+from host.aircraft.airframe import Array
+from host.twin.faults import SUPPLY_V
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors import bmp085, ubx
 from host.twin.sensors.airdata import AirData
@@ -20,7 +21,6 @@ from host.twin.sensors.imu import Imu
 from host.twin.sensors.imu_stream import ImuPacket, imu_packets
 from host.twin.sensors.mega_clock import TICKS_PER_S, clock_share, ticks
 from host.twin.sensors.receiver import EDGE, edges
-from host.twin.testcard.faults import SUPPLY_V
 
 GPS_BYTE_S = 10.0 / 38_400.0
 RAIL_COUNT = 614.0  # 5.0 V servo rail through a divider of 1.67 on a 5 V reference

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.twin.aircraft.airframe import DOWN, Q0, Q3, Array, P, R, U, W
+from host.aircraft.air import EXPONENT, LAPSE_KPM
+from host.aircraft.airframe import DOWN, Q0, Q3, Array, P, R, U, W
+from host.aircraft.attitude import to_body
 from host.twin.flight.fly import FlightRecord
-from host.twin.motion.air import EXPONENT, LAPSE_KPM
-from host.twin.motion.attitude import to_body
 from host.twin.sensors.filters import cross
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from host.twin.aircraft.airframe import Array
+from host.aircraft.airframe import Array
 
 Integers = NDArray[np.int64]
 NOISE_PA = 3.0  # rms at the highest resolution (Bosch, as the thesis quotes it)

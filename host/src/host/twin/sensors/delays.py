@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from host.twin.aircraft.file import Aircraft
+from host.aircraft.file import Aircraft
+from host.twin.faults import PITOTS, VANES
 from host.twin.flight.draws import Draws, delay_s
-from host.twin.testcard.faults import PITOTS, VANES
 
 # DLPF_CFG of the MPU-6000: bandwidth Hz and delay s of gyro and accelerometer (register map;
 # hardware facts 2.3).

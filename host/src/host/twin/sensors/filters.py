@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from host.aircraft.airframe import Array
 from host.compiled import compiled_fast
-from host.twin.aircraft.airframe import Array
 
 # At 1 kHz one Euler step per sample shifts the damping of a 14 Hz vane by 4 %, eight by 0.5 %.
 VANE_SUBSTEPS = 8

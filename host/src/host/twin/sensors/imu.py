@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.aircraft.airframe import DOWN, GRAVITY_MPS2, NORTH, Q0, Q3, Array, P, Q, R
+from host.aircraft.attitude import euler, to_body
 from host.compiled import compiled_fast
-from host.twin.aircraft.airframe import DOWN, GRAVITY_MPS2, NORTH, Q0, Q3, Array, P, Q, R
 from host.twin.flight.fly import STEP_S, FlightRecord
-from host.twin.motion.attitude import euler, to_body
 from host.twin.sensors.airdata import AirData
 from host.twin.sensors.delays import FILTERS, sensor_delays
 from host.twin.sensors.filters import delayed, first_order

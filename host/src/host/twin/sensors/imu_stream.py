@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from host.twin.aircraft.airframe import Array
+from host.aircraft.airframe import Array
+from host.twin.faults import Fault
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors.airdata import AirData
 from host.twin.sensors.delays import dlpf_for
 from host.twin.sensors.imu import Imu, imu
 from host.twin.sensors.mega_clock import TICKS_PER_S, ticks
-from host.twin.testcard.faults import Fault
 
 RATE_HZ = 200.0
 ADDRESS = 43

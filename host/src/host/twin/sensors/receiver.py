@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from host.twin.aircraft.airframe import Array
+from host.aircraft.airframe import Array
+from host.twin.faults import Fault
 from host.twin.flight.fly import GAP_US, RC_PERIOD_S, FlightRecord
 from host.twin.sensors.mega_clock import Ticks, ticks
-from host.twin.testcard.faults import Fault
 
 EDGE = np.dtype([("at", np.int64), ("levels", np.uint8)])
 GLITCH_S = (50e-6, 4e-3)

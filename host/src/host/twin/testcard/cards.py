@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
+from host import toml_reader
+from host.aircraft.air import Air
 from host.errors import UsageError
-from host.twin.aircraft import tomlin
-from host.twin.testcard.faults import FAULTS, Fault
+from host.twin.faults import FAULTS, Fault
 from host.twin.testcard.maneuvers import KINDS, STEPS, harmonics
 
 FOLDER = Path(__file__).parent / "cards"
@@ -36,19 +37,6 @@ class Flight:
     field_temperature_degc: float = 15.0
     latitude_deg: float = 30.0  # the thesis flew near Cairo
     longitude_deg: float = 31.0
-
-
-@dataclass(frozen=True, slots=True)
-class Air:
-    """Steady wind and Dryden turbulence (MIL-F-8785C 3.7.2, low-altitude form unless lengths are
-    given)."""
-
-    wind_north_mps: float = 0.0
-    wind_east_mps: float = 0.0
-    turbulence_mps: float = 0.0  # standard deviation of the vertical gust
-    length_w_m: float = 0.0  # 0: height
-    length_u_m: float = 0.0  # 0: MIL-F-8785C for the height; also for v
-    ratio_u: float = 0.0  # sigma_u / sigma_w; 0: MIL-F-8785C for the height
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +130,7 @@ Section = TypeVar("Section", Flight, Air, Pilot, Sensors)
 
 def names() -> list[str]:
     """Return the names of the cards that come with the package, sorted."""
-    return tomlin.names(FOLDER)
+    return toml_reader.names(FOLDER)
 
 
 def load(source: str | Path) -> Card:
@@ -162,13 +150,13 @@ def load(source: str | Path) -> Card:
     CardError
         What was found and what was expected, in one line.
     """
-    document = tomlin.read(source, FOLDER, "flight card", CardError)
+    document = toml_reader.read(source, FOLDER, "flight card", CardError)
     return parse(document, Path(source).stem)
 
 
 def parse(document: Mapping[str, object], name: str) -> Card:
     """Make a card of a parsed document; raises CardError."""
-    tomlin.check_format(document, name, CardError)
+    toml_reader.check_format(document, name, CardError)
     known = {"format", "title", "aircraft", "flight", "air", "pilot", "sensors", "segment", "fault"}
     for key in document:
         if key not in known:
@@ -212,7 +200,7 @@ def _table(where: str, value: object) -> dict[str, object]:
 
 
 def _number(where: str, key: str, value: object) -> float:
-    return tomlin.number(f"{where}: {key}", value, CardError)
+    return toml_reader.number(f"{where}: {key}", value, CardError)
 
 
 def _section(name: str, document: Mapping[str, object], key: str, kind: type[Section]) -> Section:

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from host.twin.aircraft.airframe import Array
+from host.aircraft.airframe import Array
 
 STEPS = {
     "pulse": ((1.0, 1.0),),

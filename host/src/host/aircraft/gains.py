@@ -1,0 +1,94 @@
+"""What a dimensional derivative is made of, stated once: gains of coefficients, and their inverse.
+
+Every way between both goes through here: the coefficients of a linear answer, templates with
+coefficients for parameters, conversions with a covariance. Etkin & Reid, Dynamics of Flight, ch. 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from host.aircraft.mass_properties import AirframeData, Condition
+
+# Rows of dimensional derivatives, and of the coefficients they stand for.
+COEFFICIENT_ROWS = {"Z": "CL", "D": "CD", "M": "Cm", "Y": "CY", "L": "Cl", "N": "Cn"}
+DIMENSIONAL_ROWS = {c: d for d, c in COEFFICIENT_ROWS.items()}
+MOMENTS = ("L", "N")  # mixed by Ixz
+
+
+def dimensional_name(coefficient: str) -> str:
+    """Return the dimensional derivative that a coefficient rules: ``M_q`` of ``Cm_q``."""
+    row, _, label = coefficient.partition("_")
+    return f"{DIMENSIONAL_ROWS[row]}_{label}"
+
+
+def coefficient_name(derivative: str) -> str:
+    """Return the coefficient that rules a dimensional derivative: ``Cm_q`` of ``M_q``."""
+    row, _, label = derivative.partition("_")
+    return f"{COEFFICIENT_ROWS[row]}_{label}"
+
+
+def dimensional_gains(airframe: AirframeData, condition: Condition) -> dict[str, dict[str, float]]:
+    """Return, per dimensional derivative of the templates, the coefficients it is made of.
+
+    Parameters
+    ----------
+    airframe : AirframeData
+        Mass, inertia, reference sizes.
+    condition : Condition
+        Airspeed and dynamic pressure.
+
+    Returns
+    -------
+    dict
+        ``{"L_p": {"Cl_p": gain, "Cn_p": gain}, ...}`` in SI; rates against p_hat, q_hat, r_hat.
+    """
+    a, V = airframe, condition.airspeed_mps
+    force = condition.qbar_pa * a.wing_area_m2
+    det = a.ixx_kgm2 * a.izz_kgm2 - a.ixz_kgm2**2
+    hat = {"q": 0.5 * a.chord_m / V, "p": 0.5 * a.span_m / V, "r": 0.5 * a.span_m / V}
+    found: dict[str, dict[str, float]] = {}
+    for label in ("alpha", "q", "de"):
+        scale = force * hat.get(label, 1.0)
+        found[f"Z_{label}"] = {f"CL_{label}": -scale / (a.mass_kg * V)}
+        found[f"M_{label}"] = {f"Cm_{label}": scale * a.chord_m / a.iyy_kgm2}
+    for label in ("alpha", "de"):
+        found[f"D_{label}"] = {f"CD_{label}": -force / a.mass_kg}
+    for label in ("beta", "p", "r", "da", "dr"):
+        scale = force * hat.get(label, 1.0)
+        moment = scale * a.span_m / det
+        found[f"Y_{label}"] = {f"CY_{label}": scale / (a.mass_kg * V)}
+        found[f"L_{label}"] = {
+            f"Cl_{label}": moment * a.izz_kgm2,
+            f"Cn_{label}": moment * a.ixz_kgm2,
+        }
+        found[f"N_{label}"] = {
+            f"Cl_{label}": moment * a.ixz_kgm2,
+            f"Cn_{label}": moment * a.ixx_kgm2,
+        }
+    return found
+
+
+def from_dimensional(
+    derivatives: Mapping[str, float], airframe: AirframeData, condition: Condition
+) -> dict[str, float]:
+    """Return the coefficients that dimensional derivatives stand for: `dimensional_gains` undone.
+
+    Of rolling and yawing moment one may be absent and counts as zero; names that are no derivative
+    are left out.
+    """
+    gains = dimensional_gains(airframe, condition)
+    found = {}
+    for name in gains:
+        if name not in derivatives:
+            continue
+        row, _, label = name.partition("_")
+        together = [f"{d}_{label}" for d in (MOMENTS if row in MOMENTS else (row,))]
+        matrix = [[gains[d][coefficient_name(c)] for c in together] for d in together]
+        solved = np.linalg.solve(matrix, [derivatives.get(d, 0.0) for d in together])
+        found[coefficient_name(name)] = float(solved[together.index(name)])
+    return found

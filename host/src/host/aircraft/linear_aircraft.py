@@ -1,0 +1,100 @@
+"""Aircraft of either kind by name or file: coefficients or published matrices."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from host import toml_reader
+from host.aircraft import file as aircraft
+from host.aircraft.airframe import GRAVITY_MPS2, Array
+from host.aircraft.file import Aircraft, AircraftError, read_document
+from host.aircraft.straight import Straight
+
+# Of the gravity terms of a file, against g and its own angle of attack.
+GRAVITY_TOLERANCE = 0.01
+
+
+def load(source: str | Path) -> Aircraft:
+    """Load an aircraft of any kind.
+
+    A linear one names in `base` the aircraft that gives all that is not in its matrices: sensors
+    and their places, servos, limits, geometry, mass.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a packaged aircraft, or path of a file.
+
+    Returns
+    -------
+    Aircraft
+
+    Raises
+    ------
+    AircraftError
+        A number is missing or wrong; matrices have the wrong size.
+    """
+    document = read_document(source)
+    if document.get("kind") != "linear":
+        return aircraft.load(source)
+    if not isinstance(document.get("source"), str):
+        raise AircraftError(f"{source}: the matrices have no source")
+    base = aircraft.load(str(document.get("base", "")))
+    numbers = {
+        key: toml_reader.number(f"{source}: {key}", document.get(key), AircraftError)
+        for key in ("u_mps", "w_mps", "elevator_rad", "throttle")
+    }
+    shapes = {"longitudinal_a": (4, 4), "longitudinal_b": (4, 1), "lateral_a": (4, 4),
+              "lateral_b": (4, 2)}  # fmt: skip
+    matrices = {name: _matrix(source, document, name, shape) for name, shape in shapes.items()}
+    alpha = math.atan2(numbers["w_mps"], numbers["u_mps"])
+    pull = matrices["longitudinal_a"][0, 3], matrices["lateral_a"][0, 3]
+    for found, sign in zip(pull, (-1.0, 1.0), strict=True):
+        expected = sign * GRAVITY_MPS2 * math.cos(alpha)
+        if abs(found - expected) > GRAVITY_TOLERANCE * GRAVITY_MPS2:
+            raise AircraftError(
+                f"{source}: gravity enters with {found:.4g} m/s2, expected {expected:.4g}"
+            )
+    # Of a motor it says nothing: the throttle moves, the aircraft does not feel it.
+    wide = np.hstack([matrices["longitudinal_b"], np.zeros((4, 1))])
+    straight = Straight(
+        **numbers,
+        longitudinal_a=matrices["longitudinal_a"],
+        longitudinal_b=wide,
+        lateral_a=matrices["lateral_a"],
+        lateral_b=matrices["lateral_b"],
+    )
+    return flown_straight(
+        base,
+        straight,
+        name=str(document.get("name", Path(source).stem)),
+        title=str(document.get("title", source)),
+    )
+
+
+def flown_straight(base: Aircraft, straight: Straight, *, name: str, title: str) -> Aircraft:
+    """Return `base` with straight lines for its aerodynamics and propulsion."""
+    speed = math.hypot(straight.u_mps, straight.w_mps)
+    return replace(
+        base,
+        name=name,
+        title=title,
+        scalars={**base.scalars, "trim.airspeed_mps": speed},
+        straight=straight,
+    )
+
+
+def _matrix(
+    source: str | Path, document: dict[str, object], name: str, shape: tuple[int, int]
+) -> Array:
+    try:
+        matrix = np.array(document.get(name), dtype=np.float64)
+    except (TypeError, ValueError):
+        matrix = np.empty(0)
+    if matrix.shape != shape or not np.isfinite(matrix).all():
+        raise AircraftError(f"{source}: {name} has shape {matrix.shape}, expected {shape}")
+    return matrix

@@ -1,0 +1,92 @@
+"""Mass, inertia, sizes and places of the sensors out of an aircraft file, each with its tolerance.
+
+The file's reader has checked every number: whatever is wrong with one is said there, in one line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.aircraft.file import load_measured
+from host.compiled import Array
+
+RECTANGLE = 1.0 / np.sqrt(3.0)  # standard deviation of an even distribution over its half width
+Place = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class AirframeData:
+    """Mass, inertia, reference sizes, sensor positions with their relative uncertainties.
+
+    Positions are in metres from the CG, x forward, y right, z down; relative numbers are standard
+    deviations. `upwash` is the share by which the vanes over-read. Arms reach from the nominal CG
+    back to where a tail surface's control force acts; 0 is not known.
+    """
+
+    name: str
+    mass_kg: float
+    ixx_kgm2: float
+    iyy_kgm2: float
+    izz_kgm2: float
+    ixz_kgm2: float
+    wing_area_m2: float
+    span_m: float
+    chord_m: float
+    mass_share: float = 0.01
+    inertia_share: float = 0.05
+    pressure_share: float = 0.02
+    imu_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    vanes_m: tuple[tuple[float, float, float], ...] = ()
+    upwash: float = 0.0
+    upwash_share: float = 0.2
+    elevator_arm_m: float = 0.0
+    rudder_arm_m: float = 0.0
+    arm_share: float = 0.06
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """Where a coefficient is taken: mean over the maneuvers."""
+
+    airspeed_mps: float
+    qbar_pa: float
+
+
+def airframe_data(source: str) -> AirframeData:
+    """Return mass, sizes and places of the sensors of an aircraft by name or file.
+
+    Raises
+    ------
+    host.errors.UsageError
+        If there is no such file, or it does not say all of that (a linear aircraft).
+    """
+    loaded = load_measured(source)
+    number, vector, cg = loaded.scalar, loaded.vector, loaded.vector("mass.cg_m")
+    return AirframeData(
+        name=loaded.title,
+        mass_kg=number("mass.mass_kg"),
+        ixx_kgm2=number("mass.ixx_kgm2"),
+        iyy_kgm2=number("mass.iyy_kgm2"),
+        izz_kgm2=number("mass.izz_kgm2"),
+        ixz_kgm2=number("mass.ixz_kgm2"),
+        wing_area_m2=number("geometry.wing_area_m2"),
+        span_m=number("geometry.span_m"),
+        chord_m=number("geometry.chord_m"),
+        mass_share=number("mass.mass_tolerance") * RECTANGLE,
+        inertia_share=number("mass.inertia_tolerance") * RECTANGLE,
+        imu_m=place(vector("sensors.imu_m") - cg),
+        vanes_m=tuple(place(vector(f"sensors.vane_{k}_m") - cg) for k in "ab"),
+        upwash=number("sensors.upwash"),
+        upwash_share=number("sensors.upwash_tolerance"),
+        elevator_arm_m=number("geometry.elevator_arm_m"),
+        rudder_arm_m=number("geometry.rudder_arm_m"),
+        arm_share=number("geometry.arm_tolerance") * RECTANGLE,
+    )
+
+
+def place(from_cg: Array) -> Place:
+    """Return x, y, z of a place (3,)."""
+    x, y, z = from_cg.tolist()
+    return x, y, z

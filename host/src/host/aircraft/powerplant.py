@@ -1,0 +1,116 @@
+"""Thrust and spin of a propeller from the throttle, by the fits in the aircraft file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from host.aircraft.file import AircraftError, load_measured
+from host.aircraft.propulsion import motor_torque, propeller, rotor_history
+from host.compiled import Array
+
+Step = Callable[[float, float, float, float], tuple[float, float, float]]
+History = Callable[[Array, Array, Array, float, float, int], Array]
+SUBSTEPS = 3  # a rotor takes 0.1 s and more to answer; records come at 33 Hz
+START_RADPS = 600.0  # forgotten within half a second
+SETTLED, SETTLING_S = 200, 0.03  # samples until a rotor keeps its speed, and their distance
+
+
+@dataclass(frozen=True, slots=True)
+class Powerplant:
+    """How the propeller answers.
+
+    Attributes
+    ----------
+    step : callable
+        From rotor speed, throttle, airspeed and density to thrust (N), torque of the air and of the
+        motor (N m).
+    history : callable
+        From throttle, airspeed and density of a flight, the first rotor speed (rad/s), the length
+        of a step (s) and the steps in a sample to thrust, rotor speed and motor torque, (3, n).
+    rotor_kgm2 : float
+    axis : (3,) Array
+        Unit vector of thrust, body axes.
+    hub_m : (3,) Array
+        From the nominal CG.
+    """
+
+    step: Step
+    history: History
+    rotor_kgm2: float
+    axis: Array
+    hub_m: Array
+
+    def run(
+        self, throttle: Array, airspeed_mps: Array, density_kgpm3: Array, dt_s: float
+    ) -> tuple[Array, Array, Array]:
+        """Return thrust (N), rotor speed (rad/s) and motor torque (N m), each (n,)."""
+        thrust, spin, drive = self.history(
+            np.ascontiguousarray(throttle),
+            np.ascontiguousarray(airspeed_mps),
+            np.ascontiguousarray(density_kgpm3),
+            START_RADPS,
+            dt_s / SUBSTEPS,
+            SUBSTEPS,
+        )
+        return thrust, spin, drive
+
+    def settled_slopes(
+        self, throttle: float, airspeed_mps: float, density_kgpm3: float
+    ) -> tuple[float, float]:
+        """Return how thrust, the rotor settled, changes with airspeed (N per m/s) and with density
+        (N per unit share)."""
+
+        def thrust(faster: float, denser: float) -> float:
+            around = np.full(SETTLED, airspeed_mps + faster)
+            air = np.full(SETTLED, density_kgpm3 * (1.0 + denser))
+            return float(self.run(np.full(SETTLED, throttle), around, air, SETTLING_S)[0][-1])
+
+        by_speed = thrust(0.5, 0.0) - thrust(-0.5, 0.0)
+        return by_speed, (thrust(0.0, 0.01) - thrust(0.0, -0.01)) / 0.02
+
+    def slope(self, spin_radps: float, airspeed_mps: float, density_kgpm3: float) -> float:
+        """Return how thrust changes with airspeed (N per m/s) at constant rotor speed."""
+        above, below = (
+            self.step(spin_radps, 0.5, airspeed_mps + half, density_kgpm3)[0]
+            for half in (0.5, -0.5)
+        )
+        return above - below
+
+
+class NoPropulsionError(AircraftError):
+    """A measured aircraft without a section [propulsion]."""
+
+
+def powerplant(source: str) -> Powerplant:
+    """Return the propeller and motor of an aircraft by name or file.
+
+    Raises
+    ------
+    NoPropulsionError
+        If a measured aircraft does not describe them.
+    """
+    loaded = load_measured(source)
+    if "propulsion.diameter_m" not in loaded.scalars:
+        raise NoPropulsionError(
+            f"aircraft {source}: no section [propulsion]; coefficients straight from"
+            " flight need the thrust: add it, or leave '--model coefficients' out"
+        )
+    frame = loaded.airframe()
+
+    def step(
+        spin_radps: float, throttle: float, airspeed_mps: float, density_kgpm3: float
+    ) -> tuple[float, float, float]:
+        thrust, load = propeller(frame, spin_radps, airspeed_mps, density_kgpm3)
+        return thrust, load, motor_torque(frame, throttle, spin_radps)
+
+    return Powerplant(
+        step,
+        partial(rotor_history, frame),
+        frame.rotor_inertia_kgm2,
+        frame.thrust_axis,
+        frame.hub_m - frame.cg_m,
+    )

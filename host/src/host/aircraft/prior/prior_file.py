@@ -1,0 +1,89 @@
+"""What a handbook or a vortex lattice said before the flight, beside what the flight says.
+
+TOML (`[coefficients]` with names as in the answer, per radian, body axes; with `alpha_deg = [...]`
+each may be a list, a table over the angle of attack), text that AVL writes with ST or SB (`avl`),
+or Digital Datcom's output (`datcom`). Tables are read between their rows at the flight's angle of
+attack, lateral derivatives turned from stability to body axes there. Signs are the house's: body
+axes x forward, y right, z down; elevator and aileron as in the answer. Coefficients are referred
+to the file's own area, chord and span, which are printed beside them where the file has them.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from host.aircraft.prior.avl import is_avl, read_avl
+from host.aircraft.prior.datcom import is_datcom, read_datcom
+from host.aircraft.prior.prior_table import Points, PriorError, PriorTable
+
+SOUND_MPS = 340.3  # standard atmosphere, sea level: chooses between Mach numbers of a handbook
+
+
+def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
+    """Return coefficients over the angle of attack.
+
+    Parameters
+    ----------
+    path : Path
+        TOML, AVL's ST or SB output, or Datcom's output.
+    airspeed_mps : float
+        Of the flight: which Mach number of several.
+
+    Raises
+    ------
+    PriorError
+        If the file cannot be read, holds no coefficient, or one that is no number.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
+        table: PriorTable | None = None
+        if path.suffix == ".toml":
+            table = _from_toml(text)
+        elif is_datcom(text):
+            table = read_datcom(text, airspeed_mps / SOUND_MPS)
+        elif is_avl(text):
+            table = read_avl(text)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise PriorError(f"{path}: cannot be read as a prior ({reason})") from error
+    except (ValueError, TypeError, PriorError) as error:
+        raise PriorError(f"{path}: {error}") from error
+    if table is None or not table.points:
+        raise PriorError(
+            f"{path}: no coefficient; expected TOML with [coefficients], or output of AVL (ST, SB)"
+            " or Datcom"
+        )
+    wrong = sorted(n for n, pairs in table.points.items() if not np.isfinite(pairs).all())
+    if wrong:
+        raise PriorError(f"{path}: {', '.join(wrong)} not a finite number")
+    return table
+
+
+def _from_toml(text: str) -> PriorTable:
+    document = tomllib.loads(text)
+    listed, table = document.get("alpha_deg", [0.0]), document.get("coefficients", {})
+    if not isinstance(listed, list) or not listed:
+        raise ValueError(f"alpha_deg is {listed!r}, expected a list of angles")
+    if not isinstance(table, dict):
+        raise ValueError(f"coefficients is {table!r}, expected a table [coefficients]")
+    angles = [_number("alpha_deg", x) for x in listed]
+    if np.any(np.diff(angles) <= 0.0):
+        raise ValueError(f"alpha_deg {angles}, expected rising angles")
+    points: Points = {}
+    for name, value in table.items():
+        values = value if isinstance(value, list) else [value] * len(angles)
+        if len(values) != len(angles):
+            raise ValueError(f"{name} has {len(values)} values, alpha_deg {len(angles)}")
+        points[str(name)] = [
+            (float(np.radians(a)), _number(name, v)) for a, v in zip(angles, values, strict=True)
+        ]
+    return PriorTable(points, stability_axes=False)
+
+
+def _number(name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{name} is {value!r}, expected a number")
+    return float(value)

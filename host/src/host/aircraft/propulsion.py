@@ -1,0 +1,86 @@
+"""Propeller and motor: thrust and torque by advance ratio, shaft power by throttle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from host.aircraft.airframe import Airframe, Array
+from host.compiled import compiled_fast
+
+
+@compiled_fast
+def polynomial(coefficients: Array, x: float) -> float:
+    """Evaluate a polynomial given from the highest power down."""
+    y = 0.0
+    for c in coefficients:
+        y = y * x + c
+    return y
+
+
+@compiled_fast
+def propeller(
+    frame: Airframe, rotor_radps: float, axial_mps: float, density_kgpm3: float
+) -> tuple[float, float]:
+    """Return thrust (N) and the torque the air takes from the rotor (N m).
+
+    The advance ratio is clamped to the range of the polynomials; beyond it (a rotor that slows
+    down or stands) the drag of the stopped blades comes in as the rotor falls below the clamped
+    speed.
+    """
+    n = max(rotor_radps, 0.0) / (2.0 * math.pi)
+    d = frame.propeller_diameter_m
+    v = max(axial_mps, 0.0)
+    limit = frame.advance_ratio_max
+    advance = limit
+    if v < limit * n * d:
+        advance = v / (n * d)
+    scale = density_kgpm3 * n * n * d**4
+    thrust = scale * polynomial(frame.ct_polynomial, advance)
+    torque = scale * d * polynomial(frame.cp_polynomial, advance) / (2.0 * math.pi)
+    stopped = 0.0
+    if v > limit * n * d:
+        stopped = 1.0 - limit * n * d / v
+    thrust -= 0.5 * density_kgpm3 * v * v * frame.stopped_drag_area_m2 * stopped
+    return thrust, torque
+
+
+@compiled_fast
+def motor_torque(frame: Airframe, throttle: float, rotor_radps: float) -> float:
+    """Return the torque of motor, friction and brake on the rotor (N m): shaft power over speed,
+    current-limited."""
+    power = max(polynomial(frame.motor_power_polynomial_w, min(max(throttle, 0.0), 1.0)), 0.0)
+    if throttle <= 0.0:
+        power = 0.0
+    drive = min(power / max(rotor_radps, 1.0), frame.motor_torque_max_nm)
+    # A controller brakes at zero throttle. Friction fades out at standstill: it never turns it
+    # back.
+    hold = frame.brake_torque_nm if throttle <= 0.0 else frame.friction_torque_nm
+    friction = hold * min(max(rotor_radps, 0.0) / 5.0, 1.0)
+    return drive - friction
+
+
+@compiled_fast
+def rotor_history(
+    frame: Airframe,
+    throttle: Array,
+    axial_mps: Array,
+    density_kgpm3: Array,
+    start_radps: float,
+    part_s: float,
+    parts: int,
+) -> Array:
+    """Run the rotor through a flight, each sample as `parts` Euler steps of `part_s`.
+
+    Returns rows of thrust (N), rotor speed (rad/s) and motor torque (N m), shape (3, n).
+    """
+    result = np.empty((3, throttle.shape[0]))
+    speed, push, torque = start_radps, 0.0, 0.0
+    for i in range(throttle.shape[0]):
+        for _ in range(parts):
+            push, load = propeller(frame, speed, axial_mps[i], density_kgpm3[i])
+            torque = motor_torque(frame, throttle[i], speed)
+            speed = max(speed + part_s * (torque - load) / frame.rotor_inertia_kgm2, 0.0)
+        result[0, i], result[1, i], result[2, i] = push, speed, torque
+    return result

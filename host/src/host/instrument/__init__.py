@@ -1,0 +1,1 @@
+"""What an instrument may be wrong by."""

@@ -1,0 +1,1 @@
+"""What to fly: it may know the virtual flight and identification."""

@@ -1,0 +1,114 @@
+"""An aircraft to fly that has the entries of identified models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from host.aircraft.file import Aircraft, AircraftError
+from host.aircraft.linear_aircraft import flown_straight
+from host.aircraft.linearisation import linearise
+from host.aircraft.straight import Straight
+from host.aircraft.trim import solve
+from host.sysid.models.model_file import read_model, read_trim
+
+# States of identified models, and those of the equations of motion they stand for.
+AXES = {
+    "longitudinal": ("airspeed_mps", "alpha_rad", "q_radps", "theta_rad"),
+    "lateral": ("beta_rad", "p_radps", "r_radps", "phi_rad"),
+}
+INPUTS = {
+    "longitudinal": ("elevator_rad", "throttle"),
+    "lateral": ("aileron_rad", "rudder_rad"),
+}
+
+
+def is_model(source: str | Path) -> bool:
+    """Return whether a file is a model as `host identify --save-model` writes it."""
+    path = Path(source)
+    if path.suffix != ".toml" or not path.is_file():
+        return False
+    return any(line.startswith("states =") for line in path.read_text("utf-8").splitlines())
+
+
+def with_models(base: Aircraft, models: Sequence[Path]) -> Aircraft:
+    """Return a linear aircraft: `base` about its trim, with the entries of identified models.
+
+    Parameters
+    ----------
+    base : Aircraft
+        With coefficients; gives what no model has.
+    models : sequence of Path
+        Models as `host identify --save-model` writes them, of one airspeed.
+
+    Returns
+    -------
+    Aircraft
+
+    Raises
+    ------
+    AircraftError
+        A model has other states than those of flight, no [trim], or another airspeed.
+    """
+    read = [(path, read_model(path), read_trim(path)) for path in models]
+    speed, alpha = read[0][2].airspeed_mps, read[0][2].alpha_rad
+    for path, _, trim in read:
+        if abs(trim.airspeed_mps - speed) > 0.05 * speed:
+            raise AircraftError(
+                f"{path}: about {trim.airspeed_mps:.1f} m/s, expected {speed:.1f} as {models[0]}"
+            )
+    frame = base.airframe()
+    trimmed = solve(frame, speed)
+    linear = linearise(frame, trimmed)
+    turn = np.eye(4)
+    turn[:2, :2] = [
+        [math.cos(alpha), -speed * math.sin(alpha)],
+        [math.sin(alpha), speed * math.cos(alpha)],
+    ]
+    turns = {"longitudinal": turn, "lateral": np.diag([speed, 1.0, 1.0, 1.0])}
+    a = {"longitudinal": linear.longitudinal_a, "lateral": linear.lateral_a}
+    b = {
+        "longitudinal": np.hstack([linear.longitudinal_b, np.zeros((4, 1))]),
+        "lateral": linear.lateral_b,
+    }
+    for path, model, _ in read:
+        axis = _axis(path, model.states, model.inputs)
+        t = turns[axis]
+        own_a, own_b = np.linalg.solve(t, a[axis] @ t), np.linalg.solve(t, b[axis])
+        rows = [AXES[axis].index(name) for name in model.states]
+        columns = [INPUTS[axis].index(name) for name in model.inputs]
+        found_a, found_b, _, _ = model.matrices(model.start)
+        own_a[np.ix_(rows, rows)] = found_a
+        own_b[np.ix_(rows, columns)] = found_b
+        a[axis], b[axis] = t @ own_a @ np.linalg.inv(t), t @ own_b
+    straight = Straight(
+        u_mps=speed * math.cos(alpha),
+        w_mps=speed * math.sin(alpha),
+        elevator_rad=float(trimmed.command[0]),
+        throttle=float(trimmed.command[3]),
+        longitudinal_a=a["longitudinal"],
+        longitudinal_b=b["longitudinal"],
+        lateral_a=a["lateral"],
+        lateral_b=b["lateral"],
+    )
+    names = ", ".join(path.name for path in models)
+    return flown_straight(
+        base, straight, name=base.name, title=f"{base.title}, linear, with {names}"
+    )
+
+
+def _axis(path: Path, states: tuple[str, ...], inputs: tuple[str, ...]) -> str:
+    for axis, known in AXES.items():
+        if set(states) <= set(known) and set(inputs) <= set(INPUTS[axis]):
+            # A phugoid leaves alpha out and hides it in its other rows.
+            if axis == "longitudinal" and "alpha_rad" not in states:
+                break
+            return axis
+    raise AircraftError(
+        f"{path}: states {', '.join(states)} with inputs {', '.join(inputs)} cannot be flown,"
+        f" expected of {', '.join(AXES['longitudinal'])} (alpha_rad among them) or"
+        f" {', '.join(AXES['lateral'])}"
+    )

@@ -1,0 +1,322 @@
+"""Test points before they are flown: what the aircraft will do, and what the data will tell.
+
+Excursions come from flying the nominal aircraft in calm air with exact inputs. Bounds come from
+`host.sysid` (sensitivities of output error on that flight, sensors' white noise), so they are
+the Cramer-Rao bounds of the whole card: all longitudinal test points together, all lateral ones
+together.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from host.aircraft.airframe import Array
+from host.aircraft.attitude import euler
+from host.aircraft.file import Aircraft
+from host.aircraft.linear_aircraft import load
+from host.aircraft.linearisation import linearise, modes
+from host.aircraft.trim import solve
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.start import start_values
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+from host.sysid.models.templates import Trim as Condition
+from host.sysid.models.templates import lateral, longitudinal
+from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.problem import OutputProblem
+from host.twin.flight.fly import FlightRecord, fly
+from host.twin.flight.pilot import Window
+from host.twin.outcome.ideal import true_table
+from host.twin.sensors.airdata import AirData, air_data
+from host.twin.testcard.cards import Card, Pilot, Segment, Sensors
+
+# White noise of each output at 100 Hz: two vanes and two pitots averaged, four conversions each,
+# MPU-6000 behind its filter; attitude as good as a filter makes it over one maneuver.
+NOISE = {
+    "airspeed_mps": 0.06,
+    "alpha_rad": 0.0008,
+    "beta_rad": 0.0008,
+    "p_radps": 0.0008,
+    "q_radps": 0.0008,
+    "r_radps": 0.0008,
+    "phi_rad": 0.003,
+    "theta_rad": 0.003,
+    "ax_mps2": 0.035,
+    "ay_mps2": 0.035,
+    "az_mps2": 0.035,
+}
+LONGITUDINAL_SHOWN = ("Z_alpha", "Z_de", "M_alpha", "M_q", "M_de", "D_V", "D_alpha")
+LATERAL_SHOWN = (
+    "Y_beta", "Y_dr", "L_beta", "L_p", "L_r", "L_da", "L_dr", "N_beta", "N_p", "N_r", "N_da",
+    "N_dr",
+)  # fmt: skip
+# Excursions a first test flight of a trainer keeps to; amplitudes of a designed card aim at them.
+WANTED = {"alpha_deg": 3.5, "beta_deg": 6.0, "bank_deg": 30.0}
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One test point of a card and what to expect of it (largest changes from trim)."""
+
+    kind: str
+    axes: tuple[str, ...]
+    amplitudes: tuple[float, ...]
+    width_s: float
+    duration_s: float
+    airspeed_mps: float
+    alpha_deg: float
+    beta_deg: float
+    roll_rate_degps: float
+    pitch_rate_degps: float
+    yaw_rate_degps: float
+    bank_deg: float
+    pitch_deg: float
+    load_factor: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """Predicted value of a derivative and its 95 % half-width from the whole card."""
+
+    name: str
+    value: float
+    half_width: float
+
+    @property
+    def percent(self) -> float:
+        """Half-width in per cent of the value; infinite at zero."""
+        return abs(100.0 * self.half_width / self.value) if self.value else math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A judged card.
+
+    Attributes
+    ----------
+    card, aircraft : Card, Aircraft
+    points : list of Point
+    bounds : list of Bound
+    refused : list of str
+        Why an axis has no bounds.
+    """
+
+    card: Card
+    aircraft: Aircraft
+    points: list[Point]
+    bounds: list[Bound]
+    refused: list[str]
+
+
+def exact(card: Card) -> Card:
+    """Return the card in calm air, with exact inputs and no faults."""
+    calm = replace(card.air, wind_north_mps=0.0, wind_east_mps=0.0, turbulence_mps=0.0)
+    pilot = Pilot(
+        timing_s=0.0, amplitude=0.0, drift=0.0, remnant=0.0, early=0.0,
+        hands_off_s=card.pilot.hands_off_s,
+    )  # fmt: skip
+    rate = max(card.flight.rate_hz, 25.0)
+    return replace(
+        card, air=calm, pilot=pilot, sensors=Sensors(tolerances=False), faults=(),
+        flight=replace(card.flight, rate_hz=rate),
+    )  # fmt: skip
+
+
+def judge(card: Card) -> Plan:
+    """Fly a card ideally and predict what it will tell.
+
+    Parameters
+    ----------
+    card : Card
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    CardError, AircraftError, TrimError
+        The card cannot be flown.
+    """
+    record = fly(exact(card))
+    segments = [s for s in card.segments if s.kind not in ("trim", "turn")]
+    windows = record.schedule.windows
+    data = air_data(record)
+    points = [_point(record, data, s, w) for s, w in zip(segments, windows, strict=True)]
+    table = true_table(record, data)
+    _, theta, _ = euler(record.trim.state[6:10])
+    condition = Condition(record.trim.airspeed_mps, record.trim.alpha_rad, float(theta))
+    bounds: list[Bound] = []
+    refused: list[str] = []
+    flown = {axis for s in segments for axis in s.axes}
+    for axes, shown, name in (
+        (("elevator",), LONGITUDINAL_SHOWN, "longitudinal"),
+        (("aileron", "rudder"), LATERAL_SHOWN, "lateral"),
+    ):
+        missing = [axis for axis in axes if axis not in flown]
+        if missing:
+            refused.append(
+                f"{name}: no input on {', '.join(missing)}, its derivatives stay unknown"
+            )
+            continue
+        model = longitudinal(condition) if name == "longitudinal" else lateral(condition)
+        chosen = [
+            (w, times) for w, times in _distinct(segments, windows) if set(w.axes) & set(axes)
+        ]
+        try:
+            bounds += _bounds(model, table, chosen, shown)
+        except IdentificationError as error:
+            refused.append(f"{name}: {error}")
+    return Plan(card, record.aircraft, points, bounds, refused)
+
+
+def _bounds(
+    model: LinearModel,
+    table: pd.DataFrame,
+    windows: list[tuple[Window, int]],
+    shown: tuple[str, ...],
+) -> list[Bound]:
+    """Fit the windows once each; a repeated one counts as often in the information."""
+    cuts = [
+        Maneuver.from_table(table, model, from_s=w.start_s - 0.3, to_s=w.end_s) for w, _ in windows
+    ]
+    problem = OutputProblem(model, cuts)
+    variance = np.array([NOISE[name] ** 2 for name in model.outputs])
+    best = minimise(problem, start_values(problem), variance=variance)
+    responses = problem.respond(best.theta)
+    if responses is None:
+        raise IdentificationError("the prior model's response grows without bound")
+    size = len(problem.names)
+    information = np.diag(problem.prior_precision)
+    for k, (response, (_, times)) in enumerate(zip(responses, windows, strict=True)):
+        place = problem.columns(k)
+        part = np.einsum("jta,j,jtb->ab", response.slopes, 1.0 / variance, response.slopes)
+        information[np.ix_(place, place)] += times * part
+    covariance = covariance_of(information, np.ones(size, dtype=np.bool_))
+    sigma = np.sqrt(np.diag(covariance))
+    return [
+        Bound(name, float(best.theta[k]), float(1.96 * sigma[k]))
+        for k, name in enumerate(problem.names)
+        if name in shown
+    ]
+
+
+def _distinct(segments: list[Segment], windows: list[Window]) -> list[tuple[Window, int]]:
+    """Return one window of each different input and how often the card has it."""
+    found: dict[Segment, tuple[Window, int]] = {}
+    for s, w in zip(segments, windows, strict=True):
+        first, times = found.get(s, (w, 0))
+        found[s] = (first, times + 1)
+    return list(found.values())
+
+
+def _point(record: FlightRecord, data: AirData, s: Segment, w: Window) -> Point:
+    inside = (record.t_s >= w.start_s) & (record.t_s < w.end_s)
+    first = int(np.argmax(inside))
+
+    def largest(x: Array) -> float:
+        return float(np.abs(x[inside] - x[first]).max())
+
+    phi, theta, _ = euler(record.states[:, 6:10])
+    load = -record.specific_force_mps2[inside, 2] / 9.80665
+    return Point(
+        kind=s.kind,
+        axes=s.axes,
+        amplitudes=s.amplitudes,
+        width_s=s.width_s,
+        duration_s=w.end_s - w.start_s,
+        airspeed_mps=largest(data.airspeed_mps),
+        alpha_deg=math.degrees(largest(data.alpha_rad)),
+        beta_deg=math.degrees(largest(data.beta_rad)),
+        roll_rate_degps=math.degrees(largest(record.states[:, 3])),
+        pitch_rate_degps=math.degrees(largest(record.states[:, 4])),
+        yaw_rate_degps=math.degrees(largest(record.states[:, 5])),
+        bank_deg=math.degrees(largest(phi)),
+        pitch_deg=math.degrees(largest(theta)),
+        load_factor=(float(load.min()), float(load.max())),
+    )
+
+
+def design(name: str, airspeed_mps: float = 0.0) -> Card:
+    """Make a card for an aircraft from its prior model.
+
+    Elevator 3-2-1-1 with a unit of 0.3 and a doublet half of 0.5 short-period periods, rudder
+    doublet of half dutch-roll periods, aileron doublet long against the roll mode; amplitudes
+    for the excursions of `WANTED`, found by flying each input once and scaling. (Jategaonkar,
+    Flight Vehicle System Identification, chapter 2.)
+
+    Parameters
+    ----------
+    name : str
+        Aircraft.
+    airspeed_mps : float
+        0: the aircraft file's.
+
+    Returns
+    -------
+    Card
+    """
+    aircraft = load(name)
+    speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")
+    frame = aircraft.airframe()
+    found = {m.name: m for m in modes(linearise(frame, solve(frame, speed)))}
+    short = 2.0 * math.pi / found["short period"].frequency_radps
+    dutch = 2.0 * math.pi / found["dutch roll"].frequency_radps
+    hand = 0.2  # a thumb is no faster
+    draft = (
+        Segment("3211", axes=("elevator",), amplitudes=(2.0,), width_s=max(0.3 * short, hand)),
+        Segment("doublet", axes=("elevator",), amplitudes=(2.0,), width_s=max(0.5 * short, hand)),
+        Segment("doublet", axes=("rudder",), amplitudes=(4.0,), width_s=max(0.5 * dutch, hand)),
+        Segment("doublet", axes=("aileron",), amplitudes=(3.0,), width_s=0.6),
+    )
+    flight = Card(name="plan", title="", aircraft=name, segments=draft)
+    flight = replace(flight, flight=replace(flight.flight, airspeed_mps=speed))
+    record = fly(exact(flight))
+    data = air_data(record)
+    segments: list[Segment] = [Segment("trim", duration_s=5.0)]
+    for s, w in zip(draft, record.schedule.windows, strict=True):
+        p = _point(record, data, s, w)
+        excursion = {
+            "elevator": (p.alpha_deg, WANTED["alpha_deg"]),
+            "rudder": (p.beta_deg, WANTED["beta_deg"]),
+            "aileron": (p.bank_deg, WANTED["bank_deg"]),
+        }[s.axes[0]]
+        limit = math.degrees(aircraft.scalar(f"surfaces.{s.axes[0]}_limit_rad"))
+        amplitude = min(s.amplitudes[0] * excursion[1] / excursion[0], 0.5 * limit)
+        chosen = replace(
+            s, amplitudes=(round(amplitude * 2.0) / 2.0 or 0.5,), width_s=round(s.width_s, 2)
+        )
+        segments += [chosen] * 3
+    segments.append(Segment("trim", duration_s=5.0))
+    about = "" if aircraft.straight else f" at {speed:.0f} m/s"
+    title = f"{aircraft.title}{about}: three of each input"
+    return replace(flight, title=title, segments=tuple(segments))
+
+
+def document(card: Card) -> dict[str, object]:
+    """Return a designed card as `tomlout.dumps` takes it."""
+    listed: list[dict[str, object]] = []
+    for s in card.segments:
+        row: dict[str, object] = {"kind": s.kind}
+        if s.axes:
+            row["axis"] = list(s.axes)
+            row["amplitude"] = list(s.amplitudes)
+        for key in ("duration_s", "bank_deg", "width_s", "low_hz", "high_hz", "airspeed_mps"):
+            value = getattr(s, key)
+            if value:
+                row[key] = value
+        if listed and {k: v for k, v in listed[-1].items() if k != "repeat"} == row:
+            listed[-1]["repeat"] = int(str(listed[-1].get("repeat", 1))) + 1
+        else:
+            listed.append(row)
+    return {
+        "format": 1,
+        "title": card.title,
+        "aircraft": card.aircraft,
+        "flight": {"airspeed_mps": card.flight.airspeed_mps},
+        "segment": listed,
+    }

@@ -1,0 +1,255 @@
+"""Dimensional derivatives to coefficients and back, with the covariance of everything known.
+
+What is known of an aircraft is uncertain: mass, inertias, the place of the CG, scales of pitot,
+vanes and surface pots. Each stands beside the numbers as one more of them (value 0, its deviation),
+so that nothing is lost on the way: what a wrong mass does to a coefficient it undoes in the motion.
+
+Dimensional derivatives are those of the templates, at the CG, per unit of what the sensors read;
+coefficients are per unit of what is true, moments about the nominal CG. Etkin & Reid, Dynamics of
+Flight, ch. 4; Klein & Morelli, ch. 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from host.aircraft.gains import (
+    coefficient_name,
+    dimensional_gains,
+    dimensional_name,
+    from_dimensional,
+)
+from host.aircraft.mass_properties import AirframeData, Condition
+from host.compiled import Array
+from host.instrument.errors import InstrumentData, deviations
+from host.sysid.errors import IdentificationError
+from host.sysid.models.templates import GRAVITY_MPS2
+
+CARRIED = (
+    "mass_share", "ixx_share", "iyy_share", "izz_share", "cg_x_m", "cg_z_m",
+    "pitot_scale", "pitot_drift_pa", "density_share", "alpha_scale", "beta_scale", "upwash_share",
+    "elevator_scale", "aileron_scale", "rudder_scale",
+)  # fmt: skip
+READ_WITH = {
+    "alpha": "alpha_scale", "beta": "beta_scale", "de": "elevator_scale", "da": "aileron_scale",
+    "dr": "rudder_scale",
+}  # fmt: skip
+LABELS = {
+    "Z": ("alpha", "q", "de"), "D": ("alpha", "de"), "M": ("alpha", "q", "de"),
+    **dict.fromkeys(("Y", "L", "N"), ("beta", "p", "r", "da", "dr")),
+}  # fmt: skip
+# What can be converted, and what it becomes.
+DERIVATIVES = tuple(f"{row}_{label}" for row, labels in LABELS.items() for label in labels)
+COEFFICIENTS = tuple(map(coefficient_name, DERIVATIVES))
+STEP = 1e-4  # of a deviation, at least of 1e-6 of the value
+Table = dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantities:
+    """Named numbers with their joint covariance: values (n,), covariance (n, n)."""
+
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+
+    def value(self, name: str) -> float:
+        """Return one of them."""
+        return float(self.values[self.names.index(name)])
+
+    def deviation(self, name: str) -> float:
+        """Return the standard deviation of one of them."""
+        k = self.names.index(name)
+        return float(np.sqrt(max(self.covariance[k, k], 0.0)))
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """What a conversion is made at: airframe, condition of the maneuvers, angle of attack, CD."""
+
+    airframe: AirframeData
+    condition: Condition
+    alpha_rad: float = 0.0
+    drag: float = 0.0
+
+
+def carried_errors(airframe: AirframeData, instrument: InstrumentData) -> dict[str, float]:
+    """Return one standard deviation of everything a conversion leans on, by name."""
+    every = deviations(instrument, airframe)
+    return {name: every[name] for name in CARRIED}
+
+
+def to_coefficients(
+    derivatives: Quantities, place: Place, errors: Mapping[str, float]
+) -> Quantities:
+    """Convert dimensional derivatives (A, B) to non-dimensional coefficients.
+
+    Parameters
+    ----------
+    derivatives : Quantities
+        Under the names of the templates (Z_alpha, M_q, L_p ...), SI; names in `CARRIED` among them
+        are known errors, with whatever they share with the others. The rest is left out.
+    place : Place
+    errors : mapping
+        Standard deviations of what else is uncertain, names of `CARRIED` (`carried_errors`); what
+        is absent is taken as exact.
+
+    Returns
+    -------
+    Quantities
+        Coefficients in the order of the derivatives, then the errors.
+
+    Raises
+    ------
+    IdentificationError
+        If there is nothing to convert, or an error is not one of these.
+    """
+
+    def convert(values: Table) -> Table:
+        own, scale = _really(place, values), _reading(place.airframe, values)
+        found = {n: v * scale(n) for n, v in values.items() if n not in CARRIED}
+        table = from_dimensional(found, own.airframe, own.condition)
+        result = {coefficient_name(n): table[coefficient_name(n)] for n in found}
+        return _moved(result, own, values, sign=1.0)
+
+    return _converted(derivatives, DERIVATIVES, errors, convert)
+
+
+def to_derivatives(
+    coefficients: Quantities, place: Place, errors: Mapping[str, float]
+) -> Quantities:
+    """Convert non-dimensional coefficients to the dimensional derivatives of (A, B).
+
+    Parameters
+    ----------
+    coefficients : Quantities
+        CL_alpha, Cm_q, Cl_p ...; names in `CARRIED` among them are known errors, with whatever they
+        share with the others. The rest is left out.
+    place : Place
+    errors : mapping
+        As in `to_coefficients`.
+
+    Returns
+    -------
+    Quantities
+        Derivatives in the order of the coefficients, then the errors.
+
+    Raises
+    ------
+    IdentificationError
+        If there is nothing to convert, or an error is not one of these.
+    """
+
+    def convert(values: Table) -> Table:
+        own, scale = _really(place, values), _reading(place.airframe, values)
+        found = {n: v for n, v in values.items() if n not in CARRIED}
+        found = _moved(found, own, values, sign=-1.0)
+        gains = dimensional_gains(own.airframe, own.condition)
+        result = {}
+        for name in found:
+            target = dimensional_name(name)
+            total = sum(gain * found.get(c, 0.0) for c, gain in gains[target].items())
+            result[target] = total / scale(target)
+        return result
+
+    return _converted(coefficients, COEFFICIENTS, errors, convert)
+
+
+def _really(place: Place, values: Table) -> Place:
+    """Return airframe and condition for assumed errors of mass, inertia and pitot."""
+    a, at = place.airframe, place.condition
+    frame = replace(
+        a,
+        mass_kg=a.mass_kg * (1.0 + values.get("mass_share", 0.0)),
+        **{
+            f"{i}_kgm2": getattr(a, f"{i}_kgm2") * (1.0 + values.get(f"{i}_share", 0.0))
+            for i in ("ixx", "iyy", "izz")
+        },
+    )
+    scale, drift_pa, density = (
+        values.get(n, 0.0) for n in ("pitot_scale", "pitot_drift_pa", "density_share")
+    )
+    qbar_pa = (at.qbar_pa - drift_pa) / (1.0 + scale)
+    share = float(np.sqrt(qbar_pa / at.qbar_pa / (1.0 + density)))
+    return replace(place, airframe=frame, condition=Condition(at.airspeed_mps * share, qbar_pa))
+
+
+def _reading(airframe: AirframeData, values: Table) -> Callable[[str], float]:
+    """Return what sensors read over what is true, by the name of a derivative."""
+    upwash = airframe.upwash
+    over = (1.0 + upwash * (1.0 + values.get("upwash_share", 0.0))) / (1.0 + upwash)
+
+    def scale(name: str) -> float:
+        label = name.partition("_")[2]
+        share = 1.0 + values.get(READ_WITH.get(label, ""), 0.0)
+        return share * over if label == "alpha" else share
+
+    return scale
+
+
+def _moved(found: Table, place: Place, values: Table, *, sign: float) -> Table:
+    """Return coefficients with moments from the CG to its nominal place (sign 1) or back (-1)."""
+    x, z = (sign * values.get(f"cg_{k}_m", 0.0) for k in "xz")
+    a, ca, sa = place.airframe, np.cos(place.alpha_rad), np.sin(place.alpha_rad)
+    lift = a.mass_kg * GRAVITY_MPS2 / (place.condition.qbar_pa * a.wing_area_m2)
+    result = dict(found)
+    for name in found:
+        row, _, label = name.partition("_")
+        up, back, side = (found.get(f"{c}_{label}", 0.0) for c in ("CL", "CD", "CY"))
+        if row == "Cm":
+            if label == "alpha":  # forces turn with the wind
+                up, back = up + place.drag, back - lift
+            axial, normal = up * sa - back * ca, -up * ca - back * sa
+            result[name] += (z * axial - x * normal) / a.chord_m
+        elif row == "Cl":
+            result[name] -= z * side / a.span_m
+        elif row == "Cn":
+            result[name] += x * side / a.span_m
+    return {name: float(value) for name, value in result.items()}
+
+
+def _converted(
+    given: Quantities,
+    known: tuple[str, ...],
+    errors: Mapping[str, float],
+    convert: Callable[[Table], Table],
+) -> Quantities:
+    """Return converted numbers and carried errors with their joint covariance."""
+    strangers = sorted(set(errors) - set(CARRIED))
+    if strangers:
+        raise IdentificationError(
+            f"unknown error {', '.join(strangers)}; known are {', '.join(CARRIED)}"
+        )
+    kept = [k for k, n in enumerate(given.names) if n in known or n in CARRIED]
+    added = [n for n in CARRIED if n in errors and n not in given.names]
+    names = [given.names[k] for k in kept] + added
+    if not set(known) & set(names):
+        raise IdentificationError(
+            f"nothing to convert among {', '.join(given.names)}; known are such as"
+            f" {', '.join(known[:4])}"
+        )
+    size = len(kept)
+    state = np.concatenate([given.values[kept], np.zeros(len(added))])
+    covariance = np.zeros((len(names), len(names)))
+    covariance[:size, :size] = given.covariance[np.ix_(kept, kept)]
+    covariance[range(size, len(names)), range(size, len(names))] = [errors[n] ** 2 for n in added]
+
+    def mapped(values: Array) -> Array:
+        table = dict(zip(names, values.tolist(), strict=True))
+        own = {n: table[n] for n in names if n in CARRIED}
+        return np.array([*convert(table).values(), *own.values()])
+
+    steps = STEP * np.sqrt(np.maximum(np.diag(covariance), (1e-2 * state) ** 2 + 1e-16))
+    slopes = np.stack(
+        [
+            (mapped(state + step * row) - mapped(state - step * row)) / (2.0 * step)
+            for step, row in zip(steps, np.eye(len(names)), strict=True)
+        ],
+        axis=1,
+    )
+    table = dict(zip(names, state.tolist(), strict=True))
+    told = (*convert(table), *(n for n in names if n in CARRIED))
+    return Quantities(told, mapped(state), slopes @ covariance @ slopes.T)

@@ -1,0 +1,311 @@
+"""Constant coefficients in a flight whose airspeed and attitude vary: departures as inputs.
+
+A linear model holds at one airspeed. Flown, forces follow V^2, damping V, gravity turns with the
+attitude and body rates couple. All of that is a product of what was measured and of the model's own
+parameters (or of known numbers), so it is written as further inputs: (V^n / V0^n - 1) times the
+deviation of the column a parameter acts on, with the parameter's own gain, and what kinematics,
+gravity and inertia say beyond their linear part. The model stays linear in its states, its
+parameters become those of V0 exactly, and every estimator can fit it.
+
+Klein & Morelli, Aircraft System Identification, sec. 3.4-3.6, for the equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from host.aircraft.mass_properties import AirframeData
+from host.compiled import Array
+from host.sysid.aerodynamics.turning_air import AXES, gust_motion, turning
+from host.sysid.errors import IdentificationError
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel, Parameter, Term
+from host.sysid.models.templates import GRAVITY_MPS2, Trim, template
+
+RATES = ("p_radps", "q_radps", "r_radps")
+MEASURED = (
+    "airspeed_mps", "alpha_rad", "beta_rad", *RATES, "phi_rad", "theta_rad",
+    "ax_mps2", "ay_mps2", "az_mps2",
+)  # fmt: skip
+SMOOTH_S = 0.1  # of airspeed: its noise would multiply every term
+# Second-order terms with a parameter of their own: name, row, factors. Drag is a parabola in lift;
+# dihedral, roll by yawing and yaw by rolling follow lift, so the angle of attack.
+BENDS = {
+    "longitudinal": (("D_alpha_alpha", "airspeed_mps", "alpha_rad"),),
+    "lateral": (
+        ("L_beta_alpha", "p_radps", "beta_rad"),
+        ("L_r_alpha", "p_radps", "r_radps"),
+        ("N_beta_alpha", "r_radps", "beta_rad"),
+        ("N_p_alpha", "r_radps", "p_radps"),
+    ),
+}
+# What airspeed does to a motion it is no state of: the propeller's torque does not grow with V^2,
+# what holds against it in trim does (left out, Cn_r is 4 % off in still air).
+PULLS: dict[str, tuple[tuple[str, str], ...]] = {
+    "longitudinal": (),
+    "lateral": (("Y_V", "beta_rad"), ("L_V", "p_radps"), ("N_V", "r_radps")),
+}
+# Rows that feel the air turn with the aircraft.
+TURNED = {"longitudinal": ("airspeed_mps", "alpha_rad"), "lateral": ("beta_rad",)}
+# Whether it does, 1, or stays with the ground, 0: mean and deviation beforehand.
+TURNS = (0.5, 0.5)
+STEADY_SHARE = 0.1  # of the airspeed: deviation of the gust reckoning cannot tell
+
+
+@dataclass(frozen=True)
+class VaryingModel:
+    """A template with departures from its linear form among its inputs.
+
+    Attributes
+    ----------
+    base : LinearModel
+        Longitudinal or lateral template, in derivatives or coefficients, without delays.
+    axis : str
+        Which of both.
+    trim : Trim
+        What the parameters belong to.
+    airframe : AirframeData
+        Inertia, for what rates do to each other.
+    spin_kgm2ps : tuple of float
+        Angular momentum of the rotor along x and z.
+    """
+
+    base: LinearModel
+    axis: str
+    trim: Trim
+    airframe: AirframeData
+    spin_kgm2ps: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if self.axis not in BENDS:
+            raise IdentificationError(
+                f"departures of '{self.axis}', known are those of {' and '.join(BENDS)}"
+            )
+
+    @property
+    def scaled(self) -> tuple[tuple[str, int], ...]:
+        """Columns that airspeed scales, with the power it does so by."""
+        found: list[tuple[str, int]] = []
+        for term in self.base.terms:
+            key = self._scaling(term)
+            if key[1] > 0 and key not in found:
+                found.append(key)
+        return tuple(found)
+
+    @property
+    def forces(self) -> tuple[str, ...]:
+        """Outputs that measure a specific force."""
+        return tuple(y for y in self.base.outputs if y in MEASURED[-3:])
+
+    @property
+    def model(self) -> LinearModel:
+        """The template with the departures as inputs, its own parameters first."""
+        return self._build(turning_air=False)
+
+    @property
+    def gusty(self) -> LinearModel:
+        """The same with ``gust_turns`` and ``gust_x``, ``_y``, ``_z`` (m/s) behind its parameters.
+
+        For filter error, to which the fast part of the gusts is process noise.
+        """
+        return self._build(turning_air=True)
+
+    def _build(self, *, turning_air: bool) -> LinearModel:
+        base, scaled = self.base, self.scaled
+        bends, airspeed = BENDS[self.axis], PULLS[self.axis]
+        n, m, p = len(base.states), len(base.inputs), len(base.outputs)
+        terms = list(base.terms)
+        for term in base.terms:
+            key = self._scaling(term)
+            if key[1] > 0:
+                matrix = "B" if term.matrix in "AB" else "D"
+                place = m + scaled.index(key)
+                terms.append(Term(matrix, term.row, place, term.parameter, term.gain))
+        rests = m + len(scaled) + n + len(self.forces)
+        turned, gusts = TURNED[self.axis], rests + len(bends) + (len(airspeed) > 0)
+        size = gusts + len(turned) * (1 + len(AXES))
+        B, D = np.zeros((n, size)), np.zeros((p, size))
+        B[:, :m], D[:, :m] = base.B, base.D
+        B[:, m + len(scaled) : m + len(scaled) + n] = np.eye(n)
+        for k, force in enumerate(self.forces):
+            D[base.outputs.index(force), m + len(scaled) + n + k] = 1.0
+        turn = {"ax_mps2": np.cos(self.trim.alpha_rad), "az_mps2": np.sin(self.trim.alpha_rad)}
+        for k, (name, row, _) in enumerate(bends):
+            terms.append(Term("B", base.states.index(row), rests + k, name))
+            for force in self.forces if row == "airspeed_mps" else ():
+                at = base.outputs.index(force)
+                terms.append(Term("D", at, rests + k, name, float(turn[force])))
+        for name, row in airspeed:
+            terms.append(Term("B", base.states.index(row), gusts - 1, name))
+            if row == "beta_rad" and "ay_mps2" in self.forces:
+                side = base.outputs.index("ay_mps2")
+                terms.append(Term("D", side, gusts - 1, name, self.trim.airspeed_mps))
+        more: tuple[Parameter, ...] = ()
+        if turning_air:
+            share = STEADY_SHARE * self.trim.airspeed_mps
+            more = (
+                Parameter("gust_turns", TURNS[0], prior_sd=TURNS[1]),
+                *(Parameter(f"gust_{axis}", prior_sd=share) for axis in AXES),
+            )
+            # Per row the gust reckoned, behind it the constants it is known but for.
+            for k, row in enumerate(turned):
+                first = gusts + k * len(more)
+                at = base.states.index(row)
+                terms += [Term("B", at, first + j, extra.name) for j, extra in enumerate(more)]
+        return replace(
+            base,
+            name=f"{base.name}, airspeed varying",
+            inputs=(
+                *base.inputs,
+                *(f"{column} by V^{power}" for column, power in scaled),
+                *(f"rest of {name}" for name in (*base.states, *self.forces)),
+                *(f"{column} by alpha on {row}" for _, row, column in bends),
+                *(("airspeed over its trim",) if airspeed else ()),
+                *(f"turning {of} on {row}" for row in turned for of in ("gust", *AXES)),
+            ),
+            B=B,
+            D=D,
+            terms=tuple(terms),
+            parameters=(
+                *base.parameters,
+                *(Parameter(name) for name, *_ in (*bends, *airspeed)),
+                *more,
+            ),
+        )
+
+    def maneuver(
+        self, columns: Mapping[str, Array], dt_s: float, name: str = "maneuver"
+    ) -> Maneuver:
+        """Return the samples of one maneuver in the columns of `model`.
+
+        Parameters
+        ----------
+        columns : mapping
+            SI, each (samples,): surfaces, airspeed, flow angles, rates, bank, pitch, specific
+            forces at the CG.
+        dt_s : float
+        name : str
+
+        Raises
+        ------
+        IdentificationError
+            If a column is missing.
+        """
+        missing = [c for c in (*MEASURED, *self.base.inputs) if c not in columns]
+        if missing:
+            raise IdentificationError(f"{name}: departures need {', '.join(missing)}")
+        ratio = _smooth(columns["airspeed_mps"], SMOOTH_S / dt_s) / self.trim.airspeed_mps
+        inputs = [columns[c] for c in self.base.inputs]
+        for column, power in self.scaled:
+            change = (ratio**power - 1.0) * _deviation(columns[column])
+            inputs.append(change if column in self.base.inputs else _between(change))
+        inputs += [_between(_deviation(rest)) for rest in self._rates(columns, ratio)]
+        inputs += [_deviation(rest) for rest in self._forces(columns, ratio)]
+        angle = _deviation(columns["alpha_rad"])
+        inputs += [
+            _between(_deviation(angle * _deviation(columns[column])))
+            for _, _, column in BENDS[self.axis]
+        ]
+        if PULLS[self.axis]:
+            inputs.append(_between(ratio - 1.0))
+        gust, steady = gust_motion(columns, dt_s)
+        motions = [gust, *(steady[:, :, k] for k in range(len(AXES)))]
+        turns = [turning(columns, motion) for motion in motions]
+        inputs += [_between(turn[row]) for row in TURNED[self.axis] for turn in turns]
+        outputs = np.column_stack([columns[y] for y in self.base.outputs])
+        return Maneuver(dt_s, np.column_stack(inputs), outputs, name=name)
+
+    def _known(self) -> Array:
+        """Return kinematics and gravity of the template."""
+        return template(self.axis, self.trim, hold=self.base.hold).A
+
+    def _scaling(self, term: Term) -> tuple[str, int]:
+        """Return the column a term acts on and the power of V it grows with beyond constant."""
+        base = self.base
+        column = (base.states if term.matrix in "AC" else base.inputs)[term.column]
+        if column == "airspeed_mps":
+            return column, 0
+        power = 1 if column in RATES else 2
+        turning = term.matrix in "AB" and base.states[term.row] in ("alpha_rad", "beta_rad")
+        return column, power - 1 if turning else power
+
+    def _rates(self, columns: Mapping[str, Array], ratio: Array) -> list[Array]:
+        """Return, per state, what its rate has beyond aerodynamics and the linear kinematics."""
+        whole = self._kinematics(columns, self.trim.airspeed_mps * ratio)
+        known = self._known()
+        states = np.column_stack([columns[s] for s in self.base.states])
+        return [whole[s] - states @ known[k] for k, s in enumerate(self.base.states)]
+
+    def _kinematics(self, columns: Mapping[str, Array], airspeed: Array) -> dict[str, Array]:
+        alpha, beta, phi, theta = (
+            columns[c] for c in ("alpha_rad", "beta_rad", "phi_rad", "theta_rad")
+        )
+        p, q, r = (columns[c] for c in RATES)
+        ax, az = columns["ax_mps2"], columns["az_mps2"]
+        sa, ca, sb, cb = np.sin(alpha), np.cos(alpha), np.sin(beta), np.cos(beta)
+        gx = -GRAVITY_MPS2 * np.sin(theta)
+        gy = GRAVITY_MPS2 * np.cos(theta) * np.sin(phi)
+        gz = GRAVITY_MPS2 * np.cos(theta) * np.cos(phi)
+        # Of the mean lift the linear model has V^2 through its accelerometer row, turning has V.
+        lift = np.mean(az * ca - ax * sa) * (1.0 - airspeed / self.trim.airspeed_mps)
+        turning = q * np.sin(phi) + r * np.cos(phi)
+        return {
+            "airspeed_mps": (gx * ca + gz * sa) * cb + gy * sb,
+            "alpha_rad": lift / self.trim.airspeed_mps
+            + (gz * ca - gx * sa) / (airspeed * cb)
+            + q
+            - np.tan(beta) * (p * ca + r * sa),
+            "theta_rad": q * np.cos(phi) - r * np.sin(phi),
+            "beta_rad": (gy * cb - sb * ((ax + gx) * ca + (az + gz) * sa)) / airspeed
+            + p * sa
+            - r * ca,
+            "phi_rad": p + np.tan(theta) * turning,
+            **self._inertial(p, q, r),
+        }
+
+    def _inertial(self, p: Array, q: Array, r: Array) -> dict[str, Array]:
+        """Return angular accelerations that rates and the rotor make."""
+        a, (hx, hz) = self.airframe, self.spin_kgm2ps
+        x = -(a.izz_kgm2 - a.iyy_kgm2) * q * r + a.ixz_kgm2 * p * q - q * hz
+        y = (a.izz_kgm2 - a.ixx_kgm2) * p * r - a.ixz_kgm2 * (p**2 - r**2) - r * hx + p * hz
+        z = -(a.iyy_kgm2 - a.ixx_kgm2) * p * q - a.ixz_kgm2 * q * r + q * hx
+        det = a.ixx_kgm2 * a.izz_kgm2 - a.ixz_kgm2**2
+        return {
+            "p_radps": (a.izz_kgm2 * x + a.ixz_kgm2 * z) / det,
+            "q_radps": y / a.iyy_kgm2,
+            "r_radps": (a.ixz_kgm2 * x + a.ixx_kgm2 * z) / det,
+        }
+
+    def _forces(self, columns: Mapping[str, Array], ratio: Array) -> list[Array]:
+        """Return, per specific force, its second order in airspeed and in the turning of lift."""
+        alpha, ax, az = columns["alpha_rad"], columns["ax_mps2"], columns["az_mps2"]
+        along = _deviation(ax * np.cos(alpha) + az * np.sin(alpha))
+        normal = _deviation(az * np.cos(alpha) - ax * np.sin(alpha))
+        angle = _deviation(alpha)
+        sine, cosine = np.sin(self.trim.alpha_rad), np.cos(self.trim.alpha_rad)
+        turned = {
+            "ax_mps2": -angle * (cosine * normal + sine * along),
+            "az_mps2": angle * (cosine * along - sine * normal),
+        }
+        return [(ratio - 1.0) ** 2 * np.mean(columns[y]) + turned.get(y, 0.0) for y in self.forces]
+
+
+def _smooth(values: Array, samples: float) -> Array:
+    """Return values under a bell of this deviation, the ends held: importing scipy takes 0.04 s."""
+    reach = int(4.0 * samples + 0.5)
+    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / samples) ** 2)
+    return np.convolve(np.pad(values, reach, mode="edge"), bell / np.sum(bell), mode="valid")
+
+
+def _deviation(values: Array) -> Array:
+    return np.asarray(values - np.mean(values), dtype=np.float64)
+
+
+def _between(values: Array) -> Array:
+    """Return means of neighbours: an input is held over the sample that follows it."""
+    result = np.array(values, dtype=np.float64)
+    result[:-1] = 0.5 * (values[:-1] + values[1:])
+    return result

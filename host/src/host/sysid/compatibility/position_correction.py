@@ -1,0 +1,41 @@
+"""Vanes and accelerometers moved to the CG by what is known of their places."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from host.aircraft.mass_properties import AirframeData
+from host.compiled import Array
+
+
+def corrected(columns: dict[str, Array], airframe: AirframeData) -> dict[str, Array]:
+    """Move vanes and accelerometers to the CG.
+
+    A vane at r sees the air of the CG plus omega x r, and over-reads by the upwash; an
+    accelerometer at r feels omega' x r + omega x (omega x r) more than the CG. The mean of the
+    vanes is corrected for the mean of their positions: roll cancels between two tips.
+    """
+    result = dict(columns)
+    still = np.zeros(len(columns["t_s"]))  # a record of one axis has not all rates
+    rates = [columns.get(f"{a}_radps", still) for a in "pqr"]
+    p, q, r = rates
+    if airframe.vanes_m:
+        x, y, z = np.mean(airframe.vanes_m, axis=0)
+        speed = np.maximum(columns["airspeed_mps"], 1.0)
+        if "alpha_rad" in columns:
+            result["alpha_rad"] = (
+                columns["alpha_rad"] / (1.0 + airframe.upwash) + (q * x - p * y) / speed
+            )
+        if "beta_rad" in columns:
+            result["beta_rad"] = columns["beta_rad"] - (r * x - p * z) / speed
+    if any(airframe.imu_m):
+        x, y, z = airframe.imu_m
+        dt_s = float(np.median(np.diff(columns["t_s"])))
+        dp, dq, dr = (np.gradient(rate, dt_s) for rate in rates)
+        felt = {
+            "ax_mps2": dq * z - dr * y + q * (p * y - q * x) - r * (r * x - p * z),
+            "ay_mps2": dr * x - dp * z + r * (q * z - r * y) - p * (p * y - q * x),
+            "az_mps2": dp * y - dq * x + p * (r * x - p * z) - q * (q * z - r * y),
+        }
+        result |= {name: columns[name] - more for name, more in felt.items() if name in columns}
+    return result

@@ -1,1 +1,0 @@
-"""Aircraft files and where their derivatives come from."""

@@ -1,1 +1,0 @@
-"""How the aircraft moves: rigid body, air, propulsion, trim, linearisation."""
