@@ -20,6 +20,7 @@ from simavr_bench import (
 )
 from simavr_bench.charge_pump import ChargePump
 from simavr_bench.gps import POSLLH, PVT, SOL, VELNED, ubx
+from simavr_bench.heartbeat import Beats, all_corners, judge_beats
 from simavr_bench.log import LogKind, pulses, select
 from simavr_bench.testing import MakeChip
 
@@ -294,6 +295,75 @@ def test_reset_releases_the_relay(make_chip: MakeChip) -> None:
     chip.hold_reset(ResetCause.BROWN_OUT)
     chip.run_s(0.06)
     assert not relay.engaged
+
+
+def beat(chip: Chip, edges: int) -> None:
+    """Make the heartbeat from outside, an edge each millisecond."""
+    for _ in range(edges):
+        chip.drive("PH5", not chip.level("PH5"))
+        chip.run_s(0.001)
+
+
+def test_relay_turned_back_forgets_the_movement_it_gave_up(make_chip: MakeChip) -> None:
+    """Let go while the new contact still bounces, and pulled in again before it went away."""
+    chip, relay, _ = relay_bench(make_chip)
+    relay.bounce_s, relay.on_volt, relay.off_volt = 0.020, 1.5, 1.5
+    beat(chip, 20)  # 8 ms until the contact is made, then it bounces
+    assert relay.engaged
+    chip.run_s(0.1)
+    assert not relay.engaged
+    states = [state for _, state in relay.contacts]
+    last_of_mega = len(states) - 1 - states[::-1].index(2)
+    opened = relay.contacts[last_of_mega + 1][0]
+    behind = [(cycle, state) for cycle, state in relay.contacts if cycle > opened]
+    # 5 ms in the air, the make, two bounces of its own
+    assert [state for _, state in behind] == [1, 0, 1, 0, 1]
+    assert behind[0][0] - opened == cycles(relay.transfer_s)
+
+
+def test_relay_let_go_for_a_moment_does_not_open(make_chip: MakeChip) -> None:
+    """The gate comes below the threshold for 2 ms: the armature needs 7 to leave."""
+    chip, relay, _ = relay_bench(make_chip)
+    relay.on_volt = relay.off_volt = 2.5
+    beat(chip, 60)
+    chip.run_s(0.009)
+    assert not relay.energised
+    before = len(relay.contacts)
+    beat(chip, 60)
+    assert relay.energised
+    assert len(relay.contacts) == before
+
+
+def test_worst_pump_is_the_worst_of_all_corners() -> None:
+    """A pattern with the longest rests allowed, and one of 1 ms with a rest of 3 ms in it."""
+    for pattern in ([0.004, 0.0025], [0.001] * 30 + [0.003], [0.001]):
+        rests = np.array((pattern * 200)[:400])
+        at = np.concatenate(([0], np.cumsum(np.round(rests * 16e6)))).astype(np.uint64)
+        for first in (0, 1):
+            level = ((np.arange(len(at)) + first) % 2).astype(np.uint8)
+            found = [judge_beats(at, level, pump=pump).gate_volt for pump in all_corners()]
+            assert judge_beats(at, level).gate_volt == pytest.approx(min(found), abs=1e-3)
+
+
+def test_heartbeat_that_rests_is_noticed() -> None:
+    """An edge each millisecond; then one of 6.5 ms, then two of 2.7 ms."""
+    steady = [0.001] * 100
+    level = (np.arange(200) % 2).astype(np.uint8)
+
+    def judged(rests: list[float], *, may_stop: bool = False) -> Beats:
+        at = np.cumsum(np.round(np.array(rests) * 16e6)).astype(np.uint64)
+        return judge_beats(at, level[: len(at)], may_stop=may_stop)
+
+    assert judged(steady).wrong() == []
+    assert judged(steady).gate_volt == pytest.approx(2.57, abs=0.02)
+    high, low = [*steady[:50], 0.0065, *steady[:50]], [*steady[:51], 0.0065, *steady[:50]]
+    assert judged(high).wrong() == ["the heartbeat rested 6.50 ms", "the gate at 1.88 V"]
+    assert judged(low).wrong() == ["the heartbeat rested 6.50 ms", "the gate at 1.36 V"]
+    two = judged([*steady[:50], 0.0027, 0.0027, *steady[:50]])
+    assert [text[:12] for text in two.wrong()] == ["two rests of", "the gate at "]
+    stopped = [*steady[:50], 0.5, *steady[:50]]
+    assert judged(stopped, may_stop=True).wrong() == []
+    assert judged(stopped).wrong()[0] == "the heartbeat rested 500.00 ms"
 
 
 def test_supply_resets_by_voltage(make_chip: MakeChip) -> None:

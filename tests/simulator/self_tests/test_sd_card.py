@@ -65,6 +65,28 @@ def test_stream_runs_at_the_bus_clock_and_busy_time(make_chip: MakeChip) -> None
         assert card.block(1000 + number) == bytes((number + i) & 0xFF for i in range(512))
 
 
+def test_card_that_is_slow_to_start_and_to_read(make_chip: MakeChip) -> None:
+    finished_s = []
+    for read_s, init_s in ((0.0002, 0.05), (0.0022, 0.05), (0.0002, 0.15)):
+        chip = make_chip("sd_card", power=False)
+        card = SdCard(chip, "PB0", blocks=8192)
+        card.delay(read_s=read_s, init_s=init_s)
+        chip.power_on()
+        run_until_value(chip, "finished", 1)
+        finished_s.append(chip.time_s)
+    usual_s, reading_s, starting_s = finished_s
+    assert starting_s - usual_s == pytest.approx(0.1, abs=0.005)
+    assert reading_s - usual_s == pytest.approx(0.002 * 3, abs=0.0005)  # three commands that read
+
+
+def test_blocks_put_while_the_card_is_out_are_on_it(make_chip: MakeChip) -> None:
+    card = SdCard(make_chip("sd_card", power=False), "PB0", blocks=8192)
+    card.remove()
+    card.put(7, pattern(9) + pattern(8))
+    assert card.block(7, 2) == pattern(9) + pattern(8)
+    assert card.block(9) == bytes(512)
+
+
 def test_stall_is_seen_by_the_host(make_chip: MakeChip) -> None:
     chip = make_chip("sd_stream", power=False)
     card = SdCard(chip, "PB0")

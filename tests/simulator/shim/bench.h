@@ -161,6 +161,7 @@ BENCH_API void bench_sd_power_cut(sd_card* s);
 BENCH_API bool bench_sd_busy(const sd_card* s);
 BENCH_API void bench_sd_fail_reads(sd_card* s, bool fail);
 BENCH_API void bench_sd_hold_line(sd_card* s, bool low);
+BENCH_API void bench_sd_delays(sd_card* s, uint32_t read_cycles, uint32_t init_cycles);
 // Keeps every block that was programmed from now on, in the caller's memory; a power cut at any
 // instant of the run can be told from it. `ended` is UINT64_MAX while the card is busy with it;
 // what a cut spoiled carries the garbage. Records beyond `capacity` are counted, not kept.

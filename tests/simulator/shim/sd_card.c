@@ -246,6 +246,10 @@ bool bench_sd_busy(const sd_card* s) {
 void bench_sd_fail_reads(sd_card* s, bool fail) {
   s->reads_fail = fail;
 }
+void bench_sd_delays(sd_card* s, uint32_t read_cycles, uint32_t init_cycles) {
+  s->set.read_cycles = read_cycles;
+  s->set.init_cycles = init_cycles;
+}
 void bench_sd_hold_line(sd_card* s, bool low) {
   s->line_low = low;
 }

@@ -147,6 +147,7 @@ _SIGNATURES: dict[str, tuple[object, tuple[object, ...]]] = {
     "sd_busy": (_bool, ()),
     "sd_fail_reads": (None, (_bool,)),
     "sd_hold_line": (None, (_bool,)),
+    "sd_delays": (None, (_u32, _u32)),
     "sd_journal": (None, (_ptr, _u64)),
     "sd_journal_count": (_u64, ()),
     "sd_counters": (None, (ct.POINTER(SdCounters),)),

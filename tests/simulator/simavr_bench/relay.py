@@ -36,7 +36,8 @@ class ChargePumpRelay:
     pump : ChargePump
         From the heartbeat to the gate.
     on_volt, off_volt : float
-        Gate voltage at which the coil surely pulls in, and at which it surely lets go.
+        Gate voltage at which the coil pulls in, and at which it lets go: as its transistor's
+        threshold, at either end of its data sheet, or the worse end for each.
     operate_s, release_s : float
         From the coil's current to the break of the old contact; with the diode across the coil
         letting go takes longer.
@@ -67,6 +68,8 @@ class ChargePumpRelay:
     energised: bool = False
     _since: int = 0
     _edges: int = 0
+    _movement: int = 0
+    _made: int = RECEIVER
     _rng: np.random.Generator = field(init=False)
 
     def __post_init__(self) -> None:
@@ -109,22 +112,33 @@ class ChargePumpRelay:
             self.chip.at(self.chip.cycle + max(1, cycles(left_s)), self._look_again)
 
     def _switch(self, energised: bool) -> None:
+        """Move the armature; what is left of a movement under way, its bounce too, is cancelled."""
         self.energised = energised
+        self._movement += 1
         now = self.chip.cycle
         target = MEGA if energised else RECEIVER
-        coil_s = self.operate_s if energised else self.release_s
-        moves = [(now + cycles(coil_s), OPEN)]
-        make = now + cycles(coil_s + self.transfer_s)
-        moves.append((make, target))
+        if self._made != OPEN and self.contacts[-1][1] == OPEN:
+            self._close(now, self._made)  # it was bouncing
+        if self._made == target:
+            return  # it had not left yet
+        make = now + cycles((self.operate_s if energised else self.release_s) + self.transfer_s)
+        moves = [(make, target)]
+        if self._made != OPEN:
+            moves.append((make - cycles(self.transfer_s), OPEN))
         for bounce in np.sort(self._rng.integers(1, max(2, cycles(self.bounce_s)), 2)):
             moves.append((make + int(bounce), OPEN))
             moves.append((make + int(bounce) + cycles(50e-6), target))
         for cycle, state in sorted(moves):
-            self.chip.at(cycle, partial(self._contact, cycle, state))
+            self.chip.at(cycle, partial(self._contact, self._movement, cycle, make, state))
 
-    def _contact(self, cycle: int, state: int) -> None:
-        if state != OPEN and state != (MEGA if self.energised else RECEIVER):
-            return  # the coil changed its mind before the contact was made
+    def _contact(self, movement: int, cycle: int, make: int, state: int) -> None:
+        if movement != self._movement:
+            return
+        if cycle <= make:
+            self._made = state
+        self._close(cycle, state)
+
+    def _close(self, cycle: int, state: int) -> None:
         self.contacts.append((cycle, state))
         self._show_sense(state == MEGA)
 

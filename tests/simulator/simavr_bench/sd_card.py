@@ -142,6 +142,10 @@ class SdCard:
         """Hold the line to the chip low, as a short or a hung card does."""
         self._lib.bench_sd_hold_line(self._card, low)
 
+    def delay(self, *, read_s: float = 0.0002, init_s: float = 0.05) -> None:
+        """Change the delay before read data, and the time until ACMD41 reports ready."""
+        self._lib.bench_sd_delays(self._card, cycles(read_s), cycles(init_s))
+
     @property
     def busy(self) -> bool:
         """Whether it is programming now."""
@@ -168,6 +172,10 @@ class SdCard:
     def block(self, number: int, count: int = 1) -> bytes:
         """Content of blocks."""
         return self._memory[number * BLOCK : (number + count) * BLOCK]
+
+    def put(self, number: int, content: bytes) -> None:
+        """Change blocks as another computer does, the card being out."""
+        self._memory[number * BLOCK : number * BLOCK + len(content)] = content
 
     def save(self, path: Path) -> None:
         """Copy the whole card to a file, as a reader would see it now."""
