@@ -10,7 +10,8 @@ import pytest
 from host.wire.blocks import scan
 from host.wire.extents import data_extents
 from host.wire.frames import find_schemas, frame_pieces
-from host.wire.schema import known_schemas, packed_schema, parse_schema
+from host.wire.schema import Schema
+from host.wire.schema_text import known_schemas, packed_schema, parse_schema
 
 from tests.host.logs import ROOT
 from tests.protocol.flights import simple_log
@@ -57,14 +58,15 @@ def test_shifted_blocks_are_found_across_windows(
 
 def test_schema_comes_from_the_log_itself(tmp_path: Path) -> None:
     writer = simple_log(1.0)
-    text = writer.text.replace(b'"rate_hz":15', b'"rate_hz":16')
+    text = writer.text.replace(b'["mx","i16","T",9.174311926606e-08', b'["mx","i16","T",2')
     other = type(writer)(text=text)
     other.begin()
     other.end()
     path = tmp_path / "other.bin"
     path.write_bytes(other.data())
-    (schema,) = find_schemas(path, scan(path).blocks).values()
-    assert schema.by_name["mag"].rate_hz == 16
+    ((_, schema),) = find_schemas(path, scan(path).blocks)
+    assert isinstance(schema, Schema)
+    assert schema.by_name["mag"].fields[1].scale == 2.0
     assert schema.hash != packed_schema().hash
 
 

@@ -144,9 +144,10 @@ def simple_log(
     seed: int = 1,
     start_us: int = 2_000_000,
     session: int = 1,
+    preallocated: int = 64 << 20,
 ) -> LogWriter:
     """Return the writer of a complete log: one session, properly ended."""
-    writer = LogWriter(session=session)
+    writer = LogWriter(session=session, preallocated=preallocated)
     writer.begin(rate_hz=rate_hz, t_us=wrapped_int(start_us - 1000))
     _coefficients(writer, start_us)
     end_us = write_flight(writer, duration_s, rate_hz=rate_hz, seed=seed, start_us=start_us)

@@ -153,6 +153,8 @@ class LogWriter:
         What the file id is made of. `session` is also the first session's number.
     text
         Schema text, the committed one when not given.
+    preallocated
+        Size in bytes of the file until it is closed, as the frame `file` says.
     keep_truth
         Remember every row and its block for `truth`; leave out for files of gigabytes.
     """
@@ -166,6 +168,7 @@ class LogWriter:
         first_block_before: bytes = bytes(BLOCK),
         card_block: int = 40_960,
         text: bytes | None = None,
+        preallocated: int = 64 << 20,
         keep_truth: bool = True,
     ) -> None:
         self._sink: BinaryIO = io.BytesIO() if sink is None else sink
@@ -174,6 +177,7 @@ class LogWriter:
         self.layouts = layouts(self.text)
         self.ids = ids(self.text)
         self._card_id = card_id
+        self.preallocated = preallocated
         self.session = session
         self.file_id = file_id(card_id, session, first_block_before, card_block)
         self.sequence = 0
@@ -188,7 +192,7 @@ class LogWriter:
         self.put("event", t_us=t_us, code=1, arg=reason)
 
     def head(self, *, rate_hz: int = 100, t_us: int = 0, resumed: bool = False) -> None:
-        """Write the frames `config` and `identity`, as at each return of the schema."""
+        """Write the frames `config`, `identity` and `file`, as at each return of the schema."""
         self.put(
             "config",
             t_us=t_us,
@@ -217,6 +221,9 @@ class LogWriter:
             board=b"sitl",
             firmware=b"synthetic",
         )
+
+        if "file" in self.ids:
+            self.put("file", t_us=t_us, number=1, preallocated=self.preallocated)
 
     def schema(self) -> None:
         """Write the whole schema into blocks of its own."""

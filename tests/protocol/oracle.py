@@ -6,6 +6,7 @@ the host package, so that where both agree, both read the page the same way.
 
 import json
 import zlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -174,7 +175,7 @@ def decode(data: bytes, *, known_schemas: Sequence[bytes] = ()) -> Decoded | Non
     valid = find_blocks(data)
     if not valid:
         return None
-    result = Decoded(file_id=valid[0].file_id)
+    result = Decoded(file_id=_own_id(data, valid))
     own = [block for block in valid if block.file_id == result.file_id]
     result.foreign = [block.position for block in valid if block.file_id != result.file_id]
     ordered = _one_per_sequence(own)
@@ -282,12 +283,32 @@ def decode_stream(data: bytes) -> Stream:
     return result
 
 
+def _own_id(data: bytes, valid: Sequence[Block]) -> int:
+    """Return the file id of the first block; in the image of a card that of the newest flight."""
+    recorded = [block for block in valid if block.sequence]
+    if data[510:512] != b"\x55\xaa" or data[:4] == MAGIC or not recorded:
+        return valid[0].file_id
+    newest = max(block.session for block in recorded)
+    return next(block.file_id for block in recorded if block.session == newest)
+
+
+def _base(own: Sequence[Block]) -> int:
+    """Return the byte at which the log's block 0 belongs."""
+    places = [block.position - BLOCK * block.sequence for block in own]
+    ahead = Counter(place for place in places if place > 0)
+    if 0 in places or not ahead:
+        return 0
+    most = max(ahead.values())
+    return min(place for place, count in ahead.items() if count == most)
+
+
 def _one_per_sequence(blocks: Sequence[Block]) -> list[Block]:
     chosen: dict[int, Block] = {}
+    base = _base(blocks)
     for block in blocks:
         held = chosen.get(block.sequence)
-        at_its_place = block.position == BLOCK * block.sequence
-        if held is None or (at_its_place and held.position != BLOCK * held.sequence):
+        at_its_place = block.position == base + BLOCK * block.sequence
+        if held is None or (at_its_place and held.position != base + BLOCK * held.sequence):
             chosen[block.sequence] = block
     return [chosen[sequence] for sequence in sorted(chosen)]
 
@@ -305,18 +326,18 @@ def _completeness(
     ):
         return "complete"
     end = max(block.position for block in ordered) + BLOCK
-    room = len(data) - end
-    behind = [block.position for block in valid if block.position >= end]
-    if room < BLOCK or (behind and (min(behind) - end) % BLOCK):
-        return "truncated"
-    if room <= 8 * BLOCK and not behind:
+    if all(block.position != end for block in valid) and _like_a_block(data, end, last):
         return "damaged"
-    if end not in behind and _like_a_block(data, end, last):
-        return "damaged"
-    return "complete"
+    made = [values["preallocated"] for values, _ in result.frames.get("file", [])]
+    base = _base([block for block in valid if block.file_id == result.file_id])
+    full = base + ((made[-1] if made else 0) or 64 << 20)
+    never_closed = end <= full and (len(data) == full or (base > 0 and full < len(data)))
+    return "truncated" if never_closed else "damaged"
 
 
 def _like_a_block(data: bytes, at: int, last: Block) -> bool:
+    if at + BLOCK > len(data):
+        return False
     head = c.Struct(
         "magic" / c.Bytes(4),
         "file_id" / c.Int32ul,

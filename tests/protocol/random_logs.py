@@ -12,6 +12,7 @@ def random_log(rng: np.random.Generator) -> LogWriter:
         session=int(rng.integers(1, 2**31)),
         first_block_before=rng.bytes(BLOCK),
         card_id=bytes(rng.permutation(list(CARD_ID)).tolist()),
+        preallocated=BLOCK * int(rng.integers(60, 300)),
     )
     rate_hz = int(rng.choice([50, 100, 200]))
     now_us = int(rng.integers(0, 2**33))  # beyond the wrap of t_us at times
@@ -22,7 +23,11 @@ def random_log(rng: np.random.Generator) -> LogWriter:
     if rng.random() < 0.6:
         writer.end(t_us=now_us & 0xFFFFFFFF)
     if rng.random() < 0.5:
-        writer.tail(_tail(writer, rng))
+        tail = _tail(writer, rng)
+        room = writer.preallocated - writer.sequence * BLOCK
+        if room > 0 and rng.random() < 0.6:  # never closed: the file has its full size
+            tail = tail[:room] + bytes(room - len(tail[:room]))
+        writer.tail(tail)
     return writer
 
 
@@ -39,7 +44,7 @@ def _something(writer: LogWriter, rng: np.random.Generator, now_us: int, rate_hz
     if choice < 0.6:
         streams = []
         for name in writer.layouts:
-            if name in ("config", "identity"):  # they head sessions only
+            if name in ("config", "identity", "file"):  # they head sessions only
                 continue
             stream = random_rows(writer, name, int(rng.integers(0, 40)), rng)
             stream.rows["t_us"] = (now_us + stream.finished_us) & 0xFFFFFFFF

@@ -1,14 +1,17 @@
 """Each lost range is blamed on what was done to it."""
 
+import os
 import struct
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+from host.log import read_log
 
 from tests.protocol.agreement import check_oracle, decoded
 from tests.protocol.flights import simple_log
-from tests.protocol.log_writer import BLOCK, LogWriter, block
+from tests.protocol.log_writer import BLOCK, ROOT, LogWriter, block
 
 FLIGHT = simple_log(2.0)
 DATA = FLIGHT.data()
@@ -112,22 +115,69 @@ def test_battery_pulled() -> None:
         check_oracle(cut + torn + behind)
 
 
-def test_preallocated_file_that_goes_on_is_complete() -> None:
-    cut = DATA[: 30 * BLOCK]
-    for behind in (bytes(20 * BLOCK), OLDER.data()[30 * BLOCK :]):
-        with decoded(cut + behind) as log:
-            assert log is not None
-            assert (log.complete, log.loss.losses) == ("complete", ())
-        check_oracle(cut + behind)
+FULL = 60 * BLOCK
+BEHIND = {"zeros": bytes(30 * BLOCK), "older flight": OLDER.data()[30 * BLOCK : 60 * BLOCK],
+          "random": np.random.default_rng(3).bytes(30 * BLOCK)}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", BEHIND)
+def test_end_of_a_file_never_closed_is_not_proven(what: str) -> None:
+    data = simple_log(2.0, preallocated=FULL).data()[: 30 * BLOCK] + BEHIND[what]
+    with decoded(data) as log:
+        assert log is not None
+        assert (log.complete, log.loss.losses) == ("truncated", ())
+        assert log.loss.unproven_bytes == 30 * BLOCK
+        assert log.loss.ending == (
+            f"complete as far as blocks reach, {30 * BLOCK} bytes behind the last block are not of"
+            " this flight"
+        )
+    check_oracle(data)
+
+
+def test_closed_file_is_complete() -> None:
+    with decoded(simple_log(2.0, preallocated=FULL).data()) as log:
+        assert log is not None
+        assert (log.complete, log.loss.losses, log.loss.ending) == ("complete", (), None)
+
+
+@pytest.mark.parametrize("what", BEHIND)
+def test_second_half_of_a_closed_file_replaced(what: str) -> None:
+    damaged = DATA[: 30 * BLOCK] + BEHIND[what][: len(DATA) - 30 * BLOCK]
+    with decoded(damaged) as log:
+        assert log is not None
+        (loss,) = log.loss.losses
+        assert loss.offset == 30 * BLOCK
+        assert (loss.cause, log.complete) == (
+            {"zeros": "zeroed", "older flight": "truncated", "random": "overwritten"}[what],
+            "damaged",
+        )
+    check_oracle(damaged)
+
+
+def test_only_the_first_block_left() -> None:
+    with decoded(DATA[:BLOCK]) as log:
+        assert log is not None
+        assert log.complete == "damaged"
+        assert [loss.cause for loss in log.loss.losses] == ["truncated"]
+
+
+def test_older_log_is_taken_for_64_mib(tmp_path: Path) -> None:
+    released = (ROOT / "tests/data/format-1-sitl.bin").read_bytes()
+    cut = released[: len(released) // 2 // BLOCK * BLOCK]
+    path = tmp_path / "flight.bin"
+    for size, said in ((64 << 20, "truncated"), ((64 << 20) + BLOCK, "damaged")):
+        path.write_bytes(cut)
+        os.truncate(path, size)
+        assert read_log(path).complete == said
 
 
 @pytest.mark.parametrize("keep", [30 * BLOCK, 30 * BLOCK + 1, 31 * BLOCK - 1])
-def test_cut_file_is_truncated(keep: int) -> None:
+def test_cut_file_is_damaged(keep: int) -> None:
     with decoded(DATA[:keep]) as log:
         assert log is not None
         (loss,) = log.loss.losses
         assert (loss.cause, loss.offset, loss.length) == ("truncated", 30 * BLOCK, keep % BLOCK)
-        assert log.complete == "truncated"
+        assert log.complete == "damaged"
     check_oracle(DATA[:keep])
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from types import FrameType
 
 from host.errors import ExitCode, HostError
+from host.text import shown
 
 # name -> one line of help. A verb is listed when its module is in the tree.
 VERBS = {
@@ -107,7 +108,7 @@ def _failed(arguments: list[str], error: Exception) -> int:
 
 def _end(arguments: list[str], text: str, code: ExitCode) -> int:
     """Say in one line why a verb gave up, to a program in JSON too; return the exit code."""
-    print(f"host: {text}", file=sys.stderr)
+    print(f"host: {shown(text)}", file=sys.stderr)
     if "--json" in arguments and "-" not in arguments:  # there stdout carries the table
         with contextlib.suppress(OSError):  # stdout itself may be what failed
             print(json.dumps({"error": text, "exit_code": int(code)}), flush=True)

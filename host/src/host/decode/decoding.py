@@ -22,6 +22,7 @@ from host.original.table import make_table
 from host.physical.calibration import load_calibration
 from host.physical.columns import COLUMNS, UNITS
 from host.progress import progress_bar
+from host.text import shown
 
 _HEAD_BYTES = 4096
 
@@ -52,6 +53,8 @@ class Decoded:
         found = []
         if self.summary["losses"]["ranges"]:
             found.append(f"{len(self.summary['losses']['ranges'])} lost ranges")
+        if self.summary["complete"] != "complete":
+            found.append(f"the log is {self.summary['complete']}")
         for session in self.summary["sessions"]:
             for kind in ("stuck", "saturated", "absent"):
                 found += [f"{name} {kind}" for name in session[kind]]
@@ -127,10 +130,8 @@ def pick(source: Path) -> Path:
     for flight in flights:
         mark = "->" if flight is chosen else "  "
         note = "" if flight.recorded else ", prepared, nothing recorded"
-        print(
-            f"{mark} {flight.path}  session {flight.session}, {flight.size_bytes} bytes{note}",
-            file=sys.stderr,
-        )
+        said = f"{mark} {flight.path}  session {flight.session}, {flight.size_bytes} bytes{note}"
+        print(shown(said), file=sys.stderr)
     return chosen.path
 
 

@@ -5,30 +5,40 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-_SHOWN_LOSSES = 12
+_SHOWN = 12
 _WIDTH = 13
 
 
 def lines(summary: Mapping[str, Any]) -> Iterator[str]:
     """Yield the lines of a summary made by `host.decode.summary.summarise`."""
     yield _row("log", f"{summary['file']}  file id {summary['file_id']}, {summary['complete']}")
+    if summary["begins_at_byte"]:
+        yield _row("", f"it begins at byte {summary['begins_at_byte']} of this file")
     yield _row("duration", f"{summary['duration_s']:.2f} s, {summary['rows']} rows")
     frames = summary["frames"]
     yield _row("frames", ", ".join(f"{name} {count}" for name, count in frames.items() if count))
-    for session in summary["sessions"]:
+    sessions = summary["sessions"]
+    for session in sessions[:_SHOWN]:
         yield from _session(session)
+    if len(sessions) > _SHOWN:
+        yield _row("", f"... and {len(sessions) - _SHOWN} more sessions: --json lists all")
     yield _row("clock", _clock(summary["clock"]))
     yield _row("GPS", _gps(summary["gps"]))
     inputs = [f"{surface} {source}" for surface, source in summary["inputs"].items()]
     yield _row("inputs", ", ".join(inputs) + ", throttle commanded")
     yield from _losses(summary["losses"])
-    for other in summary["older_data"]:
-        sessions = ", ".join(str(number) for number in other["sessions"])
+    older = summary["older_data"]
+    for other in older[:_SHOWN]:
+        numbers = other["sessions"]
+        listed = ", ".join(str(number) for number in numbers[:_SHOWN])
+        listed += ", ..." if len(numbers) > _SHOWN else ""
         yield _row(
             "older data",
-            f"{other['blocks']} blocks of file id {other['file_id']} (session {sessions}) from byte"
+            f"{other['blocks']} blocks of file id {other['file_id']} (session {listed}) from byte"
             f" {other['offset']}: not part of this log; --file-id {other['file_id']} decodes them",
         )
+    if len(older) > _SHOWN:
+        yield _row("", f"... and {len(older) - _SHOWN} more: --json lists all")
     for key, text in (
         ("duplicate_blocks", "blocks stand in the file twice: used once"),
         ("displaced_blocks", "blocks stand out of order: put back in order"),
@@ -93,18 +103,21 @@ def _gps(gps: Mapping[str, Any] | None) -> str:
 def _losses(losses: Mapping[str, Any]) -> Iterator[str]:
     ranges = losses["ranges"]
     if not ranges:
-        yield _row("losses", "none")
+        yield _row("losses", losses["ending"] or "none")
         return
     yield _row(
         "losses",
-        f"{len(ranges)} ranges: {losses['bytes']} bytes, {losses['seconds']:.3f} s,"
+        f"{sum(loss['ranges'] for loss in ranges)} ranges: {losses['bytes']} bytes,"
+        f" {losses['seconds']:.3f} s,"
         f" {losses['frames']} identification frames known lost;"
         f" {losses['dropped_frames']} frames dropped in flight",
     )
-    for loss in ranges[:_SHOWN_LOSSES]:
+    for loss in ranges[:_SHOWN]:
         yield _row("", loss["text"])
-    if len(ranges) > _SHOWN_LOSSES:
-        yield _row("", f"... and {len(ranges) - _SHOWN_LOSSES} more: --json lists all")
+    if len(ranges) > _SHOWN:
+        yield _row("", f"... and {len(ranges) - _SHOWN} more: --json lists all")
+    if losses["ending"]:
+        yield _row("", losses["ending"])
 
 
 def _calibration(note: Mapping[str, Any]) -> Iterator[str]:

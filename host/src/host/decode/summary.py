@@ -11,6 +11,7 @@ from host.log.quality import Quality, judge
 from host.physical.channels import constant_delay_us
 from host.physical.columns import ANALOGUE, COLUMNS, INERTIAL, RESTS_ON
 from host.physical.session import Session
+from host.text import shown
 
 Json = dict[str, Any]
 
@@ -31,6 +32,7 @@ def summarise(log: FlightLog) -> Json:
     return {
         "file": str(log.path),
         "file_id": f"{log.selection.file_id:08x}",
+        "begins_at_byte": log.selection.base,
         "schema": f"{log.schema.hash:08x}",
         "complete": log.complete,
         "duration_s": sum(session.duration_s for session in log.sessions),
@@ -135,8 +137,6 @@ def _session(log: FlightLog, session: Session) -> Json:
 
 
 def _reason(log: FlightLog, session: Session) -> str:
-    if "event" not in log.schema.by_name:
-        return "unknown"
     events, _ = session.slow("event")
     ends = events[events["code"] == log.schema.number("event", "session_end")]
     if not len(ends):
@@ -150,10 +150,7 @@ def _identity(session: Session) -> Json:
     for name, fields in (("identity", ("board", "firmware")), ("config", ("aircraft",))):
         data, _ = session.slow(name)
         for field in fields:
-            text = (
-                bytes(data[field][-1]).rstrip(b"\0").decode("ascii", "replace") if len(data) else ""
-            )
-            out[field] = text
+            out[field] = shown(bytes(data[field][-1]).rstrip(b"\0")) if len(data) else ""
     return out
 
 
@@ -179,8 +176,6 @@ def _clock(log: FlightLog) -> Json | None:
 
 
 def _gps(log: FlightLog) -> Json | None:
-    if "gps" not in log.schema.by_name:
-        return None
     data = log.frames["gps"]
     schema = log.schema
     fixes = (schema.number("gps_fix", "fix_2d"), schema.number("gps_fix", "fix_3d"))
@@ -203,6 +198,8 @@ def _gps(log: FlightLog) -> Json | None:
 def _losses(log: FlightLog) -> Json:
     ledger = log.loss
     return {
+        "unproven_bytes": ledger.unproven_bytes,
+        "ending": ledger.ending,
         "ranges": [
             {
                 "cause": loss.cause,
@@ -213,6 +210,7 @@ def _losses(log: FlightLog) -> Json:
                 "seconds": loss.seconds,
                 "other_frames": loss.other_frames,
                 "t_s": loss.t_s,
+                "ranges": loss.ranges,
                 "text": loss.sentence(),
             }
             for loss in ledger.losses

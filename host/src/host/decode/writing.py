@@ -9,12 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from host.errors import UsageError
 from host.export import FORMATS, open_writer
 from host.export.csv import STDOUT, printable
 from host.export.unfinished import unfinished
 from host.export.writer import Columns, Meta
 from host.log import FlightLog
+
+_ROWS_AT_ONCE = 65_536
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,20 +123,31 @@ def write_frames(log: FlightLog, kind: str, target: Path) -> list[str]:
         data = log.frames[name]
         if not len(data):
             continue
-        columns: dict[str, Any] = {}
-        units = {}
+        units: dict[str, str] = {}
         for part in frame.fields:
-            value = data[part.name]
             scale = f"{part.scale:g} " if part.scale != 1.0 and part.unit else ""
-            if value.ndim == 1:
-                columns[part.name] = value
-                units[part.name] = scale + part.unit
-            else:
-                for at in range(value.shape[1]):
-                    columns[f"{part.name}_{at}"] = value[:, at]
-                    units[f"{part.name}_{at}"] = scale + part.unit
+            count = data.dtype[part.name].shape
+            names = [f"{part.name}_{at}" for at in range(count[0])] if count else [part.name]
+            units |= dict.fromkeys(names, scale + part.unit)
+        # The schema's door lets in no name that leads out of the folder.
         file = folder / f"{name}.{kind}"
         notes = {"source": log.path.name, "frame": name, "content": "raw counts"}
-        write_table([printable(columns)], kind, file, Meta(units=units, notes=notes))
+        write_table(_raw_pieces(data), kind, file, Meta(units=units, notes=notes))
         files.append(str(file))
     return files
+
+
+def _raw_pieces(data: NDArray[Any]) -> Iterator[Columns]:
+    """Yield the fields of raw frames as columns, an array's elements as one each."""
+    for first in range(0, len(data), _ROWS_AT_ONCE):
+        rows = data[first : first + _ROWS_AT_ONCE]
+        columns: dict[str, Any] = {}
+        for name in rows.dtype.names or ():
+            value = rows[name]
+            if name == "id":
+                continue
+            if value.ndim == 1:
+                columns[name] = value
+            else:
+                columns |= {f"{name}_{at}": value[:, at] for at in range(value.shape[1])}
+        yield printable(columns)

@@ -27,7 +27,9 @@ class _Collected:
             self._parts.setdefault(name, []).append(value)
 
     def _whole(self) -> dict[str, NDArray[Any]]:
-        return {name: np.concatenate(parts) for name, parts in self._parts.items()}
+        # One column at a time: the pieces of the others are all that is held twice.
+        names = list(self._parts)
+        return {name: np.concatenate(self._parts.pop(name)) for name in names}
 
 
 class MatWriter(_Collected):

@@ -22,11 +22,13 @@ from host.wire.blocks import Progress, Scan, scan
 from host.wire.frames import find_schemas
 from host.wire.schema import Schema
 from host.wire.selection import Selection, select
-from host.wire.store import FAST, Frames, FrameStore
+from host.wire.store import Frames, FrameStore
 
 if TYPE_CHECKING:
     import pandas as pd
 
+# Each session heads its blocks with the schema: 13 of them. The first few may have lost theirs.
+_SESSIONS, _SESSION_BLOCKS = 64, 13
 GAP_BETWEEN_SESSIONS_S = 2.0  # by convention, where no GPS says how long a reset took
 
 
@@ -69,6 +71,12 @@ class FlightLog:
         blocks = selection.blocks
         if session is not None:
             blocks = blocks.take(blocks.session == session)
+        runs, most = len(session_slices(blocks)), _SESSIONS + len(blocks) // _SESSION_BLOCKS
+        if runs > most:
+            raise LogError(
+                f"{path}: the session changes {runs} times in {len(blocks)} blocks; expected at"
+                f" most {most}: a session begins with its schema; --session N reads one"
+            )
         self.blocks = blocks
         self.store = FrameStore(path, blocks, schema, progress)
 
@@ -269,12 +277,15 @@ def read_log(
 
 
 def _main_schema(path: Path, selection: Selection) -> Schema:
-    blocks = selection.blocks
-    known = find_schemas(path, blocks)
-    values, counts = np.unique(blocks.schema_hash, return_counts=True)
-    for value in values[np.argsort(-counts)].tolist():
-        if value in known and FAST in known[value].by_name:
-            return known[value]
+    """Return the schema that most blocks follow, of those that can be read."""
+    refused: LogError | None = None
+    for _, found in find_schemas(path, selection.blocks):
+        if isinstance(found, Schema):
+            return found
+        refused = refused or found
+    if refused is not None:
+        raise LogError(f"{path}: {refused}") from refused
+    values, counts = np.unique(selection.blocks.schema_hash, return_counts=True)
     raise LogError(
         f"{path}: schema {int(values[np.argmax(counts)]):08x} is neither whole in the log nor known"
         " to this program: the frames cannot be read; install the host tool of that firmware"

@@ -8,6 +8,8 @@ from typing import Any
 from host.log import read_log
 from host.log.source import find_flights
 from host.original.rows import looks_like_rows, parse_rows
+from host.text import shown
+from host.wire.blocks import is_card
 
 HEAD_BYTES = 256 << 10
 
@@ -26,7 +28,8 @@ def describe(path: Path) -> dict[str, Any]:
         variant = parse_rows(head).variant
         size = path.stat().st_size
         return {"file": str(path), "size_bytes": size, "format": f"original rows, {variant}"}
-    log = read_log(path, limit_bytes=HEAD_BYTES)
+    # The logs of a card's image stand anywhere in it.
+    log = read_log(path, limit_bytes=None if is_card(head) else HEAD_BYTES)
     out: dict[str, Any] = {
         "file": str(path),
         "size_bytes": path.stat().st_size,
@@ -87,7 +90,7 @@ def _plain(frame: Any) -> dict[str, Any]:
         if name in ("id", "t_us"):
             continue
         if value.dtype.kind == "S":
-            out[name] = bytes(value).rstrip(b"\0").decode("ascii", "replace")
+            out[name] = shown(bytes(value).rstrip(b"\0"))
         elif value.ndim:
             out[name] = bytes(value).hex()
         else:

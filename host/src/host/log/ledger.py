@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 # cause -> what it means to a reader
 CAUSES = {
@@ -16,7 +16,7 @@ CAUSES = {
     "unread": "bytes behind a frame of unknown kind",
     "ring_full": "frames dropped in flight while the card was busy",
     "unexplained": "identification frames missing, no counter says why",
-    "truncated": "the file stops without the end of its session",
+    "truncated": "the file was cut: it stops without the end of its session",
 }
 
 
@@ -42,6 +42,8 @@ class Loss:
         Slower frames known to be lost with it.
     t_s : float or None
         Time of the last row before it.
+    ranges : int
+        How many ranges of one cause, from this one on, this record stands for.
     """
 
     cause: str
@@ -52,15 +54,29 @@ class Loss:
     seconds: float | None = None
     other_frames: int = 0
     t_s: float | None = None
+    ranges: int = 1
+
+    def joined(self, other: Loss) -> Loss:
+        """Return one record of this range and a later one of the same cause."""
+        return replace(
+            self,
+            length=self.length + other.length,
+            blocks=self.blocks + other.blocks,
+            frames=(self.frames or 0) + (other.frames or 0),
+            seconds=(self.seconds or 0.0) + (other.seconds or 0.0),
+            other_frames=self.other_frames + other.other_frames,
+            ranges=self.ranges + other.ranges,
+        )
 
     def sentence(self) -> str:
         """Return the range in words."""
         frames = "?" if self.frames is None else str(self.frames)
         seconds = "?" if self.seconds is None else f"{self.seconds:.3f}"
         at = "" if self.t_s is None else f" after t = {self.t_s:.3f} s"
+        more = f"{self.ranges} ranges from " if self.ranges > 1 else ""
         return (
-            f"byte {self.offset}, {self.length} bytes: {seconds} s, {frames} identification frames"
-            f"{at}; {CAUSES[self.cause]}"
+            f"{more}byte {self.offset}, {self.length} bytes: {seconds} s, {frames}"
+            f" identification frames{at}; {CAUSES[self.cause]}"
         )
 
 
@@ -76,11 +92,25 @@ class Ledger:
         ``complete``, ``truncated`` or ``damaged``.
     dropped_frames : int
         Frames of any kind the logger itself counted as dropped.
+    unproven_bytes : int or None
+        Bytes behind the last block of a file that was never closed; None where the log says itself
+        that its session ended.
     """
 
     losses: tuple[Loss, ...]
     complete: str
     dropped_frames: int
+    unproven_bytes: int | None = None
+
+    @property
+    def ending(self) -> str | None:
+        """What cannot be proven of the log's end, in words; None if its session's end is there."""
+        if self.unproven_bytes is None:
+            return None
+        return (
+            f"complete as far as blocks reach, {self.unproven_bytes} bytes behind the last block"
+            " are not of this flight"
+        )
 
     @property
     def any(self) -> bool:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 STUCK_S = 10.0  # an ADC sum of four that does not move one count for so long reads no sensor
 _ADC_END = 4 * 1023
-_JITTER_BINS_US = 1_000_000
+_JITTER_MOST_US = 1_000_000
 _PAIRS = {"alpha": ("alpha_a", "alpha_b"), "beta": ("beta_a", "beta_b"), "pitot": ("dp_a", "dp_b")}
 
 
@@ -115,6 +115,33 @@ class Quality:
     pairs: dict[str, PairHealth] = field(default_factory=dict)
 
 
+@dataclass(slots=True)
+class _Counts:
+    """How often each whole number came: few of them in a clean log, at most one per row."""
+
+    values: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
+    counts: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+
+    def add(self, numbers: NDArray[np.int32]) -> None:
+        """Count more numbers."""
+        values, counts = np.unique(numbers, return_counts=True)
+        every = np.concatenate([self.values, values])
+        self.values, where = np.unique(every, return_inverse=True)
+        both = np.concatenate([self.counts, counts])
+        self.counts = np.bincount(where, both, len(self.values)).astype(np.int64)
+
+    def percentiles(self) -> dict[str, float]:
+        """Return p50, p99 and max; nothing without numbers."""
+        if not len(self.values):
+            return {}
+        passed = np.cumsum(self.counts)
+        at = {
+            name: float(self.values[np.searchsorted(passed, share * passed[-1])])
+            for name, share in (("p50", 0.5), ("p99", 0.99))
+        }
+        return at | {"max": float(self.values[-1])}
+
+
 def judge(session: Session) -> Quality:
     """Walk a session's identification frames once and return its figures."""
     schema = session.store.schema
@@ -127,7 +154,7 @@ def judge(session: Session) -> Quality:
         pair: PairHealth(lines[a].unit, 3.0 * float(np.hypot(_zero(lines[a]), _zero(lines[b]))))
         for pair, (a, b) in _PAIRS.items()
     }
-    jitter = np.zeros(_JITTER_BINS_US + 1, np.int64)
+    jitter = _Counts()
     clipped = fresh = 0
     before: tuple[float, int] | None = None
     for part in session.store.fast_pieces(session.span):
@@ -138,8 +165,7 @@ def judge(session: Session) -> Quality:
             t_us, count = np.r_[before[0], t_us], np.r_[before[1], count]
         before = (float(t_us[-1]), int(count[-1]))
         step = np.diff(t_us)[np.diff(count) & 0xFFFF == 1]
-        off = np.abs(step - session.interval_us).astype(np.int64)
-        jitter += np.bincount(np.minimum(off, _JITTER_BINS_US), minlength=len(jitter))
+        jitter.add(np.minimum(np.abs(step - session.interval_us), _JITTER_MOST_US).astype(np.int32))
         bits = part.data["valid"]
         is_fresh = (bits & fresh_bit) != 0
         fresh += int(np.count_nonzero(is_fresh))
@@ -161,7 +187,7 @@ def judge(session: Session) -> Quality:
             ]
             quality.pairs[pair].add(sides[0] - sides[1])
     quality.imu_saturated = clipped / fresh if fresh else 0.0
-    quality.jitter_us = _percentiles(jitter)
+    quality.jitter_us = jitter.percentiles()
     _find_faults(quality, session)
     return quality
 
@@ -175,18 +201,6 @@ def _is_valid(frame: Frame, bits: NDArray[np.uint16], name: str) -> NDArray[np.b
     if bit is None:
         return np.ones(len(bits), np.bool_)
     return np.asarray((bits >> bit & 1) != 0)
-
-
-def _percentiles(histogram: NDArray[Any]) -> dict[str, float]:
-    total = int(histogram.sum())
-    if not total:
-        return {}
-    passed = np.cumsum(histogram)
-    at = {
-        name: float(np.searchsorted(passed, share * total))
-        for name, share in (("p50", 0.5), ("p99", 0.99))
-    }
-    return at | {"max": float(np.flatnonzero(histogram)[-1])}
 
 
 def _find_faults(quality: Quality, session: Session) -> None:

@@ -70,7 +70,9 @@ class Interpolator:
         gap = step[index]
         with np.errstate(divide="ignore", invalid="ignore"):
             weight = (rows_us - sampled_us[index]) / gap
-        weight[~inside | (gap > limit_us)] = np.nan
+        # Where a clock runs backwards (a forged log) the neighbours do not hold the instant.
+        between = (weight >= 0.0) & (weight <= 1.0)
+        weight[~inside | ~between | (gap > limit_us)] = np.nan
         self._weight, self._index = weight, index
 
     def __call__(self, values: Array) -> Array:

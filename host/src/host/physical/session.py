@@ -59,6 +59,7 @@ class Session:
     rate_hz: float = 0.0
     dlpf: int = 0
     rows: int = field(default=0)
+    ident_span: tuple[int, int] = (0, 0)  # first and last block with identification frames
 
     def __post_init__(self) -> None:
         first = last = None
@@ -68,6 +69,7 @@ class Session:
                 last = part
                 self.rows += len(part.data)
         if first is not None and last is not None:
+            self.ident_span = int(first.block[0]), int(last.block[-1])
             self.start_us = int(self._times(_cut(first, 0, 1))[0])
             self.end_us = int(self._times(_cut(last, -1, None))[0])
             self.rate_hz = self._rate_hz(_cut(first, 0, _RATE_ROWS))
@@ -130,7 +132,7 @@ class Session:
             known = attitude["dlpf"][attitude["dlpf"] != 255]
             if len(known):
                 return int(np.bincount(known).argmax())
-        if _mostly(self.store.schema, self.store.sample(), "imu_original"):
+        if _mostly(self.store.schema, self.store.sample, "imu_original"):
             return 4
         return 2 if self.rate_hz > 150.0 else 3
 
@@ -144,7 +146,7 @@ def surface_sources(store: FrameStore) -> dict[str, str]:
 
     One answer per log: a column that changed its meaning halfway would mislead a fit.
     """
-    sample = store.sample()
+    sample = store.sample
     return {
         surface: "measured"
         if all(_mostly(store.schema, sample, pot) for pot in pots)

@@ -154,7 +154,9 @@ def fit_gps(parts: list[tuple[NDArray[np.int64], NDArray[np.int64]]]) -> ClockFi
         if abs(slope - before) < _CONVERGED:
             break
     # Latency wanders slowly: first-order correlation r leaves n (1 - r)/(1 + r) independent fixes.
-    lagged = float(np.clip(np.corrcoef(residual[1:], residual[:-1])[0, 1], 0.0, 0.95))
+    lagged = 0.0
+    if np.ptp(residual[1:]) > 0.0 and np.ptp(residual[:-1]) > 0.0:
+        lagged = float(np.clip(np.corrcoef(residual[1:], residual[:-1])[0, 1], 0.0, 0.95))
     half_width = _T_95 * sigma / np.sqrt(spread) * np.sqrt((1 + lagged) / (1 - lagged))
     span_s = float(max(t[-1] for t in t_s))
     good = half_width <= _MAX_HALF_WIDTH and span_s >= _MIN_SPAN_S and abs(slope) <= _SCALE_LIMIT
@@ -180,12 +182,13 @@ def _missed_wraps(
     place = np.searchsorted(which, block)
     seen = times[place] + (data["t_us"] - times[place].astype(np.uint32)).astype(np.int32)
     uptime_us = data["uptime_s"].astype(np.int64) * 1_000_000
-    missed = np.rint((uptime_us - seen) / WRAP_US).astype(np.int64)
+    # Uptime only grows: its running maximum bounds the sum, whatever a forged log says.
+    missed = np.maximum.accumulate(np.rint((uptime_us - seen) / WRAP_US).astype(np.int64))
     jumps = np.flatnonzero(np.diff(missed) > 0)
     for jump in jumps.tolist():
         # Somewhere between these two frames: where most blocks are missing.
         low, high = int(place[jump]), int(place[jump + 1])
         gaps = np.diff(blocks.sequence[which[low : high + 1]].astype(np.int64))
         if len(gaps) and gaps.max() > 1:
-            extra[low + 1 + int(np.argmax(gaps)) :] += int(missed[jump + 1] - missed[jump])
-    return extra * WRAP_US
+            extra[low + 1 + int(np.argmax(gaps))] += int(missed[jump + 1] - missed[jump])
+    return np.asarray(extra.cumsum() * WRAP_US, np.int64)

@@ -81,6 +81,7 @@ def run(args: argparse.Namespace) -> int:
     """Decode, print, write; return the exit code."""
     from host.decode.decoding import decode
     from host.decode.writing import Request
+    from host.text import shown
 
     request = Request(
         source=args.source,
@@ -97,5 +98,5 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(result.summary, indent=2, allow_nan=False), file=out)
     else:
-        print("\n".join(result.lines), file=out)
+        print("\n".join(map(shown, result.lines)), file=out)
     return int(result.exit_code(strict=args.strict))

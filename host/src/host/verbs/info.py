@@ -31,14 +31,17 @@ def run(args: argparse.Namespace) -> int:
     from host.errors import ExitCode
     from host.log.head import describe, describe_folder, head_lines
     from host.log.source import check_source
+    from host.text import shown
 
     source = check_source(args.source)
     if source.is_dir():
         flights = describe_folder(source)
-        print(json.dumps(flights, indent=2) if args.json else "\n".join(_table(flights)))
+        print(
+            json.dumps(flights, indent=2) if args.json else "\n".join(map(shown, _table(flights)))
+        )
         return int(ExitCode.OK)
     head = describe(source)
-    print(json.dumps(head, indent=2) if args.json else "\n".join(head_lines(head)))
+    print(json.dumps(head, indent=2) if args.json else "\n".join(map(shown, head_lines(head))))
     return int(ExitCode.OK)
 
 

@@ -17,14 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.wire.extents import BLOCK_BYTES, data_extents
+from host.wire.window_crc import RESIDUE, sealed
 
 MAGIC = b"FLT1"
+BOOT_SIGNATURE = b"\x55\xaa"
 HEADER_BYTES = 28
 PAYLOAD_BYTES = 480
 KIND_FRAMES = 0
 KIND_SCHEMA = 1
 WINDOW_BYTES = 1 << 20  # read at once: what the CRC brought into the cache serves the headers
-_CRC_RESIDUE = 0x2144DF1C  # CRC-32 of any bytes followed by their own CRC-32
+_DENSE = 8  # bytes under a CRC of their own per byte read, beyond which one pass costs less
 
 Progress = Callable[[int, int], None]
 
@@ -45,6 +47,7 @@ HEADER = np.dtype(
     ]
 )
 assert HEADER.itemsize == BLOCK_BYTES
+_USED_AT, _KIND_AT = 24, 26
 _MAGIC_NUMBER = int.from_bytes(MAGIC, "little")
 
 
@@ -93,11 +96,14 @@ class Scan:
         Byte ranges that hold data but no valid block (zeros and holes excepted), ascending.
     size_bytes : int
         Length of the file.
+    is_card : bool
+        True for the image of a card or of its partition: the first sector ends in 55 AA.
     """
 
     blocks: Blocks
     bad: list[tuple[int, int]]
     size_bytes: int
+    is_card: bool = False
 
 
 def scan(path: Path, progress: Progress | None = None, *, limit_bytes: int | None = None) -> Scan:
@@ -127,12 +133,18 @@ def scan(path: Path, progress: Progress | None = None, *, limit_bytes: int | Non
     found: list[Blocks] = []
     bad: list[tuple[int, int]] = []
     with path.open("rb", buffering=0) as file:
+        card = is_card(bytes(read_at(file, 0, BLOCK_BYTES)))
         for start, end in data_extents(file, size_bytes):
             runs = _scan_aligned(file, start, end, size_bytes, found, progress)
             for run in _joined(runs):
                 bad += _search(file, *run, found)
     blocks = _concatenated(found)
-    return Scan(blocks.take(np.argsort(blocks.position, kind="stable")), bad, size_bytes)
+    return Scan(blocks.take(np.argsort(blocks.position, kind="stable")), bad, size_bytes, card)
+
+
+def is_card(head: bytes) -> bool:
+    """Tell whether a file that begins so is the image of a card or of its partition."""
+    return head[510:512] == BOOT_SIGNATURE and not head.startswith(MAGIC)
 
 
 def read_at(
@@ -158,6 +170,19 @@ def read_at(
     return view[:done]
 
 
+def resembles(looked: bytes | memoryview, blocks: Blocks, near: int) -> bool:
+    """Tell whether bytes begin like block `near`: two words of magic, ids and schema fit."""
+    words = [bytes(looked[at : at + 4]) for at in (0, 4, 8, 16)]
+    expected = [
+        MAGIC,
+        *(
+            int(value[near]).to_bytes(4, "little")
+            for value in (blocks.file_id, blocks.session, blocks.schema_hash)
+        ),
+    ]
+    return sum(one == other for one, other in zip(words, expected, strict=True)) >= 2
+
+
 def _scan_aligned(
     file: FileIO,
     start: int,
@@ -172,7 +197,7 @@ def _scan_aligned(
         whole = len(buffer) // BLOCK_BYTES
         good = _good_blocks(buffer, 0, whole)
         if good.any():
-            found.append(_headers(buffer, 0, good, at))
+            found.append(_headers(buffer, np.flatnonzero(good) * BLOCK_BYTES, at))
         if progress is not None:
             progress(at + len(buffer), size_bytes)
         if not good.all():
@@ -189,39 +214,35 @@ def _search(file: FileIO, start: int, end: int, found: list[Blocks]) -> Iterator
     bad_from = start
     while window_start < end:
         buffer = bytes(read_at(file, window_start, min(WINDOW_BYTES, end - window_start)))
-        last_window = window_start + len(buffer) >= end or not buffer
-        at = 0
-        while True:
-            at = buffer.find(MAGIC, at)
-            whole = (len(buffer) - at) // BLOCK_BYTES if at >= 0 else 0
-            if whole == 0:
-                break
-            good = _good_prefix(buffer, at, whole)
-            if not good:
-                at += 1
-                continue
-            found.append(_headers(buffer, at, np.ones(good, bool), window_start))
-            yield from _nonzero(file, bad_from, window_start + at)
-            at += good * BLOCK_BYTES
-            bad_from = window_start + at
-        if last_window:
+        behind = 0
+        taken = []
+        for at in _sealed_anywhere(buffer):
+            if at >= behind:  # blocks do not overlap: the first counts
+                taken.append(at)
+                yield from _nonzero(file, bad_from, window_start + at)
+                behind = at + BLOCK_BYTES
+                bad_from = window_start + behind
+        if taken:
+            found.append(_headers(buffer, np.array(taken, np.int64), window_start))
+        if window_start + len(buffer) >= end or not buffer:
             break
         # A block may begin in the last 511 bytes of this window and end in the next.
         window_start = max(window_start + len(buffer) - BLOCK_BYTES + 1, bad_from)
     yield from _nonzero(file, bad_from, end)
 
 
-def _good_prefix(buffer: memoryview | bytes, at: int, count: int) -> int:
-    """Return how many valid blocks follow each other from byte `at` on."""
-    done = 0
-    step = 1  # grows, so that a lone block costs one check and a long shifted run is vectorised
-    while done < count:
-        step = min(step * 4, count - done)
-        good = _good_blocks(buffer, at + done * BLOCK_BYTES, step)
-        if not good.all():
-            return done + int(np.argmin(good))
-        done += step
-    return done
+def _sealed_anywhere(buffer: bytes) -> list[int]:
+    """Return where valid blocks begin, at any byte; they may overlap."""
+    if len(buffer) < BLOCK_BYTES or MAGIC not in buffer:
+        return []
+    everywhere = np.ndarray((len(buffer) - BLOCK_BYTES + 1,), "<u4", buffer, strides=(1,))
+    starts = np.flatnonzero(everywhere == _MAGIC_NUMBER)
+    octets = np.frombuffer(buffer, np.uint8)
+    used = octets[starts + _USED_AT] + octets[starts + _USED_AT + 1].astype(np.uint16) * 256
+    starts = starts[(used <= PAYLOAD_BYTES) & (octets[starts + _KIND_AT] <= KIND_SCHEMA)]
+    if len(starts) * BLOCK_BYTES > _DENSE * len(buffer):
+        return list(starts[sealed(buffer, starts)].tolist())
+    return [at for at in starts.tolist() if zlib.crc32(buffer[at : at + BLOCK_BYTES]) == RESIDUE]
 
 
 def _good_blocks(buffer: memoryview | bytes, at: int, count: int) -> NDArray[np.bool_]:
@@ -236,20 +257,19 @@ def _good_blocks(buffer: memoryview | bytes, at: int, count: int) -> NDArray[np.
     sealed = np.frombuffer(buffer, f"V{BLOCK_BYTES}", count, at)
     whole = bool(good.all())
     residues = list(map(zlib.crc32, (sealed if whole else sealed[good]).tolist()))
-    if residues.count(_CRC_RESIDUE) == count:
+    if residues.count(RESIDUE) == count:
         return good
-    good[good] = np.array(residues, np.uint32) == _CRC_RESIDUE
+    good[good] = np.array(residues, np.uint32) == RESIDUE
     return good
 
 
-def _headers(
-    buffer: memoryview | bytes, at: int, good: NDArray[np.bool_], window_start: int
-) -> Blocks:
-    head = np.frombuffer(buffer, HEADER, len(good), at)
-    position = window_start + at + np.flatnonzero(good) * BLOCK_BYTES
-    return Blocks(
-        position.astype(np.int64), *(head[field.name][good] for field in fields(Blocks)[1:])
+def _headers(buffer: memoryview | bytes, starts: NDArray[np.int64], window_start: int) -> Blocks:
+    """Return the headers of the blocks at `starts`."""
+    everywhere = np.ndarray(
+        (len(buffer) - BLOCK_BYTES + 1,), f"V{BLOCK_BYTES}", buffer, strides=(1,)
     )
+    head = everywhere[starts].view(HEADER)
+    return Blocks(starts + window_start, *(head[field.name] for field in fields(Blocks)[1:]))
 
 
 def _concatenated(parts: list[Blocks]) -> Blocks:

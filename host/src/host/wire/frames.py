@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import zlib
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from io import FileIO
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 from host.errors import LogError
 from host.wire.blocks import HEADER_BYTES, KIND_FRAMES, KIND_SCHEMA, Blocks, read_at
 from host.wire.extents import BLOCK_BYTES
-from host.wire.schema import Schema, known_schemas, parse_schema
+from host.wire.schema import Schema
+from host.wire.schema_text import known_schemas, parse_schema
 
 BLOCKS_AT_ONCE = 4096  # 2 MiB: frames and columns of one piece stay in the cache
 SCHEMA_PIECE = Struct("offset" / Int16ul, "total" / Int16ul, "text" / GreedyBytes)
@@ -56,11 +58,12 @@ class Piece:
     unread_bytes: int
 
 
-def find_schemas(path: Path, blocks: Blocks) -> dict[int, Schema]:
-    """Return the schema of each hash that the log's blocks name.
+def find_schemas(path: Path, blocks: Blocks) -> Iterator[tuple[int, Schema | LogError]]:
+    """Yield the schema of each hash that the log's blocks name, the most used first.
 
-    The log's own text comes first; a log whose copies are all damaged is read with the schema
-    of that hash that some firmware was released with. A hash that stays unknown is absent.
+    The log's own text comes first; a log whose copies are all damaged is read with a
+    released schema of the same hash. A hash that stays unknown is left out; one whose text is no
+    schema comes with the reason.
 
     Parameters
     ----------
@@ -68,49 +71,65 @@ def find_schemas(path: Path, blocks: Blocks) -> dict[int, Schema]:
     blocks : Blocks
         The log's blocks in order.
 
-    Returns
-    -------
-    dict of int to Schema
+    Yields
+    ------
+    (int, Schema or LogError)
     """
-    found: dict[int, Schema] = {}
+    values, which, counts = np.unique(blocks.schema_hash, return_inverse=True, return_counts=True)
+    pieces = np.flatnonzero(blocks.kind == KIND_SCHEMA)
+    pieces = pieces[np.argsort(which[pieces], kind="stable")]
+    bounds = np.searchsorted(which[pieces], np.arange(len(values) + 1))
     with path.open("rb", buffering=0) as file:
-        for value in np.unique(blocks.schema_hash).tolist():
-            pieces = np.flatnonzero((blocks.schema_hash == value) & (blocks.kind == KIND_SCHEMA))
-            text = _schema_text(file, blocks, pieces)
+        for at in np.argsort(-counts, kind="stable").tolist():
+            value = int(values[at])
+            text = _schema_text(file, blocks, value, pieces[bounds[at] : bounds[at + 1]])
             if text is None:
                 text = known_schemas().get(value)
             if text is None:
                 continue
-            schema = parse_schema(text)
-            if schema.hash == value:
-                found[value] = schema
-    return found
+            try:
+                yield value, parse_schema(text)
+            except LogError as error:
+                yield value, error
 
 
-def _schema_text(file: FileIO, blocks: Blocks, pieces: NDArray[np.intp]) -> str | None:
-    parts: dict[int, bytes] = {}
-    for number in pieces:
+def _schema_text(
+    file: FileIO, blocks: Blocks, value: int, pieces: NDArray[np.intp]
+) -> bytes | None:
+    """Return the text whose CRC-32 is `value`, put together from the pieces in their order."""
+    texts: dict[int, _Growing] = {}
+    for number in pieces.tolist():
         used = int(blocks.used[number])
         payload = read_at(file, int(blocks.position[number]) + HEADER_BYTES, used)
         try:
             piece = SCHEMA_PIECE.parse(payload)
         except StreamError:  # shorter than its own two numbers
             continue
-        parts[piece.offset] = piece.text
-        joined = _chain(parts, piece.total)
-        if joined is not None:
-            return joined.decode("ascii", errors="replace")
+        whole = texts.setdefault(piece.total, _Growing()).add(piece.offset, piece.text, piece.total)
+        if whole is not None and zlib.crc32(whole) == value:
+            return whole
     return None
 
 
-def _chain(parts: dict[int, bytes], total: int) -> bytes | None:
-    text = b""
-    while len(text) < total:
-        piece = parts.get(len(text))
-        if not piece:
+class _Growing:
+    """Joins pieces of a text that come in any order; each is touched once."""
+
+    def __init__(self) -> None:
+        self._text = bytearray()
+        self._waiting: dict[int, bytes] = {}
+
+    def add(self, offset: int, text: bytes, total: int) -> bytes | None:
+        """Take a piece; return the text when it is whole, and begin anew."""
+        if offset >= len(self._text) and text:
+            self._waiting[offset] = text
+        while len(self._text) < total and (piece := self._waiting.pop(len(self._text), None)):
+            self._text += piece
+        if len(self._text) < total:
             return None
-        text += piece
-    return text if len(text) == total else None
+        whole = bytes(self._text)
+        self._text.clear()
+        self._waiting.clear()
+        return whole if len(whole) == total else None
 
 
 def frame_pieces(
@@ -145,11 +164,10 @@ def frame_pieces(
     unknown = set(names) - set(schema.by_name)
     if unknown:
         raise LogError(f"this log has no frames called {', '.join(sorted(unknown))}")
-    usable = (blocks.kind == KIND_FRAMES) & (blocks.schema_hash == schema.hash)
-    if span is not None:
-        usable[: span[0]] = False
-        usable[span[1] :] = False
-    numbers = np.flatnonzero(usable)
+    first, last = span or (0, len(blocks))
+    usable = blocks.kind[first:last] == KIND_FRAMES
+    usable &= blocks.schema_hash[first:last] == schema.hash
+    numbers = first + np.flatnonzero(usable)
     memory = bytearray(min(BLOCKS_AT_ONCE, len(numbers)) * BLOCK_BYTES)
     with path.open("rb", buffering=0) as file:
         for start in range(0, len(numbers), BLOCKS_AT_ONCE):

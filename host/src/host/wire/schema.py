@@ -1,21 +1,15 @@
-"""The schema text of a log -> frames, fields and numpy dtypes (protocol/README.md, "Schema")."""
+"""Frames, fields and numpy dtypes of a format (protocol/README.md, "Schema")."""
 
 from __future__ import annotations
 
-import json
-import re
 import zlib
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from pathlib import Path
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from host.errors import LogError
-from host.resources import released_schemas, resource
-
-_TYPES = {
+TYPES = {
     "u8": "u1",
     "i8": "i1",
     "u16": "<u2",
@@ -24,9 +18,6 @@ _TYPES = {
     "i32": "<i4",
     "f32": "<f4",
 }
-_TYPE = re.compile(r"(u8|i8|u16|i16|u32|i32|f32|char)(?:\[(\d+)\])?")
-_FORMAT = "flight-test-log"
-_VERSION = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +26,7 @@ class Field:
 
     Parameters
     ----------
-    name, type, unit, axis : str
+    name, type, unit : str
         As in protocol/frames.toml.
     scale : float
         One raw step in `unit`.
@@ -55,7 +46,6 @@ class Field:
     type: str
     unit: str = ""
     scale: float = 1.0
-    axis: str = ""
     invalid: int | None = None
     valid: int | None = None
     age: str | None = None
@@ -65,13 +55,10 @@ class Field:
     @property
     def numpy_type(self) -> np.dtype[Any]:
         """Packed little-endian numpy type of the field."""
-        match = _TYPE.fullmatch(self.type)
-        if match is None:
-            raise LogError(f"the schema gives field {self.name} the unknown type {self.type!r}")
-        base, count = match.groups()
+        base, _, count = self.type.rstrip("]").partition("[")
         if base == "char":
             return np.dtype(f"S{count or 1}")
-        return np.dtype((_TYPES[base], (int(count),))) if count else np.dtype(_TYPES[base])
+        return np.dtype((TYPES[base], (int(count),))) if count else np.dtype(TYPES[base])
 
 
 @dataclass(frozen=True)
@@ -80,7 +67,6 @@ class Frame:
 
     id: int
     name: str
-    rate_hz: float | str
     fields: tuple[Field, ...]
 
     @cached_property
@@ -103,9 +89,9 @@ class Frame:
 
 @dataclass(frozen=True)
 class Schema:
-    """All frames of one released format."""
+    """All frames of one released format, as `host.wire.schema_text.parse_schema` lets them in."""
 
-    text: str
+    text: bytes
     frames: tuple[Frame, ...]
     bits: dict[str, tuple[str, ...]]
     enums: dict[str, dict[str, int]]
@@ -113,7 +99,7 @@ class Schema:
     @cached_property
     def hash(self) -> int:
         """CRC-32 of the text, as it stands in every block."""
-        return zlib.crc32(self.text.encode("ascii"))
+        return zlib.crc32(self.text)
 
     @cached_property
     def by_name(self) -> dict[str, Frame]:
@@ -140,83 +126,3 @@ class Schema:
             if value == number:
                 return name
         return f"unknown ({number})"
-
-
-def parse_schema(text: str) -> Schema:
-    """Parse the schema text of a log.
-
-    Parameters
-    ----------
-    text : str
-        JSON as protocol/README.md describes it.
-
-    Returns
-    -------
-    Schema
-
-    Raises
-    ------
-    LogError
-        If the text is no schema of a version this program knows.
-    """
-    try:
-        raw = json.loads(text)
-        if raw["format"] != _FORMAT or raw["version"] != _VERSION:
-            raise LogError(
-                f"schema of format {raw['format']!r} version {raw['version']!r};"
-                f" this program reads {_FORMAT!r} version {_VERSION}: install a newer host tool"
-            )
-        columns = raw["columns"]
-        frames = tuple(
-            Frame(
-                id=int(frame["id"]),
-                name=str(frame["name"]),
-                rate_hz=frame["rate_hz"],
-                fields=tuple(_field(columns, row) for row in frame["fields"]),
-            )
-            for frame in raw["frames"]
-        )
-        bits = {name: tuple(words) for name, words in raw["bits"].items()}
-        enums = {name: dict(words) for name, words in raw["enum"].items()}
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise LogError(f"the log's schema cannot be read: {error!r}") from error
-    return Schema(text, frames, bits, enums)
-
-
-@lru_cache(maxsize=1)
-def known_schemas() -> dict[int, str]:
-    """Return the texts of all schemas that firmware was ever released with, by their hash."""
-    texts = [_text_of(path) for path in (resource("schema.json"), *released_schemas())]
-    return {zlib.crc32(text.encode("ascii")): text for text in texts}
-
-
-def _text_of(path: Path) -> str:
-    return path.read_text(encoding="ascii").split("\n")[1]
-
-
-@lru_cache(maxsize=1)
-def packed_schema() -> Schema:
-    """Return the schema this host tool was built with.
-
-    Writers of synthetic logs use it.
-    """
-    return parse_schema(_text_of(resource("schema.json")))
-
-
-def _field(columns: list[str], row: list[Any]) -> Field:
-    value = dict(zip(columns, row, strict=False))
-    delay = value.get("delay_us")
-    if isinstance(delay, dict):
-        delay = {int(key): float(number) for key, number in delay.items()}
-    return Field(
-        name=str(value["name"]),
-        type=str(value["type"]),
-        unit=str(value.get("unit", "")),
-        scale=float(value.get("scale", 1.0)),
-        axis=str(value.get("axis", "")),
-        invalid=value.get("invalid"),
-        valid=value.get("valid"),
-        age=value.get("age"),
-        delay_us=delay,
-        table=value.get("table"),
-    )

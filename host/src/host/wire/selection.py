@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from host.errors import LogError, NotALogError
 from host.wire.blocks import Blocks, Scan
 from host.wire.extents import BLOCK_BYTES
+
+_SHOWN_IDS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,8 @@ class Selection:
         Blocks that stand in the file more than once, beyond the first copy.
     displaced : int
         Blocks that do not stand behind the block of the sequence number before.
+    base : int
+        Byte position of the log's first block: 0, but in a card's image or behind another log.
     """
 
     blocks: Blocks
@@ -58,10 +63,13 @@ class Selection:
     foreign: tuple[Foreign, ...]
     duplicates: int
     displaced: int
+    base: int
 
 
 def select(scan: Scan, name: str, file_id: int | None = None) -> Selection:
     """Pick the log of a file: that of its first valid block, or the one asked for.
+
+    In the image of a card it is the newest flight: the largest session that recorded.
 
     Parameters
     ----------
@@ -88,12 +96,17 @@ def select(scan: Scan, name: str, file_id: int | None = None) -> Selection:
             f"{name}: not one intact block of a flight log in {scan.size_bytes} bytes; expected a"
             " file the logger wrote (FLTnnnnn.BIN)"
         )
-    own_id = int(blocks.file_id[0]) if file_id is None else file_id
+    own_id = file_id
+    if own_id is None:
+        own_id = int(blocks.file_id[_newest(blocks) if scan.is_card else 0])
     own = blocks.take(blocks.file_id == own_id)
     if not len(own):
-        known = ", ".join(f"{other:08x}" for other in np.unique(blocks.file_id))
+        ids = np.unique(blocks.file_id)
+        known = ", ".join(f"{other:08x}" for other in ids[:_SHOWN_IDS])
+        known += f" and {len(ids) - _SHOWN_IDS} more" if len(ids) > _SHOWN_IDS else ""
         raise LogError(f"{name}: no block has file id {own_id:08x}; the file holds {known}")
-    ordered, duplicates = _ordered(own)
+    base = _base(own)
+    ordered, duplicates = _ordered(own, base)
     return Selection(
         blocks=ordered,
         file_id=own_id,
@@ -101,15 +114,31 @@ def select(scan: Scan, name: str, file_id: int | None = None) -> Selection:
         foreign=_foreign(blocks, own_id),
         duplicates=duplicates,
         displaced=int(np.count_nonzero(np.diff(ordered.position) <= 0)),
+        base=base,
     )
 
 
-def _ordered(own: Blocks) -> tuple[Blocks, int]:
+def _newest(blocks: Blocks) -> int:
+    """Return a block of the newest flight; a file's first block is written when it is made."""
+    recorded = np.flatnonzero(blocks.sequence > 0)
+    return int(recorded[np.argmax(blocks.session[recorded])]) if len(recorded) else 0
+
+
+def _base(own: Blocks) -> int:
+    """Return where block 0 stands, by most blocks, if none stands at its place in the file."""
+    place = own.position - own.sequence.astype(np.int64) * BLOCK_BYTES
+    if not place.all() or place.max() < 0:
+        return 0
+    values, counts = np.unique(place[place > 0], return_counts=True)
+    return int(values[np.argmax(counts)])
+
+
+def _ordered(own: Blocks, base: int) -> tuple[Blocks, int]:
     sequence = own.sequence.astype(np.int64)
     if len(own) < 2 or bool((np.diff(sequence) > 0).all()):
         return own, 0
     # A copy that stands where its number says is preferred to one that does not.
-    away = own.position != sequence * BLOCK_BYTES
+    away = own.position != base + sequence * BLOCK_BYTES
     order = np.lexsort((own.position, away, sequence))
     first: NDArray[np.bool_] = np.r_[True, np.diff(sequence[order]) != 0]
     return own.take(order[first]), int(len(first) - np.count_nonzero(first))
@@ -123,9 +152,19 @@ def _in_order(values: NDArray[np.uint32]) -> tuple[int, ...]:
 
 def _foreign(blocks: Blocks, own_id: int) -> tuple[Foreign, ...]:
     others = blocks.take(blocks.file_id != own_id)
-    found = []
-    for other in _in_order(others.file_id):
-        its = others.take(others.file_id == other)
-        sessions = tuple(np.unique(its.session).tolist())
-        found.append(Foreign(int(other), sessions, len(its), int(its.position[0])))
-    return tuple(found)
+    order = np.lexsort((others.session, others.file_id))
+    ids, sessions, places = (
+        column[order] for column in (others.file_id, others.session, others.position)
+    )
+    edges = [0, *(np.flatnonzero(np.diff(ids.astype(np.int64))) + 1).tolist(), len(ids)]
+    found = [
+        Foreign(
+            int(ids[first]),
+            tuple(dict.fromkeys(sessions[first:last].tolist())),
+            last - first,
+            int(places[first:last].min()),
+        )
+        for first, last in itertools.pairwise(edges)
+        if last > first
+    ]
+    return tuple(sorted(found, key=lambda other: other.offset))

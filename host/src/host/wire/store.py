@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ FAST = "ident"
 # Above this a log's identification frames are read again for each use instead of kept: a 2 GB log
 # must become Parquet in less than 1.5 GB of memory.
 KEEP_BLOCKS = (256 << 20) // 512
+_SAMPLE_BLOCKS, _SAMPLE_PLACES = 64, 16
 
 
 class FrameStore:
@@ -70,13 +72,15 @@ class FrameStore:
             self._report(piece)
             yield piece.frames[FAST]
 
-    def sample(self, blocks: int = 64, places: int = 16) -> NDArray[Any]:
-        """Return identification frames from evenly spread places, for decisions on a whole log."""
-        starts = np.unique(np.linspace(0, max(0, len(self.blocks) - blocks), places).astype(int))
+    @cached_property
+    def sample(self) -> NDArray[Any]:
+        """Identification frames from evenly spread places, for decisions on a whole log."""
+        last = max(0, len(self.blocks) - _SAMPLE_BLOCKS)
+        starts = np.unique(np.linspace(0, last, _SAMPLE_PLACES).astype(int))
         parts = [
             part.data
             for start in starts.tolist()
-            for part in self.fast_pieces((start, start + blocks))
+            for part in self.fast_pieces((start, start + _SAMPLE_BLOCKS))
         ]
         empty = np.empty(0, self.schema.by_name[FAST].dtype)
         return np.concatenate(parts) if parts else empty

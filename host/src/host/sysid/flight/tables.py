@@ -158,10 +158,9 @@ def _log(
         )
     if log.complete != "complete":
         loss = log.loss
-        notes.append(
-            f"the log is {log.complete}: {loss.seconds:.2f} s and {loss.lost_bytes} bytes lost"
-            " (`host decode` names every place)"
-        )
+        lost = f"{loss.seconds:.2f} s and {loss.lost_bytes} bytes lost" if loss.any else ""
+        said = "; ".join(filter(None, (lost, loss.ending)))
+        notes.insert(0, f"the log is {log.complete}: {said} (`host decode` names every place)")
     poor_columns = [c for c in calibration_note(log)["default_columns"] if c in USED]
     if poor_columns:
         notes.append(
