@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from host.errors import ExitCode
+from host.extras import install_hint
 from host.sysid.estimators.fit import METHODS
 from host.sysid.estimators.hopfield import ITERATIONS
 
@@ -142,7 +143,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--only", choices=list(STUDIES), action="append")
     options = parser.parse_args(arguments)
     if find_spec("matplotlib") is None:
-        sys.stderr.write("pictures need the extra: pip install './host[plot]'\n")
+        sys.stderr.write(f"pictures need matplotlib: {install_hint('matplotlib')}\n")
         return int(ExitCode.USAGE)
     options.folder.mkdir(parents=True, exist_ok=True)
     for name in options.only or STUDIES:

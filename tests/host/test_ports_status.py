@@ -12,6 +12,7 @@ import threading
 import tty
 from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 from types import SimpleNamespace
 
 import pytest
@@ -272,6 +273,46 @@ def test_lines_survive_garbage_and_any_portions(
         stream = stream[size:]
     assert [line for line in lines if parse_status(line)] == [WELL, SITL]
     assert all(line.isprintable() for line in lines)
+
+
+def test_lines_of_a_stranger_are_refused_or_can_be_shown() -> None:
+    """Of 9000 such lines 147 once passed the parser and ended in errors of the interpreter."""
+    random = Random(14)
+    words = ("9" * 400, "-1", "1e9", "0x1", "nan", "65536", "-", "missing", "roll", "stale", "1.5")
+
+    def altered(line: str) -> str:
+        parts = line.split(" ")
+        at, letter = random.randrange(len(parts)), random.randrange(len(line))
+        kind = random.randrange(7)
+        if kind == 0:
+            return line[:letter] + chr(random.randint(32, 126)) + line[letter + 1 :]
+        if kind == 1:
+            return line[:letter] + line[letter + random.randint(1, 5) :]
+        if kind == 2:
+            piece = line[letter : letter + random.randint(1, 9)]
+            return line[:letter] + piece * random.choice((1, 1, 40)) + line[letter:]
+        if kind == 3:
+            parts[at] = random.choice(parts)
+        elif kind == 4:
+            del parts[at]
+        elif kind == 5:
+            parts[at] = random.choice(words)
+        else:
+            parts.insert(at, random.choice(parts))
+        return " ".join(parts)
+
+    passed = 0
+    for _ in range(9000):
+        text = random.choice((SITL, WELL, BARE))
+        for _ in range(random.randint(1, 3)):
+            text = altered(text or " ")
+        line = parse_status(text)
+        if line is not None:
+            passed += 1
+            shown = line.lines()
+            assert all(len(row) < 100 for row in shown), text
+            assert len(json.dumps(line.as_json(), allow_nan=False)) < 3000, text
+    assert 400 < passed < 1500  # both ways are taken
 
 
 def test_noise_without_line_ends_takes_no_memory() -> None:

@@ -5,8 +5,7 @@
 >>> table = log.table()  # doctest: +SKIP
 """
 
-from typing import TYPE_CHECKING
-
+TYPE_CHECKING = False  # of `typing`, whose import takes longer than the rest of this file
 if TYPE_CHECKING:
     from host.errors import CalibrationError, LogError, NotALogError
     from host.log import FlightLog, read_log

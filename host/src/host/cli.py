@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import argparse
 import contextlib
 import importlib
@@ -13,9 +14,10 @@ import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import FrameType
+from typing import TextIO
 
 from host.errors import ExitCode, HostError
-from host.text import shown
+from host.terminal import cleaned_streams
 
 # name -> one line of help. A verb is listed when its module is in the tree.
 VERBS = {
@@ -29,6 +31,7 @@ VERBS = {
     "identify": "estimate the aircraft's derivatives with their uncertainty",
     "convert": "turn derivatives into coefficients, and back",
 }
+_AGAIN_S = 0.02  # until Ctrl-C comes again where Python dropped it
 _EPILOG = """\
 exit codes: 0 ok, 1 internal error, 2 usage, 3 decoded with losses, 4 not a log,
 5 device missing or silent, 6 a check failed, 130 interrupted
@@ -46,10 +49,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         Arguments without the program's name; those of the process without it.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    with cleaned_streams():
+        return _ended(arguments)
+
+
+def _ended(arguments: list[str]) -> int:
+    """Run one verb to its end, whatever that is."""
     seen: list[int] = []
     try:
         with _interrupts_noted(seen):
-            return _run(arguments)
+            try:
+                return _run(arguments)
+            finally:
+                sys.stdout.flush()  # here a reader that left, or a full disk, can still be told
     except KeyboardInterrupt:
         return _interrupted()
     except Exception as error:
@@ -65,21 +77,29 @@ def _interrupts_noted(seen: list[int]) -> Iterator[None]:
         seen.append(number)
         signal.default_int_handler(number, frame)
 
-    ours = (
-        threading.current_thread() is threading.main_thread()
-        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    )
+    def unraisable(what: sys.UnraisableHookArgs) -> None:
+        # Where Python cannot raise it (a callback of its import locks) Ctrl-C would be lost.
+        if what.exc_type is KeyboardInterrupt:
+            threading.Timer(_AGAIN_S, _thread.interrupt_main).start()
+        else:
+            told(what)
+
+    before, told = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    ours = threading.current_thread() is threading.main_thread() and callable(before)
     if ours:
+        sys.unraisablehook = unraisable
         signal.signal(signal.SIGINT, note)
     try:
         yield
     finally:
         if ours:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGINT, before)
+            sys.unraisablehook = told
 
 
 def _interrupted() -> int:
-    print("\nhost: interrupted", file=sys.stderr)
+    # A terminal has shown ^C at the beginning of the line.
+    print("\nhost: interrupted" if sys.stderr.isatty() else "host: interrupted", file=sys.stderr)
     return int(ExitCode.INTERRUPTED)
 
 
@@ -89,7 +109,7 @@ def _failed(arguments: list[str], error: Exception) -> int:
         return _end(arguments, str(error), error.exit_code)
     if isinstance(error, BrokenPipeError):
         # The reader (`head`, a pager) left: nothing more to say, and nothing to flush at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _nothing_more(sys.stdout)
         return int(ExitCode.OK)
     if isinstance(error, OSError):
         where = f"{error.filename}: " if error.filename else ""
@@ -106,12 +126,25 @@ def _failed(arguments: list[str], error: Exception) -> int:
     return _end(arguments, text, ExitCode.INTERNAL)
 
 
+def _nothing_more(stream: TextIO) -> None:
+    """Let what is still to be written to a stream go nowhere."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
 def _end(arguments: list[str], text: str, code: ExitCode) -> int:
     """Say in one line why a verb gave up, to a program in JSON too; return the exit code."""
-    print(f"host: {shown(text)}", file=sys.stderr)
-    if "--json" in arguments and "-" not in arguments:  # there stdout carries the table
-        with contextlib.suppress(OSError):  # stdout itself may be what failed
-            print(json.dumps({"error": text, "exit_code": int(code)}), flush=True)
+    line = " ".join(text.splitlines())
+    try:
+        print(f"host: {line}", file=sys.stderr)
+    except OSError:  # nobody reads it
+        _nothing_more(sys.stderr)
+    try:
+        if "--json" in arguments and "-" not in arguments:  # there stdout carries the table
+            print(json.dumps({"error": line, "exit_code": int(code)}))
+        sys.stdout.flush()
+    except OSError:  # stdout itself may be what failed
+        _nothing_more(sys.stdout)
     return int(code)
 
 

@@ -1,10 +1,12 @@
-"""A progress bar on a terminal's stderr for long files; silent everywhere else."""
+"""A progress bar on a terminal's stderr for long work; silent everywhere else."""
 
 from __future__ import annotations
 
 import sys
 import time
 from collections.abc import Callable
+
+from host.terminal import bar
 
 _WIDTH = 32
 _EVERY_S = 0.1
@@ -30,11 +32,15 @@ def progress_bar(label: str, size_bytes: int) -> Callable[[int, int], None] | No
         if done < total and now_s - last_s < _EVERY_S:
             return
         last_s = now_s
-        share = done / total if total else 1.0
-        filled = round(share * _WIDTH)
-        bar = "#" * filled + "." * (_WIDTH - filled)
-        end = "\r\033[K" if done >= total else ""
-        sys.stderr.write(f"\r{label} [{bar}] {share:4.0%}{end}")
-        sys.stderr.flush()
+        draw_share(label, done / total if total else 1.0)
+        if done >= total:
+            bar.clear()
 
     return draw
+
+
+def draw_share(label: str, share: float) -> None:
+    """Draw a bar if somebody watches; the next line that is printed takes its place."""
+    if sys.stderr.isatty():
+        filled = round(share * _WIDTH)
+        bar.draw(f"{label:8s} [{'#' * filled}{'.' * (_WIDTH - filled)}] {share:4.0%}")

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from host import toml_reader
 from host.aircraft.airframe import COEFFICIENTS, GRAVITY_MPS2, Airframe, Array
 from host.aircraft.straight import Straight
 from host.errors import UsageError
+from host.files import toml_reader
 
 FOLDER = Path(__file__).parent / "airframes"
 

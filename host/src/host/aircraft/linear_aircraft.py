@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from host import toml_reader
 from host.aircraft import file as aircraft
 from host.aircraft.airframe import GRAVITY_MPS2, Array
 from host.aircraft.file import Aircraft, AircraftError, read_document
 from host.aircraft.straight import Straight
+from host.files import toml_reader
 
 # Of the gravity terms of a file, against g and its own angle of attack.
 GRAVITY_TOLERANCE = 0.01

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import sys
 from dataclasses import dataclass, field
@@ -22,6 +21,7 @@ from host.original.table import make_table
 from host.physical.calibration import load_calibration
 from host.physical.columns import COLUMNS, UNITS
 from host.progress import progress_bar
+from host.terminal import command_line
 from host.text import shown
 
 _HEAD_BYTES = 4096
@@ -96,7 +96,7 @@ def decode(request: Request) -> Decoded:
     if request.frames:
         files += write_frames(log, kind, target)
     summary["files"] = files
-    summary["next"] = next_command(files, path)
+    summary["next"] = next_command(files, request, path)
     said = [*lines(summary), *(f"{'wrote':<13}{name}" for name in files)]
     if not summary["rows"]:
         said.append(f"{'wrote':<13}no table: the log holds no identification frame")
@@ -118,7 +118,10 @@ def decode_rows(request: Request, path: Path) -> Decoded:
     summary = finite(summarise_rows(path, rows, table, calibration))
     write_table([table.columns], kind, target, row_meta(path, summary))
     summary["files"] = [str(target)]
-    return Decoded(summary, [*row_lines(summary), f"{'wrote':<13}{target}"])
+    rate = ("--row-rate", f"{table.rate_hz:g}")
+    summary["next"] = command_line("host", "decode", path, *rate, *_own(request), "--to", "parquet")
+    said = [*row_lines(summary), f"{'wrote':<13}{target}", f"{'next':<13}{summary['next']}"]
+    return Decoded(summary, said)
 
 
 def pick(source: Path) -> Path:
@@ -156,11 +159,15 @@ def table_meta(log: FlightLog, summary: dict[str, Any]) -> Meta:
     )
 
 
-def next_command(files: list[str], source: Path) -> str:
-    """Return the command to try next."""
-    if files and importlib.util.find_spec("host.verbs.maneuvers") is not None:
-        return f"host maneuvers {source}"
-    return f"host decode {source} --to parquet" if files else f"host info {source}"
+def next_command(files: list[str], request: Request, source: Path) -> str:
+    """Return the command to try next, as it can be pasted; the calibration goes with it."""
+    if not files:
+        return command_line("host", "info", source)
+    return command_line("host", "maneuvers", source, *_own(request))
+
+
+def _own(request: Request) -> tuple[str | Path, ...]:
+    return ("--calibration", request.calibration) if request.calibration else ()
 
 
 def finite(value: Any) -> Any:

@@ -11,6 +11,7 @@ from host.log.quality import Quality, judge
 from host.physical.channels import constant_delay_us
 from host.physical.columns import ANALOGUE, COLUMNS, INERTIAL, RESTS_ON
 from host.physical.session import Session
+from host.terminal import command_line
 from host.text import shown
 
 Json = dict[str, Any]
@@ -59,7 +60,7 @@ def summarise(log: FlightLog) -> Json:
         "displaced_blocks": log.selection.displaced,
         "calibration": calibration_note(log),
         "delays_us": delays_us(log),
-        "next": f"host info {log.path}",
+        "next": command_line("host", "info", log.path),
     }
 
 

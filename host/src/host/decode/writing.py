@@ -41,7 +41,7 @@ def destination(request: Request, source: Path) -> tuple[str, Path]:
     Raises
     ------
     UsageError
-        If ending and --to disagree, or the table would overwrite its source.
+        If ending and --to disagree, the table would overwrite its source, or the place is none.
     """
     output = request.output
     if output == "-":
@@ -53,6 +53,9 @@ def destination(request: Request, source: Path) -> tuple[str, Path]:
         target = Path(f"{source.stem}.{kind}")
     else:
         named = Path(output)
+        special = named.exists() and not named.is_file() and not named.is_dir()
+        if special or named.parent == Path("/dev"):  # /dev/stdout may be a file
+            raise UsageError(f"-o {output}: a pipe or a device; -o - writes CSV to standard output")
         ending = named.suffix.lower().removeprefix(".")
         if named.is_dir() or output.endswith(("/", "\\")):
             kind = request.format or "csv"
@@ -66,8 +69,8 @@ def destination(request: Request, source: Path) -> tuple[str, Path]:
             target = named.with_name(f"{named.name}.{kind}")
     if target.exists() and target.samefile(source):
         raise UsageError(f"{target} is the source itself; name another file with -o")
-    if not target.parent.exists():
-        target.parent.mkdir(parents=True)
+    with _blamed_on(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
     return kind, target
 
 
@@ -117,7 +120,8 @@ def _blamed_on(target: Path) -> Iterator[None]:
 def write_frames(log: FlightLog, kind: str, target: Path) -> list[str]:
     """Write every kind of raw frame to a file of its own; return the files."""
     folder = target.with_suffix(".frames")
-    folder.mkdir(parents=True, exist_ok=True)
+    with _blamed_on(folder):
+        folder.mkdir(parents=True, exist_ok=True)
     files = []
     for name, frame in log.schema.by_name.items():
         data = log.frames[name]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from host.errors import UsageError
 from host.export.writer import Meta, TableWriter
+from host.extras import install_hint
 
 FORMATS = ("csv", "parquet", "mat", "npz")
 
@@ -52,7 +53,7 @@ def _parquet(path: Path, meta: Meta) -> TableWriter:
         if error.name != "pyarrow":
             raise
         raise UsageError(
-            "Parquet needs an extra: pip install 'flight-test-host[parquet]'; or use --to csv"
+            f"Parquet needs pyarrow: {install_hint('pyarrow')}; or use --to csv"
         ) from error
 
     return ParquetWriter(path, meta)

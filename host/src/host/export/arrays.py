@@ -50,7 +50,8 @@ class MatWriter(_Collected):
         content["units"] = {name[:_MAT_NAME]: self._meta.units.get(name, "") for name in columns}
         content["meaning"] = {name[:_MAT_NAME]: self._meta.texts.get(name, "") for name in columns}
         content["notes"] = dict(self._meta.notes)
-        savemat(self._path, content, oned_as="column")
+        with self._path.open("wb") as file:  # savemat hides why it could not open a name
+            savemat(file, content, oned_as="column")
 
 
 class NpzWriter(_Collected):

@@ -5,11 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-# In the order in which firmware/app/status.cpp writes them; others are shown as they are.
-KEYS = (
-    "imu", "alpha", "beta", "pitot", "pots", "baro", "gps", "rc", "drive", "relay", "card", "rail",
-    "avcc",
-)  # fmt: skip
 ANALOGUE = ("alpha", "beta", "pitot", "pots")
 LEAST_AVCC_MV = 4500  # 16 MHz needs 4.5 V (ATmega2560 datasheet, 31.4)
 UNCALIBRATED = 1.2 / 1.1  # the chip's reference may be 1.2 V instead of 1.1 V (same, VINT1)
@@ -29,9 +24,36 @@ _TITLES = {
     "rail": "servo rail",
     "avcc": "supply",
 }
-_IMAGE = re.compile(r"^([\w .-]+) (\d+\.\d+\S*)$")
+_IMAGE = re.compile(r"([\w .-]{1,32}) (\d{1,4}\.\d{1,4}\S{0,32})")
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
-_COUNTS = re.compile(r"missing|(?:\d+|-)(?: (?:\d+|-))*")
+_WORDS = r"[\w(][\w ().,:%/-]{0,47}"
+# In the order in which firmware/app/status.cpp writes them; others are shown as they are. What each
+# may say and what its numbers may be: all that the firmware's types hold, so that the readings of a
+# sick sensor are shown.
+_FIELDS: dict[str, tuple[str, float, float]] = {
+    "imu": (
+        r"missing|(?:ok|original|stale)(?: roll # pitch # deg)?(?: az # mg)?", -32_768, 32_767,
+    ),
+    "alpha": ("missing|@(?: @)?", 0, 4092),
+    "beta": ("missing|@(?: @)?", 0, 4092),
+    "pitot": ("missing|@(?: @)?", 0, 4092),
+    "pots": ("missing|@(?: @){,3}", 0, 4092),
+    "baro": ("missing|(?:stale )?# Pa", 0, 2**24),
+    "gps": ("missing|(?:stale )?fix # sat #", 0, 255),
+    "rc": ("missing|#(?: #){,7}", 0, 65_535),
+    "drive": (_WORDS, 0, 99_999_999),
+    "relay": (_WORDS, 0, 99_999_999),
+    "card": (_WORDS, 0, 99_999_999),
+    "rail": ("missing|# mV", 0, 65_535),
+    "avcc": ("(?:about )?# mV", 0, 65_535),
+}  # fmt: skip
+KEYS = tuple(_FIELDS)
+_GRAMMAR = {
+    key: re.compile(text.replace("@", r"(?:\d{1,9}|-)").replace("#", r"-?\d{1,9}"))
+    for key, (text, _, _) in _FIELDS.items()
+}
+_LATER = re.compile(r"[ -~]{1,64}")  # of a field that a later firmware adds
+_LONGEST_KEY, _MOST_FIELDS = 16, 32
 _STATES = ("missing", "stale", "original", "ok")
 _HINTS = {
     ("imu", "missing"): "no packet for a second",
@@ -174,8 +196,8 @@ def parse_status(line: str) -> StatusLine | None:
     """
     if not line.isascii():
         return None
-    head, *parts = line.split(" | ")
-    image = _IMAGE.match(head)
+    head, *parts = line.split(" | ", _MOST_FIELDS)
+    image = _IMAGE.fullmatch(head)
     if image is None:
         return None
     fields: dict[str, str] = {}
@@ -185,8 +207,18 @@ def parse_status(line: str) -> StatusLine | None:
         if not key or not words or key in fields:
             return None
         fields[key] = " ".join(words)
-    if not set(KEYS) <= set(fields) or not re.fullmatch(r"(about )?\d+ mV", fields["avcc"]):
+    found = StatusLine(image[1], image[2], fields)
+    if not set(KEYS) <= set(fields) or not all(_possible(found, key) for key in fields):
         return None
-    if not all(_COUNTS.fullmatch(fields[key]) for key in ANALOGUE):
-        return None
-    return StatusLine(image[1], image[2], fields)
+    return found
+
+
+def _possible(line: StatusLine, key: str) -> bool:
+    """Return whether a field says what the firmware can say."""
+    text = line.fields[key]
+    if key not in _FIELDS:
+        return len(key) <= _LONGEST_KEY and _LATER.fullmatch(text) is not None
+    _, least, most = _FIELDS[key]
+    if _GRAMMAR[key].fullmatch(text) is None:
+        return False
+    return all(least <= number <= most for number in line.numbers(key))

@@ -8,6 +8,7 @@ from typing import Any
 from host.log import read_log
 from host.log.source import find_flights
 from host.original.rows import looks_like_rows, parse_rows
+from host.terminal import command_line
 from host.text import shown
 from host.wire.blocks import is_card
 
@@ -68,7 +69,7 @@ def head_lines(head: dict[str, Any]) -> list[str]:
     if "format" in head:
         return [
             f"rows         {head['file']}, {head['size_bytes']} bytes, {head['format']}",
-            f"next         host decode {head['file']}",
+            f"next         {command_line('host', 'decode', Path(head['file']))}",
         ]
     lines = [
         f"log          {head['file']}, {head['size_bytes']} bytes",
@@ -79,7 +80,7 @@ def head_lines(head: dict[str, Any]) -> list[str]:
     for name in ("identity", "config"):
         values = ", ".join(f"{key} {value}" for key, value in head[name].items())
         lines.append(f"{name:<13}{values or 'not in the first 256 KiB'}")
-    lines.append(f"next         host decode {head['file']}")
+    lines.append(f"next         {command_line('host', 'decode', Path(head['file']))}")
     return lines
 
 

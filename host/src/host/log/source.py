@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from host.errors import NotALogError, UsageError
+from host.errors import NotALogError
+from host.files.regular import file_or_folder
 from host.wire.blocks import scan
 
 # Of each file in a folder this much is read: more than a few destroyed blocks cover.
@@ -80,11 +81,7 @@ def check_source(path: Path) -> Path:
     UsageError
         If nothing is there, or something that cannot be read twice.
     """
-    if not path.exists():
-        raise UsageError(f"{path}: no such file or folder")
-    if path.is_fifo() or path.is_socket() or path.is_char_device():
-        raise UsageError(f"{path}: a pipe or a device; expected a file or folder: save it first")
-    return path
+    return file_or_folder(path)
 
 
 def _candidates(folder: Path) -> Iterator[Path]:

@@ -62,7 +62,6 @@ def summarise_rows(
             if calibration.defaults()
             else [],
         },
-        "next": f"host decode {path} --row-rate {table.rate_hz:g} --to parquet",
     }
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from host.errors import CalibrationError
+from host.files.document import parse_toml, read_text
 from host.resources import resource
 
 FORMAT = "flight-test-calibration"
@@ -110,13 +110,8 @@ def load_calibration(path: Path | str | None = None) -> Calibration:
 
 
 def _read(path: Path) -> Calibration:
-    try:
-        text = path.read_text(encoding="utf-8")
-        raw = tomllib.loads(text)
-    except OSError as error:
-        raise CalibrationError(f"{path}: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CalibrationError(f"{path}: not a TOML file: {error}") from error
+    text = read_text(path, CalibrationError, "TOML")
+    raw = parse_toml(text, str(path), CalibrationError)
     if raw.get("format") != FORMAT or raw.get("version") != VERSION:
         raise CalibrationError(
             f"{path}: format {raw.get('format')!r} version {raw.get('version')!r},"

@@ -13,6 +13,7 @@ from host.aircraft.linear_aircraft import flown_straight
 from host.aircraft.linearisation import linearise
 from host.aircraft.straight import Straight
 from host.aircraft.trim import solve
+from host.files.document import read_text
 from host.sysid.models.model_file import read_model, read_trim
 
 # States of identified models, and those of the equations of motion they stand for.
@@ -31,7 +32,8 @@ def is_model(source: str | Path) -> bool:
     path = Path(source)
     if path.suffix != ".toml" or not path.is_file():
         return False
-    return any(line.startswith("states =") for line in path.read_text("utf-8").splitlines())
+    text = read_text(path, AircraftError, "TOML", encoding_errors="replace")
+    return any(line.startswith("states =") for line in text.splitlines())
 
 
 def with_models(base: Aircraft, models: Sequence[Path]) -> Aircraft:

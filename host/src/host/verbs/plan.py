@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from host.errors import ExitCode, UsageError
+from host.extras import install_hint
+from host.terminal import command_line
 
 if TYPE_CHECKING:
     from host.planning.plan import Plan, Point
@@ -50,15 +52,13 @@ def run(args: argparse.Namespace) -> int:
         from host.planning import plan as planning
         from host.twin.testcard import cards
     except ImportError as error:
-        raise UsageError(
-            f"planning needs {error.name}: install the extra, pip install './host[compiled]'"
-        ) from None
+        raise UsageError(f"planning needs {error.name}: {install_hint(error.name)}") from None
     if args.airspeed is not None and not args.airspeed > 0.0:
         raise UsageError(f"--airspeed is {args.airspeed:g}, expected above 0")
     if args.card is None:
         card = planning.design(args.aircraft or "ultrastick25e", args.airspeed or 0.0)
         if args.save is not None:
-            args.save.write_text(dumps(planning.document(card)), encoding="utf-8")
+            _save(args.save, dumps(planning.document(card)))
     elif args.save is not None:
         raise UsageError("--save goes with a designed card: leave the card's name out")
     else:
@@ -83,8 +83,18 @@ def run(args: argparse.Namespace) -> int:
         return ExitCode.OK
     _print(plan)
     if args.save is not None:
-        print(f"wrote {args.save}; fly it with `host simulate {args.save}`")
+        print(f"wrote {args.save}; fly it with: {command_line('host', 'simulate', args.save)}")
     return ExitCode.OK
+
+
+def _save(path: Path, text: str) -> None:
+    from host.sysid.answer.files import refuse_place, whole
+
+    if path.suffix != ".toml":
+        raise UsageError(f"--save {path}: ends in '{path.suffix}', expected .toml")
+    refuse_place("--save", path, folder=False)
+    with whole(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def _print(plan: Plan) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from host.errors import CheckError, ExitCode, UsageError
+from host.extras import install_hint
+from host.progress import draw_share
 
 if TYPE_CHECKING:
     from host.aircraft.file import Aircraft
@@ -61,8 +62,7 @@ def run(args: argparse.Namespace) -> int:
         from host.twin.testcard import cards
     except ImportError as error:
         raise UsageError(
-            f"the virtual flight needs {error.name}:"
-            " install the extra, pip install './host[compiled]'"
+            f"the virtual flight needs {error.name}: {install_hint(error.name)}"
         ) from None
     if args.faults:
         return _list_faults(as_json=args.json)
@@ -71,7 +71,6 @@ def run(args: argparse.Namespace) -> int:
     card = cards.load(args.card)
     if args.seed < 0:
         raise UsageError(f"seed is {args.seed}, expected 0 or more")
-    bar = _Bar(enabled=sys.stderr.isatty())
     try:
         outcome = report.simulate(
             card,
@@ -81,13 +80,12 @@ def run(args: argparse.Namespace) -> int:
             firmware=args.firmware,
             pictures=not args.no_picture,
             both=args.both,
-            progress=bar.show,
+            progress=draw_share,
         )
     except OSError as error:
         if error.filename is None and error.errno is not None:  # a write, which names no file
             error.filename = f"{args.output}: not all files of the flight were written"
         raise
-    bar.clear()
     record = outcome.record
     duration = float(record.t_s[-1])
     planned_s = pilot.duration_s(card)
@@ -193,20 +191,3 @@ def _list_faults(*, as_json: bool) -> int:
             more.append("from power-on" if kind.from_start else "at one instant")
         print(f"  {name:22s} {kind.text}" + (f" ({'; '.join(more)})" if more else ""))
     return ExitCode.OK
-
-
-class _Bar:
-    """A progress bar on standard error, only where somebody watches."""
-
-    def __init__(self, *, enabled: bool) -> None:
-        self._enabled = enabled
-
-    def show(self, stage: str, share: float) -> None:
-        if self._enabled:
-            filled = round(30 * share)
-            sys.stderr.write(f"\r{stage:8s} [{'#' * filled}{'.' * (30 - filled)}] {share:4.0%}")
-            sys.stderr.flush()
-
-    def clear(self) -> None:
-        if self._enabled:
-            sys.stderr.write("\r" + " " * 50 + "\r")

@@ -8,6 +8,8 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
+from host.terminal import bare
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -89,7 +91,7 @@ class _Screen:
         self.shown = True
         rows = [json.dumps(line.as_json())] if self._as_json else line.lines()
         if self._redraw and self._rows:
-            sys.stdout.write(f"\033[{self._rows}A\033[J")
+            bare(sys.stdout).write(f"\033[{self._rows}A\033[J")
         sys.stdout.write("\n".join(rows) + "\n")
         sys.stdout.flush()
         self._rows = len(rows)

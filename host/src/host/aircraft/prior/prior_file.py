@@ -10,14 +10,15 @@ to the file's own area, chord and span, which are printed beside them where the 
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from host.aircraft.prior.avl import is_avl, read_avl
 from host.aircraft.prior.datcom import is_datcom, read_datcom
 from host.aircraft.prior.prior_table import Points, PriorError, PriorTable
+from host.files.document import parse_toml, read_text
 
 SOUND_MPS = 340.3  # standard atmosphere, sea level: chooses between Mach numbers of a handbook
 
@@ -37,18 +38,16 @@ def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
     PriorError
         If the file cannot be read, holds no coefficient, or one that is no number.
     """
+    text = read_text(path, PriorError, "prior", encoding_errors="replace")
+    toml = parse_toml(text, str(path), PriorError) if path.suffix == ".toml" else None
+    table: PriorTable | None = None
     try:
-        text = path.read_text(encoding="utf-8-sig", errors="replace")
-        table: PriorTable | None = None
-        if path.suffix == ".toml":
-            table = _from_toml(text)
+        if toml is not None:
+            table = _from_toml(toml)
         elif is_datcom(text):
             table = read_datcom(text, airspeed_mps / SOUND_MPS)
         elif is_avl(text):
             table = read_avl(text)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise PriorError(f"{path}: cannot be read as a prior ({reason})") from error
     except (ValueError, TypeError, PriorError) as error:
         raise PriorError(f"{path}: {error}") from error
     if table is None or not table.points:
@@ -62,8 +61,7 @@ def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
     return table
 
 
-def _from_toml(text: str) -> PriorTable:
-    document = tomllib.loads(text)
+def _from_toml(document: dict[str, Any]) -> PriorTable:
     listed, table = document.get("alpha_deg", [0.0]), document.get("coefficients", {})
     if not isinstance(listed, list) or not listed:
         raise ValueError(f"alpha_deg is {listed!r}, expected a list of angles")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.compiled import Array
+from host.extras import install_hint
 from host.sysid.answer.files import whole
 from host.sysid.errors import IdentificationError
 
@@ -286,7 +287,9 @@ def _figure(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
         from matplotlib.backends.backend_svg import FigureCanvasSVG
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise IdentificationError("pictures need the extra: pip install './host[plot]'") from error
+        raise IdentificationError(
+            f"pictures need matplotlib: {install_hint('matplotlib')}"
+        ) from error
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasSVG(figure)
     yield figure

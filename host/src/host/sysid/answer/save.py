@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from host.compiled import Array
+from host.extras import install_hint
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.files import refuse_place, whole
 from host.sysid.answer.mat import labels, write_mat
@@ -83,7 +84,7 @@ def check(places: Places) -> None:
     if places.plots is not None:
         refuse_place("--plots", places.plots, folder=True)
         if importlib.util.find_spec("matplotlib") is None:
-            raise IdentificationError("pictures need the extra: pip install './host[plot]'")
+            raise IdentificationError(f"pictures need matplotlib: {install_hint('matplotlib')}")
 
 
 def write(

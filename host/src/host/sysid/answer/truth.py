@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from host.files.document import read_toml
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.mat import labels
 from host.sysid.errors import IdentificationError
@@ -31,11 +31,7 @@ def read_truth(path: Path) -> dict[str, Any]:
     IdentificationError
         If the file is none of these.
     """
-    try:
-        with path.open("rb") as file:
-            document = tomllib.load(file)
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise IdentificationError(f"{path}: cannot be read as a truth file: {error}") from error
+    document = read_toml(path, IdentificationError)
     if not isinstance(document.get("maneuver"), list):
         raise IdentificationError(f"{path}: no [[maneuver]] in it; expected flight.truth.toml")
     return document

@@ -12,7 +12,6 @@ density_kgpm3 = "rho"
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from host.compiled import Array
+from host.files.document import read_toml
 from host.sysid.errors import IdentificationError
 
 DEG, FOOT, POUND_PA = np.pi / 180.0, 0.3048, 6894.757
@@ -72,11 +72,7 @@ def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
     IdentificationError
         If it cannot be read or says what nobody understands.
     """
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise IdentificationError(f"{path}: cannot be used as a map: {reason}") from error
+    document = read_toml(path, IdentificationError)
     lines = document.get("columns")
     if not isinstance(lines, dict) or not lines:
         raise IdentificationError(f"{path}: no table [columns]")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.compiled import Array
+from host.extras import install_hint
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.text_table import HEAD_BYTES, read_text
 
@@ -99,7 +100,7 @@ def _parquet(source: Path) -> pd.DataFrame:
         frame = pd.read_parquet(source)
     except ImportError as error:
         raise IdentificationError(
-            f"{source}: Parquet needs the extra: pip install './host[parquet]'"
+            f"{source}: Parquet needs pyarrow: {install_hint('pyarrow')}"
         ) from error
     except (ValueError, OSError) as error:
         raise IdentificationError(f"{source}: not a Parquet file: {error}") from error

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.compiled import Array, BoolArray, IntArray
+from host.files.regular import file_or_folder
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.column_map import listed, mapped, read_map
 from host.sysid.flight.consistent import HINT
@@ -26,6 +27,7 @@ from host.sysid.flight.foreign import (
 )
 from host.sysid.flight.measured import measured
 from host.sysid.flight.plausible import SURFACES, check
+from host.terminal import command_line
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,8 +83,7 @@ def read_columns(
         If the file or the map cannot be used.
     """
     wanted = ("t_s", *USED, *(name for name in also if name not in USED))
-    if not source.exists():
-        raise IdentificationError(f"{source}: no such file")
+    file_or_folder(source, IdentificationError)
     kind = source.suffix.lower()
     found = None
     if kind not in READ or (kind in TEXT_KINDS[1:] and mapping is None):  # rows of the original
@@ -153,9 +154,8 @@ def _log(
         k: np.asarray(v, dtype=np.float64) for k, v in log.columns().items() if k in wanted
     }
     if not len(raw.get("t_s", ())):
-        raise IdentificationError(
-            f"{source}: nothing was recorded in it; `host info {source}` says what it is"
-        )
+        look = command_line("host", "info", source)
+        raise IdentificationError(f"{source}: nothing was recorded in it; `{look}` says what it is")
     if log.complete != "complete":
         loss = log.loss
         lost = f"{loss.seconds:.2f} s and {loss.lost_bytes} bytes lost" if loss.any else ""

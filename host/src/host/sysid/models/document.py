@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
+from host.files.document import read_toml
 from host.sysid.errors import IdentificationError
 
 
@@ -17,9 +17,4 @@ def read_document(path: Path) -> dict[str, Any]:
     IdentificationError
         If it cannot be read or is no TOML; the line says where.
     """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise IdentificationError(f"{path}: cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise IdentificationError(f"{path}: not TOML: {error}") from error
+    return read_toml(path, IdentificationError)

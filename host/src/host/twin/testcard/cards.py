@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-from host import toml_reader
 from host.aircraft.air import Air
 from host.errors import UsageError
+from host.files import toml_reader
 from host.twin.faults import FAULTS, Fault
 from host.twin.testcard.maneuvers import KINDS, STEPS, harmonics
 

@@ -8,11 +8,11 @@ caller says.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
 from host.errors import UsageError
+from host.files.document import read_toml
 
 FORMAT = 1
 
@@ -23,7 +23,7 @@ def read(source: str | Path, folder: Path, what: str, error: type[UsageError]) -
     Parameters
     ----------
     source : str or Path
-        Name of a packaged file, or path of one that ends in ``.toml``.
+        Name of a packaged file, or path of one: that has a folder or ends in ``.toml``.
     folder : Path
         Where the packaged ones are.
     what : str
@@ -37,18 +37,12 @@ def read(source: str | Path, folder: Path, what: str, error: type[UsageError]) -
         As `error`: no such file, one that cannot be read, or not TOML.
     """
     path = Path(source)
-    if path.suffix != ".toml":
+    if path.suffix != ".toml" and path.name == str(source):
         path = folder / f"{source}.toml"
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.exists():
         known = ", ".join(names(folder))
-        raise error(f"no {what} {str(source)!r}: expected a file or one of {known}") from None
-    except OSError as reason:
-        raise error(f"{path}: cannot be read ({reason.strerror or reason})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
-        raise error(f"{path.name}: not TOML: {reason}") from None
-    return document
+        raise error(f"no {what} {str(source)!r}: expected a file or one of {known}")
+    return read_toml(path, error)
 
 
 def check_format(document: Mapping[str, object], name: str, error: type[UsageError]) -> None:
