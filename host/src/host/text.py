@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import unicodedata
-
-# Control codes, formats (they turn the direction of writing), halves of characters, private ones,
-# and the two ends of a line that are no control codes.
-_HIDDEN = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
-
 
 def shown(text: str | bytes) -> str:
     """Return text on one line, without anything that a terminal would act on.
@@ -24,9 +18,8 @@ def shown(text: str | bytes) -> str:
     """
     if isinstance(text, bytes):
         text = text.decode("ascii", "backslashreplace")
-    if text.isascii() and text.isprintable():
-        return text
-    return "".join(_code(one) if unicodedata.category(one) in _HIDDEN else one for one in text)
+    # Neither control codes, nor what turns the direction of writing, nor halves of characters.
+    return "".join(one if one.isprintable() else _code(one) for one in text)
 
 
 def _code(character: str) -> str:

@@ -34,6 +34,7 @@ _DELAY_US = (-100_000, 100_000)
 _QUOTED = 40  # characters of a stranger's text in an error
 
 
+@lru_cache(maxsize=4)
 def parse_schema(text: bytes) -> Schema:
     """Parse the schema text of a log.
 
