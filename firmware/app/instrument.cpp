@@ -1,7 +1,6 @@
 #include "app/instrument.h"
 
 #include "app/text_out.h"
-#include "app/version.h"
 #include "core/progmem.h"
 #include "hal/analog_input.h"
 #include "hal/block_device.h"
@@ -25,9 +24,7 @@ void Instrument::boot() {
   const core::SettingsStatus settings = store_.load(&config_);
   hal::open_port(hal::Port::kUsb, kUsbBaud);
   TextOut usb(hal::Port::kUsb);
-  usb.ram(hal::board_name());
-  usb.letter(' ');
-  usb.flash(kVersion);
+  Status::name(&usb);
   usb.flash(kLineEnd);
   outlet_.event(frames::Event::kReset, static_cast<uint32_t>(hal::reset_source()), now_us);
   if (hal::crash_address() != 0) {

@@ -187,6 +187,8 @@ void Recorder::put_heads(uint32_t now_us) {
   const storage::FlightFile& file = volume_.file();
   const frames::FileFrame made = {now_us, file.number, file.blocks * hal::kCardBlockBytes};
   outlet_.put(made);
+  const frames::ImageFrame image = {now_us, hal::image_hash()};
+  outlet_.put(image);
   frames::BaroCoefficientsFrame words;
   if (sensors_.coefficients(&words, now_us)) outlet_.put(words);
 }

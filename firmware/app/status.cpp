@@ -17,6 +17,7 @@ constexpr uint16_t kLongestPart = 48;
 constexpr uint16_t kRailDivider = 2;  // 10 k over 10 k (hw/pin_map.toml)
 constexpr uint16_t kLeastRailSum = 8;
 
+constexpr char kImageText[] CORE_FLASH = " image ";
 constexpr char kMissing[] CORE_FLASH = " missing";
 constexpr char kStale[] CORE_FLASH = " stale";
 constexpr char kImuText[] CORE_FLASH = " | imu";
@@ -107,6 +108,15 @@ const char* volume_text(storage::VolumeStatus status) {
 
 }  // namespace
 
+void Status::name(TextOut* out) {
+  out->ram(hal::board_name());
+  out->letter(' ');
+  out->flash(kVersion);
+  if (hal::image_hash() == 0) return;
+  out->flash(kImageText);
+  out->hex(hal::image_hash());
+}
+
 void Status::start(uint32_t now_us) {
   turn_.start(now_us);
 }
@@ -123,9 +133,7 @@ void Status::step(const Recorder& recorder,
   if (out_.room() < kLongestPart) return;
   switch (part_) {
     case Part::kName:
-      out_.ram(hal::board_name());
-      out_.letter(' ');
-      out_.flash(kVersion);
+      name(&out_);
       break;
     case Part::kImu:
       imu(sensors);

@@ -11,6 +11,8 @@ namespace app {
 
 class Status {
  public:
+  // Board, version and hash of the image: the boot line, and the head of every other.
+  static void name(TextOut* out);
   void start(uint32_t now_us);
   // One part of the line per call, as the port has room.
   void step(const Recorder& recorder,

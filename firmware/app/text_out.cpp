@@ -35,4 +35,12 @@ void TextOut::fixed(int32_t value, uint8_t places) {
   }
 }
 
+void TextOut::hex(uint32_t value) {
+  for (uint8_t digit = 0; digit < 8; ++digit) {
+    const uint8_t next = static_cast<uint8_t>(value >> 28);
+    letter(static_cast<char>(next < 10 ? '0' + next : 'a' + next - 10));
+    value <<= 4;
+  }
+}
+
 }  // namespace app

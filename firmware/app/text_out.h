@@ -18,6 +18,7 @@ class TextOut {
   void number(int32_t value);
   // value / 10^places, with that many digits behind the point.
   void fixed(int32_t value, uint8_t places);
+  void hex(uint32_t value);  // eight digits
   void letter(char value) { hal::send_byte(port_, static_cast<uint8_t>(value)); }
 
  private:

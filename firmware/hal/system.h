@@ -30,4 +30,7 @@ uint16_t stack_free_bytes();
 // What the image calls itself, at most 11 characters (frames.toml, identity.board).
 const char* board_name();
 
+// The hash by which the image is known (firmware/toolchain/image_hash.py); 0: it has none.
+uint32_t image_hash();
+
 }  // namespace hal

@@ -1,4 +1,4 @@
-"""After PlatformIO's program is described: archives, strictness, the table of RAM.
+"""After PlatformIO's program is described: compiler, archives, strictness, hash, RAM.
 
 FatFs is compiled without our warnings. For the test environments our own code
 is an archive too, so that a suite of `core` needs no stand-in for hal functions
@@ -7,6 +7,7 @@ that only `app` calls.
 
 import importlib
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,23 @@ fatfs = importlib.import_module("fatfs")
 ram_table = importlib.import_module("ram_table")
 stack_depth = importlib.import_module("stack_depth")
 
-# PlatformIO's own compilers (GCC 7.3 for the AVR) were never seen here: a warning of theirs
-# must not keep a user from building.
+compilers = importlib.import_module("compilers")
+image_hash = importlib.import_module("image_hash")
+
+# Asked of the compiler that is at work, not of the name of its package.
+if env["PIOPLATFORM"] == "atmelavr":
+    try:
+        wrong = compilers.complaint(
+            compilers.version(env.subst("$CC"), env["ENV"]), os.environ.get(compilers.CHOICE, "")
+        )
+    except compilers.CompilerError as error:
+        wrong = str(error)
+    if wrong:
+        sys.stderr.write(f"{wrong}\n")
+        env.Exit(1)
+
+# A warning that PlatformIO's own build of a compiler gives and ours does not must not keep a user
+# from building.
 if os.environ.get("CI") or (root / "platformio.local.ini").is_file():
     projenv.Append(CCFLAGS=["-Werror"])
 
@@ -65,5 +81,17 @@ def show_stack(elf: Path, env: Any) -> bool:
     return bool(deepest <= room)
 
 
+def stamp(target: Any, source: Any, env: Any) -> int:
+    """Write the image's hash into it, before the .hex is made of it."""
+    try:
+        value = image_hash.stamp(Path(str(target[0])), environment=env["ENV"])
+    except image_hash.ImageError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    print(f"image {value:08x}")
+    return 0
+
+
 if env.GetProjectOption("custom_stack_bytes", ""):
+    env.AddPostAction("$PROGPATH", env.VerboseAction(stamp, "Hash of $TARGET"))
     env.AddPostAction("$PROGPATH", env.VerboseAction(show_ram, "RAM of $TARGET"))

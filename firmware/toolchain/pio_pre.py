@@ -1,4 +1,4 @@
-"""Before a PlatformIO build: board there? settings, FatFs sources, sanitizers of `native`.
+"""Before a PlatformIO build: board there? compiler, settings, FatFs, sanitizers of `native`.
 
 PlatformIO runs this ahead of the platform's own build script.
 """
@@ -63,6 +63,15 @@ if "upload" in COMMAND_LINE_TARGETS and not env.subst("$UPLOAD_PORT"):
     if absent:
         sys.stderr.write(f"{absent}\n")
         env.Exit(1)
+
+compilers = importlib.import_module("compilers")
+try:
+    chosen_compiler = compilers.folder(os.environ.get(compilers.CHOICE, ""))
+except compilers.CompilerError as error:
+    sys.stderr.write(f"{error}\n")
+    env.Exit(1)
+if chosen_compiler is not None and env["PIOPLATFORM"] == "atmelavr":
+    env.PrependENVPath("PATH", str(chosen_compiler))
 
 if env["PIOENV"] == "mega2560":
     settings_check = importlib.import_module("settings_check")

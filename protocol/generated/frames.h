@@ -11,7 +11,7 @@
 namespace frames {
 
 constexpr uint8_t kVersion = 1;
-constexpr uint32_t kSchemaHash = 0xA5A6E867u;
+constexpr uint32_t kSchemaHash = 0xCA6A5B02u;
 constexpr size_t kMaxWireSize = 68;  // longest frame with its id
 
 // Bits of `valid`.
@@ -558,6 +558,21 @@ static_assert(offsetof(FileFrame, t_us) == 0, "offset of FileFrame::t_us");
 static_assert(offsetof(FileFrame, number) == 4, "offset of FileFrame::number");
 static_assert(offsetof(FileFrame, preallocated) == 8, "offset of FileFrame::preallocated");
 
+// Which image recorded this; heads each session and returns with `identity`.
+struct __attribute__((packed)) ImageFrame {
+  uint32_t t_us;  // us
+  uint32_t hash;  // the first 32 bits of SHA-256 over the flash (firmware/toolchain/image_hash.py); 0: recorded by no image of a board
+
+  static constexpr uint8_t id() { return 12; }
+  static constexpr uint8_t wire_size() { return 9; }
+};
+constexpr uint8_t kImageId = 12;
+constexpr uint8_t kImageWireSize = 9;  // with the id byte
+constexpr uint32_t kImageHashInvalid = 0;
+static_assert(sizeof(ImageFrame) == 8, "size of ImageFrame");
+static_assert(offsetof(ImageFrame, t_us) == 0, "offset of ImageFrame::t_us");
+static_assert(offsetof(ImageFrame, hash) == 4, "offset of ImageFrame::hash");
+
 // Packet of our own ArduIMU firmware; ends in CRC-16/CCITT-FALSE over all bytes before it. Signs and scales as in frame ident.
 struct __attribute__((packed)) ImuPacket {
   uint8_t kind;  // marks this kind of packet
@@ -671,6 +686,8 @@ constexpr uint8_t wire_size(uint8_t id) {
       return 31;
     case 11:
       return 13;
+    case 12:
+      return 9;
     default:
       return 0;
   }

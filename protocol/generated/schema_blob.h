@@ -16,8 +16,8 @@
 // source file. kSchemaText ends in a zero that is not part of the text.
 namespace frames {
 
-constexpr uint16_t kSchemaSize = 7299;
-constexpr uint32_t kSchemaCrc32 = 0xA5A6E867u;
+constexpr uint16_t kSchemaSize = 7392;
+constexpr uint32_t kSchemaCrc32 = 0xCA6A5B02u;
 
 constexpr char kSchemaText[kSchemaSize + 1] FRAMES_PROGMEM =
     R"({"format":"flight-test-log","version":1,"columns":["name","type","unit","scale","axis","invalid","valid","age","delay_us","table"],"frames":[)"
@@ -31,7 +31,8 @@ constexpr char kSchemaText[kSchemaSize + 1] FRAMES_PROGMEM =
     R"({"id":8,"name":"config","rate_hz":0,"fields":[["t_us","u32","us"],["rate_hz","u16","Hz"],["input_aileron","u8"],["input_elevator","u8"],["input_rudder","u8"],["input_throttle","u8"],["input_switch","u8"],["switch_direct_max_us","u16","us"],["switch_mega_min_us","u16","us"],["hold_ms","u16","ms"],["throttle_idle_max_us","u16","us"],["auto_start","u8"],["telemetry","u8","",1,"",null,null,null,null,"telemetry"],["telemetry_baud","u32","baud"],["telemetry_budget_byteps","u16","byte/s"],["gps_source","u8","",1,"",null,null,null,null,"gps_source"],["aircraft","char[16]"]]},)"
     R"({"id":9,"name":"identity","rate_hz":0,"fields":[["t_us","u32","us"],["session","u32"],["card_id","u8[16]"],["boots","u32"],["reset_cause","u8","",1,"",null,null,null,null,"reset_cause"],["resumed","u8"],["board","char[12]"],["firmware","char[20]"]]},)"
     R"({"id":10,"name":"baro_coefficients","rate_hz":0,"fields":[["t_us","u32","us"],["sensor","u8","",1,"",null,null,null,null,"baro_sensor"],["oversampling","u8"],["words","u16[12]"]]},)"
-    R"({"id":11,"name":"file","rate_hz":0,"fields":[["t_us","u32","us"],["number","u32"],["preallocated","u32","byte"]]})"
+    R"({"id":11,"name":"file","rate_hz":0,"fields":[["t_us","u32","us"],["number","u32"],["preallocated","u32","byte"]]},)"
+    R"({"id":12,"name":"image","rate_hz":0,"fields":[["t_us","u32","us"],["hash","u32","",1,"",0]]})"
     R"(],"bits":{"valid":["alpha_a","alpha_b","beta_a","beta_b","dp_a","dp_b","pot_elevator","pot_aileron_left","pot_aileron_right","pot_rudder","imu_fresh","imu_unsaturated","attitude","imu_triggered","imu_original","mega_drives"],"imu_flags":["gyro_saturated","accel_saturated","attitude_valid","mag_valid","offsets_valid","restarted"],"sensors":["imu","imu_original","baro","gps","receiver","card","telemetry"]},"enum":{"baro_sensor":{"none":0,"bmp085":1,"bmp280":2},"gps_fix":{"none":0,"dead_reckoning":1,"fix_2d":2,"fix_3d":3},"gps_source":{"none":0,"ubx":1,"original_imu":2},"telemetry":{"off":0,"frames":1,"ascii":2},"reset_cause":{"unknown":0,"power_on":1,"external":2,"brown_out":3,"watchdog":4,"crash":5},"imu_aux":{"magnetometer":0,"gyro_bias":1,"status":2},"file_state":{"good":0,"not_a_file":1,"read_only":2,"out_of_range":3,"chain_short":4,"chain_long":5,"not_in_one_piece":6,"cyclic":7,"chain_broken":8,"folder_broken":9},"drive":{"direct_boot":0,"direct_switch":1,"direct_switch_invalid":2,"direct_receiver_lost":3,"direct_self_test":4,"mega":5,"mega_holding":6},"event":{"session_start":1,"session_end":2,"frames_dropped":3,"block_skipped":4,"card_stall":5,"card_error":6,"card_removed":7,"imu_lost":8,"imu_found":9,"imu_restarted":10,"baro_lost":11,"baro_found":12,"gps_lost":13,"gps_found":14,"receiver_lost":15,"receiver_found":16,"drive_changed":17,"reset":18,"settings_default":19,"crash":20,"watchdog_task":21,"rail_low":22,"button":23,"mark":24,"file_low":25,"receiver_storm":26,"file_odd":27,"file_mended":28,"unrecorded":29}}})";
 
 }  // namespace frames

@@ -313,6 +313,7 @@ def test_info_reads_the_head_only(capsys: pytest.CaptureFixture[str]) -> None:
     head = json.loads(capsys.readouterr().out)
     assert head["identity"]["firmware"] == "synthetic"
     assert head["config"]["rate_hz"] == 100
+    assert head["image"] == "600d1dea"
     assert head["size_bytes"] == 10 * 1024**3
     assert main(["info", "flight.bin"]) == 0
     assert "next         host decode flight.bin" in capsys.readouterr().out

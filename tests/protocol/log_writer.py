@@ -221,6 +221,7 @@ class LogWriter:
             board=b"sitl",
             firmware=b"synthetic",
         )
+        self.put("image", t_us=t_us, hash=0x600D1DEA)
 
         if "file" in self.ids:
             self.put("file", t_us=t_us, number=1, preallocated=self.preallocated)

@@ -84,6 +84,19 @@ void print_number(const int16_t value) {
   print(text + at);
 }
 
+// The boot line: which image this is.
+void show_image() {
+  char text[9] = {};
+  uint32_t left = hal::image_hash();
+  for (uint8_t digit = 8; digit != 0; left >>= 4) {
+    const uint8_t next = uint8_t(left & 0xFU);
+    text[--digit] = char(next < 10 ? '0' + next : 'a' + next - 10);
+  }
+  print("imu image ");
+  print(text);
+  print("\r\n");
+}
+
 // Offsets p q r ax ay az, declination, DLPF_CFG, compat, whether the offsets count.
 void show() {
   print("imu");
@@ -244,6 +257,8 @@ int main() {
   arduimu::start_watchdog();
   g_node.count_reset(arduimu::resets());
   g_mpu.set_dlpf(g_settings.dlpf);
+  g_port.set_baud(drivers::ublox::kBaud);
+  show_image();
   for (;;) {
     uint32_t at_us;
     uint8_t edges;

@@ -225,4 +225,8 @@ const char* board_name() {
   return "sitl";
 }
 
+uint32_t image_hash() {
+  return 0;  // a library of this computer is no image
+}
+
 }  // namespace hal

@@ -15,11 +15,11 @@ MakeRig = Callable[..., "FlightRig"]
 
 
 @pytest.fixture(scope="session")
-def flight_elf() -> Path:
-    """The flight image."""
+def flight_elf(request: pytest.FixtureRequest) -> Path:
+    """The flight image; a test that names compilers gets it by each."""
     from flight.images import build_image
 
-    return build_image("mega2560")
+    return build_image("mega2560", getattr(request, "param", None))
 
 
 @pytest.fixture(scope="session")

@@ -8,11 +8,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from compilers import CHOICE, TESTED
+
 if TYPE_CHECKING:
     from simavr_bench.pty_bridge import PtyBridge
 
 ROOT = Path(__file__).resolve().parents[3]
-# A build folder of its own: other work may be building the same image.
+# Build folders of its own, one per compiler: other work may be building the same image.
 BUILD = ROOT / "build" / "chip" / "flight" / "pio"
 
 
@@ -20,17 +22,24 @@ def _command(environment: str, *options: str) -> list[str]:
     return [str(Path(sys.executable).with_name("pio")), "run", "-e", environment, *options]
 
 
-def _variables() -> dict[str, str]:
-    return {**os.environ, "PLATFORMIO_BUILD_DIR": str(BUILD)}
+def _variables(compiler: str) -> dict[str, str]:
+    return {**os.environ, "PLATFORMIO_BUILD_DIR": str(BUILD / compiler), CHOICE: compiler}
 
 
-def build_image(environment: str) -> Path:
+def usual_compiler() -> str:
+    """Return the compiler of what is flown with one only: AVR_GCC, else the distribution's."""
+    return os.environ.get(CHOICE) or TESTED[0]
+
+
+def build_image(environment: str, compiler: str | None = None) -> Path:
     """Build the image that `pio run` makes.
 
     Parameters
     ----------
     environment : str
         Of platformio.ini: ``mega2560`` or ``arduimu``.
+    compiler : str, optional
+        One of ``compilers.TESTED``; the usual one if none is named.
 
     Returns
     -------
@@ -42,18 +51,21 @@ def build_image(environment: str) -> Path:
     RuntimeError
         If the build fails; the text is its last lines.
     """
+    chosen = compiler or usual_compiler()
     done = subprocess.run(
         _command(environment),
         cwd=ROOT,
-        env=_variables(),
+        env=_variables(chosen),
         capture_output=True,
         text=True,
         check=False,
     )
     if done.returncode != 0:
         said = f"{done.stdout[-2000:]}{done.stderr}"
-        raise RuntimeError(f"building the image {environment} failed:\n{said}")
-    return BUILD / environment / "firmware.elf"
+        raise RuntimeError(
+            f"building the image {environment} with avr-gcc {chosen} failed:\n{said}"
+        )
+    return BUILD / chosen / environment / "firmware.elf"
 
 
 def upload(environment: str, bridge: PtyBridge) -> str:
@@ -61,7 +73,7 @@ def upload(environment: str, bridge: PtyBridge) -> str:
     with subprocess.Popen(
         _command(environment, "-t", "upload", "--upload-port", bridge.path),
         cwd=ROOT,
-        env=_variables(),
+        env=_variables(usual_compiler()),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

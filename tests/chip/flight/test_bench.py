@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import stack_depth
+from compilers import TESTED
 from devices.ardu_imu import ImuSample, SentSample
 from flight.bench import pulses, signals
 from flight.bench.fly import fly
@@ -18,6 +19,7 @@ US = 16
 FRAME = 20_000 * US
 
 
+@pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
 @pytest.mark.parametrize(("rate_hz", "first"), [(100, 1), (200, 6)])
 def test_short_flight_keeps_every_limit(
     flight_elf: Path, tmp_path: Path, rate_hz: int, first: int

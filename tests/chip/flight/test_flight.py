@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from compilers import TESTED
+from host.link.status_line import parse_status
+from image_hash import image_hash
 
 import host
 
@@ -30,8 +33,11 @@ def test_bare_board_boots_and_says_what_is_missing(flight_elf: Path) -> None:
         assert chip.faults() == []
 
 
+@pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
 @pytest.mark.parametrize("imu_hz", [100.0, 200.0])
-def test_every_sample_is_in_the_log_once(make_rig: MakeRig, tmp_path: Path, imu_hz: float) -> None:
+def test_every_sample_is_in_the_log_once(
+    make_rig: MakeRig, flight_elf: Path, tmp_path: Path, imu_hz: float
+) -> None:
     from flight.rig import check_card, take_log
 
     rig = make_rig(imu_hz=imu_hz)
@@ -39,11 +45,18 @@ def test_every_sample_is_in_the_log_once(make_rig: MakeRig, tmp_path: Path, imu_
     rig.chip.run_s(8.0)
     sent = {s.sequence: s for s in rig.imu.sent}
     assert rig.relay.engaged
+    said = rig.chip.uart_sent(0).decode("ascii").split("\r\n")
     rig.land()
     check_card(rig.card_image)
     log = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin"))
     ident = log.frames["ident"]
     assert not log.loss.any
+    # The log, the boot line and what `host status` reads name the image that flew.
+    image = image_hash(flight_elf)
+    assert set(log.frames["image"]["hash"].tolist()) == {image}
+    assert said[0] == f"mega2560 0.1.0 image {image:08x}"
+    status = next(filter(None, map(parse_status, said)))
+    assert (status.board, status.image) == ("mega2560", f"{image:08x}")
     # the logger runs at 100 Hz: of 200 samples a second it logs every second one
     step = round(imu_hz / 100)
     assert np.all(np.diff(ident["imu_seq"].astype(np.uint8)) == step)

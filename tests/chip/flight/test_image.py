@@ -1,13 +1,24 @@
-"""What the flight image may hold: no heap, no text of floats, a budget, a stack that fits."""
+"""What the flight image may hold, by either compiler: no heap, a budget, its own hash."""
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 import stack_depth
+from compilers import TESTED
+from image_hash import held_hash, image_hash
+
+ROOT = Path(__file__).resolve().parents[3]
+# What a build reads; the local ini names this clone's core folder by its full path.
+BUILT_FROM = ("firmware", "protocol", "platformio.ini", "platformio.local.ini")
+
+pytestmark = pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
 
 RAM_LIMIT_BYTES = 6600
 FLASH_LIMIT_BYTES = 100_000  # 253 952 are there; more than this is a mistake
@@ -76,3 +87,48 @@ def test_deepest_stack_fits(flight_elf: Path) -> None:
     # every interrupt whose flag stays set lets the receiver's in: TWI, RX 2, UDRE 0, 2, 3
     assert {26, 29, 39, 51, 52, 55} <= set(found.nesting)
     assert 11 in found.plain
+
+
+def test_image_is_made_by_the_compiler_asked_for(
+    flight_elf: Path, request: pytest.FixtureRequest
+) -> None:
+    command = ["avr-readelf", "-p", ".comment", str(flight_elf)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    wanted = request.node.callspec.params["flight_elf"]
+    assert re.findall(r"GCC: \(GNU\) (\S+)", said) == [wanted]
+
+
+def test_image_knows_its_hash(flight_elf: Path) -> None:
+    assert held_hash(flight_elf) == image_hash(flight_elf) != 0
+
+
+def test_a_clone_elsewhere_builds_the_same_image(
+    flight_elf: Path, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    clone = tmp_path / "another" / "clone"
+    clone.mkdir(parents=True)
+    for name in filter(lambda name: (ROOT / name).exists(), BUILT_FROM):
+        source = ROOT / name
+        ignore = shutil.ignore_patterns("__pycache__")
+        if source.is_dir():
+            shutil.copytree(source, clone / name, ignore=ignore)
+        else:
+            shutil.copy(source, clone)
+    for name in ("tests/firmware", "build/fatfs-0.1.2"):
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, clone / name)
+    done = subprocess.run(
+        [str(Path(sys.executable).with_name("pio")), "run", "-e", "mega2560"],
+        cwd=clone,
+        env={
+            **os.environ,
+            "AVR_GCC": request.node.callspec.params["flight_elf"],
+            "PLATFORMIO_BUILD_DIR": str(clone / ".pio" / "build"),
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    built = clone / ".pio" / "build" / "mega2560" / "firmware.elf"
+    assert f"{held_hash(built):08x}" == f"{held_hash(flight_elf):08x}"

@@ -29,19 +29,19 @@ class MakeBoard(Protocol):
 
 
 @pytest.fixture(scope="session")
-def imu_elf() -> Path:
-    """The IMU's image."""
+def imu_elf(request: pytest.FixtureRequest) -> Path:
+    """The IMU's image, by the compiler that a test names or the usual one."""
     from flight.images import build_image
 
-    return build_image("arduimu")
+    return build_image("arduimu", getattr(request, "param", None))
 
 
 @pytest.fixture(scope="session")
-def mega_elf() -> Path:
-    """The flight image."""
+def mega_elf(request: pytest.FixtureRequest) -> Path:
+    """The flight image, by the compiler that a test names or the usual one."""
     from flight.images import build_image
 
-    return build_image("mega2560")
+    return build_image("mega2560", getattr(request, "param", None))
 
 
 @pytest.fixture

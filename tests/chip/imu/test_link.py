@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from compilers import TESTED
+from image_hash import image_hash
 
 if TYPE_CHECKING:
     from imu.rig import PairRig
@@ -24,6 +26,7 @@ CHOSEN = (
 )
 
 
+@pytest.mark.parametrize(("mega_elf", "imu_elf"), [(v, v) for v in TESTED], indirect=True)
 @pytest.mark.parametrize("over_i2c", [False, True], ids=["mpu6000", "mpu6050"])
 def test_every_sample_is_in_the_log_once_at_its_instant(
     mega_elf: Path, imu_elf: Path, tmp_path: Path, over_i2c: bool
@@ -35,7 +38,9 @@ def test_every_sample_is_in_the_log_once_at_its_instant(
     card = make_card(tmp_path / "card.img")
     rig = PairRig(mega_elf, imu_elf, card, clock_ppm=3000.0, mpu_ppm=-8000.0, over_i2c=over_i2c)
     link = run_link(rig, 6.0, tmp_path)
+    said = rig.board.chip.uart_sent(0)
     rig.close()
+    assert said.startswith(b"imu image %08x\r\n" % image_hash(imu_elf))
     assert link.match.made > 1200
     assert link.match.once == link.match.made
     assert link.match.foreign == 0

@@ -49,7 +49,10 @@ def lines(summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _session(session: Mapping[str, Any]) -> Iterator[str]:
-    who = ", ".join(filter(None, (session["board"], session["firmware"], session["aircraft"])))
+    image = f"image {session['image']}" if session["image"] else ""
+    who = ", ".join(
+        filter(None, (session["board"], session["firmware"], image, session["aircraft"]))
+    )
     yield _row(
         f"session {session['number']}",
         f"{session['duration_s']:.2f} s at {session['rate_hz']:g} Hz from t ="

@@ -152,7 +152,14 @@ def _identity(session: Session) -> Json:
         data, _ = session.slow(name)
         for field in fields:
             out[field] = shown(bytes(data[field][-1]).rstrip(b"\0")) if len(data) else ""
-    return out
+    return out | {"image": _image(session)}
+
+
+def _image(session: Session) -> str:
+    """Return the hash of the image that recorded, eight hexadecimal digits; empty if unknown."""
+    data, _ = session.slow("image")
+    known = len(data) and "hash" in (data.dtype.names or ()) and data["hash"].dtype == np.uint32
+    return f"{int(data['hash'][-1]):08x}" if known and data["hash"][-1] else ""
 
 
 def _sensors(session: Session, quality: Quality) -> list[str]:

@@ -24,7 +24,7 @@ _TITLES = {
     "rail": "servo rail",
     "avcc": "supply",
 }
-_IMAGE = re.compile(r"([\w .-]{1,32}) (\d{1,4}\.\d{1,4}\S{0,32})")
+_IMAGE = re.compile(r"([\w .-]{1,32}?) (\d{1,4}\.\d{1,4}\S{0,32})(?: image ([0-9a-f]{8}))?")
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])")
 _WORDS = r"[\w(][\w ().,:%/-]{0,47}"
 # In the order in which firmware/app/status.cpp writes them; others are shown as they are. What each
@@ -84,12 +84,15 @@ class StatusLine:
     ----------
     board, version : str
         Of the image that runs.
+    image : str
+        Its hash, eight hexadecimal digits; empty if it has none.
     fields : dict of str to str
         Key of the line -> what it says.
     """
 
     board: str
     version: str
+    image: str
     fields: dict[str, str] = field(default_factory=dict)
 
     def state(self, key: str) -> str:
@@ -137,6 +140,7 @@ class StatusLine:
         return {
             "board": self.board,
             "version": self.version,
+            "image": self.image,
             "imu": {
                 "state": self.state("imu"),
                 "roll_deg": self._behind("imu", "roll"),
@@ -159,7 +163,7 @@ class StatusLine:
 
     def lines(self) -> list[str]:
         """Return the line for a person, one thing per row."""
-        rows = [f"{self.board} {self.version}"]
+        rows = [f"{self.board} {self.version}" + (f", image {self.image}" if self.image else "")]
         for key, text in self.fields.items():
             unit = " us" if key == "rc" and self.numbers("rc") else ""
             unit = " counts" if key in ANALOGUE and self.numbers(key) else unit
@@ -207,7 +211,7 @@ def parse_status(line: str) -> StatusLine | None:
         if not key or not words or key in fields:
             return None
         fields[key] = " ".join(words)
-    found = StatusLine(image[1], image[2], fields)
+    found = StatusLine(image[1], image[2], image[3] or "", fields)
     if not set(KEYS) <= set(fields) or not all(_possible(found, key) for key in fields):
         return None
     return found

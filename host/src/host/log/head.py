@@ -39,9 +39,11 @@ def describe(path: Path) -> dict[str, Any]:
         "schema": f"{log.schema.hash:08x}",
         "kinds_of_frames": len(log.schema.frames),
     }
-    for name in ("identity", "config"):
+    for name in ("identity", "config", "image"):
         frame = log.head(name)
         out[name] = {} if frame is None else _plain(frame)
+    number = out["image"].get("hash")
+    out["image"] = f"{number:08x}" if isinstance(number, int) and number else "unknown"
     coefficients = log.head("baro_coefficients")
     out["baro"] = (
         "unknown"
@@ -76,6 +78,7 @@ def head_lines(head: dict[str, Any]) -> list[str]:
         f"file id      {head['file_id']}, first session {head['session']}",
         f"schema       {head['schema']}, {head['kinds_of_frames']} kinds of frames",
         f"barometer    {head['baro']}",
+        f"image        {head['image']}",
     ]
     for name in ("identity", "config"):
         values = ", ".join(f"{key} {value}" for key, value in head[name].items())

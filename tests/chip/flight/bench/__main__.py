@@ -8,6 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from compilers import TESTED
 from disassembly import ImageError
 from flight.bench.fly import FlightError, fly
 from flight.bench.plan import STALL_S
@@ -24,7 +25,8 @@ def main() -> int:
     )
     parser.add_argument("--minutes", type=float, default=10.0, help="simulated (default 10)")
     parser.add_argument("--rate", type=int, action="append", choices=sorted(STALL_S))
-    parser.add_argument("--elf", type=Path, help="another image than that of `pio run`")
+    parser.add_argument("--elf", type=Path, help="another image than those of `pio run`")
+    parser.add_argument("--gcc", action="append", choices=TESTED, help="compiler (default both)")
     parser.add_argument("--seed", type=int, default=1, help="of stalls, sticks and steps")
     asked = parser.parse_args()
     if asked.minutes < 0.5:
@@ -33,18 +35,22 @@ def main() -> int:
         parser.error(f"{asked.elf}: no such file; `pio run` makes .pio/build/mega2560/firmware.elf")
     table = Table()
     try:
-        elf = asked.elf or build_image("mega2560")
-        depth, room_bytes = image_rows(table, elf)
-        with tempfile.TemporaryDirectory() as folder:
-            for rate_hz in asked.rate or sorted(STALL_S):
-                flight = fly(
-                    elf,
-                    rate_hz=rate_hz,
-                    minutes=asked.minutes,
-                    folder=Path(folder),
-                    seed=asked.seed,
-                )
-                flight_rows(table, flight, depth, room_bytes)
+        if asked.elf is not None:
+            images = [asked.elf]
+        else:
+            images = [build_image("mega2560", gcc) for gcc in asked.gcc or TESTED]
+        for elf in images:
+            depth, room_bytes = image_rows(table, elf)
+            with tempfile.TemporaryDirectory() as folder:
+                for rate_hz in asked.rate or sorted(STALL_S):
+                    flight = fly(
+                        elf,
+                        rate_hz=rate_hz,
+                        minutes=asked.minutes,
+                        folder=Path(folder),
+                        seed=asked.seed,
+                    )
+                    flight_rows(table, flight, depth, room_bytes)
     except (FlightError, ImageError) as error:
         print(f"flight.bench: {error}", file=sys.stderr)
         return 6

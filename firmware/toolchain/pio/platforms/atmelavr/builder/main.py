@@ -26,10 +26,10 @@ env.Replace(
     PROGNAME="firmware",
     PROGSUFFIX=".elf",
     ASFLAGS=[chip, "-x", "assembler-with-cpp"],
-    CCFLAGS=[chip, "-Os", "-g", "-flto", *sections],
+    CCFLAGS=[chip, "-Os", "-gstabs", "-flto", *sections],
     CXXFLAGS=["-fno-exceptions", "-fno-threadsafe-statics"],
     CPPDEFINES=[("F_CPU", board.get("build.f_cpu"))],
-    LINKFLAGS=[chip, "-Os", "-g", "-flto", "-fuse-linker-plugin", "-Wl,--gc-sections"],
+    LINKFLAGS=[chip, "-Os", "-gstabs", "-flto", "-fuse-linker-plugin", "-Wl,--gc-sections"],
 )
 
 elf = env.BuildProgram()
