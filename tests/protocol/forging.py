@@ -21,7 +21,7 @@ NAMES = (
     *("=1+1", "@x", "\x1b[31m", "a\nb", "a" * 33, "a" * 4000, "\u202eabc", "id", "t_us", "ident"),
     *("A", "_a", "1a", "a b", "a,b", "nul.txt", "valid", "count", "-rf", "a\0b", "p", "lpt1"),
 )
-NUMBERS = (
+NUMBERS: tuple[Any, ...] = (
     *(0, 1, -1, 7, 8, 15, 16, 31, 32, 127, 128, 255, 256, 65535, 65536, 2**31, 2**32, 2**63),
     *(2**64, -(2**31), -(2**40), 10**400, 0.5, -0.5, 1e-13, 1e-12, 1e12, 1e13, 1e300, -1e300),
     *(float("nan"), float("inf"), float("-inf"), True, False, None, "1", [], {}, [1], {"0": 1}),
@@ -175,7 +175,7 @@ def with_schema(data: bytes, change: Callable[[bytes], bytes]) -> bytes:
         "session": int.from_bytes(first[8:12], "little"),
         "schema_hash": value,
     }
-    made = []
+    made: list[bytes] = []
     for at in range(0, max(1, len(text)), SCHEMA_ROOM):
         payload = struct.pack("<HH", at, len(text)) + text[at : at + SCHEMA_ROOM]
         made.append(block(payload, sequence=len(made), kind=1, **head))
@@ -190,10 +190,10 @@ def _change_schema(schema: dict[str, Any], rng: np.random.Generator) -> None:
     def pick(values: Any) -> Any:
         return values[int(rng.integers(len(values)))]
 
-    frame = pick(schema["frames"]) if isinstance(schema.get("frames"), list) else None
+    frame: Any = pick(schema["frames"]) if isinstance(schema.get("frames"), list) else None
     rows = frame.get("fields") if isinstance(frame, dict) else None
-    row = pick(rows) if isinstance(rows, list) and rows else None
-    if not isinstance(frame, dict) or not isinstance(row, list) or len(row) < 2:
+    row: Any = pick(rows) if isinstance(rows, list) and rows else None
+    if not isinstance(rows, list) or not isinstance(row, list) or len(row) < 2:
         schema[pick(["format", "version", "bits", "enum", "columns"])] = pick(NUMBERS)
         return
     choice = int(rng.integers(12))
