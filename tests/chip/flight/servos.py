@@ -53,6 +53,11 @@ def spoiled(rig: FlightRig, since: int, servo: str) -> int:
     return count
 
 
+def cuts_allowed(rig: FlightRig, since: int) -> int:
+    """Pulses the relay may cut since a cycle: one as a contact breaks, one as the other makes."""
+    return 2 * changes(rig, since)
+
+
 def changes(rig: FlightRig, since: int) -> int:
     """Change-overs of the relay since a cycle."""
     states = [state for cycle, state in rig.relay.contacts if state != 0 and cycle > since]

@@ -13,7 +13,7 @@ from flight.servos import (
     LONGEST_GAP_MS,
     MS,
     SERVOS,
-    changes,
+    cuts_allowed,
     released_ms,
     spoiled,
     worst_gap_ms,
@@ -45,11 +45,11 @@ def patch(rig: FlightRig, address: int, code: bytes) -> None:
 def watch_fault(
     rig: FlightRig, fault: Callable[[], None], run_s: float = 0.5
 ) -> tuple[float, float, int]:
-    """Inject a fault; give release and worst gap in ms, spoiled pulses beyond one a change."""
+    """Inject a fault; give release and worst gap in ms, spoiled pulses beyond the relay's cuts."""
     since = rig.chip.cycle
     fault()
     rig.chip.run_s(run_s)
-    extra = max(spoiled(rig, since, servo) - changes(rig, since) for servo in SERVOS)
+    extra = max(spoiled(rig, since, servo) - cuts_allowed(rig, since) for servo in SERVOS)
     return released_ms(rig, since), worst_gap_ms(rig, since), extra
 
 

@@ -33,10 +33,10 @@ class ChargePump:
         At the time of the last edge.
     """
 
-    series_ohm: float = 1_000.0
-    coupling_f: float = 0.47e-6
+    series_ohm: float = 470.0
+    coupling_f: float = 0.33e-6
     reservoir_f: float = 0.47e-6
-    bleed_ohm: float = 22_000.0
+    bleed_ohm: float = 25_500.0
     diode_volt: float = 0.3
     supply_volt: float = 5.0
     level: bool = False

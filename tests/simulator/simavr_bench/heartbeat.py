@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,10 @@ LEAST_GATE_VOLT = 2.0
 OVER_S = 0.1
 SETTLED_S = 0.03
 SUPPLY_VOLT = 4.5
-# Marked tolerances of hw/relay.md's parts; a BAT54 drops 0.24 V at 0.1 mA, 0.4 V at 10 mA.
-CAPACITOR, RESISTOR, DIODE_VOLT = 0.10, 0.05, (0.24, 0.40)
-HALF_R1_OHM, R2_OHM, CAPACITOR_F = 43_000.0, 1_000.0, 0.47e-6
+# Marked tolerances of hw/relay.md's parts. A BAT54 drops at most 0.32 V at 1 mA; when a charge ends
+# D2 carries less.
+CAPACITOR, RESISTOR, DIODE_VOLT = 0.10, 0.05, (0.24, 0.32)
+C1_F, C2_F, HALF_R1_OHM, R2_OHM = 0.33e-6, 0.47e-6, 51_000.0, 470.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +61,8 @@ def corner_pump(c1: int, c2: int, r1: int, r2: int, diode: int) -> ChargePump:
     """Make the pump with every part at one end of its tolerance: -1 low, 1 high; 4.5 V."""
     return ChargePump(
         series_ohm=R2_OHM * (1 + RESISTOR * r2),
-        coupling_f=CAPACITOR_F * (1 + CAPACITOR * c1),
-        reservoir_f=CAPACITOR_F * (1 + CAPACITOR * c2),
+        coupling_f=C1_F * (1 + CAPACITOR * c1),
+        reservoir_f=C2_F * (1 + CAPACITOR * c2),
         bleed_ohm=HALF_R1_OHM / 2 * (1 + RESISTOR * r1),
         diode_volt=DIODE_VOLT[diode > 0],
         supply_volt=SUPPLY_VOLT,
@@ -79,7 +81,7 @@ def all_corners() -> list[ChargePump]:
 
 def judge_beats(
     cycles: NDArray[np.uint64],
-    levels: NDArray[np.uint8],
+    levels: NDArray[np.unsignedinteger[Any]],
     *,
     pump: ChargePump | None = None,
     until: int | None = None,
@@ -122,7 +124,7 @@ def _lowest_gate(
     pump: ChargePump,
     rests: NDArray[np.float64],
     begins: NDArray[np.bool_],
-    levels: NDArray[np.uint8],
+    levels: NDArray[np.unsignedinteger[Any]],
 ) -> float:
     """Lowest gate voltage at the end of a rest; between two edges it is never below both ends."""
     if not len(levels):

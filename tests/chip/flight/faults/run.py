@@ -8,7 +8,7 @@ import numpy as np
 from flight.cut_flight import FILE_BLOCKS, place_of_file
 from flight.faults.model import CLOCK_LATE_US, Event, Fault, Outcome, Seen, event_names, valid_bit
 from flight.rig import FlightRig, check_card, make_card, take_log
-from flight.servos import LONGEST_GAP_MS, changes, spoiled, worst_gap_ms
+from flight.servos import LONGEST_GAP_MS, cuts_allowed, spoiled, worst_gap_ms
 from flight.settings import reference_image
 from simavr_bench.card_journal import CardJournal
 
@@ -66,11 +66,11 @@ def _judge_pilot(rig: FlightRig, fault: Fault, begin: int, gap_ms: float) -> lis
     wrong = []
     if fault.servos and not gap_ms <= LONGEST_GAP_MS:
         wrong.append(f"gap of {gap_ms:.0f} ms")
-    allowed = changes(rig, begin)
+    allowed = cuts_allowed(rig, begin)
     for servo in fault.servos:
         count = spoiled(rig, begin, servo)
         if count > allowed:
-            wrong.append(f"{count} spoilt pulses at {servo}, {allowed} change-overs")
+            wrong.append(f"{count} spoilt pulses at {servo}, allowed {allowed}")
     engaged = rig.relay.engaged
     if fault.engaged is not None and engaged != fault.engaged:
         wrong.append("the Mega drives" if engaged else "the receiver drives")
