@@ -71,8 +71,28 @@ def _compile(function: Kernel, *, reordered: bool) -> Kernel:
         kernel = _COMPILER(**how)(function)
     else:
         _load_directly(kernel)
+        _load_what_fits(kernel)
     compiled_kernel: Kernel = kernel
     return compiled_kernel
+
+
+def _load_what_fits(kernel: Any) -> None:
+    """Compile anew where the cache is of other code: numba takes a file's date for its content.
+
+    A module that moved since, or a file cut short by a full disk, ended every command in a
+    traceback (ModuleNotFoundError, UnpicklingError, EOFError).
+    """
+    cache = kernel._cache
+    load = cache.load_overload
+
+    def load_or_none(signature: Any, target: Any) -> Any:
+        try:
+            return load(signature, target)
+        except Exception:
+            cache.flush()
+            return None
+
+    cache.load_overload = load_or_none
 
 
 def _load_directly(kernel: Any) -> None:
