@@ -9,7 +9,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from protocol.generator import cases, cpp, markdown, model, schema_text
+from protocol.generator import cases, cpp, markdown, model, packets, schema_text
 
 PROTOCOL = Path(__file__).resolve().parent
 
@@ -32,6 +32,7 @@ def generate(schema: model.Schema, cases_path: Path) -> dict[str, str]:
         "schema_blob.h": cpp.blob_header(schema),
         "FRAMES.md": markdown.frames_page(schema),
         "schema.json": schema_text.json_file(schema),
+        "packets.json": packets.json_file(schema),
         "cases.h": cases.cases_header(cases_path),
     }
 

@@ -54,6 +54,7 @@ def test_wheel_decodes_a_log_outside_the_clone(tmp_path: Path) -> None:
         needs = message_from_string(packed.read(metadata).decode()).get_all("Requires-Dist", [])
         for name, place in (
             ("host/data/schema.json", "protocol/generated/schema.json"),
+            ("host/data/packets.json", "protocol/generated/packets.json"),
             ("host/data/released/ed9c9547.json", "protocol/released/ed9c9547.json"),
             ("host/data/default.toml", "hw/calibration/default.toml"),
         ):

@@ -62,7 +62,7 @@ def test_generating_twice_changes_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["frames.h", "schema_blob.h", "FRAMES.md", "schema.json", "cases.h"]
+    "name", ["frames.h", "schema_blob.h", "FRAMES.md", "schema.json", "packets.json", "cases.h"]
 )
 def test_check_names_the_file_that_differs(tmp_path: Path, name: str) -> None:
     run("--out", str(tmp_path))

@@ -6,12 +6,12 @@ or a shift by one sample is seen. Times are ticks of 0.5 us since power-on.
 
 from __future__ import annotations
 
-import binascii
 import struct
 from dataclasses import dataclass, field
 
 import numpy as np
 from host.twin.recorder.sitl_library import TICKS_PER_S, Sitl
+from host.wire.packets import packet
 from numpy.typing import NDArray
 
 Integers = NDArray[np.int64]
@@ -37,7 +37,9 @@ GRID_TICKS = 2000  # analogue: 1 ms
 PRESSURE_TICKS = 20_000  # 10 ms
 COEFFICIENTS = (408, -72, -14383, 32741, 32757, 23153, 6190, 4, -32768, -8711, 2868)
 
-IMU_ADDRESS, ORIGINAL_1, ORIGINAL_2 = 43, 42, 27
+IMU_ADDRESS = packet("imu").address
+ORIGINAL_1, ORIGINAL_2 = (packet(f"original_imu_{n}").address for n in (1, 2))
+IMU_FLAGS = 0x1C  # attitude, magnetometer and offsets valid
 PACKET_US = 5000
 PACKET_AGE_US = 900
 
@@ -132,12 +134,14 @@ class Imu:
 
     def packets(self) -> list[bytes]:
         """Return the bytes of every packet."""
-        out = []
-        for i in range(len(self.start)):
-            body = struct.pack("<BBBBIH9h3h", 0xA6, i & 0xFF, 0x1C, self.aux_kind[i],
-                               self.t_us[i], self.age[i], *self.raw[i], *self.aux[i])  # fmt: skip
-            out.append(body + struct.pack("<H", binascii.crc_hqx(body, 0xFFFF)))
-        return out
+        rows = packet("imu").rows(len(self.start))
+        rows["seq"] = np.arange(len(rows)) & 0xFF
+        rows["flags"] = IMU_FLAGS
+        for name in ("aux_kind", "t_us", "age", "aux"):
+            rows[name] = getattr(self, name)
+        for column, name in enumerate(IMU):
+            rows[name] = self.raw[:, column]
+        return packet("imu").sealed(rows)
 
 
 def imu(seconds: float) -> Imu:

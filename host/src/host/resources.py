@@ -1,4 +1,4 @@
-"""Where the schema and the default calibration are: in the wheel, else in the clone."""
+"""Where the layouts and the default calibration are: in the wheel, else in the clone."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ CLONE = Path(__file__).parents[3]
 # name -> place in the clone; hatch packs the same files into host/data (pyproject.toml).
 _FILES = {
     "schema.json": Path("protocol/generated/schema.json"),
+    "packets.json": Path("protocol/generated/packets.json"),
     "default.toml": Path("hw/calibration/default.toml"),
 }
 
@@ -28,7 +29,7 @@ def resource(name: str) -> Path:
     Parameters
     ----------
     name : str
-        ``schema.json`` or ``default.toml``.
+        ``schema.json``, ``packets.json`` or ``default.toml``.
 
     Raises
     ------

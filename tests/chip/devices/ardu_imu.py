@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import binascii
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import partial
 
 import numpy as np
+from host.wire.packets import packet
+from host.wire.schema_text import packed_schema
 from simavr_bench.chip import Chip, cycles
 
-SEQUENCED = struct.Struct("<4BIH12hH")  # packet `imu` of protocol/frames.toml
-SEQUENCED_KIND = 0xA6
-RESTARTED = 0x20  # bit of imu_flags
-SEQUENCED_ADDRESS, FIRST_ADDRESS, SECOND_ADDRESS = 43, 42, 27
+SEQUENCED, FIRST, SECOND = (packet(n) for n in ("imu", "original_imu_1", "original_imu_2"))
+RATES, FORCES, ANGLES = ("p", "q", "r"), ("ax", "ay", "az"), ("phi", "theta", "psi")
+RESTARTED = packed_schema().bit("imu_flags", "restarted")
 
 
 class MasterDeath(IntEnum):
@@ -202,18 +201,21 @@ class ArduImu:
         aux_kind, aux = self.aux_kind, self.aux
         if self.aux_source is not None:
             aux_kind, aux = self.aux_source(sequence)
-        body = SEQUENCED.pack(
-            SEQUENCED_KIND, sequence, self.flags, aux_kind, time_us,
-            round(self.delay_us / 4), *sample.rates, *sample.specific_force,
-            *sample.angles_cdeg, *aux, 0,
-        )[:-2]  # fmt: skip
-        return [(SEQUENCED_ADDRESS, body + struct.pack("<H", binascii.crc_hqx(body, 0xFFFF)))]
+        row = SEQUENCED.rows(1)
+        row["seq"], row["flags"], row["aux_kind"] = sequence, self.flags, aux_kind
+        row["t_us"], row["age"] = time_us, round(self.delay_us / SEQUENCED.scale("age"))
+        values = (*sample.rates, *sample.specific_force, *sample.angles_cdeg)
+        for name, value in zip((*RATES, *FORCES, *ANGLES), values, strict=True):
+            row[name] = value
+        row["aux"] = aux
+        return [(SEQUENCED.address, SEQUENCED.sealed(row)[0])]
 
     def _original(self, sample: ImuSample) -> list[tuple[int, bytes]]:
         # Original firmware: 2000 deg/s scale (16.4 LSB against 65.5), minus specific force.
         angles = [a / 100 for a in sample.angles_cdeg]
         rates = [r * 16.4 / 65.5 for r in sample.rates]
         x, y, z = (-float(a) for a in sample.specific_force)
-        first = struct.pack("<8f", *angles, *rates, x, y)
-        second = struct.pack("<8f", z, 25.05, 121.5, 30.0, 0.0, 0.0, 1.0, 8.0)
-        return [(FIRST_ADDRESS, first), (SECOND_ADDRESS, second)]
+        first, second = FIRST.rows(1), SECOND.rows(1)
+        first[0] = (*angles, *rates, x, y)
+        second[0] = (z, 25.05, 121.5, 30.0, 0.0, 0.0, 1.0, 8.0)
+        return [(FIRST.address, FIRST.sealed(first)[0]), (SECOND.address, SECOND.sealed(second)[0])]

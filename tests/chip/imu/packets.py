@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import binascii
-import struct
 from dataclasses import dataclass
 
-from devices.ardu_imu import FIRST_ADDRESS, SECOND_ADDRESS, SEQUENCED, SEQUENCED_ADDRESS
+import numpy as np
+from devices.ardu_imu import ANGLES, FIRST, FORCES, RATES, SECOND, SEQUENCED
 from simavr_bench import I2cBus
 
 STATUS_AUX = 2
@@ -38,22 +37,31 @@ def imu_packets(bus: I2cBus) -> list[ImuPacket]:
     """
     packets = []
     for transfer in bus.writes():
-        if transfer.address != SEQUENCED_ADDRESS or not transfer.whole:
+        if transfer.address != SEQUENCED.address or not transfer.whole:
             continue
         data = transfer.data
-        if len(data) != SEQUENCED.size:
-            raise AssertionError(f"a packet of {len(data)} bytes, expected {SEQUENCED.size}")
-        if binascii.crc_hqx(data[:-2], 0xFFFF) != int.from_bytes(data[-2:], "little"):
+        if len(data) != SEQUENCED.dtype.itemsize:
+            raise AssertionError(
+                f"a packet of {len(data)} bytes, expected {SEQUENCED.dtype.itemsize}"
+            )
+        row = np.frombuffer(data, SEQUENCED.dtype)
+        if SEQUENCED.sealed(row)[0] != data:
             raise AssertionError("a packet whose CRC is wrong")
-        kind, seq, flags, aux_kind, t_us, age, *v = SEQUENCED.unpack(data)
-        if kind != 0xA6:
-            raise AssertionError(f"a packet of kind {kind:#x}, expected 0xa6")
+        if row["kind"] != SEQUENCED.always["kind"]:
+            raise AssertionError(f"a packet of kind {int(row['kind'][0]):#x}")
+        rates, force, angles = (
+            (int(row[x][0]), int(row[y][0]), int(row[z][0])) for x, y, z in (RATES, FORCES, ANGLES)
+        )
+        x, y, z = row["aux"][0].tolist()
+        seq, flags, aux_kind, t_us, age = (
+            int(row[name][0]) for name in ("seq", "flags", "aux_kind", "t_us", "age")
+        )
+        age_us = round(age * SEQUENCED.scale("age"))
         packets.append(
             ImuPacket(
-                transfer.start, seq, flags, aux_kind, t_us, 4 * age,
-                (v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8]), (v[9], v[10], v[11]),
+                transfer.start, seq, flags, aux_kind, t_us, age_us, rates, force, angles, (x, y, z)
             )
-        )  # fmt: skip
+        )
     return packets
 
 
@@ -62,12 +70,12 @@ def original_packets(bus: I2cBus) -> list[tuple[float, ...]]:
     pairs = []
     first: tuple[float, ...] | None = None
     for transfer in bus.writes():
-        if len(transfer.data) != 32 or not transfer.whole:
+        if len(transfer.data) != FIRST.dtype.itemsize or not transfer.whole:
             continue
-        values = struct.unpack("<8f", transfer.data)
-        if transfer.address == FIRST_ADDRESS:
+        values = tuple(np.frombuffer(transfer.data, "<f4").tolist())
+        if transfer.address == FIRST.address:
             first = values
-        elif transfer.address == SECOND_ADDRESS and first is not None:
+        elif transfer.address == SECOND.address and first is not None:
             pairs.append((*first, *values))
             first = None
     return pairs

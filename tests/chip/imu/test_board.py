@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from host.wire.schema_text import packed_schema
 from simavr_bench import MpuFault, ResetCause
 
 if TYPE_CHECKING:
@@ -13,8 +14,10 @@ if TYPE_CHECKING:
     from imu.rig import ImuBoard
 
 G0_MPS2 = 9.80665
-OFFSETS_VALID, RESTARTED = 1 << 4, 1 << 5
-ATTITUDE_VALID, MAG_VALID = 1 << 2, 1 << 3
+OFFSETS_VALID, RESTARTED, ATTITUDE_VALID, MAG_VALID = (
+    packed_schema().bit("imu_flags", name)
+    for name in ("offsets_valid", "restarted", "attitude_valid", "mag_valid")
+)
 
 
 def ask(board: ImuBoard, line: str) -> str:

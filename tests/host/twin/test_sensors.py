@@ -17,10 +17,10 @@ from host.twin.sensors.analog import analog, convert, nominal
 from host.twin.sensors.delays import FILTERS
 from host.twin.sensors.filters import delayed, first_order, vane
 from host.twin.sensors.imu import imu
-from host.twin.sensors.imu_stream import ADDRESS
 from host.twin.sensors.mega_clock import ticks
 from host.twin.sensors.ubx import packet
 from host.twin.testcard.cards import Card, Sensors, load
+from host.wire.packets import packet as imu_packet
 from scipy.stats import kstest
 
 IDEAL = Sensors(**{f.name: False for f in fields(Sensors)})
@@ -261,7 +261,7 @@ def test_stimuli_are_ordered_and_on_the_recorders_clock(real: FlightRecord) -> N
     assert np.all(np.diff(given.gps["at"]) >= 0)
     starts = np.array([p.start for p in given.packets])
     assert np.all(np.diff(starts) > 0)
-    assert {p.address for p in given.packets} == {ADDRESS}
+    assert {p.address for p in given.packets} == {imu_packet("imu").address}
     assert {len(p.data) for p in given.packets} == {36}
     share = real.draws.scalar("clock_share")
     assert int(ticks(real, 10.0)) == pytest.approx(20e6 * (1.0 + share), abs=1.0)

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import mmap
 import os
-import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from host.errors import UsageError
 from host.twin.faults import Action, Fault, recorder_actions
@@ -19,6 +20,7 @@ from host.twin.recorder.fat32 import CARD_BYTES, CardImageError, CardReader, for
 from host.twin.recorder.sitl_library import LIBRARY, TICKS_PER_US, CardFault, Port, Sitl
 from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli
 from host.twin.sensors.mega_clock import TICKS_PER_S
+from host.wire.schema_text import packed_schema
 
 RATES_HZ = (25, 50, 100, 200)
 PRESS_S, LET_GO_S = 3.6, 3.9  # start button; preparing 64 MiB takes the Mega 2.8 s
@@ -241,10 +243,13 @@ def _act(sitl: Sitl, given: Stimuli, at: int, action: Action) -> None:
 
 
 def _configure(sitl: Sitl, rate_hz: int, aircraft: str, *, damaged: bool = False) -> None:
-    """Change rate and aircraft in the default settings; both places are fixed by frame `config`."""
+    """Change rate and aircraft in the default settings."""
     config = sitl.default_config()
-    struct.pack_into("<H", config, 4, rate_hz)
-    config[-16:] = aircraft.encode("ascii", "replace")[:15].ljust(16, b"\0")
+    fields = packed_schema().by_name["config"].fields
+    layout = np.dtype([(field.name, field.numpy_type) for field in fields])
+    row = np.frombuffer(config, dtype=layout)
+    row["rate_hz"] = rate_hz
+    row["aircraft"] = aircraft.encode("ascii", "replace")[: layout["aircraft"].itemsize - 1]
     try:
         sitl.set_config(config)
     except ValueError as error:
@@ -253,7 +258,7 @@ def _configure(sitl: Sitl, rate_hz: int, aircraft: str, *, damaged: bool = False
         ) from error
     if damaged:
         content = bytearray(sitl.eeprom())
-        place = content.find(bytes(config[-16:]))  # the aircraft's name
+        place = content.find(row["aircraft"].tobytes())
         content[place] ^= 0x20
         sitl.set_eeprom(bytes(content))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import binascii
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,23 +14,16 @@ from host.twin.sensors.airdata import AirData
 from host.twin.sensors.delays import dlpf_for
 from host.twin.sensors.imu import Imu, imu
 from host.twin.sensors.mega_clock import TICKS_PER_S, ticks
+from host.wire.packets import packet
+from host.wire.schema_text import packed_schema
 
 RATE_HZ = 200.0
-ADDRESS = 43
 # Sample to START of the transfer: filter turn and packing on the 328P, estimate from hardware
 # facts 6.2.
 AGE_S = 0.9e-3
 AGE_JITTER_S = 0.15e-3
 BYTE_S = 9.0 / 400_000.0
-# Packet "imu" of protocol/frames.toml, without its CRC.
-PACKET = np.dtype(
-    [("kind", "u1"), ("seq", "u1"), ("flags", "u1"), ("aux_kind", "u1"), ("t_us", "<u4"),
-     ("age", "<u2"), ("raw", "<i2", 9), ("aux", "<i2", 3)]
-)  # fmt: skip
-CRC_BYTES = 2
-GYRO_SATURATED, ACCEL_SATURATED, ATTITUDE_VALID, MAG_VALID, OFFSETS_VALID, RESTARTED = (
-    1 << bit for bit in range(6)
-)
+RAW = ("p", "q", "r", "ax", "ay", "az", "phi", "theta", "psi")
 # The IMU's firmware keeps its restart flag for 2 s, its attitude is not settled for 3 s.
 RESTARTED_S, UNSETTLED_S = 2.0, 3.0
 REPEATED_AFTER_S = 1.2e-3  # a packet takes 0.83 ms
@@ -77,12 +69,12 @@ def imu_packets(
     for fault in record.card.faults:
         sent &= _fail(fault, at, rows, own_clock, chance)
     starts = ticks(record, at + age_s)
-    body = rows.tobytes()
-    size = PACKET.itemsize
     packets = [
-        _packet(start, body[i * size : (i + 1) * size])
-        for i, start in enumerate(starts.tolist())
-        if sent[i]
+        _transfer(start, data)
+        for start, data, leaves in zip(
+            starts.tolist(), packet("imu").sealed(rows), sent.tolist(), strict=True
+        )
+        if leaves
     ]
     for fault in record.card.faults:
         packets = _damage(fault, at[sent], packets, chance)
@@ -93,8 +85,11 @@ def _rows(sample: Imu, at: Array, age_s: Array, own_clock: float) -> NDArray[np.
     count = np.arange(len(at))
     aux = np.zeros((len(at), 3), dtype=np.int64)
     kinds = count % 12  # magnetometer at 16.7 Hz, bias and status at the same pace
-    aux[kinds == 0] = np.round(sample.magnetic_t[kinds == 0] / 9.174311926606e-8)
-    aux[kinds == 4] = np.round(sample.bias_radps[kinds == 4] / 2.664624812204e-4)
+    schema = packed_schema()
+    mag_step_t = schema.by_name["mag"].field("mx").scale
+    bias_step_radps = schema.by_name["attitude"].field("bias_p").scale
+    aux[kinds == 0] = np.round(sample.magnetic_t[kinds == 0] / mag_step_t)
+    aux[kinds == 4] = np.round(sample.bias_radps[kinds == 4] / bias_step_radps)
     aux[kinds == 8] = (3150, 0x54 + 256 * sample.dlpf, 1)
     # Between their turns the magnetometer is repeated, as the IMU keeps its last reading.
     held = np.maximum.accumulate(np.where(kinds == 0, count, 0))
@@ -102,19 +97,29 @@ def _rows(sample: Imu, at: Array, age_s: Array, own_clock: float) -> NDArray[np.
     aux[repeat] = aux[held[repeat]]
     gyro_full = np.abs(sample.raw[:, :3]).max(axis=1) >= FULL_SCALE
     accel_full = np.abs(sample.raw[:, 3:6]).max(axis=1) >= FULL_SCALE
-    rows = np.zeros(len(at), dtype=PACKET)
-    rows["kind"] = 0xA6
+    rows = packet("imu").rows(len(at))
     rows["seq"] = count & 0xFF
     rows["flags"] = (
-        GYRO_SATURATED * gyro_full
-        + ACCEL_SATURATED * accel_full
-        + (ATTITUDE_VALID | MAG_VALID | OFFSETS_VALID)
+        _flag("gyro_saturated") * gyro_full
+        + _flag("accel_saturated") * accel_full
+        + (_flag("attitude_valid") | _flag("mag_valid") | _flag("offsets_valid"))
     )
-    rows["aux_kind"] = np.where(kinds == 4, 1, np.where(kinds == 8, 2, 0))
+    rows["aux_kind"] = np.select(
+        [kinds == 4, kinds == 8],
+        [schema.number("imu_aux", "gyro_bias"), schema.number("imu_aux", "status")],
+        schema.number("imu_aux", "magnetometer"),
+    )
     rows["t_us"] = np.round(at * own_clock * 1e6).astype(np.int64) & 0xFFFFFFFF
-    rows["age"] = np.round(age_s * own_clock / 4e-6).astype(np.int64)
-    rows["raw"], rows["aux"] = sample.raw, np.clip(aux, -32768, 32767)
+    age_step_s = packet("imu").scale("age") * 1e-6
+    rows["age"] = np.round(age_s * own_clock / age_step_s).astype(np.int64)
+    for column, name in enumerate(RAW):
+        rows[name] = sample.raw[:, column]
+    rows["aux"] = np.clip(aux, -32768, 32767)
     return rows
+
+
+def _flag(name: str) -> int:
+    return packed_schema().bit("imu_flags", name)
 
 
 def _fail(
@@ -129,32 +134,30 @@ def _fail(
     if fault.kind == "imu_off":
         sent[inside] = False
     elif fault.kind == "imu_stuck":
-        rows["raw"][inside] = rows["raw"][first]
+        for name in RAW:
+            rows[name][inside] = rows[name][first]
     elif fault.kind == "imu_lost_packets":
         sent[inside & (rng.random(len(at)) < fault.amount)] = False
     elif fault.kind == "imu_slow":
         sent[inside & (np.arange(len(at)) % 2 == 1)] = False
         rows["seq"] = (np.cumsum(sent) - 1) & 0xFF
     elif fault.kind == "gyro_saturated":
-        rows["raw"][inside, fault.place] = FULL_SCALE
-        rows["flags"][inside] |= GYRO_SATURATED
+        rows[RAW[fault.place]][inside] = FULL_SCALE
+        rows["flags"][inside] |= _flag("gyro_saturated")
     elif fault.kind == "imu_reset":
         again_s = fault.at_s + fault.amount
         sent[(at >= fault.at_s) & (at < again_s)] = False
         after = at >= again_s
         rows["seq"][after] = np.arange(int(after.sum())) & 0xFF
         rows["t_us"][after] = np.round((at[after] - fault.at_s) * own_clock * 1e6).astype(np.int64)
-        rows["flags"][after & (at < again_s + RESTARTED_S)] |= RESTARTED
-        rows["flags"][after & (at < again_s + UNSETTLED_S)] &= 0xFF - ATTITUDE_VALID
+        rows["flags"][after & (at < again_s + RESTARTED_S)] |= _flag("restarted")
+        rows["flags"][after & (at < again_s + UNSETTLED_S)] &= 0xFF - _flag("attitude_valid")
     return sent
 
 
-def _packet(start: int, body: bytes) -> ImuPacket:
-    crc = binascii.crc_hqx(body, 0xFFFF)
-    transfer_s = (len(body) + CRC_BYTES + 1) * BYTE_S
-    return ImuPacket(
-        start, start + round(transfer_s * TICKS_PER_S), ADDRESS, body + crc.to_bytes(2, "little")
-    )
+def _transfer(start: int, data: bytes) -> ImuPacket:
+    transfer_s = (len(data) + 1) * BYTE_S
+    return ImuPacket(start, start + round(transfer_s * TICKS_PER_S), packet("imu").address, data)
 
 
 def _damage(
