@@ -2,11 +2,13 @@
 # Put everything the project needs into .venv, .cache and build of this clone.
 #   setup.sh        all that `make test` needs
 #   setup.sh demo   only Python packages and a C++ compiler
+#   setup.sh hw     KiCad and CAD for `make hw`, in .venv-hw; nothing else asks for them
 # May be run again: what is there already is left alone.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 purpose="${1:-test}"
+[ "$purpose" != hw ] || exec .ci/setup_hw.sh
 logs=build/logs
 mkdir -p "$logs"
 
