@@ -38,6 +38,8 @@ class Device:
     part: str
     side: str
     supply: str
+    connector: str
+    length_mm: int
     pins: tuple[tuple[str, str], ...]
 
 

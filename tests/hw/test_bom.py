@@ -1,19 +1,78 @@
-"""The bill of materials keeps its promise."""
+"""The bill of materials: counted in schematic and harness, its totals stated on the pages."""
 
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
+from types import ModuleType
 
-BOM = Path(__file__).resolve().parents[2] / "hw" / "bom.csv"
+import pytest
+
+from tests.hw.test_pin_map import load_module
+
+ROOT = Path(__file__).resolve().parents[2]
+HW = ROOT / "hw"
+GENERATOR: ModuleType = load_module("generate_bom")
+PARTS, SYMBOLS, HARNESS = (
+    (HW / path).read_text(encoding="utf-8")
+    for path in ("parts.toml", "board/generated/parts.csv", "harness.toml")
+)
 
 
-def test_electronics_cost_less_than_100_usd() -> None:
-    with BOM.open(newline="") as file:
+def test_committed_list_is_current() -> None:
+    assert (HW / "bom.csv").read_text(encoding="utf-8") == GENERATOR.text(GENERATOR.read())
+
+
+def test_readme_states_every_total() -> None:
+    said = (HW / "README.md").read_text(encoding="utf-8")
+    sums = GENERATOR.totals(GENERATOR.read())
+    for price, weight in sums.values():
+        assert f"{price:.2f} USD, {weight:.0f} g" in said
+    first = (ROOT / "README.md").read_text(encoding="utf-8").split("![")[0]
+    (promise,) = map(int, re.findall(r"about (\d+) USD of electronics", " ".join(first.split())))
+    assert abs(promise - sums["logger"][0]) <= 1.0
+
+
+def test_totals_are_the_sum_of_the_list() -> None:
+    with (HW / "bom.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    total_usd = sum(float(row["quantity"]) * float(row["unit price USD"]) for row in rows)
-    assert 0 < total_usd < 100
-    total_g = sum(float(row["quantity"]) * float(row["unit weight g"]) for row in rows)
-    said = BOM.with_name("README.md").read_text(encoding="utf-8")
-    assert f"{total_usd:.2f} USD and {total_g:.0f} g" in said
-    assert all(row["part number"] and float(row["unit weight g"]) > 0 for row in rows)
+    price = sum(float(row["quantity"]) * float(row["unit price USD"]) for row in rows)
+    assert price == pytest.approx(GENERATOR.totals(GENERATOR.read())["flight"][0], abs=0.005)
+    assert all(row["part number"] and row["maker"] and row["alternative"] for row in rows)
+
+
+def test_every_symbol_stands_in_exactly_one_line() -> None:
+    symbols = [ref for refs in GENERATOR.counted(SYMBOLS).values() for ref in refs]
+    listed = [ref for line in GENERATOR.read() for ref in line.refs]
+    assert sorted(listed) == sorted(symbols)
+
+
+def test_drawings_named_are_there() -> None:
+    for line in GENERATOR.read():
+        assert not line.drawing or (HW / line.drawing).exists(), line.what
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "complaint"),
+    [
+        ('key = "bss138"', 'key = "bss139"', "bss139 has no quantity and the schematic does not"),
+        ('kit = "radio"', 'kit = "radios"', "expected one of"),
+    ],
+)
+def test_parts_that_contradict_are_refused(before: str, after: str, complaint: str) -> None:
+    with pytest.raises(GENERATOR.BomError, match=complaint):
+        GENERATOR.lines(PARTS.replace(before, after), SYMBOLS, HARNESS)
+
+
+def test_a_symbol_without_a_line_is_refused() -> None:
+    more = SYMBOLS + "U9,LM358,lm358,,\n"
+    with pytest.raises(GENERATOR.BomError, match="schematic uses lm358"):
+        GENERATOR.lines(PARTS, more, HARNESS)
+
+
+@pytest.mark.parametrize(
+    ("value", "code"), [("330", "330R"), ("1k", "1K"), ("4.7k", "4K7"), ("43k", "43K")]
+)
+def test_a_resistor_is_ordered_by_its_makers_code(value: str, code: str) -> None:
+    assert GENERATOR.resistor_code(value) == code

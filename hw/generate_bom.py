@@ -1,0 +1,187 @@
+"""Make the bill of materials: what is bought (parts.toml), counted in schematic and harness.
+
+python hw/generate_bom.py           write bom.csv
+python hw/generate_bom.py --check   prove that it is current
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import sys
+import tomllib
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+BOM = HERE / "bom.csv"
+KITS = ("logger", "radio", "flight")
+COLUMNS = (
+    "what", "maker", "part number", "alternative", "quantity", "unit price USD", "price class",
+    "unit weight g", "kit", "refs", "drawing", "part of the 2015 logger", "note",
+)  # fmt: skip
+
+
+class BomError(Exception):
+    """A part without a line, a line without a part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of the list; price in USD and weight in g of one piece."""
+
+    what: str
+    maker: str
+    number: str
+    alternative: str
+    quantity: float
+    price_usd: float
+    weight_g: float
+    kit: str
+    refs: tuple[str, ...] = ()
+    drawing: str = ""
+    of_2015: str = "none"
+    note: str = ""
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the line as text, in the order of COLUMNS."""
+        return (
+            self.what, self.maker, self.number, self.alternative, f"{self.quantity:g}",
+            f"{self.price_usd:.2f}", price_class(self.price_usd), f"{self.weight_g:g}", self.kit,
+            " ".join(self.refs), self.drawing, self.of_2015, self.note,
+        )  # fmt: skip
+
+
+def price_class(price_usd: float) -> str:
+    """Return A below 0.1 USD, B below 1, C below 10, D above: what survives a change of shop."""
+    return "ABCD"[sum(price_usd >= limit for limit in (0.1, 1.0, 10.0))]
+
+
+def counted(parts_text: str) -> dict[tuple[str, str], list[str]]:
+    """Return the references of each (part, value) of the schematic's parts.csv."""
+    found: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for row in csv.DictReader(parts_text.splitlines()[1:]):
+        if row["part"] != "none":
+            found[row["part"], row["value"]].append(row["ref"])
+    return found
+
+
+def wire_m(harness_text: str) -> float:
+    """Return the metres of wire: every pin of a cable, supply and ground with it."""
+    total = 0.0
+    for device in tomllib.loads(harness_text)["device"]:
+        lead = "servo leads" in device["connector"]  # bought ready
+        supplies = 2 if device["supply"] != "none" else 1
+        total += 0.0 if lead else (len(device["pins"]) + supplies) * device["length_mm"] / 1000.0
+    return round(total + 0.5)
+
+
+def resistor_code(value: str) -> str:
+    """Return Yageo's code: 330 -> 330R, 4.7k -> 4K7, 10k -> 10K."""
+    if not value.endswith("k"):
+        return f"{value}R"
+    whole, _, part = value.removesuffix("k").partition(".")
+    return f"{whole}K{part}"
+
+
+def lines(parts_toml: str, parts_csv: str, harness_text: str) -> list[Line]:
+    """Return the list.
+
+    Parameters
+    ----------
+    parts_toml, parts_csv, harness_text
+        Content of parts.toml, board/generated/parts.csv and harness.toml.
+
+    Raises
+    ------
+    BomError
+        A part of the schematic that parts.toml lacks; a line that nothing counts; an unknown kit.
+    """
+    symbols = counted(parts_csv)
+    found: list[Line] = []
+    seen: set[str] = set()
+    for row in tomllib.loads(parts_toml)["part"]:
+        key, kit = row.pop("key"), row["kit"]
+        if kit not in KITS:
+            raise BomError(f"parts.toml: {key} is in kit '{kit}', expected one of {KITS}")
+        seen.add(key)
+        uses = [(value, refs) for (part, value), refs in symbols.items() if part == key]
+        if key == "wire":
+            row["quantity"] = wire_m(harness_text)
+        if key != "resistor":  # only a resistor's value makes another part number
+            uses = [("", [ref for _, refs in uses for ref in refs])]
+        if "quantity" not in row and not any(refs for _, refs in uses):
+            raise BomError(f"parts.toml: {key} has no quantity and the schematic does not use it")
+        for value, refs in uses:
+            named = dict(row)
+            if key == "resistor":
+                named["number"] = row["number"].format(code=resistor_code(value))
+                named["what"] = f"{row['what']}, {value}ohm"
+            quantity = named.pop("quantity", len(refs))
+            ordered = sorted(refs, key=lambda ref: (ref[0], int(ref[1:])))
+            found.append(Line(quantity=quantity, refs=tuple(ordered), **named))
+    for part, _ in symbols:
+        if part not in seen:
+            raise BomError(
+                f"the schematic uses {part or 'a symbol without Part'}: not in parts.toml"
+            )
+    return found
+
+
+def totals(found: list[Line]) -> dict[str, tuple[float, float]]:
+    """Return price in USD and weight in g of each kit with all kits before it."""
+    sums: dict[str, tuple[float, float]] = {}
+    price = weight = 0.0
+    for kit in KITS:
+        price += sum(line.quantity * line.price_usd for line in found if line.kit == kit)
+        weight += sum(line.quantity * line.weight_g for line in found if line.kit == kit)
+        sums[kit] = (price, weight)
+    return sums
+
+
+def read() -> list[Line]:
+    """Return the list of this clone.
+
+    Raises
+    ------
+    BomError
+        See `lines`.
+    """
+    paths = ("parts.toml", "board/generated/parts.csv", "harness.toml")
+    return lines(*((HERE / path).read_text(encoding="utf-8") for path in paths))
+
+
+def text(found: list[Line]) -> str:
+    """Return bom.csv."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows(line.cells() for line in found)
+    return out.getvalue()
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write or check; 0 ok, 2 the parts contradict each other, 6 bom.csv is not current."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--check", action="store_true", help="compare with what is committed")
+    check = parser.parse_args(arguments).check
+    try:
+        found = read()
+    except BomError as error:
+        print(f"hw: {error}", file=sys.stderr)
+        return 2
+    if check:
+        if not BOM.exists() or BOM.read_text(encoding="utf-8") != text(found):
+            print("hw/bom.csv is not current: run python hw/generate_bom.py", file=sys.stderr)
+            return 6
+        return 0
+    BOM.write_text(text(found), encoding="utf-8", newline="\n")
+    for kit, (price, weight) in totals(found).items():
+        print(f"{kit}: {price:.2f} USD, {weight:.0f} g")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
