@@ -29,10 +29,11 @@ quietly() {
 }
 
 # One line each why: compiler and Python of the PC; compiler, library and uploader of the Mega;
-# unit tests; the chip simulator and the board's bootloader for it; looking into card images as a PC would.
+# unit tests; coverage-guided fuzzing; the chip simulator and the board's bootloader for it; looking into card images as a PC would.
 packages=(git make python3 python3-venv g++
   gcc-avr avr-libc avrdude
   doctest-dev
+  clang libclang-rt-dev
   simavr libsimavr-dev arduino-core-avr
   dosfstools mtools)
 

@@ -15,7 +15,7 @@ void SessionStore::slot(uint8_t index, const uint8_t* bytes) {
     return;
   }
   const uint32_t writes = get_le<uint32_t>(bytes);
-  if (found_ && writes <= writes_) {
+  if (writes > kMostWrites || (found_ && writes <= writes_)) {
     return;
   }
   found_ = true;

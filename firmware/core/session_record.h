@@ -14,6 +14,10 @@ struct SessionRecord {
 constexpr uint8_t kSessionSlots = 16;
 constexpr uint8_t kSessionSlotSize = 14;  // writes u32, session u32, boots u32, CRC-16
 
+// A count above this was never reached: ten times what the cells bear. Believed, the largest number
+// would let no later write count.
+constexpr uint32_t kMostWrites = 1UL << 24;
+
 class SessionStore {
  public:
   // Once for each slot of the EEPROM, in any order.

@@ -175,3 +175,18 @@ TEST_CASE("a write torn by a power cut costs that write only") {
     CHECK(eeprom.read().latest().session == 20U);
   }
 }
+
+TEST_CASE("a count of writes that no EEPROM bears is not believed") {
+  Eeprom eeprom;
+  core::SessionStore store = eeprom.read();
+  eeprom.write(store, 7, 8);
+  uint8_t* const forged = eeprom.slots[9];
+  memset(forged, 0xFF, core::kSessionSlotSize);
+  constexpr uint8_t kCrc = core::kSessionSlotSize - 2;
+  core::put_le(forged + kCrc, core::crc16(core::kCrc16Start, forged, kCrc));
+  // Believed, the next write would carry the count 0, and be the oldest of all for ever.
+  core::SessionStore again = eeprom.read();
+  CHECK(again.latest().session == 7U);
+  eeprom.write(again, 8, 9);
+  CHECK(eeprom.read().latest().session == 8U);
+}

@@ -1,0 +1,17 @@
+// A target with a fault of its own, so that the tests see it found: behind the word "bad" a rule is
+// broken, or with PLANTED_READ a byte is read behind the end.
+#include "feed.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
+  uint8_t* copy = static_cast<uint8_t*>(malloc(size == 0 ? 1 : size));
+  memcpy(copy, bytes, size);
+  const bool found = size >= 3 && memcmp(copy, "bad", 3) == 0;
+#ifdef PLANTED_READ
+  const int sum = found ? copy[size] : 0;
+#else
+  const int sum = 0;
+  ALWAYS(!found);
+#endif
+  free(copy);
+  return sum < 0 ? -1 : 0;
+}
