@@ -39,6 +39,7 @@ void Instrument::boot() {
   status_.start(now_us);
   ascii_row_.start(now_us);
   second_.start(now_us);
+  airborne_.start(hal::flight_mark(), now_us);
   turn_us_ = now_us;
   system_us_ = now_us;
   self_test_ = self_test_passed();
@@ -109,7 +110,7 @@ void Instrument::step_slow(uint32_t now_us) {
       if (second_.due(now_us, kSecondUs)) put_system(now_us);
       return;
     case 6:
-      recorder_.decide(pilot_.inputs(config_), config_, now_us);
+      decide_recording(now_us);
       return;
     case 7:
       pass_self_test();
@@ -117,6 +118,20 @@ void Instrument::step_slow(uint32_t now_us) {
     default:
       return;
   }
+}
+
+void Instrument::decide_recording(uint32_t now_us) {
+  const core::PilotInputs pilot = pilot_.inputs(config_);
+  core::AirborneInputs seen;
+  sensors_.airborne_inputs(&seen);
+  seen.throttle_valid = pilot.throttle_valid;
+  seen.throttle_idle = pilot.throttle_idle;
+  const core::FlightState before = airborne_.state();
+  const core::FlightState state = airborne_.step(seen, now_us);
+  if (state != before) {
+    outlet_.event(frames::Event::kFlightState, static_cast<uint32_t>(state), now_us);
+  }
+  recorder_.decide(pilot, airborne_, config_, now_us);
 }
 
 // As soon as the supply is measured; put_system() takes it back.

@@ -12,6 +12,7 @@
 #include "app/status.h"
 #include "app/store.h"
 #include "app/telemetry.h"
+#include "core/airborne.h"
 #include "core/byte_ring.h"
 
 namespace app {
@@ -37,6 +38,7 @@ class Instrument {
   static void while_waiting(void* context);
 
   void step_slow(uint32_t now_us);
+  void decide_recording(uint32_t now_us);
   void pass_self_test();
   bool self_test_passed() const;
   void put_system(uint32_t now_us);
@@ -60,6 +62,7 @@ class Instrument {
   Recorder recorder_{ring_, shared_.volume, outlet_, store_, sensors_};
   Panel panel_;
   Status status_;
+  core::Airborne airborne_;
   core::Every second_;
   uint32_t turn_us_ = 0;    // when this turn of the loop began
   uint32_t uptime_us_ = 0;  // part of a second

@@ -15,11 +15,14 @@ using storage::VolumeStatus;
 namespace {
 
 constexpr uint32_t kRetryUs = 2000000UL;
-constexpr uint32_t kReceiverUs = 150000UL;  // six frames of the slowest receiver
 constexpr uint32_t kLowSeconds = 60;
-constexpr uint32_t kLeastSeconds = 1800;  // with less left, the ground prepares a new file
-constexpr uint16_t kTaxiCmps = 300;
+constexpr uint32_t kLeastSeconds = 1800;    // with less left, the ground prepares a new file
 constexpr uint32_t kOtherBytesPerS = 1000;  // frames beside the identification frame
+
+// Argument of the event `session_end`.
+constexpr uint8_t kEndButton = 0;
+constexpr uint8_t kEndFull = 1;
+constexpr uint8_t kEndDoubt = 3;
 
 // Blocks the end of a session may need: the ring, and a return of the schema under way.
 constexpr uint32_t kEndBlocks = 32;
@@ -50,45 +53,59 @@ void Recorder::step(uint32_t now_us) {
   if (status != CardStatus::kOk) fail(status, now_us);
 }
 
-void Recorder::decide(const core::PilotInputs& in, frames::ConfigFrame& config, uint32_t now_us) {
+void Recorder::decide(const core::PilotInputs& in,
+                      const core::Airborne& airborne,
+                      frames::ConfigFrame& config,
+                      uint32_t now_us) {
   config_ = &config;
+  const bool high = in.throttle_valid && !in.throttle_idle;
+  flight_ = airborne.state();
+  landed_ = flight_ == core::FlightState::kGround && !high;
   const core::RecordAction action =
       control_.update(in, recording(), config.auto_start != 0, now_us);
   const uint16_t press_ms = control_.take_press_ms();
   if (press_ms > 0) outlet_.event(frames::Event::kButton, press_ms, now_us);
   const bool start_button = action == core::RecordAction::kStartButton;
-  const bool flying = in.throttle_valid && !in.throttle_idle;
   switch (state_) {
     case State::kNoFile:
     case State::kFailed:
       if (file_wanted_) {
-        // Not in flight; a receiver has told by now, if there is one.
-        if (!flying && now_us - retry_us_ >= kReceiverUs) prepare_next();
+        if (landed_) prepare_next();
       } else if (!looked_ || now_us - retry_us_ >= kRetryUs) {
         open_volume();
       }
       break;
     case State::kUndecided:
-      decide_open_file(in, start_button, now_us);
+      decide_open_file(in, start_button, airborne, now_us);
       break;
     case State::kReady:
       if (start_button) begin(0, prepared_, now_us);
       if (action == core::RecordAction::kStartThrottle) begin(1, prepared_, now_us);
       break;
     case State::kRecording:
-      record(action, in, now_us);
+      record(action, now_us);
       break;
     case State::kEnding:
       if (!end_told_) {
         tell_end();
       } else if (writer_.drained() && stream_.rests() && stream_.ended(now_us)) {
-        finish(now_us);
+        if (end_why_ == kEndFull) {
+          state_ = State::kFileFull;
+        } else if (landed_) {
+          finish(now_us);
+        }
       }
       break;
     case State::kFileFull:
-      if (landed(in, now_us)) finish(now_us);
+      if (landed_) finish(now_us);
       break;
   }
+}
+
+// A reset that is no loss of power, with the mark of a recording: it goes on, wherever we are.
+bool Recorder::kept_power() {
+  const hal::ResetSource source = hal::reset_source();
+  return source != hal::ResetSource::kPowerOn && source != hal::ResetSource::kBrownOut;
 }
 
 void Recorder::open_volume() {
@@ -106,6 +123,10 @@ void Recorder::open_volume() {
       case storage::FileState::kNone:
       case storage::FileState::kClosed:
         file_wanted_ = true;
+        // A card found full stays so on the panel until the ground has looked again.
+        if (volume_status_ != VolumeStatus::kFull && volume_status_ != VolumeStatus::kFragmented) {
+          volume_status_ = status;
+        }
         break;
       case storage::FileState::kBlank:
         file_wanted_ = volume_.smaller_than_new() && !room_for(kLeastSeconds, 1);
@@ -116,6 +137,7 @@ void Recorder::open_volume() {
       case storage::FileState::kOpen:
         volume_status_ = status;
         boot_.start(hal::flight_mark() || after_failure);
+        resume_sure_ = after_failure || (hal::flight_mark() && kept_power());
         state_ = State::kUndecided;
         break;
     }
@@ -123,12 +145,16 @@ void Recorder::open_volume() {
   retry_us_ = hal::now_us();
 }
 
-void Recorder::decide_open_file(const core::PilotInputs& in, bool start_pressed, uint32_t now_us) {
-  switch (boot_.update(in, start_pressed, now_us)) {
+void Recorder::decide_open_file(const core::PilotInputs& in,
+                                bool start_pressed,
+                                const core::Airborne& airborne,
+                                uint32_t now_us) {
+  switch (boot_.update(in, start_pressed, flight_, airborne.moves(), now_us)) {
     case core::BootAction::kWait:
       return;
     case core::BootAction::kResume:
       begin(2, false, now_us);
+      in_doubt_ = !start_pressed && !resume_sure_;
       return;
     case core::BootAction::kClose:
       storage::Volume::set_date(sensors_.fat_date());
@@ -169,7 +195,7 @@ void Recorder::begin(uint32_t why, bool same_session, uint32_t now_us) {
   put_heads(now_us);
   outlet_.event(frames::Event::kSessionStart, why, now_us);
   outlet_.release_waiting();
-  boot_.start(false);
+  in_doubt_ = false;
   file_low_told_ = false;
   marks_ = 0;
   stream_.start(file.first_lba);
@@ -206,15 +232,16 @@ void Recorder::identity(frames::IdentityFrame* out, uint32_t now_us) const {
   core::flash_copy(out->firmware, kVersion, sizeof kVersion);
 }
 
-void Recorder::record(core::RecordAction action, const core::PilotInputs& in, uint32_t now_us) {
+void Recorder::record(core::RecordAction action, uint32_t now_us) {
   if (writer_.take_identities_due()) {
     // The first pass of the schema comes with the heads that begin() has put already.
     if (heads_told_) put_heads(now_us);
     heads_told_ = true;
   }
   if (action == core::RecordAction::kMark) outlet_.event(frames::Event::kMark, ++marks_, now_us);
-  watch_room(in, now_us);
-  if (action == core::RecordAction::kStop) end(0, now_us);
+  watch_room(now_us);
+  watch_doubt(now_us);
+  if (action == core::RecordAction::kStop) end(kEndButton, now_us);
 }
 
 // Compared in bytes: a division costs 640 cycles, every turn of the loop.
@@ -226,27 +253,22 @@ bool Recorder::room_for(uint32_t seconds, uint32_t next_block) const {
   return blocks > needed && (blocks - needed) * core::kBlockPayloadSize > bytes_per_s * seconds;
 }
 
-// Throttle idle for 10 s, and a GPS that has a fix does not say that we glide.
-bool Recorder::landed(const core::PilotInputs& in, uint32_t now_us) {
-  const bool idle = boot_.update(in, false, now_us) == core::BootAction::kClose;
-  const frames::GpsFrame& gps = sensors_.gps();
-  const bool heard = (sensors_.heard() & frames::kSensorsGps) != 0;
-  const bool moving = heard && gps.fix >= static_cast<uint8_t>(frames::GpsFix::kFix2d) &&
-                      gps.ground_speed > kTaxiCmps;
-  return idle && !moving;
+// A file was continued because this might have been a flight, and it was none.
+void Recorder::watch_doubt(uint32_t now_us) {
+  if (flight_ == core::FlightState::kFlying) in_doubt_ = false;
+  if (in_doubt_ && landed_) end(kEndDoubt, now_us);
 }
 
-void Recorder::watch_room(const core::PilotInputs& in, uint32_t now_us) {
+void Recorder::watch_room(uint32_t now_us) {
   const uint32_t next = writer_.sequence();
   if (next + kEndBlocks >= volume_.file().blocks) {
-    end(1, now_us);
+    end(kEndFull, now_us);
     return;
   }
   // The next flight gets a new file rather than the end of this one. (A file that never had so much
   // room is used to its half at least.)
-  if (!room_for(kLeastSeconds, next) && next > volume_.file().blocks / 2 && landed(in, now_us)) {
-    end(1, now_us);
-    full_ = false;
+  if (!room_for(kLeastSeconds, next) && next > volume_.file().blocks / 2 && landed_) {
+    end(kEndFull, now_us);
     return;
   }
   if (file_low_told_ || room_for(kLowSeconds, next)) return;
@@ -260,7 +282,7 @@ void Recorder::end(uint32_t why, uint32_t now_us) {
   hal::set_flight_mark(false);
   state_ = State::kEnding;
   ended_us_ = now_us;
-  full_ = why == 1;
+  end_why_ = static_cast<uint8_t>(why);
   end_told_ = false;
   (void)outlet_.send(frames::Event::kSessionEnd, why, now_us);
   tell_end();
@@ -270,17 +292,12 @@ void Recorder::end(uint32_t why, uint32_t now_us) {
 void Recorder::tell_end() {
   if (ring_.free() < 2U * frames::kEventWireSize) return;
   (void)ring_.tell_dropped();
-  (void)ring_.push_event(frames::Event::kSessionEnd, full_ ? 1U : 0U, ended_us_);
+  (void)ring_.push_event(frames::Event::kSessionEnd, end_why_, ended_us_);
   writer_.finish();
   end_told_ = true;
 }
 
 void Recorder::finish(uint32_t now_us) {
-  if (state_ == State::kEnding && full_) {
-    state_ = State::kFileFull;
-    boot_.start(false);
-    return;
-  }
   storage::Volume::set_date(sensors_.fat_date());
   volume_status_ = volume_.mount_again();
   if (volume_status_ == VolumeStatus::kReady) {

@@ -37,7 +37,10 @@ class Recorder {
   // Once per turn of the main loop: carries the block under way on.
   void step(uint32_t now_us);
   // Every 10 ms or so: start, stop, resume. Looks for the card at the first call.
-  void decide(const core::PilotInputs& in, frames::ConfigFrame& config, uint32_t now_us);
+  void decide(const core::PilotInputs& in,
+              const core::Airborne& airborne,
+              frames::ConfigFrame& config,
+              uint32_t now_us);
 
   State state() const { return state_; }
   storage::VolumeStatus volume_status() const { return volume_status_; }
@@ -49,17 +52,21 @@ class Recorder {
 
  private:
   void open_volume();
-  void decide_open_file(const core::PilotInputs& in, bool start_pressed, uint32_t now_us);
+  void decide_open_file(const core::PilotInputs& in,
+                        bool start_pressed,
+                        const core::Airborne& airborne,
+                        uint32_t now_us);
   void begin(uint32_t why, bool same_session, uint32_t now_us);
-  void record(core::RecordAction action, const core::PilotInputs& in, uint32_t now_us);
+  void record(core::RecordAction action, uint32_t now_us);
   void end(uint32_t why, uint32_t now_us);
   void tell_end();
   void finish(uint32_t now_us);
   void prepare_next();
   void fail(hal::CardStatus status, uint32_t now_us);
   void put_heads(uint32_t now_us);
-  void watch_room(const core::PilotInputs& in, uint32_t now_us);
-  bool landed(const core::PilotInputs& in, uint32_t now_us);
+  void watch_room(uint32_t now_us);
+  void watch_doubt(uint32_t now_us);
+  static bool kept_power();
   bool room_for(uint32_t seconds, uint32_t next_block) const;
   uint32_t next_session();
 
@@ -72,6 +79,7 @@ class Recorder {
   storage::Volume volume_;
   core::RecordControl control_;
   core::BootControl boot_;
+  core::FlightState flight_ = core::FlightState::kInDoubt;
   const frames::ConfigFrame* config_ = nullptr;
   uint32_t retry_us_ = 0;
   uint32_t marks_ = 0;
@@ -84,8 +92,11 @@ class Recorder {
   bool resumed_ = false;
   bool heads_told_ = false;
   bool file_low_told_ = false;
-  bool full_ = false;      // the session ended for want of room
-  bool end_told_ = false;  // by its event
+  bool landed_ = false;       // it is the ground, and the throttle does not say take-off
+  bool resume_sure_ = false;  // an open file is continued because it was being recorded
+  bool in_doubt_ = false;     // the session continues an open file, and nobody was seen flying yet
+  uint8_t end_why_ = 0;       // of the session, as its event says
+  bool end_told_ = false;     // by its event
 };
 
 }  // namespace app

@@ -259,6 +259,28 @@ bool Sensors::coefficients(frames::BaroCoefficientsFrame* out, uint32_t now_us) 
   return true;
 }
 
+void Sensors::airborne_inputs(core::AirborneInputs* out) const {
+  const core::ImuSample& sample = imu_.sample();
+  out->rates[0] = sample.p;
+  out->rates[1] = sample.q;
+  out->rates[2] = sample.r;
+  out->force[0] = sample.ax;
+  out->force[1] = sample.ay;
+  out->force[2] = sample.az;
+  out->imu = imu_present_;
+  out->imu_original = sample.original;
+  out->pitot[0] = ident_.dp_a;
+  out->pitot[1] = ident_.dp_b;
+  static_assert(frames::kValidDpB == frames::kValidDpA << 1, "a bit per pitot");
+  out->pitots =
+      static_cast<uint8_t>((analog_ & (frames::kValidDpA | frames::kValidDpB)) / frames::kValidDpA);
+  const frames::GpsFrame& gps = gps_.frame();
+  out->gps = gps_present_ && gps.fix >= static_cast<uint8_t>(frames::GpsFix::kFix2d) &&
+             gps.ground_speed != frames::kGpsGroundSpeedInvalid;
+  out->ground_speed_cmps = gps.ground_speed;
+  out->static_pressure = barometer_.present() ? barometer_.frame().static_pressure : 0;
+}
+
 void Sensors::put_health(frames::SystemFrame* out) {
   heard_ = hearing_;
   hearing_ = 0;

@@ -7,6 +7,7 @@
 #include "app/gps_link.h"
 #include "app/outlet.h"
 #include "app/pilot_link.h"
+#include "core/airborne.h"
 #include "core/every.h"
 #include "core/gps_receiver.h"
 #include "core/ident_trigger.h"
@@ -39,6 +40,8 @@ class Sensors {
   // Of the last scan: the first ten bits of `valid`, neither open nor shorted.
   uint16_t analog() const { return analog_; }
   uint16_t rail() const { return rail_; }
+  // What tells of flying or the ground; the receiver's part is left to the caller.
+  void airborne_inputs(core::AirborneInputs* out) const;
 
  private:
   void step_imu(const PilotLink& pilot, Outlet& outlet);

@@ -57,6 +57,7 @@ constexpr char kTextUnreadable[] CORE_FLASH = "unreadable";
 constexpr char kTextFull[] CORE_FLASH = "full";
 constexpr char kTextFragmented[] CORE_FLASH = "fragmented";
 constexpr char kTextUndecided[] CORE_FLASH = "open flight ";
+constexpr char kTextAwaitsGround[] CORE_FLASH = "waits for the ground";
 constexpr char kTextReady[] CORE_FLASH = "ready ";
 constexpr char kTextLost[] CORE_FLASH = "lost";
 
@@ -287,7 +288,9 @@ void Status::card(const Recorder& recorder) {
   out_.flash(kCardText);
   switch (recorder.state()) {
     case Recorder::State::kNoFile:
-      out_.flash(volume_text(recorder.volume_status()));
+      out_.flash(recorder.volume_status() == storage::VolumeStatus::kReady
+                     ? kTextAwaitsGround
+                     : volume_text(recorder.volume_status()));
       return;
     case Recorder::State::kFailed:
       out_.flash(kTextLost);

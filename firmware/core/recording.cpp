@@ -68,22 +68,20 @@ uint16_t RecordControl::take_press_ms() {
   return press_ms;
 }
 
-BootAction BootControl::update(const PilotInputs& in, bool start_pressed, uint32_t now_us) {
-  const bool flying = in.throttle_valid && !in.throttle_idle;
-  if (!in.throttle_valid || flying) {
-    idle_ = false;
-  }
-  if (reset_mark_ || start_pressed || flying) {
+BootAction BootControl::update(
+    const PilotInputs& in, bool start_pressed, FlightState flight, bool moves, uint32_t now_us) {
+  const bool high = in.throttle_valid && !in.throttle_idle;
+  if (resume_ || start_pressed || high || flight == FlightState::kFlying) {
     return BootAction::kResume;
   }
-  if (!in.throttle_valid) {
-    return BootAction::kWait;
+  if (flight == FlightState::kGround) {
+    return BootAction::kClose;
   }
-  if (!idle_) {
-    idle_ = true;
-    idle_us_ = now_us;
+  if (moves && !doubt_) {
+    doubt_ = true;
+    doubt_us_ = now_us;
   }
-  return now_us - idle_us_ >= kIdleUs ? BootAction::kClose : BootAction::kWait;
+  return doubt_ && now_us - doubt_us_ >= kDoubtUs ? BootAction::kResume : BootAction::kWait;
 }
 
 }  // namespace core

@@ -3,6 +3,8 @@
 
 #include <stdint.h>
 
+#include "core/airborne.h"
+
 namespace core {
 
 struct PilotInputs {
@@ -41,22 +43,30 @@ class RecordControl {
 
 enum class BootAction : uint8_t { kWait, kResume, kClose };
 
-// What to do with a file that an earlier power-on left open. Until an answer no metadata is
-// written: this may be a reset in flight.
+// What to do with a file that an earlier power-on left open. Closing it writes metadata, so that
+// waits until it is the ground for sure (core/airborne.h); continuing it writes none.
+//
+//   seen                                                        then
+//   the mark of a reset, a card that comes back, a press,       continue at once
+//   throttle above idle, flying
+//   8 s ago somebody said moving, and it is not yet the ground  continue: in doubt
+//   the ground                                                  close
 class BootControl {
  public:
-  static constexpr uint32_t kIdleUs = 10000000UL;
+  static constexpr uint32_t kDoubtUs = 8000000UL;
 
-  void start(bool reset_mark) {
-    reset_mark_ = reset_mark;
-    idle_ = false;
+  void start(bool resume) {
+    resume_ = resume;
+    doubt_ = false;
   }
-  BootAction update(const PilotInputs& in, bool start_pressed, uint32_t now_us);
+  // `moves`: Airborne::moves().
+  BootAction update(
+      const PilotInputs& in, bool start_pressed, FlightState flight, bool moves, uint32_t now_us);
 
  private:
-  uint32_t idle_us_ = 0;
-  bool idle_ = false;
-  bool reset_mark_ = false;
+  uint32_t doubt_us_ = 0;  // the first said so
+  bool doubt_ = false;
+  bool resume_ = false;
 };
 
 }  // namespace core

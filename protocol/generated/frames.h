@@ -11,7 +11,7 @@
 namespace frames {
 
 constexpr uint8_t kVersion = 1;
-constexpr uint32_t kSchemaHash = 0xCA6A5B02u;
+constexpr uint32_t kSchemaHash = 0xFEB7AFECu;
 constexpr size_t kMaxWireSize = 68;  // longest frame with its id
 
 // Bits of `valid`.
@@ -142,6 +142,9 @@ enum class Event : uint8_t {
   kFileOdd = 27,
   kFileMended = 28,
   kUnrecorded = 29,
+  kFlightState = 30,
+  kRelayLost = 31,
+  kReceiverRefused = 32,
 };
 
 // All identification channels at one instant. A new-type IMU packet triggers it (every n-th at lower rates), or the timer 1.5 periods after the last trigger.

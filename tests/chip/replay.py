@@ -24,12 +24,13 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "simulator"))  # started by path, from anywhere
 
-from devices.stimuli import Replay, read_stimuli, signal_pins  # noqa: E402
+from devices.stimuli import Replay, adc_channel, read_stimuli, signal_pins  # noqa: E402
 from simavr_bench import Chip, cycles  # noqa: E402
 from simavr_bench.log import LogKind, pulses  # noqa: E402
 
 SERVOS = ("servo_aileron", "servo_elevator", "servo_rudder", "servo_throttle")
 TICKS_PER_S = 2_000_000
+PITOT_ZERO_V = 2.5
 _IDLE_US = (1500, 1500, 1500, 1000, 1000)
 
 
@@ -79,9 +80,11 @@ def _report_progress() -> Callable[[float], None]:
     return report
 
 
-def _close_at_bench(chip: Chip, lines: list[str], time_s: float) -> None:
-    # throttle idle: the recorder closes the file of the flight it finds
+def _close_at_bench(chip: Chip, lines: list[str], pitots: list[int], time_s: float) -> None:
+    # Standing still: the recorder closes the file of the flight it finds.
     chip.run_s(0.5)
+    for channel in pitots:
+        chip.analog(channel, PITOT_ZERO_V)
     chip.power_on()
     for frame in range(int(time_s / 0.02)):
         at = chip.cycle + cycles(0.02 * frame)
@@ -117,7 +120,9 @@ def main(argv: list[str] | None = None) -> int:
         load = chip.load_now().busy_fraction
         chip.power_off()
         if options.close_s > 0:
-            _close_at_bench(chip, [pins[f"rc_{i}"] for i in range(5)], options.close_s)
+            pitots = [adc_channel(pins[name]) for name in ("dp_a", "dp_b")]
+            lines = [pins[f"rc_{i}"] for i in range(5)]
+            _close_at_bench(chip, lines, pitots, options.close_s)
         if options.servos is not None:
             widths = {name: pulses(*chip.edges(pins[name])) for name in SERVOS}
             np.savez(options.servos, allow_pickle=False, **widths)

@@ -35,6 +35,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DEMO = ROOT / "build" / "scripted"
 CLUSTER_BLOCKS = 8
 NAME = "FLT00001.BIN"
+GROUND_S = 25.0
 START_S, IDLE_S, STOP_S, END_S = 2.0, 121.0, 122.0, 128.0
 RATES_HZ = {"ident": 100, "mag": 15, "attitude": 10, "baro": 25, "gps": 5, "system": 1}
 
@@ -62,9 +63,15 @@ def new_card_file(path: Path) -> None:
 
 
 def fly(card: Path, flight: Script) -> None:
-    """Let the firmware live through the script: boot, record on the button, stop, close."""
+    """Let the firmware live through the script: a file on the ground, record, stop, close."""
     sitl = Sitl()
     with card.open("r+b") as file, mmap.mmap(file.fileno(), 0) as image:
+        sitl.insert_card(image, CARD_ID)
+        sitl.power_on()  # on the ground: a bare board needs 18 s to know it
+        sitl.run_for(GROUND_S)
+        sitl.power_cut()
+        sitl.close()
+        sitl = Sitl()
         sitl.insert_card(image, CARD_ID)
         flight.give(sitl)
         sitl.press(round(START_S * TICKS_PER_S), 0.3)

@@ -32,9 +32,11 @@ RC_PERIODS = (97, 113, 131, 149, 167)  # receiver frames
 IMU_PERIODS = (401, 443, 487, 523, 571, 613, 659, 709, 761)  # packets
 ANALOG_PERIODS_MS = (4001, 4507, 5003, 5501, 6007, 6521, 7001, 7507, 8009, 8513, 9001)
 
+LEVEL = (3, -2, 1, 40, -30, -8190, 12, -9, 4500)
 IMU_RANGES = (32767, 32767, 32767, 32767, 32767, 32767, 18000, 9000, 18000)
 GRID_TICKS = 2000  # analogue: 1 ms
 PRESSURE_TICKS = 20_000  # 10 ms
+STILL_AIR = (27_898, 4 * 23_843)
 COEFFICIENTS = (408, -72, -14383, 32741, 32757, 23153, 6190, 4, -32768, -8711, 2868)
 
 IMU_ADDRESS = packet("imu").address
@@ -144,12 +146,17 @@ class Imu:
         return packet("imu").sealed(rows)
 
 
-def imu(seconds: float) -> Imu:
-    """Return packets at 200 Hz: attitude 100 Hz of magnetometer, bias and status between them."""
+def imu(seconds: float, *, still_from_s: float | None = None) -> Imu:
+    """Return packets at 200 Hz: attitude 100 Hz of magnetometer, bias and status between them.
+
+    Behind `still_from_s` it lies level on the ground.
+    """
     index = np.arange(int(seconds * 1e6 / PACKET_US) - 4)
     raw = np.empty((len(index), 9), dtype=np.int64)
     for channel, (period, limit) in enumerate(zip(IMU_PERIODS, IMU_RANGES, strict=True)):
         raw[:, channel] = np.round(triangle(index, period, -limit, limit))
+    if still_from_s is not None:
+        raw[index * PACKET_US >= still_from_s * 1e6] = LEVEL
     kind = np.select([index % 12 == 4, index % 12 == 8], [1, 2], 0)
     aux = np.empty((len(index), 3), dtype=np.int64)
     for k in range(3):
@@ -208,8 +215,8 @@ def ubx(kind: int, payload: bytes) -> bytes:
     return b"\xb5\x62" + body + bytes((a, b))
 
 
-def gps(seconds: float) -> Gps:
-    """Return epochs over the full range of every field."""
+def gps(seconds: float, *, still_from_s: float | None = None) -> Gps:
+    """Return epochs over the full range of every field; a slow one behind `still_from_s`."""
     index = np.arange(int(seconds * 5) - 1)
 
     def wave(period: int, low: float, high: float) -> Integers:
@@ -232,6 +239,8 @@ def gps(seconds: float) -> Gps:
         "fix": np.where(index % 7 == 3, 2, 3),
         "satellites": wave(23, 4, 12),
     }
+    if still_from_s is not None:
+        values["ground_speed"][index * 0.2 >= still_from_s] = 30
     late = values["itow_ms"] >= 604_800_000  # the week ends in flight
     values["itow_ms"] = np.where(late, values["itow_ms"] - 604_800_000, values["itow_ms"])
     values["week"] = values["week"] + late
@@ -265,26 +274,41 @@ def script(
     simultaneous: bool = False,
     idle_from_s: float | None = None,
 ) -> Script:
-    """Write the script of a flight that ends with throttle idle from `idle_from_s` on."""
+    """Write the script of a flight that stands on the ground from `idle_from_s` on."""
     return Script(
         seconds,
         receiver(seconds, frame_us=frame_us, simultaneous=simultaneous, idle_from_s=idle_from_s),
-        imu(seconds),
-        gps(seconds),
-        analog(seconds),
-        pressure(seconds),
+        imu(seconds, still_from_s=idle_from_s),
+        gps(seconds, still_from_s=idle_from_s),
+        analog(seconds, still_from_s=idle_from_s),
+        pressure(seconds, still_from_s=idle_from_s),
     )
 
 
-def analog(seconds: float) -> NDArray[np.float64]:
-    """Return counts of the eleven channels, from 0 to the end of the last count."""
+def analog(seconds: float, *, still_from_s: float | None = None) -> NDArray[np.float64]:
+    """Return counts of the eleven channels, from 0 to the end of the last count.
+
+    Behind `still_from_s` the pitots stand at their zero.
+    """
     index = np.arange(int(seconds * TICKS_PER_S / GRID_TICKS) + 2)
-    return np.stack([triangle(index, period, 0.0, 1023.99) for period in ANALOG_PERIODS_MS], axis=1)
+    counts = np.stack(
+        [triangle(index, period, 0.0, 1023.99) for period in ANALOG_PERIODS_MS], axis=1
+    )
+    if still_from_s is not None:
+        still = index * GRID_TICKS >= still_from_s * TICKS_PER_S
+        counts[still, ANALOG.index("dp_a")] = counts[still, ANALOG.index("dp_b")] = 511.5
+    return counts
 
 
-def pressure(seconds: float) -> NDArray[np.float64]:
-    """Return UT from -20 to 55 degC, and UP over 19 bits: partly beyond what is possible."""
+def pressure(seconds: float, *, still_from_s: float | None = None) -> NDArray[np.float64]:
+    """Return UT from -20 to 55 degC, and UP over 19 bits: partly beyond what is possible.
+
+    Behind `still_from_s` they are the datasheet's example.
+    """
     index = np.arange(int(seconds * TICKS_PER_S / PRESSURE_TICKS) + 2)
-    return np.stack(
+    raw = np.stack(
         [triangle(index, 4703, 24342, 33315), triangle(index, 3301, 40_000, 524_287)], axis=1
     )
+    if still_from_s is not None:
+        raw[index * PRESSURE_TICKS >= still_from_s * TICKS_PER_S] = STILL_AIR
+    return raw

@@ -7,7 +7,7 @@ import pytest
 from host.twin.recorder.sitl_library import TICKS_PER_S, CardFault, Level, Recorder, Sitl, Volume
 
 from tests.protocol import oracle
-from tests.sitl.bench import Bench, events, flight, idle_receiver, missing, spread
+from tests.sitl.bench import GROUND_S, Bench, events, flight, idle_receiver, missing, spread
 from tests.sitl.card_image import BLOCK, format_fat32, new_card, read_file
 
 
@@ -131,7 +131,7 @@ def test_card_removed_and_put_back(tmp_path: Path) -> None:
     assert bench.state() == Recorder.RECORDING
     bench.stop()
     log = bench.log(tmp_path)
-    assert [session.number for session in log.sessions] == [1, 2]
+    assert [session.number for session in log.sessions] == [1, 2, 3]
     assert events(log, "card_removed") == [0]
     assert bench.fsck(tmp_path) == ""
 
@@ -145,10 +145,10 @@ def boot_with(image: bytearray | None, *, unreadable: bool = False) -> tuple[Vol
     if unreadable:
         sitl.add_card_fault(0, CardFault.UNREADABLE, 1)
     sitl.power_on()
-    sitl.run_for(12.0)
+    sitl.run_for(GROUND_S + 12.0)
     state = sitl.state()
     at, level = sitl.levels(Level.LED)
-    rising = at[level == 1]
+    rising = at[(level == 1) & (at > GROUND_S * TICKS_PER_S)]
     groups = np.split(rising, np.flatnonzero(np.diff(rising) > TICKS_PER_S) + 1)
     return Volume(state.volume), len(groups[1]) if len(groups) > 2 else 0
 

@@ -7,7 +7,7 @@ from host.twin.recorder.sitl_library import EEPROM_BYTES, TICKS_PER_S, Recorder
 
 from tests.protocol import oracle
 from tests.sitl.bench import Bench, events, flight, idle_receiver, missing
-from tests.sitl.card_image import CARD_ID, format_fat32, read_file, remove_files
+from tests.sitl.card_image import CARD_ID, format_fat32, new_card, read_file, remove_files
 from tests.sitl.compare import NAMES, compare
 
 ERASED = b"\xff" * EEPROM_BYTES
@@ -45,18 +45,16 @@ def test_files_are_numbered_and_never_overwritten(tmp_path: Path) -> None:
     assert bench.fsck(tmp_path) == ""
 
 
-def test_pulled_battery_is_closed_when_throttle_has_been_idle_for_ten_seconds(
-    tmp_path: Path,
-) -> None:
+def test_pulled_battery_is_closed_when_it_is_the_ground_for_sure(tmp_path: Path) -> None:
     bench = Bench()
-    idle_receiver(bench.sitl, 6.0, 30.0)
+    idle_receiver(bench.sitl, 6.0, 40.0)
     bench.power_on_and_record(4.0)
     power_cycle(bench)
     assert bench.state() == Recorder.UNDECIDED
     written = bench.sitl.state().ground_writes
-    bench.sitl.run_until(15 * TICKS_PER_S)
+    bench.sitl.run_for(16.5)
     assert bench.sitl.state().ground_writes == written  # no metadata before the decision
-    bench.sitl.run_until(20 * TICKS_PER_S)
+    bench.sitl.run_for(5.0)
     assert bench.state() == Recorder.READY
     log = bench.log(tmp_path)
     assert events(log, "session_end") == [2]
@@ -77,7 +75,7 @@ def test_throttle_above_idle_resumes_an_open_file(tmp_path: Path) -> None:
     bench.sitl.run_for(3.0)
     assert bench.state() == Recorder.RECORDING
     assert bench.sitl.state().file_number == 1
-    assert decoded(bench).sessions == [1, 2]
+    assert decoded(bench).sessions == [1, 2, 3]
 
 
 def test_reset_in_flight_resumes_within_two_seconds_without_metadata(tmp_path: Path) -> None:
@@ -95,11 +93,11 @@ def test_reset_in_flight_resumes_within_two_seconds_without_metadata(tmp_path: P
     bench.sitl.run_until(27 * TICKS_PER_S)
     bench.stop()
     log = bench.log(tmp_path)
-    assert [session.number for session in log.sessions] == [1, 2]
+    assert [session.number for session in log.sessions] == [1, 2, 3]
     assert events(log, "session_start") == [0, 2]
     assert BROWN_OUT in events(log, "reset")
     assert log.complete == "complete"
-    second = bench.log(tmp_path, session=2)
+    second = bench.log(tmp_path, session=3)
     clock_us = -(reset_at // 2)
     frames = {name: second.frames[name] for name in NAMES}
     assert [d for d in compare(frames, plan, clock_us=clock_us) if not d.good] == []
@@ -126,12 +124,12 @@ def test_files_deleted_and_eeprom_erased_again_and_again(wipe: str) -> None:
     The formatted card gives the new file the place of the old one, the other card does not. The
     id's CRC must not run over a block's own CRC, which would make it a constant.
     """
-    bench = Bench()
+    bench = Bench(new_card())
     ids = []
     for seconds in (9.0, 6.0, 3.0, 2.0):
         short_flight(bench, seconds)
         log = decoded(bench)
-        assert log.sessions == [1]
+        assert log.sessions == [log.sessions[-1]]
         assert log.foreign == []
         ids.append(log.file_id)
         bench.sitl.power_cut()
@@ -144,7 +142,7 @@ def test_files_deleted_and_eeprom_erased_again_and_again(wipe: str) -> None:
 
 
 def test_old_blocks_behind_the_end_are_known_to_be_stale(tmp_path: Path) -> None:
-    bench = Bench()
+    bench = Bench(new_card())
     short_flight(bench, 9.0)
     bench.sitl.power_cut()
     bench.sitl.set_eeprom(ERASED)
@@ -155,11 +153,11 @@ def test_old_blocks_behind_the_end_are_known_to_be_stale(tmp_path: Path) -> None
     assert len(found.foreign) > 50
     assert found.sessions == [1]
     times = [values["t_us"] for values, _ in found.frames["ident"]]
-    assert max(times) < 4_500_000
+    assert max(times) - min(times) < 4_000_000
     # The next boot finds the true end too.
-    idle_receiver(bench.sitl, bench.sitl.now() / TICKS_PER_S, bench.sitl.now() / TICKS_PER_S + 15)
+    idle_receiver(bench.sitl, bench.sitl.now() / TICKS_PER_S, bench.sitl.now() / TICKS_PER_S + 25)
     bench.sitl.power_on()
-    bench.sitl.run_for(14.0)
+    bench.sitl.run_for(22.0)
     assert bench.state() == Recorder.READY
     again = decoded(bench)
     assert again.foreign == []
@@ -211,7 +209,7 @@ def test_full_file_ends_the_session_and_the_ground_makes_a_new_one(tmp_path: Pat
     bench = Bench(file_blocks=300)
     idle_receiver(bench.sitl, 0.1, 1.0)
     idle_receiver(bench.sitl, 1.0, 40.0, throttle_us=1700)
-    idle_receiver(bench.sitl, 40.0, 60.0)
+    idle_receiver(bench.sitl, 40.0, 70.0)
     bench.sitl.power_on()
     bench.sitl.run_for(30.0)
     assert bench.state() == Recorder.FILE_FULL
@@ -221,22 +219,22 @@ def test_full_file_ends_the_session_and_the_ground_makes_a_new_one(tmp_path: Pat
     # Neither throttle nor a reset in flight brings metadata onto the card.
     written = bench.sitl.state().ground_writes
     bench.sitl.reset(BROWN_OUT)
-    bench.sitl.run_until(49 * TICKS_PER_S)
+    bench.sitl.run_until(57 * TICKS_PER_S)
     assert bench.sitl.state().ground_writes == written
-    bench.sitl.run_until(55 * TICKS_PER_S)
+    bench.sitl.run_until(63 * TICKS_PER_S)
     assert bench.state() == Recorder.READY
     assert bench.log(tmp_path).complete == "complete"
     assert len(bench.files()) == 2
 
 
 def test_no_new_file_is_prepared_in_flight() -> None:
-    bench = Bench()
+    bench = Bench(new_card())
     idle_receiver(bench.sitl, 0.1, 8.0, throttle_us=1700)
-    idle_receiver(bench.sitl, 8.0, 12.0)
+    idle_receiver(bench.sitl, 8.0, 40.0)
     bench.sitl.power_on()  # a card without a file, throttle above idle
-    bench.sitl.run_until(7 * TICKS_PER_S)
+    bench.sitl.run_until(25 * TICKS_PER_S)
     assert bench.sitl.state().ground_writes == 0
-    bench.sitl.run_until(10 * TICKS_PER_S)
+    bench.sitl.run_until(28 * TICKS_PER_S)
     assert bench.state() == Recorder.READY
 
 

@@ -118,7 +118,7 @@ def signal_pins(pin_map: Path) -> dict[str, str]:
     return {s["name"]: arduino_pin(s["pin"]) for s in signals}
 
 
-def _adc_channel(pin: str) -> int:
+def adc_channel(pin: str) -> int:
     return int(pin[2]) + (8 if pin[1] == "K" else 0)
 
 
@@ -165,7 +165,7 @@ class Replay:
         grid = self._start + np.arange(len(stimuli.analog)) * stimuli.step * CYCLES_PER_TICK
         for column, name in enumerate(ANALOG):
             volt = stimuli.analog[:, column] * (5.0 / 1024.0)
-            chip.analog_profile(_adc_channel(pins[name]), grid, volt)
+            chip.analog_profile(adc_channel(pins[name]), grid, volt)
 
     def plan(self, kind: str, at_tick: int, value: float = 0.0) -> None:
         """Plan a fault.

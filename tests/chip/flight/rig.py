@@ -33,6 +33,8 @@ SERVOS = {
 ANALOG_CHANNELS = (1, 5, 2, 6, 3, 4, 7, 13, 0, 14, 15)
 CYCLES_PER_US = 16
 
+GROUND_S = 11.0
+STANDING_CMPS, FLYING_CMPS = (20, -10, 0), (1200, -300, 10)
 IDLE_US, CRUISE_US = 1000.0, 1500.0
 DIRECT_US, MEGA_US = 1000.0, 1900.0
 
@@ -59,6 +61,16 @@ def numbered(time_s: float) -> ImuSample:
     )
 
 
+def at_rest(time_s: float) -> ImuSample:
+    """Give samples of an aircraft on the ground: noise that no two neighbours share."""
+    step = round(time_s * 200)
+    return ImuSample(
+        (step % 31, -(step % 29), step % 27),
+        (100 + step % 200, 200 - step % 150, -8192 + step % 170),
+        (100 + step % 50, 200 - step % 40, 9000 + step % 60),
+    )
+
+
 @dataclass
 class FlightRig:
     """A powered-off instrument; `take_off` brings it to recording with the Mega driving.
@@ -82,6 +94,10 @@ class FlightRig:
         its own, kept with `save_card`.
     card_kind : CardKind
         How the card is addressed.
+    ground_s : float
+        IMU and GPS stand still for so long after power-on, then move; 0: it wakes in flight.
+    source : callable
+        What the IMU sends while it moves.
     """
 
     elf: Path
@@ -93,6 +109,7 @@ class FlightRig:
     bootloader: bool = False
     in_place: bool = True
     card_kind: CardKind = CardKind.SDHC
+    ground_s: float = GROUND_S
     source: Callable[[float], ImuSample] = numbered
     sticks: Callable[[float], Sequence[float]] | None = None
     chip: Chip = field(init=False)
@@ -103,6 +120,7 @@ class FlightRig:
     card: SdCard = field(init=False)
     relay: ChargePumpRelay = field(init=False)
     started: list[int] = field(default_factory=list)
+    moving: bool = False
 
     def __post_init__(self) -> None:
         """Wire everything; nothing has power yet."""
@@ -125,9 +143,9 @@ class FlightRig:
         )
         self.receiver.width_us = [CRUISE_US, CRUISE_US, CRUISE_US, IDLE_US, DIRECT_US]
         self.imu = ArduImu(
-            self.chip, rate_hz=self.imu_hz, scl_hz=400_000.0, source=self.source, flags=0x14
+            self.chip, rate_hz=self.imu_hz, scl_hz=400_000.0, source=self._sample, flags=0x14
         )
-        self.gps = GpsUart(self.chip, 2, knows_pvt=True)
+        self.gps = GpsUart(self.chip, 2, knows_pvt=True, velocity_cmps=STANDING_CMPS)
         self.baro = Bmp085(self.chip, "PA2", "PA3")
         self.relay = ChargePumpRelay(self.chip, "PH5", SERVOS, sense="PH6")
         self.chip.on_start(self.started.append)
@@ -140,6 +158,22 @@ class FlightRig:
         self.receiver.start()
         self.imu.start()
         self.gps.start()
+        if self.ground_s > 0.0:
+            self.stand()
+            self.chip.at(self.chip.cycle + round(self.ground_s * CYCLES_PER_US * 1e6), self.fly)
+        else:
+            self.fly()
+
+    def stand(self) -> None:
+        """Let IMU and GPS stand still, as on the ground."""
+        self.moving, self.gps.velocity_cmps = False, STANDING_CMPS
+
+    def fly(self) -> None:
+        """Let IMU and GPS move."""
+        self.moving, self.gps.velocity_cmps = True, FLYING_CMPS
+
+    def _sample(self, time_s: float) -> ImuSample:
+        return self.source(time_s) if self.moving else at_rest(time_s)
 
     def take_off(self, *, ground_s: float = 12.0) -> None:
         """Power on, wait on the ground, throttle up, switch to direct and then to Mega."""

@@ -129,7 +129,7 @@ def fly_on(flight_elf: Path, image: Path, record_s: float) -> tuple[FlightRig, C
     from flight.rig import CRUISE_US, FlightRig
     from simavr_bench.card_journal import CardJournal
 
-    rig = FlightRig(flight_elf, image)
+    rig = FlightRig(flight_elf, image, ground_s=0.0)
     journal = CardJournal(rig.card)
     rig.receiver.width_us[3] = CRUISE_US
     rig.chip.watch(BUZZER)
@@ -159,7 +159,7 @@ def test_full_file_stops_with_an_alarm_and_is_closed_on_the_ground(
         rig.chip.run_s(time_s)
     assert written(journal, full_at) == 0
     assert "card full 1" in last_line(rig)
-    rig.gps.velocity_cmps = (0, 0, 0)
+    rig.stand()
     rig.chip.run_s(12.0)
     assert "card ready 2" in last_line(rig)
     rig.land()
@@ -180,7 +180,7 @@ def test_with_less_than_half_an_hour_left_the_ground_prepares_a_new_file(
 
     image = fill(open_card, tmp_path / "late.img", left=blocks_for(minutes))
     rig, _ = fly_on(flight_elf, image, 3.0)
-    rig.gps.velocity_cmps = (0, 0, 0)
+    rig.stand()
     rig.receiver.width_us[3] = IDLE_US
     rig.chip.run_s(20.0)
     rig.receiver.width_us[3] = CRUISE_US
@@ -204,7 +204,7 @@ def test_blank_file_with_little_room_is_left_for_a_new_one(
     for _ in range(2):
         rig = FlightRig(flight_elf, image)
         rig.power_on()
-        rig.chip.run_s(7.0)
+        rig.chip.run_s(11.0)
         rig.land()
         names = list_files(image)
         blank = read_file(image, "FLT00001.BIN", tmp_path / "blank")
@@ -235,7 +235,7 @@ def test_button_starts_and_stops_and_no_file_is_overwritten(
         rig.chip.drive(BUTTON, None)
         rig.chip.run_s(0.5)
 
-    rig.chip.run_s(8.0)
+    rig.chip.run_s(11.0)
     assert "card ready 42" in last_line(rig)
     lines = len(rig.status_lines())
     press(0.3)
@@ -247,7 +247,8 @@ def test_button_starts_and_stops_and_no_file_is_overwritten(
     rig.receiver.width_us[3] = IDLE_US
     rig.chip.run_s(0.5)
     press(2.5)
-    rig.chip.run_s(10.0)
+    rig.stand()
+    rig.chip.run_s(12.0)
     assert "card ready 43" in last_line(rig)
     rig.land()
     check_card(image)
@@ -264,10 +265,43 @@ def test_button_starts_and_stops_and_no_file_is_overwritten(
     assert "2026-12-24" in listed  # as the GPS said
 
 
-def test_power_off_in_mid_idle_starts_the_ten_seconds_anew(
+def outside_the_file(journal: CardJournal, first_lba: int) -> int:
+    """Blocks programmed that are none of the flight's file."""
+    from flight.cut_flight import FILE_BLOCKS
+
+    place = journal.records()["block"].astype(np.int64) - first_lba
+    return int(np.count_nonzero((place < 0) | (place >= FILE_BLOCKS)))
+
+
+@pytest.mark.parametrize("missing", ["nothing", "imu", "gps", "baro"])
+def test_idle_glide_behind_a_supply_dip_goes_on_in_its_file(
+    flight_elf: Path, open_card: tuple[Path, int], tmp_path: Path, missing: str
+) -> None:
+    """The mark is lost with the supply, the receiver boots for 2.5 s, the throttle is idle."""
+    from flight.rig import IDLE_US, FlightRig
+    from simavr_bench.card_journal import CardJournal, copy_sparse
+
+    image, first_lba = open_card
+    rig = FlightRig(flight_elf, copy_sparse(image, tmp_path / "open.img"), ground_s=0.0)
+    journal = CardJournal(rig.card)
+    rig.receiver.width_us[3] = IDLE_US
+    rig.receiver.lost = True
+    rig.baro.source = lambda cycle: (27_898, 8 * 23_843 + cycle // 160_000)
+    rig.power_on()
+    rig.imu.silent, rig.gps.silent = missing == "imu", missing == "gps"
+    rig.baro.present = missing != "baro"
+    rig.chip.run_s(2.5)
+    rig.receiver.lost = False
+    rig.chip.run_s(27.5)
+    assert written(journal, 0) > 300
+    assert outside_the_file(journal, first_lba) == 0
+    rig.land()
+
+
+def test_aircraft_that_stands_still_closes_its_file_when_that_is_sure(
     flight_elf: Path, open_card: tuple[Path, int], tmp_path: Path
 ) -> None:
-    """Idle, a moment without receiver, idle again: no metadata until 10 s in one piece."""
+    """No metadata while the receiver boots, nor for 4 s behind a jolt; then file and a new one."""
     from flight.rig import IDLE_US, FlightRig
     from simavr_bench.card_journal import CardJournal, copy_sparse
 
@@ -275,12 +309,12 @@ def test_power_off_in_mid_idle_starts_the_ten_seconds_anew(
     journal = CardJournal(rig.card)
     rig.receiver.width_us[3] = IDLE_US
     rig.power_on()
-    rig.chip.run_s(8.0)
-    rig.receiver.lost = True
+    rig.chip.run_s(3.0)
+    rig.moving = True
     rig.chip.run_s(0.5)
-    rig.receiver.lost = False
-    rig.chip.run_s(9.9)
+    rig.moving = False
+    rig.chip.run_s(4.0)
     assert written(journal, 0) == 0
-    rig.chip.run_s(12.0)
+    rig.chip.run_s(9.0)
     assert "card ready 2" in last_line(rig)
     rig.land()

@@ -39,10 +39,10 @@ def test_original_imu_with_its_position_and_ascii_rows(make_rig: MakeRig, tmp_pa
     from flight.settings import settings_image
 
     rig = make_rig(imu_hz=50.0)
-    rig.imu.original, rig.imu.scl_hz, rig.imu.source = True, 100_000.0, turning
+    rig.imu.original, rig.imu.scl_hz, rig.source = True, 100_000.0, turning
     rig.chip.load(settings_image(telemetry=ASCII_ROW, gps_source=ORIGINAL_GPS))
     rig.power_on()
-    rig.chip.run_s(8.0)
+    rig.chip.run_s(11.0)
     assert "| gps fix 3 sat 8 |" in rig.status_lines()[-1]
     rig.receiver.width_us[3] = CRUISE_US
     rig.chip.run_s(1.5)
@@ -86,7 +86,7 @@ def test_bmp280_stands_in_for_the_bmp085(make_rig: MakeRig, tmp_path: Path) -> N
     rig.baro.present = False
     baro = Bmp280(rig.chip, "PA2", "PA3")
     rig.power_on()
-    rig.chip.run_s(7.0)
+    rig.chip.run_s(11.0)
     assert "baro 10065" in rig.status_lines()[-1]  # 100653 Pa: the datasheet's example
     rig.receiver.width_us[3] = CRUISE_US
     rig.chip.run_s(4.0)
@@ -108,8 +108,8 @@ def test_bare_board_with_a_card_records_what_is_there(make_rig: MakeRig, tmp_pat
     rig.baro.present = False
     rig.chip.watch(LED, BUZZER)
     rig.chip.power_on()
-    rig.chip.run_s(7.0)
-    assert "card ready 1" in rig.status_lines()[-1]
+    rig.chip.run_s(24.0)  # nobody but the pitots says still: 18 s, and the file is made
+    assert any("card ready 1" in line for line in rig.status_lines()[-2:])
     pressed = rig.chip.cycle
     assert rig.chip.level(LED)
     rig.chip.drive(BUTTON, False)
@@ -130,7 +130,7 @@ def test_bare_board_with_a_card_records_what_is_there(make_rig: MakeRig, tmp_pat
     ident = log.frames["ident"]
     assert len(ident) > 350
     steps_us = np.diff(ident["t_us"].astype(np.int64))
-    assert np.all(np.abs(steps_us - 10_000) <= 100)  # by turns of the main loop
+    assert np.all(np.abs(steps_us - 10_000) <= 300)  # a turn that looks at the stack takes 0.24 ms
     assert steps_us.mean() == pytest.approx(10_000, abs=1)
     assert np.all(np.abs(ident["alpha_a"] / 4096 * 5.0 - 0.8) < 0.01)
     bits = valid_bit("imu_fresh") | valid_bit("imu_triggered") | valid_bit("mega_drives")

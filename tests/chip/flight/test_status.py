@@ -31,7 +31,7 @@ def last_line(rig: FlightRig) -> StatusLine:
 def test_line_shows_every_sensor(make_rig: MakeRig) -> None:
     rig = make_rig()
     rig.power_on()
-    rig.chip.run_s(6.0)
+    rig.chip.run_s(11.0)
     line = last_line(rig)
     assert line.complaints() == []
     volts = [0.8 + 0.33 * slot for slot in range(11)]
@@ -63,7 +63,7 @@ def test_host_status_shows_the_line_of_the_real_image(make_rig: MakeRig) -> None
 
     rig = make_rig()
     rig.power_on()
-    rig.chip.run_s(4.0)
+    rig.chip.run_s(11.0)
     with PtyBridge(rig.chip, 0) as bridge:
         command = [sys.executable, "-m", "host", "status", bridge.path, "--once", "--json"]
         with subprocess.Popen(
@@ -113,6 +113,7 @@ def test_record_of_the_chips_reference_corrects_the_supply(
     eeprom = bytearray(rig.chip.eeprom())
     eeprom[4088:] = data[4:12]
     rig.chip.set_eeprom(bytes(eeprom))
+    rig.chip.run_s(7.0)
     rig.chip.reset()
     rig.chip.run_s(4.0)
     line = last_line(rig)

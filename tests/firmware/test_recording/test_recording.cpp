@@ -5,6 +5,7 @@
 namespace {
 
 using core::BootAction;
+using core::FlightState;
 using core::RecordAction;
 
 struct Pilot {
@@ -129,45 +130,47 @@ TEST_CASE("the length of a press is told once") {
   CHECK_EQ(pilot.control.take_press_ms(), 0);
 }
 
-TEST_CASE("an unclosed file: throttle above idle, a reset mark or a press resume it at once") {
-  const core::PilotInputs idle = {false, true, true};
-  const core::PilotInputs high = {false, true, false};
+namespace {
+
+const core::PilotInputs kIdle = {false, true, true};
+const core::PilotInputs kHigh = {false, true, false};
+const core::PilotInputs kLost = {false, false, false};
+
+}  // namespace
+
+TEST_CASE("an unclosed file: throttle above idle, a mark, a press or flying continue it at once") {
   core::BootControl by_throttle;
-  CHECK(by_throttle.update(idle, false, 0) == BootAction::kWait);
-  CHECK(by_throttle.update(high, false, 5000) == BootAction::kResume);
+  CHECK(by_throttle.update(kIdle, false, FlightState::kInDoubt, false, 0) == BootAction::kWait);
+  CHECK(by_throttle.update(kHigh, false, FlightState::kInDoubt, false, 5000) ==
+        BootAction::kResume);
   core::BootControl by_mark;
   by_mark.start(true);
-  CHECK(by_mark.update(idle, false, 0) == BootAction::kResume);
+  CHECK(by_mark.update(kIdle, false, FlightState::kInDoubt, false, 0) == BootAction::kResume);
   core::BootControl by_press;
-  CHECK(by_press.update(idle, true, 0) == BootAction::kResume);
+  CHECK(by_press.update(kIdle, true, FlightState::kInDoubt, false, 0) == BootAction::kResume);
+  core::BootControl by_flying;
+  CHECK(by_flying.update(kLost, false, FlightState::kFlying, true, 0) == BootAction::kResume);
 }
 
-TEST_CASE("idle throttle of before the flight does not count behind it") {
+TEST_CASE("neither an idle throttle nor a silent receiver closes it: the ground does") {
   core::BootControl boot;
-  uint32_t now_us = 0;
-  for (; now_us < 5000000U; now_us += 10000U) {
-    CHECK(boot.update({false, true, true}, false, now_us) == core::BootAction::kWait);
-  }
-  for (; now_us < 60000000U; now_us += 10000U) {
-    CHECK(boot.update({false, true, false}, false, now_us) == core::BootAction::kResume);
-  }
-  CHECK(boot.update({false, true, true}, false, now_us) == core::BootAction::kWait);
-  CHECK(boot.update({false, true, true}, false, now_us + 9900000U) == core::BootAction::kWait);
-  CHECK(boot.update({false, true, true}, false, now_us + 10000000U) == core::BootAction::kClose);
-}
-
-TEST_CASE("it is closed after 10 s of valid idle throttle without a break, never before") {
-  core::BootControl boot;
-  const core::PilotInputs idle = {false, true, true};
-  const core::PilotInputs lost = {false, false, false};
   const uint32_t start_us = 0xFFFF0000U;
-  CHECK(boot.update(lost, false, start_us) == BootAction::kWait);
-  CHECK(boot.update(lost, false, start_us + 60000000U) == BootAction::kWait);
-  const uint32_t idle_us = start_us + 61000000U;
-  CHECK(boot.update(idle, false, idle_us) == BootAction::kWait);
-  CHECK(boot.update(idle, false, idle_us + 9000000U) == BootAction::kWait);
-  CHECK(boot.update(lost, false, idle_us + 9500000U) == BootAction::kWait);
-  CHECK(boot.update(idle, false, idle_us + 11000000U) == BootAction::kWait);
-  CHECK(boot.update(idle, false, idle_us + 20999999U) == BootAction::kWait);
-  CHECK(boot.update(idle, false, idle_us + 21000000U) == BootAction::kClose);
+  for (uint32_t at_us = 0; at_us < 60000000U; at_us += 10000U) {
+    const core::PilotInputs& in = at_us < 3000000U ? kLost : kIdle;
+    CHECK(boot.update(in, false, FlightState::kInDoubt, false, start_us + at_us) ==
+          BootAction::kWait);
+  }
+  CHECK(boot.update(kIdle, false, FlightState::kGround, false, start_us + 60000000U) ==
+        BootAction::kClose);
+}
+
+TEST_CASE("in doubt it is continued 8 s after the first that moved, unless it is the ground") {
+  core::BootControl boot;
+  uint32_t now_us = 0xFFFFFFFFU - 2000000U;
+  CHECK(boot.update(kIdle, false, FlightState::kInDoubt, true, now_us) == BootAction::kWait);
+  now_us += 7990000U;
+  CHECK(boot.update(kIdle, false, FlightState::kInDoubt, false, now_us) == BootAction::kWait);
+  CHECK(boot.update(kIdle, false, FlightState::kGround, false, now_us) == BootAction::kClose);
+  now_us += 10000U;
+  CHECK(boot.update(kIdle, false, FlightState::kInDoubt, false, now_us) == BootAction::kResume);
 }

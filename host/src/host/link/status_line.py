@@ -72,7 +72,8 @@ _HINTS = {
     ("card", "full"): "no room for a flight file; free 64 MiB",
     ("card", "fragmented"): "no 64 MiB in one piece; format the card",
     ("card", "lost"): "it went away while it was in use",
-    ("card", "open flight"): "an earlier flight is open; throttle idle for 10 s closes it",
+    ("card", "open flight"): "an earlier flight is open; closed when it stands still",
+    ("card", "waits for the ground"): "its file is made when it stands still, within 20 s",
 }
 
 

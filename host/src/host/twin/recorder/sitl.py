@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from host.errors import UsageError
 from host.twin.faults import Action, Fault, recorder_actions
@@ -23,10 +24,13 @@ from host.twin.sensors.mega_clock import TICKS_PER_S
 from host.wire.schema_text import packed_schema
 
 RATES_HZ = (25, 50, 100, 200)
-PRESS_S, LET_GO_S = 3.6, 3.9  # start button; preparing 64 MiB takes the Mega 2.8 s
-CLOSE_S = 20.0  # the next power-on, throttle idle for 10 s: the recorder closes the file
+PRESS_S, LET_GO_S = 3.6, 3.9  # start button
+GROUND_S = 25.0  # the power-on before: a bare board knows the ground after 18 s, makes a file
+CLOSE_S = 20.0  # the next power-on: on the ground the recorder closes the file
 # Room on the card per second of flight at 100 Hz: about 18 blocks are used.
 BLOCKS_PER_S = 40
+PITOTS = (4, 5)  # places of dp_a and dp_b in a scan
+PITOT_ZERO = 512.0
 CARD_ID = b"\x03VIRT\x15card\x10\x00\x00\x01\x00\xf0"
 CARD_EVENTS = {
     "card_busy": CardFault.BUSY,
@@ -121,8 +125,11 @@ def record(
         No library, or the recorder did not make a file.
     """
     check_duration(given)
+    room_s = given.duration / TICKS_PER_S + 30.0
+    blocks = round(room_s * BLOCKS_PER_S * max(rate_hz / 100.0, 0.5))
+    image = card_image(faults, blocks)
     sitl = Sitl(library_path())
-    image = card_image(faults)
+    sitl.set_file_blocks(blocks)
     try:
         return _record(sitl, image, given, rate_hz, aircraft, faults, seed, progress)
     finally:
@@ -159,9 +166,6 @@ def _record(
     kinds = {fault.kind for fault in faults}
     if "card_absent" not in kinds:
         sitl.insert_card(image, CARD_ID)
-    room_s = given.duration / TICKS_PER_S + 30.0
-    blocks = round(room_s * BLOCKS_PER_S * max(rate_hz / 100.0, 0.5))
-    sitl.set_file_blocks(blocks)
     _configure(sitl, rate_hz, aircraft, damaged="settings_damaged" in kinds)
     for fault in faults:
         if fault.kind == "clock_wrap":
@@ -187,6 +191,7 @@ def _record(
     sitl.power_cut(seed & 0xFFFFFFFF)
     later = end + TICKS_PER_S
     sitl.run_until(later)
+    sitl.set_analog(later, SAMPLE_STEP_TICKS, still_analog(given)[None, :])
     sitl.add_edges(*_idle_receiver(later, later + round(CLOSE_S * TICKS_PER_S)))
     sitl.power_on()
     sitl.run_until(later + round(CLOSE_S * TICKS_PER_S))
@@ -213,12 +218,34 @@ def file_of(image: mmap.mmap, faults: Sequence[Fault]) -> tuple[bytes, str]:
     return CardReader(image).read(flights[0]), flights[0].name
 
 
-def card_image(faults: Sequence[Fault]) -> mmap.mmap:
-    """Return the card the flight begins with: empty and formatted, unless a fault says else."""
+def card_image(faults: Sequence[Fault], file_blocks: int | None = None) -> mmap.mmap:
+    """Return the card the flight begins with: a file prepared on it, unless a fault says else.
+
+    A flight's stimuli begin in the air, where the recorder makes no file. So it had power on the
+    ground before.
+    """
     kinds = {fault.kind for fault in faults}
     if "card_unformatted" in kinds:
         return mmap.mmap(-1, CARD_BYTES)
-    return format_card(full="card_full" in kinds)
+    image = format_card(full="card_full" in kinds)
+    sitl = Sitl(library_path())
+    try:
+        if file_blocks is not None:
+            sitl.set_file_blocks(file_blocks)
+        sitl.insert_card(image, CARD_ID)
+        sitl.power_on()
+        sitl.run_for(GROUND_S)
+        sitl.power_cut()
+    finally:
+        sitl.close()
+    return image
+
+
+def still_analog(given: Stimuli) -> NDArray[np.float64]:
+    """Return the last counts of a flight's analogue inputs, its pitots without wind."""
+    counts = np.array(given.analog[-1], dtype=np.float64)
+    counts[list(PITOTS)] = PITOT_ZERO
+    return counts
 
 
 def _act(sitl: Sitl, given: Stimuli, at: int, action: Action) -> None:
