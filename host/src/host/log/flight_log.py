@@ -27,8 +27,8 @@ from host.wire.store import Frames, FrameStore
 if TYPE_CHECKING:
     import pandas as pd
 
-# Each session heads its blocks with the schema: 13 of them. The first few may have lost theirs.
-_SESSIONS, _SESSION_BLOCKS = 64, 13
+# A reset costs at least the schema, 14 blocks, and a second of flight as many; some may be damaged.
+_SESSIONS, _SESSION_BLOCKS = 48, 28
 GAP_BETWEEN_SESSIONS_S = 2.0  # by convention, where no GPS says how long a reset took
 
 
@@ -75,7 +75,7 @@ class FlightLog:
         if runs > most:
             raise LogError(
                 f"{path}: the session changes {runs} times in {len(blocks)} blocks; expected at"
-                f" most {most}: a session begins with its schema; --session N reads one"
+                f" most {most}: a session holds its schema and a second; --session N reads one"
             )
         self.blocks = blocks
         self.store = FrameStore(path, blocks, schema, progress)

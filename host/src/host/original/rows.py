@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,7 +39,7 @@ VARIANTS: dict[str, tuple[str, ...]] = {
 }
 _LABELS = sorted({label for labels in VARIANTS.values() for label in labels}, key=len, reverse=True)
 # "gpsgc0.00" and "gpsalt:17.00 " are both as printed
-_FIELD = re.compile(rf"({'|'.join(_LABELS)})\s*:?\s*(-?\d{{1,7}}(?:\.(\d{{1,7}}))?)")
+_FIELD = re.compile(rf"({'|'.join(_LABELS)})\s*(?::\s*)?(-?\d{{1,7}}(?:\.(\d{{1,7}}))?)")
 _BARE_ROLL = re.compile(r"(-?\d{1,3}\.(\d\d))")  # variant 26: the station strips "RLL:"
 _SIGNATURE = re.compile(rb"PCH\s*:\s*-?\d+\.\d+\s*,\s*YAW\s*:")
 _RANGES = {
@@ -105,25 +106,30 @@ def read_rows(path: Path) -> OriginalRows:
 
 def parse_rows(data: bytes, name: str = "rows") -> OriginalRows:
     """Parse original rows; see `read_rows`."""
-    found = [row for line in re.finditer(rb"[^\r\n]+", data) for row in _rows_of_line(line)]
-    if not found:
+    # Twice: what all rows have in common first, so that no row is held but as numbers.
+    count, seen = 0, Counter[str]()
+    digits_of: dict[str, Counter[int]] = {}
+    for row in _rows(data):
+        count += 1
+        seen.update(row.fields.keys())
+        for label, (_, digits) in row.fields.items():
+            digits_of.setdefault(label, Counter[int]())[digits] += 1
+    if not count:
         raise NotALogError(f"{name}: no row of the original logger (RLL:...,PCH:...,YAW:...)")
-    variant = _variant(found)
-    labels = VARIANTS[variant]
-    decimals = _usual_decimals(found)
-    values = {label: np.full(len(found), np.nan) for label in labels}
-    for at, row in enumerate(found):
+    variant = _variant(seen)
+    # Fewer or more decimals than usual are a damaged number.
+    decimals = {label: digits.most_common(1)[0][0] for label, digits in digits_of.items()}
+    values = {label: np.full(count, np.nan) for label in VARIANTS[variant]}
+    offset, length = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    for at, row in enumerate(_rows(data)):
+        offset[at], length[at] = row.offset, row.length
         for label, (text, digits) in row.fields.items():
             if label in values and digits == decimals[label]:
                 values[label][at] = _in_range(label, float(text))
-    damaged = np.sum([np.isnan(column) for column in values.values()], axis=0)
-    return OriginalRows(
-        variant,
-        values,
-        np.array([row.offset for row in found], np.int64),
-        np.array([row.length for row in found], np.int64),
-        np.asarray(damaged, np.int64),
-    )
+    damaged = np.zeros(count, np.int64)
+    for column in values.values():
+        damaged += np.isnan(column)
+    return OriginalRows(variant, values, offset, length, damaged)
 
 
 @dataclass(slots=True)
@@ -133,39 +139,45 @@ class _Row:
     fields: dict[str, tuple[str, int]]
 
 
-def _rows_of_line(line: re.Match[bytes]) -> list[_Row]:
-    """Split one line into rows: two of them where the end of the first was lost."""
-    rows: list[_Row] = []
+def _rows(data: bytes) -> Iterator[_Row]:
+    """Yield the rows: two of a line where the end of the first was lost."""
+    for line in re.finditer(rb"[^\r\n]+", data):
+        yield from (row for row in _rows_of_line(line) if len(row.fields) >= 2)
+
+
+def _rows_of_line(line: re.Match[bytes]) -> Iterator[_Row]:
+    row: _Row | None = None
     order = -1
-    text = line.group().decode("ascii", "replace")
-    whole_labels = {label: at for at, label in enumerate(_ORDER)}
     at_byte = line.start()
     last: str | None = None
-    for token in text.split(","):
-        match = _FIELD.fullmatch(token.strip())
-        roll = _BARE_ROLL.fullmatch(token.strip()) if not rows and match is None else None
+    for part in re.finditer(rb"[^,]*(?:,|$)", line.group()):
+        token = part.group().rstrip(b",").decode("ascii", "replace").strip()
+        match = _FIELD.fullmatch(token)
+        roll = _BARE_ROLL.fullmatch(token) if row is None and match is None else None
         if match is not None or roll is not None:
             label = match.group(1) if match is not None else "RLL"
-            if not rows or whole_labels[label] <= order:
-                _distrust_cut(rows, last)
-                rows.append(_Row(at_byte, 0, {}))
-            order = whole_labels[label]
-            number = match.group(2) if match is not None else token.strip()
-            rows[-1].fields[label] = (number, len(number.partition(".")[2]))
+            if row is None or _PLACE[label] <= order:
+                if row is not None:
+                    yield _without_cut(row, last)
+                row = _Row(at_byte, 0, {})
+            order = _PLACE[label]
+            number = match.group(2) if match is not None else token
+            row.fields[label] = (number, len(number.partition(".")[2]))
             last = label
-        elif rows and token.strip("0 ."):
+        elif row is not None and token.strip("0 ."):
             last = None  # what was cut is this token, not the field before it
-        at_byte += len(token) + 1
-        if rows:
-            rows[-1].length = min(at_byte, line.end()) - rows[-1].offset
-    _distrust_cut(rows, last)
-    return [row for row in rows if len(row.fields) >= 2]
+        at_byte = line.start() + part.end()
+        if row is not None:
+            row.length = at_byte - row.offset
+    if row is not None:
+        yield _without_cut(row, last)
 
 
-def _distrust_cut(rows: list[_Row], last: str | None) -> None:
+def _without_cut(row: _Row, last: str | None) -> _Row:
     """Drop the last field of a row that ends early: its number may be cut in the middle."""
-    if rows and last is not None and last != "throts":
-        rows[-1].fields.pop(last, None)
+    if last is not None and last != "throts":
+        row.fields.pop(last, None)
+    return row
 
 
 # One order that all variants keep: a label that steps back in it begins a new row.
@@ -177,22 +189,15 @@ _ORDER = (
 )
 
 
-def _variant(rows: list[_Row]) -> str:
-    seen = Counter(label for row in rows for label in row.fields)
+_PLACE = {label: at for at, label in enumerate(_ORDER)}
+
+
+def _variant(seen: Counter[str]) -> str:
     if seen["velocitya"] or seen["alphaa"] or seen["betab"]:
         return "26 readings"
     if seen["elev"] or seen["ail"] or seen["gpsalt"] or seen["ruds"]:
         return "27 readings"
     return "23 readings"
-
-
-def _usual_decimals(rows: list[_Row]) -> dict[str, int]:
-    """Return for each label how many decimals it has: fewer or more are a damaged number."""
-    counts: dict[str, Counter[int]] = {}
-    for row in rows:
-        for label, (_, digits) in row.fields.items():
-            counts.setdefault(label, Counter())[digits] += 1
-    return {label: counter.most_common(1)[0][0] for label, counter in counts.items()}
 
 
 def _in_range(label: str, value: float) -> float:

@@ -15,6 +15,7 @@ from host.physical.columns import COLUMNS, UNITS
 
 Json = dict[str, Any]
 _SHOWN = 8
+_LISTED = 10_000  # a file with more damaged rows tells nothing by listing them
 
 
 def summarise_rows(
@@ -50,8 +51,10 @@ def summarise_rows(
                     "text": f"byte {rows.offset[at]}, row {at + 1}: {rows.damaged[at]} of"
                     f" {len(rows.values)} fields missing or damaged, marked invalid",
                 }
-                for at in hurt.tolist()
-            ]
+                for at in hurt[:_LISTED].tolist()
+            ],
+            "damaged_rows": len(hurt),
+            "ending": None,
         },
         "calibration": {
             "name": calibration.name,
@@ -81,10 +84,11 @@ def row_lines(summary: Json) -> list[str]:
         words = ", ".join(f"{name} {count}" for name, count in lost.items())
         out.append(f"{'overflow':<13}two counts explain the value, marked invalid: {words}")
     ranges = summary["losses"]["ranges"]
-    out.append(f"{'losses':<13}" + (f"{len(ranges)} damaged rows" if ranges else "none"))
+    hurt = summary["losses"]["damaged_rows"]
+    out.append(f"{'losses':<13}" + (f"{hurt} damaged rows" if hurt else "none"))
     out += [f"{'':<13}{loss['text']}" for loss in ranges[:_SHOWN]]
-    if len(ranges) > _SHOWN:
-        out.append(f"{'':<13}... and {len(ranges) - _SHOWN} more: --json lists all")
+    if hurt > _SHOWN:
+        out.append(f"{'':<13}... and {hurt - _SHOWN} more: --json lists {len(ranges)}")
     out += [f"{'note':<13}{note}" for note in summary["notes"]]
     out.append(f"{'calibration':<13}{summary['calibration']['name']}")
     return out
