@@ -7,11 +7,11 @@ int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
   memcpy(copy, bytes, size);
   const bool found = size >= 3 && memcmp(copy, "bad", 3) == 0;
 #ifdef PLANTED_READ
-  const int sum = found ? copy[size] : 0;
+  static volatile uint8_t kept;
+  if (found) kept = copy[size];
 #else
-  const int sum = 0;
   ALWAYS(!found);
 #endif
   free(copy);
-  return sum < 0 ? -1 : 0;
+  return 0;
 }
