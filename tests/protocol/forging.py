@@ -223,7 +223,8 @@ def _change_schema(schema: dict[str, Any], rng: np.random.Generator) -> None:
         if isinstance(table, dict) and table:
             table[pick([*NAMES, *table])] = pick([*NUMBERS, *NAMES, list(NAMES), ["a"] * 40])
     elif choice == 10:
-        rows += [[f"more_{at}", "u8"] for at in range(int(rng.choice([1, 20, 60, 300])))]
+        name, kind = pick([*NAMES, "file", "units", "notes", "more"]), pick(TYPES)
+        rows += [[f"{name}{at or ''}", kind] for at in range(int(rng.choice([1, 1, 2, 60, 300])))]
     else:
         schema[pick(["format", "version", "bits", "enum", "columns", "frames"])] = pick(NUMBERS)
 

@@ -17,6 +17,7 @@ import sys
 import tempfile
 import traceback
 import warnings
+import zlib
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -27,6 +28,7 @@ import numpy as np
 from host.decode.decoding import decode
 from host.decode.writing import Request, write_frames
 from host.errors import HostError
+from host.export import FORMATS
 from host.log import FlightLog, read_log
 from host.log.head import describe, head_lines
 from host.physical.calibration import load_calibration
@@ -103,7 +105,8 @@ def judge(data: bytes, folder: Path, *, whole: bool = False) -> tuple[str, int]:
         end = log.complete
         if whole:
             log.table()
-            said = decode(Request(path, output=str(out / "flight.csv"), frames=True)).summary
+            kind = FORMATS[len(data) % len(FORMATS)]
+            said = decode(Request(path, output=str(out / f"flight.{kind}"), frames=True)).summary
             json.dumps(said, allow_nan=False)
             head_lines(describe(path))
     except HostError as error:
@@ -215,7 +218,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _save(campaign: Campaign, keep: Path) -> None:
-    state = {"done": campaign.done, "rows": campaign.rows, "ends": dict(campaign.ends)}
+    state = {
+        "of": _code(),
+        "done": campaign.done,
+        "rows": campaign.rows,
+        "ends": dict(campaign.ends),
+    }
     keep.write_text(json.dumps(state | {"failures": campaign.failures}))
 
 
@@ -223,7 +231,17 @@ def _load(keep: Path) -> Campaign:
     if not keep.is_file():
         return Campaign()
     state = json.loads(keep.read_text())
+    if state.get("of") != _code():  # what it was about has changed
+        return Campaign()
     return Campaign(state["done"], state["rows"], Counter(state["ends"]), state["failures"])
+
+
+@lru_cache(maxsize=1)
+def _code() -> int:
+    """Return a CRC-32 over the host's rooms that read a log, and over the mutations."""
+    rooms = [f"host/src/host/{name}" for name in ("wire", "log", "decode", "export", "physical")]
+    files = [path for room in [*rooms, "tests/protocol"] for path in (ROOT / room).glob("*.py")]
+    return zlib.crc32(b"".join(path.read_bytes() for path in sorted(files)))
 
 
 @lru_cache(maxsize=1)
@@ -233,8 +251,6 @@ def _calibration() -> Any:
 
 @lru_cache(maxsize=1)
 def _known() -> dict[int, bytes]:
-    import zlib
-
     return {zlib.crc32(text): text for text in released_texts()}
 
 

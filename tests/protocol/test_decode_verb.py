@@ -14,7 +14,7 @@ from tests.protocol.log_writer import BLOCK
 from tests.protocol.test_damage import OTHER_FILES
 
 FLIGHT = simple_log(2.0)
-OK, LOSSES, NOT_A_LOG = 0, 3, 4
+OK, LOSSES, NOT_A_LOG, CHECK = 0, 3, 4, 6
 
 
 def run(path: Path, *options: str) -> int:
@@ -88,3 +88,39 @@ def test_sparse_file_of_ten_gigabytes(tmp_path: Path, capsys: pytest.CaptureFixt
     os.truncate(path, 10 * 1024**3)
     assert run(path, "--json") == OK
     assert json.loads(capsys.readouterr().out)["rows"] == 200
+
+
+def never_closed(path: Path) -> None:
+    """Write a flight whose file has its full size and no end of its session."""
+    size = 400 * BLOCK
+    data = simple_log(8.0, preallocated=size).data()[: -2 * BLOCK]
+    path.write_bytes(data + bytes(size - len(data)))
+
+
+def test_file_never_closed_is_exit_code_0_and_fails_strict(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "flight.bin"
+    never_closed(path)
+    assert run(path) == OK
+    said = capsys.readouterr().out
+    assert "complete as far as blocks reach, " in said
+    assert "losses       none" not in said
+    assert run(path, "--strict") == CHECK
+    capsys.readouterr()
+    assert run(path, "--json", "--session", "1") == OK
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["complete"] == "truncated"
+    assert summary["losses"]["unproven_bytes"] > 0
+
+
+@pytest.mark.parametrize("verb", ["maneuvers", "identify"])
+def test_first_line_says_that_the_end_is_not_proven(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str
+) -> None:
+    path = tmp_path / "flight.bin"
+    never_closed(path)
+    code = main([verb, str(path)])  # nothing was flown in it: an answer, or one line that says why
+    said = capsys.readouterr()
+    first = (said.out or said.err).splitlines()[0]
+    assert "complete as far as blocks reach, " in first, (code, said)

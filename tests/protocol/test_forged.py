@@ -290,3 +290,27 @@ def test_two_hundred_mutations(kind: str, capsys: pytest.CaptureFixture[str]) ->
     assert fuzz_log.main([kind, "--seed", "5000", "--count", "200", "--no-limit"]) == 0, (
         capsys.readouterr().out
     )
+
+
+@pytest.mark.parametrize("kind", ["csv", "npz", "mat", "parquet"])
+def test_fields_called_as_parts_of_a_format_are_columns_like_others(
+    tmp_path: Path, kind: str
+) -> None:
+    names = ["file", "units", "notes", "meaning", "allow_pickle", "a" * 31 + "b", "a" * 31 + "c"]
+
+    def more(schema: dict[str, Any]) -> None:
+        schema["frames"].append(
+            {"id": 99, "name": "more", "rate_hz": 0,
+             "fields": [["t_us", "u32"], *([name, "f32"] for name in names)]}
+        )  # fmt: skip
+
+    text = altered(more)
+    value = int.from_bytes(text[16:20], "little")
+    nan = bytes([99]) + bytes(4) + struct.pack("<f", float("nan")) * len(names)
+    behind = of_flight(len(text) // BLOCK, nan, schema_hash=value)
+    path = tmp_path / "flight.bin"
+    path.write_bytes(text + behind)
+    target = tmp_path / f"flight.{kind}"
+    assert main(["decode", str(path), "--frames", "-o", str(target)]) in (0, 3)
+    assert (tmp_path / f"flight.frames/more.{kind}").stat().st_size > 100
+    assert main(["info", str(path)]) == 0

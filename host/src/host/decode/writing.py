@@ -119,7 +119,8 @@ def _blamed_on(target: Path) -> Iterator[None]:
 
 def write_frames(log: FlightLog, kind: str, target: Path) -> list[str]:
     """Write every kind of raw frame to a file of its own; return the files."""
-    folder = target.with_suffix(".frames")
+    beside = Path(log.path.name) if target == STDOUT else target
+    folder = beside.with_suffix(".frames")
     with _blamed_on(folder):
         folder.mkdir(parents=True, exist_ok=True)
     files = []

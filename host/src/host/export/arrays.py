@@ -32,6 +32,20 @@ class _Collected:
         return {name: np.concatenate(self._parts.pop(name)) for name in names}
 
 
+def _distinct(names: list[str], reserved: tuple[str, ...], longest: int) -> dict[str, str]:
+    """Return a name for each column that no other and no part of the format has."""
+    taken = set(reserved)
+    out: dict[str, str] = {}
+    for name in names:
+        short, number = name[:longest], 1
+        while short in taken:
+            number += 1
+            short = f"{name[: longest - 4]}_{number}"
+        taken.add(short)
+        out[name] = short
+    return out
+
+
 class MatWriter(_Collected):
     """MATLAB file: one column vector per column, structs `units`, `meaning` and `notes`."""
 
@@ -46,9 +60,10 @@ class MatWriter(_Collected):
                     f"column {name} has {value.nbytes} bytes; MAT version 5 holds"
                     f" {_MAT_LIMIT_BYTES}: use --to parquet, or one --session"
                 )
-        content: dict[str, Any] = {name[:_MAT_NAME]: value for name, value in columns.items()}
-        content["units"] = {name[:_MAT_NAME]: self._meta.units.get(name, "") for name in columns}
-        content["meaning"] = {name[:_MAT_NAME]: self._meta.texts.get(name, "") for name in columns}
+        names = _distinct(list(columns), ("units", "meaning", "notes"), _MAT_NAME)
+        content: dict[str, Any] = {names[name]: value for name, value in columns.items()}
+        content["units"] = {names[name]: self._meta.units.get(name, "") for name in columns}
+        content["meaning"] = {names[name]: self._meta.texts.get(name, "") for name in columns}
         content["notes"] = dict(self._meta.notes)
         with self._path.open("wb") as file:  # savemat hides why it could not open a name
             savemat(file, content, oned_as="column")
@@ -62,7 +77,9 @@ class NpzWriter(_Collected):
         columns = self._whole()
         pairs = [(name, self._meta.units.get(name, "")) for name in columns]
         notes = list(self._meta.notes.items())
-        content: dict[str, Any] = dict(columns)
+        # The first three are arguments of numpy's own.
+        names = _distinct(list(columns), ("file", "args", "allow_pickle", "units", "notes"), 200)
+        content: dict[str, Any] = {names[name]: value for name, value in columns.items()}
         content["units"] = np.array(pairs, dtype=str).reshape(-1, 2)
         content["notes"] = np.array(notes, dtype=str).reshape(-1, 2)
         np.savez(self._path, **content)

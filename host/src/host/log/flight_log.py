@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 # A reset costs at least the schema, 14 blocks, and a second of flight as many; some may be damaged.
 _SESSIONS, _SESSION_BLOCKS = 48, 28
+_SHOWN_SESSIONS = 12
 GAP_BETWEEN_SESSIONS_S = 2.0  # by convention, where no GPS says how long a reset took
 
 
@@ -65,7 +66,8 @@ class FlightLog:
         self.schema = schema
         self.calibration = calibration
         if session is not None and session not in selection.sessions:
-            known = ", ".join(str(number) for number in selection.sessions)
+            known = ", ".join(str(number) for number in selection.sessions[:_SHOWN_SESSIONS])
+            known += ", ..." if len(selection.sessions) > _SHOWN_SESSIONS else ""
             raise LogError(f"{path}: no session {session}; this log holds {known}")
         self._only = session
         blocks = selection.blocks

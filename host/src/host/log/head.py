@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -98,5 +99,6 @@ def _plain(frame: Any) -> dict[str, Any]:
         elif value.ndim:
             out[name] = bytes(value).hex()
         else:
-            out[name] = int(value)
+            number = value.item()
+            out[name] = number if math.isfinite(number) else None
     return out
