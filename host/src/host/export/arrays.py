@@ -66,7 +66,7 @@ class MatWriter(_Collected):
         content["meaning"] = {names[name]: self._meta.texts.get(name, "") for name in columns}
         content["notes"] = dict(self._meta.notes)
         with self._path.open("wb") as file:  # savemat hides why it could not open a name
-            savemat(file, content, oned_as="column")
+            savemat(file, content, oned_as="column")  # type: ignore[arg-type]  # it takes files
 
 
 class NpzWriter(_Collected):
