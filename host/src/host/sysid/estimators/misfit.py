@@ -66,5 +66,5 @@ def widened_names(model: LinearModel, factor: Array) -> list[str]:
         return []
     return [
         f"the model does not follow this motion throughout: intervals widened {', '.join(said)}"
-        " times; such ones held 90-92 % of cases in gusts, not 95, Cm_alpha 83 (host/STUDY.md, d)"
+        " times; such ones held 90-92 % of cases in gusts, not 95, Cm_alpha 83 (host/studies/nonlinear_gusts.md)"
     ]
