@@ -1,6 +1,6 @@
 """Fly and identify the flight of host/IDENTIFY.md, and make that page's pictures anew.
 
-    cd host && python -m studies.first_flight
+cd host && python -m studies.first_flight
 """
 
 from __future__ import annotations
