@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
-from host.instrument.errors import instrument_data
+from host.instrument.deviations import instrument_data
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.errors import IdentificationError

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import AirframeData
-from host.instrument.errors import instrument_data
+from host.instrument.deviations import instrument_data
 from host.sysid import Maneuver
 from host.sysid.compatibility.at_cg import IMU_DELAY, at_cg, open_errors, without_open
 from host.sysid.compatibility.reconstruction import Compatibility, Finding

@@ -13,7 +13,7 @@ from host.aircraft.powerplant import powerplant
 from host.cli import main
 from host.compiled import Array
 from host.export import toml as tomlout
-from host.instrument.errors import instrument_data
+from host.instrument.deviations import instrument_data
 from host.sysid.coefficients.answer import CoefficientFit, Derivative
 from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.local import Mean, local_derivatives

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
-from host.instrument.errors import instrument_data
+from host.instrument.deviations import instrument_data
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
 from host.sysid.answer.truth import true_coefficients

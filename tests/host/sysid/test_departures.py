@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.aircraft.powerplant import powerplant
+from host.instrument.deviations import unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.estimators.start import regressed, start_values
 from host.sysid.flight import linear
 from host.sysid.flight.departures import spin_of
 from host.sysid.flight.finder import Found
-from host.sysid.flight.linear import IMU_SD_M, identify
+from host.sysid.flight.linear import identify, imu_place_m
 from host.sysid.flight.tables import even_columns
 from host.sysid.models.delays import DELAYS
 from host.sysid.models.result import FitResult
@@ -96,7 +97,9 @@ def test_equation_error_gives_the_start_though_places_and_delays_are_free(
     """What enters no regression keeps its own start; all else begins near the truth."""
     columns, maneuvers = calm
     truth = true_coefficients({"maneuver": maneuvers}, "lateral")
-    full = template("lateral", Trim(20.0, 0.07, 0.07), imu_sd_m=IMU_SD_M, delays=DELAYS)
+    full = template(
+        "lateral", Trim(20.0, 0.07, 0.07), imu_sd_m=imu_place_m(unknown_sensors()), delays=DELAYS
+    )
     cut = [linear._cut(columns, full, f) for f in windows(maneuvers)]
     told = regressed(full, cut)
     assert "imu_x_m" not in told

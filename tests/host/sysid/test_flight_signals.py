@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import START_RADPS, SUBSTEPS, powerplant
-from host.instrument.errors import deviations, instrument_data
+from host.instrument.deviations import deviations, instrument_data
 from host.sysid.coefficients.fit import COLUMNS
 from host.sysid.compatibility.signals import Record, corrected
 

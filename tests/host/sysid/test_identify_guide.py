@@ -11,7 +11,7 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import NoPropulsionError, powerplant
 from host.cli import main
 from host.export.toml import dumps
-from host.instrument.errors import instrument_data
+from host.instrument.deviations import instrument_data
 from host.sysid.flight.tables import read_columns
 from host.sysid.models.model_file import read_model
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
-from host.instrument.errors import instrument_data
+from host.instrument.deviations import instrument_data
 from host.sysid.compatibility.flight_path import (
     AIR,
     GPS,
@@ -168,7 +168,7 @@ def test_injected_bias_scale_and_delay_come_back() -> None:
 
 def test_gusts_do_not_pass_for_vanes_that_under_read() -> None:
     """The calibration's own word on the vanes is withheld: data alone tell their scale."""
-    unsure = replace(INSTRUMENT, vane_scale=0.3)
+    unsure = INSTRUMENT.scaled(10.0, "vane_scale")
     errors, faults = [], []
     for seed in (1, 2):
         columns, true = flown(seed)

@@ -1,123 +1,240 @@
-"""What the airborne instrument may be wrong by: one standard deviation of each unknown error.
+"""Every error an instrument may have, by name: how large, how drawn, for whom, and who says so.
 
-Every entry moves the corrected signals or the known mass properties; `coefficient_fit` estimates
-all of them beside the coefficients, so that what the data cannot tell stays in the intervals.
+`standard.toml` has them all; a calibration and an aircraft file say better. Identification takes
+one standard deviation of each from here, the virtual flight draws from here.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 
-import numpy as np
+from host.aircraft.file import Aircraft
+from host.errors import CalibrationError
+from host.physical.calibration import Calibration, Line
 
-from host.aircraft.file import load_measured
-from host.aircraft.mass_properties import AirframeData, place
-
-EVEN = 1.0 / np.sqrt(3.0)  # standard deviation of an even distribution over its half-width
-PAIR = 1.0 / np.sqrt(2.0)  # of the mean of two sensors
-DEGREE = np.pi / 180.0
+STANDARD = Path(__file__).with_name("standard.toml")
+EVEN = 1.0 / math.sqrt(3.0)  # standard deviation of an even distribution over its half-width
+DISTRIBUTIONS = ("even", "normal")
+DRAWN = ("instrument", "flight")
+KEYS = ("sigma", "half_width", "distribution", "drawn", "shared", "source")
+# Lines of a calibration and the errors their zero and slope have.
+LINES = {
+    **dict.fromkeys(("alpha_a", "alpha_b", "beta_a", "beta_b"), ("vane_zero_rad", "vane_scale")),
+    **dict.fromkeys(("dp_a", "dp_b"), ("pitot_zero_pa", "pitot_scale")),
+    **dict.fromkeys(
+        ("pot_elevator", "pot_aileron_left", "pot_aileron_right", "pot_rudder"),
+        ("pot_zero_rad", "pot_scale"),
+    ),
+}
+IMU_LINES = {
+    "imu.gyro": ("gyro_bias_radps", "gyro_scale"),
+    "imu.accel": ("accel_bias_mps2", "accel_scale"),
+}
 
 
 @dataclass(frozen=True, slots=True)
-class InstrumentData:
-    """Sensor dynamics from the aircraft file, and what is left after calibration.
+class NamedError:
+    """One error of all sensors that have it.
 
-    Half-widths of the even distributions of an instrument that was calibrated once; positions in
-    metres from the nominal CG.
+    Attributes
+    ----------
+    name : str
+        Ends in its unit; a share or scale has none.
+    sensors : tuple of str
+    width : tuple of float
+        One per sensor: half-width of an even distribution, standard deviation of a normal one.
+    distribution : str
+        ``even`` or ``normal``.
+    drawn : str
+        ``instrument``: constant; ``flight``: new at every power-on.
+    shared : tuple of str
+        Those of the sensors that have one value in common; others have their own.
+    source : str
+    aircraft_file : str
+        Which tolerance of an aircraft file says it; empty: none.
     """
 
-    imu_m: tuple[float, float, float]
-    vanes_m: tuple[float, float, float]
-    upwash: float
-    upwash_share: float
-    vane_hz_per_mps: float
-    vane_damping: float
-    vane_friction_rad: float
-    friction_speed_mps: float
-    pitot_lag_s: float
-    position_m: float = 0.010
-    cg_m: float = 0.010
-    vane_scale: float = 0.03
-    vane_zero_rad: float = 0.5 * DEGREE
-    pitot_scale: float = 0.03
-    pitot_drift_pa: float = 4.88
-    delay_share: float = 0.20
-    delay_least_s: float = 1e-3
-    align_s: float = 0.5e-3  # filters modelled as one pole and a delay
-    misalignment_rad: float = 1.0 * DEGREE
-    gyro_scale: float = 0.01
-    gyro_bias_radps: float = 0.5 * DEGREE
-    accel_scale: float = 0.01
-    accel_bias_mps2: float = 0.245
-    pot_scale: float = 0.01
-    friction_share: float = 0.2  # standard deviation
-    density_share: float = 0.005  # standard deviation
-    thrust_share: float = 0.02  # standard deviation
-    imu_bandwidth_hz: float = 42.0  # MPU-6000 register map, DLPF_CFG 3
+    name: str
+    sensors: tuple[str, ...]
+    width: tuple[float, ...]
+    distribution: str
+    drawn: str
+    shared: tuple[str, ...]
+    source: str
+    aircraft_file: str = ""
+
+    @property
+    def sigmas(self) -> tuple[float, ...]:
+        """One standard deviation of each sensor."""
+        return tuple(w * (EVEN if self.distribution == "even" else 1.0) for w in self.width)
+
+    def sigma(self, sensor: str) -> float:
+        """Return one standard deviation of a sensor's error."""
+        return self.sigmas[self.sensors.index(sensor)]
+
+    def of_mean(self, *sensors: str) -> float:
+        """Return one standard deviation of the mean of some sensors' errors; none: of all."""
+        named = sensors or self.sensors
+        common = sum(self.sigma(s) for s in named if s in self.shared)
+        own = sum(self.sigma(s) ** 2 for s in named if s not in self.shared)
+        return math.sqrt(common**2 + own) / len(named)
 
 
-def instrument_data(source: str) -> InstrumentData:
-    """Return the sensors' places and dynamics of an aircraft by name or file.
+@dataclass(frozen=True, slots=True)
+class InstrumentErrors:
+    """All errors of an instrument, by name."""
+
+    named: Mapping[str, NamedError]
+
+    def __getitem__(self, name: str) -> NamedError:
+        """Return an error by name."""
+        return self.named[name]
+
+    def __iter__(self) -> Iterator[NamedError]:
+        """Go through all errors."""
+        return iter(self.named.values())
+
+    def scaled(self, factor: float, *names: str) -> InstrumentErrors:
+        """Return the same with some errors, or all, that many times as large."""
+        wanted = names or tuple(self.named)
+        changed = {
+            n: replace(self[n], width=tuple(factor * w for w in self[n].width)) for n in wanted
+        }
+        return InstrumentErrors({**self.named, **changed})
+
+
+@cache
+def standard_errors() -> InstrumentErrors:
+    """Return the errors of an instrument that was calibrated once, as `standard.toml` has them."""
+    document = tomllib.loads(STANDARD.read_text(encoding="utf-8"))
+    found = {}
+    for name, table in document["error"].items():
+        said = table.get("aircraft_file", "")
+        blank = NamedError(name, tuple(table["sensors"]), (), "even", "flight", (), "", said)
+        kept = {k: v for k, v in table.items() if k in KEYS}
+        found[name] = _said(blank, kept, f"{STANDARD.name}: [error.{name}]")
+    return InstrumentErrors(found)
+
+
+def instrument_errors(
+    aircraft: Aircraft | None = None, calibration: Calibration | None = None
+) -> InstrumentErrors:
+    """Return what an instrument may be wrong by.
+
+    Parameters
+    ----------
+    aircraft : Aircraft, optional
+        Gives tolerances of mass, places and upwash.
+    calibration : Calibration, optional
+        Gives the deviations of its measured lines and its tables [error.NAME]. A line that nobody
+        measured on this instrument says nothing: the standard holds.
 
     Raises
     ------
-    host.errors.UsageError
-        If there is no such file, or it does not describe its sensors.
+    CalibrationError
+        If an error is unknown, or a key of it or its value is not what it may be.
     """
-    loaded = load_measured(source)
-    number, vector, cg = loaded.scalar, loaded.vector, loaded.vector("mass.cg_m")
-    between = 0.5 * (vector("sensors.vane_a_m") + vector("sensors.vane_b_m"))
-    return InstrumentData(
-        imu_m=place(vector("sensors.imu_m") - cg),
-        vanes_m=place(between - cg),
-        upwash=number("sensors.upwash"),
-        upwash_share=number("sensors.upwash_tolerance"),
-        vane_hz_per_mps=number("sensors.vane_frequency_hz_per_mps"),
-        vane_damping=number("sensors.vane_damping"),
-        vane_friction_rad=number("sensors.vane_friction_rad"),
-        friction_speed_mps=number("trim.airspeed_mps"),
-        pitot_lag_s=number("sensors.pitot_lag_s"),
-        position_m=number("sensors.position_tolerance_m"),
-        cg_m=number("mass.cg_tolerance_m"),
+    found = dict(standard_errors().named)
+    if aircraft is not None:
+        for name, error in found.items():
+            if error.aircraft_file:
+                tolerance = aircraft.scalar(error.aircraft_file)
+                source = aircraft.sources.get(error.aircraft_file, error.source)
+                found[name] = replace(error, width=(tolerance,) * len(error.sensors), source=source)
+    if calibration is not None:
+        for name, line in calibration.lines.items():
+            if not line.default:
+                _take_line(found, name, line)
+        for name, table in calibration.errors.items():
+            where = f"{calibration.path}: [error.{name}]"
+            if name not in found:
+                raise CalibrationError(
+                    f"{where} is unknown; known are {', '.join(n for n in found)}"
+                )
+            if found[name].aircraft_file:
+                raise CalibrationError(
+                    f"{where} belongs into the aircraft file, as {found[name].aircraft_file}"
+                )
+            found[name] = _said(found[name], table, where)
+    return InstrumentErrors(found)
+
+
+def _take_line(found: dict[str, NamedError], name: str, line: Line) -> None:
+    """Put the deviations of a calibration's line where they belong."""
+    channel = name.partition(".")[2]
+    if name in IMU_LINES:
+        zero, scale = IMU_LINES[name]
+        sensors, by_zero = found[zero].sensors, line.zero_sigma
+    elif name.startswith("channel.") and channel in LINES:
+        zero, scale = LINES[channel]
+        sensors, by_zero = (channel,), line.zero_sigma * abs(line.slope[0])
+    else:
+        return
+    for error, sigma in ((zero, by_zero), (scale, line.slope_sigma)):
+        old = found[error]
+        width = sigma / (EVEN if old.distribution == "even" else 1.0)
+        widths = tuple(
+            width if s in sensors else w for s, w in zip(old.sensors, old.width, strict=True)
+        )
+        found[error] = replace(old, width=widths, source=line.source)
+
+
+def _said(error: NamedError, table: Mapping[str, object], where: str) -> NamedError:
+    """Return an error with what a table says of it."""
+    unknown = [key for key in table if key not in KEYS]
+    if unknown:
+        raise CalibrationError(f"{where} has {unknown[0]!r}, expected of {', '.join(KEYS)}")
+    for key, known in (("distribution", DISTRIBUTIONS), ("drawn", DRAWN)):
+        if table.get(key, known[0]) not in known:
+            choice = " or ".join(known)
+            raise CalibrationError(f"{where} {key} is {table[key]!r}, expected {choice}")
+    if not isinstance(table.get("source"), str) or not table["source"]:
+        raise CalibrationError(f"{where} has no source")
+    shared = table.get("shared", list(error.shared))
+    if not isinstance(shared, list) or any(s not in error.sensors for s in shared):
+        raise CalibrationError(f"{where} shared is {shared!r}, expected of {list(error.sensors)}")
+    distribution = str(table.get("distribution", error.distribution))
+    width = error.width
+    if distribution != error.distribution and width:
+        ratio = EVEN if error.distribution == "even" else 1.0 / EVEN
+        width = tuple(ratio * w for w in width)  # the same deviation
+    if "sigma" in table and "half_width" in table:
+        raise CalibrationError(f"{where} has sigma and half_width, expected one of them")
+    for key in ("sigma", "half_width"):
+        if key not in table:
+            continue
+        if key == "half_width" and distribution != "even":
+            raise CalibrationError(f"{where} is {distribution} and has half_width, expected sigma")
+        width = _numbers(table[key], len(error.sensors), f"{where} {key}")
+        if key == "sigma" and distribution == "even":
+            width = tuple(w / EVEN for w in width)
+    if not width:
+        raise CalibrationError(f"{where} has no sigma")
+    return replace(
+        error,
+        width=width,
+        distribution=distribution,
+        drawn=str(table.get("drawn", error.drawn)),
+        shared=tuple(shared),
+        source=str(table["source"]),
     )
 
 
-def deviations(instrument: InstrumentData, airframe: AirframeData) -> dict[str, float]:
-    """Return one standard deviation of every error, by name."""
-    i = instrument
-    late_share = np.hypot(i.delay_share * EVEN * PAIR, i.align_s / 8e-3)
-    result = {
-        "mass_share": airframe.mass_share,
-        "ixx_share": airframe.inertia_share,
-        "iyy_share": airframe.inertia_share,
-        "izz_share": airframe.inertia_share,
-        "vane_x_m": i.position_m * EVEN * PAIR,
-        "vane_z_m": i.position_m * EVEN * PAIR,
-        "alpha_scale": i.vane_scale * EVEN * PAIR,
-        "beta_scale": i.vane_scale * EVEN * PAIR,
-        "upwash_share": i.upwash_share * EVEN * PAIR,
-        "alpha_zero_rad": i.vane_zero_rad * EVEN * PAIR,
-        "pitot_scale": i.pitot_scale * EVEN * PAIR,
-        "pitot_drift_pa": i.pitot_drift_pa * EVEN * PAIR,
-        "density_share": i.density_share,
-        "imu_delay_s": float(np.hypot(i.delay_least_s * EVEN, i.align_s)),
-        "alpha_lag_share": float(late_share),
-        "beta_lag_share": float(late_share),
-        "pitot_delay_s": i.delay_share * i.pitot_lag_s * EVEN * PAIR,
-        "friction_share": i.friction_share,
-        "elevator_scale": i.pot_scale * EVEN,
-        "aileron_scale": i.pot_scale * EVEN * PAIR,
-        "rudder_scale": i.pot_scale * EVEN,
-        "thrust_share": i.thrust_share,
-    }
-    for axis in "xyz":
-        result |= {
-            f"cg_{axis}_m": i.cg_m * EVEN,
-            f"imu_{axis}_m": i.position_m * EVEN,
-            f"gyro_{axis}_scale": i.gyro_scale * EVEN,
-            f"gyro_{axis}_bias_radps": i.gyro_bias_radps * EVEN,
-            f"accel_{axis}_scale": i.accel_scale * EVEN,
-            f"accel_{axis}_bias_mps2": i.accel_bias_mps2 * EVEN,
-            f"tilt_{axis}_rad": i.misalignment_rad * EVEN,
-        }
-    return {name: float(value) for name, value in result.items()}
+def _numbers(value: object, count: int, where: str) -> tuple[float, ...]:
+    """Return one number per sensor, of a number or a list."""
+    listed = value if isinstance(value, list) else [value] * count
+    good = [
+        x
+        for x in listed
+        if isinstance(x, int | float) and not isinstance(x, bool) and 0.0 <= x < math.inf
+    ]
+    if len(good) != len(listed) or len(listed) != count:
+        raise CalibrationError(
+            f"{where} is {value!r}, expected a number of 0 or more, or {count} of them"
+        )
+    return tuple(float(x) for x in good)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from host.resources import resource
 FORMAT = "flight-test-calibration"
 VERSION = 1
 _NUMBERS = ("zero", "slope", "zero_sigma", "slope_sigma")
+ERRORS = "error"
 _TEXTS = ("unit", "source")
 
 
@@ -61,6 +63,9 @@ class Calibration:
         Its text, copied into every export.
     lines : dict of str to Line
         By table and channel: ``channel.alpha_a``, ``pulse.elevator``, ``imu.gyro``, ...
+    errors : dict
+        Tables [error.NAME] as they stand: what the instrument may be wrong by beside its lines
+        (`host.instrument` reads them).
     """
 
     name: str
@@ -68,6 +73,7 @@ class Calibration:
     path: Path
     text: str
     lines: dict[str, Line]
+    errors: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def defaults(self) -> list[str]:
         """Names of the lines that nobody measured on this instrument."""
@@ -106,7 +112,7 @@ def load_calibration(path: Path | str | None = None) -> Calibration:
                 f"{path}: [{name}] has {len(line.zero)} numbers in zero and slope,"
                 f" expected {len(default.lines[name].zero)}"
             )
-    return Calibration(own.name, own.date, own.path, own.text, default.lines | own.lines)
+    return replace(own, lines=default.lines | own.lines)
 
 
 def _read(path: Path) -> Calibration:
@@ -121,10 +127,14 @@ def _read(path: Path) -> Calibration:
     lines = {
         f"{table}.{channel}": _line(path, f"{table}.{channel}", entry, default)
         for table, entries in raw.items()
-        if isinstance(entries, dict)
+        if isinstance(entries, dict) and table != ERRORS
         for channel, entry in entries.items()
     }
-    return Calibration(str(raw.get("name", path.stem)), str(raw.get("date", "")), path, text, lines)
+    errors = raw.get(ERRORS, {})
+    if not isinstance(errors, dict) or not all(isinstance(e, dict) for e in errors.values()):
+        raise CalibrationError(f"{path}: {ERRORS} is {errors!r}, expected tables [{ERRORS}.NAME]")
+    name, date = str(raw.get("name", path.stem)), str(raw.get("date", ""))
+    return Calibration(name, date, path, text, lines, errors)
 
 
 def _line(path: Path, name: str, entry: Any, default: bool) -> Line:
@@ -140,6 +150,8 @@ def _line(path: Path, name: str, entry: Any, default: bool) -> Line:
         if not all(isinstance(one, int | float) and not isinstance(one, bool) for one in values):
             raise CalibrationError(f"{path}: [{name}] {key} is {value!r}, expected a number")
         numbers[key] = tuple(float(one) for one in values)
+        if key.endswith("sigma") and not all(0.0 <= one < math.inf for one in numbers[key]):
+            raise CalibrationError(f"{path}: [{name}] {key} is {value!r}, expected 0 or more")
     if len(numbers["zero"]) != len(numbers["slope"]) or not all(numbers["slope"]):
         raise CalibrationError(
             f"{path}: [{name}] needs as many zeros as slopes, and no slope of 0;"

@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from host.errors import UsageError
+from host.instrument.errors import InstrumentErrors
 from host.log import read_log
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome import compare, ideal, thesis, truth
@@ -40,7 +41,14 @@ class VirtualFlight:
     record: FlightRecord
 
 
-def virtual_flight(card: str | Path | Card, seed: int, *, chain: str = "sitl") -> VirtualFlight:
+def virtual_flight(
+    card: str | Path | Card,
+    seed: int,
+    *,
+    chain: str = "sitl",
+    errors: InstrumentErrors | None = None,
+    instrument_seed: int | None = None,
+) -> VirtualFlight:
     """Fly a card once.
 
     Parameters
@@ -51,6 +59,8 @@ def virtual_flight(card: str | Path | Card, seed: int, *, chain: str = "sitl") -
         ``sitl`` through the recorder, decoded with the calibration of the virtual instrument;
         ``none`` the sensors without recorder; ``true`` the truth in the same columns; ``thesis``
         its logger.
+    errors, instrument_seed
+        Of the instrument, as `fly` takes them.
 
     Returns
     -------
@@ -70,7 +80,8 @@ def virtual_flight(card: str | Path | Card, seed: int, *, chain: str = "sitl") -
     """
     if chain not in CHAINS:
         raise ValueError(f"chain is {chain!r}, expected one of {', '.join(CHAINS)}")
-    record = fly(card if isinstance(card, Card) else load(card), seed=seed)
+    flown = card if isinstance(card, Card) else load(card)
+    record = fly(flown, seed=seed, errors=errors, instrument_seed=instrument_seed)
     data = air_data(record)
     if chain == "true":
         table = ideal.true_table(record, data)
@@ -91,7 +102,7 @@ def virtual_flight(card: str | Path | Card, seed: int, *, chain: str = "sitl") -
         with tempfile.TemporaryDirectory() as folder:
             log, text = Path(folder) / "flight.bin", Path(folder) / "calibration.toml"
             log.write_bytes(recording.log)
-            text.write_text(calibration(record.aircraft), encoding="utf-8")
+            text.write_text(calibration(record.aircraft, record.draws.errors), encoding="utf-8")
             decoded = read_log(log, calibration=text)
             table = decoded.table()
             first_us = int(decoded.frames["ident"]["t_us"][0])

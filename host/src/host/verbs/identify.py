@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from host.aircraft.powerplant import Powerplant
+    from host.instrument.deviations import InstrumentData
     from host.sysid.answer.save import Places
     from host.sysid.coefficients.flight import CoefficientAnswer
     from host.sysid.coefficients.model import CoefficientModel
@@ -131,13 +132,14 @@ def run(args: argparse.Namespace) -> int:
         if not args.aircraft:
             raise IdentificationError("--prior compares coefficients; they need --aircraft")
     windows = chosen(columns, from_s=args.from_s, to_s=args.to_s, numbers=args.maneuver or ())
-    agreement = _agreement(columns, args.aircraft, airframe, notes)
+    instrument = _instrument(args.aircraft, args.calibration)
+    agreement = _agreement(columns, airframe, instrument, notes)
     # Without the places of the sensors a vane ahead of the CG passes for a late one.
     known_errors = agreement if airframe is not None and not args.no_corrections else None
     rotor = _rotor(args.aircraft)
     answers: list[Answer] = []
     terms = _coefficient_model(args.model)
-    direct = _direct(args, columns, windows, notes, terms) if terms else None
+    direct = _direct(args, columns, windows, instrument, notes, terms) if terms else None
     failed: dict[str, list[str]] = {}  # why, and of which models
     for method in wanted:
         for name, user_model in models:
@@ -291,16 +293,25 @@ def _rotor(aircraft: str | None) -> Powerplant | None:
         return None
 
 
+def _instrument(aircraft: str | None, path: Path | None) -> InstrumentData | None:
+    """Return the sensors, and what the calibration says that they may be wrong by."""
+    from host.instrument.deviations import instrument_data
+    from host.physical.calibration import load_calibration
+
+    return instrument_data(aircraft, load_calibration(path) if path else None) if aircraft else None
+
+
 def _agreement(
-    columns: dict[str, Any], aircraft: str | None, airframe: Any, notes: list[str]
+    columns: dict[str, Any],
+    airframe: Any,
+    instrument: InstrumentData | None,
+    notes: list[str],
 ) -> Compatibility | None:
     """Return what sensors are wrong by; None with a note where it cannot be told."""
-    from host.instrument.errors import instrument_data
     from host.sysid.compatibility.reconstruction import reconstruct
     from host.sysid.errors import IdentificationError
 
     try:
-        instrument = instrument_data(aircraft) if aircraft else None
         return reconstruct(columns, airframe, instrument)
     except IdentificationError as error:
         notes.append(str(error))
@@ -311,6 +322,7 @@ def _direct(
     args: argparse.Namespace,
     columns: dict[str, Any],
     windows: list[Found] | None,
+    instrument: InstrumentData | None,
     notes: list[str],
     terms: CoefficientModel,
 ) -> CoefficientAnswer | None:
@@ -322,7 +334,9 @@ def _direct(
     from host.sysid.coefficients.flight import identify_coefficients
 
     try:
-        return identify_coefficients(columns, args.aircraft, windows=windows, model=terms)
+        return identify_coefficients(
+            columns, args.aircraft, windows=windows, model=terms, instrument=instrument
+        )
     except IdentificationError as error:
         notes.append(f"coefficients: {error}")
         return None

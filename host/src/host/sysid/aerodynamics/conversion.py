@@ -24,7 +24,7 @@ from host.aircraft.gains import (
 )
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.compiled import Array
-from host.instrument.errors import InstrumentData, deviations
+from host.instrument.deviations import InstrumentData, deviations
 from host.sysid.errors import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import Condition, airframe_data
 from host.aircraft.prior.prior_file import read_prior
-from host.instrument.errors import instrument_data
+from host.instrument.deviations import instrument_data
 from host.sysid.aerodynamics.conversion import (
     CARRIED,
     COEFFICIENTS,

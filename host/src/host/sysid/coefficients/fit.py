@@ -18,7 +18,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.compiled import Array
-from host.instrument.errors import InstrumentData, deviations
+from host.instrument.deviations import InstrumentData, deviations
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.gust_free import gust_free
 from host.sysid.coefficients.joint import LastStep

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.aircraft.mass_properties import airframe_data
+from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import NoPropulsionError, powerplant
 from host.compiled import Array
-from host.instrument.errors import InstrumentData, instrument_data
+from host.instrument.deviations import InstrumentData, instrument_data
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.coefficients.answer import METHOD, QUANTILE, CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
@@ -91,6 +91,8 @@ def identify_coefficients(
     *,
     windows: Sequence[Found] | None = None,
     model: CoefficientModel | None = None,
+    airframe: AirframeData | None = None,
+    instrument: InstrumentData | None = None,
 ) -> CoefficientAnswer:
     """Find the maneuvers of a flight and fit coefficients to all of them at once.
 
@@ -104,13 +106,18 @@ def identify_coefficients(
         Use these instead of finding them.
     model : CoefficientModel, optional
         The terms of every coefficient; `standard_model` by default.
+    airframe : AirframeData, optional
+        In place of what the aircraft file says.
+    instrument : InstrumentData, optional
+        What the sensors may be wrong by, as `instrument_data` reads it of a calibration; the
+        standard errors without.
 
     Raises
     ------
     IdentificationError
         If a column or an axis is missing, or the aircraft file lacks what is needed.
     """
-    airframe, data = airframe_data(aircraft), instrument_data(aircraft)
+    airframe, data = airframe or airframe_data(aircraft), instrument or instrument_data(aircraft)
     try:
         propulsion = powerplant(aircraft)
     except NoPropulsionError as error:

@@ -14,7 +14,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.compiled import Array
-from host.instrument.errors import InstrumentData
+from host.instrument.deviations import InstrumentData
 from host.sysid.coefficients.rows import Flown
 from host.sysid.compatibility.signals import BLEND_RADPS, Record
 from host.sysid.errors import IdentificationError

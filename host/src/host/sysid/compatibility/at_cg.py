@@ -14,10 +14,10 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.compiled import Array
-from host.instrument.errors import EVEN, PAIR, InstrumentData
-from host.instrument.errors import deviations as drawn
+from host.instrument.deviations import InstrumentData, vane_delay_s
+from host.instrument.deviations import deviations as drawn
 from host.sysid.compatibility.flight_path import AIR, DELAYS
-from host.sysid.compatibility.path_data import unfiltered, unstuck
+from host.sysid.compatibility.path_data import NOTHING, unfiltered, unstuck
 from host.sysid.compatibility.position_correction import corrected
 from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
 
@@ -34,7 +34,6 @@ LATE = {
 }
 POTS = {f"{name}_scale": f"{name}_rad" for name in ("elevator", "aileron", "rudder")}
 PLACES = tuple(f"{what}_{a}_m" for what in ("imu", "cg", "vane") for a in "xyz")
-NOTHING = AirframeData("nothing but places", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
 
 
 def at_cg(
@@ -84,7 +83,7 @@ def vane_delay(
         return told.value, told.half_width / NORMAL
     omega = 2.0 * np.pi * i.vane_hz_per_mps * float(np.median(columns[AIR[0]]))
     nominal = 2.0 * i.vane_damping / omega
-    return nominal, max(i.delay_share * nominal, i.delay_least_s) * EVEN * PAIR
+    return nominal, vane_delay_s(i, nominal)
 
 
 def open_errors(found: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:

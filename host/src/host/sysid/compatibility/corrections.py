@@ -15,7 +15,7 @@ import numpy as np
 
 from host.compiled import Array
 from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, INERTIAL, PITOT
-from host.sysid.compatibility.path_data import DENSITY_SHARE
+from host.sysid.compatibility.path_data import density_share
 from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
 
 RATES = tuple(f"{a}_radps" for a in "pqr")
@@ -58,7 +58,8 @@ def deviations(found: Compatibility) -> dict[str, float]:
 def pressure_part(found: Compatibility) -> float:
     """Return the part of an error of V squared that is the pitot's, not the density's."""
     total = found["pitot_scale"].prior_half_width / NORMAL
-    return max(1.0 - (DENSITY_SHARE / max(total, DENSITY_SHARE)) ** 2, LEAST_PRESSURE_SHARE)
+    density = density_share(found.instrument)
+    return max(1.0 - (density / max(total, density)) ** 2, LEAST_PRESSURE_SHARE)
 
 
 def without_errors(

@@ -9,7 +9,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.compiled import Array, BoolArray
-from host.instrument.errors import DEGREE, EVEN, PAIR, InstrumentData
+from host.instrument.deviations import InstrumentData, deviations, unknown_sensors
 from host.sysid.compatibility.flight_path import (
     AIR,
     DELAYS,
@@ -40,13 +40,13 @@ MOST_STRETCHES = 8
 LEAST_LIFE = 0.1  # of the liveliest stretch: what an axis has before any is chosen
 QUADRANTS = 4  # of heading: wind and pitot scale need them
 LAGS = (*range(0, 10), *range(10, 31, 2))  # in blocks: what an answer to a surface lasts
-START_SD = np.array([1.0, 1.0, 1.0, 5.0 * DEGREE, 5.0 * DEGREE, 20.0 * DEGREE])
+START_SD = np.array([1.0, 1.0, 1.0, *np.radians([5.0, 5.0, 20.0])])
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
 SMOOTH_S = 0.03  # half a window for derivatives: 9 Hz at 100 Hz
 SPEED_SMOOTH_S = 0.25  # half a window: one count of the pitot is 1.4 % of trim speed
 SMOOTHED = "airspeed_mps smoothed"
 BEND_MPS = 1e-6
-DENSITY_SHARE = 0.01  # a barometer in a warm fuselage reads 3 K high
+NOTHING = AirframeData("nothing but places", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
 FLYING = 0.5  # of the median airspeed
 # What no calibration says: deviation of the steady wind, delays of vanes and GPS.
 WIND_SD_MPS = 10.0
@@ -108,33 +108,36 @@ def prepare(
 
 def prior(instrument: InstrumentData | None) -> dict[str, tuple[float, float]]:
     """Return mean and standard deviation of every unknown before the flight."""
-    i = instrument or InstrumentData(
-        (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), upwash=0.1, upwash_share=0.2, vane_hz_per_mps=1.0,
-        vane_damping=0.1, vane_friction_rad=0.0, friction_speed_mps=1.0, pitot_lag_s=0.010,
-    )  # fmt: skip
-    result = dict.fromkeys(INERTIAL[0:3], (0.0, i.gyro_bias_radps * EVEN))
-    result |= dict.fromkeys(INERTIAL[3:6], (0.0, i.gyro_scale * EVEN))
-    result |= dict.fromkeys(INERTIAL[6:9], (0.0, i.accel_bias_mps2 * EVEN))
-    result |= dict.fromkeys(INERTIAL[9:12], (0.0, i.accel_scale * EVEN))
-    result |= dict.fromkeys(INERTIAL[12:15], (0.0, i.misalignment_rad * EVEN))
-    vane, upwash = i.vane_scale * EVEN * PAIR, i.upwash * i.upwash_share * EVEN * PAIR
-    zero = i.vane_zero_rad * EVEN * PAIR
-    sd = {
-        "alpha_scale": float(np.hypot(vane, upwash)),
-        "alpha_zero_rad": zero,
-        "beta_scale": vane,
-        "beta_zero_rad": zero,
-        "pitot_scale": float(np.hypot(i.pitot_scale * EVEN * PAIR, DENSITY_SHARE)),
-        "pitot_zero_pa": i.pitot_drift_pa * EVEN * PAIR,
+    i = instrument or unknown_sensors()
+    e, sd = i.errors, deviations(i, NOTHING)
+    kinds = (
+        *("gyro_{}_bias_radps", "gyro_{}_scale", "accel_{}_bias_mps2", "accel_{}_scale"),
+        "tilt_{}_rad",
+    )
+    alike = [sd[kind.format(axis)] for kind in kinds for axis in "xyz"]
+    result = {name: (0.0, own) for name, own in zip(INERTIAL, alike, strict=True)}
+    known = {
+        "alpha_scale": float(np.hypot(sd["alpha_scale"], i.upwash * sd["upwash_share"])),
+        "alpha_zero_rad": sd["alpha_zero_rad"],
+        "beta_scale": sd["beta_scale"],
+        "beta_zero_rad": e["vane_zero_rad"].of_mean("beta_a", "beta_b"),
+        "pitot_scale": float(np.hypot(sd["pitot_scale"], density_share(i))),
+        "pitot_zero_pa": sd["pitot_drift_pa"],
     }
-    result |= {name: (0.0, sd[name]) for name in (*FLOW, *PITOT)}
+    result |= {name: (0.0, known[name]) for name in (*FLOW, *PITOT)}
     result |= dict(zip(DELAYS, (VANE_DELAY_S, (i.pitot_lag_s, i.pitot_lag_s)), strict=True))
     # Both were measured from the same point: where the balance is does not matter.
-    place = i.position_m * EVEN * float(np.hypot(1.0, PAIR))
+    place = float(np.hypot(sd["imu_x_m"], sd["vane_x_m"]))
     result |= dict.fromkeys(PLACES, (0.0, place))
     wind = (0.0, WIND_SD_MPS)
     result |= dict(zip(WITH_GPS, (GPS_DELAY_S, wind, wind), strict=True))
-    return {name: (float(mean), float(sd)) for name, (mean, sd) in result.items()}
+    return {name: (float(mean), float(own)) for name, (mean, own) in result.items()}
+
+
+def density_share(instrument: InstrumentData | None) -> float:
+    """Return one deviation of density as a share: instruments and a fuselage that is warm."""
+    e = (instrument or unknown_sensors()).errors
+    return float(np.hypot(e["density_share"].of_mean(), e["fuselage_heat_share"].of_mean()))
 
 
 def unstuck(data: Mapping[str, Array], name: str, i: InstrumentData, dt_s: float) -> Array:

@@ -16,14 +16,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.compiled import Array
-from host.sysid.compatibility.flight_path import AIR, GPS, PathProblem
+from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, GPS, PITOT, PLACES, PathProblem
 from host.sysid.errors import IdentificationError
 from host.sysid.numerics.noise import OutputNoise, lagged_moments, regress
 
 ORDER = 2  # memory of the residuals: a gust and a sensor
 MOST_ITERATIONS = 25
 MEMORY_FROM = 2  # iteration at which residuals are worth modelling
-MEMORY_UNTIL = 5  # from then on memory and instruments stay, and the equations can settle
+LEARNING = 4  # iterations; then memory and instruments stay, and the equations can settle
+# A second search, where the first does not settle: errors twice those of a calibrated instrument
+# leave residuals at iteration 2 of which nothing is learned (3 of 12 flights). It first finds what
+# inertial sensors and GPS tell, air data all but held to their calibration: without instruments
+# gusts would draw them off.
+PATIENCE = 12  # plain iterations at most
+NEAR = 3.0  # of a standard error, the last plain step
+HOLDING = 1e4  # times the prior precision
+AIR_ERRORS = (*FLOW, *PITOT, *DELAYS, *PLACES)
 SETTLED = 0.05  # of a standard error: the last step
 DRIFT_POWERS = 4  # constants to cubics follow no gust either
 RIDGE = 1e-10  # of a column's own product: a surface that stood still has none
@@ -55,18 +63,28 @@ def fit_path(problem: PathProblem, follows: Sequence[Array]) -> PathFit:
     IdentificationError
         If the path is not finite at some step or the equations are singular.
     """
+    found = _search(problem, follows, patience=0)
+    return found if found.converged else _search(problem, follows, patience=PATIENCE)
+
+
+def _search(problem: PathProblem, follows: Sequence[Array], patience: int) -> PathFit:
+    """Iterate until the equations settle; after `patience` plain iterations at most."""
     theta = problem.prior_mean.copy()
     outputs = problem.model.outputs
     noise = [OutputNoise.white() for _ in outputs]
     held: dict[int, list[Array]] = {}
-    converged = False
+    held_back = [k for k, name in enumerate(problem.names) if name in AIR_ERRORS]
+    converged, near = False, False
     iteration = 0
+    plain, learnt_from = bool(patience), max(patience, MEMORY_FROM)
     while True:
         responses = problem.respond(theta)
         if responses is None:
             raise IdentificationError("data compatibility: the flight path is not finite")
         residuals = [problem.measured(k) - r.y for k, r in enumerate(responses)]
-        learning = MEMORY_FROM <= iteration <= MEMORY_UNTIL
+        if plain and (near or iteration == patience):
+            plain, learnt_from = False, max(iteration, MEMORY_FROM)
+        learning = learnt_from <= iteration < learnt_from + LEARNING
         # Of every stretch, one array per output.
         whites: list[list[Array]] = [[] for _ in responses]
         tools: list[list[Array]] = [[] for _ in responses]
@@ -83,8 +101,10 @@ def fit_path(problem: PathProblem, follows: Sequence[Array]) -> PathFit:
             for k, parts in enumerate(zip(white, held.get(j, slope), slope, strict=True)):
                 for into, part in zip((whites, tools, slopes), parts, strict=True):
                     into[k].append(part / deviation)
-        H = np.diag(problem.prior_precision)
-        g = problem.prior_precision * (problem.prior_mean - theta)
+        precision = problem.prior_precision.copy()
+        precision[held_back] *= HOLDING if plain else 1.0
+        H = np.diag(precision)
+        g = precision * (problem.prior_mean - theta)
         for k, rows in enumerate(zip(whites, tools, slopes, strict=True)):
             e, Z, J = map(np.concatenate, rows)
             own = problem.columns(k)
@@ -95,7 +115,7 @@ def fit_path(problem: PathProblem, follows: Sequence[Array]) -> PathFit:
             inverse = np.linalg.inv(H / np.outer(size, size)) / np.outer(size, size)
         except np.linalg.LinAlgError as error:
             raise IdentificationError("data compatibility: singular equations") from error
-        if converged or iteration == MOST_ITERATIONS:
+        if converged or iteration == MOST_ITERATIONS + patience:
             B = np.diag(problem.prior_precision)
             for k, own_tools in enumerate(tools):
                 own, Z = problem.columns(k), np.concatenate(own_tools)
@@ -109,8 +129,9 @@ def fit_path(problem: PathProblem, follows: Sequence[Array]) -> PathFit:
         theta = theta + np.clip(step, -most, most)
         iteration += 1
         error_size = np.sqrt(np.maximum(np.abs(np.diag(inverse)), 1e-300))
-        small = bool(np.all(np.abs(step) < SETTLED * error_size))
-        converged = small and iteration > MEMORY_FROM + 1
+        largest = float(np.max(np.abs(step) / error_size))
+        near = largest < NEAR
+        converged = largest < SETTLED and not plain and iteration > learnt_from + 1
 
 
 def _memory(residuals: Sequence[Array]) -> OutputNoise:

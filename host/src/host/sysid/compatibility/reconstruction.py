@@ -16,7 +16,8 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.compiled import Array
-from host.instrument.errors import InstrumentData
+from host.instrument.deviations import InstrumentData
+from host.sysid.compatibility.claims import Claim, claim_words, claims
 from host.sysid.compatibility.flight_path import FLOW, GPS, INERTIAL
 from host.sysid.compatibility.path_data import prepare, prior
 from host.sysid.compatibility.path_fit import fit_path
@@ -80,6 +81,8 @@ class Compatibility:
     gps : bool
     instrument : InstrumentData, optional
         What the calibration leaves open, as far as it was told.
+    claims : tuple of Claim
+        What the flight says of the file's own deviations: all together, then group by group.
     """
 
     findings: tuple[Finding, ...]
@@ -87,6 +90,7 @@ class Compatibility:
     stretches: tuple[tuple[float, float], ...]
     gps: bool
     instrument: InstrumentData | None = None
+    claims: tuple[Claim, ...] = ()
 
     def __getitem__(self, name: str) -> Finding:
         """Return a finding by name."""
@@ -127,8 +131,11 @@ def reconstruct(
     covariance = fit.covariance[:count, :count]
     scales = [problem.common.index(name) for name in FLOW[::2]]
     covariance[scales, scales] += VANE_MODEL**2
+    before = prior(instrument)
+    wide = covariance if gps else GUSTY**2 * covariance
+    judged = claims(problem.common, fit.theta[:count], wide, before)
     findings = []
-    for name, (mean, sd) in prior(instrument).items():
+    for name, (mean, sd) in before.items():
         known = name in problem.common and (gps or name not in HIDDEN)
         k = problem.common.index(name) if known else None
         deviation = sd if k is None else float(np.sqrt(covariance[k, k]))
@@ -149,7 +156,7 @@ def reconstruct(
         name: float(np.sqrt(q / problem.counted(name)))
         for name, q in zip(problem.model.outputs, squares, strict=True)
     }
-    return Compatibility(tuple(findings), rms, when, gps, instrument)
+    return Compatibility(tuple(findings), rms, when, gps, instrument, judged)
 
 
 def _reason(name: str, *, gps: bool) -> str:
@@ -168,6 +175,7 @@ def words(found: Compatibility) -> list[str]:
     lines += [f"  {f.name:20s} {f.value:11.4g}  +- {f.half_width:8.2g}" for f in wrong]
     if not wrong:
         lines.append("  no sensor error stands out of its interval")
+    lines += [f"  {line}" for line in claim_words(found.claims)]
     reasons: dict[str, list[str]] = {}
     for f in found.findings:
         if not f.told:
@@ -184,6 +192,15 @@ def document(found: Compatibility) -> dict[str, object]:
         "gps": found.gps,
         "stretches_s": [list(s) for s in found.stretches],
         "residual_rms": found.rms,
+        "calibration": {
+            c.name: {
+                "times": c.times,
+                "directions": c.directions,
+                "probability": c.probability,
+                "doubted": c.doubted,
+            }
+            for c in found.claims
+        },
         "findings": {
             f.name: {
                 "value": f.value,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.compiled import Array
-from host.instrument.errors import InstrumentData
+from host.instrument.deviations import InstrumentData
 
 PASS_HZ, STOP_HZ = 9.0, 13.0
 THIN_HZ = 33.0  # rate of the fit: nothing is left above 13 Hz, a fit takes a third of the time

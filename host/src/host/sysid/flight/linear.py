@@ -10,7 +10,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.aircraft.powerplant import Powerplant
 from host.compiled import Array
-from host.instrument.errors import EVEN, InstrumentData
+from host.instrument.deviations import InstrumentData, deviations, unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
     CoefficientTable,
@@ -26,6 +26,7 @@ from host.sysid.compatibility.corrections import (
     without_delays,
     without_errors,
 )
+from host.sysid.compatibility.path_data import NOTHING
 from host.sysid.compatibility.position_correction import corrected
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.errors import IdentificationError
@@ -64,7 +65,6 @@ AXIS_OF = {
     "roll": ("aileron_rad",),
     "dutch-roll": ("rudder_rad",),
 }
-IMU_SD_M = 0.014  # tape measure and balance, 10 mm each
 FREE = ("output", "innovation")  # residuals of methods that simulate
 WEAK_GRADE = 0.2
 # Output error takes turbulence for sensor noise. Simulated flights of the demonstration card, error
@@ -332,13 +332,19 @@ def _template(
         trim,
         accelerometers=method not in UNTIED and all(c in columns for c in forces),
         delays=DELAYS if able else (),
-        imu_sd_m=IMU_SD_M if able else 0.0,
+        imu_sd_m=imu_place_m(unknown_sensors()) if able else 0.0,
     )
 
 
 def _frees_places(method: str) -> bool:
     """Return whether a method can estimate delays and places of accelerometers."""
     return method.startswith("output-error") or method in STAGED
+
+
+def imu_place_m(i: InstrumentData) -> float:
+    """Return one deviation of the IMU's height above the CG, m: tape measure and balance."""
+    sd = deviations(i, NOTHING)
+    return float(np.hypot(sd["imu_z_m"], sd["cg_z_m"]))
 
 
 def _drag_arm(model: LinearModel, trim: Trim, i: InstrumentData) -> LinearModel:
@@ -349,7 +355,7 @@ def _drag_arm(model: LinearModel, trim: Trim, i: InstrumentData) -> LinearModel:
     """
     if "ax_mps2" not in model.outputs:
         return model
-    sd_m = EVEN * float(np.hypot(i.position_m, i.cg_m))
+    sd_m = imu_place_m(i)
     free = template(model.name, trim, accelerometers=True, imu_sd_m=sd_m)
     kept = [x for x in free.levers if x.output == "ax_mps2"]
     names = {x.parameter for x in free.levers} - {x.parameter for x in kept}

@@ -92,7 +92,7 @@ def read_columns(
     if found is None:
         found = read_foreign(source)
         if calibration is not None:
-            found.notes.append("--calibration is for logs: this table is taken as it is")
+            found.notes.append("--calibration is for logs: here only its standard deviations count")
     raw, notes = dict(found.columns), found.notes
     if mapping is not None:
         lines = read_map(mapping, wanted)

@@ -1,34 +1,63 @@
 """What differs from flight to flight and is not told to the host: drawn by seed.
 
-Ranges as stated for this product; uniform within them unless said otherwise. The host sees only
-the aircraft file and the calibration, with these ranges as their uncertainty.
+How large, and how distributed, the instrument's own file says (`host.instrument`): the host sees
+the aircraft file and the calibration with the same deviations.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from host.aircraft.airframe import Airframe, Array
 from host.aircraft.file import Aircraft
+from host.instrument.errors import (
+    InstrumentErrors,
+    NamedError,
+    instrument_errors,
+    standard_errors,
+)
 
-# Half-widths.
-DELAY_SHARE = 0.20
-DELAY_LEAST_S = 1e-3
-VANE_SCALE = 0.03
-PITOT_SCALE = 0.03
-PITOT_DRIFT_COUNT = 1.0
-MISALIGNMENT_RAD = np.deg2rad(1.0)
-CLOCK_SHARE = 0.005  # ceramic resonator of the Mega, 0.5 %
-GYRO_BIAS_RADPS = np.deg2rad(0.5)  # left after the zeroing at rest; the chip's own is 20 deg/s
-GYRO_SCALE = 0.01  # after calibration; the data sheet allows 3 %
-ACCEL_BIAS_MPS2 = 0.05 * 9.80665 / 2  # half of the data sheet's 50 mg: calibrated once
-ACCEL_SCALE = 0.01
-VANE_ZERO_RAD = np.deg2rad(0.5)
-POT_ZERO_RAD = np.deg2rad(0.3)
-POT_SCALE = 0.01
+PITOT_PA_PER_COUNT = 4.8828125  # MPXV7002DP on a 10-bit converter, hw/calibration/default.toml
+VANES = ("alpha_a", "alpha_b", "beta_a", "beta_b")
+PITOTS = ("dp_a", "dp_b")
+POTS = ("pot_elevator", "pot_aileron_left", "pot_aileron_right", "pot_rudder")
+# What is drawn, in this order: its error, whose, how often for each (x, y, z), in which unit.
+DRAWN: tuple[tuple[str, str, tuple[str, ...], int, float], ...] = (
+    ("mass_share", "mass_share", (), 0, 1.0),
+    ("inertia_share", "inertia_share", ("x", "y", "z"), 1, 1.0),
+    ("cg_m", "cg_m", ("x", "y", "z"), 1, 1.0),
+    *((f"{name}_m", "place_m", (name,), 3, 1.0)
+      for name in ("imu", "vane_a", "vane_b", "pitot_a", "pitot_b")),
+    ("upwash_share", "upwash_share", ("a", "b"), 1, 1.0),
+    ("misalignment_rad", "misalignment_rad", ("x", "y", "z"), 1, 1.0),
+    ("imu_delay_share", "delay_share", ("imu",), 0, 1.0),
+    ("vane_delay_share", "delay_share", VANES, 1, 1.0),
+    ("pitot_delay_share", "delay_share", PITOTS, 1, 1.0),
+    ("imu_delay_s", "delay_least_s", ("imu",), 0, 1.0),
+    ("vane_delay_s", "delay_least_s", VANES, 1, 1.0),
+    ("pitot_delay_s", "delay_least_s", PITOTS, 1, 1.0),
+    ("gps_delay_share", "delay_share", ("gps",), 0, 1.0),
+    ("field_m", "gps_place_m", ("north", "east", "down"), 1, 1.0),
+    ("vane_scale_share", "vane_scale", VANES, 1, 1.0),
+    ("vane_zero_rad", "vane_zero_rad", VANES, 1, 1.0),
+    ("pitot_scale_share", "pitot_scale", PITOTS, 1, 1.0),
+    ("pitot_drift_count", "pitot_zero_pa", PITOTS, 1, PITOT_PA_PER_COUNT),
+    ("pot_zero_rad", "pot_zero_rad", POTS, 1, 1.0),
+    ("pot_scale_share", "pot_scale", POTS, 1, 1.0),
+    ("gyro_bias_radps", "gyro_bias_radps", ("x", "y", "z"), 1, 1.0),
+    ("gyro_scale_share", "gyro_scale", ("x", "y", "z"), 1, 1.0),
+    ("accel_bias_mps2", "accel_bias_mps2", ("x", "y", "z"), 1, 1.0),
+    ("accel_scale_share", "accel_scale", ("x", "y", "z"), 1, 1.0),
+    ("clock_share", "clock_share", ("mega",), 0, 1.0),
+    ("imu_clock_share", "clock_share", ("imu",), 0, 1.0),
+    ("baro_offset_pa", "baro_offset_pa", ("baro",), 0, 1.0),
+    ("vane_friction_share", "vane_friction_share", VANES, 1, 1.0),
+    ("thrust_share", "thrust_share", ("propeller",), 0, 1.0),
+    ("servo_bandwidth_share", "servo_bandwidth_share", ("elevator", "aileron", "rudder"), 1, 1.0),
+)  # fmt: skip
 
 # Switches of a card and the draws they leave nominal.
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -51,6 +80,9 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "place_tolerance": ("cg_m", "imu_m", "vane_a_m", "vane_b_m", "pitot_a_m", "pitot_b_m"),
     "mass_tolerance": ("mass_share", "inertia_share"),
     "barometer_offset": ("baro_offset_pa",),
+    "friction_tolerance": ("vane_friction_share",),
+    "thrust_tolerance": ("thrust_share",),
+    "servo_tolerance": ("servo_bandwidth_share",),
 }
 
 
@@ -62,9 +94,12 @@ class Draws:
     ----------
     values : dict
         Name with unit to number or array.
+    errors : InstrumentErrors
+        What they were drawn from.
     """
 
     values: dict[str, Array]
+    errors: InstrumentErrors = field(default_factory=standard_errors)
 
     def scalar(self, name: str) -> float:
         """Return one number."""
@@ -81,6 +116,8 @@ def draw(
     *,
     tolerances: bool,
     nominal: Collection[str] = (),
+    errors: InstrumentErrors | None = None,
+    of_instrument: np.random.Generator | None = None,
 ) -> Draws:
     """Draw the errors of one flight.
 
@@ -93,55 +130,48 @@ def draw(
         False: everything is exactly nominal (the generator advances all the same).
     nominal : collection of str
         Keys of `GROUPS` whose draws are nominal while the others stay as they were.
+    errors : InstrumentErrors, optional
+        Of the instrument that flies; without, the standard ones with the aircraft's tolerances.
+    of_instrument : numpy Generator, optional
+        What is constant of an instrument comes from here, so that several flights can share it;
+        without, every flight has an instrument of its own.
 
     Returns
     -------
     Draws
     """
+    errors = errors or instrument_errors(aircraft)
     scale = 1.0 if tolerances else 0.0
-
-    def within(half: float, *shape: int) -> Array:
-        return np.asarray(scale * rng.uniform(-half, half, shape))
-
-    s = aircraft.scalar
-    spot = s("sensors.position_tolerance_m")
-    values: dict[str, Array] = {
-        "mass_share": within(s("mass.mass_tolerance")),
-        "inertia_share": within(s("mass.inertia_tolerance"), 3),  # x, y, z
-        "cg_m": within(s("mass.cg_tolerance_m"), 3),
-        "imu_m": within(spot, 3),
-        "vane_a_m": within(spot, 3),
-        "vane_b_m": within(spot, 3),
-        "pitot_a_m": within(spot, 3),
-        "pitot_b_m": within(spot, 3),
-        "upwash_share": within(s("sensors.upwash_tolerance"), 2),
-        "misalignment_rad": within(float(MISALIGNMENT_RAD), 3),
-        "imu_delay_share": within(DELAY_SHARE),
-        "vane_delay_share": within(DELAY_SHARE, 4),
-        "pitot_delay_share": within(DELAY_SHARE, 2),
-        "imu_delay_s": within(DELAY_LEAST_S),
-        "vane_delay_s": within(DELAY_LEAST_S, 4),
-        "pitot_delay_s": within(DELAY_LEAST_S, 2),
-        "gps_delay_share": within(DELAY_SHARE),
-        "field_m": within(5.0, 3),  # slow position error of the GPS at power-on
-        "vane_scale_share": within(VANE_SCALE, 4),  # alpha a, alpha b, beta a, beta b
-        "vane_zero_rad": within(float(VANE_ZERO_RAD), 4),
-        "pitot_scale_share": within(PITOT_SCALE, 2),
-        "pitot_drift_count": within(PITOT_DRIFT_COUNT, 2),
-        "pot_zero_rad": within(float(POT_ZERO_RAD), 4),  # elevator, aileron l, r, rudder
-        "pot_scale_share": within(POT_SCALE, 4),
-        "gyro_bias_radps": within(float(GYRO_BIAS_RADPS), 3),
-        "gyro_scale_share": within(GYRO_SCALE, 3),
-        "accel_bias_mps2": within(ACCEL_BIAS_MPS2, 3),
-        "accel_scale_share": within(ACCEL_SCALE, 3),
-        "clock_share": within(CLOCK_SHARE),
-        "imu_clock_share": within(CLOCK_SHARE),
-        "baro_offset_pa": within(100.0),  # BMP085 absolute accuracy, +-1 hPa typical
-    }
+    values: dict[str, Array] = {}
+    for name, of, sensors, size, unit in DRAWN:
+        error = errors[of]
+        value = _drawn(rng, error, sensors, size, unit)
+        if of_instrument is not None:
+            constant = _drawn(of_instrument, error, sensors, size, unit)
+            value = constant if error.drawn == "instrument" else value
+        values[name] = np.asarray(scale * value)
     for group in nominal:
         for name in GROUPS[group]:
             values[name] = np.zeros_like(values[name])
-    return Draws(values)
+    return Draws(values, errors)
+
+
+def _drawn(
+    rng: np.random.Generator, error: NamedError, sensors: Sequence[str], size: int, unit: float
+) -> Array:
+    """Return one number, one per sensor, or x, y, z of one sensor."""
+    own = sensors or error.sensors
+    width = np.array([error.width[error.sensors.index(s)] for s in own]) / unit
+    shape = () if size == 0 else (size * len(own),)
+    width = width[0] if size == 0 else np.repeat(width, size)
+    if error.distribution == "even":
+        value = rng.uniform(-width, width, shape)
+    else:
+        value = width * rng.standard_normal(shape)
+    together = [k for k, s in enumerate(own) if s in error.shared]
+    if size == 1 and together:
+        value[together] = value[together[0]] / width[together[0]] * width[together]
+    return np.asarray(value)
 
 
 def flown(aircraft: Aircraft, draws: Draws) -> Airframe:
@@ -155,12 +185,18 @@ def flown(aircraft: Aircraft, draws: Draws) -> Airframe:
         izz_kgm2=frame.izz_kgm2 * iz,
         ixz_kgm2=frame.ixz_kgm2 * (ix * iz) ** 0.5,
         cg_m=frame.cg_m + draws.vector("cg_m"),
+        ct_polynomial=frame.ct_polynomial * (1.0 + draws.scalar("thrust_share")),
+        servo_bandwidth_radps=frame.servo_bandwidth_radps
+        * (1.0 + float(draws.vector("servo_bandwidth_share")[0])),
     )
 
 
-def delay_s(nominal_s: float, share: float, least_s: float) -> float:
-    """Return a drawn delay: +-20 % of the nominal one, at least +-1 ms, never negative."""
+def delay_s(
+    nominal_s: float, share: float, least_s: float, errors: InstrumentErrors | None = None
+) -> float:
+    """Return a drawn delay: by a share of the nominal one, by the least where that is more."""
+    e = errors or standard_errors()
     off = share * nominal_s
-    if abs(DELAY_SHARE * nominal_s) < DELAY_LEAST_S:
+    if e["delay_share"].sigma("imu") * nominal_s < e["delay_least_s"].sigma("imu"):
         off = least_s
     return max(nominal_s + off, 0.0)

@@ -30,6 +30,7 @@ from host.aircraft.linear_aircraft import load
 from host.aircraft.rigid_body import rotate_to_body, rotate_to_ned, step
 from host.aircraft.trim import Trim, solve
 from host.compiled import compiled_fast
+from host.instrument.errors import InstrumentErrors
 from host.twin.flight.draws import GROUPS, Draws, draw, flown
 from host.twin.flight.pilot import Schedule, gains, schedule
 from host.twin.testcard.cards import Card
@@ -262,6 +263,8 @@ def fly(
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
     aircraft: Aircraft | None = None,
+    errors: InstrumentErrors | None = None,
+    instrument_seed: int | None = None,
 ) -> FlightRecord:
     """Fly a card.
 
@@ -274,6 +277,10 @@ def fly(
         Called with the share flown, 0 to 1.
     aircraft : Aircraft, optional
         In place of the one the card names.
+    errors : InstrumentErrors, optional
+        What is drawn from; without, the standard errors with the aircraft's tolerances.
+    instrument_seed : int, optional
+        Fixes what is constant of an instrument; without, every flight has one of its own.
 
     Returns
     -------
@@ -292,7 +299,16 @@ def fly(
         np.random.default_rng([seed, purpose]) for purpose in range(4)
     )
     nominal = [group for group in GROUPS if not getattr(card.sensors, group)]
-    draws = draw(plane, rng_draw, tolerances=card.sensors.tolerances, nominal=nominal)
+    draws = draw(
+        plane,
+        rng_draw,
+        tolerances=card.sensors.tolerances,
+        nominal=nominal,
+        errors=errors,
+        of_instrument=(
+            None if instrument_seed is None else np.random.default_rng([instrument_seed, 4])
+        ),
+    )
     frame = flown(plane, draws)
     atmosphere = air_model.atmosphere(
         card.flight.field_pressure_pa, card.flight.field_temperature_degc

@@ -5,36 +5,44 @@ Zeros and slopes are the nominal ones; the flight's own errors (`draws`) are not
 
 from __future__ import annotations
 
-import math
 import tomllib
 
 from host.aircraft.file import Aircraft
 from host.export.toml import dumps
+from host.instrument.errors import (
+    IMU_LINES,
+    LINES,
+    InstrumentErrors,
+    NamedError,
+    instrument_errors,
+    standard_errors,
+)
 from host.resources import resource
-from host.twin.flight import draws
 from host.twin.flight.fly import IDLE_US, NEUTRAL_US, THROW_US
 from host.twin.sensors.analog import CHANNELS
 from host.twin.testcard.cards import AXES
 
-UNIFORM = 1.0 / math.sqrt(3.0)  # standard deviation of a uniform number over its half-width
+OF_LINES = {name for pair in (*LINES.values(), *IMU_LINES.values()) for name in pair}
 
 
-def calibration(aircraft: Aircraft) -> str:
-    """Return the text of the calibration file that belongs to virtual flights of an aircraft."""
+def calibration(aircraft: Aircraft, errors: InstrumentErrors | None = None) -> str:
+    """Return the text of the calibration file that belongs to virtual flights of an aircraft.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    errors : InstrumentErrors, optional
+        What the file is to say of the instrument; the standard without.
+    """
+    errors = errors or instrument_errors(aircraft)
     default = tomllib.loads(resource("default.toml").read_text(encoding="utf-8"))
-    source = "virtual instrument, host/twin/flight/draws.py"
+    source = "virtual instrument, host/instrument/standard.toml"
     channels: dict[str, object] = {}
     for name in CHANNELS:
         entry = dict(default["channel"][name])
-        slope = float(entry["slope"])
-        if name.startswith("dp"):
-            zero_sigma, slope_sigma = draws.PITOT_DRIFT_COUNT, draws.PITOT_SCALE
-        elif name.startswith("pot"):
-            zero_sigma, slope_sigma = draws.POT_ZERO_RAD / slope, draws.POT_SCALE
-        else:
-            zero_sigma, slope_sigma = draws.VANE_ZERO_RAD / slope, draws.VANE_SCALE
-        entry["zero_sigma"] = round(float(zero_sigma) * UNIFORM, 4)
-        entry["slope_sigma"] = round(slope_sigma * UNIFORM, 4)
+        zero, scale = LINES[name]
+        entry["zero_sigma"] = float(f"{errors[zero].sigma(name) / abs(float(entry['slope'])):.4g}")
+        entry["slope_sigma"] = float(f"{errors[scale].sigma(name):.4g}")
         entry["source"] = source
         channels[name] = entry
     pulses: dict[str, object] = {}
@@ -49,20 +57,15 @@ def calibration(aircraft: Aircraft) -> str:
             "slope_sigma": 0.01,
             "source": "virtual transmitter: full throw is +-400 us",
         }
-    imu = {
-        "gyro": {
-            **default["imu"]["gyro"],
-            "zero_sigma": round(float(draws.GYRO_BIAS_RADPS) * UNIFORM, 5),
-            "slope_sigma": round(draws.GYRO_SCALE * UNIFORM, 5),
+    imu = {}
+    for name, (zero, scale) in IMU_LINES.items():
+        sensor = name.partition(".")[2]
+        imu[sensor] = {
+            **default["imu"][sensor],
+            "zero_sigma": float(f"{errors[zero].of_mean('x'):.4g}"),
+            "slope_sigma": float(f"{errors[scale].of_mean('x'):.4g}"),
             "source": source,
-        },
-        "accel": {
-            **default["imu"]["accel"],
-            "zero_sigma": round(draws.ACCEL_BIAS_MPS2 * UNIFORM, 4),
-            "slope_sigma": round(draws.ACCEL_SCALE * UNIFORM, 5),
-            "source": source,
-        },
-    }
+        }
     return dumps(
         {
             "format": default["format"],
@@ -73,5 +76,29 @@ def calibration(aircraft: Aircraft) -> str:
             "channel": channels,
             "pulse": pulses,
             "imu": imu,
+            "error": {e.name: _table(e) for e in errors if _is_told(e)},
         }
     )
+
+
+def _is_told(error: NamedError) -> bool:
+    """Return whether neither a line nor the aircraft file says all of an error."""
+    if error.aircraft_file:
+        return False
+    usual = standard_errors()[error.name]
+    same = [(e.distribution, e.drawn, e.shared) for e in (error, usual)]
+    return same[0] != same[1] or error.name not in OF_LINES
+
+
+def _table(error: NamedError) -> dict[str, object]:
+    """Return a table [error.NAME]; of what the lines say, how it is drawn only."""
+    table: dict[str, object] = {
+        "distribution": error.distribution,
+        "drawn": error.drawn,
+        "shared": list(error.shared),
+        "source": error.source,
+    }
+    if error.name in OF_LINES:
+        return table
+    key = "half_width" if error.distribution == "even" else "sigma"
+    return {key: list(error.width), **table}

@@ -136,7 +136,7 @@ def simulate(
     outcome = Outcome(record, data)
     stem = folder / "flight"
     text = folder / "calibration.toml"
-    text.write_text(calibration(record.aircraft), encoding="utf-8")
+    text.write_text(calibration(record.aircraft, record.draws.errors), encoding="utf-8")
     outcome.files.append(text)
     if firmware == "none":
         outcome.table = ideal.measured_table(record, data)

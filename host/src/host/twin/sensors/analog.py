@@ -91,7 +91,8 @@ def analog(record: FlightRecord, data: AirData) -> Analog:
             if switches.vane_dynamics:
                 # A slower vane is one of lower frequency.
                 own = frequency * nominal_vane_s(plane) / late[CHANNELS[k]]
-                angle = vane(angle, speed, own, damping, friction, reference, STEP_S)
+                stuck = friction * (1.0 + float(draws.vector("vane_friction_share")[k]))
+                angle = vane(angle, speed, own, damping, stuck, reference, STEP_S)
             zero, slope = scale[CHANNELS[k]]
             share = 1.0 + float(draws.vector("vane_scale_share")[k])
             counts[:, k] = zero + (share * angle + draws.vector("vane_zero_rad")[k]) / slope

@@ -50,7 +50,10 @@ def sensor_delays(aircraft: Aircraft, draws: Draws, dlpf: int) -> dict[str, floa
     found = {}
     for name, (_, nominal_s) in zip(("gyro", "accelerometer"), FILTERS[dlpf], strict=True):
         found[name] = delay_s(
-            nominal_s, draws.scalar("imu_delay_share"), draws.scalar("imu_delay_s")
+            nominal_s,
+            draws.scalar("imu_delay_share"),
+            draws.scalar("imu_delay_s"),
+            draws.errors,
         )
     for kind, names, nominal_s in (
         ("vane", VANES, nominal_vane_s(aircraft)),
@@ -58,6 +61,6 @@ def sensor_delays(aircraft: Aircraft, draws: Draws, dlpf: int) -> dict[str, floa
     ):
         shares, least = draws.vector(f"{kind}_delay_share"), draws.vector(f"{kind}_delay_s")
         for name, share, least_s in zip(names, shares, least, strict=True):
-            found[name] = delay_s(nominal_s, float(share), float(least_s))
+            found[name] = delay_s(nominal_s, float(share), float(least_s), draws.errors)
     found["gps"] = GPS_LATENCY_S * (1.0 + draws.scalar("gps_delay_share"))
     return found

@@ -70,6 +70,10 @@ class Sensors:
     place_tolerance: bool = True  # of CG and sensors
     mass_tolerance: bool = True  # and inertia
     barometer_offset: bool = True
+    # What no calibration measures; off, so that cards fly as they did before these were drawn.
+    friction_tolerance: bool = False
+    thrust_tolerance: bool = False
+    servo_tolerance: bool = False
     noise: bool = True
     imu_filter: bool = True
     vane_dynamics: bool = True

@@ -1,0 +1,143 @@
+"""The instrument as identification meets it: sensors' places and dynamics, one deviation of each
+unknown.
+
+Every unknown moves the corrected signals or the known mass properties. The mean of two sensors is
+read: the deviation of the mean is what counts.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+from host.aircraft.file import load_measured
+from host.aircraft.mass_properties import AirframeData, Place, place
+from host.instrument.errors import InstrumentErrors, instrument_errors, standard_errors
+from host.physical.calibration import Calibration
+
+VANE_LATE_S = 8e-3  # about a vane's delay at trim: the filter model's error is a share of it
+
+
+@dataclass(frozen=True, slots=True)
+class InstrumentData:
+    """Places and dynamics of the sensors from the aircraft file, and what may be wrong with them.
+
+    Places are in metres from the nominal CG.
+    """
+
+    imu_m: Place
+    vanes_m: Place
+    upwash: float
+    vane_hz_per_mps: float
+    vane_damping: float
+    vane_friction_rad: float
+    friction_speed_mps: float
+    pitot_lag_s: float
+    imu_bandwidth_hz: float = 42.0  # MPU-6000 register map, DLPF_CFG 3
+    errors: InstrumentErrors = field(default_factory=standard_errors)
+
+    def scaled(self, factor: float, *names: str) -> InstrumentData:
+        """Return the same with some errors, or all, that many times as large."""
+        return replace(self, errors=self.errors.scaled(factor, *names))
+
+
+def instrument_data(source: str, calibration: Calibration | None = None) -> InstrumentData:
+    """Return the sensors of an aircraft by name or file, and what they may be wrong by.
+
+    Parameters
+    ----------
+    source : str
+        Aircraft.
+    calibration : Calibration, optional
+        Of the instrument; standard errors without.
+
+    Raises
+    ------
+    host.errors.UsageError
+        If there is no such file, it does not describe its sensors, or the calibration says
+        something of an error that cannot be.
+    """
+    loaded = load_measured(source)
+    number, vector, cg = loaded.scalar, loaded.vector, loaded.vector("mass.cg_m")
+    between = 0.5 * (vector("sensors.vane_a_m") + vector("sensors.vane_b_m"))
+    return InstrumentData(
+        imu_m=place(vector("sensors.imu_m") - cg),
+        vanes_m=place(between - cg),
+        upwash=number("sensors.upwash"),
+        vane_hz_per_mps=number("sensors.vane_frequency_hz_per_mps"),
+        vane_damping=number("sensors.vane_damping"),
+        vane_friction_rad=number("sensors.vane_friction_rad"),
+        friction_speed_mps=number("trim.airspeed_mps"),
+        pitot_lag_s=number("sensors.pitot_lag_s"),
+        errors=instrument_errors(loaded, calibration),
+    )
+
+
+def unknown_sensors() -> InstrumentData:
+    """Return sensors of which no aircraft file says anything."""
+    nowhere = (0.0, 0.0, 0.0)
+    return InstrumentData(
+        nowhere, nowhere, upwash=0.1, vane_hz_per_mps=1.0, vane_damping=0.1,
+        vane_friction_rad=0.0, friction_speed_mps=1.0, pitot_lag_s=0.010,
+    )  # fmt: skip
+
+
+def deviations(instrument: InstrumentData, airframe: AirframeData) -> dict[str, float]:
+    """Return one standard deviation of every unknown of the coefficients, by name."""
+    e = instrument.errors
+    vanes = {"alpha": ("alpha_a", "alpha_b"), "beta": ("beta_a", "beta_b")}
+    late = {
+        name: math.hypot(
+            e["delay_share"].of_mean(*pair), e["filter_model_s"].of_mean(pair[0]) / VANE_LATE_S
+        )
+        for name, pair in vanes.items()
+    }
+    result = {
+        "mass_share": airframe.mass_share,
+        "ixx_share": airframe.inertia_share,
+        "iyy_share": airframe.inertia_share,
+        "izz_share": airframe.inertia_share,
+        "vane_x_m": e["place_m"].of_mean("vane_a", "vane_b"),
+        "vane_z_m": e["place_m"].of_mean("vane_a", "vane_b"),
+        "alpha_scale": e["vane_scale"].of_mean(*vanes["alpha"]),
+        "beta_scale": e["vane_scale"].of_mean(*vanes["beta"]),
+        "upwash_share": e["upwash_share"].of_mean(),
+        "alpha_zero_rad": e["vane_zero_rad"].of_mean(*vanes["alpha"]),
+        "pitot_scale": e["pitot_scale"].of_mean(),
+        "pitot_drift_pa": e["pitot_zero_pa"].of_mean(),
+        "density_share": e["density_share"].of_mean(),
+        "imu_delay_s": imu_delay_s(instrument),
+        "alpha_lag_share": late["alpha"],
+        "beta_lag_share": late["beta"],
+        "pitot_delay_s": e["delay_share"].of_mean("dp_a", "dp_b") * instrument.pitot_lag_s,
+        "friction_share": e["vane_friction_share"].of_mean(),
+        "elevator_scale": e["pot_scale"].of_mean("pot_elevator"),
+        "aileron_scale": e["pot_scale"].of_mean("pot_aileron_left", "pot_aileron_right"),
+        "rudder_scale": e["pot_scale"].of_mean("pot_rudder"),
+        "thrust_share": e["thrust_share"].of_mean(),
+    }
+    for axis in "xyz":
+        result |= {
+            f"cg_{axis}_m": e["cg_m"].sigma(axis),
+            f"imu_{axis}_m": e["place_m"].sigma("imu"),
+            f"gyro_{axis}_scale": e["gyro_scale"].sigma(axis),
+            f"gyro_{axis}_bias_radps": e["gyro_bias_radps"].sigma(axis),
+            f"accel_{axis}_scale": e["accel_scale"].sigma(axis),
+            f"accel_{axis}_bias_mps2": e["accel_bias_mps2"].sigma(axis),
+            f"tilt_{axis}_rad": e["misalignment_rad"].sigma(axis),
+        }
+    return {name: float(value) for name, value in result.items()}
+
+
+def imu_delay_s(instrument: InstrumentData) -> float:
+    """Return one deviation of the IMU's delay, s: what its filter's model leaves in it too."""
+    e = instrument.errors
+    return math.hypot(e["delay_least_s"].sigma("imu"), e["filter_model_s"].sigma("imu"))
+
+
+def vane_delay_s(instrument: InstrumentData, nominal_s: float) -> float:
+    """Return one deviation of the vanes' mean delay, s."""
+    e = instrument.errors
+    share, least = e["delay_share"], e["delay_least_s"]
+    pairs = (("alpha_a", "alpha_b"), ("beta_a", "beta_b"))
+    return max(max(nominal_s * share.of_mean(*pair), least.of_mean(*pair)) for pair in pairs)

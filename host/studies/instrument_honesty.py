@@ -1,0 +1,174 @@
+"""Flights drawn from one instrument file, analysed with another: do intervals hold, is it noticed?
+
+Each flight has an instrument of its own, drawn from one file with every tolerance on. It is
+analysed twice: with that file, and with one that claims a third of every deviation (the aircraft
+file's tolerances too). Pooled over the principal derivatives of `--model coefficients`: how many
+truths lie inside, and how often the compatibility check doubts the file.
+
+The instrument is not the one the package calls standard: its calibration is twice as wide and
+every error normal, so that neither answer rests on numbers the identifier knows. Rows go to a file
+as they are found, and flights that are in it are not flown again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from host.aircraft.file import load as load_aircraft
+from host.aircraft.mass_properties import AirframeData, airframe_data
+from host.instrument.deviations import InstrumentData, instrument_data
+from host.instrument.errors import InstrumentErrors, instrument_errors
+from host.sysid.coefficients.flight import identify_coefficients
+from host.sysid.compatibility.reconstruction import reconstruct
+from host.sysid.errors import IdentificationError
+from host.sysid.flight.tables import even_columns
+from host.twin.testcard.cards import Card, load
+from host.twin.virtual import VirtualFlight, virtual_flight
+
+from studies.coefficients import truths
+
+AIRCRAFT = "ultrastick25e"
+FIRST_SEED = 7000
+FLIGHTS = 60
+COUNTED = (
+    "CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr",
+)  # fmt: skip
+ROWS = Path("../build/study/instrument_honesty.jsonl")
+CLAIMS = {"honest": 1.0, "a third": 1.0 / 3.0}
+WIDER = 2.0
+# What a calibration states; the rest is as the package has it.
+CALIBRATED = (
+    "gyro_bias_radps", "gyro_scale", "accel_bias_mps2", "accel_scale", "vane_zero_rad",
+    "vane_scale", "pitot_zero_pa", "pitot_scale", "pot_zero_rad", "pot_scale", "misalignment_rad",
+)  # fmt: skip
+Row = dict[str, Any]
+
+
+def true_errors() -> InstrumentErrors:
+    """Return the file that flights are drawn from: every error normal, calibrated ones wider."""
+    wider = instrument_errors(load_aircraft(AIRCRAFT)).scaled(WIDER, *CALIBRATED)
+    return InstrumentErrors(
+        {e.name: replace(e, distribution="normal", width=e.sigmas) for e in wider}
+    )
+
+
+def every_tolerance(card: str) -> Card:
+    """Return a card with every tolerance drawn."""
+    plan = load(card)
+    every = replace(
+        plan.sensors, friction_tolerance=True, thrust_tolerance=True, servo_tolerance=True
+    )
+    return replace(plan, sensors=every)
+
+
+def claimed(factor: float) -> tuple[AirframeData, InstrumentData]:
+    """Return what a file says that claims a factor of the true deviations."""
+    airframe = airframe_data(AIRCRAFT)
+    airframe = replace(
+        airframe,
+        mass_share=factor * airframe.mass_share,
+        inertia_share=factor * airframe.inertia_share,
+    )
+    return airframe, replace(instrument_data(AIRCRAFT), errors=true_errors().scaled(factor))
+
+
+def analysed(flight: VirtualFlight, factor: float) -> Row:
+    """Return error and half-width of each derivative, and what the check says of the file."""
+    columns, _ = even_columns(flight.table)
+    airframe, data = claimed(factor)
+    row: Row = {"intervals": {}, "check": {}}
+    try:
+        found = reconstruct(columns, airframe, data)
+        row["check"] = {c.name: [c.times, c.directions, c.probability] for c in found.claims}
+        row["doubted"] = found.claims[0].doubted
+    except IdentificationError as error:
+        row |= {"doubted": True, "failed": str(error)}
+    try:
+        answer = identify_coefficients(columns, AIRCRAFT, airframe=airframe, instrument=data)
+    except IdentificationError as error:
+        return row | {"failed": str(error)}
+    expected = truths(list(flight.maneuvers))
+    for d in answer.fit.derivatives:
+        if d.name in COUNTED:
+            row["intervals"][d.name] = [d.value - expected[d.name], d.half_width]
+    return row
+
+
+def fly(card: str, seeds: Sequence[int], kept: Path) -> Iterator[Row]:
+    """Return a row per flight and file: those kept, then those flown now."""
+    rows = [json.loads(line) for line in kept.read_text().splitlines()] if kept.is_file() else []
+    done = {(row["card"], row["seed"]) for row in rows}
+    yield from (row for row in rows if row["card"] == card and row["seed"] in seeds)
+    for seed in seeds:
+        if (card, seed) in done:
+            continue
+        flight = virtual_flight(every_tolerance(card), seed, errors=true_errors())
+        fresh = [
+            {"card": card, "seed": seed, "file": name, **analysed(flight, factor)}
+            for name, factor in CLAIMS.items()
+        ]
+        with kept.open("a", encoding="utf-8") as out:
+            out.writelines(json.dumps(row) + "\n" for row in fresh)
+        yield from fresh
+
+
+def lines(rows: Sequence[Row]) -> list[str]:
+    """Return coverage and alarms of each file, then of each derivative and group."""
+    result = []
+    for name in CLAIMS:
+        own = [row for row in rows if row["file"] == name]
+        pairs = [(n, *p) for row in own for n, p in row["intervals"].items()]
+        inside = np.array([abs(miss) <= half for _, miss, half in pairs])
+        doubted = [bool(row["doubted"]) for row in own]
+        if not len(inside):
+            continue
+        result.append(
+            f"{name}: {len(own)} flights, covered {100 * inside.mean():.1f} % of {len(inside)};"
+            f" doubted in {sum(doubted)} ({100 * np.mean(doubted):.0f} %);"
+            f" failed {sum('failed' in row for row in own)}"
+        )
+        for derivative in COUNTED:
+            hit = [abs(miss) <= half for n, miss, half in pairs if n == derivative]
+            result.append(f"  {derivative:9s} {100 * np.mean(hit):5.1f} %")
+        for group in sorted({g for row in own for g in row["check"]}):
+            told = [row["check"][group] for row in own if group in row["check"]]
+            times = np.array([t for t, n, _ in told if n])
+            if len(times):
+                alarms = np.mean([p < 0.01 for _, n, p in told if n])
+                rms = np.sqrt(np.mean(times**2))
+                result.append(
+                    f"  {group:18s} told in {len(times)} flights, rms {rms:.2f} times the file's,"
+                    f" alone doubted in {100 * alarms:.0f} %"
+                )
+    return result
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Fly what is missing, print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--flights", type=int, default=FLIGHTS)
+    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
+    parser.add_argument("--card", default="survey")
+    parser.add_argument(
+        "--rows", type=Path, default=Path("../build/study/instrument_honesty.jsonl")
+    )
+    options = parser.parse_args(arguments)
+    options.rows.parent.mkdir(parents=True, exist_ok=True)
+    seeds = range(options.first, options.first + options.flights)
+    rows: list[Row] = []
+    for row in fly(options.card, seeds, options.rows):
+        rows.append(row)
+        sys.stderr.write(f"{row['seed']} {row['file']}: doubted {row['doubted']}\n")
+    sys.stdout.write("\n".join(lines(rows)) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
