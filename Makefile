@@ -65,4 +65,4 @@ fuzz: setup ## random input, guided by coverage: 2000 of each kind (FULL=1: all,
 	@$(PYTHON) -m tests.fuzz $(FUZZ) $(if $(FULL),--full)
 
 clean: ## remove what builds made; .venv and downloads stay
-	rm -rf .pio build/sitl build/logs build/fatfs-*
+	rm -rf .pio build/sitl build/logs

@@ -137,10 +137,7 @@ if ! grep -qsx "$inputs" .cache/kernels-done; then
   printf '%s\n' "$inputs" >.cache/kernels-done
 fi
 
-# --- FatFs and PlatformIO --------------------------------------------------------------------
-
-[ -f build/fatfs-0.1.2/ff.c ] || say "fetching FatFs"
-"$python" firmware/toolchain/fatfs.py >/dev/null
+# --- PlatformIO ------------------------------------------------------------------------------
 
 if [ "$purpose" != demo ]; then
   inputs="$({ find firmware/toolchain/pio* -type f -not -name '*.pyc' | sort | xargs cat

@@ -3,7 +3,6 @@
 #include "app/text_out.h"
 #include "core/progmem.h"
 #include "hal/analog_input.h"
-#include "hal/block_device.h"
 #include "hal/clock.h"
 #include "hal/serial.h"
 #include "hal/system.h"
@@ -43,21 +42,7 @@ void Instrument::boot() {
   turn_us_ = now_us;
   system_us_ = now_us;
   self_test_ = self_test_passed();
-  hal::set_card_wait(&Instrument::while_waiting, this);
   hal::start_watchdog();
-}
-
-void Instrument::while_waiting(void* context) {
-  // A call of the card that waits is bounded by itself: the recorder counts as running.
-  Instrument& self = *static_cast<Instrument*>(context);
-  const uint32_t now_us = hal::now_us();
-  self.pass_self_test();
-  self.pilot_.step(self.config_, self.self_test_, self.outlet_, now_us);
-  self.sensors_.step(self.config_, self.pilot_, self.outlet_, now_us);
-  self.pilot_.ran(kTaskSensors);
-  self.pilot_.ran(kTaskRecorder);
-  self.pilot_.beat(now_us);
-  self.panel_.step(self.recorder_, now_us);
 }
 
 void Instrument::step() {
@@ -85,7 +70,8 @@ void Instrument::step() {
   if (loop_us > loop_max_us_) {
     loop_max_us_ = static_cast<uint16_t>(loop_us > 65535U ? 65535U : loop_us);
   }
-  hal::sleep_until_interrupt();
+  // A card that is searched gives the next block at once.
+  if (!recorder_.in_a_hurry()) hal::sleep_until_interrupt();
   turn_us_ = hal::now_us();
   asleep_us_ += turn_us_ - end_us;
 }

@@ -35,8 +35,6 @@ class Instrument {
   const frames::ConfigFrame& config() const { return config_; }
 
  private:
-  static void while_waiting(void* context);
-
   void step_slow(uint32_t now_us);
   void decide_recording(uint32_t now_us);
   void pass_self_test();
@@ -44,14 +42,8 @@ class Instrument {
   void put_system(uint32_t now_us);
   void put_telemetry_heads(uint32_t now_us);
 
-  // FatFs works between sessions, the ring in one.
-  union Shared {
-    uint8_t ring[kRingBytes];
-    storage::Volume::Memory volume;
-  };
-
-  Shared shared_ = {};
-  core::ByteRing ring_{shared_.ring, kRingBytes};
+  uint8_t ring_bytes_[kRingBytes] = {};
+  core::ByteRing ring_{ring_bytes_, kRingBytes};
   frames::ConfigFrame config_ = {};
   Telemetry telemetry_;
   AsciiRow ascii_row_;
@@ -59,7 +51,7 @@ class Instrument {
   Store store_;
   PilotLink pilot_;
   Sensors sensors_;
-  Recorder recorder_{ring_, shared_.volume, outlet_, store_, sensors_};
+  Recorder recorder_{ring_, outlet_, store_, sensors_};
   Panel panel_;
   Status status_;
   core::Airborne airborne_;

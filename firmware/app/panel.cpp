@@ -10,6 +10,9 @@ constexpr uint32_t kHalfFlashUs = 200000UL;
 constexpr uint32_t kHalfSlowUs = 500000UL;
 constexpr uint32_t kHalfFastUs = 100000UL;
 constexpr uint8_t kPauseHalves = 10;
+constexpr uint32_t kWorkUs = 1000000UL;
+constexpr uint32_t kWorkLitUs = 100000UL;
+constexpr uint32_t kWorkLitUsPerPercent = 8000UL;
 
 }  // namespace
 
@@ -30,6 +33,8 @@ uint8_t trouble_flashes(Recorder::State state, storage::VolumeStatus status) {
       return 5;
     case storage::VolumeStatus::kFragmented:
       return 6;
+    case storage::VolumeStatus::kDamaged:
+      return 8;
   }
   return 0;
 }
@@ -53,11 +58,14 @@ void Panel::step(const Recorder& recorder, uint32_t now_us) {
     }
     const bool on = flash_ < 2 * flashes && flash_ % 2 == 0;
     hal::set_led(on);
-    hal::set_buzzer(on);
+    hal::set_buzzer(recorder.unrecorded() ? alarm(now_us) : on);
     return;
   }
   if (state == Recorder::State::kReady) {
     hal::set_led(true);
+  } else if (state == Recorder::State::kNoFile) {
+    if (since_us >= kWorkUs) turned_us_ = now_us;
+    hal::set_led(since_us < kWorkLitUs + recorder.percent() * kWorkLitUsPerPercent);
   } else {
     const uint32_t half_us = state == Recorder::State::kRecording ? kHalfSlowUs : kHalfFastUs;
     if (since_us >= half_us) {
@@ -66,7 +74,19 @@ void Panel::step(const Recorder& recorder, uint32_t now_us) {
     }
     hal::set_led(flash_ == 0);
   }
+  if (recorder.unrecorded()) {
+    hal::set_buzzer(alarm(now_us));
+    return;
+  }
   sound(now_us);
+}
+
+bool Panel::alarm(uint32_t now_us) {
+  if (now_us - tone_us_ >= kHalfFastUs) {
+    tone_us_ = now_us;
+    alarm_on_ = !alarm_on_;
+  }
+  return alarm_on_;
 }
 
 void Panel::sound(uint32_t now_us) {

@@ -1,6 +1,8 @@
 // What the pilot at the field sees and hears. LED: on while ready, slow blinks while recording,
-// fast blinks while an open file waits for the throttle, else groups of flashes that say what is
-// wrong. Buzzer: one long tone at the start, two at the end, groups of beeps with the flashes.
+// fast blinks while an open file waits for the throttle, one blink a second that grows longer as
+// the work on the card goes on, else groups of flashes that say what is wrong. Buzzer: one long
+// tone at the start, two at the end, groups of beeps with the flashes, quick beeps while the
+// throttle is above idle and nothing can be recorded.
 #pragma once
 
 #include <stdint.h>
@@ -15,16 +17,18 @@ class Panel {
 
  private:
   void sound(uint32_t now_us);
+  bool alarm(uint32_t now_us);
 
   uint32_t turned_us_ = 0;
   uint32_t tone_us_ = 0;
   uint8_t flash_ = 0;  // half periods since the group began
   uint8_t tones_ = 0;  // half periods of the tone still to come
+  bool alarm_on_ = false;
   Recorder::State shown_ = Recorder::State::kNoFile;
 };
 
 // Flashes of a group: 2 no card, 3 no FAT32, 4 unreadable, 5 full, 6 no room in one piece,
-// 7 card lost while recording. 0: nothing is wrong.
+// 7 card lost while recording, 8 file system damaged. 0: nothing is wrong.
 uint8_t trouble_flashes(Recorder::State state, storage::VolumeStatus status);
 
 }  // namespace app

@@ -11,10 +11,14 @@ namespace app {
 
 using hal::CardStatus;
 using storage::VolumeStatus;
+using Job = storage::Volume::Job;
 
 namespace {
 
 constexpr uint32_t kRetryUs = 2000000UL;
+constexpr uint32_t kSearchUs = 5000000UL;  // then a file of kSmallSeconds is enough, for now
+constexpr uint32_t kSmallSeconds = 900;
+constexpr uint32_t kGraceUs = 1000000UL;
 constexpr uint32_t kLowSeconds = 60;
 constexpr uint32_t kLeastSeconds = 1800;    // with less left, the ground prepares a new file
 constexpr uint32_t kOtherBytesPerS = 1000;  // frames beside the identification frame
@@ -23,6 +27,9 @@ constexpr uint32_t kOtherBytesPerS = 1000;  // frames beside the identification 
 constexpr uint8_t kEndButton = 0;
 constexpr uint8_t kEndFull = 1;
 constexpr uint8_t kEndDoubt = 3;
+
+// The events of the end and the frame `file`, and what only events may use.
+constexpr uint16_t kLastWords = 2 * frames::kEventWireSize + frames::kFileWireSize + 48;
 
 // Blocks the end of a session may need: the ring, and a return of the schema under way.
 constexpr uint32_t kEndBlocks = 32;
@@ -34,23 +41,34 @@ void copy_text(char* to, const char* from, uint8_t size) {
 
 }  // namespace
 
-Recorder::Recorder(core::ByteRing& ring,
-                   storage::Volume::Memory& memory,
-                   Outlet& outlet,
-                   Store& store,
-                   Sensors& sensors)
+Recorder::Recorder(core::ByteRing& ring, Outlet& outlet, Store& store, Sensors& sensors)
     : ring_(ring),
       outlet_(outlet),
       store_(store),
       sensors_(sensors),
       writer_(ring, storage::schema_text(), storage::schema_size(), storage::schema_hash()),
-      stream_(writer_, outlet),
-      volume_(memory) {}
+      stream_(writer_, outlet) {
+  ring_.close();
+}
 
 void Recorder::step(uint32_t now_us) {
-  if (state_ != State::kRecording && state_ != State::kEnding) return;
+  if (state_ != State::kRecording && state_ != State::kEnding) {
+    work_on_card(now_us);
+    return;
+  }
   const CardStatus status = stream_.step(now_us);
   if (status != CardStatus::kOk) fail(status, now_us);
+}
+
+bool Recorder::in_a_hurry() const {
+  return volume_.job() != Job::kNone && !volume_.waits();
+}
+
+void Recorder::work_on_card(uint32_t now_us) {
+  const Job job = volume_.job();
+  uint8_t* const sector = ring_.lend();
+  if (job == Job::kNone || sector == nullptr) return;
+  if (volume_.step(sector, may_write_)) job_ended(job, now_us);
 }
 
 void Recorder::decide(const core::PilotInputs& in,
@@ -61,26 +79,37 @@ void Recorder::decide(const core::PilotInputs& in,
   const bool high = in.throttle_valid && !in.throttle_idle;
   flight_ = airborne.state();
   landed_ = flight_ == core::FlightState::kGround && !high;
+  if (landed_) landed_us_ = now_us;
+  may_write_ = landed_ || (may_write_ && flight_ == core::FlightState::kGround &&
+                           now_us - landed_us_ < kGraceUs);
   const core::RecordAction action =
       control_.update(in, recording(), config.auto_start != 0, now_us);
   const uint16_t press_ms = control_.take_press_ms();
   if (press_ms > 0) outlet_.event(frames::Event::kButton, press_ms, now_us);
   const bool start_button = action == core::RecordAction::kStartButton;
+  tell_unrecorded(high, now_us);
   switch (state_) {
     case State::kNoFile:
     case State::kFailed:
       if (file_wanted_) {
-        if (landed_) prepare_next();
-      } else if (!looked_ || now_us - retry_us_ >= kRetryUs) {
-        open_volume();
+        make_room(now_us);
+      } else if (volume_.job() == Job::kNone && (!looked_ || now_us - retry_us_ >= kRetryUs)) {
+        looked_ = true;
+        start_why_ = kNoStart;
+        volume_.look();
       }
       break;
     case State::kUndecided:
       decide_open_file(in, start_button, airborne, now_us);
       break;
     case State::kReady:
-      if (start_button) begin(0, prepared_, now_us);
-      if (action == core::RecordAction::kStartThrottle) begin(1, prepared_, now_us);
+      if (start_button) start_why_ = 0;
+      if (action == core::RecordAction::kStartThrottle) start_why_ = 1;
+      if (start_why_ != kNoStart) {
+        start(start_why_, now_us);
+      } else {
+        make_room(now_us);
+      }
       break;
     case State::kRecording:
       record(action, now_us);
@@ -108,47 +137,115 @@ bool Recorder::kept_power() {
   return source != hal::ResetSource::kPowerOn && source != hal::ResetSource::kBrownOut;
 }
 
-void Recorder::open_volume() {
-  const bool after_failure = state_ == State::kFailed;
-  looked_ = true;
-  prepared_ = false;
-  // What the panel shows stays until the answer is known.
-  VolumeStatus status = volume_.mount();
-  storage::FileState found = storage::FileState::kNone;
-  if (status == VolumeStatus::kReady) status = volume_.find_latest(&found);
+void Recorder::tell_unrecorded(bool flying, uint32_t now_us) {
+  const bool cannot =
+      state_ == State::kNoFile || state_ == State::kFailed || state_ == State::kFileFull;
+  const bool before = unrecorded_;
+  unrecorded_ = cannot && flying && config_->auto_start != 0;
+  if (unrecorded_ && !before) outlet_.event(frames::Event::kUnrecorded, 0, now_us);
+}
+
+void Recorder::job_ended(Job job, uint32_t now_us) {
+  retry_us_ = now_us;
+  const VolumeStatus status = volume_.status();
   if (status != VolumeStatus::kReady) {
-    volume_status_ = status;
-  } else {
-    switch (found) {
-      case storage::FileState::kNone:
-      case storage::FileState::kClosed:
-        file_wanted_ = true;
-        // A card found full stays so on the panel until the ground has looked again.
-        if (volume_status_ != VolumeStatus::kFull && volume_status_ != VolumeStatus::kFragmented) {
-          volume_status_ = status;
-        }
-        break;
-      case storage::FileState::kBlank:
-        file_wanted_ = volume_.smaller_than_new() && !room_for(kLeastSeconds, 1);
-        if (file_wanted_) break;
-        volume_status_ = status;
-        state_ = State::kReady;
-        break;
-      case storage::FileState::kOpen:
-        volume_status_ = status;
-        boot_.start(hal::flight_mark() || after_failure);
-        resume_sure_ = after_failure || (hal::flight_mark() && kept_power());
-        state_ = State::kUndecided;
-        break;
+    if (state_ != State::kReady || job != Job::kSearch) {
+      volume_status_ = status;
+      if (state_ != State::kFailed) state_ = State::kNoFile;
     }
+    file_wanted_ = false;
+    return;
   }
-  retry_us_ = hal::now_us();
+  switch (job) {
+    case Job::kLook:
+      looked(now_us);
+      break;
+    case Job::kSearch:
+      if (state_ == State::kReady || volume_.best_blocks() >= least_blocks()) break;
+      file_wanted_ = false;
+      volume_status_ = volume_.shortage(least_blocks());
+      break;
+    case Job::kMake:
+      state_ = State::kReady;
+      volume_status_ = status;
+      file_wanted_ = volume_.smaller_than_new() && !volume_.searched();
+      if (file_wanted_) volume_.go_on_searching();
+      break;
+    case Job::kMend:
+      outlet_.event(frames::Event::kFileMended, volume_.file().number, now_us);
+      break;
+    case Job::kClose:
+      state_ = State::kNoFile;
+      volume_.look_again();
+      break;
+    case Job::kNone:
+    case Job::kStart:
+      break;
+  }
+}
+
+void Recorder::looked(uint32_t now_us) {
+  const bool after_failure = state_ == State::kFailed;
+  const uint32_t odd = static_cast<uint32_t>(volume_.odd());
+  if (odd != 0) {
+    outlet_.event(frames::Event::kFileOdd, odd << 24 | volume_.file().number, now_us);
+  }
+  prepared_ = false;
+  switch (volume_.state()) {
+    case storage::FileState::kNone:
+    case storage::FileState::kClosed:
+      state_ = State::kNoFile;
+      file_wanted_ = true;
+      break;
+    case storage::FileState::kBlank:
+      volume_status_ = VolumeStatus::kReady;
+      state_ = State::kReady;
+      file_wanted_ = volume_.smaller_than_new();
+      break;
+    case storage::FileState::kOpen:
+      volume_status_ = VolumeStatus::kReady;
+      boot_.start(hal::flight_mark() || after_failure);
+      resume_sure_ = after_failure || (hal::flight_mark() && kept_power());
+      state_ = State::kUndecided;
+      return;
+  }
+  if (file_wanted_) volume_.search();
+}
+
+// Room for a new file, or for more of one that is ready and small: taken when it is as large as it
+// can be, or after a while when it is large enough.
+void Recorder::make_room(uint32_t now_us) {
+  const Job job = volume_.job();
+  if (!file_wanted_ || !landed_ || (job != Job::kNone && job != Job::kSearch)) return;
+  const bool replace = state_ == State::kReady;
+  const uint32_t best = volume_.best_blocks();
+  const uint32_t now_blocks = volume_.file().blocks;
+  const uint32_t least = replace ? now_blocks + now_blocks / 4 + 1 : least_blocks();
+  const bool most = job == Job::kNone;
+  const bool small = !replace || now_blocks < least_blocks();
+  const bool enough = small && now_us - retry_us_ >= kSearchUs && best >= least_blocks();
+  if (most && best < least) file_wanted_ = false;
+  if (best < least || !(most || enough) || !volume_.leave()) return;
+  volume_.set_date(sensors_.fat_date());
+  if (volume_.can_mend()) {
+    volume_.mend();
+  } else {
+    make_file(replace);
+  }
+}
+
+void Recorder::make_file(bool replace) {
+  const uint32_t session = replace && prepared_ ? volume_.file().last_session : next_session();
+  prepared_ = true;
+  volume_.make(session, replace);
+  if (volume_.job() == Job::kNone) job_ended(Job::kMake, hal::now_us());
 }
 
 void Recorder::decide_open_file(const core::PilotInputs& in,
                                 bool start_pressed,
                                 const core::Airborne& airborne,
                                 uint32_t now_us) {
+  if (volume_.job() != Job::kNone) return;  // it is being closed
   switch (boot_.update(in, start_pressed, flight_, airborne.moves(), now_us)) {
     case core::BootAction::kWait:
       return;
@@ -157,23 +254,17 @@ void Recorder::decide_open_file(const core::PilotInputs& in,
       in_doubt_ = !start_pressed && !resume_sure_;
       return;
     case core::BootAction::kClose:
-      storage::Volume::set_date(sensors_.fat_date());
-      volume_status_ =
-          volume_.close(volume_.file().next_block, !volume_.file().ended, hal::now_us());
-      state_ = State::kNoFile;
-      if (volume_status_ == VolumeStatus::kReady) prepare_next();
+      volume_.set_date(sensors_.fat_date());
+      volume_.close(volume_.file().next_block, !volume_.file().ended, now_us);
       return;
   }
 }
 
-void Recorder::prepare_next() {
-  file_wanted_ = false;
-  const uint32_t session = next_session();
-  storage::Volume::set_date(sensors_.fat_date());
-  volume_status_ = volume_.prepare(session);
-  prepared_ = volume_status_ == VolumeStatus::kReady;
-  state_ = prepared_ ? State::kReady : State::kNoFile;
-  retry_us_ = hal::now_us();
+// A search is left at once; a block under way on the card comes to its end first.
+void Recorder::start(uint32_t why, uint32_t now_us) {
+  if (!volume_.leave()) return;
+  start_why_ = kNoStart;
+  begin(why, prepared_, now_us);
 }
 
 uint32_t Recorder::next_session() {
@@ -188,7 +279,6 @@ void Recorder::begin(uint32_t why, bool same_session, uint32_t now_us) {
   const uint32_t session = same_session ? file.last_session : next_session();
   prepared_ = false;
   resumed_ = why == 2;
-  storage::Volume::unmount();  // from here its memory is the ring's
   writer_.start(file.file_id, session, file.next_block, now_us);
   outlet_.open();
   heads_told_ = false;
@@ -244,13 +334,20 @@ void Recorder::record(core::RecordAction action, uint32_t now_us) {
   if (action == core::RecordAction::kStop) end(kEndButton, now_us);
 }
 
+uint32_t Recorder::bytes_per_s() const {
+  return static_cast<uint32_t>(config_->rate_hz) * frames::kIdentWireSize + kOtherBytesPerS;
+}
+
+uint32_t Recorder::least_blocks() const {
+  const uint32_t blocks = bytes_per_s() * kSmallSeconds / core::kBlockPayloadSize + kEndBlocks;
+  return blocks < volume_.file_blocks() ? blocks : volume_.file_blocks();
+}
+
 // Compared in bytes: a division costs 640 cycles, every turn of the loop.
 bool Recorder::room_for(uint32_t seconds, uint32_t next_block) const {
-  const uint32_t bytes_per_s =
-      static_cast<uint32_t>(config_->rate_hz) * frames::kIdentWireSize + kOtherBytesPerS;
   const uint32_t needed = next_block + kEndBlocks;
   const uint32_t blocks = volume_.file().blocks;
-  return blocks > needed && (blocks - needed) * core::kBlockPayloadSize > bytes_per_s * seconds;
+  return blocks > needed && (blocks - needed) * core::kBlockPayloadSize > bytes_per_s() * seconds;
 }
 
 // A file was continued because this might have been a flight, and it was none.
@@ -290,25 +387,29 @@ void Recorder::end(uint32_t why, uint32_t now_us) {
 
 // The ring may be full: then the last words wait until the card has taken a block of it.
 void Recorder::tell_end() {
-  if (ring_.free() < 2U * frames::kEventWireSize) return;
+  if (ring_.free() < kLastWords) return;
   (void)ring_.tell_dropped();
+  const storage::FlightFile& file = volume_.file();
+  // The next boot may have to free what is behind the end: it asks the last block how far.
+  (void)ring_.push(frames::FileFrame{ended_us_, file.number, file.blocks * hal::kCardBlockBytes});
   (void)ring_.push_event(frames::Event::kSessionEnd, end_why_, ended_us_);
   writer_.finish();
   end_told_ = true;
 }
 
 void Recorder::finish(uint32_t now_us) {
-  storage::Volume::set_date(sensors_.fat_date());
-  volume_status_ = volume_.mount_again();
-  if (volume_status_ == VolumeStatus::kReady) {
-    volume_status_ = volume_.close(writer_.sequence(), false, now_us);
-  }
+  ring_.close();
+  volume_.set_date(sensors_.fat_date());
+  volume_.close(writer_.sequence(), false, now_us);
+  volume_status_ = VolumeStatus::kReady;
+  file_wanted_ = false;
   state_ = State::kNoFile;
-  if (volume_status_ == VolumeStatus::kReady) prepare_next();
 }
 
 void Recorder::fail(CardStatus status, uint32_t now_us) {
   outlet_.close();
+  ring_.close();
+  file_wanted_ = false;
   if (status == CardStatus::kAbsent) {
     outlet_.event(frames::Event::kCardRemoved, 0, now_us);
   } else {

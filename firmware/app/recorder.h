@@ -1,5 +1,6 @@
 // The session: which file, when it starts and ends. Its blocks go through CardStream.
-// Decisions are made in core (RecordControl, BootControl, BlockWriter) and storage (Volume).
+// Decisions are made in core (RecordControl, BootControl, BlockWriter), what a card needs in
+// storage (Volume), in memory of the ring, which is closed then.
 #pragma once
 
 #include <stdint.h>
@@ -17,7 +18,7 @@ namespace app {
 class Recorder {
  public:
   enum class State : uint8_t {
-    kNoFile,     // see volume_status()
+    kNoFile,     // see volume_status(): ready while the card is being worked on
     kUndecided,  // an open file was found: a reset in flight, or the battery was pulled
     kReady,
     kRecording,
@@ -26,16 +27,13 @@ class Recorder {
     kFailed,    // the card went away or answers no more
   };
 
-  // `memory` may be the ring's: it is used between sessions only.
-  Recorder(core::ByteRing& ring,
-           storage::Volume::Memory& memory,
-           Outlet& outlet,
-           Store& store,
-           Sensors& sensors);
+  Recorder(core::ByteRing& ring, Outlet& outlet, Store& store, Sensors& sensors);
 
   void set_file_blocks(uint32_t blocks) { volume_.set_file_blocks(blocks); }
-  // Once per turn of the main loop: carries the block under way on.
+  // Once per turn of the main loop: carries the block under way on, at most 1.2 ms.
   void step(uint32_t now_us);
+  // The card gives the next block at once: no sleep between two turns.
+  bool in_a_hurry() const;
   // Every 10 ms or so: start, stop, resume. Looks for the card at the first call.
   void decide(const core::PilotInputs& in,
               const core::Airborne& airborne,
@@ -44,6 +42,12 @@ class Recorder {
 
   State state() const { return state_; }
   storage::VolumeStatus volume_status() const { return volume_status_; }
+  // Throttle is above idle, and nothing is recorded.
+  bool unrecorded() const { return unrecorded_; }
+  storage::Volume::Job job() const { return volume_.job(); }
+  uint8_t percent() const { return volume_.percent(); }
+  // The file is ready, and smaller than one that may still be found.
+  bool small_file() const { return state_ == State::kReady && volume_.smaller_than_new(); }
   uint32_t file_number() const { return volume_.file().number; }
   bool recording() const { return state_ == State::kRecording; }
   // Identity of the session, as the log and the radio get it.
@@ -51,22 +55,31 @@ class Recorder {
   void put_health(frames::SystemFrame* out);
 
  private:
-  void open_volume();
+  static constexpr uint8_t kNoStart = 0xFF;
+
+  void work_on_card(uint32_t now_us);
+  void job_ended(storage::Volume::Job job, uint32_t now_us);
+  void looked(uint32_t now_us);
+  void make_room(uint32_t now_us);
+  void make_file(bool replace);
+  void tell_unrecorded(bool flying, uint32_t now_us);
   void decide_open_file(const core::PilotInputs& in,
                         bool start_pressed,
                         const core::Airborne& airborne,
                         uint32_t now_us);
+  void start(uint32_t why, uint32_t now_us);
   void begin(uint32_t why, bool same_session, uint32_t now_us);
   void record(core::RecordAction action, uint32_t now_us);
   void end(uint32_t why, uint32_t now_us);
   void tell_end();
   void finish(uint32_t now_us);
-  void prepare_next();
   void fail(hal::CardStatus status, uint32_t now_us);
   void put_heads(uint32_t now_us);
   void watch_room(uint32_t now_us);
   void watch_doubt(uint32_t now_us);
   static bool kept_power();
+  uint32_t bytes_per_s() const;
+  uint32_t least_blocks() const;
   bool room_for(uint32_t seconds, uint32_t next_block) const;
   uint32_t next_session();
 
@@ -81,14 +94,18 @@ class Recorder {
   core::BootControl boot_;
   core::FlightState flight_ = core::FlightState::kInDoubt;
   const frames::ConfigFrame* config_ = nullptr;
-  uint32_t retry_us_ = 0;
+  uint32_t landed_us_ = 0;  // last known to be so
+  uint32_t retry_us_ = 0;   // the card was last looked for, or the search began
   uint32_t marks_ = 0;
   uint32_t ended_us_ = 0;
   State state_ = State::kNoFile;
-  storage::VolumeStatus volume_status_ = storage::VolumeStatus::kNoCard;
+  storage::VolumeStatus volume_status_ = storage::VolumeStatus::kReady;
   bool looked_ = false;
-  bool file_wanted_ = false;  // the card is good, a new file waits for the ground
-  bool prepared_ = false;     // the file's first block carries this power-on's session
+  bool may_write_ = false;    // on the ground, and a second of throttle-up for what was begun
+  bool file_wanted_ = false;  // the card is good, a new file waits for room and for the ground
+  bool unrecorded_ = false;
+  uint8_t start_why_ = kNoStart;  // a session that begins as soon as the card is free
+  bool prepared_ = false;         // the file's first block carries this power-on's session
   bool resumed_ = false;
   bool heads_told_ = false;
   bool file_low_told_ = false;

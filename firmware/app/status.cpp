@@ -56,6 +56,14 @@ constexpr char kTextNoFat[] CORE_FLASH = "not FAT32";
 constexpr char kTextUnreadable[] CORE_FLASH = "unreadable";
 constexpr char kTextFull[] CORE_FLASH = "full";
 constexpr char kTextFragmented[] CORE_FLASH = "fragmented";
+constexpr char kTextDamaged[] CORE_FLASH = "damaged";
+constexpr char kTextUnrecorded[] CORE_FLASH = "not recorded, ";
+constexpr char kTextLooking[] CORE_FLASH = "looking";
+constexpr char kTextSearching[] CORE_FLASH = "searching ";
+constexpr char kTextPreparing[] CORE_FLASH = "preparing ";
+constexpr char kTextClosing[] CORE_FLASH = "closing";
+constexpr char kTextSmall[] CORE_FLASH = "ready, small ";
+constexpr char kPercent[] CORE_FLASH = " %";
 constexpr char kTextUndecided[] CORE_FLASH = "open flight ";
 constexpr char kTextAwaitsGround[] CORE_FLASH = "waits for the ground";
 constexpr char kTextReady[] CORE_FLASH = "ready ";
@@ -103,6 +111,8 @@ const char* volume_text(storage::VolumeStatus status) {
       return kTextFull;
     case storage::VolumeStatus::kFragmented:
       return kTextFragmented;
+    case storage::VolumeStatus::kDamaged:
+      return kTextDamaged;
   }
   return kTextUnreadable;
 }
@@ -284,13 +294,41 @@ void Status::receiver(const PilotLink& pilot) {
   }
 }
 
+void Status::work(const Recorder& recorder) {
+  using Job = storage::Volume::Job;
+  switch (recorder.job()) {
+    case Job::kStart:
+    case Job::kLook:
+      out_.flash(kTextLooking);
+      return;
+    case Job::kClose:
+    case Job::kMend:
+      out_.flash(kTextClosing);
+      return;
+    case Job::kNone:
+      out_.flash(kTextAwaitsGround);
+      return;
+    case Job::kSearch:
+      out_.flash(kTextSearching);
+      break;
+    case Job::kMake:
+      out_.flash(kTextPreparing);
+      break;
+  }
+  out_.number(recorder.percent());
+  out_.flash(kPercent);
+}
+
 void Status::card(const Recorder& recorder) {
   out_.flash(kCardText);
   switch (recorder.state()) {
     case Recorder::State::kNoFile:
-      out_.flash(recorder.volume_status() == storage::VolumeStatus::kReady
-                     ? kTextAwaitsGround
-                     : volume_text(recorder.volume_status()));
+      if (recorder.unrecorded()) out_.flash(kTextUnrecorded);
+      if (recorder.volume_status() != storage::VolumeStatus::kReady) {
+        out_.flash(volume_text(recorder.volume_status()));
+      } else {
+        work(recorder);
+      }
       return;
     case Recorder::State::kFailed:
       out_.flash(kTextLost);
@@ -299,6 +337,8 @@ void Status::card(const Recorder& recorder) {
       out_.flash(kTextUndecided);
       break;
     case Recorder::State::kReady:
+      out_.flash(recorder.small_file() ? kTextSmall : kTextReady);
+      break;
     case Recorder::State::kRecording:
     case Recorder::State::kEnding:
       out_.flash(kTextReady);

@@ -48,6 +48,7 @@ class Status {
   void gps(const Sensors& sensors);
   void receiver(const PilotLink& pilot);
   void card(const Recorder& recorder);
+  void work(const Recorder& recorder);
 
   TextOut out_{hal::Port::kUsb};
   core::Every turn_;

@@ -57,6 +57,18 @@ uint8_t frame_at(const uint8_t* block, uint16_t used, uint16_t offset) {
   return size <= used - offset ? size : 0;
 }
 
+const uint8_t* find_frame(const uint8_t* block, uint16_t used, uint8_t id) {
+  uint16_t offset = 0;
+  for (uint8_t size = frame_at(block, used, 0); size != 0; size = frame_at(block, used, offset)) {
+    const uint8_t* frame = block + kBlockHeaderSize + offset;
+    if (frame[0] == id) {
+      return frame;
+    }
+    offset = static_cast<uint16_t>(offset + size);
+  }
+  return nullptr;
+}
+
 bool block_has_event(const uint8_t* block, uint16_t used, uint8_t code) {
   uint16_t offset = 0;
   for (uint8_t size = frame_at(block, used, 0); size != 0; size = frame_at(block, used, offset)) {

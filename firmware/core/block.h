@@ -34,6 +34,9 @@ BlockVerdict check_block(const uint8_t* block, BlockHeader& header);
 // that the schema does not have. `offset` counts from the start of the payload.
 uint8_t frame_at(const uint8_t* block, uint16_t used, uint16_t offset);
 
+// The first frame with that id in a frame block, its id byte; null: there is none.
+const uint8_t* find_frame(const uint8_t* block, uint16_t used, uint8_t id);
+
 // True when a frame block holds the event `code`.
 bool block_has_event(const uint8_t* block, uint16_t used, uint8_t code);
 

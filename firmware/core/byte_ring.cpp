@@ -5,6 +5,7 @@
 namespace core {
 
 void ByteRing::clear() {
+  open_ = true;
   head_ = 0;
   used_ = 0;
   free_min_ = capacity_;
@@ -18,6 +19,9 @@ bool ByteRing::fits(uint8_t id, uint16_t size) const {
 }
 
 bool ByteRing::push(uint8_t id, const void* fields, uint32_t t_us) {
+  if (!open_) {
+    return false;
+  }
   const uint8_t size = frames::wire_size(id);
   // An event squeezed into the reserve does not mean that there is room again.
   const bool tells = dropped_pending_ != 0 && id != frames::kEventId;
@@ -47,7 +51,7 @@ bool ByteRing::push(uint8_t id, const void* fields, uint32_t t_us) {
 }
 
 bool ByteRing::tell_dropped() {
-  if (dropped_pending_ == 0) {
+  if (dropped_pending_ == 0 || !open_) {
     return true;
   }
   if (free() < frames::kEventWireSize) {

@@ -1,6 +1,7 @@
 // Frames waiting for the card: whole frames, one behind the other, in a ring of bytes.
 // When it is full the newest frame is dropped and counted; before the next frame that finds room
 // (events aside) stands an event `frames_dropped` with the number and the time of the first.
+// Between sessions it is closed, takes nothing, and its memory is anybody's.
 // Main loop only: no interrupt may touch it.
 #pragma once
 
@@ -15,7 +16,13 @@ class ByteRing {
   constexpr ByteRing(uint8_t* buffer, uint16_t capacity)
       : buffer_(buffer), capacity_(capacity), free_min_(capacity) {}
 
-  void clear();  // empties it and forgets all drops
+  void clear();  // opens it, empties it and forgets all drops
+  void close() {
+    open_ = false;
+    used_ = 0;
+  }
+  // Its memory, to be asked for at each use; null while it is open.
+  uint8_t* lend() { return open_ ? nullptr : buffer_; }
 
   // `fields` is the packed struct without its id; its size follows from the id.
   bool push(uint8_t id, const void* fields, uint32_t t_us);
@@ -54,6 +61,7 @@ class ByteRing {
   uint16_t head_ = 0;  // oldest byte
   uint16_t used_ = 0;
   uint16_t free_min_;
+  bool open_ = true;
   uint16_t dropped_pending_ = 0;  // not yet told by an event
   uint32_t dropped_first_us_ = 0;
   uint32_t dropped_ = 0;

@@ -45,7 +45,7 @@ class GpsReceiver {
 // Everything of a frame that has an invalid value gets it; the rest is 0.
 void clear_gps(frames::GpsFrame& frame);
 
-// Date and time as FatFs wants them (two-second steps, UTC by 18 leap seconds); 0 if not known.
+// Date and time as a FAT holds them (two-second steps, UTC by 18 leap seconds); 0 if not known.
 uint32_t fat_time(uint16_t week, uint32_t itow_ms);
 
 }  // namespace core

@@ -1,4 +1,4 @@
-// The life of an SD card over SPI: start, single blocks on the ground, a stream in flight. SD
+// The life of an SD card over SPI: start, single blocks, a stream in flight. No call waits. SD
 // Specifications Part 1, Physical Layer Simplified Specification 6.00, chapter 7.
 #pragma once
 
@@ -16,65 +16,97 @@ class SdCard {
  public:
   static constexpr uint32_t kInitUs = 1000000UL;
   static constexpr uint32_t kReadUs = 150000UL;
-  static constexpr uint32_t kWriteUs = 1000000UL;
+  static constexpr uint32_t kBusyUs = 5000000UL;
+  static constexpr uint16_t kPortion = 128;  // bytes of a block in a call
 
   explicit SdCard(Spi& spi) : spi_(spi), wire_(spi) {}
 
-  // Initialisation that never waits: `start`, then `poll` until it is false.
+  // Initialisation: `start`, then `poll` until it is false.
   void start() {
     state_ = State::kPowerUp;
     wire_.set_status(CardStatus::kNoCard);
     started_us_ = spi_.now_us();
   }
-  // One step, at most 1.5 ms at 400 kHz. True while it goes on.
+  // One step, at most 1 ms at 250 kHz. True while it goes on.
   bool poll() {
     switch (state_) {
       case State::kPowerUp:
         return step(power_up());
+      case State::kVoltage:
+        return step(ask_voltage());
+      case State::kCrcOn:
+        return step(turn_crc_on());
       case State::kNegotiate:
         return step(negotiate());
       case State::kIdentify:
         return step(identify());
-      case State::kOff:
-      case State::kIdle:
-      case State::kStreaming:
-      case State::kStopping:
-      case State::kReopening:
-        break;
+      case State::kCid:
+        return step(take_cid());
+      case State::kCsd:
+        return step(take_csd());
+      default:
+        return false;
     }
-    return false;
   }
-  bool initialised() const { return state_ != State::kOff && state_ > State::kIdentify; }
+  bool initialised() const { return state_ >= State::kIdle; }
   CardStatus status() const { return wire_.status(); }  // of the last call that failed, or kOk
   const uint8_t* cid() const { return cid_; }           // 16 bytes
   uint32_t sectors() const { return sectors_; }
   bool high_capacity() const { return high_capacity_; }
 
-  // ---- on the ground: calls that wait, at most as long as the card may be busy ----
-  bool read(uint32_t sector, uint8_t* to) {
-    if (!idle_for_command()) {
-      return false;
+  // ---- single blocks ----
+  // After it, call `read` or `write` with the 512 bytes until it says kDone or kFailed. A step is
+  // 128 bytes, 0.4 ms, or a look at a card that is busy.
+  void begin_block_at(uint32_t sector) {
+    if (!initialised()) {
+      return;
     }
-    const bool good = wire_.command(Wire::kReadBlock, address(sector)) == 0
-                          ? wire_.receive(to, 512, kReadUs)
-                          : wire_.fail(CardStatus::kCommand);
-    wire_.release();
-    return good;
+    next_sector_ = sector;
+    started_us_ = spi_.now_us();
+    state_ = State::kAsking;
+    spi_.select();
   }
-  bool write(uint32_t sector, const uint8_t* from) {
-    if (!idle_for_command()) {
-      return false;
+  CardStep read(uint8_t* to) {
+    if (state_ == State::kAsking) {
+      return ask(Wire::kReadBlock, State::kReading);
     }
-    bool good = wire_.fail(CardStatus::kCommand);
-    if (wire_.command(Wire::kWriteBlock, address(sector)) == 0) {
+    if (state_ != State::kReading) {
+      return CardStep::kFailed;
+    }
+    const CardStep result = wire_.receive(to, 512, kPortion);
+    if (result == CardStep::kAgain) {
+      return wire_.sends() || !late(kReadUs) ? result : end(wire_.failed(CardStatus::kReadToken));
+    }
+    return end(result);
+  }
+  CardStep write(const uint8_t* from) {
+    if (state_ == State::kAsking) {
+      return ask(Wire::kWriteBlock, State::kSending);
+    }
+    if (state_ == State::kProgramming) {
+      if (wire_.idle()) {
+        return end(CardStep::kDone);
+      }
+      return late(kBusyUs) ? end(wire_.failed(CardStatus::kTimeout)) : CardStep::kAgain;
+    }
+    if (state_ != State::kSending) {
+      return CardStep::kFailed;
+    }
+    if (sent_ == 0) {
       spi_.transfer(0xFF);
       wire_.open_block(Wire::kTokenBlock);
-      wire_.put(from, 512);
-      good = wire_.close_block() == CardWrite::kAccepted &&
-             (wire_.wait_idle(kWriteUs) || wire_.fail(CardStatus::kTimeout));
     }
-    wire_.release();
-    return good;
+    wire_.put(from + sent_, kPortion);
+    sent_ = static_cast<uint16_t>(sent_ + kPortion);
+    if (sent_ < 512) {
+      return CardStep::kAgain;
+    }
+    if (wire_.close_block() != CardWrite::kAccepted) {
+      return end(CardStep::kFailed);
+    }
+    state_ = State::kProgramming;
+    started_us_ = spi_.now_us();
+    return CardStep::kAgain;
   }
 
   // ---- in flight: a multi-block write that never waits ----
@@ -123,7 +155,7 @@ class SdCard {
     }
     return result;
   }
-  // Ends the write; poll `closing` until false before any call that waits.
+  // Ends the write; poll `closing` until false before any other call.
   void close_stream() {
     if (state_ == State::kStreaming) {
       wire_.stop_token();
@@ -142,21 +174,28 @@ class SdCard {
   enum class State : uint8_t {
     kOff,
     kPowerUp,
+    kVoltage,
+    kCrcOn,
     kNegotiate,
     kIdentify,
+    kCid,
+    kCsd,
     kIdle,
+    kAsking,
+    kReading,
+    kSending,
+    kProgramming,
     kStreaming,
     kStopping,
     kReopening
   };
-  enum class Step : uint8_t { kAgain, kDone, kFailed };
 
-  bool step(Step result) {
-    if (result == Step::kAgain) {
+  bool step(CardStep result) {
+    if (result == CardStep::kAgain) {
       return true;
     }
     wire_.release();
-    if (result == Step::kDone) {
+    if (result == CardStep::kDone) {
       state_ = State::kIdle;
       wire_.set_status(CardStatus::kOk);
     } else {
@@ -164,9 +203,34 @@ class SdCard {
     }
     return false;
   }
+  CardStep next(State state) {
+    state_ = state;
+    return CardStep::kAgain;
+  }
+  bool late(uint32_t limit_us) const { return spi_.now_us() - started_us_ > limit_us; }
+  CardStep end(CardStep result) {
+    wire_.release();
+    state_ = State::kIdle;
+    return result;
+  }
+  // The command of a single block, once the card is idle.
+  CardStep ask(uint8_t command, State then) {
+    if (!wire_.idle()) {
+      return late(kBusyUs) ? end(wire_.failed(CardStatus::kTimeout)) : CardStep::kAgain;
+    }
+    const uint8_t r1 = wire_.command(command, address(next_sector_));
+    if (r1 != 0) {
+      const bool gone = r1 == Wire::kNoAnswer;
+      return end(wire_.failed(gone ? CardStatus::kNoResponse : CardStatus::kCommand));
+    }
+    wire_.expect();
+    sent_ = 0;
+    started_us_ = spi_.now_us();
+    return next(then);
+  }
 
   // Section 7.2.1: at least 74 clocks with chip select high, then CMD0, CMD8, CRC on.
-  Step power_up() {
+  CardStep power_up() {
     spi_.slow();
     spi_.deselect();
     for (uint8_t i = 0; i < 10; ++i) {
@@ -176,38 +240,42 @@ class SdCard {
     // A reset in flight meets a card that is still in a multi-block write, in the middle of a block
     // or busy: end that first. A card that is busy takes CMD0 and nothing behind it.
     const uint32_t since_us = spi_.now_us() - started_us_;
-    if (spi_.transfer(0xFF) != 0xFF && since_us <= kInitUs) {
+    if (!wire_.idle() && since_us <= kInitUs) {
       wire_.release();
-      return Step::kAgain;
+      return CardStep::kAgain;
     }
-    uint8_t r1 = wire_.command(Wire::kGoIdle, 0);
-    if (r1 == Wire::kIdleBit) {
-      r1 = wire_.command(Wire::kSendIfCond, 0x1AA);
+    const uint8_t r1 = wire_.command(Wire::kGoIdle, 0);
+    return r1 == Wire::kIdleBit ? next(State::kVoltage) : again_or_none();
+  }
+
+  CardStep again_or_none() {
+    wire_.release();
+    if (late(kInitUs / 2)) {
+      return wire_.failed(CardStatus::kNoCard);
     }
+    end_lost_write();
+    return next(State::kPowerUp);
+  }
+
+  CardStep ask_voltage() {
+    const uint8_t r1 = wire_.command(Wire::kSendIfCond, 0x1AA);
     if (r1 == Wire::kNoAnswer || (r1 & Wire::kIdleBit) == 0) {
-      wire_.release();
-      if (since_us > kInitUs / 2) {
-        wire_.set_status(CardStatus::kNoCard);
-        return Step::kFailed;
-      }
-      end_lost_write();
-      return Step::kAgain;
+      return again_or_none();
     }
     version_2_ = (r1 & Wire::kIllegalBit) == 0;
     if (version_2_) {
       uint8_t r7[4];
       wire_.receive_plain(r7, 4);
       if (r1 != Wire::kIdleBit || (r7[2] & 0x0F) != 1 || r7[3] != 0xAA) {
-        wire_.set_status(CardStatus::kVoltage);
-        return Step::kFailed;
+        return wire_.failed(CardStatus::kVoltage);
       }
     }
-    if (wire_.command(Wire::kCrcOnOff, 1) != Wire::kIdleBit) {
-      wire_.set_status(CardStatus::kCommand);
-      return Step::kFailed;
-    }
-    state_ = State::kNegotiate;
-    return Step::kAgain;
+    return next(State::kCrcOn);
+  }
+
+  CardStep turn_crc_on() {
+    return wire_.command(Wire::kCrcOnOff, 1) == Wire::kIdleBit ? next(State::kNegotiate)
+                                                               : wire_.failed(CardStatus::kCommand);
   }
 
   void end_lost_write() {
@@ -219,54 +287,69 @@ class SdCard {
     spi_.deselect();
   }
 
-  Step negotiate() {
+  CardStep negotiate() {
     wire_.command(Wire::kApplication, 0);
     const uint8_t r1 = wire_.command(Wire::kSendOpCond, version_2_ ? 0x40000000UL : 0);
     if (r1 == Wire::kIdleBit) {
-      if (spi_.now_us() - started_us_ > kInitUs) {
-        wire_.set_status(CardStatus::kInitTimeout);
-        return Step::kFailed;
-      }
-      return Step::kAgain;
+      return late(kInitUs) ? wire_.failed(CardStatus::kInitTimeout) : CardStep::kAgain;
     }
     if (r1 != 0) {
-      wire_.set_status(CardStatus::kCommand);
-      return Step::kFailed;
+      return wire_.failed(CardStatus::kCommand);
     }
-    state_ = State::kIdentify;
     spi_.fast();
-    return Step::kAgain;
+    return next(State::kIdentify);
   }
 
-  Step identify() {
-    wire_.set_status(CardStatus::kCommand);
+  CardStep identify() {
     high_capacity_ = false;
     if (version_2_) {
       uint8_t ocr[4];
       if (wire_.command(Wire::kReadOcr, 0) != 0) {
-        return Step::kFailed;
+        return wire_.failed(CardStatus::kCommand);
       }
       wire_.receive_plain(ocr, 4);
       high_capacity_ = (ocr[0] & 0b0100'0000) != 0;
     }
     if (!high_capacity_ && wire_.command(Wire::kSetBlockLength, 512) != 0) {
-      return Step::kFailed;
+      return wire_.failed(CardStatus::kCommand);
     }
+    return ask_register(Wire::kSendCid, State::kCid);
+  }
+
+  CardStep ask_register(uint8_t command, State then) {
+    if (wire_.command(command, 0) != 0) {
+      return wire_.failed(CardStatus::kCommand);
+    }
+    wire_.expect();
+    started_us_ = spi_.now_us();
+    return next(then);
+  }
+
+  CardStep take_cid() {
+    const CardStep result = take_register(cid_);
+    return result == CardStep::kDone ? ask_register(Wire::kSendCsd, State::kCsd) : result;
+  }
+
+  CardStep take_csd() {
     uint8_t csd[16];
-    if (wire_.command(Wire::kSendCid, 0) != 0 || !wire_.receive(cid_, 16, kReadUs) ||
-        wire_.command(Wire::kSendCsd, 0) != 0 || !wire_.receive(csd, 16, kReadUs)) {
-      return Step::kFailed;
-    }
-    return read_capacity(csd) ? Step::kDone : Step::kFailed;
+    const CardStep result = take_register(csd);
+    return result == CardStep::kDone ? read_capacity(csd) : result;
+  }
+
+  // All 16 bytes at once when they come.
+  CardStep take_register(uint8_t* to) {
+    const CardStep result = wire_.receive(to, 16, 16);
+    const bool none = result == CardStep::kAgain && late(kReadUs);
+    return none ? wire_.failed(CardStatus::kReadToken) : result;
   }
 
   // Section 5.3: C_SIZE of CSD version 1 and 2.
-  bool read_capacity(const uint8_t* csd) {
+  CardStep read_capacity(const uint8_t* csd) {
     const uint8_t version = static_cast<uint8_t>(csd[0] >> 6);
     if (version == 1) {
       const uint32_t size = core::get_be24(csd + 7) & 0x3FFFFFUL;
       sectors_ = (size + 1) << 10;
-      return true;
+      return CardStep::kDone;
     }
     if (version == 0) {
       const uint16_t size = static_cast<uint16_t>(
@@ -275,33 +358,22 @@ class SdCard {
           static_cast<uint8_t>((((csd[9] & 0x03U) << 1) | (csd[10] >> 7)) + 2);
       const uint8_t length = csd[5] & 0x0F;  // log2 of the read block length, 9 to 11
       if (length < 9 || length > 11) {
-        return wire_.fail(CardStatus::kUnsupported);
+        return wire_.failed(CardStatus::kUnsupported);
       }
       sectors_ = (static_cast<uint32_t>(size) + 1) << (multiplier + length - 9);
-      return true;
+      return CardStep::kDone;
     }
-    return wire_.fail(CardStatus::kUnsupported);
+    return wire_.failed(CardStatus::kUnsupported);
   }
 
   uint32_t address(uint32_t sector) const { return high_capacity_ ? sector : sector << 9; }
-
-  bool idle_for_command() {
-    if (state_ != State::kIdle) {
-      return false;
-    }
-    spi_.select();
-    if (wire_.wait_idle(kWriteUs)) {
-      return true;
-    }
-    wire_.release();
-    return wire_.fail(CardStatus::kTimeout);
-  }
 
   Spi& spi_;
   Wire wire_;
   uint32_t started_us_ = 0;
   uint32_t sectors_ = 0;
   uint32_t next_sector_ = 0;
+  uint16_t sent_ = 0;  // bytes of a single block
   uint8_t cid_[16] = {};
   State state_ = State::kOff;
   bool high_capacity_ = false;

@@ -20,9 +20,12 @@ enum class CardStatus : uint8_t {
   kWriteCrc = 7,      // data response 101: the card saw a wrong CRC
   kWriteError = 8,    // data response 110
   kNoResponse = 9,    // no data response: the card is gone
-  kTimeout = 10,      // busy for longer than 1 s in a call that waits
+  kTimeout = 10,      // busy for longer than 5 s with a single block
   kUnsupported = 11,  // CSD of another kind
 };
+
+// Of what goes on over many calls.
+enum class CardStep : uint8_t { kAgain, kDone, kFailed };
 
 enum class CardWrite : uint8_t {
   kAccepted,  // the card programs it now
@@ -34,7 +37,6 @@ enum class CardWrite : uint8_t {
 //      void send(uint8_t)          one byte out; may return while it is shifted
 //      void select(), deselect()   chip select low, high
 //      uint32_t now_us()
-//      void waiting()              called again and again while a call waits
 template <typename Spi>
 class SdWire {
  public:
@@ -49,9 +51,9 @@ class SdWire {
 
   CardStatus status() const { return status_; }  // of the last call that failed, or as set
   void set_status(CardStatus status) { status_ = status; }
-  bool fail(CardStatus status) {
+  CardStep failed(CardStatus status) {
     status_ = status;
-    return false;
+    return CardStep::kFailed;
   }
 
   // R1, or kNoAnswer. Section 7.3.1.1; CRC-7 in bits 7 to 1.
@@ -82,28 +84,45 @@ class SdWire {
     }
   }
 
-  bool receive(uint8_t* to, uint16_t size, uint32_t limit_us) {
-    const uint32_t from_us = spi_.now_us();
-    uint8_t token = 0xFF;
-    do {
-      if (spi_.now_us() - from_us > limit_us) {
-        return fail(CardStatus::kReadToken);
+  // A block comes that the card sends by itself; call `receive` until it is there.
+  void expect() {
+    at_ = 0;
+    sends_ = false;
+  }
+  bool sends() const { return sends_; }  // the block has begun to come
+  // At most `most` bytes of a block of `size`; a few looks at the bus while there is none.
+  CardStep receive(uint8_t* to, uint16_t size, uint16_t most) {
+    if (!sends_) {
+      uint8_t token = 0xFF;
+      for (uint8_t looks = kLooks; looks != 0 && token == 0xFF; --looks) {
+        token = spi_.transfer(0xFF);
       }
-      spi_.waiting();  // at least once: a search reads thousands of blocks of a card that is quick
-      token = spi_.transfer(0xFF);
-    } while (token == 0xFF);
-    if (token != kTokenBlock) {
-      return fail(CardStatus::kReadToken);
+      if (token == 0xFF) {
+        return CardStep::kAgain;
+      }
+      if (token != kTokenBlock) {
+        return failed(CardStatus::kReadToken);
+      }
+      sends_ = true;
+      crc_ = core::kCrc16StartCard;
     }
-    uint16_t crc = core::kCrc16StartCard;
-    while (size-- != 0) {
+    const uint16_t left = static_cast<uint16_t>(size - at_);
+    uint16_t count = left < most ? left : most;
+    uint16_t crc = crc_;
+    uint8_t* next = to + at_;
+    at_ = static_cast<uint16_t>(at_ + count);
+    while (count-- != 0) {
       const uint8_t byte = spi_.transfer(0xFF);
-      *to++ = byte;
+      *next++ = byte;
       crc = core::crc16_add(crc, byte);
     }
+    crc_ = crc;
+    if (at_ < size) {
+      return CardStep::kAgain;
+    }
     crc = core::crc16_add(crc, spi_.transfer(0xFF));
     crc = core::crc16_add(crc, spi_.transfer(0xFF));
-    return crc == 0 || fail(CardStatus::kReadCrc);
+    return crc == 0 ? CardStep::kDone : failed(CardStatus::kReadCrc);
   }
 
   void open_block(uint8_t token) {
@@ -141,16 +160,8 @@ class SdWire {
     spi_.transfer(0xFF);  // busy begins after one byte
   }
 
-  bool wait_idle(uint32_t limit_us) {
-    const uint32_t from_us = spi_.now_us();
-    while (spi_.transfer(0xFF) != 0xFF) {
-      if (spi_.now_us() - from_us > limit_us) {
-        return false;
-      }
-      spi_.waiting();
-    }
-    return true;
-  }
+  // One byte on the bus: not busy.
+  bool idle() { return spi_.transfer(0xFF) == 0xFF; }
 
   void release() {
     spi_.deselect();
@@ -166,8 +177,12 @@ class SdWire {
     }
   }
 
+  static constexpr uint8_t kLooks = 16;  // 35 us
+
   Spi& spi_;
   uint16_t crc_ = 0;
+  uint16_t at_ = 0;     // bytes received
+  bool sends_ = false;  // they come
   CardStatus status_ = CardStatus::kNoCard;
 };
 

@@ -1,4 +1,5 @@
-// The memory card in 512-byte blocks: calls that wait, for the ground, and a stream that does not.
+// The memory card in 512-byte blocks: single blocks and a stream. No call waits for the card; none
+// takes longer than 1 ms.
 #pragma once
 
 #include <stdint.h>
@@ -10,25 +11,24 @@ constexpr uint8_t kCardIdBytes = 16;
 
 enum class CardStatus : uint8_t {
   kOk,
-  kBusy,      // stream only: not now
+  kBusy,      // not now: ask again
   kRejected,  // the card refused the block; the stream has ended
   kError,     // the card answers, but not as it should
   kAbsent,    // no answer
 };
 
-// Called about every 0.1 ms while one of the waiting calls below waits, so that receiver, servos,
-// sensors and watchdog are served. It must not use the card. Null: nothing is called.
-using CardWait = void (*)(void* context);
-void set_card_wait(CardWait wait, void* context);
+// --- one thing at a time: each goes on by its poll until that says something else than kBusy ---
+void start_card();
+CardStatus poll_start();
+void begin_read(uint32_t lba);
+CardStatus poll_read(uint8_t* block);
+void begin_write(uint32_t lba);
+CardStatus poll_write(const uint8_t* block);
 
-// --- on the ground: each call waits, up to 1 s for start_card() and 0.5 s for the others ---
-CardStatus start_card();
 CardStatus read_card_id(uint8_t* id);  // the CID register, kCardIdBytes
-uint32_t card_blocks();                // 0 before start_card()
-CardStatus read_card(uint32_t lba, uint8_t* block);
-CardStatus write_card(uint32_t lba, const uint8_t* block);
+uint32_t card_blocks();                // 0 until the card has started
 
-// --- the stream: no call waits for the card; the longest is a block on SPI, 0.9 ms ---
+// --- the stream ---
 // Opens a multi-block write. kOk: poll until it is ready.
 CardStatus begin_stream(uint32_t lba);
 // kOk: takes a block now. kBusy: still writing. Else the stream has ended.

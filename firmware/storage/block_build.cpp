@@ -48,17 +48,22 @@ void build_schema_block(uint8_t* block, uint32_t file_id, uint32_t session) {
   seal(block, header);
 }
 
-void build_end_block(uint8_t* block, const core::BlockHeader& header, uint32_t now_us) {
+void build_end_block(uint8_t* block,
+                     const core::BlockHeader& header,
+                     const frames::FileFrame& made) {
   memset(block, 0, core::kBlockSize);
   frames::EventFrame event = {};
-  event.t_us = now_us;
+  event.t_us = made.t_us;
   event.code = static_cast<uint8_t>(frames::Event::kSessionEnd);
   event.arg = 2;
   uint8_t* const payload = block + core::kBlockHeaderSize;
-  payload[0] = frames::EventFrame::id();
-  memcpy(payload + 1, &event, sizeof event);
+  payload[0] = frames::FileFrame::id();
+  memcpy(payload + 1, &made, sizeof made);
+  uint8_t* const behind = payload + frames::FileFrame::wire_size();
+  behind[0] = frames::EventFrame::id();
+  memcpy(behind + 1, &event, sizeof event);
   core::BlockHeader full = header;
-  full.used = frames::EventFrame::wire_size();
+  full.used = frames::FileFrame::wire_size() + frames::EventFrame::wire_size();
   full.kind = core::BlockKind::kFrames;
   seal(block, full);
 }

@@ -1,90 +1,89 @@
-// The card's file system: finds, prepares and closes flight files FLTnnnnn.BIN. The only room that
-// sees FatFs. Every call here may wait for the card (hal/block_device.h); none is made in flight,
-// except mount() and find_latest(), which write nothing.
+// The card's file system: finds, prepares and closes flight files FLTnnnnn.BIN. One job at a time,
+// in steps that return to the main loop: each moves or looks at one block and lasts at most 1.2 ms.
 #pragma once
 
 #include <stdint.h>
 
-#include "ff.h"
 #include "hal/block_device.h"
+#include "storage/card_state.h"
+#include "storage/close_file.h"
+#include "storage/free_run.h"
+#include "storage/look.h"
+#include "storage/make_file.h"
+#include "storage/transfer.h"
 
 namespace storage {
 
-enum class VolumeStatus : uint8_t {
-  kReady,
-  kNoCard,
-  kNoFat,       // exFAT, not formatted
-  kUnreadable,  // the card answers with errors
-  kFull,
-  kFragmented,  // room enough, but not in one piece
-};
-
-enum class FileState : uint8_t {
-  kNone,    // no flight file, or the latest is not one of this logger
-  kClosed,  // cut to its used length, or used to its end
-  kBlank,   // prepared, never recorded into
-  kOpen,    // holds a recording that nobody ended
-};
-
-struct FlightFile {
-  uint32_t first_lba = 0;
-  uint32_t blocks = 0;  // room
-  uint32_t next_block = 0;
-  uint32_t file_id = 0;
-  uint32_t last_session = 0;  // of its last block; 0: none
-  uint32_t last_dropped = 0;
-  uint32_t number = 0;
-  bool ended = false;  // its last block says session_end
-};
-
 class Volume {
  public:
-  static constexpr uint32_t kFileBlocks = 131072;  // 64 MiB: 2.6 h at 100 Hz
-  static constexpr uint32_t kMaxNumber = 99999;
+  enum class Job : uint8_t { kNone, kStart, kLook, kSearch, kMake, kClose, kMend };
 
-  // What FatFs needs between mount() and unmount(); anybody's else.
-  using Memory = FATFS;
-  explicit Volume(Memory& memory) : fs_(memory) {}
+  static constexpr uint32_t kFileBlocks = Look::kMostBlocks;  // 64 MiB: 2.6 h at 100 Hz
+  static constexpr uint32_t kMaxNumber = 99999;
 
   // Tests use smaller files. At least 2 blocks.
   void set_file_blocks(uint32_t blocks) { file_blocks_ = blocks; }
   // Date of new and closed files, as core::fat_time() makes it; 0: not known.
-  static void set_date(uint32_t fat_time);
+  void set_date(uint32_t fat_time) { card_.date = fat_time; }
 
-  VolumeStatus mount();
-  // The same for a card that is known and was not changed since; file() stays.
-  VolumeStatus mount_again();
-  // FatFs forgets the volume and its memory.
-  static void unmount();
-  // Looks at the file with the largest number: what it holds, and where its used part ends.
-  VolumeStatus find_latest(FileState* state);
-  // Makes the file with the next number: contiguous, with a first block of its own, so that its
-  // id is known and no older block behind it can be taken for its content.
-  VolumeStatus prepare(uint32_t session);
+  // --- jobs; `step` until it says that the job has ended, then ask `status` ---
+  void look();        // starts the card, then as look_again()
+  void look_again();  // what is on it: file(), state(), odd()
+  // Looks for room; best_blocks() grows. It may be left for another job at any time, and gone on
+  // with. Ends with room for a whole file, or with all of the card looked at.
+  void search();
+  void go_on_searching() { job_ = Job::kSearch; }
+  // A file of the best room found. The next number, with a first block of its own, so that its id
+  // is known and no older block behind it can be taken for its content; or, with `replace`, the
+  // same file with more room: only one that was never recorded into.
+  void make(uint32_t session, bool replace);
   // Cuts file() to `used_blocks`. With `end_event` a block saying session_end 2 goes behind them.
-  VolumeStatus close(uint32_t used_blocks, bool end_event, uint32_t now_us);
+  void close(uint32_t used_blocks, bool end_event, uint32_t now_us);
+  bool can_mend() const { return CloseFile::can_mend(card_); }
+  void mend();
 
-  const FlightFile& file() const { return file_; }
-  bool smaller_than_new() const { return file_.blocks < file_blocks_; }
+  // Goes on with the job, in memory of kSectorBytes that stays as it is between the steps of a job.
+  // Writes are begun only while `may_write`. True: the job has ended.
+  bool step(uint8_t* sector, bool may_write);
+  // Leaves the job if the card is not in the middle of a block; false: ask again.
+  bool leave();
+
+  Job job() const { return job_; }
+  bool waits() const { return waits_; }  // with a write, for the ground
+  uint8_t percent() const;               // of the job
+  VolumeStatus status() const { return status_; }
+  FileState state() const { return card_.state; }
+  frames::FileState odd() const { return card_.odd; }
+  const FlightFile& file() const { return card_.file; }
+  bool smaller_than_new() const { return card_.file.blocks < file_blocks_; }
+  uint32_t file_blocks() const { return file_blocks_; }
+  uint32_t best_blocks() const;  // of the search
+  bool searched() const { return run_.ended() && !near_; }
+  // Why there is no room for `blocks`, behind a search of the whole card.
+  VolumeStatus shortage(uint32_t blocks) const;
 
  private:
-  using Name = char[13];  // 8.3 and a zero
+  void begin(Job job, Wish first);
+  void follow(Wish wish);
+  Wish next(uint8_t* sector);
+  Wish next_run(const uint8_t* sector);
+  Wish read_run() const;
+  void end(VolumeStatus status);
 
-  static void make_name(uint32_t number, Name name);
-  static uint32_t number_of(const char* name);
-  VolumeStatus from_result(FRESULT result) const;
-  VolumeStatus find_largest(uint32_t* number);
-  VolumeStatus shortage() const;
-  VolumeStatus inspect(FIL* fil, FileState* state);
-  VolumeStatus find_end();
-  hal::CardStatus own_block(uint32_t block, bool* own);
-  VolumeStatus write_first_block(uint32_t session);
-  hal::CardStatus write_end_event(uint32_t block, uint32_t now_us);
-  uint8_t* window();
-
-  FATFS& fs_;
-  FlightFile file_;
+  CardState card_;
+  FreeRun run_;
+  Transfer transfer_;
+  union {  // one job at a time
+    Look look_ = {};
+    MakeFile make_;
+    CloseFile close_;
+  };
   uint32_t file_blocks_ = kFileBlocks;
+  Job job_ = Job::kNone;
+  VolumeStatus status_ = VolumeStatus::kNoCard;
+  Wish::Kind wish_ = Wish::Kind::kAgain;
+  bool waits_ = false;
+  bool near_ = false;  // the search is still where FSInfo points
 };
 
 }  // namespace storage

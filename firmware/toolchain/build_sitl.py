@@ -1,8 +1,8 @@
 """Build the firmware as a shared library for this computer: build/sitl/libsitl.so.
 
-Compiles core, drivers, storage, app, boards/sitl and FatFs with the compilers
-named by CXX and CC (default c++ and cc; g++ and clang++ both work). Only what
-changed is compiled again. Import `build`, or run it: it prints the library.
+Compiles core, drivers, storage, app and boards/sitl with the compiler named by
+CXX (default c++; g++ and clang++ both work). Only what changed is compiled
+again. Import `build`, or run it: it prints the library.
 """
 
 from __future__ import annotations
@@ -16,14 +16,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-import fatfs
-
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 LIBRARY = ROOT / "build" / "sitl" / "libsitl.so"
 ROOMS = ("core", "drivers", "storage", "app", "boards/sitl")
 
-INCLUDES = ("-Ifirmware", "-Iprotocol", "-Ifirmware/storage")
+INCLUDES = ("-Ifirmware", "-Iprotocol")
 COMMON = ("-O2", "-g1", "-fPIC")
 # A name nobody defines must fail here, not when the library is loaded; macOS does so by itself.
 LINK = ("-shared", "-Wl,--no-undefined") if sys.platform == "linux" else ("-shared",)
@@ -84,13 +82,9 @@ def build(*, library: Path = LIBRARY, extra_flags: tuple[str, ...] = ()) -> Path
     ------
     BuildError
         If a compiler or the linker fails.
-    fatfs.FetchError
-        If FatFs cannot be fetched.
     """
-    sources = fatfs.ensure()
     cxx = os.environ.get("CXX", "c++")
-    cc = os.environ.get("CC", "clang" if "clang" in cxx else "cc")
-    units = list(_units(library.parent, sources, cxx, cc, extra_flags))
+    units = list(_units(library.parent, cxx, extra_flags))
     link = [cxx, *LINK, *extra_flags, *(str(unit.target) for unit in units)]
 
     # A change of compiler or flags is a change of every object.
@@ -110,15 +104,12 @@ def build(*, library: Path = LIBRARY, extra_flags: tuple[str, ...] = ()) -> Path
     return library
 
 
-def _units(
-    folder: Path, sources: Path, cxx: str, cc: str, extra: tuple[str, ...]
-) -> Iterator[Unit]:
-    include = (*INCLUDES, f"-I{sources}", *COMMON, *extra)
+def _units(folder: Path, cxx: str, extra: tuple[str, ...]) -> Iterator[Unit]:
+    command = (cxx, "-std=gnu++14", *STRICT, "-Werror", *INCLUDES, *COMMON, *extra)
     for room in ROOMS:
         for source in sorted((FIRMWARE / room).glob("*.cpp")):
             target = folder / source.relative_to(FIRMWARE).with_suffix(".o")
-            yield Unit(source, target, (cxx, "-std=gnu++14", *STRICT, "-Werror", *include))
-    yield Unit(sources / "ff.c", folder / "fatfs" / "ff.o", (cc, *include))
+            yield Unit(source, target, command)
 
 
 def _run(command: list[str]) -> None:
@@ -133,7 +124,7 @@ def main() -> int:
     parser.parse_args()
     try:
         print(build())
-    except (BuildError, fatfs.FetchError) as error:
+    except BuildError as error:
         print(f"build_sitl: {error}", file=sys.stderr)
         return 1
     return 0

@@ -48,7 +48,6 @@ class Sources:
         self._root = root
         patterns = ("firmware/**/*.h", "firmware/**/*.cpp", "protocol/generated/*.h")
         paths = [path for pattern in patterns for path in sorted(root.glob(pattern))]
-        paths += sorted(root.glob("build/fatfs-*/*.[ch]"))
         self._texts = {
             self.short(str(path.relative_to(root))): path.read_text(errors="replace")
             for path in paths
@@ -57,9 +56,8 @@ class Sources:
 
     @staticmethod
     def short(path: str) -> str:
-        """Name of a file in the tables: as in the tree, FatFs by its name."""
-        name = path.removeprefix("./")
-        return re.sub(r"^.*build/fatfs-[^/]*/", "FatFs/", name)
+        """Name of a file in the tables: as in the tree."""
+        return path.removeprefix("./")
 
     def of_class(self, name: str) -> str | None:
         """File that defines a class; None if none or several do."""

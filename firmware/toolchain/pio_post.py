@@ -1,8 +1,7 @@
 """After PlatformIO's program is described: compiler, archives, strictness, hash, RAM.
 
-FatFs is compiled without our warnings. For the test environments our own code
-is an archive too, so that a suite of `core` needs no stand-in for hal functions
-that only `app` calls.
+For the test environments our own code is an archive, so that a suite of `core`
+needs no stand-in for hal functions that only `app` calls.
 """
 
 import importlib
@@ -18,7 +17,6 @@ env = DefaultEnvironment()
 projenv: Any = globals()["projenv"]
 root = Path(env.subst("$PROJECT_DIR"))
 # pio_pre.py has put this folder on the path; SCons takes it off before it builds.
-fatfs = importlib.import_module("fatfs")
 ram_table = importlib.import_module("ram_table")
 stack_depth = importlib.import_module("stack_depth")
 
@@ -48,8 +46,6 @@ if archive_filter:
     archives.append(
         projenv.BuildLibrary("$BUILD_DIR/firmware_archive", "$PROJECT_SRC_DIR", archive_filter)
     )
-if env["PIOENV"] != "arduimu":
-    archives.append(env.BuildLibrary("$BUILD_DIR/fatfs_archive", str(fatfs.SOURCES), "+<ff.c>"))
 env.Append(LIBS=archives)
 
 

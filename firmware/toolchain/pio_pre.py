@@ -1,4 +1,4 @@
-"""Before a PlatformIO build: board there? compiler, settings, FatFs, sanitizers of `native`.
+"""Before a PlatformIO build: board there? compiler, settings, sanitizers of `native`.
 
 PlatformIO runs this ahead of the platform's own build script.
 """
@@ -80,14 +80,6 @@ if env["PIOENV"] == "mega2560":
     )
     if wrong:
         sys.stderr.write(f"{wrong}\n")
-        env.Exit(1)
-
-if env["PIOENV"] != "arduimu":
-    fatfs = importlib.import_module("fatfs")
-    try:
-        env.Append(CPPPATH=[str(fatfs.ensure(python=env.subst("$PYTHONEXE")))])
-    except fatfs.FetchError as error:
-        sys.stderr.write(f"fatfs: {error}\n")
         env.Exit(1)
 
 if env["PIOENV"] == "native":

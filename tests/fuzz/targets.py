@@ -3,7 +3,7 @@
     python -m tests.fuzz.targets rc_decoder --runs 2000
     python -m tests.fuzz.targets rc_decoder --merge     keep what is new in tests/data/fuzz
 
-Under address and undefined-behaviour sanitizers; FatFs and our own code alike. An input that breaks
+Under address and undefined-behaviour sanitizers. An input that breaks
 a rule stays in build/fuzz/failures; `--input FILE` repeats it. Exit codes: 0, 6 for a broken rule,
 1 where nothing could be built.
 """

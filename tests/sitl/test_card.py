@@ -247,7 +247,7 @@ def test_power_cut_at_a_random_instant_of_flight(tmp_path: Path, seed: int) -> N
 
 
 def test_formatting_clears_what_was_there() -> None:
-    """The card of these tests is a card: what it formats, FatFs and fsck agree on."""
+    """The card of these tests is a card: what it formats, fsck agrees on."""
     image = new_card()
     before = bytes(image)
     image[40 * BLOCK : 50 * BLOCK] = b"x" * (10 * BLOCK)

@@ -196,7 +196,7 @@ def test_holding_delays_the_release_by_its_time_for_surfaces_only(hold_ms: int) 
     bench, last = lose_receiver(hold_ms)
     longer_s = released_s(bench, last) - plain_s
     assert longer_s == pytest.approx(hold_ms / 1000, abs=0.01)
-    assert longer_s <= 1.0
+    assert longer_s <= 1.001  # a turn of the loop
     start, output, width = bench.sitl.pulses()
     held = start > last + ticks(0.1)
     assert set(output[held].tolist()) == {0, 1, 2}  # never throttle

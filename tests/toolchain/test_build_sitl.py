@@ -7,7 +7,6 @@ import os
 from pathlib import Path
 
 import build_sitl
-import fatfs
 import pytest
 
 SOURCE = '#include "core/answer.h"\nextern "C" int answer() { return kAnswer; }\n'
@@ -15,15 +14,13 @@ SOURCE = '#include "core/answer.h"\nextern "C" int answer() { return kAnswer; }\
 
 @pytest.fixture
 def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Make a firmware of one source and one header, with an empty FatFs."""
-    for folder in ("firmware/core", "firmware/boards/sitl", "fatfs"):
+    """Make a firmware of one source and one header."""
+    for folder in ("firmware/core", "firmware/boards/sitl"):
         (tmp_path / folder).mkdir(parents=True)
-    (tmp_path / "fatfs" / "ff.c").write_text("int ff_unit = 0;\n")
     (tmp_path / "firmware/core/answer.h").write_text("constexpr int kAnswer = 41;\n")
     (tmp_path / "firmware/boards/sitl/answer.cpp").write_text(SOURCE)
     monkeypatch.setattr(build_sitl, "ROOT", tmp_path)
     monkeypatch.setattr(build_sitl, "FIRMWARE", tmp_path / "firmware")
-    monkeypatch.setattr(fatfs, "ensure", lambda: tmp_path / "fatfs")
     return tmp_path
 
 

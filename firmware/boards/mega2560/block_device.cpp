@@ -11,9 +11,6 @@
 
 namespace {
 
-hal::CardWait g_wait = nullptr;
-void* g_wait_context = nullptr;
-
 class Spi {
  public:
   static uint8_t transfer(const uint8_t byte) {
@@ -49,11 +46,6 @@ class Spi {
     polls_ = 12;        // a byte: 16 cycles
   }
   static uint32_t now_us() { return hal::now_us(); }
-  static void waiting() {
-    if (g_wait != nullptr) {
-      g_wait(g_wait_context);
-    }
-  }
 
  private:
   static void finish() {
@@ -96,20 +88,30 @@ hal::CardStatus failure() {
   }
 }
 
+hal::CardStatus result_of(const drivers::CardStep step) {
+  switch (step) {
+    case drivers::CardStep::kAgain:
+      return hal::CardStatus::kBusy;
+    case drivers::CardStep::kDone:
+      return hal::CardStatus::kOk;
+    case drivers::CardStep::kFailed:
+      break;
+  }
+  return failure();
+}
+
 }  // namespace
 
 namespace hal {
 
-void set_card_wait(const CardWait wait, void* const context) {
-  g_wait = wait;
-  g_wait_context = context;
-}
-
-CardStatus start_card() {
+void start_card() {
   g_closing = false;
   g_card.start();
-  while (g_card.poll()) {
-    Spi::waiting();
+}
+
+CardStatus poll_start() {
+  if (g_card.poll()) {
+    return CardStatus::kBusy;
   }
   return g_card.initialised() ? CardStatus::kOk : failure();
 }
@@ -126,12 +128,20 @@ uint32_t card_blocks() {
   return g_card.initialised() ? g_card.sectors() : 0;
 }
 
-CardStatus read_card(const uint32_t lba, uint8_t* const block) {
-  return g_card.read(lba, block) ? CardStatus::kOk : failure();
+void begin_read(const uint32_t lba) {
+  g_card.begin_block_at(lba);
 }
 
-CardStatus write_card(const uint32_t lba, const uint8_t* const block) {
-  return g_card.write(lba, block) ? CardStatus::kOk : failure();
+CardStatus poll_read(uint8_t* const block) {
+  return result_of(g_card.read(block));
+}
+
+void begin_write(const uint32_t lba) {
+  g_card.begin_block_at(lba);
+}
+
+CardStatus poll_write(const uint8_t* const block) {
+  return result_of(g_card.write(block));
 }
 
 CardStatus begin_stream(const uint32_t lba) {

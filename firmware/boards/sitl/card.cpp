@@ -66,12 +66,20 @@ CardStatus Card::read(uint32_t lba, uint8_t* block) const {
   return CardStatus::kOk;
 }
 
-CardStatus Card::write(uint32_t lba, const uint8_t* block) {
-  if (!present() || !started_) return CardStatus::kAbsent;
+CardStatus Card::write(uint32_t lba, const uint8_t* block, int64_t now, int64_t busy) {
   if (lba >= blocks_) return CardStatus::kError;
-  memcpy(image_ + static_cast<size_t>(lba) * hal::kCardBlockBytes, block, hal::kCardBlockBytes);
+  const int64_t fault = 2 * static_cast<int64_t>(next_busy_us_);
+  next_busy_us_ = 0;
+  program(lba, block, now + (fault > 0 ? fault : busy));
   ++ground_writes_;
   return CardStatus::kOk;
+}
+
+void Card::program(uint32_t lba, const uint8_t* block, int64_t until) {
+  memcpy(pending_block_, block, sizeof pending_block_);
+  pending_lba_ = lba;
+  pending_ = true;
+  busy_until_ = until;
 }
 
 CardStatus Card::begin_stream(uint32_t lba, int64_t now) {
@@ -100,12 +108,9 @@ CardStatus Card::write_stream(const uint8_t* block, int64_t now) {
     streaming_ = false;
     return CardStatus::kRejected;
   }
-  memcpy(pending_block_, block, sizeof pending_block_);
-  pending_lba_ = stream_lba_++;
-  pending_ = true;
   const uint32_t busy_us = next_busy_us_ > 0 ? next_busy_us_ : every_busy_us_;
   next_busy_us_ = 0;
-  busy_until_ = now + 2 * static_cast<int64_t>(busy_us);
+  program(stream_lba_++, block, now + 2 * static_cast<int64_t>(busy_us));
   ++blocks_taken_;
   return CardStatus::kOk;
 }

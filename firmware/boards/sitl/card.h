@@ -34,7 +34,8 @@ class Card {
 
   hal::CardStatus start(int64_t now);
   hal::CardStatus read(uint32_t lba, uint8_t* block) const;
-  hal::CardStatus write(uint32_t lba, const uint8_t* block);
+  // A single block, programmed for `busy` or as long as a fault says.
+  hal::CardStatus write(uint32_t lba, const uint8_t* block, int64_t now, int64_t busy);
   hal::CardStatus begin_stream(uint32_t lba, int64_t now);
   hal::CardStatus poll_stream(int64_t now);
   hal::CardStatus write_stream(const uint8_t* block, int64_t now);
@@ -48,11 +49,13 @@ class Card {
   uint32_t blocks() const { return started_ ? blocks_ : 0; }
   const uint8_t* id() const { return id_; }
   bool present() const { return present_ && image_ != nullptr; }
+  bool usable() const { return present() && started_; }
   bool programming() const { return pending_; }
   uint32_t blocks_taken() const { return blocks_taken_; }
   uint32_t ground_writes() const { return ground_writes_; }
 
  private:
+  void program(uint32_t lba, const uint8_t* block, int64_t until);
   void commit();
 
   uint8_t* image_ = nullptr;

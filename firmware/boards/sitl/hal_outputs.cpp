@@ -18,24 +18,39 @@ using sitl::world;
 namespace {
 
 constexpr uint16_t kSendBuffer = 128;
-constexpr Tick kReadTicks = 900 * kTicksPerUs;
-constexpr Tick kWriteTicks = 1500 * kTicksPerUs;
+constexpr Tick kAskTicks = 50 * kTicksPerUs;
+constexpr Tick kStartTicks = 20 * kTicksPerMs;
+constexpr Tick kAccessTicks = 200 * kTicksPerUs;    // until a block asked for comes
+constexpr Tick kProgramTicks = 1000 * kTicksPerUs;  // a single block
+constexpr uint8_t kPortions = 4;                    // of a single block, one a call
+constexpr Tick kPortionTicks = 225 * kTicksPerUs;
 constexpr Tick kSpiByteTicks = 3;  // 1.5 us: 8 MHz and the loop around it
 constexpr Tick kEepromTicks = 3400 * kTicksPerUs;
 
 uint8_t block[kCardBlockBytes];
 uint16_t block_filled = 0;
 
-CardWait card_wait = nullptr;
-void* card_wait_context = nullptr;
+// A single block on its way, or a card that starts.
+struct Single {
+  uint32_t lba = 0;
+  Tick ready = 0;
+  uint8_t portions = 0;
+} single;
 
-void wait(Tick duration) {
-  const Tick end = world().now + duration;
-  while (world().now < end) {
-    const Tick next = std::min(world().now + kTicksPerMs / 2, world().next_event());
-    world().advance_to(std::max(world().now + 1, std::min(next, end)));
-    if (card_wait != nullptr) card_wait(card_wait_context);
-  }
+void begin_single(uint32_t lba) {
+  single = {lba, world().now + kAccessTicks, 0};
+}
+
+// Asking takes time too: a loop that asks again and again must not stand still in it.
+CardStatus still_busy() {
+  world().advance_to(world().now + kAskTicks);
+  return CardStatus::kBusy;
+}
+
+// One portion passes over the bus. True: it was the last.
+bool portion_passed() {
+  world().advance_to(world().now + kPortionTicks);
+  return ++single.portions == kPortions;
 }
 
 sitl::PortModel& model(Port port) {
@@ -66,14 +81,12 @@ bool relay_engaged() {
   return world().relay.engaged || world().relay.welded;
 }
 
-void set_card_wait(CardWait wait_function, void* context) {
-  card_wait = wait_function;
-  card_wait_context = context;
+void start_card() {
+  single.ready = world().now + kStartTicks;
 }
 
-CardStatus start_card() {
-  wait(20 * kTicksPerMs);
-  return world().card.start(world().now);
+CardStatus poll_start() {
+  return world().now < single.ready ? still_busy() : world().card.start(world().now);
 }
 
 CardStatus read_card_id(uint8_t* id) {
@@ -86,16 +99,29 @@ uint32_t card_blocks() {
   return world().card.blocks();
 }
 
-CardStatus read_card(uint32_t lba, uint8_t* block) {
-  wait(kReadTicks);
-  world().card.step(world().now);
-  return world().card.read(lba, block);
+void begin_read(uint32_t lba) {
+  begin_single(lba);
 }
 
-CardStatus write_card(uint32_t lba, const uint8_t* block) {
-  wait(kWriteTicks);
+CardStatus poll_read(uint8_t* to) {
   world().card.step(world().now);
-  return world().card.write(lba, block);
+  if (!world().card.usable()) return CardStatus::kAbsent;
+  if (world().now < single.ready || world().card.programming()) return still_busy();
+  return portion_passed() ? world().card.read(single.lba, to) : CardStatus::kBusy;
+}
+
+void begin_write(uint32_t lba) {
+  begin_single(lba);
+}
+
+CardStatus poll_write(const uint8_t* from) {
+  world().card.step(world().now);
+  if (!world().card.usable()) return CardStatus::kAbsent;
+  if (world().now < single.ready || world().card.programming()) return still_busy();
+  if (single.portions == kPortions) return CardStatus::kOk;
+  if (!portion_passed()) return CardStatus::kBusy;
+  const CardStatus status = world().card.write(single.lba, from, world().now, kProgramTicks);
+  return status == CardStatus::kOk ? CardStatus::kBusy : status;
 }
 
 CardStatus begin_stream(uint32_t lba) {

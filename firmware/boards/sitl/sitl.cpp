@@ -19,14 +19,8 @@ using sitl::world;
 std::unique_ptr<app::Instrument> instrument;
 uint32_t file_blocks = 0;
 
-// A chip loses its memory; here FatFs's pointer to it must go first.
-void switch_off() {
-  if (instrument != nullptr) storage::Volume::unmount();
-  instrument.reset();
-}
-
 void boot(uint8_t source) {
-  switch_off();
+  instrument.reset();
   World& w = world();
   w.skip_stimuli();
   w.booted_at = w.now;
@@ -60,7 +54,7 @@ void add_bytes(sitl::Script<sitl::ByteStimulus>* script,
 extern "C" {
 
 void sitl_create() {
-  switch_off();
+  instrument.reset();
   file_blocks = 0;
   world() = World();
 }
@@ -182,7 +176,7 @@ void sitl_power_on() {
 }
 
 void sitl_power_cut(uint32_t seed) {
-  switch_off();
+  instrument.reset();
   world().card.step(world().now);
   world().card.cut(seed);
   world().reset_chip();

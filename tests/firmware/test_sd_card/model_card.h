@@ -27,8 +27,7 @@ class ModelCard {
 
   // ---- what a test looks at ----
   uint8_t store[kSectors][512] = {};
-  uint16_t free_clocks = 0;  // bytes before the first select
-  uint16_t waits = 0;
+  uint16_t free_clocks = 0;   // bytes before the first select
   uint16_t bad_commands = 0;  // wrong CRC-7 or a command the state does not allow
   uint32_t bytes = 0;         // on the bus since power-on
   bool is_fast = false;
@@ -60,10 +59,6 @@ class ModelCard {
   void slow() { is_fast = false; }
   void fast() { is_fast = true; }
   uint32_t now_us() const { return clock_us_; }
-  void waiting() {
-    ++waits;
-    clock_us_ += 100;
-  }
   void advance_us(uint32_t us) { clock_us_ += us; }
   // As after a reset of the Mega in the middle of a block.
   void leave_in_block() {

@@ -72,6 +72,10 @@ _HINTS = {
     ("card", "full"): "no room for a flight file; free 64 MiB",
     ("card", "fragmented"): "no 64 MiB in one piece; format the card",
     ("card", "lost"): "it went away while it was in use",
+    ("card", "damaged"): "its file system has numbers that cannot be; format the card to FAT32",
+    ("card", "looking"): "it is being read",
+    ("card", "searching"): "room is being looked for; nothing is recorded before it is found",
+    ("card", "preparing"): "a file is being made; nothing is recorded before it is ready",
     ("card", "open flight"): "an earlier flight is open; closed when it stands still",
     ("card", "waits for the ground"): "its file is made when it stands still, within 20 s",
 }
@@ -100,7 +104,7 @@ class StatusLine:
         """``ok``, ``missing``, ``stale``, ``original``; of card and relay what they say."""
         text = self.fields[key]
         if key == "card":
-            return re.sub(r"\s+\d+$", "", text)
+            return re.sub(r"\s+\d+( %)?$", "", text)
         if key == "relay":
             return text
         return next((word for word in _STATES if word in text.split()), "ok")
@@ -154,7 +158,7 @@ class StatusLine:
             "receiver": {"state": self.state("rc"), "pulse_us": self.numbers("rc")},
             "servos_by": self.fields["drive"],
             "relay": self.state("relay"),
-            "card": {"state": self.state("card"), "file_number": self._first("card")},
+            "card": {"state": self.state("card"), "file_number": self._file_number()},
             "rail_mv": self._first("rail"),
             "supply_mv": self._first("avcc"),
             "supply_calibrated": self.supply_calibrated,
@@ -179,6 +183,9 @@ class StatusLine:
     def _behind(self, key: str, word: str) -> float | None:
         words = self.fields[key].split()
         return float(words[words.index(word) + 1]) if word in words[:-1] else None
+
+    def _file_number(self) -> float | None:
+        return None if "%" in self.fields["card"] else self._first("card")
 
     def _first(self, key: str) -> float | None:
         numbers = self.numbers(key)

@@ -1,0 +1,41 @@
+#include "storage/chain_edit.h"
+
+#include "storage/fat_sector.h"
+
+namespace storage {
+
+uint32_t ChainEdit::lba(const Layout& layout) const {
+  return entry_lba(layout, at_);
+}
+
+uint32_t ChainEdit::first_in_sector(const Layout& layout) const {
+  const uint32_t first = at_ - entry_index(layout, at_);
+  return first < first_ ? first_ : first;
+}
+
+bool ChainEdit::edit(uint8_t* sector, const Layout& layout) const {
+  uint32_t cluster = first_in_sector(layout);
+  uint16_t index = entry_index(layout, cluster);
+  for (; cluster <= at_; ++cluster, ++index) {
+    uint32_t value = kFree;
+    if (edit_ == Edit::kLink) {
+      if (entry(sector, layout, index) != kFree) return false;
+      value = cluster == last_ ? kEnd : cluster + 1;
+    } else if (edit_ == Edit::kTrim && cluster == first_) {
+      value = kEnd;
+    }
+    put_entry(sector, layout, index, value);
+  }
+  return true;
+}
+
+ChainEdit::Next ChainEdit::written(const Layout& layout) {
+  if (++copy_ < layout.fats) return Next::kCopy;
+  copy_ = 0;
+  const uint32_t first = first_in_sector(layout);
+  if (first == first_) return Next::kDone;
+  at_ = first - 1;
+  return Next::kSector;
+}
+
+}  // namespace storage

@@ -1,0 +1,49 @@
+#include "storage/free_run.h"
+
+#include "storage/fat_sector.h"
+
+namespace storage {
+
+void FreeRun::start(const Layout& layout, uint32_t from, uint32_t count, uint32_t wanted) {
+  *this = FreeRun();
+  at_ = layout.has_cluster(from) ? from : kFirstCluster;
+  now_.first = at_;
+  left_ = count < layout.clusters ? count : layout.clusters;
+  total_ = left_;
+  wanted_ = wanted;
+}
+
+bool FreeRun::take(const uint8_t* sector, const Layout& layout) {
+  uint16_t index = entry_index(layout, at_);
+  uint16_t count = static_cast<uint16_t>((1U << entries_shift(layout)) - index);
+  const uint32_t to_end = layout.clusters + kFirstCluster - at_;
+  if (count > to_end) count = static_cast<uint16_t>(to_end);
+  if (count > left_) count = static_cast<uint16_t>(left_);
+  left_ -= count;
+  uint16_t run = 0;  // at the end of what is looked at, in this sector
+  uint16_t free_here = 0;
+  for (; count != 0; --count, ++index) {
+    if (entry(sector, layout, index) == kFree) {
+      ++run;
+      ++free_here;
+      ++at_;
+      continue;
+    }
+    now_.count += run;
+    if (now_.count > best_.count) best_ = now_;
+    run = 0;
+    ++at_;
+    now_ = {at_, 0};
+  }
+  free_ += free_here;
+  now_.count += run;
+  if (now_.count > best_.count) best_ = now_;
+  if (best_.count > wanted_) best_.count = wanted_;
+  if (at_ - kFirstCluster == layout.clusters) {  // goes on at the other end, which is another run
+    at_ = kFirstCluster;
+    now_ = {at_, 0};
+  }
+  return ended();
+}
+
+}  // namespace storage

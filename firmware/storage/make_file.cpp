@@ -1,0 +1,102 @@
+#include "storage/make_file.h"
+
+#include "core/block.h"
+#include "core/bytes.h"
+#include "hal/block_device.h"
+#include "storage/block_build.h"
+
+namespace storage {
+
+Wish MakeFile::start(
+    const Run& run, uint32_t blocks, uint32_t session, bool replace, CardState& card) {
+  run_ = run;
+  blocks_ = blocks;
+  session_ = session;
+  replace_ = replace;
+  phase_ = Phase::kLink;
+  return allocation_.start(Edit::kLink, run.first, run.first + run.count - 1, card);
+}
+
+Wish MakeFile::next(uint8_t* sector, CardState& card) {
+  const uint32_t first_lba = card.layout.lba_of(run_.first);
+  switch (phase_) {
+    case Phase::kLink: {
+      const Wish wish = allocation_.next(sector, card);
+      if (wish.kind != Wish::Kind::kDone) return wish;
+      phase_ = Phase::kOldBlock;
+      return read_block(first_lba);
+    }
+    case Phase::kOldBlock: {
+      // A valid block ends in its own CRC, which makes the CRC over all of it a constant: two files
+      // that begin on the same block would get the same id. The place of the file stands in for it:
+      // it tells apart two files that begin on blocks never used.
+      core::put_le<uint32_t>(sector + core::kBlockCrcOffset, first_lba);
+      uint8_t card_id[hal::kCardIdBytes];
+      if (hal::read_card_id(card_id) != hal::CardStatus::kOk) return failed();
+      file_id_ = core::make_file_id(card_id, session_, sector);
+      phase_ = Phase::kBuild;  // by itself: either takes a millisecond
+      return again();
+    }
+    case Phase::kBuild:
+      build_schema_block(sector, file_id_, session_);
+      phase_ = Phase::kBlock;
+      return write_block(first_lba);
+    case Phase::kBlock:
+      phase_ = Phase::kEntry;
+      return read_block(replace_ ? card.entry.lba : card.free_entry.lba);
+    case Phase::kEntry:
+      return enter(sector, card);
+    case Phase::kEntryWritten:
+      return entered(card);
+    case Phase::kFreeOld:
+      return allocation_.next(sector, card);
+  }
+  return failed();
+}
+
+Wish MakeFile::enter(uint8_t* sector, CardState& card) {
+  phase_ = Phase::kEntryWritten;
+  const uint32_t bytes = blocks_ * kSectorBytes;
+  if (replace_) {
+    set_cluster(sector, card.entry.index, run_.first);
+    set_size(sector, card.entry.index, bytes, card.fat_date());
+    return write_block(card.entry.lba);
+  }
+  const uint32_t number = card.file.number + 1;
+  make_entry(sector, card.free_entry.index, number, run_.first, bytes, card.fat_date());
+  return write_block(card.free_entry.lba);
+}
+
+Wish MakeFile::entered(CardState& card) {
+  const uint32_t old_first = card.first_cluster();
+  const uint32_t old_count = card.layout.clusters_for(card.file.blocks);
+  card.file = made(card);
+  card.state = FileState::kBlank;
+  card.odd = frames::FileState::kGood;
+  if (replace_) {
+    phase_ = Phase::kFreeOld;
+    return allocation_.start(Edit::kFree, old_first, old_first + old_count - 1, card);
+  }
+  card.entry = card.free_entry;
+  card.free_entry = {};
+  return done();
+}
+
+FlightFile MakeFile::made(const CardState& card) const {
+  FlightFile file;
+  file.first_lba = card.layout.lba_of(run_.first);
+  file.blocks = blocks_;
+  file.next_block = 1;
+  file.file_id = file_id_;
+  file.last_session = session_;
+  file.number = card.file.number + (replace_ ? 0 : 1);
+  return file;
+}
+
+uint8_t MakeFile::percent() const {
+  if (phase_ != Phase::kLink) return 99;
+  return static_cast<uint8_t>(100 -
+                              (allocation_.chain().left() * 100 / allocation_.chain().count()));
+}
+
+}  // namespace storage

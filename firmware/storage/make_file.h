@@ -1,0 +1,36 @@
+// Job: makes a flight file of a run of free clusters, or gives a file that was never recorded into
+// another, larger run. Every power cut leaves the file whole, or clusters that belong to none.
+#pragma once
+
+#include <stdint.h>
+
+#include "storage/allocation.h"
+#include "storage/card_state.h"
+#include "storage/free_run.h"
+
+namespace storage {
+
+class MakeFile {
+ public:
+  // With `replace` card.file keeps its number and entry; else the next number is taken.
+  Wish start(const Run& run, uint32_t blocks, uint32_t session, bool replace, CardState& card);
+  Wish next(uint8_t* sector, CardState& card);
+  uint8_t percent() const;
+
+ private:
+  enum class Phase : uint8_t { kLink, kOldBlock, kBuild, kBlock, kEntry, kEntryWritten, kFreeOld };
+
+  FlightFile made(const CardState& card) const;
+  Wish enter(uint8_t* sector, CardState& card);
+  Wish entered(CardState& card);
+
+  Allocation allocation_;
+  Run run_;
+  uint32_t blocks_;
+  uint32_t session_;
+  uint32_t file_id_;
+  Phase phase_;
+  bool replace_;
+};
+
+}  // namespace storage
