@@ -23,10 +23,10 @@ def test_a_whole_log_says_nothing_of_losses() -> None:
     assert not any("the log is" in note for note in read_columns(LOG)[1])
 
 
-def test_a_truncated_log_is_told(tmp_path: Path, whole: bytes) -> None:
+def test_a_cut_log_is_told(tmp_path: Path, whole: bytes) -> None:
     path = tmp_path / "flight.bin"
     path.write_bytes(whole[: len(whole) * 2 // 3])
-    assert any(n.startswith("the log is truncated: ") for n in read_columns(path)[1])
+    assert any(n.startswith("the log is damaged: ") for n in read_columns(path)[1])
 
 
 def test_a_hole_in_a_log_is_told(tmp_path: Path, whole: bytes) -> None:
