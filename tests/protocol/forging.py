@@ -132,7 +132,9 @@ def forge_schema(data: bytes, rng: np.random.Generator) -> bytes:
     def change(text: bytes) -> bytes:
         try:
             schema = json.loads(text)
-        except ValueError:  # already forged as text
+        except (ValueError, RecursionError):  # already forged as text
+            return text
+        if not isinstance(schema, dict):
             return text
         for _ in range(int(rng.integers(1, 4))):
             _change_schema(schema, rng)
