@@ -48,9 +48,9 @@ void Instrument::boot() {
 void Instrument::step() {
   const uint32_t now_us = turn_us_;
   pilot_.step(config_, self_test_, outlet_, now_us);
-  const uint16_t stored = ring_.used();
+  const uint8_t frames = outlet_.frames();
   sensors_.step(config_, pilot_, outlet_, now_us);
-  const bool made_frame = ring_.used() != stored;
+  const bool made_frame = outlet_.frames() != frames;
   pilot_.ran(kTaskSensors);
   // A receiver pulse that ends behind the pilot's step waits for the next, and 2 ms is all it may:
   // making a frame takes more than half of that, and the card's portion comes on top.
@@ -63,6 +63,7 @@ void Instrument::step() {
     ascii_row_.step(sensors_, pilot_.channels(), telemetry_, now_us);
     step_slow(now_us);
   }
+  if (outlet_.frames() == frames) recorder_.work_on_card(now_us);
   pilot_.beat(now_us);
 
   const uint32_t end_us = hal::now_us();

@@ -16,9 +16,12 @@ class Outlet {
   // Frames that find no room are counted by the ring.
   template <typename Frame>
   void put(const Frame& frame) {
+    ++frames_;
     if (logging_) (void)ring_.push(frame);
     telemetry_.offer(Frame::id(), &frame, sizeof frame, frame.t_us);
   }
+
+  uint8_t frames() const { return frames_; }  // put so far, and round again
 
   // Events of the time before a session wait for it. Of more than eight the first two stay, which
   // tell of the boot, and the oldest behind them is given up.
@@ -63,6 +66,7 @@ class Outlet {
   Telemetry& telemetry_;
   frames::EventFrame waiting_[kWaiting] = {};
   uint8_t waiting_count_ = 0;
+  uint8_t frames_ = 0;
   bool logging_ = false;
 };
 

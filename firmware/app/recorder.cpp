@@ -52,10 +52,7 @@ Recorder::Recorder(core::ByteRing& ring, Outlet& outlet, Store& store, Sensors& 
 }
 
 void Recorder::step(uint32_t now_us) {
-  if (state_ != State::kRecording && state_ != State::kEnding) {
-    work_on_card(now_us);
-    return;
-  }
+  if (!streams()) return;
   const CardStatus status = stream_.step(now_us);
   if (status != CardStatus::kOk) fail(status, now_us);
 }
@@ -65,6 +62,7 @@ bool Recorder::in_a_hurry() const {
 }
 
 void Recorder::work_on_card(uint32_t now_us) {
+  if (streams()) return;
   const Job job = volume_.job();
   uint8_t* const sector = ring_.lend();
   if (job == Job::kNone || sector == nullptr) return;

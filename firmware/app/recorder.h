@@ -30,8 +30,11 @@ class Recorder {
   Recorder(core::ByteRing& ring, Outlet& outlet, Store& store, Sensors& sensors);
 
   void set_file_blocks(uint32_t blocks) { volume_.set_file_blocks(blocks); }
-  // Once per turn of the main loop: carries the block under way on, at most 1.2 ms.
+  // Once per turn of the main loop: carries the session's block under way on.
   void step(uint32_t now_us);
+  // Between sessions, in a turn that has done little else: one step of what the card needs, at
+  // most 1.2 ms.
+  void work_on_card(uint32_t now_us);
   // The card gives the next block at once: no sleep between two turns.
   bool in_a_hurry() const;
   // Every 10 ms or so: start, stop, resume. Looks for the card at the first call.
@@ -57,7 +60,7 @@ class Recorder {
  private:
   static constexpr uint8_t kNoStart = 0xFF;
 
-  void work_on_card(uint32_t now_us);
+  bool streams() const { return state_ == State::kRecording || state_ == State::kEnding; }
   void job_ended(storage::Volume::Job job, uint32_t now_us);
   void looked(uint32_t now_us);
   void make_room(uint32_t now_us);

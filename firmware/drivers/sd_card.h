@@ -17,7 +17,7 @@ class SdCard {
   static constexpr uint32_t kInitUs = 1000000UL;
   static constexpr uint32_t kReadUs = 150000UL;
   static constexpr uint32_t kBusyUs = 5000000UL;
-  static constexpr uint16_t kPortion = 128;  // bytes of a block in a call
+  static constexpr uint16_t kPortion = 256;  // bytes of a block in a call
 
   explicit SdCard(Spi& spi) : spi_(spi), wire_(spi) {}
 
@@ -56,7 +56,7 @@ class SdCard {
 
   // ---- single blocks ----
   // After it, call `read` or `write` with the 512 bytes until it says kDone or kFailed. A step is
-  // 128 bytes, 0.4 ms, or a look at a card that is busy.
+  // half a block, 0.6 ms, or a look at a card that is busy.
   void begin_block_at(uint32_t sector) {
     if (!initialised()) {
       return;
@@ -68,7 +68,7 @@ class SdCard {
   }
   CardStep read(uint8_t* to) {
     if (state_ == State::kAsking) {
-      return ask(Wire::kReadBlock, State::kReading);
+      return ask(Wire::kReadBlock, State::kReading);  // half a millisecond until the block comes
     }
     if (state_ != State::kReading) {
       return CardStep::kFailed;

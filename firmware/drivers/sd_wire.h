@@ -35,6 +35,8 @@ enum class CardWrite : uint8_t {
 
 // Spi: uint8_t transfer(uint8_t)   one byte out and in
 //      void send(uint8_t)          one byte out; may return while it is shifted
+//      void ask()                  begins a byte in
+//      uint8_t next(), last()      that byte, with another begun or not
 //      void select(), deselect()   chip select low, high
 //      uint32_t now_us()
 template <typename Spi>
@@ -105,6 +107,7 @@ class SdWire {
       }
       sends_ = true;
       crc_ = core::kCrc16StartCard;
+      spi_.ask();
     }
     const uint16_t left = static_cast<uint16_t>(size - at_);
     uint16_t count = left < most ? left : most;
@@ -112,7 +115,7 @@ class SdWire {
     uint8_t* next = to + at_;
     at_ = static_cast<uint16_t>(at_ + count);
     while (count-- != 0) {
-      const uint8_t byte = spi_.transfer(0xFF);
+      const uint8_t byte = spi_.next();  // the one behind it comes meanwhile
       *next++ = byte;
       crc = core::crc16_add(crc, byte);
     }
@@ -120,8 +123,8 @@ class SdWire {
     if (at_ < size) {
       return CardStep::kAgain;
     }
-    crc = core::crc16_add(crc, spi_.transfer(0xFF));
-    crc = core::crc16_add(crc, spi_.transfer(0xFF));
+    crc = core::crc16_add(crc, spi_.next());
+    crc = core::crc16_add(crc, spi_.last());
     return crc == 0 ? CardStep::kDone : failed(CardStatus::kReadCrc);
   }
 

@@ -17,7 +17,6 @@ CardStatus Transfer::step(uint8_t* sector, bool may_write) {
       return CardStatus::kBusy;
     }
     begun_ = true;
-    return CardStatus::kBusy;
   }
   const CardStatus status = writes() ? hal::poll_write(sector) : hal::poll_read(sector);
   if (status != CardStatus::kBusy) begun_ = false;

@@ -112,7 +112,8 @@ bool Volume::step(uint8_t* sector, bool may_write) {
     }
   } else {
     follow(next(sector));
-    return job_ == Job::kNone;
+    if (job_ != Job::kSearch) return job_ == Job::kNone;
+    status = transfer_.step(sector, may_write);  // its sectors are quickly looked at
   }
   if (status == CardStatus::kBusy) {
     waits_ = job_ != Job::kStart && !transfer_.under_way();

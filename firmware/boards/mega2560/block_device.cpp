@@ -24,6 +24,16 @@ class Spi {
     SPDR = byte;
     shifting_ = true;
   }
+  static void ask() {
+    finish();
+    SPDR = 0xFF;
+  }
+  static uint8_t next() {
+    const uint8_t byte = last();
+    SPDR = 0xFF;
+    return byte;
+  }
+  static uint8_t last() { return avr::spi_ended(polls_) ? SPDR : kNoCard; }
   static void select() {
     start();
     finish();

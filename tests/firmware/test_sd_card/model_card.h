@@ -51,6 +51,13 @@ class ModelCard {
     return reply;
   }
   void send(uint8_t out) { transfer(out); }
+  void ask() { asked_ = transfer(0xFF); }
+  uint8_t next() {
+    const uint8_t byte = asked_;
+    ask();
+    return byte;
+  }
+  uint8_t last() const { return asked_; }
   void select() {
     selected_ = true;
     ever_selected_ = true;
@@ -70,6 +77,8 @@ class ModelCard {
   void leave_busy(uint16_t for_bytes) { busy_ = for_bytes; }
 
  private:
+  uint8_t asked_ = 0xFF;
+
   enum class Receiving : uint8_t { kCommand, kToken, kData };
 
   void queue(uint8_t byte) { replies_[queued_++] = byte; }
