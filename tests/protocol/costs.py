@@ -101,8 +101,8 @@ def hostile(count: int) -> dict[str, Callable[[], bytes]]:
             for at in range(count)
         ),
         "a session per block": lambda: blocks(count, plain, session=lambda at: at + 2),
-        "a session per 14 blocks": lambda: blocks(
-            count, plain, session=lambda at: 2 + at // resets
+        "as many sessions as can be": lambda: blocks(
+            count, plain, session=lambda at: 2 + at * resets // count
         ),
         "a file id per block": lambda: blocks(count, plain, file_id=lambda at: at),
         "a schema per block": lambda: blocks(
