@@ -31,6 +31,7 @@ VERBS = {
     "identify": "estimate the aircraft's derivatives with their uncertainty",
     "convert": "turn derivatives into coefficients, and back",
 }
+_LONGEST_LINE = 2000  # characters
 _AGAIN_S = 0.02  # until Ctrl-C comes again where Python dropped it
 _EPILOG = """\
 exit codes: 0 ok, 1 internal error, 2 usage, 3 decoded with losses, 4 not a log,
@@ -135,6 +136,8 @@ def _nothing_more(stream: TextIO) -> None:
 def _end(arguments: list[str], text: str, code: ExitCode) -> int:
     """Say in one line why a verb gave up, to a program in JSON too; return the exit code."""
     line = " ".join(text.splitlines())
+    if len(line) > _LONGEST_LINE:  # it repeats a stranger's text
+        line = f"{line[:_LONGEST_LINE]}..."
     try:
         print(f"host: {line}", file=sys.stderr)
     except OSError:  # nobody reads it

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from host.aircraft.airframe import COEFFICIENTS, GRAVITY_MPS2, Airframe, Array
+from host.aircraft.plausible import doubts, impossible
+from host.aircraft.ranges import RANGES
 from host.aircraft.straight import Straight
 from host.errors import UsageError
 from host.files import toml_reader
@@ -54,6 +56,7 @@ _OPTIONAL: Mapping[str, Mapping[str, float]] = {
 MEASURED = ("mass", "geometry", "trim", "sensors")
 MEASURED_IF_THERE = ("propulsion",)
 _MEASURED_TRIM = ("airspeed_mps",)
+_LONGEST = 200  # numbers of one list
 
 
 class AircraftError(UsageError):
@@ -86,6 +89,11 @@ class Aircraft:
     def scalar(self, key: str) -> float:
         """Return one number by "section.key"."""
         return self.scalars[key]
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What no known aircraft has, in words; a line each for whoever uses the file."""
+        return tuple(f"{self.name}: {one}" for one in doubts(self.scalars, self.vectors))
 
     def vector(self, key: str) -> Array:
         """Return a copy of one array by "section.key"."""
@@ -193,8 +201,9 @@ def load(source: str | Path) -> Aircraft:
             raise AircraftError(
                 f"{source}: aerodynamics.{name} has {found} values, expected {nodes} as alpha_rad"
             )
-    if np.any(np.diff(loaded.vectors["aerodynamics.alpha_rad"]) <= 0.0):
-        raise AircraftError(f"{source}: aerodynamics.alpha_rad must increase")
+    for name in ("alpha_rad", "stall_alpha_rad"):
+        if np.any(np.diff(loaded.vectors[f"aerodynamics.{name}"]) <= 0.0):
+            raise AircraftError(f"{source}: aerodynamics.{name} must increase")
     return loaded
 
 
@@ -245,19 +254,30 @@ def _loaded(
         for key in (*keys, *optional):
             where = f"{source}: {section}.{key}"
             value = table.get(key, optional.get(key))
-            scalars[f"{section}.{key}"] = toml_reader.number(where, value, AircraftError)
+            scalars[f"{section}.{key}"] = RANGES[f"{section}.{key}"].check(
+                where, value, AircraftError
+            )
         for key in _VECTORS[section]:
             where = f"{source}: {section}.{key}"
-            listed = toml_reader.numbers(where, table.get(key), AircraftError)
+            quantity = RANGES[f"{section}.{key}"]
+            listed = toml_reader.listed(where, table.get(key), AircraftError)
             if key.endswith("_m") and len(listed) != 3:  # a place
                 raise AircraftError(f"{where} has {len(listed)} numbers, expected 3: x, y, z")
-            vectors[f"{section}.{key}"] = np.array(listed, dtype=np.float64)
+            if not 2 <= len(listed) <= _LONGEST:
+                raise AircraftError(f"{where} has {len(listed)} numbers, expected 2 to {_LONGEST}")
+            vectors[f"{section}.{key}"] = np.array(
+                [quantity.check(f"{where}[{k}]", x, AircraftError) for k, x in enumerate(listed)]
+            )
         own = table.get("sources", {})
+        if not isinstance(own, dict):
+            raise AircraftError(f"{source}: {section}.sources is no table")
         for key in (*keys, *optional, *_VECTORS[section]):
             origin = own.get(key, table.get("source", ""))
             if not isinstance(origin, str) or not origin:
                 raise AircraftError(f"{source}: {section}.{key} has no source")
             sources[f"{section}.{key}"] = origin
+    for wrong in impossible(scalars, vectors):
+        raise AircraftError(f"{source}: {wrong}")
     return Aircraft(
         name=str(document.get("name", Path(source).stem)),
         title=str(document.get("title", source)),

@@ -11,11 +11,19 @@ import numpy as np
 from host.aircraft import file as aircraft
 from host.aircraft.airframe import GRAVITY_MPS2, Array
 from host.aircraft.file import Aircraft, AircraftError, read_document
+from host.aircraft.ranges import RANGES
 from host.aircraft.straight import Straight
-from host.files import toml_reader
+from host.files.quantities import Quantity
 
 # Of the gravity terms of a file, against g and its own angle of attack.
 GRAVITY_TOLERANCE = 0.01
+_CONDITION = {
+    "u_mps": RANGES["trim.airspeed_mps"],
+    "w_mps": Quantity("m/s", -1000.0, 1000.0, "as the airspeed"),
+    "elevator_rad": Quantity("rad", -1.6, 1.6, "a surface hinged at most square to the flow"),
+    "throttle": Quantity("", 0.0, 1.0, "a share"),
+}
+LARGEST_ENTRY = 1e5  # M_q of an indoor model -100, Z_de of a fighter 200
 
 
 def load(source: str | Path) -> Aircraft:
@@ -45,8 +53,8 @@ def load(source: str | Path) -> Aircraft:
         raise AircraftError(f"{source}: the matrices have no source")
     base = aircraft.load(str(document.get("base", "")))
     numbers = {
-        key: toml_reader.number(f"{source}: {key}", document.get(key), AircraftError)
-        for key in ("u_mps", "w_mps", "elevator_rad", "throttle")
+        key: quantity.check(f"{source}: {key}", document.get(key), AircraftError)
+        for key, quantity in _CONDITION.items()
     }
     shapes = {"longitudinal_a": (4, 4), "longitudinal_b": (4, 1), "lateral_a": (4, 4),
               "lateral_b": (4, 2)}  # fmt: skip
@@ -95,6 +103,11 @@ def _matrix(
         matrix = np.array(document.get(name), dtype=np.float64)
     except (TypeError, ValueError):
         matrix = np.empty(0)
-    if matrix.shape != shape or not np.isfinite(matrix).all():
+    if matrix.shape != shape:
         raise AircraftError(f"{source}: {name} has shape {matrix.shape}, expected {shape}")
+    if not np.all(np.abs(matrix) <= LARGEST_ENTRY):
+        raise AircraftError(
+            f"{source}: {name} has an entry of {np.max(np.abs(matrix)):g}, expected up to"
+            f" {LARGEST_ENTRY:g}"
+        )
     return matrix

@@ -16,7 +16,8 @@ from host.files.regular import regular_file
 MOST_BYTES = 4 << 20  # the largest file of ours, the truth of an hour of flight, has 0.4 MB
 DEEPEST = 12  # tables and lists within each other; ours go to 4
 MOST_VALUES = 200_000
-LONGEST_TEXT = 20_000  # characters of one text or key
+LONGEST_TEXT = 2000  # characters of one text; ours have 200
+LONGEST_KEY = 100
 LARGEST = 1e18  # beyond every number that means something, below all that overflows
 _DIGITS = 40  # shown of a number
 
@@ -97,8 +98,8 @@ def _refuse_excess(document: dict[str, Any], name: str, error: type[UsageError])
                 raise error(f"{name}: {where}: nested deeper than {DEEPEST} lists or tables")
             inner = value.items() if isinstance(value, dict) else enumerate(value)
             for key, one in inner:
-                if isinstance(key, str) and len(key) > LONGEST_TEXT:
-                    raise error(f"{name}: {where}: a key of more than {LONGEST_TEXT} characters")
+                if isinstance(key, str) and len(key) > LONGEST_KEY:
+                    raise error(f"{name}: {where}: a key of more than {LONGEST_KEY} characters")
                 step = f"[{key}]" if isinstance(key, int) else f".{key}" if where else key
                 left.append((where + step, depth + 1, one))
         elif isinstance(value, str):

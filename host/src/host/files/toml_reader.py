@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from host.errors import UsageError
-from host.files.document import read_toml
+from host.files.document import read_toml, shown
 
 FORMAT = 1
 
@@ -59,12 +59,12 @@ def names(folder: Path) -> list[str]:
 def number(where: str, value: object, error: type[UsageError]) -> float:
     """Return a finite number; raise `error`, which names the place, if it is none."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise error(f"{where} is {value!r}, expected a number")
+        raise error(f"{where} is {shown(value)}, expected a number")
     return float(value)
 
 
-def numbers(where: str, value: object, error: type[UsageError]) -> list[float]:
-    """Return a list of finite numbers; raise `error` if it is none."""
+def listed(where: str, value: object, error: type[UsageError]) -> list[object]:
+    """Return a list; raise `error` if it is none."""
     if not isinstance(value, list):
-        raise error(f"{where} is {value!r}, expected a list of numbers")
-    return [number(f"{where}[{k}]", x, error) for k, x in enumerate(value)]
+        raise error(f"{where} is {shown(value)}, expected a list of numbers")
+    return value

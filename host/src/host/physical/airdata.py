@@ -95,11 +95,12 @@ def _signed_mach(impact_pa: Array, static_pa: Array | float) -> Array:
     """Solve q/p = (1 + 0.2 M2)^3.5 - 1 for M by its series up to x^4.
 
     With x = |q/p|: M2 = 5 ((1 + x)^(2/7) - 1) = 10/7 x (1 - 5/14 x (1 - 4/7 x (1 - 19/28 x))).
-    At the sensor's 2 kPa (x = 0.02) the error is below 1e-7 of M.
+    At the sensor's 2 kPa (x = 0.02) the error is below 1e-7 of M; above Mach 1 it is NaN.
     """
     x = impact_pa / static_pa
     sign = np.sign(x)
     np.abs(x, out=x)
+    np.copyto(x, np.nan, where=x > 0.9)
     series = x * (-19.0 / 28.0)
     series += 1.0
     series *= x

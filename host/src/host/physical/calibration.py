@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from host.errors import CalibrationError
-from host.files.document import parse_toml, read_text
+from host.files.document import parse_toml, read_text, shown
+from host.files.quantities import Quantity
 from host.resources import resource
 
 FORMAT = "flight-test-calibration"
@@ -16,6 +16,21 @@ VERSION = 1
 _NUMBERS = ("zero", "slope", "zero_sigma", "slope_sigma")
 ERRORS = "error"
 _TEXTS = ("unit", "source")
+_AXES = 3
+_CONVERTER = "of a converter of at most 24 bits, or pulses in microseconds"
+_RANGES = {
+    "zero": Quantity("", -2e7, 2e7, _CONVERTER),
+    "slope": Quantity("", -1e6, 1e6, "the span of a converter in at most 1e6 steps of the unit"),
+    "zero_sigma": Quantity("", 0.0, 2e7, _CONVERTER),
+    "slope_sigma": Quantity("", 0.0, 10.0, "a share: 0.03 is 3 %, 10 is nothing known"),
+}
+_SLOPES = {
+    "rad": Quantity("rad per raw unit", -0.1, 0.1, "an encoder of 64 steps a turn"),
+    "Pa": Quantity("Pa per raw unit", -1000.0, 1000.0, "8 bits of 2 bar"),
+    "": Quantity("per raw unit", -0.1, 0.1, "the throttle in ten steps"),
+    "rad/s": Quantity("", -10.0, 10.0, "rad/s per rad/s, or per count of a gyro"),
+    "m/s2": Quantity("", -100.0, 100.0, "m/s2 per m/s2, or per count of an accelerometer"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +127,11 @@ def load_calibration(path: Path | str | None = None) -> Calibration:
                 f"{path}: [{name}] has {len(line.zero)} numbers in zero and slope,"
                 f" expected {len(default.lines[name].zero)}"
             )
+        if line.unit != default.lines[name].unit:
+            raise CalibrationError(
+                f"{path}: [{name}] unit is {line.unit!r}, expected {default.lines[name].unit!r}:"
+                " slope is in that unit per raw unit"
+            )
     return replace(own, lines=default.lines | own.lines)
 
 
@@ -120,7 +140,7 @@ def _read(path: Path) -> Calibration:
     raw = parse_toml(text, str(path), CalibrationError)
     if raw.get("format") != FORMAT or raw.get("version") != VERSION:
         raise CalibrationError(
-            f"{path}: format {raw.get('format')!r} version {raw.get('version')!r},"
+            f"{path}: format {shown(raw.get('format'))} version {shown(raw.get('version'))},"
             f" expected {FORMAT!r} version {VERSION}"
         )
     default = bool(raw.get("default", False))
@@ -139,7 +159,7 @@ def _read(path: Path) -> Calibration:
 
 def _line(path: Path, name: str, entry: Any, default: bool) -> Line:
     if not isinstance(entry, dict):
-        raise CalibrationError(f"{path}: {name} is {entry!r}, expected a table of numbers")
+        raise CalibrationError(f"{path}: {name} is {shown(entry)}, expected a table of numbers")
     missing = [key for key in (*_NUMBERS, *_TEXTS) if key not in entry]
     if missing:
         raise CalibrationError(f"{path}: [{name}] lacks {', '.join(missing)}")
@@ -147,22 +167,25 @@ def _line(path: Path, name: str, entry: Any, default: bool) -> Line:
     for key in _NUMBERS:
         value = entry[key]
         values = value if isinstance(value, list) else [value]
-        if not all(isinstance(one, int | float) and not isinstance(one, bool) for one in values):
-            raise CalibrationError(f"{path}: [{name}] {key} is {value!r}, expected a number")
-        numbers[key] = tuple(float(one) for one in values)
-        if key.endswith("sigma") and not all(0.0 <= one < math.inf for one in numbers[key]):
-            raise CalibrationError(f"{path}: [{name}] {key} is {value!r}, expected 0 or more")
+        if not 1 <= len(values) <= _AXES:
+            raise CalibrationError(f"{path}: [{name}] {key} has {len(values)} numbers")
+        numbers[key] = tuple(
+            _RANGES[key].check(f"{path}: [{name}] {key}", one, CalibrationError) for one in values
+        )
     if len(numbers["zero"]) != len(numbers["slope"]) or not all(numbers["slope"]):
         raise CalibrationError(
             f"{path}: [{name}] needs as many zeros as slopes, and no slope of 0;"
-            f" found zero {entry['zero']!r}, slope {entry['slope']!r}"
+            f" found zero {shown(entry['zero'])}, slope {shown(entry['slope'])}"
         )
+    unit = str(entry["unit"])
+    for slope in numbers["slope"] if unit in _SLOPES else ():
+        _SLOPES[unit].check(f"{path}: [{name}] slope", slope, CalibrationError)
     return Line(
         zero=numbers["zero"],
         slope=numbers["slope"],
         zero_sigma=numbers["zero_sigma"][0],
         slope_sigma=numbers["slope_sigma"][0],
-        unit=str(entry["unit"]),
+        unit=unit,
         source=str(entry["source"]),
         default=bool(entry.get("default", default)),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from math import isfinite, radians
 
+    from host.aircraft.file import load_measured
     from host.errors import ExitCode, UsageError
     from host.sysid.answer.converted import At, conversion_document, conversion_lines, convert
     from host.sysid.answer.json import json_text
@@ -55,6 +57,8 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"--alpha is {args.alpha:g}, expected between -90 and 90 deg")
     alpha_rad = None if args.alpha is None else radians(args.alpha)
     done = convert(args.source, args.aircraft, At(args.airspeed, alpha_rad, args.density))
+    for doubt in load_measured(args.aircraft).doubts:
+        print(f"host: {doubt}", file=sys.stderr)
     if args.json:
         print(json_text(conversion_document(done)))
     else:

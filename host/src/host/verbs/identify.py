@@ -115,9 +115,11 @@ def run(args: argparse.Namespace) -> int:
     )
     airframe = None
     if args.aircraft:
+        from host.aircraft.file import load_measured
         from host.aircraft.mass_properties import airframe_data
 
         airframe = airframe_data(args.aircraft)
+        notes += load_measured(args.aircraft).doubts
     truth = None
     if args.truth:
         from host.sysid.answer.truth import read_truth

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -67,6 +68,8 @@ def run(args: argparse.Namespace) -> int:
         speed = args.airspeed or card.flight.airspeed_mps
         card = replace(card, flight=replace(card.flight, airspeed_mps=speed))
     plan = planning.judge(card)
+    for doubt in plan.aircraft.doubts:
+        print(f"host: {doubt}", file=sys.stderr)
     if args.json:
         print(
             json.dumps(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,7 +57,6 @@ def run(args: argparse.Namespace) -> int:
     """Fly, and print what was written; return an exit code."""
     try:
         from host.twin.faults import without_recorder
-        from host.twin.flight import pilot
         from host.twin.outcome import report
         from host.twin.recorder import sitl
         from host.twin.testcard import cards
@@ -87,8 +87,10 @@ def run(args: argparse.Namespace) -> int:
             error.filename = f"{args.output}: not all files of the flight were written"
         raise
     record = outcome.record
+    for doubt in record.aircraft.doubts:
+        print(f"host: {doubt}", file=sys.stderr)
     duration = float(record.t_s[-1])
-    planned_s = pilot.duration_s(card)
+    planned_s = cards.duration_s(card)
     # The chip simulator is another process: its time is only on the wall.
     spent = outcome.wall_s if args.firmware == "avr" else outcome.processor_s
     busy = sum(s for stage, s in spent.items() if stage not in ("load", "picture"))

@@ -18,8 +18,12 @@ import numpy as np
 from host.aircraft.prior.avl import is_avl, read_avl
 from host.aircraft.prior.datcom import is_datcom, read_datcom
 from host.aircraft.prior.prior_table import Points, PriorError, PriorTable
-from host.files.document import parse_toml, read_text
+from host.files.document import parse_toml, read_text, shown
+from host.files.quantities import Quantity
 
+_ALPHA = Quantity("deg", -180.0, 180.0, "half a turn")
+# Roskam, Heffley: Cm_q -40, Cm_alphadot -20; per degree they would be 57 times smaller.
+COEFFICIENT = Quantity("", -1000.0, 1000.0, "twenty times the largest of published tables")
 SOUND_MPS = 340.3  # standard atmosphere, sea level: chooses between Mach numbers of a handbook
 
 
@@ -55,33 +59,28 @@ def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
             f"{path}: no coefficient; expected TOML with [coefficients], or output of AVL (ST, SB)"
             " or Datcom"
         )
-    wrong = sorted(n for n, pairs in table.points.items() if not np.isfinite(pairs).all())
-    if wrong:
-        raise PriorError(f"{path}: {', '.join(wrong)} not a finite number")
+    for name, pairs in table.points.items():
+        for _, value in pairs:
+            COEFFICIENT.check(f"{path}: {name}", value, PriorError)
     return table
 
 
 def _from_toml(document: dict[str, Any]) -> PriorTable:
     listed, table = document.get("alpha_deg", [0.0]), document.get("coefficients", {})
     if not isinstance(listed, list) or not listed:
-        raise ValueError(f"alpha_deg is {listed!r}, expected a list of angles")
+        raise ValueError(f"alpha_deg is {shown(listed)}, expected a list of angles")
     if not isinstance(table, dict):
-        raise ValueError(f"coefficients is {table!r}, expected a table [coefficients]")
-    angles = [_number("alpha_deg", x) for x in listed]
+        raise ValueError(f"coefficients is {shown(table)}, expected a table [coefficients]")
+    angles = [_ALPHA.check("alpha_deg", x, PriorError) for x in listed]
     if np.any(np.diff(angles) <= 0.0):
-        raise ValueError(f"alpha_deg {angles}, expected rising angles")
+        raise ValueError(f"alpha_deg {shown(angles)}, expected rising angles")
     points: Points = {}
     for name, value in table.items():
         values = value if isinstance(value, list) else [value] * len(angles)
         if len(values) != len(angles):
             raise ValueError(f"{name} has {len(values)} values, alpha_deg {len(angles)}")
         points[str(name)] = [
-            (float(np.radians(a)), _number(name, v)) for a, v in zip(angles, values, strict=True)
+            (float(np.radians(a)), COEFFICIENT.check(name, v, PriorError))
+            for a, v in zip(angles, values, strict=True)
         ]
     return PriorTable(points, stability_axes=False)
-
-
-def _number(name: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{name} is {value!r}, expected a number")
-    return float(value)

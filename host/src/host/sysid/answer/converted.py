@@ -14,6 +14,8 @@ import numpy as np
 
 from host.aircraft.mass_properties import Condition, airframe_data
 from host.aircraft.prior.prior_file import read_prior
+from host.files.document import shown
+from host.files.quantities import Quantity
 from host.instrument.deviations import instrument_data
 from host.sysid.aerodynamics.conversion import (
     CARRIED,
@@ -46,6 +48,9 @@ IN_WORDS = {
 OTHER = dict(zip(DERIVATIVES, COEFFICIENTS, strict=True))
 OTHER |= {coefficient: derivative for derivative, coefficient in OTHER.items()}
 AXES = ("longitudinal", "lateral")
+_LARGE = "M_alpha of an indoor model at 10 m/s: -1000 1/s2"
+_VALUE = Quantity("", -1e6, 1e6, _LARGE)
+_HALF_WIDTH = Quantity("", 0.0, 1e6, _LARGE)
 EXPECTED = (
     "a model of host identify --save-model, TOML with [derivatives] or [coefficients], or output of"
     " AVL (ST, SB) or Datcom"
@@ -149,6 +154,8 @@ def _from_toml(path: Path) -> tuple[dict[str, tuple[float, float]], Trim | None]
     if "states" in document:
         model = read_model(path)
         fit = document.get("fit", {})
+        if not isinstance(fit, dict):
+            raise IdentificationError(f"{path}: fit is {shown(fit)}, expected a table")
         values = {p.name: _pair(path, p.name, fit.get(p.name, p.start)) for p in model.parameters}
         return values, read_trim(path) if "trim" in document else None
     if "alpha_deg" in document:
@@ -164,12 +171,15 @@ def _from_toml(path: Path) -> tuple[dict[str, tuple[float, float]], Trim | None]
 def _pair(path: Path, name: str, entry: object) -> tuple[float, float]:
     """Return value and half-width of ``4.1`` or ``[4.1, 0.2]``."""
     listed = entry if isinstance(entry, list) else [entry, 0.0]
-    numbers = [float(x) for x in listed if isinstance(x, int | float) and not isinstance(x, bool)]
-    if len(listed) != 2 or len(numbers) != 2 or not np.isfinite(numbers).all() or numbers[1] < 0.0:
+    where = f"{path}: {name}"
+    if len(listed) != 2:
         raise IdentificationError(
-            f"{path}: {name} is {entry!r}, expected a number or [value, 95 % half-width]"
+            f"{where} is {shown(entry)}, expected a number or [value, 95 % half-width]"
         )
-    return numbers[0], numbers[1]
+    return (
+        _VALUE.check(where, listed[0], IdentificationError),
+        _HALF_WIDTH.check(f"{where}: half-width", listed[1], IdentificationError),
+    )
 
 
 def _unit(name: str) -> str:

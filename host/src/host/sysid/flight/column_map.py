@@ -20,6 +20,7 @@ import numpy as np
 
 from host.compiled import Array
 from host.files.document import read_toml
+from host.files.quantities import Quantity
 from host.sysid.errors import IdentificationError
 
 DEG, FOOT, POUND_PA = np.pi / 180.0, 0.3048, 6894.757
@@ -53,6 +54,7 @@ ALIASES = {
     "sec": "s", "seconds": "s", "msec": "ms", "usec": "us", "µs": "us", "μs": "us",
 }  # fmt: skip
 KEYS = {"from", "unit", "sign", "scale", "offset"}
+_FACTOR = Quantity("", -1e12, 1e12, "nanoseconds to seconds: 1e-9; no unit is further from ours")
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +116,7 @@ def _line(where: str, name: str, line: object) -> Line:
     if not isinstance(unit, str) or unit not in units:
         raise IdentificationError(f"{where}: unit '{unit}' unknown; use one of {', '.join(units)}")
     for key in ("sign", "scale", "offset"):
-        value = line.get(key, 1)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-            raise IdentificationError(f"{where}: {key} is {value!r}, not a number")
+        _FACTOR.check(f"{where}: {key}", line.get(key, 1), IdentificationError)
     sign, scale = line.get("sign", 1), float(line.get("scale", 1.0))
     if sign not in (1, -1) or scale == 0.0:
         raise IdentificationError(f"{where}: sign must be 1 or -1, scale not zero")

@@ -42,6 +42,8 @@ from typing import cast
 import numpy as np
 
 from host.compiled import Array
+from host.files.document import shown
+from host.files.quantities import Quantity
 from host.sysid.errors import IdentificationError
 from host.sysid.models.delays import delays_of
 from host.sysid.models.document import read_document
@@ -56,6 +58,15 @@ KEYS = {
     "name", "states", "inputs", "outputs", "hold", "state_biases", "output_biases",
     "initial_states", "parameters", "delays", "levers", "fit", "trim", *MATRICES,
 }  # fmt: skip
+_LARGE = "M_alpha of an indoor model at 10 m/s: -1000 1/s2"
+_NUMBER = Quantity("", -1e6, 1e6, _LARGE)
+_POSITIVE = Quantity("", 0.0, 1e6, _LARGE, above=True)
+_TRIM = {
+    "airspeed_mps": Quantity("m/s", 0.5, 2000.0, "indoor models to the X-15"),
+    "alpha_rad": Quantity("rad", -1.6, 1.6, "a quarter turn; in degrees it would be larger"),
+    "theta_rad": Quantity("rad", -1.6, 1.6, "a quarter turn; in degrees it would be larger"),
+}
+MOST_SIGNALS = 30  # both axes together have 8 states and 14 outputs
 
 
 def read_model(path: Path) -> LinearModel:
@@ -78,12 +89,11 @@ def read_trim(path: Path) -> Trim:
         If the file has none: a model that a user wrote.
     """
     table = read_document(path).get("trim", {})
-    try:
-        return Trim(*(float(table[key]) for key in ("airspeed_mps", "alpha_rad", "theta_rad")))
-    except (KeyError, TypeError, ValueError):
-        raise IdentificationError(
-            f"{path}: no [trim] with airspeed_mps, alpha_rad and theta_rad"
-        ) from None
+    if not isinstance(table, dict) or not _TRIM.keys() <= table.keys():
+        raise IdentificationError(f"{path}: no [trim] with {', '.join(_TRIM)}")
+    return Trim(
+        *(q.check(f"{path}: trim.{k}", table[k], IdentificationError) for k, q in _TRIM.items())
+    )
 
 
 def model_from(document: Mapping[str, object], source: str = "model") -> LinearModel:
@@ -105,6 +115,10 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         )
     }
     n, m, p = (len(signals[key]) for key in ("states", "inputs", "outputs"))
+    if max(n, m, p) > MOST_SIGNALS:
+        raise IdentificationError(
+            f"{source}: {max(n, m, p)} states, inputs or outputs, expected up to {MOST_SIGNALS}"
+        )
     shapes = {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}
     fixed: dict[str, Array] = {}
     terms: list[Term] = []
@@ -179,7 +193,9 @@ def _matrix(
 def parse_entry(entry: object, where: str) -> tuple[float, list[tuple[str, float]]]:
     """Return the known part and the (parameter, gain) pairs of one matrix entry."""
     if isinstance(entry, bool) or not isinstance(entry, int | float | str):
-        raise IdentificationError(f"{where}: {entry!r}, expected a number or a sum of parameters")
+        raise IdentificationError(
+            f"{where}: {shown(entry)}, expected a number or a sum of parameters"
+        )
     if not isinstance(entry, str):
         return _number(entry, where), []
     constant, pieces, position = 0.0, [], 0
@@ -197,6 +213,8 @@ def parse_entry(entry: object, where: str) -> tuple[float, list[tuple[str, float
         else:
             constant += sign * float(found["gain"])
         position = found.end()
+    for number in (constant, *(gain for _, gain in pieces)):
+        _number(number, where)
     return constant, pieces
 
 
@@ -215,7 +233,9 @@ def _constants(
 
 def _table(value: object, allowed: Collection[str], where: str) -> dict[str, object]:
     if not isinstance(value, dict):
-        raise IdentificationError(f"{where}: {value!r}, expected a table of {', '.join(allowed)}")
+        raise IdentificationError(
+            f"{where}: {shown(value)}, expected a table of {', '.join(allowed)}"
+        )
     strangers = sorted(set(value) - set(allowed))
     if strangers:
         raise IdentificationError(
@@ -225,11 +245,7 @@ def _table(value: object, allowed: Collection[str], where: str) -> dict[str, obj
 
 
 def _number(value: object, where: str, *, positive: bool = False) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise IdentificationError(f"{where} is {value!r}, expected a number")
-    if positive and value <= 0.0:
-        raise IdentificationError(f"{where} is {value!r}, expected a number above zero")
-    return float(value)
+    return (_POSITIVE if positive else _NUMBER).check(where, value, IdentificationError)
 
 
 def _parameters(value: object, used: list[str], source: str) -> tuple[Parameter, ...]:

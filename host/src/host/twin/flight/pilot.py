@@ -10,7 +10,7 @@ import numpy as np
 from host.aircraft.airframe import Airframe, Array
 from host.aircraft.linearisation import linearise
 from host.aircraft.trim import Trim
-from host.twin.testcard.cards import AXES, Card, Segment
+from host.twin.testcard.cards import AXES, Card, Segment, duration_s, length_s
 from host.twin.testcard.maneuvers import (
     STEPS,
     multisine,
@@ -70,20 +70,6 @@ class Schedule:
     windows: list[Window] = field(default_factory=list)
 
 
-def duration_s(card: Card) -> float:
-    """Return the length of the card, ground time included."""
-    return card.flight.ground_s + sum(_length_s(card, s) for s in card.segments)
-
-
-def _length_s(card: Card, s: Segment) -> float:
-    if s.kind in STEPS:
-        units = sum(length for _, length in STEPS[s.kind])
-        return s.before_s + units * s.width_s + card.pilot.hands_off_s
-    if s.kind in ("trim", "turn"):
-        return s.duration_s
-    return s.before_s + s.duration_s + card.pilot.hands_off_s
-
-
 def schedule(card: Card, airspeed_mps: float, step_s: float, rng: np.random.Generator) -> Schedule:
     """Turn a card into the pilot's program, with the errors of a human hand.
 
@@ -110,7 +96,7 @@ def schedule(card: Card, airspeed_mps: float, step_s: float, rng: np.random.Gene
     inputs: list[tuple[Segment, float, float, float]] = []
     at = card.flight.ground_s
     for s in card.segments:
-        begin, at = at, at + _length_s(card, s)
+        begin, at = at, at + length_s(card, s)
         span = slice(round(begin / step_s), round(at / step_s))
         if s.airspeed_mps > 0.0:
             result.airspeed_mps[span] = s.airspeed_mps

@@ -12,11 +12,11 @@ from host.errors import UsageError
 from host.files import toml_reader
 from host.twin.faults import FAULTS, Fault
 from host.twin.testcard.maneuvers import KINDS, STEPS, harmonics
+from host.twin.testcard.ranges import LONGEST_FLIGHT_S, RANGES
 
 FOLDER = Path(__file__).parent / "cards"
-# Numbers of [flight], [air] and [pilot] that may be below zero.
-SIGNED = ("heading_deg", "field_temperature_degc", "latitude_deg", "longitude_deg",
-          "wind_north_mps", "wind_east_mps")  # fmt: skip
+MOST_SEGMENTS = 2000  # repeated ones counted each
+MOST_TONES = 1000  # of a multisine; the widest card has 60
 AXES = ("elevator", "aileron", "rudder", "throttle")
 
 
@@ -177,14 +177,12 @@ def parse(document: Mapping[str, object], name: str) -> Card:
     if not isinstance(faults, list):
         raise CardError(f"{name}: fault is not a list of tables")
     flight = _section(name, document, "flight", Flight)
-    for key in ("height_m", "rate_hz"):
-        value = getattr(flight, key)
-        if value <= 0.0:
-            raise CardError(f"{name}: flight.{key} is {value:g}, expected above 0")
     segments: list[Segment] = []
     for i, table in enumerate(listed):
         segments += _segments(f"{name}: segment {i + 1}", table)
-    return Card(
+        if len(segments) > MOST_SEGMENTS:
+            raise CardError(f"{name}: more than {MOST_SEGMENTS} segments, repeated ones counted")
+    card = Card(
         name=name,
         title=str(document.get("title", name)),
         aircraft=aircraft,
@@ -195,6 +193,26 @@ def parse(document: Mapping[str, object], name: str) -> Card:
         sensors=_section(name, document, "sensors", Sensors),
         faults=tuple(_fault(f"{name}: fault {i + 1}", table) for i, table in enumerate(faults)),
     )
+    if duration_s(card) > LONGEST_FLIGHT_S:
+        raise CardError(
+            f"{name}: {duration_s(card):g} s in all, expected up to {LONGEST_FLIGHT_S:g} s"
+        )
+    return card
+
+
+def duration_s(card: Card) -> float:
+    """Return the length of the card, ground time included."""
+    return card.flight.ground_s + sum(length_s(card, s) for s in card.segments)
+
+
+def length_s(card: Card, s: Segment) -> float:
+    """Return the length of one of its segments, with the trim before and the rest behind."""
+    if s.kind in STEPS:
+        units = sum(length for _, length in STEPS[s.kind])
+        return s.before_s + units * s.width_s + card.pilot.hands_off_s
+    if s.kind in ("trim", "turn"):
+        return s.duration_s
+    return s.before_s + s.duration_s + card.pilot.hands_off_s
 
 
 def _table(where: str, value: object) -> dict[str, object]:
@@ -204,7 +222,8 @@ def _table(where: str, value: object) -> dict[str, object]:
 
 
 def _number(where: str, key: str, value: object) -> float:
-    return toml_reader.number(f"{where}: {key}", value, CardError)
+    """Return a number within its range; `key` is its place in `RANGES`."""
+    return RANGES[key].check(f"{where}: {key}", value, CardError)
 
 
 def _section(name: str, document: Mapping[str, object], key: str, kind: type[Section]) -> Section:
@@ -221,9 +240,7 @@ def _section(name: str, document: Mapping[str, object], key: str, kind: type[Sec
                 raise CardError(f"{name}: {key}.{entry} is {value!r}, expected true or false")
             values[entry] = value
         else:
-            values[entry] = _number(f"{name}: [{key}]", entry, value)
-            if values[entry] < 0.0 and entry not in SIGNED:
-                raise CardError(f"{name}: {key}.{entry} is {value!r}, expected 0 or more")
+            values[entry] = _number(name, f"{key}.{entry}", value)
     return kind(**values)
 
 
@@ -241,14 +258,14 @@ def _segments(where: str, value: object) -> list[Segment]:
         raise CardError(f"{where}: axis is {axis!r}, expected of {', '.join(AXES)}")
     amplitude = table.pop("amplitude", [])
     listed = amplitude if isinstance(amplitude, list) else [amplitude]
-    amplitudes = tuple(_number(where, "amplitude", x) for x in listed)
+    amplitudes = tuple(_number(where, "segment.amplitude", x) for x in listed)
     numbers: dict[str, float] = {}
     allowed = ("duration_s", "bank_deg", "width_s", "low_hz", "high_hz", "before_s",
                "airspeed_mps", "attention")  # fmt: skip
     for key, x in table.items():
         if key not in allowed:
             raise CardError(f"{where}: unknown key {key!r}, expected one of {', '.join(allowed)}")
-        numbers[key] = _number(where, key, x)
+        numbers[key] = _number(where, f"segment.{key}", x)
     if kind in KINDS and (not axes or len(axes) != len(amplitudes)):
         raise CardError(
             f"{where}: {len(axes)} axes and {len(amplitudes)} amplitudes, expected one each"
@@ -266,6 +283,11 @@ def _segments(where: str, value: object) -> list[Segment]:
         raise CardError(f"{where}: high_hz is {numbers['high_hz']!r}, expected above low_hz")
     if kind == "multisine":
         tones = harmonics(numbers["duration_s"], numbers["low_hz"], numbers["high_hz"])
+        if len(tones) > MOST_TONES:
+            raise CardError(
+                f"{where}: {len(tones)} whole multiples of 1/duration_s between low_hz and high_hz,"
+                f" expected up to {MOST_TONES}: a shorter input or a narrower band"
+            )
         if len(tones) < len(axes):
             raise CardError(
                 f"{where}: {len(tones)} whole multiples of 1/duration_s between low_hz and high_hz"
@@ -277,7 +299,7 @@ def _segments(where: str, value: object) -> list[Segment]:
 def _fault(where: str, value: object) -> Fault:
     table = dict(_table(where, value))
     kind = table.pop("kind", None)
-    if kind not in FAULTS:
+    if not isinstance(kind, str) or kind not in FAULTS:
         raise CardError(f"{where}: kind is {kind!r}, expected one of {', '.join(FAULTS)}")
     about = FAULTS[kind]
     channel = table.pop("channel", "")
@@ -291,7 +313,7 @@ def _fault(where: str, value: object) -> Fault:
                 f"{where}: unknown key {key!r} of {kind}, expected one of"
                 f" {', '.join((*allowed, 'channel') if about.channels else allowed)}"
             )
-    numbers = {key: _number(where, key, x) for key, x in table.items()}
+    numbers = {key: _number(where, f"fault.{key}", x) for key, x in table.items()}
     if about.from_start:
         if numbers.setdefault("at_s", 0.0) != 0.0:
             raise CardError(f"{where}: {kind} stands at power-on, expected at_s = 0 or none")
