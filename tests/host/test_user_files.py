@@ -136,8 +136,10 @@ REAL = {
 
 @pytest.mark.parametrize("name", REAL)
 def test_real_aircraft_are_taken_without_a_word(name: str) -> None:
-    keys = ("mass_kg", "wing_area_m2", "span_m", "chord_m")
-    keys += ("ixx_kgm2", "iyy_kgm2", "izz_kgm2", "ixz_kgm2", "airspeed_mps")
+    keys = (
+        *("mass_kg", "wing_area_m2", "span_m", "chord_m"),
+        *("ixx_kgm2", "iyy_kgm2", "izz_kgm2", "ixz_kgm2", "airspeed_mps"),
+    )
     values: dict[str, object] = dict(zip(keys, REAL[name], strict=True))
     speed = REAL[name][-1]
     values |= {"minimum_airspeed_mps": 0.8 * speed, "maximum_airspeed_mps": 1.2 * speed}
@@ -226,6 +228,6 @@ def test_cards_that_cannot_be_flown(
 
 
 def test_a_refused_number_of_a_thousand_digits_is_cut() -> None:
-    with pytest.raises(AircraftError, match=r"expected a number that is one") as refused:
+    with pytest.raises(AircraftError, match=r"expected a number up to") as refused:
         load_measured(changed(mass_kg="1" + "0" * 300))
     assert len(str(refused.value)) < 200

@@ -142,7 +142,7 @@ def use_aircraft(path: Path, rng: random.Random) -> None:
     from host.aircraft.mass_properties import airframe_data
     from host.aircraft.powerplant import powerplant
     from host.aircraft.trim import solve
-    from host.instrument.errors import instrument_data
+    from host.instrument.deviations import instrument_data
     from host.sysid.answer.converted import At, conversion_document, convert
 
     plane = None
@@ -170,9 +170,13 @@ def use_aircraft(path: Path, rng: random.Random) -> None:
 def use_calibration(path: Path, rng: random.Random) -> None:
     """As `decode` does."""
     import numpy as np
+    from host.instrument.errors import instrument_errors
     from host.log import read_log
+    from host.physical.calibration import load_calibration
 
     del rng
+    for error in instrument_errors(calibration=load_calibration(path)):
+        finite(error.sigmas)
     columns = read_log(Path("flight.bin"), calibration=path).columns()
     assert not any(np.isinf(np.asarray(v, dtype=np.float64)).any() for v in columns.values())
 
@@ -277,6 +281,12 @@ airspeed_mps = 17.0
 alpha_rad = 0.05
 theta_rad = 0.05
 """
+ERROR = b"""
+[error.thrust_share]
+sigma = 0.05
+drawn = "flight"
+source = "static thrust on a scale"
+"""
 PRIOR = b"""alpha_deg = [-2.0, 2.0, 6.0]
 [coefficients]
 CL_alpha = [4.6, 4.7, 4.5]
@@ -299,7 +309,9 @@ def sources(kind: str) -> list[bytes]:
         return [*found, "\n".join(f"{k} = {toml(v)}" for k, v in measured.items()).encode()]
     if kind == "calibration":
         Path("flight.bin").write_bytes(written(*flight(0.5)))
-        return [(ROOT / "hw/calibration/default.toml").read_bytes()]
+        default = (ROOT / "hw/calibration/default.toml").read_bytes()
+        own = default.replace(b"default = true", b"default = false") + ERROR
+        return [default, own]
     if kind == "map":
         rows = "".join(f"{20000 * k},{k % 7},-1.0{k % 3},0.{k % 9},1\n" for k in range(60))
         Path("foreign.csv").write_text(f"TimeUS,AOA,Nz,q,de\n{rows}")

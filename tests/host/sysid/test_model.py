@@ -118,7 +118,7 @@ def test_entries_are_parsed() -> None:
         ({"parameters": {"k": "fast"}}, "parameter k is 'fast', expected a number"),
         ({"parameters": {"k": {"start": True}}}, "k: start is True, expected a number"),
         ({"parameters": {"k": {"start": float("inf")}}}, "start is inf, expected a number"),
-        ({"parameters": {"k": {"prior_sd": 0}}}, "prior_sd is 0, expected a number above zero"),
+        ({"parameters": {"k": {"prior_sd": 0}}}, "prior_sd is 0, expected above 0"),
         ({"parameters": {"k": {"lower": 1, "upper": -1}}}, "lower 1 is not below upper -1"),
         ({"parameters": {"k": {"start": 3, "upper": 2}}}, "start 3 is not between .* upper 2"),
         ({"delays": [{"name": "d", "outputs": "a"}]}, "delay d: outputs must be a list"),

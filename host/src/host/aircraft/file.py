@@ -57,6 +57,7 @@ MEASURED = ("mass", "geometry", "trim", "sensors")
 MEASURED_IF_THERE = ("propulsion",)
 _MEASURED_TRIM = ("airspeed_mps",)
 _LONGEST = 200  # numbers of one list
+_LENGTHS = {"alpha_rad": (2, _LONGEST), "stall_alpha_rad": (2, 2)}
 
 
 class AircraftError(UsageError):
@@ -263,8 +264,11 @@ def _loaded(
             listed = toml_reader.listed(where, table.get(key), AircraftError)
             if key.endswith("_m") and len(listed) != 3:  # a place
                 raise AircraftError(f"{where} has {len(listed)} numbers, expected 3: x, y, z")
-            if not 2 <= len(listed) <= _LONGEST:
-                raise AircraftError(f"{where} has {len(listed)} numbers, expected 2 to {_LONGEST}")
+            least, most = _LENGTHS.get(key, (1, _LONGEST))
+            if not least <= len(listed) <= most:
+                raise AircraftError(
+                    f"{where} has {len(listed)} numbers, expected {least} to {most}"
+                )
             vectors[f"{section}.{key}"] = np.array(
                 [quantity.check(f"{where}[{k}]", x, AircraftError) for k, x in enumerate(listed)]
             )

@@ -80,10 +80,10 @@ def ratios(s: Mapping[str, float], v: Mapping[str, Array]) -> Iterator[Ratio]:
         f" wing_area_m2 {area:g})",
         mass * GRAVITY_MPS2 / (pressure * area), (0.01, 3.0), (1e-4, 100.0),
     )  # fmt: skip
-    for key, usual in (("mass.cg_m", 1.0), *((k, 3.0) for k in v if k.startswith("sensors."))):
+    for key, most in (("mass.cg_m", 1.0), *((k, 3.0) for k in v if k.startswith("sensors."))):
         far = float(np.linalg.norm(v[key]))
         name = f"distance of {key} / span ({far:g} m, span_m {span:g})"
-        yield Ratio(name, far / span, (0.0, usual), (0.0, 10.0))
+        yield Ratio(name, far / span, (0.0, most), (0.0, 10.0))
 
 
 def impossible(s: Mapping[str, float], v: Mapping[str, Array]) -> Iterator[str]:

@@ -106,7 +106,7 @@ def _refuse_excess(document: dict[str, Any], name: str, error: type[UsageError])
             if len(value) > LONGEST_TEXT:
                 raise error(f"{name}: {where}: a text of more than {LONGEST_TEXT} characters")
         elif isinstance(value, int | float) and not abs(value) <= LARGEST:  # NaN too
-            raise error(f"{name}: {where} is {shown(value)}, expected a number that is one")
+            raise error(f"{name}: {where} is {shown(value)}, expected a number up to {LARGEST:g}")
 
 
 def shown(value: object) -> str:

@@ -48,7 +48,9 @@ class Quantity:
         UsageError
             As `error`: no number, not finite, or out of range.
         """
-        if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise error(f"{where} is {shown(value)}, expected a number")
+        if not abs(value) < math.inf:  # NaN neither
             raise error(f"{where} is {shown(value)}, expected a number")
         low = value <= self.least if self.above else value < self.least
         if low or value > self.most:
