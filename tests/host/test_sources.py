@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 from host.cli import main
+from host.errors import UsageError
 
+import host
 from tests.host.logs import flight, written
 
 # Every argument that names a file to read; {} is the file.
@@ -134,3 +136,25 @@ def test_names_that_are_no_utf8_or_control_the_terminal(
                 assert "\u202e" not in text
         assert main(["decode", f"{path}.missing"]) == 2
         assert capsysbinary.readouterr()[1].count(b"\n") == 1
+
+
+def test_the_library_reads_no_pipe_either() -> None:
+    os.mkfifo("pipe")
+    for path in ("pipe", "/dev/zero", os.devnull):
+        with pytest.raises(UsageError, match="a pipe or a device"):
+            host.read_log(path)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("airspeed", "1e300"), ("airspeed", "nan"), ("density", "1e300"), ("density", "0"),
+     ("alpha", "90"), ("alpha", "inf")],
+)  # fmt: skip
+def test_a_flight_condition_that_cannot_be(
+    option: str, value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["convert", "prior.toml", "--aircraft", "ultrastick25e", f"--{option}", value]
+    assert main(given) == 2
+    said = capsys.readouterr().err
+    assert f"--{option} is {value.replace('e3', 'e+3')}" in said
+    assert said.count("\n") == 1

@@ -120,7 +120,7 @@ def test_command_hears_another_aircraft_and_keeps_unlike_inputs_apart(
     assert "2x doublet elevator" in text
     assert "1x doublet elevator" in text
     assert main(["plan", "demo", "--airspeed", "-4"]) == 2
-    assert "--airspeed is -4, expected above 0" in capsys.readouterr().err
+    assert "--airspeed is -4 m/s, expected 0.5 to 2000 m/s" in capsys.readouterr().err
 
 
 def test_a_full_disk_names_the_folder_of_the_flight(

@@ -24,8 +24,11 @@ _ANGLE = Quantity("rad", -1.6, 1.6, "90 degrees; in degrees it would be larger")
 _PLACE_M = Quantity("m", -100.0, 100.0, _PLACE)
 _TOLERANCE = Quantity("", 0.0, 0.5, _SHARE)
 _TOLERANCE_M = Quantity("m", 0.0, 5.0, "a place that is known to less is not known")
-_SPEED_MPS = Quantity("m/s", 0.5, 2000.0, _SPEED)
 _TORQUE = Quantity("N m", 0.0, 1e6, "largest turboprops 1e5 N m")
+# Of a flight condition.
+AIRSPEED = Quantity("m/s", 0.5, 2000.0, _SPEED)
+DENSITY = Quantity("kg/m3", 1e-3, 10.0, "from 50 km to wind tunnels under pressure")
+ALPHA_DEG = Quantity("deg", -89.0, 89.0, "at 90 degrees derivatives have no axes")
 _LIMIT = Quantity("rad", 0.0, 1.6, _SURFACE, above=True)
 _POLYNOMIAL = Quantity("", -1e3, 1e3, "propeller data: coefficients below 10")
 
@@ -45,9 +48,9 @@ RANGES: Mapping[str, Quantity] = {
     "geometry.elevator_arm_m": Quantity("m", -100.0, 100.0, _PLACE),
     "geometry.rudder_arm_m": Quantity("m", -100.0, 100.0, _PLACE),
     "geometry.arm_tolerance": _TOLERANCE,
-    "trim.airspeed_mps": _SPEED_MPS,
-    "trim.minimum_airspeed_mps": _SPEED_MPS,
-    "trim.maximum_airspeed_mps": _SPEED_MPS,
+    "trim.airspeed_mps": AIRSPEED,
+    "trim.minimum_airspeed_mps": AIRSPEED,
+    "trim.maximum_airspeed_mps": AIRSPEED,
     "aerodynamics.alpha_rad": Quantity("rad", -3.2, 3.2, "half a turn"),
     "aerodynamics.stall_alpha_rad": _ANGLE,
     "aerodynamics.cd_0": Quantity("", 0.0, 2.0, "a plate across the flow has 2"),

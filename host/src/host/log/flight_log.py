@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.errors import LogError
+from host.files.regular import file_or_folder
 from host.log.ledger import Ledger
 from host.log.losses import make_ledger
 from host.physical.calibration import Calibration, load_calibration
@@ -258,6 +259,8 @@ def read_log(
         If the session, the file id or the schema is not known.
     CalibrationError
         If the calibration file cannot be used.
+    UsageError
+        If it is a pipe or a device.
     OSError
         If the file cannot be read.
 
@@ -268,6 +271,8 @@ def read_log(
     >>> log.table()[["t_s", "alpha_rad", "q_radps"]]  # doctest: +SKIP
     """
     path = Path(path)
+    if path.exists():
+        file_or_folder(path)
     if not isinstance(calibration, Calibration):
         calibration = load_calibration(calibration)
     found = scan(path, progress, limit_bytes=limit_bytes)

@@ -42,19 +42,18 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Convert and print."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from math import isfinite, radians
+    from math import radians
 
     from host.aircraft.file import load_measured
+    from host.aircraft.ranges import AIRSPEED, ALPHA_DEG, DENSITY
     from host.errors import ExitCode, UsageError
     from host.sysid.answer.converted import At, conversion_document, conversion_lines, convert
     from host.sysid.answer.json import json_text
 
-    for option in ("airspeed", "density"):
+    for option, quantity in (("airspeed", AIRSPEED), ("density", DENSITY), ("alpha", ALPHA_DEG)):
         value = getattr(args, option)
-        if value is not None and not (isfinite(value) and value > 0.0):
-            raise UsageError(f"--{option} is {value:g}, expected above 0")
-    if args.alpha is not None and not abs(args.alpha) < 90.0:
-        raise UsageError(f"--alpha is {args.alpha:g}, expected between -90 and 90 deg")
+        if value is not None:
+            quantity.check(f"--{option}", value, UsageError)
     alpha_rad = None if args.alpha is None else radians(args.alpha)
     done = convert(args.source, args.aircraft, At(args.airspeed, alpha_rad, args.density))
     for doubt in load_measured(args.aircraft).doubts:

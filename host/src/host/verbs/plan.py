@@ -49,13 +49,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Judge or design a card and print it; return an exit code."""
     try:
+        from host.aircraft.ranges import AIRSPEED
         from host.export.toml import dumps
         from host.planning import plan as planning
         from host.twin.testcard import cards
     except ImportError as error:
         raise UsageError(f"planning needs {error.name}: {install_hint(error.name)}") from None
-    if args.airspeed is not None and not args.airspeed > 0.0:
-        raise UsageError(f"--airspeed is {args.airspeed:g}, expected above 0")
+    if args.airspeed is not None:
+        AIRSPEED.check("--airspeed", args.airspeed, UsageError)
     if args.card is None:
         card = planning.design(args.aircraft or "ultrastick25e", args.airspeed or 0.0)
         if args.save is not None:
