@@ -21,10 +21,10 @@ DOORS: dict[str, tuple[Callable[[str | Path], object], type[UsageError]]] = {
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"\xff\xfe\x00log", "wrong.toml: not TOML: 'utf-8' codec"),
+        (b"\xff\xfe\x00log", "wrong.toml: not TOML: byte 0 is no UTF-8"),
         (b"format = ", "wrong.toml: not TOML: Invalid value"),
         (b"format = 2", r"wrong(\.toml)?: format is 2, expected 1"),
-        (None, "wrong.toml: cannot be read"),
+        (None, "wrong.toml: a folder; name a file in it"),
     ],
 )
 def test_a_wrong_file_is_one_line(
