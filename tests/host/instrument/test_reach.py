@@ -1,0 +1,75 @@
+"""Every error that a calibration states reaches an interval, larger and smaller."""
+
+from pathlib import Path
+
+import pytest
+from host.aircraft.file import load
+from host.compiled import Array
+from host.instrument.deviations import instrument_data
+from host.physical.calibration import load_calibration
+from host.sysid.coefficients.flight import identify_coefficients
+from host.sysid.flight.tables import even_columns
+from host.twin.outcome.instrument import calibration
+from host.twin.virtual import virtual_flight
+
+NAME = "ultrastick25e"
+# Lines of a calibration, the number in them, and a coefficient whose interval it rules.
+LINES = {
+    "alpha": (("alpha_a", "alpha_b"), "slope_sigma", "CL_alpha"),
+    "beta": (("beta_a", "beta_b"), "slope_sigma", "Cn_beta"),
+    "pitot": (("dp_a", "dp_b"), "slope_sigma", "CL_alpha"),
+    "pitot zero": (("dp_a", "dp_b"), "zero_sigma", "CL_alpha"),
+    "elevator": (("pot_elevator",), "slope_sigma", "Cm_de"),
+    "rudder": (("pot_rudder",), "slope_sigma", "Cn_dr"),
+    "gyro": (("gyro",), "slope_sigma", "Cl_da"),
+    "accelerometer": (("accel",), "slope_sigma", "CL_alpha"),
+}
+TABLES = {"thrust": ("thrust_share", "CD_0"), "misalignment": ("misalignment_rad", "Cn_da")}
+
+
+@pytest.fixture(scope="module")
+def columns() -> dict[str, Array]:
+    return even_columns(virtual_flight("demo", 41, chain="none").table)[0]
+
+
+def halves(columns: dict[str, Array], path: Path, text: str) -> dict[str, float]:
+    """Return the half-widths of an answer with a calibration of that text."""
+    path.write_text(text, encoding="utf-8")
+    data = instrument_data(NAME, load_calibration(path))
+    answer = identify_coefficients(columns, NAME, instrument=data)
+    return {d.name: d.half_width for d in answer.fit.derivatives}
+
+
+def scaled(text: str, tables: tuple[str, ...], key: str, factor: float) -> str:
+    """Return a calibration with one number of some tables so many times as large."""
+    lines, inside = [], False
+    for line in text.splitlines():
+        if line.startswith("["):
+            inside = line.strip("[]").rpartition(".")[2] in tables
+        name, _, value = line.partition(" = ")
+        if inside and name == key:
+            numbers = [factor * float(x) for x in value.strip("[]").split(",")]
+            line = f"{name} = {numbers[0] if len(numbers) == 1 else numbers}"
+        lines.append(line)
+    return "\n".join(lines) + "\n"
+
+
+def test_lines_and_tables_of_a_calibration_move_intervals(
+    columns: dict[str, Array], tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.toml"
+    text = calibration(load(NAME))
+    usual = halves(columns, path, text)
+    for group, (tables, key, coefficient) in LINES.items():
+        wide = halves(columns, path, scaled(text, tables, key, 10.0))
+        assert wide[coefficient] > 1.05 * usual[coefficient], group
+    for group, (table, coefficient) in TABLES.items():
+        key = "sigma" if table == "thrust_share" else "half_width"
+        wide = halves(columns, path, scaled(text, (table,), key, 10.0))
+        assert wide[coefficient] > 1.05 * usual[coefficient], group
+    narrow = text
+    for tables, key, _ in LINES.values():
+        narrow = scaled(narrow, tables, key, 0.1)
+    small = halves(columns, path, narrow)
+    for coefficient in ("CL_alpha", "Cn_beta", "Cm_de"):
+        assert small[coefficient] < 0.95 * usual[coefficient], coefficient

@@ -1,0 +1,69 @@
+"""A file that claims too little is doubted, an honest one as rarely as stated."""
+
+import numpy as np
+import pytest
+from host.aircraft.mass_properties import airframe_data
+from host.compiled import Array
+from host.instrument.deviations import instrument_data
+from host.sysid.compatibility.claims import ALARM, VISIBLE, Claim, claim_words, claims
+from host.sysid.compatibility.path_data import prior
+from host.sysid.compatibility.reconstruction import document, reconstruct, words
+from host.sysid.flight.tables import even_columns
+from host.twin.virtual import virtual_flight
+
+NAME = "ultrastick25e"
+NAMES = tuple(name for own in VISIBLE.values() for name in own)
+
+
+def drawn(rng: np.random.Generator, times: float, noise: Array) -> tuple[Array, Array]:
+    """Return what a flight finds of errors `times` as large as stated, and its covariance.
+
+    A direct look at every error with noise of its own, and the file for a prior: what a linear
+    reconstruction does.
+    """
+    stated = np.array([sd for _, sd in (prior(None)[n] for n in NAMES)])
+    looked = rng.normal(0.0, times * stated) + rng.normal(0.0, noise * stated)
+    posterior = 1.0 / (1.0 / stated**2 + 1.0 / (noise * stated) ** 2)
+    return posterior * looked / (noise * stated) ** 2, np.diag(posterior)
+
+
+@pytest.mark.parametrize(("times", "least", "most"), [(1.0, 0.0, 0.03), (3.0, 0.99, 1.0)])
+def test_alarms_come_as_often_as_stated(times: float, least: float, most: float) -> None:
+    rng = np.random.default_rng(5)
+    noise = np.geomspace(0.1, 2.0, len(NAMES))
+    found = [claims(NAMES, *drawn(rng, times, noise), prior(None)) for _ in range(500)]
+    assert least <= np.mean([f[0].doubted for f in found]) <= most
+    rms = np.sqrt(np.mean([f[0].times ** 2 for f in found]))
+    assert pytest.approx(rms, abs=0.05) == 1.0 if times == 1.0 else 2.0 < rms < 3.0
+
+
+def test_what_the_flight_does_not_tell_is_not_judged() -> None:
+    rng = np.random.default_rng(5)
+    found = claims(NAMES, *drawn(rng, 1.0, np.full(len(NAMES), 30.0)), prior(None))
+    assert all(c.directions == 0 and not c.doubted for c in found)
+    assert claim_words(found) == []
+
+
+def test_a_doubted_file_is_named_with_the_errors_it_claims_too_small() -> None:
+    found = (
+        Claim("all", 2.5, 9, ALARM / 10.0),
+        Claim("gyro_scale", 3.1, 3, ALARM / 10.0),
+        Claim("vane_scale", 1.1, 2, 0.4),
+    )
+    (line,) = claim_words(found)
+    assert "gyro_scale 3.1 times" in line
+    assert "vane_scale" not in line
+
+
+def test_a_recorded_flight_doubts_a_file_that_claims_a_fifth_and_no_honest_one() -> None:
+    columns, _ = even_columns(virtual_flight("demo", 901).table)
+    airframe, data = airframe_data(NAME), instrument_data(NAME)
+    honest = reconstruct(columns, airframe, data)
+    assert not honest.claims[0].doubted
+    assert honest.claims[0].directions > 8
+    bold = reconstruct(columns, airframe, data.scaled(0.2))
+    assert bold.claims[0].doubted
+    assert any("claims less than this flight shows" in line for line in words(bold))
+    told = document(bold)["calibration"]
+    assert isinstance(told, dict)
+    assert told["all"]["doubted"]
