@@ -1,7 +1,7 @@
 """No test depends on time, on chance, or on how it was started.
 
-Hypothesis draws the same cases, at any speed, every run. A shell that starts a job in the background
-lets it ignore Ctrl-C, and so its children: those that are to end by Ctrl-C would hang.
+Hypothesis draws the same cases, at any speed, every run. A shell that starts a job in the
+background lets it ignore Ctrl-C, and so its children: those that are to end by Ctrl-C would hang.
 """
 
 import signal

@@ -7,7 +7,7 @@ model is his example with M_wdot folded in, turned from w to alpha and from feet
 from __future__ import annotations
 
 import numpy as np
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.models.model import LinearModel, Parameter, Term, free_model
 
 FOOT_M = 0.3048

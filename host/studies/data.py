@@ -5,7 +5,7 @@ variance and scale of the Dryden one (MIL-F-8785C).
 """
 
 import numpy as np
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.problem import OutputProblem
 from scipy import linalg

@@ -20,7 +20,7 @@ from host.aircraft.attitude import euler
 from host.aircraft.gains import dimensional_gains
 from host.aircraft.linearisation import linearise
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.aerodynamics.in_coefficients import in_coefficients
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import MATRICES, LinearModel

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from host.compiled import Array
+from host.arrays import Array
 
 LEAD_S = 1.0  # level flight before the first step
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import InstrumentData, instrument_data
 from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct

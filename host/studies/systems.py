@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from host.compiled import Array
+from host.arrays import Array
 from scipy import linalg, signal
 
 

@@ -13,7 +13,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.estimators.hopfield import (
     ITERATIONS,
     LAMBDA,

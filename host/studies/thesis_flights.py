@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
 from host.sysid.estimators.hopfield import free_run, line_search, network

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from host.compiled import Array, BoolArray
+from host.arrays import Array, BoolArray
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.filter_error import information_at
 from host.sysid.estimators.fit import fit

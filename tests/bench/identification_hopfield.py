@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.estimators.hopfield import iterate_until, largest_stable_gain, network
 from host.sysid.estimators.rows import solve_normal
 from host.sysid.models.maneuver import Maneuver

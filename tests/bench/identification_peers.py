@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import aeroid
 import numpy as np
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.estimators.start import start_values
 from host.sysid.numerics.problem import OutputProblem
 from numpy.typing import NDArray

@@ -10,12 +10,6 @@ import importlib
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.floating[Any]]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 DIRECT_WITH = ("0.68.",)
 

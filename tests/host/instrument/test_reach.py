@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from host.aircraft.file import load
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import instrument_data
 from host.physical.calibration import load_calibration
 from host.sysid.coefficients.flight import identify_coefficients

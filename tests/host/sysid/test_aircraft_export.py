@@ -16,8 +16,8 @@ from host.aircraft.file import read_document
 from host.aircraft.local_derivatives import coefficients, local_derivatives
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
+from host.arrays import Array
 from host.cli import main
-from host.compiled import Array
 from host.export import toml as tomlout
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document

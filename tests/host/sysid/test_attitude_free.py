@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import instrument_data
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import instrument_data
 from host.sysid.compatibility.claims import ALARM, VISIBLE, Claim, claim_words, claims
 from host.sysid.compatibility.path_data import prior

@@ -10,8 +10,8 @@ import pytest
 from host.aircraft.file import read_document
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
+from host.arrays import Array
 from host.cli import main
-from host.compiled import Array
 from host.export import toml as tomlout
 from host.instrument.deviations import instrument_data
 from host.sysid.coefficients.answer import CoefficientFit, Derivative

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import InstrumentData, deviations, instrument_data
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients

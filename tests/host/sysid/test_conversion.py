@@ -8,7 +8,7 @@ from host.aircraft.airframe import Airframe
 from host.aircraft.file import load
 from host.aircraft.local_derivatives import coefficients as about_cg
 from host.aircraft.mass_properties import Condition, airframe_data
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import instrument_data
 from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.aerodynamics.conversion import (

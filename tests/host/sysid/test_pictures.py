@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.arrays import Array
 from host.cli import main
-from host.compiled import Array
 from host.sysid.answer.panels import (
     Bar,
     Cloud,

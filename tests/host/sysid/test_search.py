@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators import search as searching
 from host.sysid.estimators.following import following_start, led_model

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.coefficients.step import Known, stepped
 from host.sysid.coefficients.stretches import Side, Stretch, Unknowns, stretches, summed
 from host.sysid.coefficients.windows import Block, Key, Window, window_block

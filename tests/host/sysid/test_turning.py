@@ -5,7 +5,7 @@ import pytest
 from host.aircraft.air import Turbulence, gusts
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.coefficients.model import standard_model
 from host.sysid.coefficients.rows import Flown, equations
 from host.sysid.coefficients.turning import (

@@ -1,7 +1,7 @@
 """The gust of a flight by dead reckoning, and whether it turns with the aircraft."""
 
 import numpy as np
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.aerodynamics.turning_air import gust_motion, turning
 from host.sysid.estimators.fit import fit
 from scipy.spatial.transform import Rotation

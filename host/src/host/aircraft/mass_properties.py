@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.aircraft.file import load_measured
-from host.compiled import Array
+from host.arrays import Array
 
 RECTANGLE = 1.0 / np.sqrt(3.0)  # standard deviation of an even distribution over its half width
 Place = tuple[float, float, float]

@@ -10,7 +10,7 @@ import numpy as np
 
 from host.aircraft.file import AircraftError, load_measured
 from host.aircraft.propulsion import motor_torque, propeller, rotor_history
-from host.compiled import Array
+from host.arrays import Array
 
 Step = Callable[[float, float, float, float], tuple[float, float, float]]
 History = Callable[[Array, Array, Array, float, float, int], Array]

@@ -13,7 +13,7 @@ import numpy as np
 
 from host.aircraft.gains import dimensional_name, from_dimensional
 from host.aircraft.mass_properties import AirframeData, Condition
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.models.result import FitResult
 from host.sysid.models.templates import Trim
 

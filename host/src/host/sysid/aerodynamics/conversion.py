@@ -23,7 +23,7 @@ from host.aircraft.gains import (
     from_dimensional,
 )
 from host.aircraft.mass_properties import AirframeData, Condition
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import InstrumentData, deviations
 from host.sysid.errors import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2

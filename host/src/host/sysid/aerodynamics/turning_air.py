@@ -17,7 +17,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.models.templates import GRAVITY_MPS2
 
 AXES = ("x", "y", "z")

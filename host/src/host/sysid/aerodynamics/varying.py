@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.aerodynamics.turning_air import AXES, gust_motion, turning
 from host.sysid.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver

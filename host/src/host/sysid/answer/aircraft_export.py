@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.files import whole
 from host.sysid.coefficients.answer import Flight

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.answer.files import whole
 from host.sysid.answer.units import parameter_unit
 from host.sysid.compatibility.signals import THIN_HZ

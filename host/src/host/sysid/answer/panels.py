@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.extras import install_hint
 from host.sysid.answer.files import whole
 from host.sysid.errors import IdentificationError

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.answer.json import found_name
 from host.sysid.answer.panels import (
     Bar,

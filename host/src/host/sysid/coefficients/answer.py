@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
-from host.compiled import Array, IntArray
+from host.arrays import Array, IntArray
 from host.sysid.coefficients.joint import Prediction
 from host.sysid.coefficients.local import Local
 from host.sysid.numerics.repeats import Repeats

@@ -17,7 +17,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import InstrumentData, deviations
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.gust_free import gust_free

@@ -9,7 +9,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import NoPropulsionError, powerplant
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import InstrumentData, instrument_data
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.coefficients.answer import METHOD, QUANTILE, CoefficientFit

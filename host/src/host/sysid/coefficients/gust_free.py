@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import InstrumentData
 from host.sysid.coefficients.rows import Flown
 from host.sysid.compatibility.signals import BLEND_RADPS, Record

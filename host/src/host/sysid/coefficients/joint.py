@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.coefficients.rows import KINEMATIC
 from host.sysid.coefficients.step import STILL, Step
 from host.sysid.coefficients.stretches import Stretch, Unknowns, summed

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.coefficients.model import BODY, CoefficientModel
 
 POLAR = "CD_CL2"

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.models.document import read_document
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.aerodynamics.conversion import Quantities
 from host.sysid.coefficients.answer import QUANTILE, CoefficientFit
 from host.sysid.models.modes import Mode, longitudinal_names, mode_of

@@ -13,7 +13,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
-from host.compiled import Array, IntArray
+from host.arrays import Array, IntArray
 from host.sysid.coefficients.model import CoefficientModel
 from host.sysid.compatibility.signals import Record
 from host.sysid.models.templates import GRAVITY_MPS2

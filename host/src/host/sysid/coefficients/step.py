@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array, BoolArray, IntArray
+from host.arrays import Array, BoolArray, IntArray
 from host.sysid.coefficients.stretches import Sums
 from host.sysid.errors import IdentificationError
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array, IntArray
+from host.arrays import Array, IntArray
 from host.sysid.coefficients.windows import FLAT, Block, Key, degree, row_weight, used
 from host.sysid.compatibility.signals import Spectrum
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.coefficients.windows import Block, Key
 from host.sysid.compatibility.signals import Spectrum
 

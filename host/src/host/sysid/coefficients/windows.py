@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array, BoolArray, IntArray
+from host.arrays import Array, BoolArray, IntArray
 from host.sysid.coefficients.rows import KINEMATIC, LATERAL, LONGITUDINAL, Equation
 from host.sysid.compatibility.signals import Spectrum
 from host.sysid.errors import IdentificationError

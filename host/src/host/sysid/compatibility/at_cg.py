@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import InstrumentData, vane_delay_s
 from host.instrument.deviations import deviations as drawn
 from host.sysid.compatibility.flight_path import AIR, DELAYS

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.compatibility.flight_path import FLOW, INERTIAL, PITOT, PLACES
 
 # Groups that kinematics can see, by the names of the instrument's file, and their unknowns.

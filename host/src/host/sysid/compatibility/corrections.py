@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, INERTIAL, PITOT
 from host.sysid.compatibility.path_data import density_share
 from host.sysid.compatibility.reconstruction import NORMAL, Compatibility

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array, IntArray
+from host.arrays import Array, IntArray
 from host.sysid.compatibility.strapdown import cross, path_slopes, small_turn, strapdown
 from host.sysid.numerics.problem import Response
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
-from host.compiled import Array, BoolArray
+from host.arrays import Array, BoolArray
 from host.instrument.deviations import InstrumentData, deviations, unknown_sensors
 from host.sysid.compatibility.flight_path import (
     AIR,

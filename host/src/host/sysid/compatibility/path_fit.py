@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, GPS, PITOT, PLACES, PathProblem
 from host.sysid.errors import IdentificationError
 from host.sysid.numerics.noise import OutputNoise, lagged_moments, regress

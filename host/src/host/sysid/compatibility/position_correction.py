@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
-from host.compiled import Array
+from host.arrays import Array
 
 
 def corrected(columns: dict[str, Array], airframe: AirframeData) -> dict[str, Array]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import InstrumentData
 from host.sysid.compatibility.claims import Claim, claim_words, claims
 from host.sysid.compatibility.flight_path import FLOW, GPS, INERTIAL

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import InstrumentData
 
 PASS_HZ, STOP_HZ = 9.0, 13.0

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.compiled import Array, IntArray, compiled
+from host.arrays import Array, IntArray
+from host.compiled import compiled
 from host.sysid.models.templates import GRAVITY_MPS2
 
 

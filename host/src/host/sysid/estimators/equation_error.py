@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.compiled import Array, IntArray
+from host.arrays import Array, IntArray
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.rows import (
     NEVER_MOVED,

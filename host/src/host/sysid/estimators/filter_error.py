@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from host.compiled import Array, BoolArray
+from host.arrays import Array, BoolArray
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.misfit import misfit_factor, widened_names
 from host.sysid.estimators.rival import against_coloured_noise

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.numerics.output_error import minimise

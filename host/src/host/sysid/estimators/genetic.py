@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.models.maneuver import Maneuver

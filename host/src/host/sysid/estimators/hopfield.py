@@ -19,7 +19,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from host.compiled import Array, compiled
+from host.arrays import Array
+from host.compiled import compiled
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
 from host.sysid.estimators.rows import normal_equations, regression_rows

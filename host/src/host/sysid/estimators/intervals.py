@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.estimators.search import search
 from host.sysid.numerics.noise import OutputNoise, choose_order, lagged_moments, regress
 from host.sysid.numerics.output_error import Optimum, covariance_of, minimise, whitened_slopes

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.models.model import LinearModel
 
 WINDOW_S = 1.0  # longest memory looked for: more than a short period, most of a dutch roll
@@ -66,5 +66,6 @@ def widened_names(model: LinearModel, factor: Array) -> list[str]:
         return []
     return [
         f"the model does not follow this motion throughout: intervals widened {', '.join(said)}"
-        " times; such ones held 90-92 % of cases in gusts, not 95, Cm_alpha 83 (host/studies/nonlinear_gusts.md)"
+        " times; such ones held 90-92 % of cases in gusts, not 95, Cm_alpha 83"
+        " (host/studies/nonlinear_gusts.md)"
     ]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.intervals import HIGHEST_ORDER, Interval, fit_with_memory
 from host.sysid.estimators.start import start_values

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from host.compiled import Array, compiled
+from host.arrays import Array
+from host.compiled import compiled
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
 from host.sysid.estimators.rows import Row, regression_rows, solve_normal

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.following import following_start
 from host.sysid.estimators.kalman import noise_deviation

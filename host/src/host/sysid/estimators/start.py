@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.rows import regression_rows, solve_rows
 from host.sysid.models.maneuver import Maneuver

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.compiled import Array, BoolArray
+from host.arrays import Array, BoolArray
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
 from host.sysid.estimators.rows import regression_rows

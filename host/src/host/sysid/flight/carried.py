@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.aircraft.mass_properties import Condition
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Moved, trim_of
 from host.sysid.compatibility.at_cg import open_errors, without_open
 from host.sysid.compatibility.corrections import (

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import AXES, Found, find
 

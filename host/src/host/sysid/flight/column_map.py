@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.files.document import read_toml
 from host.files.quantities import Quantity
 from host.sysid.errors import IdentificationError

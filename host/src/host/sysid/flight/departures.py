@@ -16,7 +16,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Moved
 from host.sysid.aerodynamics.varying import BENDS, MEASURED, VaryingModel
 from host.sysid.flight.carried import follower

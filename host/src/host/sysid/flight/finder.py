@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array, BoolArray, IntArray
+from host.arrays import Array, BoolArray, IntArray
 
 LAG_S = 0.12  # a hand needs about this long for one edge
 LEAST_EDGE_RAD = 0.025  # 1.4 degrees: a pulse smaller than this excites nothing on a trainer

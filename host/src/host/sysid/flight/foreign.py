@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.extras import install_hint
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.text_table import HEAD_BYTES, read_text

@@ -9,7 +9,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.aircraft.powerplant import Powerplant
-from host.compiled import Array
+from host.arrays import Array
 from host.instrument.deviations import InstrumentData, deviations, unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from host.compiled import Array, BoolArray, IntArray
+from host.arrays import Array, BoolArray, IntArray
 from host.sysid.flight.finder import FLYING_SHARE
 
 FAR = 100.0  # of the range that 96 % of the values lie in

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.consistent import BLOCK_S, FEWEST, HINT, SURE, block_means, consistent
 from host.sysid.models.templates import GRAVITY_MPS2

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.compiled import Array, BoolArray, IntArray
+from host.arrays import Array, BoolArray, IntArray
 from host.files.regular import file_or_folder
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.column_map import listed, mapped, read_map

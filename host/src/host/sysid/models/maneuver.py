@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from host.compiled import Array, IntArray
+from host.arrays import Array, IntArray
 from host.sysid.errors import IdentificationError
 
 MATRICES = ("A", "B", "C", "D")

@@ -41,7 +41,7 @@ from typing import cast
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.files.document import shown
 from host.files.quantities import Quantity
 from host.sysid.errors import IdentificationError

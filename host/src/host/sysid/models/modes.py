@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 

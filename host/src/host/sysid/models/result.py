@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import special
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.models.model import LinearModel
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 
 LAG_SHARE = 5  # a fifth of the record
 

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.errors import IdentificationError
 
 POLYNOMIAL = 3

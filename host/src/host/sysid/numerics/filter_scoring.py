@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from host.compiled import Array, IntArray
+from host.arrays import Array, IntArray
 from host.sysid.numerics.filter_problem import FilterProblem, Gain, Likelihood
 from host.sysid.numerics.filter_slopes import GainSlopes, gain_slopes, matrix_slopes
 from host.sysid.numerics.kernels import transition

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.models.model import LinearModel
 from host.sysid.numerics.filter_problem import FilterProblem, Gain, van_loan
 from host.sysid.numerics.kernels import transition

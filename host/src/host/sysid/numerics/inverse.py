@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.compiled import Array
+from host.arrays import Array
 
 
 def covariance_of(information: Array) -> Array:

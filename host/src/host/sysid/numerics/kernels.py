@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.compiled import Array, IntArray, compiled
+from host.arrays import Array, IntArray
+from host.compiled import compiled
 
 TAYLOR_ORDER = 14  # 0.5^15 / 15! = 2e-17: below double precision for a scaled norm of 0.5
 SCALED_NORM = 0.5

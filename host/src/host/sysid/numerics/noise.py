@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from host.compiled import Array, compiled
+from host.arrays import Array
+from host.compiled import compiled
 from host.sysid.numerics.kernels import ar_filter
 
 POLE_LIMIT = 0.999  # radius: closer to one, a 2000-sample record cannot tell noise from drift

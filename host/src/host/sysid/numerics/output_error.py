@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from host.compiled import Array, BoolArray
+from host.arrays import Array, BoolArray
 from host.sysid.errors import IdentificationError
 from host.sysid.numerics.noise import OutputNoise
 from host.sysid.numerics.problem import OutputProblem, Response

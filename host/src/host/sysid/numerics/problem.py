@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.compiled import Array, IntArray
+from host.arrays import Array, IntArray
 from host.sysid.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import EntryTable, LinearModel

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
-from host.compiled import Array
+from host.arrays import Array
 from host.sysid.models.result import FitResult
 
 SIGNIFICANCE = 0.01

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.compiled import Array, compiled
+from host.arrays import Array
+from host.compiled import compiled
 from host.sysid.numerics.kernels import STATE_LIMIT
 
 DOUBLINGS = 40
