@@ -33,6 +33,7 @@ struct CardState {
   FlightFile file;             // the newest
   EntryPlace entry = {};       // its own
   EntryPlace free_entry = {};  // for the next
+  uint32_t folder_end = 0;     // last cluster of the root folder; FAT16: 0
   uint32_t free_clusters = 0;  // as FSInfo says, or kUnknown
   uint32_t next_cluster = 0;   // where FSInfo would look for a free one
   uint32_t date = 0;           // of new and closed files; 0: not known

@@ -21,7 +21,7 @@ bool ChainCheck::take(const uint8_t* sector, const Layout& layout) {
 }
 
 FileState ChainCheck::judge(uint32_t next, const Layout& layout) const {
-  if (next >= kLeastEnd) return at_ == last_ ? FileState::kGood : FileState::kChainShort;
+  if (next >= kLeastEndEntry) return at_ == last_ ? FileState::kGood : FileState::kChainShort;
   if (!layout.has_cluster(next)) return FileState::kChainBroken;
   if (next >= first_ && next <= at_) return FileState::kCyclic;
   return at_ == last_ && next == at_ + 1 ? FileState::kChainLong : FileState::kNotInOnePiece;

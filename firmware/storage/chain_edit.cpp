@@ -17,12 +17,12 @@ bool ChainEdit::edit(uint8_t* sector, const Layout& layout) const {
   uint32_t cluster = first_in_sector(layout);
   uint16_t index = entry_index(layout, cluster);
   for (; cluster <= at_; ++cluster, ++index) {
-    uint32_t value = kFree;
+    uint32_t value = kFreeEntry;
     if (edit_ == Edit::kLink) {
-      if (entry(sector, layout, index) != kFree) return false;
-      value = cluster == last_ ? kEnd : cluster + 1;
+      if (entry(sector, layout, index) != kFreeEntry) return false;
+      value = cluster == last_ ? kEndEntry : cluster + 1;
     } else if (edit_ == Edit::kTrim && cluster == first_) {
-      value = kEnd;
+      value = kEndEntry;
     }
     put_entry(sector, layout, index, value);
   }
@@ -30,8 +30,8 @@ bool ChainEdit::edit(uint8_t* sector, const Layout& layout) const {
 }
 
 ChainEdit::Next ChainEdit::written(const Layout& layout) {
-  if (++copy_ < layout.fats) return Next::kCopy;
-  copy_ = 0;
+  if (++copies_done_ < layout.fats) return Next::kCopy;
+  copies_done_ = 0;
   const uint32_t first = first_in_sector(layout);
   if (first == first_) return Next::kDone;
   at_ = first - 1;

@@ -22,13 +22,17 @@ class ChainEdit {
     first_ = first;
     last_ = last;
     at_ = last;
-    copy_ = 0;
+    copies_done_ = 0;
   }
   // Block of the first copy that is to be read, then changed by `edit`, then written to `to_lba`.
   uint32_t lba(const Layout& layout) const;
   // False: an entry that should be free is not.
   bool edit(uint8_t* sector, const Layout& layout) const;
-  uint32_t to_lba(const Layout& layout) const { return lba(layout) + copy_ * layout.fat_sectors; }
+  // The first copy, which is read, comes last: until then the change is as if never begun.
+  uint32_t to_lba(const Layout& layout) const {
+    const uint8_t copy = static_cast<uint8_t>(layout.fats - 1 - copies_done_);
+    return lba(layout) + copy * layout.fat_sectors;
+  }
   // The sector is written. kCopy: again, to the next copy; kSector: read the next; kDone: all is.
   enum class Next : uint8_t { kCopy, kSector, kDone };
   Next written(const Layout& layout);
@@ -46,7 +50,7 @@ class ChainEdit {
   uint32_t first_;
   uint32_t last_;
   uint32_t at_;  // the last that is not yet written
-  uint8_t copy_;
+  uint8_t copies_done_;
   Edit edit_;
 };
 

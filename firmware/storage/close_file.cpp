@@ -90,8 +90,8 @@ Wish CloseFile::follow_tail(const uint8_t* sector, CardState& card) {
       ++last_;
       continue;
     }
-    if (next == kFree) --last_;
-    const bool ours = next == kFree || (next >= kLeastEnd && last_ == end);
+    if (next == kFreeEntry) --last_;
+    const bool ours = next == kFreeEntry || (next >= kLeastEndEntry && last_ == end);
     card.odd = Odd::kGood;
     return ours ? trim(card) : done();
   }

@@ -9,9 +9,9 @@
 namespace storage {
 
 constexpr uint32_t kEntryMask = 0x0FFFFFFFUL;
-constexpr uint32_t kFree = 0;
-constexpr uint32_t kEnd = kEntryMask;
-constexpr uint32_t kLeastEnd = 0x0FFFFFF8UL;
+constexpr uint32_t kFreeEntry = 0;
+constexpr uint32_t kEndEntry = kEntryMask;
+constexpr uint32_t kLeastEndEntry = 0x0FFFFFF8UL;
 
 // log2 of the entries in a sector.
 inline uint8_t entries_shift(const Layout& layout) {

@@ -23,7 +23,7 @@ bool FreeRun::take(const uint8_t* sector, const Layout& layout) {
   uint16_t run = 0;  // at the end of what is looked at, in this sector
   uint16_t free_here = 0;
   for (; count != 0; --count, ++index) {
-    if (entry(sector, layout, index) == kFree) {
+    if (entry(sector, layout, index) == kFreeEntry) {
       ++run;
       ++free_here;
       ++at_;

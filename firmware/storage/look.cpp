@@ -117,7 +117,7 @@ Wish Look::folder_sector(const uint8_t* sector, CardState& card) {
 Wish Look::folder_cluster(const uint8_t* sector, CardState& card) {
   const Layout& layout = card.layout;
   const uint32_t next = entry(sector, layout, entry_index(layout, folder_.cluster));
-  if (next >= kLeastEnd) return folder_ends(card);
+  if (next >= kLeastEndEntry) return folder_ends(card);
   if (!layout.has_cluster(next) || next == folder_.mark) {
     card.odd = Odd::kFolderBroken;
     return folder_ends(card);
@@ -135,6 +135,7 @@ Wish Look::folder_cluster(const uint8_t* sector, CardState& card) {
 
 Wish Look::folder_ends(CardState& card) {
   card.free_entry = walk_.free;
+  card.folder_end = folder_.cluster;
   if (walk_.number == 0) return found(FileState::kNone, card.odd, card);
   card.file.number = walk_.number;
   card.entry = walk_.newest;

@@ -1,9 +1,12 @@
 #include "storage/make_file.h"
 
+#include <string.h>
+
 #include "core/block.h"
 #include "core/bytes.h"
 #include "hal/block_device.h"
 #include "storage/block_build.h"
+#include "storage/fat_sector.h"
 
 namespace storage {
 
@@ -13,13 +16,63 @@ Wish MakeFile::start(
   blocks_ = blocks;
   session_ = session;
   replace_ = replace;
+  if (replace || card.free_entry.lba != 0) return link(card);
+  // The root folder is full: the first cluster becomes its next.
+  phase_ = Phase::kFolderLink;
+  return allocation_.start(Edit::kLink, run.first, run.first, card);
+}
+
+Wish MakeFile::link(const CardState& card) {
   phase_ = Phase::kLink;
-  return allocation_.start(Edit::kLink, run.first, run.first + run.count - 1, card);
+  run_.count = card.layout.clusters_for(blocks_);
+  return allocation_.start(Edit::kLink, run_.first, run_.first + run_.count - 1, card);
+}
+
+// Empty before it is joined to the folder, in the second copy of the table before the first.
+Wish MakeFile::lengthen_folder(uint8_t* sector, CardState& card) {
+  const Layout& layout = card.layout;
+  switch (phase_) {
+    case Phase::kFolderLink: {
+      const Wish wish = allocation_.next(sector, card);
+      if (wish.kind != Wish::Kind::kDone) return wish;
+      phase_ = Phase::kFolderClear;
+      lba_ = layout.lba_of(run_.first + 1);
+      memset(sector, 0, kSectorBytes);
+      return write_block(--lba_);
+    }
+    case Phase::kFolderClear:
+      if (lba_ != layout.lba_of(run_.first)) return write_block(--lba_);
+      phase_ = Phase::kFolderJoin;
+      return read_block(entry_lba(layout, card.folder_end));
+    case Phase::kFolderJoin:
+      put_entry(sector, layout, entry_index(layout, card.folder_end), run_.first);
+      phase_ = Phase::kFolderJoined;
+      lba_ = entry_lba(layout, card.folder_end) + (layout.fats - 1) * layout.fat_sectors;
+      return write_block(lba_);
+    default:
+      if (lba_ != entry_lba(layout, card.folder_end)) {
+        lba_ -= layout.fat_sectors;
+        return write_block(lba_);
+      }
+      card.folder_end = run_.first;
+      card.free_entry = {layout.lba_of(run_.first), 0};
+      ++run_.first;
+      --run_.count;
+      if (blocks_ > run_.count << layout.cluster_shift) {
+        blocks_ = run_.count << layout.cluster_shift;
+      }
+      return link(card);
+  }
 }
 
 Wish MakeFile::next(uint8_t* sector, CardState& card) {
   const uint32_t first_lba = card.layout.lba_of(run_.first);
   switch (phase_) {
+    case Phase::kFolderLink:
+    case Phase::kFolderClear:
+    case Phase::kFolderJoin:
+    case Phase::kFolderJoined:
+      return lengthen_folder(sector, card);
     case Phase::kLink: {
       const Wish wish = allocation_.next(sector, card);
       if (wish.kind != Wish::Kind::kDone) return wish;

@@ -18,8 +18,22 @@ class MakeFile {
   uint8_t percent() const;
 
  private:
-  enum class Phase : uint8_t { kLink, kOldBlock, kBuild, kBlock, kEntry, kEntryWritten, kFreeOld };
+  enum class Phase : uint8_t {
+    kFolderLink,
+    kFolderClear,
+    kFolderJoin,
+    kFolderJoined,
+    kLink,
+    kOldBlock,
+    kBuild,
+    kBlock,
+    kEntry,
+    kEntryWritten,
+    kFreeOld
+  };
 
+  Wish link(const CardState& card);
+  Wish lengthen_folder(uint8_t* sector, CardState& card);
   FlightFile made(const CardState& card) const;
   Wish enter(uint8_t* sector, CardState& card);
   Wish entered(CardState& card);
@@ -28,7 +42,10 @@ class MakeFile {
   Run run_;
   uint32_t blocks_;
   uint32_t session_;
-  uint32_t file_id_;
+  union {
+    uint32_t file_id_;
+    uint32_t lba_;  // of the folder's new cluster or table
+  };
   Phase phase_;
   bool replace_;
 };

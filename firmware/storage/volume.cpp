@@ -17,10 +17,11 @@ void Volume::look_again() {
 }
 
 void Volume::make(uint32_t session, bool replace) {
-  Run run = run_.best();
+  const Run run = run_.best();
   run_.forget_best();
-  if (run.count == 0 ||
-      (!replace && (card_.file.number >= kMaxNumber || card_.free_entry.lba == 0))) {
+  // FAT32's root folder can be made longer by a cluster.
+  const bool place = replace || card_.free_entry.lba != 0 || (card_.layout.wide && run.count > 1);
+  if (run.count == 0 || !place || (!replace && card_.file.number >= kMaxNumber)) {
     job_ = Job::kNone;
     status_ = VolumeStatus::kFull;
     return;
@@ -42,11 +43,17 @@ void Volume::mend() {
 // files since.
 void Volume::search() {
   const Layout& layout = card_.layout;
-  const uint32_t wanted = layout.clusters_for(file_blocks_);
+  const uint32_t wanted = wanted_clusters();
   near_ = layout.has_cluster(card_.next_cluster);
   run_.start(layout, card_.next_cluster, near_ ? 2 * wanted : layout.clusters, wanted);
   job_ = Job::kSearch;
   follow(read_run());
+}
+
+// Of a file, and one for a root folder that is full.
+uint32_t Volume::wanted_clusters() const {
+  const bool folder_full = card_.layout.wide && card_.free_entry.lba == 0;
+  return card_.layout.clusters_for(file_blocks_) + (folder_full ? 1 : 0);
 }
 
 Wish Volume::read_run() const {
@@ -55,12 +62,12 @@ Wish Volume::read_run() const {
 
 Wish Volume::next_run(const uint8_t* sector) {
   if (!run_.take(sector, card_.layout)) return read_run();
-  if (!near_ || run_.best().count >= card_.layout.clusters_for(file_blocks_)) return done();
+  if (!near_ || run_.best().count >= wanted_clusters()) return done();
   const FlightFile& file = card_.file;
   const uint32_t behind =
       file.first_lba == 0 ? 0 : card_.first_cluster() + card_.layout.clusters_for(file.blocks);
   near_ = false;
-  run_.start(card_.layout, behind, card_.layout.clusters, card_.layout.clusters_for(file_blocks_));
+  run_.start(card_.layout, behind, card_.layout.clusters, wanted_clusters());
   return read_run();
 }
 

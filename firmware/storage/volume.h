@@ -68,6 +68,7 @@ class Volume {
   Wish next(uint8_t* sector);
   Wish next_run(const uint8_t* sector);
   Wish read_run() const;
+  uint32_t wanted_clusters() const;
   void end(VolumeStatus status);
 
   CardState card_;

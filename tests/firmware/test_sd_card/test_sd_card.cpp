@@ -177,7 +177,7 @@ TEST_CASE(
     "a block busy for three seconds is waited for, step by step; one that never ends is not") {
   Bench bench;
   REQUIRE(bench.start());
-  bench.model.busy_bytes = 3000U * 1000U / 202U;  // a look is a byte and the turn around it
+  bench.model.busy_bytes = 14851;  // a look is a byte, 2 us, and a turn of 200 us
   uint32_t from_us = bench.model.now_us();
   CHECK(bench.write(0, sector_buffer));
   CHECK(bench.model.now_us() - from_us > 2900000U);

@@ -193,13 +193,13 @@ TEST_CASE("an entry of the table keeps its upper four bits, FAT16 counts as FAT3
   put_entry(sector, wide, 5, 77);
   CHECK_EQ(get_le<uint32_t>(sector + 20), 0xF000004DU);
   CHECK_EQ(entry(sector, wide, 5), 77U);
-  CHECK(entry(sector, wide, 6) >= kLeastEnd);
+  CHECK(entry(sector, wide, 6) >= kLeastEndEntry);
   const Layout narrow = small_layout(false, 5000);
-  CHECK(entry(sector, narrow, 200) >= kLeastEnd);
-  put_entry(sector, narrow, 200, kEnd);
-  CHECK(entry(sector, narrow, 200) >= kLeastEnd);
+  CHECK(entry(sector, narrow, 200) >= kLeastEndEntry);
+  put_entry(sector, narrow, 200, kEndEntry);
+  CHECK(entry(sector, narrow, 200) >= kLeastEndEntry);
   put_le<uint16_t>(sector, 0xFFF7);  // bad
-  CHECK(entry(sector, narrow, 0) < kLeastEnd);
+  CHECK(entry(sector, narrow, 0) < kLeastEndEntry);
   CHECK(!narrow.has_cluster(entry(sector, narrow, 0)));
 }
 
@@ -215,8 +215,8 @@ TEST_CASE("a chain is one run, or is told apart") {
       {0, 0, Odd::kGood, 20},
       {19, 30, Odd::kChainLong, 20},
       {19, 200, Odd::kNotInOnePiece, 20},
-      {7, kEnd, Odd::kChainShort, 8},
-      {7, kFree, Odd::kChainBroken, 8},
+      {7, kEndEntry, Odd::kChainShort, 8},
+      {7, kFreeEntry, Odd::kChainBroken, 8},
       {7, 0x0FFFFFF7, Odd::kChainBroken, 8},
       {7, 502, Odd::kChainBroken, 8},
       {7, 12, Odd::kCyclic, 8},
@@ -229,7 +229,7 @@ TEST_CASE("a chain is one run, or is told apart") {
   for (const Case& one : kCases) {
     memset(sector, 0, sizeof sector);
     for (uint8_t i = 0; i < 20; ++i) put_entry(sector, layout, 10 + i, 11U + i);
-    put_entry(sector, layout, 29, kEnd);
+    put_entry(sector, layout, 29, kEndEntry);
     if (one.next != 0 || one.at != 0) {
       put_entry(sector, layout, static_cast<uint16_t>(10 + one.at), one.next);
     }
@@ -250,7 +250,7 @@ TEST_CASE("a chain goes on from sector to sector, each looked at once") {
     const uint32_t base = check.cluster() / 128 * 128;
     for (uint16_t i = 0; i < 128; ++i) put_entry(sector, layout, i, base + i + 1);
     if (base <= 1099 && 1099 < base + 128)
-      put_entry(sector, layout, static_cast<uint16_t>(1099 - base), kEnd);
+      put_entry(sector, layout, static_cast<uint16_t>(1099 - base), kEndEntry);
     ++sectors;
     if (check.take(sector, layout)) break;
   }
@@ -268,7 +268,7 @@ uint16_t search(FreeRun& run, const Layout& layout, Used used, uint16_t most = 1
     const uint16_t entries = static_cast<uint16_t>(1U << entries_shift(layout));
     const uint32_t base = run.cluster() & ~static_cast<uint32_t>(entries - 1U);
     for (uint16_t i = 0; i < entries; ++i) {
-      put_entry(sector, layout, i, used(base + i) ? kEnd : kFree);
+      put_entry(sector, layout, i, used(base + i) ? kEndEntry : kFreeEntry);
     }
     ++sectors;
     if (run.take(sector, layout)) break;
@@ -329,17 +329,17 @@ TEST_CASE("a run linked and freed, from the back, in every copy") {
     before = lba;
     REQUIRE(edit.edit(sector, layout));
     if (lba == 100U + 2U) {
-      CHECK_EQ(entry(sector, layout, 300 - 256), kEnd);
-      CHECK_EQ(entry(sector, layout, 301 - 256), kFree);
+      CHECK_EQ(entry(sector, layout, 300 - 256), kEndEntry);
+      CHECK_EQ(entry(sector, layout, 301 - 256), kFreeEntry);
     }
     if (lba == 100U) {
-      CHECK_EQ(entry(sector, layout, 119), kFree);
+      CHECK_EQ(entry(sector, layout, 119), kFreeEntry);
       CHECK_EQ(entry(sector, layout, 120), 121U);
     }
-    CHECK_EQ(edit.to_lba(layout), lba);
+    CHECK_EQ(edit.to_lba(layout), lba + 50U);
     ++writes;
     CHECK(edit.written(layout) == ChainEdit::Next::kCopy);
-    CHECK_EQ(edit.to_lba(layout), lba + 50U);
+    CHECK_EQ(edit.to_lba(layout), lba);
     ++writes;
     on = edit.written(layout) == ChainEdit::Next::kSector;
   }
@@ -351,8 +351,8 @@ TEST_CASE("a run linked and freed, from the back, in every copy") {
   CHECK(!edit.edit(sector, layout));
   edit.start(Edit::kTrim, 120, 127);
   REQUIRE(edit.edit(sector, layout));
-  CHECK_EQ(entry(sector, layout, 120), kEnd);
-  CHECK_EQ(entry(sector, layout, 121), kFree);
+  CHECK_EQ(entry(sector, layout, 120), kEndEntry);
+  CHECK_EQ(entry(sector, layout, 121), kFreeEntry);
   CHECK_EQ(edit.next_free(), 121U);
 }
 

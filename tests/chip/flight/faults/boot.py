@@ -61,33 +61,31 @@ def exfat(path: Path) -> Path:
     return path
 
 
-def full(path: Path) -> Path:
-    """A file leaves less room than a flight needs."""
-    make_card(path)
+def fill(path: Path, name: str, mebibytes: int) -> None:
+    """Put a file of so many MiB on a card."""
     filler = path.with_name("filler")
     with filler.open("wb") as file:
-        file.truncate(250 << 20)
+        file.truncate(mebibytes << 20)
     subprocess.run(
-        ["mcopy", "-i", str(path), str(filler), "::FILLER.DAT"], check=True, capture_output=True
+        ["mcopy", "-i", str(path), str(filler), f"::{name}"], check=True, capture_output=True
     )
+
+
+def full(path: Path) -> Path:
+    """A file leaves less room than 15 minutes need, 7.2 MiB."""
+    make_card(path)
+    fill(path, "FILLER.DAT", 292)
     return path
 
 
 def fragmented(path: Path) -> Path:
-    """Room enough, but a file every 50 MiB."""
+    """Room enough, but a file every 6 MiB."""
     make_card(path)
-    filler = path.with_name("filler")
-    for number in range(5):
-        with filler.open("wb") as file:
-            file.truncate(50 << 20)
-        for name in (f"GAP{number}.DAT", f"KEEP{number}.DAT"):
-            subprocess.run(
-                ["mcopy", "-i", str(path), str(filler), f"::{name}"],
-                check=True, capture_output=True,
-            )  # fmt: skip
-            with filler.open("wb") as file:
-                file.truncate(1 << 20)
-    for number in range(5):
+    for number in range(4):
+        fill(path, f"GAP{number}.DAT", 6)
+        fill(path, f"KEEP{number}.DAT", 1)
+    fill(path, "FILLER.DAT", 265)
+    for number in range(4):
         subprocess.run(["mdel", "-i", str(path), f"::GAP{number}.DAT"], check=True)
     return path
 
