@@ -44,7 +44,7 @@ class FuzzError(Exception):
 class Target:
     """One program: what it links and how long its inputs may be."""
 
-    units: tuple[str, ...]  # below firmware/, without suffix
+    units: tuple[str, ...]  # patterns below firmware/, without suffix
     longest: int  # bytes of an input
 
 
@@ -59,6 +59,7 @@ TARGETS = {
         ("core/settings", "core/imu_record", "core/session_record", "core/crc"), 300
     ),
     "block_writer": Target(_BLOCKS, 1000),
+    "fat": Target(("storage/*", "core/block", "core/crc"), 300),
 }
 
 
@@ -79,7 +80,9 @@ def build(name: str, *, extra_flags: tuple[str, ...] = ()) -> Path:
     if compiler is None:
         raise FuzzError("no clang++ found: apt-get install clang libclang-rt-dev, or make setup")
     target = TARGETS[name]
-    sources = [SOURCES / f"{name}.cpp", *(ROOT / f"firmware/{u}.cpp" for u in target.units)]
+    firmware = ROOT / "firmware"
+    sources = [SOURCES / f"{name}.cpp"]
+    sources += [path for unit in target.units for path in sorted(firmware.glob(f"{unit}.cpp"))]
     headers = [path for room in ("core", "drivers", "hal", "storage", "generated")
                for path in sorted((ROOT / "firmware" / room).glob("*.h"))]  # fmt: skip
     headers += [*sorted(SOURCES.glob("*.h")), *sorted((ROOT / "protocol/generated").glob("*.h"))]
