@@ -11,6 +11,60 @@ constexpr uint8_t kSol = 0x06;
 constexpr uint8_t kPvt = 0x07;
 constexpr uint8_t kVelned = 0x12;
 
+// Payloads by the offset of each word of four bytes, as the receiver descriptions of u-blox 6 and
+// (NAV-PVT) 7 list them.
+constexpr uint8_t kTimeOfWeek = 0;  // of all of them
+constexpr uint8_t kLastWord = 68;   // that anything here looks at
+
+namespace posllh {
+constexpr uint8_t kLength = 28;
+constexpr uint8_t kLongitude = 4;
+constexpr uint8_t kLatitude = 8;
+constexpr uint8_t kHeightAboveSea = 16;
+constexpr uint8_t kHAccuracy = 20;
+constexpr uint8_t kVAccuracy = 24;
+}  // namespace posllh
+
+namespace sol {
+constexpr uint8_t kLength = 52;
+constexpr uint8_t kWeekFixFlags = 8;
+constexpr uint8_t kSatellites = 44;  // in its last byte
+constexpr uint8_t kFixOk = 0b0001;
+constexpr uint8_t kWeekKnown = 0b0100;
+constexpr uint8_t kTimeKnown = 0b1000;
+}  // namespace sol
+
+namespace velned {
+constexpr uint8_t kLength = 36;
+constexpr uint8_t kNorth = 4;
+constexpr uint8_t kEast = 8;
+constexpr uint8_t kDown = 12;
+constexpr uint8_t kGroundSpeed = 20;
+constexpr uint8_t kCourse = 24;
+constexpr uint8_t kSAccuracy = 28;
+}  // namespace velned
+
+namespace pvt {
+constexpr uint8_t kLeastLength = 84;
+constexpr uint8_t kDate = 4;
+constexpr uint8_t kTimeAndValid = 8;
+constexpr uint8_t kFixSatellites = 20;
+constexpr uint8_t kLongitude = 24;
+constexpr uint8_t kLatitude = 28;
+constexpr uint8_t kHeightAboveSea = 36;
+constexpr uint8_t kHAccuracy = 40;
+constexpr uint8_t kVAccuracy = 44;
+constexpr uint8_t kNorth = 48;
+constexpr uint8_t kEast = 52;
+constexpr uint8_t kDown = 56;
+constexpr uint8_t kGroundSpeed = 60;
+constexpr uint8_t kCourse = 64;
+constexpr uint8_t kSAccuracy = 68;
+constexpr uint8_t kDateValid = 0b01;
+constexpr uint8_t kTimeValid = 0b10;
+constexpr uint8_t kFixOk = 1;
+}  // namespace pvt
+
 constexpr uint8_t kHasPosllh = 0b001;
 constexpr uint8_t kHasSol = 0b010;
 constexpr uint8_t kHasVelned = 0b100;
@@ -92,7 +146,7 @@ bool GpsReceiver::byte(uint8_t value, uint32_t now_us) {
     case UbxEvent::kNone:
       return false;
     case UbxEvent::kWord:
-      if (parser_.message_class() == kNavigation && parser_.offset() < 72) {
+      if (parser_.message_class() == kNavigation && parser_.offset() <= kLastWord) {
         word(static_cast<uint8_t>(parser_.offset()), parser_.word());
       }
       return false;
@@ -115,22 +169,22 @@ void GpsReceiver::word(uint8_t offset, uint32_t value) {
   const bool old = !sends_pvt_;
   switch (parser_.message_id()) {
     case kPosllh:
-      if (old && length == 28) {
+      if (old && length == posllh::kLength) {
         posllh(offset, value);
       }
       break;
     case kSol:
-      if (old && length == 52) {
+      if (old && length == sol::kLength) {
         sol(offset, value);
       }
       break;
     case kVelned:
-      if (old && length == 36) {
+      if (old && length == velned::kLength) {
         velned(offset, value);
       }
       break;
     case kPvt:
-      if (length >= 84) {
+      if (length >= pvt::kLeastLength) {
         pvt(offset, value);
       }
       break;
@@ -141,50 +195,50 @@ void GpsReceiver::word(uint8_t offset, uint32_t value) {
 
 void GpsReceiver::posllh(uint8_t offset, uint32_t value) {
   const int32_t number = static_cast<int32_t>(value);
-  if (offset == 0) {
+  if (offset == kTimeOfWeek) {
     begin_epoch(value);
-  } else if (offset == 4) {
+  } else if (offset == posllh::kLongitude) {
     frame_.longitude = within(number, kMaxLongitude, frames::kGpsLongitudeInvalid);
-  } else if (offset == 8) {
+  } else if (offset == posllh::kLatitude) {
     frame_.latitude = within(number, kMaxLatitude, frames::kGpsLatitudeInvalid);
-  } else if (offset == 16) {
+  } else if (offset == posllh::kHeightAboveSea) {
     frame_.height = number;
-  } else if (offset == 20) {
+  } else if (offset == posllh::kHAccuracy) {
     frame_.h_accuracy = to_u16(value / 10);
-  } else if (offset == 24) {
+  } else if (offset == posllh::kVAccuracy) {
     frame_.v_accuracy = to_u16(value / 10);
   }
 }
 
 void GpsReceiver::sol(uint8_t offset, uint32_t value) {
-  if (offset == 0) {
+  if (offset == kTimeOfWeek) {
     begin_epoch(value);
-  } else if (offset == 8) {
+  } else if (offset == sol::kWeekFixFlags) {
     const uint8_t flags = static_cast<uint8_t>(value >> 24);
-    const bool week_known = (flags & 0b0100) != 0;
-    time_known_ = (flags & 0b1000) != 0;
+    const bool week_known = (flags & sol::kWeekKnown) != 0;
+    time_known_ = (flags & sol::kTimeKnown) != 0;
     frame_.week = week_known ? static_cast<uint16_t>(value) : frames::kGpsWeekInvalid;
-    frame_.fix = to_fix(static_cast<uint8_t>(value >> 16), (flags & 1) != 0);
-  } else if (offset == 44) {
+    frame_.fix = to_fix(static_cast<uint8_t>(value >> 16), (flags & sol::kFixOk) != 0);
+  } else if (offset == sol::kSatellites) {
     frame_.satellites = static_cast<uint8_t>(value >> 24);
   }
 }
 
 void GpsReceiver::velned(uint8_t offset, uint32_t value) {
   const int32_t number = static_cast<int32_t>(value);
-  if (offset == 0) {
+  if (offset == kTimeOfWeek) {
     begin_epoch(value);
-  } else if (offset == 4) {
+  } else if (offset == velned::kNorth) {
     frame_.v_north = to_i16(number);
-  } else if (offset == 8) {
+  } else if (offset == velned::kEast) {
     frame_.v_east = to_i16(number);
-  } else if (offset == 12) {
+  } else if (offset == velned::kDown) {
     frame_.v_down = to_i16(number);
-  } else if (offset == 20) {
+  } else if (offset == velned::kGroundSpeed) {
     frame_.ground_speed = to_u16(value);
-  } else if (offset == 24) {
+  } else if (offset == velned::kCourse) {
     frame_.course = to_u16(value / 1000);
-  } else if (offset == 28) {
+  } else if (offset == velned::kSAccuracy) {
     frame_.s_accuracy = to_u16(value);
   }
 }
@@ -193,55 +247,55 @@ void GpsReceiver::pvt(uint8_t offset, uint32_t value) {
   const int32_t number = static_cast<int32_t>(value);
   const uint8_t last = static_cast<uint8_t>(value >> 24);
   switch (offset) {
-    case 0:
+    case kTimeOfWeek:
       parts_ = 0;
       begin_epoch(value);
       break;
-    case 4:
+    case pvt::kDate:
       days_ = gps_days(static_cast<uint16_t>(value), static_cast<uint8_t>(value >> 16), last);
       break;
-    case 8:
-      time_known_ = (last & 0b10) != 0;
-      if ((last & 0b11) == 0b11 && epoch_ms_ < kWeekMs) {
+    case pvt::kTimeAndValid:
+      time_known_ = (last & pvt::kTimeValid) != 0;
+      if ((last & pvt::kTimeValid) != 0 && (last & pvt::kDateValid) != 0 && epoch_ms_ < kWeekMs) {
         // The date is UTC, the time of week GPS: near midnight they differ by a day.
         frame_.week = static_cast<uint16_t>((days_ + 3 - epoch_ms_ / kDayMs) / 7);
       }
       break;
-    case 20:
-      frame_.fix = to_fix(static_cast<uint8_t>(value), (value >> 8 & 1) != 0);
+    case pvt::kFixSatellites:
+      frame_.fix = to_fix(static_cast<uint8_t>(value), (value >> 8 & pvt::kFixOk) != 0);
       frame_.satellites = last;
       break;
-    case 24:
+    case pvt::kLongitude:
       frame_.longitude = within(number, kMaxLongitude, frames::kGpsLongitudeInvalid);
       break;
-    case 28:
+    case pvt::kLatitude:
       frame_.latitude = within(number, kMaxLatitude, frames::kGpsLatitudeInvalid);
       break;
-    case 36:
+    case pvt::kHeightAboveSea:
       frame_.height = number;
       break;
-    case 40:
+    case pvt::kHAccuracy:
       frame_.h_accuracy = to_u16(value / 10);
       break;
-    case 44:
+    case pvt::kVAccuracy:
       frame_.v_accuracy = to_u16(value / 10);
       break;
-    case 48:
+    case pvt::kNorth:
       frame_.v_north = to_i16(number / 10);
       break;
-    case 52:
+    case pvt::kEast:
       frame_.v_east = to_i16(number / 10);
       break;
-    case 56:
+    case pvt::kDown:
       frame_.v_down = to_i16(number / 10);
       break;
-    case 60:
+    case pvt::kGroundSpeed:
       frame_.ground_speed = number < 0 ? uint16_t{0} : to_u16(value / 10);
       break;
-    case 64:
+    case pvt::kCourse:
       frame_.course = number < 0 ? frames::kGpsCourseInvalid : to_u16(value / 1000);
       break;
-    case 68:
+    case pvt::kSAccuracy:
       frame_.s_accuracy = to_u16(value / 10);
       break;
     default:
@@ -271,7 +325,7 @@ bool GpsReceiver::message() {
   }
   const uint8_t id = parser_.message_id();
   const uint16_t length = parser_.length();
-  if (id == kPvt && length >= 84) {
+  if (id == kPvt && length >= pvt::kLeastLength) {
     sends_pvt_ = true;
     finish();
     return true;
@@ -280,11 +334,11 @@ bool GpsReceiver::message() {
     return false;
   }
   uint8_t part = 0;
-  if (id == kPosllh && length == 28) {
+  if (id == kPosllh && length == posllh::kLength) {
     part = kHasPosllh;
-  } else if (id == kSol && length == 52) {
+  } else if (id == kSol && length == sol::kLength) {
     part = kHasSol;
-  } else if (id == kVelned && length == 36) {
+  } else if (id == kVelned && length == velned::kLength) {
     part = kHasVelned;
   }
   parts_ = static_cast<uint8_t>(parts_ | part);
