@@ -301,3 +301,26 @@ TEST_CASE("the rounded upper half of a product, against 64 bits: random factors 
   }
   CHECK_EQ(wrong, 0);
 }
+
+TEST_CASE("steps of 40 ms, one after the other, at whatever rates: nothing overflows") {
+  Random random(40);
+  core::AttitudeSettings settings;
+  for (uint8_t kind = 0; kind < 4; ++kind) {
+    core::Attitude attitude(settings);
+    for (uint16_t i = 0; i < 1500; ++i) {
+      core::AttitudeInput in;
+      const uint8_t down = static_cast<uint8_t>(random.below(3));
+      in.force[down] = random.below(2) == 0 ? int16_t{8192} : int16_t{-8192};
+      int16_t field[3];
+      for (uint8_t axis = 0; axis < 3; ++axis) {
+        const int16_t any = static_cast<int16_t>(random.below(65535) - 32768);
+        in.rates[axis] = kind == 3 ? any : axis <= kind ? int16_t{32767} : int16_t{0};
+        field[axis] = static_cast<int16_t>(random.below(4095) - 2048);
+      }
+      attitude.step(in, 40000);
+      attitude.set_field(field);
+      CHECK(attitude.theta_cdeg() >= -9001);
+      CHECK(attitude.theta_cdeg() <= 9001);
+    }
+  }
+}
