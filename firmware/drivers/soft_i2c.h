@@ -9,8 +9,8 @@ enum class BusStatus : uint8_t { kIdle, kBusy, kDone, kNack, kStuck };
 
 // Pins: void sda(bool released), void scl(bool released), bool sda(), bool scl()
 //       void half_bit()   at least 1.3 us for 400 kHz
-// A poll moves one byte, about 60 us. A line held low for 2 ms ends the transaction as kStuck
-// after nine clocks and a STOP.
+// A poll moves one byte with the START or STOP beside it, about 60 us. A line held low for 2 ms
+// ends the transaction as kStuck after nine clocks and a STOP.
 template <typename Pins>
 class SoftI2c {
  public:
@@ -18,8 +18,8 @@ class SoftI2c {
 
   explicit SoftI2c(Pins& pins) : pins_(pins) {}
 
-  // Writes `out`, then, if `in_size` is not 0, reads behind a repeated START. The buffer is used
-  // for both and must live until the end.
+  // Writes `out`, one byte at least, then, if `in_size` is not 0, reads behind a repeated START.
+  // The buffer is used for both and must live until the end.
   bool start(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size, uint32_t now_us) {
     if (status_ == BusStatus::kBusy) {
       return false;
@@ -53,21 +53,17 @@ class SoftI2c {
   }
 
  private:
-  enum class Phase : uint8_t { kStart, kWriteAddress, kWrite, kRestart, kReadAddress, kRead };
+  enum class Phase : uint8_t { kStart, kWrite, kRestart, kRead };
 
   void move() {
     switch (phase_) {
       case Phase::kStart:
         begin();
-        phase_ = Phase::kWriteAddress;
-        return;
-      case Phase::kWriteAddress:
         acknowledged(write_byte(static_cast<uint8_t>(address_ << 1)));
         phase_ = Phase::kWrite;
         return;
       case Phase::kWrite:
-        if (at_ < out_size_) {
-          acknowledged(write_byte(buffer_[at_++]));
+        if (!acknowledged(write_byte(buffer_[at_++])) || at_ < out_size_) {
           return;
         }
         if (in_size_ == 0) {
@@ -80,9 +76,6 @@ class SoftI2c {
       case Phase::kRestart:
         bit_edge();
         begin();
-        phase_ = Phase::kReadAddress;
-        return;
-      case Phase::kReadAddress:
         acknowledged(write_byte(static_cast<uint8_t>(address_ << 1 | 1)));
         phase_ = Phase::kRead;
         return;
@@ -96,10 +89,11 @@ class SoftI2c {
     }
   }
 
-  void acknowledged(bool acknowledge) {
+  bool acknowledged(bool acknowledge) {
     if (!acknowledge) {
       end(BusStatus::kNack);
     }
+    return acknowledge;
   }
 
   // START: SDA falls while SCL is high. SCL rests high between bytes.
