@@ -27,9 +27,9 @@ void arduimu_init3(void) {
 
 }  // extern "C"
 
-// Not a reset of the chip: the board's bootloader (ATmegaBOOT) leaves the watchdog running and
-// would be reset by it for ever. The program starts again at its first instruction instead, past
-// the bootloader; every register that matters is written at the start.
+// The first time-out, with interrupts on, is no reset of the chip: the program starts again at its
+// first instruction, past the bootloader; every register that matters is written at the start. A
+// program that hangs with interrupts off cannot come here: the second time-out resets the chip.
 ISR(WDT_vect, ISR_NAKED) {
   __asm__ __volatile__(
       "clr __zero_reg__ \n\t"
@@ -48,7 +48,7 @@ void start_watchdog() {
   const avr::InterruptsOff guard;
   wdt_reset();
   WDTCSR = _BV(WDCE) | _BV(WDE);
-  WDTCSR = _BV(WDIE) | _BV(WDP2) | _BV(WDP0);  // interrupt only, 0.5 s
+  WDTCSR = _BV(WDE) | _BV(WDIE) | _BV(WDP2) | _BV(WDP0);  // 0.5 s, and as much again to the reset
 }
 
 uint16_t resets() {
