@@ -19,6 +19,8 @@ root = Path(env.subst("$PROJECT_DIR"))
 # pio_pre.py has put this folder on the path; SCons takes it off before it builds.
 ram_table = importlib.import_module("ram_table")
 stack_depth = importlib.import_module("stack_depth")
+disassembly = importlib.import_module("disassembly")
+naked = importlib.import_module("naked")
 
 compilers = importlib.import_module("compilers")
 image_hash = importlib.import_module("image_hash")
@@ -58,7 +60,17 @@ def show_ram(target: Any, source: Any, env: Any) -> int:
         stack_bytes=int(env.GetProjectOption("custom_stack_bytes")),
         environment=env["ENV"],
     )
-    return 0 if show_stack(elf, env) and enough else 1
+    return 0 if show_stack(elf, env) and naked_as_written(elf, env) and enough else 1
+
+
+def naked_as_written(elf: Path, env: Any) -> bool:
+    """Print what is wrong with the interrupts in assembly; False if anything is."""
+    wrong = naked.complaints(
+        disassembly.Program(elf, environment=env["ENV"]), env.BoardConfig().get("build.mcu")
+    )
+    for line in wrong:
+        print(line)
+    return not wrong
 
 
 def show_stack(elf: Path, env: Any) -> bool:
