@@ -13,6 +13,8 @@ namespace {
 
 constexpr uint32_t kUsbBaud = 115200UL;
 constexpr uint32_t kSecondUs = 1000000UL;
+constexpr uint8_t kCountedTurns = 127;  // a prime: no phase of the scan is left out
+constexpr uint16_t kShares = 256;
 
 constexpr char kLineEnd[] CORE_FLASH = "\r\n";
 
@@ -41,20 +43,20 @@ void Instrument::boot() {
   airborne_.start(hal::flight_mark(), now_us);
   turn_us_ = now_us;
   system_us_ = now_us;
-  self_test_ = self_test_passed();
+  hal::measure_supply();
   hal::start_watchdog();
 }
 
 void Instrument::step() {
   const uint32_t now_us = turn_us_;
-  pilot_.step(config_, self_test_, outlet_, now_us);
+  pilot_.step(config_, supply_.good(), outlet_, now_us);
   const uint8_t frames = outlet_.frames();
   sensors_.step(config_, pilot_, outlet_, now_us);
   const bool made_frame = outlet_.frames() != frames;
   pilot_.ran(kTaskSensors);
   // A receiver pulse that ends behind the pilot's step waits for the next, and 2 ms is all it may:
   // making a frame takes more than half of that, and the card's portion comes on top.
-  if (made_frame) pilot_.step(config_, self_test_, outlet_, hal::now_us());
+  if (made_frame) pilot_.step(config_, supply_.good(), outlet_, hal::now_us());
   recorder_.step(now_us);
   pilot_.ran(kTaskRecorder);
   // A turn that made a frame leaves the rest to the next, for the same reason.
@@ -64,7 +66,7 @@ void Instrument::step() {
     step_slow(now_us);
   }
   if (outlet_.frames() == frames) recorder_.work_on_card(now_us);
-  pilot_.beat(now_us);
+  pilot_.beat(outlet_, now_us);
 
   const uint32_t end_us = hal::now_us();
   const uint32_t loop_us = end_us - now_us;
@@ -72,9 +74,32 @@ void Instrument::step() {
     loop_max_us_ = static_cast<uint16_t>(loop_us > 65535U ? 65535U : loop_us);
   }
   // A card that is searched gives the next block at once.
-  if (!recorder_.in_a_hurry()) hal::sleep_until_interrupt();
+  const bool rests = !recorder_.in_a_hurry();
+  uint16_t idle_us = 0;
+  const bool counts = rests && ++counted_turn_ == kCountedTurns;
+  if (counts) {
+    idle_us = hal::idle_until_interrupt();
+  } else if (rests) {
+    hal::sleep_until_interrupt();
+  }
   turn_us_ = hal::now_us();
-  asleep_us_ += turn_us_ - end_us;
+  const uint32_t rest_us = turn_us_ - end_us;
+  asleep_us_ += rest_us;
+  if (counts) {
+    counted_turn_ = 0;
+    counted_us_ = static_cast<uint16_t>(counted_us_ + rest_us);
+    idle_us_ = static_cast<uint16_t>(idle_us_ + idle_us);
+  }
+}
+
+// Of the time asleep, without the interrupts in it: their share is known from the turns counted,
+// eight a second, of about four seconds.
+uint32_t Instrument::idle_us() {
+  if (counted_us_ == 0) return asleep_us_;
+  const uint16_t shares = static_cast<uint16_t>(uint32_t{idle_us_} * kShares / counted_us_);
+  idle_us_ = static_cast<uint16_t>(idle_us_ - idle_us_ / 4U);
+  counted_us_ = static_cast<uint16_t>(counted_us_ - counted_us_ / 4U);
+  return asleep_us_ / kShares * shares;
 }
 
 // What need not be done every turn takes turns: each of it every eighth, some 8 ms.
@@ -85,7 +110,7 @@ void Instrument::step_slow(uint32_t now_us) {
       store_.poll();
       return;
     case 1:
-      panel_.step(recorder_, now_us);
+      panel_.step(recorder_, pilot_.relay_lost(), now_us);
       return;
     case 2:
       status_.step(recorder_, sensors_, pilot_, store_.reference_mv(), now_us);
@@ -123,16 +148,13 @@ void Instrument::decide_recording(uint32_t now_us) {
 
 // As soon as the supply is measured; put_system() takes it back.
 void Instrument::pass_self_test() {
-  if (!self_test_) self_test_ = self_test_passed();
-}
-
-bool Instrument::self_test_passed() const {
-  return core::supply_good(hal::avcc_mv(), store_.reference_mv());
+  if (!supply_.good()) (void)supply_.passes(hal::avcc_mv(), store_.reference_mv());
 }
 
 void Instrument::put_system(uint32_t now_us) {
   // The supply is measured once a second.
-  self_test_ = core::supply_still_good(self_test_, hal::avcc_mv(), store_.reference_mv());
+  (void)supply_.measured(hal::avcc_mv(), store_.reference_mv());
+  hal::measure_supply();
   const uint32_t elapsed_us = now_us - system_us_;
   uptime_us_ += elapsed_us;
   while (uptime_us_ >= kSecondUs) {
@@ -144,8 +166,9 @@ void Instrument::put_system(uint32_t now_us) {
   frame.uptime_s = uptime_s_;
   frame.loop_max_us = loop_max_us_;
   frame.cpu_load = frames::kSystemCpuLoadInvalid;
-  if (elapsed_us >= 1000U && asleep_us_ <= elapsed_us) {
-    frame.cpu_load = static_cast<uint16_t>((elapsed_us - asleep_us_) / (elapsed_us / 1000U));
+  const uint32_t rest_us = idle_us();
+  if (elapsed_us >= 1000U && rest_us <= elapsed_us) {
+    frame.cpu_load = static_cast<uint16_t>((elapsed_us - rest_us) / (elapsed_us / 1000U));
   }
   recorder_.put_health(&frame);
   sensors_.put_health(&frame);

@@ -14,6 +14,7 @@
 #include "app/telemetry.h"
 #include "core/airborne.h"
 #include "core/byte_ring.h"
+#include "core/supply.h"
 
 namespace app {
 
@@ -37,8 +38,8 @@ class Instrument {
  private:
   void step_slow(uint32_t now_us);
   void decide_recording(uint32_t now_us);
+  uint32_t idle_us();
   void pass_self_test();
-  bool self_test_passed() const;
   void put_system(uint32_t now_us);
   void put_telemetry_heads(uint32_t now_us);
 
@@ -59,11 +60,14 @@ class Instrument {
   uint32_t turn_us_ = 0;    // when this turn of the loop began
   uint32_t uptime_us_ = 0;  // part of a second
   uint32_t uptime_s_ = 0;
-  uint32_t asleep_us_ = 0;  // since the last frame `system`
-  uint32_t system_us_ = 0;  // when that was made
+  uint32_t asleep_us_ = 0;   // since the last frame `system`
+  uint32_t system_us_ = 0;   // when that was made
+  uint16_t counted_us_ = 0;  // rests in which the chip stayed awake and counted
+  uint16_t idle_us_ = 0;     // of these, left by interrupts
   uint16_t loop_max_us_ = 0;
-  uint8_t slot_ = 0;        // of step_slow()
-  bool self_test_ = false;  // as it was last found
+  uint8_t counted_turn_ = 0;
+  uint8_t slot_ = 0;          // of step_slow()
+  core::SupplyWatch supply_;  // the self-test
 };
 
 }  // namespace app

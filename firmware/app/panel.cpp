@@ -13,6 +13,7 @@ constexpr uint8_t kPauseHalves = 10;
 constexpr uint32_t kWorkUs = 1000000UL;
 constexpr uint32_t kWorkLitUs = 100000UL;
 constexpr uint32_t kWorkLitUsPerPercent = 8000UL;
+constexpr uint8_t kRelayFlashes = 9;
 
 }  // namespace
 
@@ -39,7 +40,7 @@ uint8_t trouble_flashes(Recorder::State state, storage::VolumeStatus status) {
   return 0;
 }
 
-void Panel::step(const Recorder& recorder, uint32_t now_us) {
+void Panel::step(const Recorder& recorder, bool relay_lost, uint32_t now_us) {
   const Recorder::State state = recorder.state();
   if (state != shown_) {
     if (state == Recorder::State::kRecording) tones_ = 2;
@@ -49,7 +50,8 @@ void Panel::step(const Recorder& recorder, uint32_t now_us) {
     turned_us_ = now_us;
     tone_us_ = now_us;
   }
-  const uint8_t flashes = trouble_flashes(state, recorder.volume_status());
+  const uint8_t flashes =
+      relay_lost ? kRelayFlashes : trouble_flashes(state, recorder.volume_status());
   const uint32_t since_us = now_us - turned_us_;
   if (flashes > 0) {
     if (since_us >= kHalfFlashUs) {

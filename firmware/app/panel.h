@@ -13,7 +13,8 @@ namespace app {
 
 class Panel {
  public:
-  void step(const Recorder& recorder, uint32_t now_us);
+  // `relay_lost`: the relay did not follow the heartbeat.
+  void step(const Recorder& recorder, bool relay_lost, uint32_t now_us);
 
  private:
   void sound(uint32_t now_us);
@@ -28,7 +29,8 @@ class Panel {
 };
 
 // Flashes of a group: 2 no card, 3 no FAT32, 4 unreadable, 5 full, 6 no room in one piece,
-// 7 card lost while recording, 8 file system damaged. 0: nothing is wrong.
+// 7 card lost while recording, 8 file system damaged; 9, before all others: the relay does not
+// follow. 0: nothing is wrong.
 uint8_t trouble_flashes(Recorder::State state, storage::VolumeStatus status);
 
 }  // namespace app

@@ -74,7 +74,22 @@ void PilotLink::look_at_contact(uint32_t now_us) {
   contact_stuck_ = hal::relay_engaged();
 }
 
-void PilotLink::beat(uint32_t now_us) {
+// Between two edges: the pump holds the gate for ten times as long.
+void PilotLink::watch_relay(Outlet& outlet, uint32_t now_us) {
+  if (!drive_.relay() || !toggled_) {
+    relay_watch_.rest();
+    return;
+  }
+  const core::RelayFault fault = relay_watch_.look(hal::relay_engaged(), now_us);
+  if (fault == core::RelayFault::kNone) return;
+  relay_watch_.rest();
+  drive_.relay_lost();
+  relay_lost_ = true;
+  outlet.event(frames::Event::kRelayLost, static_cast<uint32_t>(fault), now_us);
+}
+
+void PilotLink::beat(Outlet& outlet, uint32_t now_us) {
+  watch_relay(outlet, now_us);
   if (!health_.beat(now_us)) return;
   hal::feed_watchdog();
   if (!drive_.relay()) return;
@@ -93,6 +108,12 @@ void PilotLink::report(Outlet& outlet, uint32_t now_us) {
     }
     told_missing_ = missing;
   }
+  const bool refused = decoder_.refused_hz() != 0;
+  if (refused && !told_refused_) {
+    outlet.event(frames::Event::kReceiverRefused, decoder_.refused_hz(), now_us);
+  }
+  told_refused_ = refused;
+  if (drive_.relay()) relay_lost_ = false;
   if (drive_.drive() != told_drive_) {
     told_drive_ = drive_.drive();
     outlet.event(frames::Event::kDriveChanged, static_cast<uint32_t>(told_drive_), now_us);

@@ -8,6 +8,7 @@
 #include "core/health.h"
 #include "core/rc_decoder.h"
 #include "core/recording.h"
+#include "core/relay_watch.h"
 
 namespace app {
 
@@ -25,7 +26,8 @@ class PilotLink {
             uint32_t now_us);
   // Turns the heartbeat over and feeds the watchdog once every task has run.
   void ran(Task task) { health_.ran(static_cast<uint8_t>(task)); }
-  __attribute__((noinline)) void beat(uint32_t now_us);  // by its name a test on the chip stops it
+  // By its name a test on the chip stops it.
+  __attribute__((noinline, noclone)) void beat(Outlet& outlet, uint32_t now_us);
 
   core::PilotInputs inputs(const frames::ConfigFrame& config) const;
   const core::RcChannels& channels() const { return channels_; }
@@ -34,6 +36,8 @@ class PilotLink {
   uint16_t servo_ticks(uint8_t servo) const { return drive_.servo_ticks(servo); }
   // The relay's contact says engaged although no heartbeat holds it: it must not be used.
   bool contact_stuck() const { return contact_stuck_; }
+  // It did not follow the heartbeat, and has not been engaged since: an alarm.
+  bool relay_lost() const { return relay_lost_; }
 
  private:
   static constexpr uint16_t kPollUs = 3500;  // pulses that stay away show within this
@@ -42,6 +46,7 @@ class PilotLink {
   static constexpr uint16_t kHoldingRestUs = 1000;  // a hold ends on time
 
   void look_at_contact(uint32_t now_us);
+  void watch_relay(Outlet& outlet, uint32_t now_us);
   void poll_receiver(Outlet& outlet, uint32_t now_us);
   void decide(const frames::ConfigFrame& config,
               bool self_test_passed,
@@ -52,6 +57,7 @@ class PilotLink {
   core::RcDecoder decoder_;
   core::DriveControl drive_;
   core::HealthGate health_{kTaskCount};
+  core::RelayWatch relay_watch_;
   core::RcChannels channels_ = {};
   uint16_t sent_ticks_[core::kServos] = {};
   uint32_t polled_us_ = 0;
@@ -64,6 +70,8 @@ class PilotLink {
   bool stormy_ = false;
   bool toggled_ = false;  // a heartbeat edge may hold the relay
   bool contact_stuck_ = false;
+  bool relay_lost_ = false;
+  bool told_refused_ = false;
 };
 
 }  // namespace app

@@ -23,6 +23,8 @@ constexpr uint32_t kLowSeconds = 60;
 constexpr uint32_t kLeastSeconds = 1800;    // with less left, the ground prepares a new file
 constexpr uint32_t kOtherBytesPerS = 1000;  // frames beside the identification frame
 
+constexpr uint32_t kTakeOffUs = 18000000UL;  // as core::Airborne::kAloneS
+
 // Argument of the event `session_end`.
 constexpr uint8_t kEndButton = 0;
 constexpr uint8_t kEndFull = 1;
@@ -76,7 +78,10 @@ void Recorder::decide(const core::PilotInputs& in,
   config_ = &config;
   const bool high = in.throttle_valid && !in.throttle_idle;
   flight_ = airborne.state();
-  landed_ = flight_ == core::FlightState::kGround && !high;
+  // A throttle above idle may be the take-off, unless nothing else moves for so long.
+  if (!high) high_us_ = now_us;
+  const bool takes_off = high && now_us - high_us_ < kTakeOffUs;
+  landed_ = flight_ == core::FlightState::kGround && !takes_off;
   if (landed_) landed_us_ = now_us;
   may_write_ = landed_ || (may_write_ && flight_ == core::FlightState::kGround &&
                            now_us - landed_us_ < kGraceUs);

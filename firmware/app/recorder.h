@@ -112,7 +112,8 @@ class Recorder {
   bool resumed_ = false;
   bool heads_told_ = false;
   bool file_low_told_ = false;
-  bool landed_ = false;       // it is the ground, and the throttle does not say take-off
+  uint32_t high_us_ = 0;      // the throttle was last not above idle
+  bool landed_ = false;       // it is the ground, and nobody takes off
   bool resume_sure_ = false;  // an open file is continued because it was being recorded
   bool in_doubt_ = false;     // the session continues an open file, and nobody was seen flying yet
   uint8_t end_why_ = 0;       // of the session, as its event says

@@ -39,6 +39,8 @@ constexpr char kGpsText[] CORE_FLASH = " | gps";
 constexpr char kFixText[] CORE_FLASH = " fix ";
 constexpr char kSatellites[] CORE_FLASH = " sat ";
 constexpr char kReceiverText[] CORE_FLASH = " | rc us";
+constexpr char kRefused[] CORE_FLASH = " refused, ";
+constexpr char kHertz[] CORE_FLASH = " Hz";
 constexpr char kCardText[] CORE_FLASH = " | card ";
 constexpr char kDriveText[] CORE_FLASH = " | drive ";
 constexpr char kRelayText[] CORE_FLASH = " | relay ";
@@ -74,6 +76,7 @@ constexpr char kDirectSwitch[] CORE_FLASH = "direct (switch)";
 constexpr char kDirectInvalid[] CORE_FLASH = "direct (switch invalid)";
 constexpr char kDirectLost[] CORE_FLASH = "direct (receiver lost)";
 constexpr char kDirectTest[] CORE_FLASH = "direct (self-test)";
+constexpr char kDirectRelay[] CORE_FLASH = "direct (relay)";
 constexpr char kMega[] CORE_FLASH = "mega";
 constexpr char kHolding[] CORE_FLASH = "mega (holding)";
 
@@ -89,6 +92,8 @@ const char* drive_text(frames::Drive drive) {
       return kDirectLost;
     case frames::Drive::kDirectSelfTest:
       return kDirectTest;
+    case frames::Drive::kDirectRelay:
+      return kDirectRelay;
     case frames::Drive::kMega:
       return kMega;
     case frames::Drive::kMegaHolding:
@@ -285,7 +290,14 @@ void Status::gps(const Sensors& sensors) {
 void Status::receiver(const PilotLink& pilot) {
   out_.flash(kReceiverText);
   if (pilot.decoder().valid() == 0) {
-    out_.flash(kMissing);
+    const uint16_t refused_hz = pilot.decoder().refused_hz();
+    if (refused_hz == 0) {
+      out_.flash(kMissing);
+      return;
+    }
+    out_.flash(kRefused);
+    out_.number(refused_hz);
+    out_.flash(kHertz);
     return;
   }
   for (uint8_t channel = 0; channel < core::kChannels; ++channel) {

@@ -147,7 +147,10 @@ void DriveControl::engage_or_explain(const RcChannels& rc, bool self_test_passed
     return;
   }
   heard_ = true;
-  drive_ = frames::Drive::kDirectSwitch;
+  // What released the relay stays said until the pilot switches to direct.
+  if (drive_ != frames::Drive::kDirectRelay || switch_ == Switch::kDirect) {
+    drive_ = frames::Drive::kDirectSwitch;
+  }
   if (now_us - since_us_ < kSwitchSettleUs) {
     return;
   }

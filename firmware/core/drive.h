@@ -40,6 +40,10 @@ class DriveControl {
               bool self_test_passed,
               uint32_t now_us);
 
+  // The relay does not follow the heartbeat: to the receiver, until the switch sequence is seen
+  // anew.
+  void relay_lost() { release(frames::Drive::kDirectRelay); }
+
   frames::Drive drive() const { return drive_; }
   bool relay() const {
     return drive_ == frames::Drive::kMega || drive_ == frames::Drive::kMegaHolding;

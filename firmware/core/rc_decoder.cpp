@@ -51,8 +51,21 @@ void RcDecoder::rise(uint8_t index, uint32_t t_ticks, bool late) {
   if (input.candidate != 0) {
     settle(index, low_ticks);
   }
+  if (!late && low_ticks < kLowBeforeTicks) {
+    count_fast(t_ticks - input.rise);
+  }
   input.rise = t_ticks;
   set(trusted_, bit_of(index), !late && low_ticks >= kLowBeforeTicks);
+}
+
+void RcDecoder::count_fast(uint32_t period_ticks) {
+  if (period_ticks < kMinWidthTicks || period_ticks > kMaxWidthTicks + kLowBeforeTicks) {
+    return;
+  }
+  fast_ticks_ = static_cast<uint16_t>(period_ticks);
+  if (fast_pulses_ < kRefusedPulses) {
+    ++fast_pulses_;
+  }
 }
 
 void RcDecoder::fall(uint8_t index, uint32_t t_ticks, bool late) {
@@ -97,6 +110,7 @@ void RcDecoder::settle(uint8_t index, uint32_t low_ticks) {
     measure_frame(static_cast<uint16_t>(period_ticks / kTicksPerUs));
   }
   ++changes_;
+  fast_pulses_ = 0;
   input.accepted = input.rise;
   input.width = input.candidate;
   input.candidate = 0;

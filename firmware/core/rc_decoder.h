@@ -4,8 +4,9 @@
 // A pulse is accepted when both edges were stamped in time, its width is 800 to 2200 us, the line
 // was low for 2 ms before and 300 us after it (a dropout inside a pulse would else leave two short
 // ones), and since the last accepted pulse rose the measured frame time less 4.5 ms passed (9 ms
-// while it is not known). Frame times from 14 to 22.5 ms and receivers that send channels one after
-// the other or all at once pass without being told.
+// while it is not known). Channels that come all at once above 250 Hz leave no 2 ms of low: such a
+// receiver is refused, and said to be. Frame times from 14 to 22.5 ms and receivers that send
+// channels one after the other or all at once pass without being told.
 #pragma once
 
 #include <stdint.h>
@@ -32,6 +33,7 @@ class RcDecoder {
   static constexpr uint32_t kLostTicks = 60000UL * kTicksPerUs;
   static constexpr uint32_t kAgeTicks = 2000UL * kTicksPerUs;  // between two looks at all ages
   static constexpr uint8_t kSteadyPulses = 3;
+  static constexpr uint8_t kRefusedPulses = 250;  // in a row, of all inputs: 0.2 s at 250 Hz
 
   // Levels of all inputs (bit 0 to 4) behind an edge. `late`: the stamp cannot be trusted.
   void edge(uint32_t t_ticks, uint8_t levels, bool late);
@@ -50,6 +52,13 @@ class RcDecoder {
   uint8_t fresh() const { return fresh_; }         // bit per input: last pulse at most 45 ms old
   uint8_t steady() const { return steady_; }       // bit per input: three accepted in a row
   uint16_t frame_us() const { return frame_us_; }  // 0: not known
+  // Rate in Hz of pulses that follow each other too fast to be used, while none is accepted; else
+  // 0.
+  uint16_t refused_hz() const {
+    return fast_pulses_ < kRefusedPulses
+               ? uint16_t{0}
+               : static_cast<uint16_t>(1000000UL * kTicksPerUs / fast_ticks_);
+  }
   uint8_t changes() const { return changes_; }     // counts what poll and edge changed of these
   uint16_t glitches() const { return glitches_; }  // pulses rejected
 
@@ -65,6 +74,7 @@ class RcDecoder {
 
   void rise(uint8_t index, uint32_t t_ticks, bool late);
   void fall(uint8_t index, uint32_t t_ticks, bool late);
+  void count_fast(uint32_t period_ticks);
   void confirm(uint32_t now_ticks);
   void settle(uint8_t index, uint32_t low_ticks);
   void measure_frame(uint16_t period_us);
@@ -75,6 +85,8 @@ class RcDecoder {
   uint32_t aged_ticks_ = 0;  // the last look at all ages
   uint16_t frame_us_ = 0;
   uint16_t glitches_ = 0;
+  uint16_t fast_ticks_ = 1;  // from rise to rise of the last pulse that came too fast
+  uint8_t fast_pulses_ = 0;
   uint8_t levels_ = 0;
   uint8_t trusted_ = 0;  // bit per input: the rise was stamped in time, after a long enough low
   uint8_t valid_ = 0;

@@ -28,8 +28,24 @@ bool supply_good(uint16_t nominal_mv, uint16_t reference_mv) {
   return supply_mv(nominal_mv, at_most) >= kLeastSupplyMv;
 }
 
-bool supply_still_good(bool before, uint16_t nominal_mv, uint16_t reference_mv) {
-  return nominal_mv == 0 ? before : supply_good(nominal_mv, reference_mv);
+bool SupplyWatch::passes(uint16_t nominal_mv, uint16_t reference_mv) {
+  good_ = supply_good(nominal_mv, reference_mv);
+  low_ = 0;
+  return good_;
+}
+
+bool SupplyWatch::measured(uint16_t nominal_mv, uint16_t reference_mv) {
+  if (nominal_mv == 0) {
+    return good_;
+  }
+  if (supply_good(nominal_mv, reference_mv)) {
+    good_ = true;
+    low_ = 0;
+  } else if (low_ < kLowInARow) {
+    ++low_;
+    good_ = good_ && low_ < kLowInARow;
+  }
+  return good_;
 }
 
 }  // namespace core

@@ -23,8 +23,21 @@ uint16_t supply_mv(uint16_t nominal_mv, uint16_t reference_mv);
 // False when the supply is below 4.5 V for sure: without a calibration, even by a part of 1.2 V.
 // False while it is not measured: nothing is proven yet.
 bool supply_good(uint16_t nominal_mv, uint16_t reference_mv);
-// The same in flight, where a supply that is no longer measured (its converter failed) is as good
-// as it was `before`: a sensor never releases the relay, and the brown-out detector still does.
-bool supply_still_good(bool before, uint16_t nominal_mv, uint16_t reference_mv);
+// The same in flight, once per measurement. One odd conversion releases no relay: it is too low
+// only when three in a row say so. A supply that is no longer measured (its converter failed) is as
+// good as it was: a sensor never releases the relay, and the brown-out detector still does.
+class SupplyWatch {
+ public:
+  static constexpr uint8_t kLowInARow = 3;
+
+  // At boot, until it is good: the first measurement decides.
+  bool passes(uint16_t nominal_mv, uint16_t reference_mv);
+  bool measured(uint16_t nominal_mv, uint16_t reference_mv);
+  bool good() const { return good_; }
+
+ private:
+  uint8_t low_ = 0;
+  bool good_ = false;
+};
 
 }  // namespace core

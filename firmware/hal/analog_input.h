@@ -24,8 +24,9 @@ void start_analog();
 void arm_scan(uint8_t mask);
 
 // Starts a scan now, when none runs, and gives its instant; nothing is armed afterwards. False: a
-// packet has just started one. Waits for the supply's measurement, which takes 208 us once a
-// second; one that does not end in 300 us is given up as by start_analog(). Main loop only.
+// packet has just started one. Waits for the supply's measurement, which takes 208 us
+// where it was asked for; one that does not end in 300 us is given up as by start_analog(). Main
+// loop only.
 bool start_scan(uint32_t* started_us);
 
 // The scan of the last start_scan(), or of the last packet released that started one. It is done
@@ -33,6 +34,9 @@ bool start_scan(uint32_t* started_us);
 // stays until the scan behind it is released or started. Main loop only.
 bool scan_done();
 uint16_t scan_sum(uint8_t slot);
+
+// Asks for one measurement of the supply, behind the next scan.
+void measure_supply();
 
 // The analogue supply as measured against the chip's reference between scans, in mV; 0: unknown.
 uint16_t avcc_mv();

@@ -24,6 +24,10 @@ void feed_watchdog();
 // Sleeps until the next interrupt, 1 ms at most. Main loop only.
 void sleep_until_interrupt();
 
+// The same without sleep: counts what interrupts leave of the time until then, in us. Sleep itself
+// cannot tell: interrupts that do not end it are part of it.
+uint16_t idle_until_interrupt();
+
 // Stack never touched since boot; 65535: unknown.
 uint16_t stack_free_bytes();
 

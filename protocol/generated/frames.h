@@ -11,7 +11,7 @@
 namespace frames {
 
 constexpr uint8_t kVersion = 1;
-constexpr uint32_t kSchemaHash = 0xFEB7AFECu;
+constexpr uint32_t kSchemaHash = 0x7CD9E42Au;
 constexpr size_t kMaxWireSize = 68;  // longest frame with its id
 
 // Bits of `valid`.
@@ -110,6 +110,7 @@ enum class Drive : uint8_t {
   kDirectSelfTest = 4,
   kMega = 5,
   kMegaHolding = 6,
+  kDirectRelay = 7,
 };
 
 enum class Event : uint8_t {

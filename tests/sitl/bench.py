@@ -25,7 +25,7 @@ GROUND_S = 25.0  # a bare board has nobody that says still: 18 s
 EVENTS = {
     "session_start": 1, "session_end": 2, "frames_dropped": 3, "block_skipped": 4, "card_stall": 5,
     "card_removed": 7, "imu_lost": 8, "imu_found": 9, "baro_lost": 11, "receiver_lost": 15,
-    "reset": 18,
+    "reset": 18, "flight_state": 30, "relay_lost": 31, "receiver_refused": 32,
 }  # fmt: skip
 
 
@@ -150,10 +150,12 @@ def missing(count: NDArray[np.uint16]) -> int:
     return int((np.diff(count).astype(np.uint16) - np.uint16(1)).astype(np.int64).sum())
 
 
-def idle_receiver(sitl: Sitl, first_s: float, last_s: float, *, throttle_us: int = 1100) -> None:
+def idle_receiver(
+    sitl: Sitl, first_s: float, last_s: float, *, throttle_us: int = 1100, switch_us: int = 1100
+) -> None:
     """Give steady pulses, the switch at direct."""
     count = int((last_s - first_s) * 50)
-    width = np.tile(np.array([3000, 3000, 3000, 2 * throttle_us, 2200]), (count, 1))
+    width = np.tile(np.array([3000, 3000, 3000, 2 * throttle_us, 2 * switch_us]), (count, 1))
     start = np.round((first_s + np.arange(count) * 0.02) * TICKS_PER_S).astype(np.int64)
     offsets = np.arange(5) * 5000
     sitl.add_edges(*scripted.Receiver(start[:, None] + offsets, width).edges())

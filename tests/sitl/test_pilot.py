@@ -1,15 +1,17 @@
 """The pilot's pulses: repeated exactly, released when they must be, never invented."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from host.original import rows as original_rows
 from host.twin.recorder.sitl_library import TICKS_PER_S, Level, Port
 
 from tests.protocol import oracle
-from tests.sitl.bench import Bench, config_places, flight, idle_receiver
+from tests.sitl.bench import Bench, config_places, events, flight, idle_receiver
 from tests.sitl.script import Receiver
 
-MEGA, DIRECT_LOST = 5, 3
+MEGA, DIRECT_LOST, DIRECT_RELAY = 5, 3, 7
 TELEMETRY_BYTE = 20  # in the fields of frame config
 
 
@@ -212,3 +214,39 @@ def test_holding_delays_the_release_by_its_time_for_surfaces_only(hold_ms: int) 
 def test_more_than_a_second_of_holding_is_refused() -> None:
     with pytest.raises(ValueError, match="out of its range"):
         Bench().configure(hold_ms=1001)
+
+
+def test_relay_that_never_pulls_in_is_told_and_wants_the_switch_sequence() -> None:
+    """Its contact stays open: released 50 ms behind the first edge, with an alarm."""
+    bench = Bench()
+    bench.sitl.cut_relay()
+    idle_receiver(bench.sitl, 0.1, 3.0)
+    idle_receiver(bench.sitl, 3.0, 8.0, switch_us=1900)
+    idle_receiver(bench.sitl, 8.0, 10.0)
+    idle_receiver(bench.sitl, 10.0, 14.0, switch_us=1900)
+    bench.sitl.power_on()
+    bench.sitl.run_until(ticks(3.5))
+    assert bench.sitl.state().drive == DIRECT_RELAY
+    bench.sitl.run_until(ticks(7.9))
+    assert bench.sitl.state().drive == DIRECT_RELAY
+    at, level = bench.sitl.levels(Level.BUZZER)
+    assert np.count_nonzero(level[at > ticks(3.0)] == 1) >= 8
+    bench.sitl.cut_relay(False)
+    bench.sitl.run_until(ticks(12.0))
+    assert bench.sitl.state().relay
+    at, level = bench.sitl.levels(Level.BUZZER)
+    assert not np.any(at > ticks(11.0))
+
+
+def test_relay_that_drops_in_flight_is_told(tmp_path: Path) -> None:
+    bench = Bench()
+    flight(34.0).give(bench.sitl)
+    bench.power_on_and_record(8.0)
+    assert bench.sitl.state().relay
+    bench.sitl.cut_relay()
+    bench.sitl.run_for(0.1)
+    assert bench.sitl.state().drive == DIRECT_RELAY
+    bench.sitl.run_until(ticks(20.0))
+    assert bench.sitl.state().drive == DIRECT_RELAY
+    bench.stop()
+    assert events(bench.log(tmp_path), "relay_lost") == [1]

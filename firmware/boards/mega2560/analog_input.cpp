@@ -23,7 +23,6 @@ constexpr uint8_t kReference = _BV(REFS0);  // AVCC: the sensors are ratiometric
 constexpr uint8_t kBandgapMux = 0x1E;
 constexpr uint16_t kBandgapMv = 1100;
 constexpr uint8_t kConversions = hal::kAnalogSlots * hal::kAnalogRounds;
-constexpr uint8_t kScansPerSupply = 128;  // about once a second
 // Of the supply, behind a scan: the first only settles the reference, which wants 70 us.
 constexpr uint8_t kSupplyConversions = 2;
 constexpr uint32_t kSupplyUs = 300;  // of those, with all that interrupts add
@@ -33,8 +32,7 @@ constexpr uint8_t kIdle = _BV(ADEN) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0);  // 
 constexpr uint8_t kFree = kIdle | _BV(ADATE) | _BV(ADIE);
 constexpr uint8_t kOnce = kIdle | _BV(ADIE);
 
-uint8_t g_scans = kScansPerSupply - 1;  // the self-test waits for the supply of the first
-uint8_t g_reading;                      // 0 or 1: half of adc_sums that scan_sum() reads
+uint8_t g_reading;  // 0 or 1: half of adc_sums that scan_sum() reads
 
 // ADMUX of a channel; its bit ADLAR, else unused, stands for MUX5 of ADCSRB.
 constexpr uint8_t selection(const uint8_t slot) {
@@ -136,7 +134,7 @@ ISR(ADC_vect, ISR_NAKED) {
       "ldi r24, %[once] \n\t"
       "sts %[control_a], r24 \n\t"
       "rjmp 9f \n\t"
-      // The scan is done: the supply, once a second.
+      // The scan is done: the supply, where it was asked for.
       "5: lds r24, %[taken] \n\t"
       "tst r24 \n\t"
       "breq 8f \n\t"
@@ -292,11 +290,11 @@ bool scan_done() {
 }
 
 uint16_t scan_sum(const uint8_t slot) {
-  if (slot == kAnalogRail && ++g_scans >= kScansPerSupply) {
-    g_scans = 0;
-    adc_wanted = kSupplyConversions;
-  }
   return adc_sums[g_reading == 0 ? slot : uint8_t(slot + kAnalogSlots)];
+}
+
+void measure_supply() {
+  adc_wanted = kSupplyConversions;
 }
 
 uint16_t avcc_mv() {

@@ -114,6 +114,8 @@ uint16_t scan_sum(uint8_t slot) {
   return world().sums[world().reading][slot];
 }
 
+void measure_supply() {}
+
 uint16_t avcc_mv() {
   return world().avcc_mv;
 }

@@ -243,6 +243,13 @@ void sleep_until_interrupt() {
   w.awake = false;
 }
 
+// Here interrupts take no time.
+uint16_t idle_until_interrupt() {
+  const Tick from = sitl::world().now;
+  sleep_until_interrupt();
+  return static_cast<uint16_t>((sitl::world().now - from) / sitl::kTicksPerUs);
+}
+
 uint16_t stack_free_bytes() {
   return 65535U;
 }

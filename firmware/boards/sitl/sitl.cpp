@@ -129,6 +129,10 @@ void sitl_weld_relay(int welded) {
   world().relay.welded = welded != 0;
 }
 
+void sitl_cut_relay(int cut) {
+  world().cut_relay(cut != 0);
+}
+
 void sitl_set_pressure(
     const uint16_t* words, int64_t start, int64_t step, const double* raw, size_t rows) {
   world().sensor.configure(sitl::PressureSensor::Chip::kBmp085, words);

@@ -41,6 +41,8 @@ void sitl_set_analog(int64_t start, int64_t step, const double* counts, size_t r
 void sitl_set_supply(uint16_t avcc_mv);
 // The relay's contacts stay where they are when engaged, heartbeat or not.
 void sitl_weld_relay(int welded);
+// Its contacts stay at rest whatever the heartbeat does.
+void sitl_cut_relay(int cut);
 // A BMP085 with its 11 coefficients; rows of UT and UP, UP as at oversampling 3.
 void sitl_set_pressure(
     const uint16_t* words, int64_t start, int64_t step, const double* raw, size_t rows);

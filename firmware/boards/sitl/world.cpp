@@ -156,7 +156,7 @@ void World::toggle_heartbeat() {
   step_relay(now);
   relay.last_toggle = now;
   if (relay.charge < kPumpFull) ++relay.charge;
-  if (relay.charge == kPumpFull && !relay.engaged) {
+  if (relay.charge == kPumpFull && !relay.engaged && !relay.cut) {
     relay.engaged = true;
     relay_log.push_back({now, true});
   }
@@ -165,9 +165,18 @@ void World::toggle_heartbeat() {
 void World::step_relay(Tick when) {
   if (relay.charge == 0 || when - relay.last_toggle < kPumpTicks) return;
   relay.charge = 0;
+  release_relay(relay.last_toggle + kPumpTicks);
+}
+
+void World::release_relay(Tick when) {
   if (!relay.engaged) return;
   relay.engaged = false;
-  relay_log.push_back({relay.last_toggle + kPumpTicks, false});
+  relay_log.push_back({when, false});
+}
+
+void World::cut_relay(bool cut) {
+  relay.cut = cut;
+  if (cut) release_relay(now);
 }
 
 void World::reset_chip() {

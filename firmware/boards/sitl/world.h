@@ -80,6 +80,7 @@ struct RelayModel {
   Tick last_toggle = -kNever / 2;
   bool engaged = false;
   bool welded = false;
+  bool cut = false;
 };
 
 struct PortModel {
@@ -146,6 +147,7 @@ struct World {
   Card card;
 
   World();
+  void cut_relay(bool cut);
 
   // Lets time pass, with every interrupt on its way.
   void advance_to(Tick when);
@@ -164,6 +166,7 @@ struct World {
   void fire(Tick when);
   void step_servos(Tick when);
   void step_relay(Tick when);
+  void release_relay(Tick when);
 };
 
 // The one world of this library; boards/sitl/hal_*.cpp act on it.

@@ -94,6 +94,9 @@ void serve_scan(const uint32_t now_us) {
       scan_sums[slot] = hal::scan_sum(slot);
     }
     supply_mv = hal::avcc_mv();
+    if ((scans & 127U) == 0) {
+      hal::measure_supply();
+    }
     scans = uint16_t(scans + 1U);
     g_scanning = false;
   }

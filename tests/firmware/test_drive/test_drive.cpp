@@ -1,6 +1,7 @@
 // Who drives, stepped every 5 ms with a clock of the test's own.
 #include "check.h"
 #include "core/drive.h"
+#include "core/relay_watch.h"
 #include "core/settings.h"
 #include "random_numbers.h"
 
@@ -331,4 +332,84 @@ TEST_CASE("random losses and switch moves: every output is live, or a held surfa
   }
   CHECK_EQ(wrong, 0);
   CHECK(engaged > 20);
+}
+
+TEST_CASE(
+    "a relay that does not follow goes to the receiver until the switch sequence comes again") {
+  Bench bench;
+  bench.engage();
+  CHECK(bench.is(Drive::kMega));
+  bench.drive.relay_lost();
+  CHECK(!bench.drive.relay());
+  bench.run_ms(5000);  // the switch still says Mega
+  CHECK(bench.is(Drive::kDirectRelay));
+  bench.engage();
+  CHECK(bench.is(Drive::kMega));
+}
+
+namespace {
+
+using core::RelayFault;
+
+// A relay that follows the edges as the data sheet says, looked at every turn of the main loop.
+struct RelayBench {
+  core::RelayWatch watch;
+  Random random{7};
+  uint32_t now_us = 0xFFFFFFFFU - 2000000U;
+
+  RelayFault look_us(uint32_t for_us, bool closed) {
+    RelayFault fault = RelayFault::kNone;
+    for (const uint32_t end_us = now_us + for_us; fault == RelayFault::kNone && end_us != now_us;) {
+      const uint32_t left_us = end_us - now_us;
+      const uint16_t turn_us = static_cast<uint16_t>(700 + random.below(1600));
+      now_us += turn_us < left_us ? turn_us : left_us;
+      fault = watch.look(closed, now_us);
+    }
+    return fault;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a relay that never pulls in is lost 50 ms behind the first edge, not before") {
+  RelayBench bench;
+  CHECK(bench.look_us(49000, false) == RelayFault::kNone);
+  CHECK(bench.look_us(6000, false) == RelayFault::kNeverEngaged);
+}
+
+TEST_CASE("a relay that drops is lost within 25 ms, one that bounces is not") {
+  RelayBench bench;
+  bench.look_us(5000, false);
+  CHECK(bench.look_us(1000000, true) == RelayFault::kNone);
+  for (uint8_t i = 0; i < 100; ++i) {
+    CHECK(bench.look_us(15000, false) == RelayFault::kNone);
+    CHECK(bench.look_us(1000, true) == RelayFault::kNone);
+  }
+  const uint32_t opened_us = bench.now_us;
+  CHECK(bench.look_us(30000, false) == RelayFault::kOpened);
+  CHECK(bench.now_us - opened_us <= 25000);
+}
+
+TEST_CASE("looks that are far apart say nothing of the time between") {
+  core::RelayWatch watch;
+  CHECK(watch.look(true, 1000) == RelayFault::kNone);
+  CHECK(watch.look(false, 2000) == RelayFault::kNone);
+  CHECK(watch.look(false, 90000) == RelayFault::kNone);
+  CHECK(watch.look(false, 91000) == RelayFault::kNone);
+}
+
+TEST_CASE("1000 engagements in a row with 1 ms of bounce never trip it") {
+  RelayBench bench;
+  for (uint16_t i = 0; i < 1000; ++i) {
+    RelayFault fault = bench.look_us(3000UL + bench.random.below(7000), false);
+    for (uint8_t bounce = 0; bounce < 3 && fault == RelayFault::kNone; ++bounce) {
+      fault = bench.look_us(300, (bounce & 1U) == 0);
+    }
+    if (fault == RelayFault::kNone) {
+      fault = bench.look_us(100000, true);
+    }
+    CHECK(fault == RelayFault::kNone);
+    bench.watch.rest();
+    bench.now_us += uint32_t{1000} * bench.random.below(400);
+  }
 }

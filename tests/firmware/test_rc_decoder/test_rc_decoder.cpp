@@ -359,3 +359,24 @@ TEST_CASE("random widths on any receiver come out as they went in") {
     CHECK_EQ(wrong, 0);
   }
 }
+
+TEST_CASE("all channels at once at 333 Hz are refused, and that is said; 200 Hz is used") {
+  core::RcDecoder decoder;
+  uint32_t t_ticks = 0xFFFF0000U;
+  const auto fly = [&](uint32_t period_ticks, uint16_t frames) {
+    for (uint16_t i = 0; i < frames; ++i) {
+      decoder.edge(t_ticks, kAll, false);
+      decoder.edge(t_ticks + 3000, 0, false);
+      decoder.poll(t_ticks + 3000 + 700);
+      t_ticks += period_ticks;
+    }
+  };
+  fly(6000, 40);
+  CHECK_EQ(decoder.refused_hz(), 0);
+  fly(6000, 40);
+  CHECK_EQ(decoder.refused_hz(), 333);
+  CHECK_EQ(decoder.valid(), 0);
+  fly(10000, 10);
+  CHECK_EQ(decoder.refused_hz(), 0);
+  CHECK_EQ(decoder.valid(), kAll);
+}

@@ -1,6 +1,7 @@
 // The analogue supply: what a measurement says, with and without the chip's own reference.
 #include "check.h"
 #include "core/supply.h"
+#include "random_numbers.h"
 
 TEST_CASE("a healthy board passes whatever its reference, a starved one fails for sure") {
   // 4.75 V, the least a 5 V regulator may give, as chips of 1.0 to 1.2 V see it.
@@ -17,13 +18,31 @@ TEST_CASE("a healthy board passes whatever its reference, a starved one fails fo
 }
 
 TEST_CASE("a supply no longer measured stays as it was, one measured too low does not") {
-  for (uint8_t before = 0; before < 2; ++before) {
-    const bool good = before != 0;
-    CHECK(core::supply_still_good(good, 0, 0) == good);
-    CHECK(core::supply_still_good(good, 0, 1137) == good);
-    CHECK(core::supply_still_good(good, 5000, 0));
-    CHECK(!core::supply_still_good(good, 4100, 0));
+  core::SupplyWatch watch;
+  CHECK(!watch.measured(0, 0));
+  CHECK(watch.measured(5000, 0));
+  CHECK(watch.measured(0, 1137));
+  for (uint8_t i = 0; i < 3; ++i) {
+    watch.measured(4100, 0);
   }
+  CHECK(!watch.good());
+  CHECK(!watch.measured(0, 0));
+}
+
+TEST_CASE("one or two odd conversions change nothing, wherever they fall; three do") {
+  Random random(5);
+  core::SupplyWatch watch;
+  CHECK(watch.passes(5000, 0));
+  uint8_t odd = 0;
+  for (uint16_t i = 0; i < 5000; ++i) {
+    const bool low = odd < 2 && random.below(2) == 0;
+    odd = static_cast<uint8_t>(low ? odd + 1 : 0);
+    CHECK(watch.measured(low ? random.below(4124) : uint16_t{4900}, 0));
+  }
+  watch.measured(5000, 0);
+  CHECK(watch.measured(4100, 0));
+  CHECK(watch.measured(4100, 0));
+  CHECK(!watch.measured(4100, 0));
 }
 
 TEST_CASE("a calibrated measurement is the meter's within 10 mV") {

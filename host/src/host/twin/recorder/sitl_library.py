@@ -244,6 +244,10 @@ class Sitl:
         """Let the relay's contact say engaged for ever."""
         self._c.sitl_weld_relay(ctypes.c_int(1))
 
+    def cut_relay(self, cut: bool = True) -> None:
+        """Let the relay stay at rest whatever the heartbeat does, or follow it again."""
+        self._c.sitl_cut_relay(ctypes.c_int(cut))
+
     def set_pressure(
         self, coefficients: Sequence[int], start: int, step: int, raw: npt.ArrayLike
     ) -> None:
