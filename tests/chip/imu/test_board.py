@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from host.wire.schema_text import packed_schema
@@ -270,3 +272,41 @@ def test_compat_sends_the_original_packets_with_their_meaning(make_board: MakeBo
     assert altitude == pytest.approx(30.0)
     assert speed == pytest.approx(np.hypot(12.0, 3.0), abs=0.02)
     assert (fix, satellites) == (1.0, 9.0)
+
+
+@pytest.mark.parametrize("bootloader", [False, True])
+def test_hang_with_interrupts_off_ends_in_a_reset(imu_elf: Path, bootloader: bool) -> None:
+    """`cli` and a jump to itself: the watchdog's interrupt cannot run, its reset can."""
+    from imu.packets import imu_packets
+    from imu.rig import ImuBoard
+    from simavr_bench import Image
+    from simavr_bench.log import LogKind
+
+    board = ImuBoard(imu_elf, bootloader=bootloader)
+    board.bus.listen(27, 42, 43)
+    board.bus.log_bytes()
+    board.power_on()
+    board.chip.run_s(5.0)
+
+    def resets() -> int:
+        return len(board.chip.records(LogKind.OUT_OF_RESET))
+
+    before, hung = resets(), board.chip.cycle
+    address, size = board.chip.symbols["_ZN7arduimu13poll_transferEv"]
+    code = board.chip.flash(address, size)
+    board.chip.load(Image({address: b"\xf8\x94\xff\xcf"}))
+    while resets() == before and board.chip.cycle - hung < 2 * 16_000_000:
+        board.chip.run_s(0.02)
+    assert 0.5 * 16e6 < board.chip.cycle - hung < 1.2 * 16e6
+    board.chip.load(Image({address: code}))  # what hung it was no fault of the program
+    board.chip.run_s(4.0)
+    count = resets() - before
+    packets = [p for p in imu_packets(board.bus) if p.start > hung + 16e6]
+    board.chip.close()
+    if bootloader:
+        assert count > 20  # ATmegaBOOT leaves the watchdog on (boards/arduimu/README.md)
+        return
+    assert count == 1
+    assert len(packets) > 200
+    assert packets[0].start - hung < 2.5 * 16e6
+    assert packets[0].flags & RESTARTED
