@@ -136,7 +136,7 @@ def test_task_that_does_not_report_lets_go_within_50_ms(flying: FlightRig) -> No
 def test_stuck_heartbeat_lets_go_within_50_ms(flying: FlightRig, level: bool) -> None:
     from simavr_bench import in_fork
 
-    start, size = flying.chip.symbols["_ZN3app9PilotLink4beatEm"]
+    start, size = flying.chip.symbols["_ZN3app9PilotLink4beatERNS_6OutletEm"]
     code = np.frombuffer(flying.chip.flash(start, size), "<u2")
     stores = np.flatnonzero((code[:-1] & 0xFE0F == 0x9200) & (code[1:] == STS_PINH))
     assert len(stores) == 1

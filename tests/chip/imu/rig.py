@@ -36,8 +36,8 @@ class ImuBoard:
         An MPU-6050 on the bus instead of an MPU-6000 on SPI.
     qmc : bool
         A QMC5883L where a HMC5883L is expected.
-    bootloader : bool or Path
-        Start in Debian's copy of the board's bootloader, or in another.
+    bootloader : bool
+        Start in Debian's copy of the board's bootloader.
     seed : int
         Of noise, jitter and memory at power-on.
     """
@@ -52,14 +52,12 @@ class ImuBoard:
         product_id: int = 0x58,
         over_i2c: bool = False,
         qmc: bool = False,
-        bootloader: bool | Path = False,
+        bootloader: bool = False,
         seed: int = 2,
     ) -> None:
-        self.chip = Chip(
-            model="atmega328p", bootloader=bool(bootloader), startup_s=0.065, seed=seed
-        )
+        self.chip = Chip(model="atmega328p", bootloader=bootloader, startup_s=0.065, seed=seed)
         if bootloader:
-            self.chip.load(bootloader if isinstance(bootloader, Path) else BOOTLOADER)
+            self.chip.load(BOOTLOADER)
         self.chip.load(elf)
         self.bus = I2cBus(self.chip, slave, master_ppm=clock_ppm)
         self.mpu = Mpu6000(
