@@ -109,7 +109,7 @@ def test_a_table_is_read_at_the_angle_asked_for(
         (b"\xff\xfe\x00", "not TOML"),
         (b"[rows]\nCL = 1\n", "nothing to convert; expected a model of host identify"),
         (b"[coefficients]\nCL_alpha = 'steep'\n", "CL_alpha is 'steep', expected a number or"),
-        (b"[coefficients]\nCL_alpha = [4.1, -1]\n", "CL_alpha is [4.1, -1], expected a number or"),
+        (b"[coefficients]\nCL_alpha = [4.1, -1]\n", "CL_alpha: half-width is -1, expected 0 to"),
         (b"[coefficients]\nCL_0 = 0.1\n", "nothing to convert"),
         (b"[coefficients]\nCL_alpha = 4\n[derivatives]\nM_q = -3\n", "expected one kind"),
         (b"derivatives = 3\n", "expected lines such as M_q"),

@@ -303,7 +303,7 @@ def test_columns_of_several_rates_are_refused(
     [
         ("alpha_rad", 'from = "AOA", units = "deg"', "unknown key units"),
         ("alpha_rad", 'from = "AOA", unit = "kt"', "unit 'kt' unknown; use one of rad, deg"),
-        ("alpha_rad", 'from = "AOA", sign = "-"', "sign is '-', not a number"),
+        ("alpha_rad", 'from = "AOA", sign = "-"', "sign is '-', expected a number"),
         ("alpha_rad", 'from = "AOA", sign = 2', "sign must be 1 or -1"),
         ("alpha_rad", 'from = ["AOA"]', "expected"),
         ("aplha_rad", 'from = "AOA"', "did you mean alpha_rad"),

@@ -172,7 +172,7 @@ def _pair(path: Path, name: str, entry: object) -> tuple[float, float]:
     """Return value and half-width of ``4.1`` or ``[4.1, 0.2]``."""
     listed = entry if isinstance(entry, list) else [entry, 0.0]
     where = f"{path}: {name}"
-    if len(listed) != 2:
+    if len(listed) != 2 or isinstance(listed[0], str):
         raise IdentificationError(
             f"{where} is {shown(entry)}, expected a number or [value, 95 % half-width]"
         )
