@@ -1,0 +1,79 @@
+"""In flight on the chip: the heartbeat's rests, the load that the log states, pressure's rate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import host
+
+if TYPE_CHECKING:
+    from flight.rig import FlightRig
+
+MakeRig = Callable[..., "FlightRig"]
+FLOWN_S = 12.0
+LONGEST_REST_MS, LONG_REST_MS = 4.0, 2.5
+
+
+def test_flight_states_its_load_and_never_rests_long(make_rig: MakeRig, tmp_path: Path) -> None:
+    """A GPS that comes back and is set up anew, a mark, the status line: all in one flight."""
+    from flight.rig import take_log
+
+    rig = make_rig(imu_hz=200.0)
+    rig.chip.watch("PH5")
+    rig.take_off()
+    since = rig.chip.cycle
+    rig.chip.clear_statistics()
+    rig.gps.silent = True
+    rig.chip.run_s(4.0)
+    rig.gps.silent, rig.gps.baud, rig.gps.enabled = False, 9600, set()
+    rig.chip.drive("PG0", False)
+    rig.chip.run_s(0.3)
+    rig.chip.drive("PG0", None)
+    rig.chip.run_s(FLOWN_S - 4.3)
+    busy = rig.chip.load_now().busy_fraction
+    assert rig.relay.engaged
+    at, _ = rig.chip.edges("PH5")
+    rests_ms = np.diff(at[at > since].astype(np.int64)) / 16e3
+    assert len(rests_ms) > 5000
+    assert rests_ms.max() <= LONGEST_REST_MS
+    assert np.minimum(rests_ms[1:], rests_ms[:-1]).max() <= LONG_REST_MS
+    rig.land()
+    log = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin"))
+    stated = log.frames["system"]["cpu_load"][-10:].astype(float) / 1000
+    assert stated.mean() == pytest.approx(busy, abs=0.015)
+    t_us = log.frames["baro"]["t_us"].astype(np.int64)
+    assert len(t_us) > 250
+    assert 1e6 / np.diff(t_us).mean() == pytest.approx(25.0, abs=0.2)
+
+
+def test_relay_whose_contact_opens_in_flight_is_released(make_rig: MakeRig, tmp_path: Path) -> None:
+    """Open for 20 ms: no more edges, whatever the switch says, until its sequence comes again."""
+    from flight.rig import DIRECT_US, MEGA_US, take_log
+
+    rig = make_rig()
+    rig.chip.watch("PH5")
+    rig.take_off()
+    assert rig.relay.engaged
+    rig.chip.drive("PH6", True)  # its sense line, as if the contact opened
+    opened = rig.chip.cycle
+    rig.chip.run_s(1.0)
+    at, _ = rig.chip.edges("PH5")
+    last_ms = (int(at[-1]) - opened) / 16e3
+    assert 18.0 < last_ms < 26.0
+    assert not rig.relay.engaged
+    rig.chip.drive("PH6", None)
+    rig.chip.run_s(1.0)
+    assert not rig.relay.engaged
+    for switch_us in (DIRECT_US, MEGA_US):
+        rig.receiver.width_us[4] = switch_us
+        rig.chip.run_s(0.6)
+    at, _ = rig.chip.edges("PH5")
+    assert int(at[-1]) > rig.chip.cycle - 16_000_000 // 10  # it drives again
+    rig.land()
+    events = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin")).frames["event"]
+    assert events["arg"][events["code"] == 31].tolist() == [1]
