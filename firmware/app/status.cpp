@@ -59,7 +59,7 @@ constexpr char kTextUnreadable[] CORE_FLASH = "unreadable";
 constexpr char kTextFull[] CORE_FLASH = "full";
 constexpr char kTextFragmented[] CORE_FLASH = "fragmented";
 constexpr char kTextDamaged[] CORE_FLASH = "damaged";
-constexpr char kTextUnrecorded[] CORE_FLASH = "not recorded, ";
+constexpr char kTextUnrecorded[] CORE_FLASH = ", not recorded";
 constexpr char kTextLooking[] CORE_FLASH = "looking";
 constexpr char kTextSearching[] CORE_FLASH = "searching ";
 constexpr char kTextPreparing[] CORE_FLASH = "preparing ";
@@ -335,11 +335,11 @@ void Status::card(const Recorder& recorder) {
   out_.flash(kCardText);
   switch (recorder.state()) {
     case Recorder::State::kNoFile:
-      if (recorder.unrecorded()) out_.flash(kTextUnrecorded);
       if (recorder.volume_status() != storage::VolumeStatus::kReady) {
         out_.flash(volume_text(recorder.volume_status()));
       } else {
         work(recorder);
+        if (recorder.unrecorded()) out_.flash(kTextUnrecorded);
       }
       return;
     case Recorder::State::kFailed:

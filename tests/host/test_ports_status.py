@@ -221,7 +221,11 @@ def test_every_trouble_has_a_remedy() -> None:
         "relay stuck", "FAT32", "servo rail", "4.5 V",
     ):  # fmt: skip
         assert word in text
-    for state in ("missing", "unreadable", "full", "fragmented", "lost", "open flight 7"):
+    for state in (
+        "missing", "unreadable", "full", "fragmented", "damaged", "lost", "open flight 7",
+        "looking", "searching 12 %", "searching 12 %, not recorded", "preparing 99 %", "closing",
+        "ready, small 7", "waits for the ground, not recorded",
+    ):  # fmt: skip
         changed = parse_status(WELL.replace("card ready 12", f"card {state}"))
         assert changed is not None
         assert len(changed.complaints()) == 1, state

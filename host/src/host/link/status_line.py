@@ -69,13 +69,15 @@ _HINTS = {
     ("card", "missing"): "put a card in",
     ("card", "not FAT32"): "format it to FAT32; cards above 32 GB are sold as exFAT",
     ("card", "unreadable"): "another card, or look at its wires",
-    ("card", "full"): "no room for a flight file; free 64 MiB",
-    ("card", "fragmented"): "no 64 MiB in one piece; format the card",
+    ("card", "full"): "no room for 15 minutes; free 64 MiB",
+    ("card", "fragmented"): "no 15 minutes in one piece; format the card",
     ("card", "lost"): "it went away while it was in use",
     ("card", "damaged"): "its file system has numbers that cannot be; format the card to FAT32",
     ("card", "looking"): "it is being read",
     ("card", "searching"): "room is being looked for; nothing is recorded before it is found",
     ("card", "preparing"): "a file is being made; nothing is recorded before it is ready",
+    ("card", "closing"): "the file of the last flight is being cut to its length",
+    ("card", "ready, small"): "room for 15 minutes at least; more is being looked for",
     ("card", "open flight"): "an earlier flight is open; closed when it stands still",
     ("card", "waits for the ground"): "its file is made when it stands still, within 20 s",
 }
@@ -104,7 +106,7 @@ class StatusLine:
         """``ok``, ``missing``, ``stale``, ``original``; of card and relay what they say."""
         text = self.fields[key]
         if key == "card":
-            return re.sub(r"\s+\d+( %)?$", "", text)
+            return re.sub(r"(\s+\d+( %)?)?(, not recorded)?$", "", text)
         if key == "relay":
             return text
         return next((word for word in _STATES if word in text.split()), "ok")
