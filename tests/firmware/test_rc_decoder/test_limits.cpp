@@ -251,3 +251,22 @@ TEST_CASE("edges that were lost forget what was half seen and keep what was acce
   CHECK_EQ(line.decoder.width_ticks(0), kWidth);
   CHECK_EQ(line.decoder.valid(), 1);
 }
+
+TEST_CASE("a lost channel leaves the frame time to the others; the last one takes it along") {
+  RcDecoder decoder;
+  decoder.edge(kStart, 0, false);
+  uint32_t at = kStart;
+  for (uint8_t frame = 0; frame < 10; ++frame) {
+    at += 20 * kMs;
+    // The second channel is gone behind the fifth frame.
+    const uint8_t sent = frame < 5 ? 3 : 1;
+    decoder.edge(at, sent, false);
+    decoder.edge(at + kWidth, 0, false);
+    decoder.poll(at + kWidth + RcDecoder::kLowAfterTicks);
+  }
+  CHECK_EQ(decoder.valid(), 1);
+  CHECK_EQ(decoder.frame_us(), 20000);
+  decoder.poll(at + 63 * kMs);
+  CHECK_EQ(decoder.valid(), 0);
+  CHECK_EQ(decoder.frame_us(), 0);
+}
