@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench study flight-bench imu-bench faults power-cuts fuzz hw clean
+.PHONY: help setup demo test native mega sitl lint format bench study flight-bench imu-bench faults power-cuts fuzz mutants hw clean
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # Runs a module of tests/chip in that folder; the simulator's package lies beside it.
@@ -60,6 +60,9 @@ power-cuts: setup ## power cuts in flight, of metadata, and the next boot (minut
 hw: ## check schematic, board and mechanics in KiCad and CAD (asks for an apt source; minutes)
 	@.ci/setup.sh hw
 	@.venv-hw/bin/python -m pytest --noconftest tests/hw/campaign/check_*.py
+
+mutants: setup ## share of mutants of the deciding files that their unit tests kill (an hour)
+	@$(PYTHON) -m tests.mutants $(MUTANTS)
 
 fuzz: setup ## random input, guided by coverage: 2000 of each kind (FULL=1: all, an hour or two)
 	@$(PYTHON) -m tests.fuzz $(FUZZ) $(if $(FULL),--full)

@@ -1,0 +1,290 @@
+"""Make mutants of one file of firmware/core and let its own native suite judge each.
+
+universalmutator alters the source line by line. A mutant counts when it compiles and its object
+differs from the original's and from every other mutant's (-O2, no debug information): what the
+compiler finds the same cannot be told apart by any test. It is killed when a test case fails, the
+suite crashes or runs for more than ten seconds of processor time. What survives plain is built once
+more under address and undefined-behaviour sanitizers, as `pio test -e native` builds everything.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+import re
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+CORE = ROOT / "firmware" / "core"
+SUITES = ROOT / "tests" / "firmware"
+OUT = ROOT / "build" / "mutants"
+
+COMPILER = os.environ.get("CXX", "g++")
+PLAIN = (
+    "-std=gnu++14",
+    "-O2",
+    "-g0",
+    "-w",
+    "-fPIC",
+    "-Ifirmware",
+    "-Iprotocol",
+    "-Itests/firmware",
+)
+SANITIZED = (
+    *("-std=gnu++14", "-O1", "-g1", "-w", "-fPIC", "-Ifirmware", "-Iprotocol", "-Itests/firmware"),
+    *("-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
+)
+MAIN = ("-std=gnu++14", "-O0", "-g0", "-w", "-Itests/firmware")  # doctest's own code: 2 s, not 16
+CPU_LIMIT_S = 10
+LIBRARY = "libmutant.so"
+# What the rules make of names of types (uint0_t, uint(8+1)_t): never compiles.
+_BROKEN_TYPE = re.compile(r"\bu?int(-?[01]|\(\d+[+-]1\))_t|\bu?int\d+_t\(")
+
+INVALID, SAME, KILLED, SURVIVED = "invalid", "same", "killed", "survived"
+
+
+class MutantError(Exception):
+    """The unchanged file does not pass its suite, or a tool is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mutant:
+    """One changed source: the line it changed, as it was and as it is."""
+
+    text: str
+    line: int
+    was: str
+    now: str
+
+    @property
+    def key(self) -> str:
+        """Name of the mutant in the notes."""
+        return sha256(self.text.encode()).hexdigest()[:20]
+
+
+def mutants_of(source: Path) -> list[Mutant]:
+    """Let universalmutator alter a file; what can never compile is left out at once."""
+    program = Path(sys.executable).with_name("mutate")
+    if not program.is_file():
+        raise MutantError(f"no {program}: run make setup")
+    original = source.read_text(encoding="utf-8")
+    found: dict[str, Mutant] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        command = [str(program), str(source), "cpp", "--noCheck", "--mutantDir", folder]
+        subprocess.run(command, capture_output=True, check=True, cwd=folder)
+        for path in sorted(Path(folder).glob(f"{source.stem}.mutant.*.cpp"), key=_number):
+            text = path.read_text(encoding="utf-8")
+            mutant = _compare(original, text)
+            if mutant is not None and not _BROKEN_TYPE.search(mutant.now):
+                found.setdefault(mutant.key, mutant)
+    # In an order that says nothing, so that the first hundred stand for all.
+    return sorted(found.values(), key=lambda mutant: mutant.key)
+
+
+def _number(path: Path) -> int:
+    return int(path.name.split(".")[-2])
+
+
+def _compare(original: str, text: str) -> Mutant | None:
+    old, new = original.splitlines(), text.splitlines()
+    for tag, i1, i2, j1, j2 in difflib.SequenceMatcher(None, old, new, False).get_opcodes():
+        if tag != "equal":
+            was, now = " ".join(old[i1:i2]), " ".join(line.strip() for line in new[j1:j2])
+            return Mutant(text, i1 + 1, was.strip(), now.strip())
+    return None
+
+
+class Judge:
+    """The suites of one file, compiled once, and the verdict on each of its mutants.
+
+    Parameters
+    ----------
+    name : str
+        Of the file in firmware/core, without suffix.
+    suites : tuple of str
+        Its suites in tests/firmware.
+    folder : Path
+        For objects and programs.
+
+    Raises
+    ------
+    MutantError
+        If the unchanged file does not pass.
+    """
+
+    def __init__(self, name: str, suites: tuple[str, ...], folder: Path) -> None:
+        self.source = CORE / f"{name}.cpp"
+        self._folder = folder
+        self._programs: dict[tuple[str, ...], list[Path]] = {}
+        for flags in (PLAIN, SANITIZED):
+            kind = "plain" if flags is PLAIN else "sanitized"
+            others = [p for p in sorted(CORE.glob("*.cpp")) if p != self.source]
+            objects = [self._object(path, flags, kind) for path in others]
+            objects.append(self._object(SUITES / "check_main.cpp", MAIN, "main"))
+            own = self._object(self.source, flags, kind)
+            original = folder / kind
+            original.mkdir()
+            if not self._link(own, original, flags):
+                raise MutantError(f"{name} does not link")
+            self._programs[flags] = [
+                self._program(suite, objects, original, flags, kind) for suite in suites
+            ]
+            if not self._passes(original, flags):
+                raise MutantError(f"{name}: its own suite fails without a mutation")
+        self.original = self._content(self._object(self.source, PLAIN, "plain"))
+
+    def verdict(self, mutant: Mutant, seen: dict[str, str]) -> str:
+        """Judge a mutant; `seen` holds the objects known so far, by their content."""
+        with tempfile.TemporaryDirectory(dir=self._folder) as name:
+            folder = Path(name)
+            # The same name for all: it must not tell the objects apart.
+            source = folder / self.source.name
+            source.write_text(mutant.text, encoding="utf-8")
+            built = folder / "mutant.o"
+            if not self._compile(source, built, PLAIN):
+                return INVALID
+            content = self._content(built)
+            if content == self.original or seen.setdefault(content, mutant.key) != mutant.key:
+                return SAME
+            if not self._link(built, folder, PLAIN) or not self._passes(folder, PLAIN):
+                return KILLED
+            if not self._compile(source, built, SANITIZED):
+                return INVALID
+            well = self._link(built, folder, SANITIZED) and self._passes(folder, SANITIZED)
+            return SURVIVED if well else KILLED
+
+    def _object(self, path: Path, flags: tuple[str, ...], kind: str) -> Path:
+        target = self._folder / f"{kind}-{path.stem}.o"
+        if not target.is_file() and not self._compile(path, target, flags):
+            raise MutantError(f"{path} does not compile")
+        return target
+
+    @staticmethod
+    def _compile(source: Path, target: Path, flags: tuple[str, ...]) -> bool:
+        command = [COMPILER, *flags, "-I", str(CORE), "-c", str(source), "-o", str(target)]
+        return subprocess.run(command, cwd=ROOT, capture_output=True, check=False).returncode == 0
+
+    # A mutant is a library of its own beside programs that stay: linking those takes ten times as
+    # long as compiling it.
+    @staticmethod
+    def _link(built: Path, folder: Path, flags: tuple[str, ...]) -> bool:
+        extra = [flag for flag in flags if "sanitize" in flag]
+        library = folder / LIBRARY
+        command = [COMPILER, *extra, "-shared", str(built), "-o", str(library)]
+        return subprocess.run(command, cwd=ROOT, capture_output=True, check=False).returncode == 0
+
+    def _program(
+        self, suite: str, objects: list[Path], library: Path, flags: tuple[str, ...], kind: str
+    ) -> Path:
+        program = self._folder / f"{kind}-{suite}"
+        cases = [self._object(p, flags, kind) for p in sorted((SUITES / suite).glob("*.cpp"))]
+        extra = [flag for flag in flags if "sanitize" in flag]
+        command = [COMPILER, *extra, "-rdynamic", *map(str, [*cases, *objects])]
+        command += [f"-L{library}", "-lmutant", "-o", str(program)]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise MutantError(f"{suite} does not link: {done.stderr[-500:]}")
+        return program
+
+    def _passes(self, library: Path, flags: tuple[str, ...]) -> bool:
+        # A name that is missing shows at the start, not at its first call.
+        variables = {**os.environ, "LD_LIBRARY_PATH": str(library), "LD_BIND_NOW": "1"}
+        for program in self._programs[flags]:
+            try:
+                # The suites' main() tells failures in words, for PlatformIO, and ends with 0.
+                done = subprocess.run(
+                    [str(program)], capture_output=True, text=True, errors="replace", check=False,
+                    preexec_fn=_limit, timeout=600, env=variables,
+                )  # fmt: skip
+            except subprocess.TimeoutExpired:
+                return False
+            if done.returncode != 0 or "SUCCESS!" not in done.stdout:
+                return False
+        return True
+
+    @staticmethod
+    def _content(built: Path) -> str:
+        return sha256(built.read_bytes()).hexdigest()
+
+
+def _limit() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT_S, CPU_LIMIT_S))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What came of the mutants of a file."""
+
+    name: str
+    verdicts: dict[str, str]
+    survivors: list[Mutant]
+
+    def count(self, verdict: str) -> int:
+        """How many ended so."""
+        return sum(1 for one in self.verdicts.values() if one == verdict)
+
+    @property
+    def share(self) -> float:
+        """Killed of those that count."""
+        counted = self.count(KILLED) + self.count(SURVIVED)
+        return self.count(KILLED) / counted if counted else 0.0
+
+
+def judge_file(
+    name: str, suites: tuple[str, ...], *, jobs: int, most: int | None = None, out: Path = OUT
+) -> Result:
+    """Judge every mutant of a file, going on where an earlier run of the same file stopped.
+
+    A survivor is judged again when a suite has changed; what was killed stays so while the file
+    is the same, as long as suites only grow (remove build/mutants to begin anew). `most` bounds how
+    many are judged: a sample that says nothing of which.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    source = CORE / f"{name}.cpp"
+    headers = b"".join(path.read_bytes() for path in sorted(CORE.glob("*.h")))
+    of_file = sha256(source.read_bytes() + headers).hexdigest()
+    texts = b"".join(p.read_bytes() for s in suites for p in sorted((SUITES / s).glob("*")))
+    of_suites = sha256(texts).hexdigest()
+    notes = out / f"{name}.json"
+    kept = json.loads(notes.read_text()) if notes.is_file() else {}
+    verdicts: dict[str, str] = kept.get("verdicts", {}) if kept.get("file") == of_file else {}
+    seen: dict[str, str] = kept.get("seen", {}) if verdicts else {}
+    if kept.get("suites") != of_suites:
+        verdicts = {key: one for key, one in verdicts.items() if one != SURVIVED}
+    mutants = mutants_of(source)[:most]
+    waiting = [mutant for mutant in mutants if mutant.key not in verdicts]
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
+        if waiting:
+            judge = Judge(name, suites, Path(folder))
+            pairs = zip(waiting, pool.map(lambda m: judge.verdict(m, seen), waiting), strict=True)
+            for at, (mutant, one) in enumerate(pairs):
+                verdicts[mutant.key] = one
+                if at % 20 == 19 or at + 1 == len(waiting):
+                    notes.write_text(
+                        json.dumps({"file": of_file, "suites": of_suites,
+                                    "verdicts": verdicts, "seen": seen})
+                    )  # fmt: skip
+                    _progress(name, at + 1, len(waiting))
+    known = {mutant.key: verdicts[mutant.key] for mutant in mutants}
+    return Result(name, known, [m for m in mutants if known[m.key] == SURVIVED])
+
+
+def _progress(name: str, done: int, whole: int) -> None:
+    if sys.stderr.isatty() or done == whole or done % 500 == 0:
+        print(f"{name}: {done} of {whole}", file=sys.stderr, flush=True)
+
+
+def survivor_lines(result: Result) -> Iterator[str]:
+    """Name each survivor: line, as it was, as it is."""
+    for mutant in result.survivors:
+        yield f"  {result.name}.cpp:{mutant.line}  {mutant.was}  =>  {mutant.now}"

@@ -1,0 +1,101 @@
+"""The judge of mutants: what fails is killed, what compiles alike does not count."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.mutants import judge
+
+SOURCE = """\
+#include <stdint.h>
+// A comment.
+uint8_t at_most(uint8_t value, uint8_t most) {
+  return value > most ? most : value;
+}
+uint8_t unused_by_the_suite(uint8_t value) {
+  return value + 3;
+}
+"""
+SUITE = """\
+#include <stdint.h>
+
+#include "check.h"
+uint8_t at_most(uint8_t value, uint8_t most);
+TEST_CASE("no more than the most") {
+  CHECK_EQ(at_most(7, 5), 5);
+  CHECK_EQ(at_most(3, 5), 3);
+}
+"""
+MORE = """\
+uint8_t unused_by_the_suite(uint8_t value);
+TEST_CASE("three more") { CHECK_EQ(unused_by_the_suite(4), 7); }
+"""
+
+
+@pytest.fixture
+def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A core of one file and its suite."""
+    core, suites = tmp_path / "core", tmp_path / "suites"
+    (suites / "test_clamp").mkdir(parents=True)
+    core.mkdir()
+    shutil.copy(judge.SUITES / "check_main.cpp", suites)
+    (core / "clamp.cpp").write_text(SOURCE)
+    (suites / "test_clamp" / "test_clamp.cpp").write_text(SUITE)
+    monkeypatch.setattr(judge, "CORE", core)
+    monkeypatch.setattr(judge, "SUITES", suites)
+    monkeypatch.setattr(judge, "CPU_LIMIT_S", 2)
+    return tmp_path
+
+
+def mutant(before: str, after: str) -> judge.Mutant:
+    """Change the source in one place."""
+    assert before in SOURCE
+    return judge.Mutant(SOURCE.replace(before, after), 1, before, after)
+
+
+def test_verdicts(tree: Path) -> None:
+    folder = tree / "out"
+    folder.mkdir()
+    one = judge.Judge("clamp", ("test_clamp",), folder)
+    seen: dict[str, str] = {}
+    changes = {
+        "less": ("value > most", "value < most"),
+        "endless": ("  return value > most", "  for (;;) value++;\n  return value > most"),
+        "gone": ("uint8_t at_most(", "uint8_t other("),
+        "comment": ("// A comment.", "// Another."),
+        "nonsense": ("value > most", "value >< most"),
+        "untested": ("value + 3", "value + 4"),
+        "again": ("value + 3", "4 + value"),
+    }
+    told = {name: one.verdict(mutant(*change), seen) for name, change in changes.items()}
+    assert told == {
+        "less": judge.KILLED,
+        "endless": judge.KILLED,
+        "gone": judge.KILLED,
+        "comment": judge.SAME,
+        "nonsense": judge.INVALID,
+        "untested": judge.SURVIVED,
+        "again": judge.SAME,
+    }
+
+
+def test_a_file_that_fails_its_own_suite_is_refused(tree: Path) -> None:
+    (tree / "core" / "clamp.cpp").write_text(SOURCE.replace("value > most", "value < most"))
+    folder = tree / "out"
+    folder.mkdir()
+    with pytest.raises(judge.MutantError, match="its own suite fails"):
+        judge.Judge("clamp", ("test_clamp",), folder)
+
+
+def test_a_run_goes_on_and_survivors_are_judged_again_by_a_new_suite(tree: Path) -> None:
+    first = judge.judge_file("clamp", ("test_clamp",), jobs=1, out=tree / "notes")
+    assert first.count(judge.KILLED) > 3
+    assert any("value + 3" in one.was for one in first.survivors)
+    suite = tree / "suites" / "test_clamp" / "test_clamp.cpp"
+    suite.write_text(SUITE + MORE)
+    second = judge.judge_file("clamp", ("test_clamp",), jobs=1, out=tree / "notes")
+    assert second.share > first.share
+    assert not any("value + 3" in one.was for one in second.survivors)
