@@ -190,3 +190,24 @@ TEST_CASE("random pushes and blocks: what was accepted comes out, what was dropp
   CHECK(accepted + ring.dropped() == next);
   CHECK_EQ(buffer[kCapacity], 0xEE);
 }
+
+TEST_CASE("a closed ring lends its memory and takes no frame; an open one lends nothing") {
+  uint8_t memory[128];
+  core::ByteRing lender(memory, sizeof(memory));
+  lender.clear();
+  CHECK(lender.lend() == nullptr);
+  CHECK(lender.push_event(frames::Event::kMark, 1, 0));
+  lender.close();
+  CHECK_EQ(lender.used(), 0);
+  REQUIRE(lender.lend() == memory);
+  memset(memory, 0x5A, sizeof(memory));
+  CHECK(!lender.push_event(frames::Event::kMark, 2, 0));
+  CHECK(lender.tell_dropped());
+  for (const uint8_t byte : memory) {
+    CHECK_EQ(byte, 0x5A);
+  }
+  CHECK_EQ(lender.dropped(), 0U);
+  lender.clear();
+  CHECK(lender.lend() == nullptr);
+  CHECK(lender.push_event(frames::Event::kMark, 3, 0));
+}
