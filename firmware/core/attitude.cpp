@@ -7,7 +7,7 @@ namespace {
 
 constexpr int32_t kOneQ30 = INT32_C(1) << 30;
 constexpr int32_t kHalfQ30 = kOneQ30 / 2;  // 1 - 2 (x2 + y2) without its 2, which would not fit
-constexpr int32_t kRadpsQ27 = 35764;  // 1/65.5 deg/s in rad/s, Q27
+constexpr int32_t kRadpsQ27 = 35764;       // 1/65.5 deg/s in rad/s, Q27
 constexpr int16_t kGravity = 8192;
 constexpr uint32_t kHalfPerUs = 17180;              // 4e-6 * 2^32: rate Q27 to half an angle Q30
 constexpr uint32_t kTurnPerCmps = 4277;             // 16 * 8192 / (980.665 * 2^27) * 2^32
