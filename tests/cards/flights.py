@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from functools import cache
+from functools import lru_cache
 
 from tests.cards.sparse import BLOCK, END, SparseCard
 from tests.protocol.log_writer import LogWriter
@@ -46,7 +46,7 @@ class FlightFile:
     entry: int
 
 
-@cache
+@lru_cache(maxsize=32)
 def flight_blocks(session: int, blocks: int, *, ended: bool) -> bytes:
     """Write a flight of so many blocks; block 0 belongs to the schema, as in a prepared file."""
     writer = LogWriter(session=session, card_block=1000 * session, keep_truth=False)

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import json
 import subprocess
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
 BLOCK = 512
-MOST_PASSES = 12
-MAGIC = b"FLT1"  # protocol/README.md, The log
 
 
 def list_files(image: Path) -> list[str]:
@@ -49,49 +46,6 @@ def findings(image: Path) -> str:
     """What `fsck.vfat -n` finds; empty if nothing."""
     done = subprocess.run(["fsck.vfat", "-n", str(image)], capture_output=True, check=False)
     return done.stdout.decode(errors="replace") if done.returncode else ""
-
-
-def repair(image: Path) -> int:
-    """Let `fsck.vfat -a` repair the image, again while a look still finds something.
-
-    Returns
-    -------
-    int
-        Passes it took; 0: nothing was wrong.
-
-    Raises
-    ------
-    AssertionError
-        If it gave up, or left something.
-    """
-    for passes in range(MOST_PASSES):
-        left = findings(image)
-        if not left:
-            return passes
-        done = subprocess.run(["fsck.vfat", "-a", str(image)], capture_output=True, check=False)
-        if done.returncode not in (0, 1):
-            raise AssertionError(f"fsck.vfat -a gave up ({done.returncode}) on: {left[:300]}")
-    raise AssertionError(f"{MOST_PASSES} passes of fsck.vfat -a left: {findings(image)[:300]}")
-
-
-def whole_blocks(data: bytes) -> dict[tuple[int, int], bytes]:
-    """Find every 512 bytes that carry the log's magic and their own CRC-32.
-
-    Returns
-    -------
-    dict
-        The blocks by file id and sequence number.
-    """
-    found = {}
-    at = data.find(MAGIC)
-    while at >= 0:
-        block = data[at : at + BLOCK]
-        whole = at % BLOCK == 0 and len(block) == BLOCK
-        if whole and zlib.crc32(block[:508]) == int.from_bytes(block[508:], "little"):
-            name = int.from_bytes(block[4:8], "little"), int.from_bytes(block[12:16], "little")
-            found[name] = block
-        at = data.find(MAGIC, at + 1)
-    return found
 
 
 def frames_of(block: bytes, sizes: dict[int, int]) -> Iterator[tuple[int, int]]:

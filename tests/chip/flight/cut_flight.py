@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -13,6 +14,7 @@ from flight.rig import FlightRig
 from numpy.typing import NDArray
 from simavr_bench import CardKind, cycles
 from simavr_bench.card_journal import CardJournal, CutCard, Journal
+from simavr_bench.heartbeat import Beats
 from simavr_bench.sd_card import make_fat32
 
 FILE_BLOCKS = 131_072  # 64 MiB
@@ -68,6 +70,8 @@ class Flight:
         Cycles between which the power may be cut.
     first_lba : int
         Where the flight's file begins.
+    beats : Beats
+        Of the heartbeat.
     """
 
     plan: Plan
@@ -76,6 +80,7 @@ class Flight:
     begin: int
     end: int
     first_lba: int
+    beats: Beats
 
     def in_file(self) -> NDArray[np.bool_]:
         """Tell which records of the journal are blocks of the flight's file."""
@@ -179,9 +184,9 @@ def fly(elf: Path, plan: Plan, base: Path, *, seed: int) -> Flight:
         phase = rng.integers(0, cycles(3.0 - plan.stall_s), len(at))
         rig.card.stall_at([int(c) for c in at + phase], plan.stall_s)
     rig.chip.run_until(end + cycles(1.5))
-    records = journal.records()
+    records, beats = journal.records(), rig.beats()
     rig.chip.close()
-    return Flight(plan, rig.card_image, records, begin, end, place_of_file(records))
+    return Flight(plan, rig.card_image, records, begin, end, place_of_file(records), beats)
 
 
 class FlightCuts:
@@ -246,7 +251,10 @@ class FlightCuts:
 
         flight = self.flight
         file = self.card.path.with_name("cut.bin")
-        data = read_file(self.card.path, "FLT00001.BIN", file)
+        try:
+            data = read_file(self.card.path, "FLT00001.BIN", file)
+        except subprocess.CalledProcessError:
+            return ["mtools does not read FLT00001.BIN"]
         ended = flight.journal[flight.in_file() & (flight.journal["ended"] <= cycle)]
         wrong = []
         for record in ended:

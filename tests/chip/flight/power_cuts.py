@@ -1,12 +1,11 @@
 """Cut the power at random instants of flight, of preparing and of closing a file.
 
-    make power-cuts                       300 instants of flight, 100 of metadata, 30 true reboots
-    make power-cuts CUTS="--flight 30 --ground 20 --reboots 6"
-    make power-cuts CUTS="--every"        and within every block of metadata once
+    make power-cuts                       300 instants of flight, all metadata, 30 reboots
+    make power-cuts CUTS="--flight 30 --step 40 --reboots 6"
 
 Simulation only. A cut takes everything that comes after it: so one run of the simulated chip, with
-every block the card programmed and when, gives the card of any instant. The reboots are true cuts:
-they check that this is so, and what the next boot does.
+every block the card programmed and when, gives the card of any instant. The next boot is judged as
+the pilot has it, with nothing repaired. The reboots are true cuts: they check that this is so.
 """
 
 from __future__ import annotations
@@ -19,12 +18,11 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
+from flight.cut_boots import CLUSTER_KILOBYTES, cut_everywhere, write_on_the_ground
 from flight.cut_flight import PAYLOAD, Flight, FlightCuts, Plan, fly, make_base
-from flight.cut_ground import GroundRun, close_and_prepare, judge_ground_cut
 from flight.cut_reboot import BOOTS, RebootBench, RebootResult, compare_with, spread
 from flight.images import build_image
 from simavr_bench import CardKind
-from simavr_bench.card_journal import CutCard
 
 # Cards of 4 to 32 GB come with clusters of 64 blocks; those of up to 2 GB are addressed in bytes.
 LARGE = (CardKind.SDHC, 2100, 64)
@@ -57,21 +55,26 @@ def cut_flight(flight: Flight, count: int, folder: Path, seed: int) -> int:
     return bad
 
 
-def cut_ground(run: GroundRun, cycles: list[int], plan: Plan, folder: Path, seed: int) -> int:
-    """Cut closing or preparing, print a row; gives the number of wrong cuts."""
-    card = CutCard(run.base, folder / "ground.img", run.journal, seed=seed)
-    results = [(cycle, judge_ground_cut(run, card, cycle, folder)) for cycle in cycles]
-    for cycle, result in results:
+def cut_metadata(
+    elf: Path, kilobytes: int, folder: Path, *, every: int, on_chip: int, seed: int
+) -> tuple[int, int, float]:
+    """Cut closing and preparing, print a row; gives cuts, wrong ones, the lowest gate voltage."""
+    run = write_on_the_ground(elf, kilobytes, folder)
+    results = list(cut_everywhere(elf, run, folder, every=every, on_chip=on_chip, seed=seed))
+    for result in results:
         for text in result.wrong:
-            print(f"    cut at {cycle / 16e6:.6f} s: {text}")
-    spoilt = sum(result.spoilt is not None for _, result in results)
-    passes = max((result.passes for _, result in results), default=0)
-    salvaged = sum(result.salvaged for _, result in results)
+            how = "within" if result.garbage else "before"
+            print(f"    {kilobytes} kB, {how} write {result.write}: {text}")
+    bad = sum(bool(result.wrong) for result in results)
+    flown = [result.beats for result in results if result.beats is not None]
+    gate_volt = min((beats.gate_volt for beats in flown), default=float("inf"))
+    rest_ms = 1e3 * max((beats.rest_s for beats in flown), default=0.0)
     print(
-        f"  {plan.name:26} {run.name:10} {len(cycles):5} {spoilt:8} {passes:12} {salvaged:9}",
+        f"  {kilobytes:5} kB {len(run.writes):8} {len(results):6} {len(flown):8} "
+        f"{rest_ms:12.2f} {gate_volt:8.2f} {bad:7}",
         flush=True,
     )
-    return sum(bool(result.wrong) for _, result in results)
+    return len(results), bad, gate_volt
 
 
 def reboot(bench: RebootBench, count: int, seed: int) -> int:
@@ -104,28 +107,25 @@ def run_flights(elf: Path, count: int, seed: int, folder: Path) -> tuple[int, li
         base = make_base(plan, folder / f"base{k}.img", seed + k)
         flight = fly(elf, plan, base, seed=seed + k)
         flights.append(flight)
+        for text in flight.beats.wrong():
+            print(f"    {plan.name}: {text}")
+            bad += 1
         bad += cut_flight(flight, cuts, folder, seed + k)
     return bad, flights
 
 
-def run_ground(
-    elf: Path, flights: list[Flight], count: int, seed: int, folder: Path, *, every: bool
-) -> int:
-    """Close and prepare behind the first two flights, and cut that."""
-    print("\nground                     phase       cuts  garbage  fsck passes  salvaged")
-    bad = 0
-    counts = iter(share(count, 4))
-    for k, flight in enumerate(flights[:2]):
-        left = CutCard(flight.base, folder / f"open{k}.img", flight.journal, seed=seed)
-        left.cut(flight.end)
-        rng = np.random.default_rng(seed + k)
-        for run in close_and_prepare(elf, left.path, flight.plan.kind, folder):
-            instants = [int(c) for c in run.instants(next(counts), rng)]
-            bad += cut_ground(run, instants, flight.plan, folder, seed)
-            if every:
-                instants = [int(c) for c in run.every_block()]
-                bad += cut_ground(run, instants, flight.plan, folder, seed)
-    return bad
+def run_metadata(elf: Path, folder: Path, *, every: int, seed: int) -> tuple[int, int]:
+    """Cut at every write of metadata, clusters of each size; gives cuts and wrong ones."""
+    print("\nmetadata    writes   cuts  on chip  longest rest     gate   wrong   (ms, V)")
+    cuts = bad = 0
+    for kilobytes in CLUSTER_KILOBYTES:
+        on_chip = 16 if kilobytes == 4 else 2
+        more, wrong, _ = cut_metadata(
+            elf, kilobytes, folder, every=every, on_chip=on_chip, seed=seed + kilobytes
+        )
+        cuts += more
+        bad += wrong
+    return cuts, bad
 
 
 def run_reboots(elf: Path, flight: Flight, count: int, seed: int, folder: Path) -> int:
@@ -142,9 +142,8 @@ def main() -> int:
     """Print the tables; 0 if every cut left what it must, else 6."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--flight", type=int, default=300, help="cuts in flight (default 300)")
-    parser.add_argument("--ground", type=int, default=100, help="cuts on the ground (default 100)")
+    parser.add_argument("--step", type=int, default=1, help="writes of metadata to the next cut")
     parser.add_argument("--reboots", type=int, default=30, help="true cuts (default 30)")
-    parser.add_argument("--every", action="store_true", help="in every block of metadata too")
     parser.add_argument("--seed", type=int, default=1, help="default 1")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -152,9 +151,10 @@ def main() -> int:
         # Its own copy: a build meanwhile would make the reboots another program's.
         elf = Path(shutil.copy(build_image("mega2560"), folder / "firmware.elf"))
         bad, flights = run_flights(elf, options.flight, options.seed, folder)
-        bad += run_ground(elf, flights, options.ground, options.seed, folder, every=options.every)
+        cuts, wrong = run_metadata(elf, folder, every=options.step, seed=options.seed)
+        bad += wrong
         bad += run_reboots(elf, flights[0], options.reboots, options.seed, folder)
-    total = options.flight + options.ground + options.reboots
+    total = options.flight + cuts + options.reboots
     print(f"\n{total} cuts, seed {options.seed}: {bad} left what they must not")
     return 6 if bad else 0
 

@@ -18,10 +18,13 @@ from simavr_bench import (
     Receiver,
     SdCard,
 )
+from simavr_bench.heartbeat import Beats, judge_beats
 
 BOOTLOADER = Path(
     "/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex"
 )
+HEARTBEAT = "PH5"
+THRESHOLDS_VOLT = (0.8, 1.5)  # BSS138, least and most
 RECEIVER_PINS = ("PK0", "PK1", "PK2", "PK3", "PK4")
 SERVOS = {
     "aileron": ("PK0", "PE4"),
@@ -94,6 +97,8 @@ class FlightRig:
         its own, kept with `save_card`.
     card_kind : CardKind
         How the card is addressed.
+    threshold_volt : float or None
+        Of the relay's transistor; None: the end of its data sheet that is worse for each movement.
     ground_s : float
         IMU and GPS stand still for so long after power-on, then move; 0: it wakes in flight.
     source : callable
@@ -109,6 +114,7 @@ class FlightRig:
     bootloader: bool = False
     in_place: bool = True
     card_kind: CardKind = CardKind.SDHC
+    threshold_volt: float | None = None
     ground_s: float = GROUND_S
     source: Callable[[float], ImuSample] = numbered
     sticks: Callable[[float], Sequence[float]] | None = None
@@ -147,7 +153,9 @@ class FlightRig:
         )
         self.gps = GpsUart(self.chip, 2, knows_pvt=True, velocity_cmps=STANDING_CMPS)
         self.baro = Bmp085(self.chip, "PA2", "PA3")
-        self.relay = ChargePumpRelay(self.chip, "PH5", SERVOS, sense="PH6")
+        self.relay = ChargePumpRelay(self.chip, HEARTBEAT, SERVOS, sense="PH6")
+        if self.threshold_volt is not None:
+            self.relay.on_volt = self.relay.off_volt = self.threshold_volt
         self.chip.on_start(self.started.append)
         for slot, channel in enumerate(ANALOG_CHANNELS):
             self.chip.analog(channel, 0.8 + 0.33 * slot, noise_lsb=0.5)
@@ -183,6 +191,17 @@ class FlightRig:
         self.chip.run_s(1.5)
         self.receiver.width_us[4] = MEGA_US
         self.chip.run_s(0.5)
+
+    def beats(self, *, may_stop: bool = False) -> Beats:
+        """Judge the heartbeat so far, at the worst tolerances of its pump.
+
+        Parameters
+        ----------
+        may_stop : bool
+            Whether the Mega may have ceased to drive.
+        """
+        until = None if may_stop else self.chip.cycle
+        return judge_beats(*self.chip.edges(HEARTBEAT), may_stop=may_stop, until=until)
 
     def status_lines(self) -> list[str]:
         """Lines of the USB port so far."""

@@ -66,6 +66,35 @@ def test_card_that_cannot_be_recorded_on(flight_elf: Path, tmp_path: Path, injec
     assert in_fork(partial(boot, flight_elf, tmp_path, bad)).wrong == []
 
 
+@pytest.mark.parametrize(
+    "injected",
+    [
+        "closing cut, chain first, 4 kB",
+        "newest chain cyclic at its begin",
+        "first cluster out of range",
+        "3 s stall while mounting",
+    ],
+)
+def test_strange_card_at_power_on(flight_elf: Path, tmp_path: Path, injected: str) -> None:
+    from flight.faults.strange import STRANGE_CARDS, fly_strange
+
+    row = next(row for row in STRANGE_CARDS if row.injected == injected)
+    assert fly_strange(flight_elf, tmp_path, row).judgement.wrong == []
+
+
+@pytest.mark.parametrize("threshold_volt", [0.8, 1.5])
+def test_refused_block_with_either_transistor(
+    flight_elf: Path, tmp_path: Path, threshold_volt: float
+) -> None:
+    from flight.faults.rows import FAULTS
+    from flight.faults.run import ready_rig, run_fault
+    from simavr_bench import in_fork
+
+    rig, journal = ready_rig(flight_elf, tmp_path, threshold_volt=threshold_volt)
+    fault = next(fault for fault in FAULTS if fault.injected == "block refused twice")
+    assert in_fork(partial(run_fault, rig, journal, fault, tmp_path)).wrong == []
+
+
 def test_an_expectation_that_is_not_met_is_said(
     in_flight: tuple[FlightRig, CardJournal], tmp_path: Path
 ) -> None:

@@ -2,53 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-import host
-
 if TYPE_CHECKING:
+    from flight.cut_boots import GroundWrites
     from flight.cut_flight import Flight
-    from flight.cut_ground import GroundRun
     from simavr_bench.card_journal import Journal
 
 
-@dataclass(frozen=True, slots=True)
-class Cuttable:
-    """A flight and what the next power-on wrote on the ground."""
-
-    flight: Flight
-    closing: GroundRun
-    preparing: GroundRun
-
-
 @pytest.fixture(scope="module")
-def cuttable(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cuttable]:
-    """One flight on a card of 300 MiB, its file closed at the next power-on."""
+def flight(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Flight:
+    """One flight on a card of 300 MiB."""
     from flight.cut_flight import Plan, fly, make_base
-    from flight.cut_ground import close_and_prepare
     from simavr_bench import CardKind
-    from simavr_bench.card_journal import CutCard
 
     folder = tmp_path_factory.mktemp("cuts")
     plan = Plan("short", CardKind.SDSC, 300, 8, flight_s=6.0, stall_s=0.5)
-    flight = fly(flight_elf, plan, make_base(plan, folder / "base.img", 5), seed=5)
-    left = CutCard(flight.base, folder / "open.img", flight.journal)
-    left.cut(flight.end)
-    closing, preparing = close_and_prepare(flight_elf, left.path, plan.kind, folder)
-    yield Cuttable(flight, closing, preparing)
+    return fly(flight_elf, plan, make_base(plan, folder / "base.img", 5), seed=5)
 
 
-def test_flight_loses_nothing_that_was_written(cuttable: Cuttable, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def ground(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> GroundWrites:
+    """What is written on the ground beside an open flight, clusters of 64 kB."""
+    from flight.cut_boots import write_on_the_ground
+
+    return write_on_the_ground(flight_elf, 64, tmp_path_factory.mktemp("ground"))
+
+
+def test_flight_loses_nothing_that_was_written(flight: Flight, tmp_path: Path) -> None:
     from flight.cut_flight import FlightCuts
 
-    cuts = FlightCuts(cuttable.flight, tmp_path, seed=6)
-    flight = cuttable.flight
+    cuts = FlightCuts(flight, tmp_path, seed=6)
     rows = flight.journal[flight.in_file()]
     inside = rows[(rows["begun"] > flight.begin) & (rows["ended"] < flight.end)]
     # a block of the schema, one in flight, one with a stall
@@ -65,35 +54,34 @@ def test_flight_loses_nothing_that_was_written(cuttable: Cuttable, tmp_path: Pat
     assert {result.state for result in results} >= {"busy", "idle"}
 
 
-def test_next_power_on_writes_nothing_beside_the_file_in_flight(cuttable: Cuttable) -> None:
-    flight = cuttable.flight
+def test_next_power_on_writes_nothing_beside_the_file_in_flight(flight: Flight) -> None:
     later = flight.journal["begun"] > flight.begin
     assert np.all(flight.in_file()[later])
     assert np.count_nonzero(~flight.in_file()) > 100  # on the ground it did
 
 
-@pytest.mark.parametrize("phase", ["closing", "preparing"])
-def test_metadata_can_be_cut_anywhere(cuttable: Cuttable, tmp_path: Path, phase: str) -> None:
-    from flight.cut_ground import judge_ground_cut
-    from simavr_bench.card_journal import CutCard
-
-    run = {"closing": cuttable.closing, "preparing": cuttable.preparing}[phase]
-    card = CutCard(run.base, tmp_path / "cut.img", run.journal, seed=7)
-    every = run.every_block()
-    # the last block is the directory's: garbage there is the worst that can happen
-    instants = [*run.instants(4, np.random.default_rng(7)), every[0], every[-1]]
-    results = [judge_ground_cut(run, card, int(cycle), tmp_path) for cycle in sorted(instants)]
-    assert [result.wrong for result in results] == [[]] * len(results)
-    assert any(result.spoilt is not None for result in results)
+def test_heartbeat_of_the_flight(flight: Flight) -> None:
+    assert flight.beats.wrong() == []
 
 
-@pytest.mark.parametrize("boot", [0, 1])
+def test_next_boot_records_whatever_write_was_cut(
+    flight_elf: Path, ground: GroundWrites, tmp_path: Path
+) -> None:
+    """A few of the writes of closing and preparing, cut before and within."""
+    from flight.cut_boots import cut_everywhere
+
+    every = len(ground.writes) // 5
+    cuts = list(cut_everywhere(flight_elf, ground, tmp_path, every=every, on_chip=2, seed=7))
+    assert [cut.wrong for cut in cuts] == [[]] * len(cuts)
+    assert sum(cut.beats is not None for cut in cuts) >= 4
+
+
+@pytest.mark.parametrize("boot", range(4))
 def test_true_cut_and_the_next_boot(
-    flight_elf: Path, cuttable: Cuttable, tmp_path: Path, boot: int
+    flight_elf: Path, flight: Flight, tmp_path: Path, boot: int
 ) -> None:
     from flight.cut_reboot import BOOTS, RebootBench, compare_with
 
-    flight = cuttable.flight
     bench = RebootBench.take_off(flight_elf, flight.plan, flight.base, tmp_path, seed=5)
     assert compare_with(flight, bench) == ""
     assert bench.cut(31_234_567, BOOTS[boot]).wrong == []
@@ -107,12 +95,11 @@ def altered(journal: Journal, rows: list[int]) -> Journal:
     return changed
 
 
-def test_a_lost_block_is_noticed(cuttable: Cuttable, tmp_path: Path) -> None:
+def test_a_lost_block_is_noticed(flight: Flight, tmp_path: Path) -> None:
     """A card that says it is done with a block and was not: one row is written elsewhere."""
     from flight.cut_flight import FlightCuts
     from simavr_bench.card_journal import CutCard
 
-    flight = cuttable.flight
     cuts = FlightCuts(flight, tmp_path, seed=6)
     rows = np.flatnonzero(flight.in_file() & (flight.journal["begun"] > flight.begin))
     lying = flight.journal.copy()
@@ -121,11 +108,10 @@ def test_a_lost_block_is_noticed(cuttable: Cuttable, tmp_path: Path) -> None:
     assert any("is not in the file" in text for text in cuts.judge(flight.end).wrong)
 
 
-def test_metadata_in_flight_is_noticed(cuttable: Cuttable, tmp_path: Path) -> None:
+def test_metadata_in_flight_is_noticed(flight: Flight, tmp_path: Path) -> None:
     """The FAT of the preparation written between blocks of the flight: a cut leaves lost chains."""
     from flight.cut_flight import FlightCuts
 
-    flight = cuttable.flight
     metadata = np.flatnonzero(~flight.in_file())
     data = np.flatnonzero(flight.in_file())
     late, early = list(metadata[-60:]), list(metadata[:-60])
@@ -136,39 +122,43 @@ def test_metadata_in_flight_is_noticed(cuttable: Cuttable, tmp_path: Path) -> No
     assert any("fsck.vfat found" in text for text in cuts.judge(cycle).wrong)
 
 
-def test_a_file_closed_too_short_is_noticed(cuttable: Cuttable, tmp_path: Path) -> None:
-    """The directory says a size one cluster short of what was recorded."""
-    from flight.cut_ground import judge_ground_cut
-    from simavr_bench.card_journal import CutCard
+def test_a_file_closed_too_short_is_noticed(ground: GroundWrites, tmp_path: Path) -> None:
+    """The directory says a size one block short of what was recorded."""
+    from flight.cut_boots import judge_card
 
-    run = cuttable.closing
-    short = run.journal.copy()
-    data = bytearray(short["data"][run.last].tobytes())
-    entry = data.index(b"FLT00001BIN")
-    size = int.from_bytes(data[entry + 28 : entry + 32], "little") - 4096
-    data[entry + 28 : entry + 32] = size.to_bytes(4, "little")
-    short["data"][run.last] = np.frombuffer(bytes(data), np.uint8)
-    card = CutCard(run.base, tmp_path / "short.img", short)
-    cut = judge_ground_cut(run, card, int(short["ended"][run.last]) + 1, tmp_path)
-    assert any("blocks lost" in text for text in cut.wrong)
+    card = ground.card_after(len(ground.writes))
+    assert judge_card(card, ground, tmp_path) == []
+    root = card.lba(2) * 512
+    entry = card.image.find(b"FLT00007BIN", root, root + 65536)
+    size = int.from_bytes(card.image[entry + 28 : entry + 32], "little")
+    card.image[entry + 28 : entry + 32] = (len(ground.flight) - 512).to_bytes(4, "little")
+    wrong = judge_card(card, ground, tmp_path)
+    assert size > len(ground.flight)
+    assert [text.split()[0] for text in wrong] == ["mtools", "pyfatfs", "cut.bin:"]
 
 
-def test_what_fsck_salvaged_decodes_in_one_piece(cuttable: Cuttable, tmp_path: Path) -> None:
-    """The FAT's sector with the flight's end spoilt: the file and the FSCK files put together."""
-    from flight.card_files import list_files, read_file, repair, whole_blocks
-    from simavr_bench.card_journal import CutCard
+def test_a_spoilt_block_of_the_flight_is_noticed(ground: GroundWrites, tmp_path: Path) -> None:
+    from flight.cut_boots import judge_garbage
 
-    run = cuttable.closing
-    card = CutCard(run.base, tmp_path / "cut.img", run.journal, seed=8)
-    rows = run.journal[run.first : run.last + 1]
-    fat = next(k for k, row in enumerate(rows) if row["data"][:4].tobytes() != b"FLT1")
-    card.cut(int(rows["begun"][fat]) + 1)
-    repair(card.path)
-    names = list_files(card.path)
-    assert any(name.startswith("FSCK") for name in names)
-    pieces = [read_file(card.path, name, tmp_path / "piece") for name in names]
-    whole = tmp_path / "whole.bin"
-    whole.write_bytes(b"".join(piece for piece in pieces if whole_blocks(piece)))
-    log = host.read_log(whole)
-    assert not log.loss.frames
-    assert len(log.scan.blocks) == len(run.flights) + 1  # and the one that ends the session
+    from tests.cards.truth import look_at
+
+    card = ground.card_after(10)
+    assert judge_garbage(card, ground, tmp_path) == []
+    (entry,) = (entry for number, entry in look_at(card).flights if number == 7)
+    card.image[(card.lba(entry.first) + 100) * 512 + 40] ^= 1
+    assert judge_garbage(card, ground, tmp_path) != []
+
+
+def test_more_than_a_file_is_noticed() -> None:
+    """What fsck.vfat may say behind a cut, and what it may not."""
+    from flight.cut_boots import beyond_a_file
+
+    allowed = (
+        "fsck.fat 4.2 (2021-01-31)\nFATs differ but appear to be intact.\n  Using first FAT.\n"
+        "/FLT00007.BIN\n  File size is 204800 bytes, cluster chain length is > 262144 bytes.\n"
+        "  Truncating file to 204800 bytes.\nReclaimed 1024 unused clusters (67108864 bytes).\n"
+        "Leaving filesystem unchanged.\n/x/cut.img: 2 files, 1028/66550 clusters\n"
+    )
+    assert beyond_a_file(allowed, 64) == []
+    assert beyond_a_file("Reclaimed 1025 unused clusters (67174400 bytes).", 64) != []
+    assert beyond_a_file("/FLT00006.BIN and\n/FLT00007.BIN\n  share clusters.", 64) != []

@@ -15,6 +15,7 @@ from simavr_bench.library import SdCounters, SdSettings
 from simavr_bench.pins import pin_number
 
 BLOCK = 512
+MAP_NORESERVE = 0x4000  # <asm-generic/mman.h>; Python names it from 3.13 on
 
 
 class CardKind(Enum):
@@ -85,7 +86,8 @@ class SdCard:
             )
         else:
             blocks = image.stat().st_size // BLOCK
-            flags = mmap.MAP_SHARED if in_place else mmap.MAP_PRIVATE
+            # A card of 32 GB is larger than the memory it is promised: only what changes is taken.
+            flags = mmap.MAP_SHARED if in_place else mmap.MAP_PRIVATE | MAP_NORESERVE
             with image.open("r+b") as file:
                 self._memory = mmap.mmap(file.fileno(), blocks * BLOCK, flags=flags)
         if blocks % 1024 or blocks == 0:

@@ -13,6 +13,7 @@ from flight.card_files import findings
 from flight.rig import CRUISE_US, MEGA_US, FlightRig, make_card
 from flight.servos import LONGEST_GAP_MS, spoiled, worst_gap_ms
 from simavr_bench import in_fork
+from simavr_bench.heartbeat import Beats
 
 EXFAT = b"\xeb\x76\x90EXFAT   "
 
@@ -107,13 +108,13 @@ def dead_sector(rig: FlightRig) -> None:
 
 
 BAD_CARDS = (
-    BadCard("no card at boot", "card missing", empty, 2, lambda rig: rig.card.remove()),
-    BadCard("card not formatted", "card not FAT32", unformatted, 3),
-    BadCard("card with exFAT", "card not FAT32", exfat, 3),
-    BadCard("card that cannot be read", "card unreadable", empty, 4, dead_sector),
-    BadCard("card full", "card full", full, 5),
-    BadCard("card in pieces", "card fragmented", fragmented, 6),
-    BadCard("card with FLT99999.BIN", "card full", last_number, 5),
+    BadCard("no card at boot", "missing", empty, 2, lambda rig: rig.card.remove()),
+    BadCard("card not formatted", "not FAT32", unformatted, 3),
+    BadCard("card with exFAT", "not FAT32", exfat, 3),
+    BadCard("card that cannot be read", "unreadable", empty, 4, dead_sector),
+    BadCard("card full", "full", full, 5),
+    BadCard("card in pieces", "fragmented", fragmented, 6),
+    BadCard("card with FLT99999.BIN", "full", last_number, 5),
 )
 
 
@@ -122,6 +123,7 @@ class BootOutcome:
     """What was seen."""
 
     gap_ms: float
+    beats: Beats
     said: str
     wrong: list[str]
 
@@ -150,10 +152,10 @@ def boot(elf: Path, folder: Path, bad: BadCard) -> BootOutcome:
     since = rig.chip.cycle
     rig.chip.run_s(3.0)
     line = rig.status_lines()[-2]
-    gap_ms = worst_gap_ms(rig, since)
+    gap_ms, beats = worst_gap_ms(rig, since), rig.beats()
     beeps = beeps_in_group(rig)
-    wrong = []
-    if bad.said not in line:
+    wrong = beats.wrong()
+    if bad.said not in line.partition("| card ")[2].partition(" |")[0]:
         wrong.append(f"says: {line}")
     if beeps != {bad.flashes}:
         wrong.append(f"beeps in groups of {sorted(beeps)}, not {bad.flashes}")
@@ -167,7 +169,7 @@ def boot(elf: Path, folder: Path, bad: BadCard) -> BootOutcome:
     if before and rig.card.block(0, rig.card.blocks) != before:
         wrong.append("the card was changed")
     rig.chip.close()
-    return BootOutcome(gap_ms, bad.said, wrong)
+    return BootOutcome(gap_ms, beats, bad.said, wrong)
 
 
 def judge_card(bad: BadCard, rig: FlightRig, folder: Path, wrong: list[str]) -> None:
@@ -190,5 +192,9 @@ def run_boots(elf: Path, folder: Path, *, only: str = "") -> int:
         bad_rows += bool(seen.wrong)
         said = "NOT: " + "; ".join(seen.wrong) if seen.wrong else f'"{seen.said}"'
         text = f"{bad.flashes} beeps, Mega may drive"
-        print(f"5   {bad.injected:31} {text:33} {seen.gap_ms:4.0f} {'-':>5} {'-':>6}  {said}")
+        print(
+            f"5   {bad.injected:31} {text:33} {seen.gap_ms:4.0f} {'-':>5} {'-':>6} "
+            f"{seen.beats.gate_volt:5.2f}  {said}",
+            flush=True,
+        )
     return bad_rows

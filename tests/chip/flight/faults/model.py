@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from flight.rig import FlightRig
     from simavr_bench.card_journal import Journal
+    from simavr_bench.heartbeat import Beats
 
     from host import FlightLog
 
@@ -171,6 +172,11 @@ class Fault:
     fault_s: float = FAULT_S
     after_s: float = AFTER_S
 
+    @property
+    def may_stop(self) -> bool:
+        """Whether the Mega may cease to drive meanwhile."""
+        return self.engaged is not True or self.resets
+
 
 @dataclass(slots=True)
 class Outcome:
@@ -179,6 +185,7 @@ class Outcome:
     gap_ms: float
     lost: int
     recovered_s: float
+    beats: Beats
     wrong: list[str] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
 

@@ -17,9 +17,12 @@ NOT_HEALTH = ("mega_drives", "imu_triggered", "imu_original")
 RESUMED_S = 2.0
 
 
-def ready_rig(elf: Path, folder: Path) -> tuple[FlightRig, CardJournal]:
+def ready_rig(
+    elf: Path, folder: Path, *, threshold_volt: float | None = None
+) -> tuple[FlightRig, CardJournal]:
     """Bring a rig into flight, its card in private pages and journalled."""
-    rig = FlightRig(elf, make_card(folder / "empty.img"), in_place=False)
+    card = make_card(folder / "empty.img")
+    rig = FlightRig(elf, card, in_place=False, threshold_volt=threshold_volt)
     rig.chip.load(reference_image(1100))  # the model's: without it 4.4 V may be a good board's
     journal = CardJournal(rig.card)
     rig.take_off()
@@ -40,6 +43,8 @@ def run_fault(rig: FlightRig, journal: CardJournal, fault: Fault, folder: Path) 
     over = rig.chip.cycle
     gap_ms = worst_gap_ms(rig, begin, servos=fault.servos) if fault.servos else float("nan")
     wrong = _judge_pilot(rig, fault, begin, gap_ms)
+    beats = rig.beats(may_stop=fault.may_stop)
+    wrong += beats.wrong()
     rig.chip.power_off()
     image = rig.save_card(folder / "card.img")
     wrong += _judge_card(journal, image, begin)
@@ -59,7 +64,7 @@ def run_fault(rig: FlightRig, journal: CardJournal, fault: Fault, folder: Path) 
     if fault.recovers and not recovered_s < fault.after_s - 0.2:
         wrong.append("not recovered")
     wrong += fault.check(seen)
-    return Outcome(gap_ms, lost, recovered_s, wrong, _said(seen))
+    return Outcome(gap_ms, lost, recovered_s, beats, wrong, _said(seen))
 
 
 def _judge_pilot(rig: FlightRig, fault: Fault, begin: int, gap_ms: float) -> list[str]:
