@@ -35,7 +35,7 @@ from host.twin.virtual import VirtualFlight, virtual_flight
 from studies.coefficients import truths
 
 AIRCRAFT = "ultrastick25e"
-FIRST_SEED = 7000
+FIRST_SEED = 7200  # 7000-7023 were looked at while this was written
 FLIGHTS = 60
 COUNTED = (
     "CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr",
@@ -99,13 +99,13 @@ def analysed(flight: VirtualFlight, seed: int, factor: float) -> Row:
     columns, _ = even_columns(flight.table)
     expected = truths(list(flight.maneuvers))
     airframe, data = claimed(drawing(expected, seed), factor)
-    row: Row = {"intervals": {}, "check": {}}
+    row: Row = {"intervals": {}, "check": {}, "doubted": False}
     try:
         found = reconstruct(columns, airframe, data)
         row["check"] = {c.name: [c.times, c.directions, c.probability] for c in found.claims}
         row["doubted"] = found.claims[0].doubted
     except IdentificationError as error:
-        row |= {"doubted": True, "failed": str(error)}
+        row["failed"] = str(error)  # no check, so no doubt
     try:
         answer = identify_coefficients(columns, AIRCRAFT, airframe=airframe, instrument=data)
     except IdentificationError as error:

@@ -28,7 +28,8 @@ LEARNING = 4  # iterations; then memory and instruments stay, and the equations 
 # leave residuals at iteration 2 of which nothing is learned (3 of 12 flights). It first finds what
 # inertial sensors and GPS tell, air data all but held to their calibration: without instruments
 # gusts would draw them off.
-PATIENCE = 12  # plain iterations at most
+PATIENCE = 25  # plain iterations at most, each halved until the misfit falls
+HALVINGS = 5
 NEAR = 3.0  # of a standard error, the last plain step
 HOLDING = 1e4  # times the prior precision
 AIR_ERRORS = (*FLOW, *PITOT, *DELAYS, *PLACES)
@@ -76,13 +77,23 @@ def _search(problem: PathProblem, follows: Sequence[Array], patience: int) -> Pa
     held_back = [k for k, name in enumerate(problem.names) if name in AIR_ERRORS]
     converged, near = False, False
     iteration = 0
+    origin, least, halvings = theta, np.inf, 0
     plain, learnt_from = bool(patience), max(patience, MEMORY_FROM)
     while True:
         responses = problem.respond(theta)
         if responses is None:
             raise IdentificationError("data compatibility: the flight path is not finite")
         residuals = [problem.measured(k) - r.y for k, r in enumerate(responses)]
+        precision = problem.prior_precision.copy()
+        if plain:
+            precision[held_back] *= HOLDING
+            here = _misfit(problem, residuals, theta, precision)
+            if here > least and halvings < HALVINGS:
+                theta, halvings = 0.5 * (theta + origin), halvings + 1
+                continue
+            origin, least, halvings = theta, here, 0
         if plain and (near or iteration == patience):
+            precision = problem.prior_precision
             plain, learnt_from = False, max(iteration, MEMORY_FROM)
         learning = learnt_from <= iteration < learnt_from + LEARNING
         # Of every stretch, one array per output.
@@ -101,8 +112,6 @@ def _search(problem: PathProblem, follows: Sequence[Array], patience: int) -> Pa
             for k, parts in enumerate(zip(white, held.get(j, slope), slope, strict=True)):
                 for into, part in zip((whites, tools, slopes), parts, strict=True):
                     into[k].append(part / deviation)
-        precision = problem.prior_precision.copy()
-        precision[held_back] *= HOLDING if plain else 1.0
         H = np.diag(precision)
         g = precision * (problem.prior_mean - theta)
         for k, rows in enumerate(zip(whites, tools, slopes, strict=True)):
@@ -132,6 +141,16 @@ def _search(problem: PathProblem, follows: Sequence[Array], patience: int) -> Pa
         largest = float(np.max(np.abs(step) / error_size))
         near = largest < NEAR
         converged = largest < SETTLED and not plain and iteration > learnt_from + 1
+
+
+def _misfit(
+    problem: PathProblem, residuals: Sequence[Array], theta: Array, precision: Array
+) -> float:
+    """Return twice the negative log likelihood of white residuals of unknown size and the prior."""
+    squares = np.sum(np.hstack(residuals) ** 2, axis=1)
+    counts = np.array([problem.counted(name) for name in problem.model.outputs])
+    off = theta - problem.prior_mean
+    return float(counts @ np.log(np.maximum(squares, 1e-300)) + off**2 @ precision)
 
 
 def _memory(residuals: Sequence[Array]) -> OutputNoise:
