@@ -1,4 +1,4 @@
-"""Make the bill of materials: what is bought (parts.toml), counted in schematic and harness.
+"""Make the bill of materials: what is bought, counted in schematic, harness and mechanics.
 
 python hw/generate_bom.py           write bom.csv
 python hw/generate_bom.py --check   prove that it is current
@@ -17,6 +17,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 BOM = HERE / "bom.csv"
+PETG_USD_PER_G = 0.025
 KITS = ("logger", "radio", "flight")
 COLUMNS = (
     "what", "maker", "part number", "alternative", "quantity", "unit price USD", "price class",
@@ -130,6 +131,30 @@ def lines(parts_toml: str, parts_csv: str, harness_text: str) -> list[Line]:
     return found
 
 
+def made(masses_csv: str) -> list[Line]:
+    """Return the mechanical parts that are printed or cut, by file; printed ones as if solid."""
+    found = []
+    for row in csv.DictReader(masses_csv.splitlines()[2:]):
+        if row["file"]:
+            printed = row["material"] == "petg"
+            mass_g = float(row["mass_g"])
+            stem = row["file"].removesuffix(".step")
+            found.append(
+                Line(
+                    what=f"{row['name']}, {row['material']}",
+                    maker="own",
+                    number=f"mechanics/generated/step/{row['file']}",
+                    alternative="PLA indoors, ABS" if printed else "see its drawing",
+                    quantity=int(row["quantity"]),
+                    price_usd=round(mass_g * PETG_USD_PER_G, 2) if printed else 0.0,
+                    weight_g=mass_g,
+                    kit="flight",
+                    drawing=f"mechanics/generated/drawings/{stem}.svg",
+                )
+            )
+    return found
+
+
 def totals(found: list[Line]) -> dict[str, tuple[float, float]]:
     """Return price in USD and weight in g of each kit with all kits before it."""
     sums: dict[str, tuple[float, float]] = {}
@@ -150,7 +175,9 @@ def read() -> list[Line]:
         See `lines`.
     """
     paths = ("parts.toml", "board/generated/parts.csv", "harness.toml")
-    return lines(*((HERE / path).read_text(encoding="utf-8") for path in paths))
+    texts = [(HERE / path).read_text(encoding="utf-8") for path in paths]
+    masses = (HERE / "mechanics/generated/masses.csv").read_text(encoding="utf-8")
+    return lines(*texts) + made(masses)
 
 
 def text(found: list[Line]) -> str:
