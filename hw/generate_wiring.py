@@ -1,6 +1,6 @@
-"""Make the wiring pictures' WireViz sources from harness.toml and pin_map.toml.
+"""Make wiring pictures' WireViz sources and the table of cables from harness.toml and pin_map.toml.
 
-python hw/generate_wiring.py           write generated/wiring.yml and generated/power.yml
+python hw/generate_wiring.py           write generated/CABLES.md, wiring.yml, power.yml, imu.yml
 python hw/generate_wiring.py --check   prove that they, and the pictures made of them, are current
 python hw/generate_wiring.py --draw    draw the pictures too (wireviz from PyPI, graphviz)
 """
@@ -8,6 +8,7 @@ python hw/generate_wiring.py --draw    draw the pictures too (wireviz from PyPI,
 from __future__ import annotations
 
 import argparse
+import csv
 import hashlib
 import json
 import shutil
@@ -23,6 +24,14 @@ HERE = Path(__file__).resolve().parent
 OUT = HERE / "generated"
 FIRST_LINE = "# made by hw/generate_wiring.py from hw/harness.toml and hw/pin_map.toml; do not edit"
 MEGA = "Arduino Mega 2560"
+_SUPPLY_COLOURS = {
+    "GND": "BK",
+    "5V": "RD",
+    "VCC": "RD",
+    "HV": "RD",
+    "+ servo rail": "RD",
+    "3V3": "OG",
+}
 _WIRE_COLOURS = ("BN", "OG", "YE", "GN", "BU", "VT", "GY", "PK", "TQ", "WH")
 
 
@@ -50,6 +59,7 @@ class Cable:
     start: str
     end: str
     wires: tuple[tuple[str, str, str], ...]
+    length_mm: int = 0
 
 
 def load_devices(harness_text: str, map_text: str) -> list[Device]:
@@ -94,7 +104,7 @@ def signal_picture(harness_text: str, map_text: str) -> str:
     """Write the WireViz source of the signal wires."""
     devices = load_devices(harness_text, map_text)
     pins = {str(row["name"]): str(row["pin"]) for row in tomllib.loads(map_text)["signal"]}
-    links = tomllib.loads(harness_text)["link"]
+    links = [row for row in tomllib.loads(harness_text)["link"] if "picture" not in row]
     connectors: dict[str, tuple[str, list[str], str]] = {
         device.name: (device.part, [pin for pin, _ in device.pins], device.supply)
         for device in devices
@@ -106,10 +116,10 @@ def signal_picture(harness_text: str, map_text: str) -> str:
             for place, (pin, signal) in enumerate(device.pins)
         )
         if device.side == "left":
-            cables.append(Cable(device.name, MEGA, wires))
+            cables.append(Cable(device.name, MEGA, wires, device.length_mm))
         else:
             turned = tuple((here, there, colour) for there, here, colour in wires)
-            cables.append(Cable(MEGA, device.name, turned))
+            cables.append(Cable(MEGA, device.name, turned, device.length_mm))
     for link in links:
         for end, place in (("from", 0), ("to", 1)):
             part, held, supply = connectors.get(link[end], (link.get(f"{end}_part", ""), [], ""))
@@ -136,6 +146,67 @@ def board_order(devices: list[Device]) -> list[str]:
         signals = [s for device in devices if device.side == side for _, s in device.pins]
         placed += [((place + 0.5) / len(signals), s) for place, s in enumerate(signals)]
     return [signal for _, signal in sorted(placed)]
+
+
+def link_picture(harness_text: str, picture: str) -> str:
+    """Write the WireViz source of the wires that do not touch the Mega and name this picture."""
+    links = [r for r in tomllib.loads(harness_text)["link"] if r.get("picture") == picture]
+    connectors: dict[str, list[str]] = {}
+    cables = []
+    for link in links:
+        for end, place in (("from", 0), ("to", 1)):
+            held = connectors.setdefault(link[end], [])
+            held += [pair[place] for pair in link["pins"] if pair[place] not in held]
+        wires = tuple(
+            (a, b, _SUPPLY_COLOURS.get(a, _WIRE_COLOURS[place]))
+            for place, (a, b) in enumerate(link["pins"])
+        )
+        cables.append(Cable(link["from"], link["to"], wires, link["length_mm"]))
+    lines = [FIRST_LINE, *_style(), "connectors:"]
+    for name, pins in connectors.items():
+        lines += _connector(name, "IMU tray", [(pin, "") for pin in pins])
+    return "\n".join([*lines, *_cables(cables)]) + "\n"
+
+
+def cable_table(harness_text: str, nets_text: str) -> str:
+    """Write the table to make cables from: each plug of the shield, pin by pin.
+
+    Parameters
+    ----------
+    harness_text
+        Content of harness.toml.
+    nets_text
+        Content of board/generated/nets.csv, which knows the plugs' pins.
+    """
+    rows = list(csv.DictReader(nets_text.splitlines()[1:]))
+    lines = [
+        f"<!-- {FIRST_LINE.removeprefix('# ')} -->",
+        "# Cables of the shield, plug by plug",
+        "",
+        "Pin 1 has the square pad. Lengths for a span of 1.8 m; 28 AWG, servo leads 22 AWG.",
+        "",
+        "| plug | to | pin | wire | colour | length m |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for device in tomllib.loads(harness_text)["device"]:
+        for plug in _plugs(device["connector"]):
+            pins = sorted((r for r in rows if r["ref"] == plug), key=lambda row: int(row["pin"]))
+            for place, row in enumerate(pins):
+                name = row["pin name"]
+                colour = _SUPPLY_COLOURS.get(name, _WIRE_COLOURS[place % len(_WIRE_COLOURS)])
+                length = f"{device['length_mm'] / 1000:g}" if device["length_mm"] else "plugged in"
+                lines.append(
+                    f"| {plug} | {device['name']} | {row['pin']} | {name} | {colour} | {length} |"
+                )
+    return "\n".join(lines) + "\n"
+
+
+def _plugs(connector: str) -> list[str]:
+    # "J1 to J5, servo leads" or "J26, plugged in"
+    first, _, last = connector.partition(",")[0].partition(" to ")
+    if not first.startswith("J"):
+        return []
+    return [f"J{n}" for n in range(int(first[1:]), int((last or first)[1:]) + 1)]
 
 
 def power_picture(harness_text: str) -> str:
@@ -195,6 +266,8 @@ def _cables(cables: list[Cable]) -> Iterator[str]:
         yield f"  W{number}:"
         yield f"    wirecount: {len(cable.wires)}"
         yield f"    colors: [{', '.join(colour for _, _, colour in cable.wires)}]"
+        if cable.length_mm:
+            yield f"    length: {cable.length_mm / 1000:g}"
         yield "    show_wirecount: false"
         yield "    show_wirenumbers: false"
     yield "connections:"
@@ -242,7 +315,14 @@ def main(arguments: list[str] | None = None) -> int:
         made = {
             OUT / "wiring.yml": signal_picture(harness.read_text(), pin_map.read_text()),
             OUT / "power.yml": power_picture(harness.read_text()),
+            OUT / "imu.yml": link_picture(harness.read_text(), "imu"),
         }
+        nets = (HERE / "board" / "generated" / "nets.csv").read_text(encoding="utf-8")
+        table = cable_table(harness.read_text(), nets)
+        if not args.check:
+            (OUT / "CABLES.md").write_text(table, encoding="utf-8")
+        elif (OUT / "CABLES.md").read_text(encoding="utf-8") != table:
+            raise HarnessError("CABLES.md is not current: run python hw/generate_wiring.py")
         for path, content in made.items():
             picture = path.with_suffix(".svg")
             if args.check:

@@ -18,6 +18,14 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 MEGA = "M1"
 RAILS = {"5 V sensors": "+5V", "servo rail": "+VSERVO", "3.3 V of the Mega": "+3V3"}
+# Symbols of what stands on the IMU's tray, and its plug.
+_TRAY = {
+    "Shield J22": "J22",
+    "Pro Mini": "M2",
+    "Level shifter": "M3",
+    "GY-521": "M4",
+    "GY-271": "M5",
+}
 SUPPLIES = {*RAILS.values(), "GND"}
 _CONTACT = re.compile(r"^\| (K\d) ([ab]) \| (.+?) \| (.+?) \| (.+?) \|$", re.M)
 # Contact set a is pins 2, 3, 4 of the relay, b is 9, 8, 7 (data sheet ASCTB14E, seen from below).
@@ -104,6 +112,7 @@ def faults(board: Board, map_text: str, harness_text: str, relay_text: str) -> l
     return [
         *_mega_faults(board, pins),
         *_device_faults(board, tomllib.loads(harness_text)["device"]),
+        *_link_faults(board, tomllib.loads(harness_text)["link"]),
         *_contact_faults(board, relay_text),
     ]
 
@@ -156,6 +165,32 @@ def _device_faults(board: Board, devices: list[dict[str, object]]) -> list[str]:
             if wanted and net != wanted:
                 found.append(f"{name} {board.names[pin]} stands on {net}, expected {wanted}")
     return found
+
+
+def _link_faults(board: Board, links: list[dict[str, object]]) -> list[str]:
+    found = []
+    for link in links:
+        pairs = link["pins"]
+        if "picture" not in link or not isinstance(pairs, list):
+            continue
+        here, there = (_TRAY[str(link[end])] for end in ("from", "to"))
+        for one, other in pairs:
+            nets = [_nets_at(board, here, one), _nets_at(board, there, other)]
+            if not nets[0] or nets[0] != nets[1]:
+                found.append(
+                    f"{link['from']} {one} and {link['to']} {other} of harness.toml:"
+                    f" the schematic has {nets[0] or 'nothing'} and {nets[1] or 'nothing'}"
+                )
+    return found
+
+
+def _nets_at(board: Board, ref: str, word: str) -> set[str]:
+    """Return the nets on a symbol's pins of a number or a name."""
+    return {
+        net
+        for pin, net in board.net_of.items()
+        if pin[0] == ref and word in (pin[1], board.names[pin])
+    }
 
 
 def _contact_faults(board: Board, relay_text: str) -> list[str]:

@@ -58,6 +58,8 @@ def swapped(one: str, other: str) -> str:
         ("K3,8", "K3,9", "K3 pin 9 is on GND, relay.md says open"),
         ("R4,2", "R3,2", "relay.md says pin 3 through R4"),
         ("M1,50", "M1,51", "pin 50 carries card_miso"),
+        ("M2,A4", "M2,A5", "Shield J22 SDA and Pro Mini A4 of harness.toml"),
+        ("M4,INT", "M5,SDA", "Pro Mini D2 and GY-521 INT of harness.toml"),
     ],
 )
 def test_a_wrong_wire_is_found(one: str, other: str, complaint: str) -> None:
