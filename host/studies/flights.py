@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.errors import IdentificationError
@@ -126,7 +126,7 @@ def add_flight(tally: Tally, folder: Path, *, fit: bool, aircraft: str = "ultras
         answers = identify(
             columns,
             airframe=airframe,
-            compatibility=reconstruct(columns, airframe, instrument_data(aircraft)),
+            compatibility=reconstruct(columns, airframe, sensor_error_model(aircraft)),
             powerplant=powerplant(aircraft),
         )
     except IdentificationError:

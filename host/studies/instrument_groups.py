@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
-from host.instrument.deviations import InstrumentData, instrument_data
+from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.linear import identify
@@ -100,7 +100,9 @@ class Reach:
         return max(-self.tenth[0], self.ten[0]) > MOVED
 
 
-def answers(columns: Columns, airframe: AirframeData, data: InstrumentData) -> dict[str, Interval]:
+def answers(
+    columns: Columns, airframe: AirframeData, data: SensorErrorModel
+) -> dict[str, Interval]:
     """Return both answers of `host identify`: coefficients, then the linear one's."""
     direct = identify_coefficients(columns, AIRCRAFT, airframe=airframe, instrument=data)
     result = {f"{d.name} (direct)": (d.value, d.half_width) for d in direct.fit.derivatives}
@@ -117,7 +119,7 @@ def answers(columns: Columns, airframe: AirframeData, data: InstrumentData) -> d
 
 def reaches(columns: Columns, groups: Mapping[str, tuple[str, ...]]) -> Iterator[Reach]:
     """Find both answers again with every group a tenth and ten times as large."""
-    airframe, data = airframe_data(AIRCRAFT), instrument_data(AIRCRAFT)
+    airframe, data = airframe_data(AIRCRAFT), sensor_error_model(AIRCRAFT)
     usual = answers(columns, airframe, data)
     for group, names in groups.items():
         both = []
@@ -146,7 +148,7 @@ def shift_with(columns: Columns, group: str) -> tuple[float, str]:
     The file says so too: it states ten times as much.
     """
     airframe = airframe_data(AIRCRAFT)
-    data = instrument_data(AIRCRAFT).scaled(10.0, *GROUPS[group])
+    data = sensor_error_model(AIRCRAFT).scaled(10.0, *GROUPS[group])
     usual = answers(columns, airframe, data)
     there = answers(TOLD[group][0](columns), airframe, data)
     return max((abs(there[n][0] - v) / h, n) for n, (v, h) in usual.items())

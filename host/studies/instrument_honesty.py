@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from host.aircraft.file import load as load_aircraft
 from host.aircraft.mass_properties import AirframeData, airframe_data
-from host.instrument.deviations import InstrumentData, instrument_data
+from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.instrument.errors import InstrumentErrors, instrument_errors
 from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
@@ -83,7 +83,7 @@ def drawing(expected: Mapping[str, float], seed: int) -> AirframeData:
     )
 
 
-def claimed(airframe: AirframeData, factor: float) -> tuple[AirframeData, InstrumentData]:
+def claimed(airframe: AirframeData, factor: float) -> tuple[AirframeData, SensorErrorModel]:
     """Return what files say that claim a factor of the true deviations."""
     airframe = replace(
         airframe,
@@ -91,7 +91,7 @@ def claimed(airframe: AirframeData, factor: float) -> tuple[AirframeData, Instru
         inertia_share=factor * airframe.inertia_share,
         arm_share=factor * airframe.arm_share,
     )
-    return airframe, replace(instrument_data(AIRCRAFT), errors=true_errors().scaled(factor))
+    return airframe, replace(sensor_error_model(AIRCRAFT), errors=true_errors().scaled(factor))
 
 
 def analysed(flight: VirtualFlight, seed: int, factor: float) -> Row:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.errors import IdentificationError
@@ -62,7 +62,7 @@ def add(flight: VirtualFlight, method: str, told: Tally, printed: Tally) -> None
             names=AXES,
             method=method,
             airframe=airframe,
-            compatibility=reconstruct(columns, airframe, instrument_data(AIRCRAFT)),
+            compatibility=reconstruct(columns, airframe, sensor_error_model(AIRCRAFT)),
             powerplant=powerplant(AIRCRAFT),
         )
     except IdentificationError:

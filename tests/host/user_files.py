@@ -142,7 +142,7 @@ def use_aircraft(path: Path, rng: random.Random) -> None:
     from host.aircraft.mass_properties import airframe_data
     from host.aircraft.powerplant import powerplant
     from host.aircraft.trim import solve
-    from host.instrument.deviations import instrument_data
+    from host.instrument.deviations import sensor_error_model
     from host.sysid.answer.converted import At, conversion_document, convert
 
     plane = None
@@ -155,7 +155,7 @@ def use_aircraft(path: Path, rng: random.Random) -> None:
             with contextlib.suppress(HostError):
                 finite(solve(frame, plane.scalar("trim.airspeed_mps")).command)
     airframe_data(str(path))
-    instrument_data(str(path))
+    sensor_error_model(str(path))
     Path("prior.toml").write_text("[coefficients]\nCm_q = -10.0\nCL_alpha = 5.0\n")
     done = convert(Path("prior.toml"), str(path), At())
     finite(done.found.values, *(done.half_width(n) for n in done.found.names[:2]))

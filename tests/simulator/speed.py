@@ -9,9 +9,8 @@ import sys
 import time
 from pathlib import Path
 
-from simavr_bench import ChargePumpRelay, Chip, GpsUart, Receiver, SdCard, cycles
-
 from build import build_program
+from simavr_bench import ChargePumpRelay, Chip, GpsUart, Receiver, SdCard, cycles
 
 
 def _send_packets(chip: Chip, number: int = 0) -> None:

@@ -8,7 +8,7 @@ import pytest
 from host.aircraft.file import load
 from host.aircraft.mass_properties import airframe_data
 from host.errors import CalibrationError
-from host.instrument.deviations import deviations, instrument_data
+from host.instrument.deviations import deviations, sensor_error_model
 from host.instrument.errors import EVEN, instrument_errors, standard_errors
 from host.physical.calibration import load_calibration
 from host.resources import resource
@@ -39,7 +39,7 @@ def test_every_error_says_how_it_is_drawn_for_whom_and_by_whose_word() -> None:
 
 def test_lines_of_a_calibration_reach_identification(tmp_path: Path) -> None:
     """Each zero_sigma and slope_sigma of what identification reads is a deviation of its own."""
-    data = instrument_data(NAME, load_calibration(measured(tmp_path)))
+    data = sensor_error_model(NAME, load_calibration(measured(tmp_path)))
     found = deviations(data, airframe_data(NAME))
     # The default's lines, had somebody measured them: two sensors each, whose mean is read.
     slope = 2.0 * math.pi / 1024.0
@@ -57,14 +57,14 @@ def test_lines_of_a_calibration_reach_identification(tmp_path: Path) -> None:
 
 
 def test_a_line_nobody_measured_and_a_missing_key_take_named_defaults(tmp_path: Path) -> None:
-    standard = deviations(instrument_data(NAME), airframe_data(NAME))
-    assert deviations(instrument_data(NAME, load_calibration()), airframe_data(NAME)) == standard
+    standard = deviations(sensor_error_model(NAME), airframe_data(NAME))
+    assert deviations(sensor_error_model(NAME, load_calibration()), airframe_data(NAME)) == standard
     path = tmp_path / "one.toml"
     text = resource("default.toml").read_text(encoding="utf-8")
     head = 'format = "flight-test-calibration"\nversion = 1\nname = "one"\ndate = "2026-11-22"\n'
     line = text[text.index("[channel.alpha_a]") : text.index("[channel.alpha_b]")]
     path.write_text(head + line, encoding="utf-8")
-    one = deviations(instrument_data(NAME, load_calibration(path)), airframe_data(NAME))
+    one = deviations(sensor_error_model(NAME, load_calibration(path)), airframe_data(NAME))
     assert {n for n in one if one[n] != standard[n]} == {"alpha_zero_rad", "alpha_scale"}
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from host.aircraft.file import load
 from host.arrays import Array
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.physical.calibration import load_calibration
 from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.flight.tables import even_columns
@@ -35,7 +35,7 @@ def columns() -> dict[str, Array]:
 def halves(columns: dict[str, Array], path: Path, text: str) -> dict[str, float]:
     """Return the half-widths of an answer with a calibration of that text."""
     path.write_text(text, encoding="utf-8")
-    data = instrument_data(NAME, load_calibration(path))
+    data = sensor_error_model(NAME, load_calibration(path))
     answer = identify_coefficients(columns, NAME, instrument=data)
     return {d.name: d.half_width for d in answer.fit.derivatives}
 

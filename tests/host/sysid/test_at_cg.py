@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import AirframeData
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid import Maneuver
 from host.sysid.compatibility.at_cg import IMU_DELAY, at_cg, open_errors, without_open
 from host.sysid.compatibility.reconstruction import Compatibility, Finding
 from host.sysid.estimators.gust import fit_with_gust, gust_model
-from host.sysid.flight.carried import moved_by
+from host.sysid.flight.carried import systematic_error_shifts
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 from host.sysid.models.templates import Trim, template
@@ -24,7 +24,7 @@ def told(delay_s: float) -> Compatibility:
     """Return a reconstruction that told the vanes' delay to half a millisecond."""
     late = Finding("vane_delay_s", delay_s, 0.0005, 0.02, told=True, reason="")
     pitot = Finding("pitot_scale", 0.0, 0.03, 0.031, told=False, reason="")
-    return Compatibility((late, pitot), {}, (), gps=True, instrument=instrument_data(NAME))
+    return Compatibility((late, pitot), {}, (), gps=True, instrument=sensor_error_model(NAME))
 
 
 def still(samples: int, dt_s: float = 0.01) -> Columns:
@@ -118,7 +118,9 @@ def test_one_step_of_filter_error_foretells_the_fit_of_disturbed_data() -> None:
     columns, maneuver, model, result, trim = gusty()
     assert result.residual_kind == "innovation"
     found = told(0.007)
-    moved = {m.error: m for m in moved_by(result, [maneuver], [columns], found, trim)}
+    moved = {
+        m.error: m for m in systematic_error_shifts(result, [maneuver], [columns], found, trim)
+    }
     sizes = open_errors(found, columns)
     for error in (IMU_DELAY, "imu_x_m", "elevator_scale"):
         other = without_open(columns, error, sizes[error], found)

@@ -6,7 +6,7 @@ import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.model import standard_model
@@ -67,7 +67,7 @@ def test_an_attitude_wrong_by_degrees_moves_no_coefficient() -> None:
 
     def fitted(given: dict[str, Array]) -> CoefficientFit:
         return fit_coefficients(
-            given, windows, airframe_data(NAME), instrument_data(NAME), powerplant(NAME)
+            given, windows, airframe_data(NAME), sensor_error_model(NAME), powerplant(NAME)
         )
 
     # What a tilted vertical and a slow drift of the filter leave.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.arrays import Array
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid.compatibility.claims import ALARM, VISIBLE, Claim, claim_words, claims
 from host.sysid.compatibility.path_data import prior
 from host.sysid.compatibility.reconstruction import document, reconstruct, words
@@ -57,7 +57,7 @@ def test_a_doubted_file_is_named_with_the_errors_it_claims_too_small() -> None:
 
 def test_a_recorded_flight_doubts_a_file_that_claims_a_fifth_and_no_honest_one() -> None:
     columns, _ = even_columns(virtual_flight("demo", 901).table)
-    airframe, data = airframe_data(NAME), instrument_data(NAME)
+    airframe, data = airframe_data(NAME), sensor_error_model(NAME)
     honest = reconstruct(columns, airframe, data)
     assert not honest.claims[0].doubted
     assert honest.claims[0].directions > 8

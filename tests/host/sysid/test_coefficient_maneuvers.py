@@ -7,7 +7,7 @@ import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.joint import LastStep, prediction, pulls
@@ -138,7 +138,7 @@ def slipped(share: float) -> CoefficientFit:
     moved[inside] = mean + (1.0 + share) * (moved[inside] - mean)
     kept = {k: v[t > 8.0] for k, v in (columns | {"elevator_rad": moved}).items()}
     return fit_coefficients(
-        kept, windows, airframe_data(NAME), instrument_data(NAME), powerplant(NAME)
+        kept, windows, airframe_data(NAME), sensor_error_model(NAME), powerplant(NAME)
     )
 
 

@@ -13,7 +13,7 @@ from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.cli import main
 from host.export import toml as tomlout
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid.coefficients.answer import CoefficientFit, Derivative
 from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.local import Mean, local_derivatives
@@ -83,7 +83,7 @@ def fitted(flight: VirtualFlight, model: CoefficientModel | None) -> Coefficient
         for m in flight.maneuvers
     ]
     kept = {k: v[flying] for k, v in columns.items()}
-    data = instrument_data(NAME)
+    data = sensor_error_model(NAME)
     return fit_coefficients(kept, windows, airframe_data(NAME), data, powerplant(NAME), model)
 
 

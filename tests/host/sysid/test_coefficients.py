@@ -8,12 +8,12 @@ import pytest
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
-from host.instrument.deviations import InstrumentData, deviations, instrument_data
+from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.coefficients.windows import Window
-from host.sysid.compatibility.signals import Record, corrected, usable_length
+from host.sysid.compatibility.signals import Record, apply_sensor_errors, usable_length
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import Found
 from host.sysid.flight.tables import even_columns
@@ -39,7 +39,7 @@ def flight() -> VirtualFlight:
 
 
 def fitted(
-    flight: VirtualFlight, data: InstrumentData, airframe: AirframeData | None = None
+    flight: VirtualFlight, data: SensorErrorModel, airframe: AirframeData | None = None
 ) -> CoefficientFit:
     columns, _ = even_columns(flight.table)
     flying = columns["t_s"] > 8.0
@@ -69,7 +69,7 @@ def misses(flight: VirtualFlight, fit: CoefficientFit) -> dict[str, float]:
 
 
 def test_finds_the_truth_and_covers_it(flight: VirtualFlight) -> None:
-    fit = fitted(flight, instrument_data(NAME))
+    fit = fitted(flight, sensor_error_model(NAME))
     miss = misses(flight, fit)
     assert {k: v for k, v in miss.items() if k in WITHIN and abs(v) > WITHIN[k]} == {}
     for d in fit.derivatives:
@@ -82,20 +82,20 @@ def test_finds_the_truth_and_covers_it(flight: VirtualFlight) -> None:
 def test_roll_under_the_elevator_tells_a_cg_beside_the_plane_of_symmetry() -> None:
     beside = virtual_flight("multisine", 700, chain="none")
     true_m = float(beside.record.draws.values["cg_m"][1])
-    value, left = fitted(beside, instrument_data(NAME)).errors["cg_y_m"]
+    value, left = fitted(beside, sensor_error_model(NAME)).errors["cg_y_m"]
     assert abs(true_m) > 0.007
     assert left < 0.001
     assert abs(value - true_m) < 3.0 * left
 
 
 def test_a_vane_taken_for_frictionless_shows_in_damping(flight: VirtualFlight) -> None:
-    smooth = replace(instrument_data(NAME), vane_friction_rad=0.0)
+    smooth = replace(sensor_error_model(NAME), vane_friction_rad=0.0)
     miss = misses(flight, fitted(flight, smooth))
     assert abs(miss["Cm_q"]) > 0.06
 
 
 def test_the_drawing_tells_the_arm_of_the_accelerometers_from_lift(flight: VirtualFlight) -> None:
-    data, frame = instrument_data(NAME), airframe_data(NAME)
+    data, frame = sensor_error_model(NAME), airframe_data(NAME)
     unknown = replace(frame, elevator_arm_m=0.0, rudder_arm_m=0.0)
     wrong = replace(frame, elevator_arm_m=0.7 * frame.elevator_arm_m, arm_share=0.01)
     lift = {}
@@ -110,7 +110,7 @@ def test_the_drawing_tells_the_arm_of_the_accelerometers_from_lift(flight: Virtu
 
 
 def test_undoes_vane_inertia_upwash_and_places() -> None:
-    data = replace(instrument_data(NAME), vane_friction_rad=0.0)
+    data = replace(sensor_error_model(NAME), vane_friction_rad=0.0)
     t = np.arange(2000) * 0.01
     alpha = 0.1 + 0.03 * np.sin(2.0 * np.pi * 2.0 * t)
     q = 0.4 * np.sin(2.0 * np.pi * 1.5 * t)
@@ -135,13 +135,13 @@ def test_undoes_vane_inertia_upwash_and_places() -> None:
         "density_kgpm3": np.full(2000, 1.2),
     }
     zero = dict.fromkeys(deviations(data, airframe_data(NAME)), 0.0)
-    found = corrected(Record(0.01, columns), zero, data, 17.0)
+    found = apply_sensor_errors(Record(0.01, columns), zero, data, 17.0)
     middle = slice(300, -300)
     assert np.max(np.abs(found["alpha"] - alpha)[middle]) < 5e-4
     assert np.max(np.abs(found["q"] - q)[middle]) < 2e-3
     # The bound fails where the vane's inertia is left in.
     fast = replace(data, vane_hz_per_mps=10.0)
-    left_in = corrected(Record(0.01, columns), zero, fast, 17.0)["alpha"]
+    left_in = apply_sensor_errors(Record(0.01, columns), zero, fast, 17.0)["alpha"]
     assert np.max(np.abs(left_in - alpha)[middle]) > 2e-3
 
 
@@ -152,7 +152,7 @@ def test_lengths_that_transform_fast() -> None:
 def test_what_is_missing_is_named() -> None:
     empty: dict[str, np.ndarray] = {"t_s": np.arange(10.0)}
     with pytest.raises(IdentificationError, match="alpha_rad"):
-        fit_coefficients(empty, [], airframe_data(NAME), instrument_data(NAME), powerplant(NAME))
+        fit_coefficients(empty, [], airframe_data(NAME), sensor_error_model(NAME), powerplant(NAME))
 
 
 def test_a_flight_of_two_seconds_is_refused_in_one_line() -> None:

@@ -9,7 +9,7 @@ from host.aircraft.file import load
 from host.aircraft.local_derivatives import coefficients as about_cg
 from host.aircraft.mass_properties import Condition, airframe_data
 from host.arrays import Array
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.aerodynamics.conversion import (
     CARRIED,
@@ -27,7 +27,7 @@ NAME = "ultrastick25e"
 AIRFRAME = airframe_data(NAME)
 ALPHA = 0.08
 PLACE = Place(AIRFRAME, Condition(17.0, 177.0), ALPHA)
-ERRORS = carried_errors(AIRFRAME, instrument_data(NAME))
+ERRORS = carried_errors(AIRFRAME, sensor_error_model(NAME))
 TRUE = {
     "CL_alpha": 3.94, "CL_q": 8.0, "CL_de": 0.53, "CD_alpha": 0.30, "CD_de": 0.05,
     "Cm_alpha": -1.65, "Cm_q": -10.9, "Cm_de": -1.27,

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
 from host.sysid.answer.truth import true_coefficients
@@ -25,7 +25,7 @@ from host.sysid.compatibility.corrections import (
 )
 from host.sysid.compatibility.reconstruction import Compatibility, Finding, reconstruct
 from host.sysid.flight import linear
-from host.sysid.flight.carried import carried, moved_by
+from host.sysid.flight.carried import carried, systematic_error_shifts
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns
 from host.sysid.models.delays import DELAYS
@@ -42,7 +42,7 @@ def flown() -> tuple[Columns, list[dict[str, Any]], Compatibility]:
     """One recorded flight in light turbulence, its maneuvers, what its sensors are wrong by."""
     flight = virtual_flight("demo", 901)
     columns, _ = even_columns(flight.table)
-    found = reconstruct(columns, airframe_data(NAME), instrument_data(NAME))
+    found = reconstruct(columns, airframe_data(NAME), sensor_error_model(NAME))
     return columns, flight.maneuvers, found
 
 
@@ -155,7 +155,9 @@ def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
     found = Compatibility(
         tuple(finding(n, 0.0, 1.96 * s, 1.96 * s) for n, s in size.items()), {}, (), gps=True
     )
-    moved = {m.error: m for m in moved_by(result, [maneuver], [columns], found, trim)}
+    moved = {
+        m.error: m for m in systematic_error_shifts(result, [maneuver], [columns], found, trim)
+    }
     assert set(moved) == set(size)
     for error, deviation in size.items():
         other = without_errors(columns, {error: deviation}, pressure_part(found))

@@ -12,7 +12,7 @@ from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import coefficients
-from host.sysid.compatibility.position_correction import corrected
+from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import find, grade
 from host.sysid.flight.linear import identify
@@ -134,7 +134,7 @@ def test_vane_and_accelerometer_are_moved_to_the_cg() -> None:
         "made up", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0,
         imu_m=(0.05, -0.02, 0.03), vanes_m=((0.2, 0.0, 0.0),), upwash=0.1,
     )  # fmt: skip
-    back = corrected(columns, airframe)
+    back = transfer_to_cg(columns, airframe)
     inner = slice(5, -5)
     for axis, name in enumerate(("ax_mps2", "ay_mps2", "az_mps2")):
         np.testing.assert_allclose(back[name][inner], cg[inner, axis], atol=1e-6)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import START_RADPS, SUBSTEPS, powerplant
-from host.instrument.deviations import deviations, instrument_data
+from host.instrument.deviations import deviations, sensor_error_model
 from host.sysid.coefficients.fit import COLUMNS
-from host.sysid.compatibility.signals import Record, corrected
+from host.sysid.compatibility.signals import Record, apply_sensor_errors
 
 NAME = "ultrastick25e"
 
@@ -35,16 +35,16 @@ def columns() -> dict[str, np.ndarray]:
     return {k: v[:600] + steady.get(k, 0.0) for k, v in swing.items()}
 
 
-@pytest.mark.parametrize("name", list(deviations(instrument_data(NAME), airframe_data(NAME))))
+@pytest.mark.parametrize("name", list(deviations(sensor_error_model(NAME), airframe_data(NAME))))
 def test_a_correction_does_not_depend_on_those_before(
     columns: dict[str, np.ndarray], name: str
 ) -> None:
-    data = instrument_data(NAME)
+    data = sensor_error_model(NAME)
     none = dict.fromkeys(deviations(data, airframe_data(NAME)), 0.0)
     moved = {**none, name: 0.01}
     worn = Record(0.03, columns)
     for errors in (moved, none, moved):
-        back = corrected(worn, errors, data, 17.0)
-        fresh = corrected(Record(0.03, columns), errors, data, 17.0)
+        back = apply_sensor_errors(worn, errors, data, 17.0)
+        fresh = apply_sensor_errors(Record(0.03, columns), errors, data, 17.0)
         for signal, values in fresh.items():
             np.testing.assert_array_equal(back[signal], values)

@@ -11,7 +11,7 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import NoPropulsionError, powerplant
 from host.cli import main
 from host.export.toml import dumps
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid.flight.tables import read_columns
 from host.sysid.models.model_file import read_model
 
@@ -31,7 +31,7 @@ def test_a_measured_aircraft_gives_what_identification_needs(tmp_path: Path) -> 
     airframe = airframe_data(mine(tmp_path))
     assert (airframe.mass_kg, airframe.izz_kgm2, airframe.elevator_arm_m) == (1.793, 0.1193, 0.632)
     assert airframe.imu_m == (0.02, 0.0, 0.01)
-    assert instrument_data(mine(tmp_path)).friction_speed_mps == 17.0
+    assert sensor_error_model(mine(tmp_path)).friction_speed_mps == 17.0
 
 
 def test_it_is_that_of_a_flyable_file_with_the_same_numbers(tmp_path: Path) -> None:
@@ -40,7 +40,7 @@ def test_it_is_that_of_a_flyable_file_with_the_same_numbers(tmp_path: Path) -> N
         del document[section]
     less = dumps(document | {"kind": "measured"})
     assert airframe_data(mine(tmp_path, less)) == airframe_data("ultrastick25e")
-    assert instrument_data(mine(tmp_path, less)) == instrument_data("ultrastick25e")
+    assert sensor_error_model(mine(tmp_path, less)) == sensor_error_model("ultrastick25e")
     ours, theirs = powerplant(mine(tmp_path, less)), powerplant("ultrastick25e")
     assert ours.slope(700.0, 17.0, 1.2) == theirs.slope(700.0, 17.0, 1.2)
 
@@ -60,7 +60,7 @@ def test_places_count_from_the_cg_wherever_it_is(tmp_path: Path) -> None:
             there[section][name] = [place + more for place, more in pairs]
     plain, moved = mine(tmp_path, dumps(here)), tmp_path / "moved.toml"
     moved.write_text(dumps(there), encoding="utf-8")
-    for of in (airframe_data, instrument_data):
+    for of in (airframe_data, sensor_error_model):
         ours, theirs = of(str(moved)), of(plain)
         for places in ("imu_m", "vanes_m"):
             np.testing.assert_allclose(getattr(ours, places), getattr(theirs, places), atol=1e-12)

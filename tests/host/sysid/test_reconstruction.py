@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid.compatibility.flight_path import (
     AIR,
     GPS,
@@ -26,7 +26,7 @@ from host.twin.sensors.delays import FILTERS, sensor_delays
 from host.twin.virtual import virtual_flight
 
 NAME = "ultrastick25e"
-AIRFRAME, INSTRUMENT = airframe_data(NAME), instrument_data(NAME)
+AIRFRAME, INSTRUMENT = airframe_data(NAME), sensor_error_model(NAME)
 Columns = dict[str, np.ndarray]
 
 

@@ -19,7 +19,7 @@ VANE_LATE_S = 8e-3  # about a vane's delay at trim: the filter model's error is 
 
 
 @dataclass(frozen=True, slots=True)
-class InstrumentData:
+class SensorErrorModel:
     """Places and dynamics of the sensors from the aircraft file, and what may be wrong with them.
 
     Places are in metres from the nominal CG.
@@ -36,12 +36,12 @@ class InstrumentData:
     imu_bandwidth_hz: float = 42.0  # MPU-6000 register map, DLPF_CFG 3
     errors: InstrumentErrors = field(default_factory=standard_errors)
 
-    def scaled(self, factor: float, *names: str) -> InstrumentData:
+    def scaled(self, factor: float, *names: str) -> SensorErrorModel:
         """Return the same with some errors, or all, that many times as large."""
         return replace(self, errors=self.errors.scaled(factor, *names))
 
 
-def instrument_data(source: str, calibration: Calibration | None = None) -> InstrumentData:
+def sensor_error_model(source: str, calibration: Calibration | None = None) -> SensorErrorModel:
     """Return the sensors of an aircraft by name or file, and what they may be wrong by.
 
     Parameters
@@ -60,7 +60,7 @@ def instrument_data(source: str, calibration: Calibration | None = None) -> Inst
     loaded = load_measured(source)
     number, vector, cg = loaded.scalar, loaded.vector, loaded.vector("mass.cg_m")
     between = 0.5 * (vector("sensors.vane_a_m") + vector("sensors.vane_b_m"))
-    return InstrumentData(
+    return SensorErrorModel(
         imu_m=place(vector("sensors.imu_m") - cg),
         vanes_m=place(between - cg),
         upwash=number("sensors.upwash"),
@@ -73,16 +73,16 @@ def instrument_data(source: str, calibration: Calibration | None = None) -> Inst
     )
 
 
-def unknown_sensors() -> InstrumentData:
+def unknown_sensors() -> SensorErrorModel:
     """Return sensors of which no aircraft file says anything."""
     nowhere = (0.0, 0.0, 0.0)
-    return InstrumentData(
+    return SensorErrorModel(
         nowhere, nowhere, upwash=0.1, vane_hz_per_mps=1.0, vane_damping=0.1,
         vane_friction_rad=0.0, friction_speed_mps=1.0, pitot_lag_s=0.010,
     )  # fmt: skip
 
 
-def deviations(instrument: InstrumentData, airframe: AirframeData) -> dict[str, float]:
+def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str, float]:
     """Return one standard deviation of every unknown of the coefficients, by name."""
     e = instrument.errors
     vanes = {"alpha": ("alpha_a", "alpha_b"), "beta": ("beta_a", "beta_b")}
@@ -129,13 +129,13 @@ def deviations(instrument: InstrumentData, airframe: AirframeData) -> dict[str, 
     return {name: float(value) for name, value in result.items()}
 
 
-def imu_delay_s(instrument: InstrumentData) -> float:
+def imu_delay_s(instrument: SensorErrorModel) -> float:
     """Return one deviation of the IMU's delay, s: what its filter's model leaves in it too."""
     e = instrument.errors
     return math.hypot(e["delay_least_s"].sigma("imu"), e["filter_model_s"].sigma("imu"))
 
 
-def vane_delay_s(instrument: InstrumentData, nominal_s: float) -> float:
+def vane_delay_s(instrument: SensorErrorModel, nominal_s: float) -> float:
     """Return one deviation of the vanes' mean delay, s."""
     e = instrument.errors
     share, least = e["delay_share"], e["delay_least_s"]

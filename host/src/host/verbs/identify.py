@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from host.aircraft.powerplant import Powerplant
-    from host.instrument.deviations import InstrumentData
+    from host.instrument.deviations import SensorErrorModel
     from host.sysid.answer.save import Places
     from host.sysid.coefficients.flight import CoefficientAnswer
     from host.sysid.coefficients.model import CoefficientModel
@@ -295,18 +295,20 @@ def _rotor(aircraft: str | None) -> Powerplant | None:
         return None
 
 
-def _instrument(aircraft: str | None, path: Path | None) -> InstrumentData | None:
+def _instrument(aircraft: str | None, path: Path | None) -> SensorErrorModel | None:
     """Return the sensors, and what the calibration says that they may be wrong by."""
-    from host.instrument.deviations import instrument_data
+    from host.instrument.deviations import sensor_error_model
     from host.physical.calibration import load_calibration
 
-    return instrument_data(aircraft, load_calibration(path) if path else None) if aircraft else None
+    return (
+        sensor_error_model(aircraft, load_calibration(path) if path else None) if aircraft else None
+    )
 
 
 def _agreement(
     columns: dict[str, Any],
     airframe: Any,
-    instrument: InstrumentData | None,
+    instrument: SensorErrorModel | None,
     notes: list[str],
 ) -> Compatibility | None:
     """Return what sensors are wrong by; None with a note where it cannot be told."""
@@ -324,7 +326,7 @@ def _direct(
     args: argparse.Namespace,
     columns: dict[str, Any],
     windows: list[Found] | None,
-    instrument: InstrumentData | None,
+    instrument: SensorErrorModel | None,
     notes: list[str],
     terms: CoefficientModel,
 ) -> CoefficientAnswer | None:

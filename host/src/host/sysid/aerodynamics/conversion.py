@@ -24,7 +24,7 @@ from host.aircraft.gains import (
 )
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
-from host.instrument.deviations import InstrumentData, deviations
+from host.instrument.deviations import SensorErrorModel, deviations
 from host.sysid.errors import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
 
@@ -76,7 +76,7 @@ class Place:
     drag: float = 0.0
 
 
-def carried_errors(airframe: AirframeData, instrument: InstrumentData) -> dict[str, float]:
+def carried_errors(airframe: AirframeData, instrument: SensorErrorModel) -> dict[str, float]:
     """Return one standard deviation of everything a conversion leans on, by name."""
     every = deviations(instrument, airframe)
     return {name: every[name] for name in CARRIED}

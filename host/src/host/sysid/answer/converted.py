@@ -16,7 +16,7 @@ from host.aircraft.mass_properties import Condition, airframe_data
 from host.aircraft.prior.prior_file import read_prior
 from host.files.document import shown
 from host.files.quantities import Quantity
-from host.instrument.deviations import instrument_data
+from host.instrument.deviations import sensor_error_model
 from host.sysid.aerodynamics.conversion import (
     CARRIED,
     COEFFICIENTS,
@@ -115,7 +115,7 @@ def convert(path: Path, aircraft: str, at: At) -> Converted:
     IdentificationError
         If the file cannot be read or holds nothing to convert.
     """
-    airframe, instrument = airframe_data(aircraft), instrument_data(aircraft)
+    airframe, instrument = airframe_data(aircraft), sensor_error_model(aircraft)
     values, trim = _from_toml(path) if path.suffix == ".toml" else ({}, None)
     speed = at.airspeed_mps or (trim.airspeed_mps if trim else instrument.friction_speed_mps)
     alpha = at.alpha_rad if at.alpha_rad is not None else trim.alpha_rad if trim else 0.0

@@ -18,7 +18,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
-from host.instrument.deviations import InstrumentData, deviations
+from host.instrument.deviations import SensorErrorModel, deviations
 from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.gust_free import gust_free
 from host.sysid.coefficients.joint import LastStep
@@ -37,7 +37,7 @@ from host.sysid.coefficients.step import Known, stepped
 from host.sysid.coefficients.stretches import Side, Unknowns, stretches, summed
 from host.sysid.coefficients.turning import gust_information, gust_strength, turned
 from host.sysid.coefficients.windows import Window, noise_spectra
-from host.sysid.compatibility.signals import thinned, usable_length
+from host.sysid.compatibility.signals import decimated, usable_length
 from host.sysid.errors import IdentificationError
 
 PLAIN_ROUNDS, FULL_ROUNDS = 3, 2  # without errors of the instrument and slow gusts, with them
@@ -61,7 +61,7 @@ def fit_coefficients(
     columns: Mapping[str, Array],
     windows: Sequence[Window],
     airframe: AirframeData,
-    data: InstrumentData,
+    data: SensorErrorModel,
     plant: Powerplant,
     model: CoefficientModel | None = None,
 ) -> CoefficientFit:
@@ -97,7 +97,7 @@ def fit_coefficients(
     shift = len(t) - kept if late else 0
     cut = {k: np.ascontiguousarray(columns[k][shift : shift + kept]) for k in COLUMNS}
     t = t[shift : shift + kept]
-    record = thinned(cut, float(t[-1] - t[0]) / (kept - 1))
+    record = decimated(cut, float(t[-1] - t[0]) / (kept - 1))
     t = t[0] + np.arange(record.samples) * record.dt_s
     prior = deviations(data, airframe)
     names = tuple(prior)

@@ -10,7 +10,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import NoPropulsionError, powerplant
 from host.arrays import Array
-from host.instrument.deviations import InstrumentData, instrument_data
+from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.coefficients.answer import METHOD, QUANTILE, CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
@@ -92,7 +92,7 @@ def identify_coefficients(
     windows: Sequence[Found] | None = None,
     model: CoefficientModel | None = None,
     airframe: AirframeData | None = None,
-    instrument: InstrumentData | None = None,
+    instrument: SensorErrorModel | None = None,
 ) -> CoefficientAnswer:
     """Find the maneuvers of a flight and fit coefficients to all of them at once.
 
@@ -108,8 +108,8 @@ def identify_coefficients(
         The terms of every coefficient; `standard_model` by default.
     airframe : AirframeData, optional
         In place of what the aircraft file says.
-    instrument : InstrumentData, optional
-        What the sensors may be wrong by, as `instrument_data` reads it of a calibration; the
+    instrument : SensorErrorModel, optional
+        What the sensors may be wrong by, as `sensor_error_model` reads it of a calibration; the
         standard errors without.
 
     Raises
@@ -117,7 +117,7 @@ def identify_coefficients(
     IdentificationError
         If a column or an axis is missing, or the aircraft file lacks what is needed.
     """
-    airframe, data = airframe or airframe_data(aircraft), instrument or instrument_data(aircraft)
+    airframe, data = airframe or airframe_data(aircraft), instrument or sensor_error_model(aircraft)
     try:
         propulsion = powerplant(aircraft)
     except NoPropulsionError as error:
@@ -198,7 +198,7 @@ def _causes(fit: CoefficientFit) -> dict[str, tuple[str, float]]:
     return result
 
 
-def _delays(fit: CoefficientFit, data: InstrumentData) -> dict[str, tuple[float, float]]:
+def _delays(fit: CoefficientFit, data: SensorErrorModel) -> dict[str, tuple[float, float]]:
     omega = 2.0 * np.pi * data.vane_hz_per_mps * data.friction_speed_mps
     vane_s = 2.0 * data.vane_damping / omega
     table = {"delay_imu_s": ("imu_delay_s", 1.0)}

@@ -14,7 +14,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.instrument.deviations import InstrumentData
+from host.instrument.deviations import SensorErrorModel
 from host.sysid.coefficients.rows import Flown
 from host.sysid.compatibility.signals import BLEND_RADPS, Record
 from host.sysid.errors import IdentificationError
@@ -46,7 +46,7 @@ def gust_free(
     flown: Flown,
     value: Callable[[str], float],
     airframe: AirframeData,
-    data: InstrumentData,
+    data: SensorErrorModel,
     condition: tuple[float, float, float],
 ) -> tuple[Record, Flown]:
     """Return sensor columns and attitude of a gust-free flight with the same surfaces.

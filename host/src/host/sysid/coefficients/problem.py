@@ -14,12 +14,12 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array, IntArray
-from host.instrument.deviations import InstrumentData
+from host.instrument.deviations import SensorErrorModel
 from host.sysid.coefficients.model import CoefficientModel
 from host.sysid.coefficients.rows import KINEMATIC, Equation, Flown, equations
 from host.sysid.coefficients.turning import LENGTH_M
 from host.sysid.coefficients.windows import Block, Key, Window, transformed, window_block
-from host.sysid.compatibility.signals import Record, Spectrum, attitude, corrected
+from host.sysid.compatibility.signals import Record, Spectrum, apply_sensor_errors, attitude
 from host.sysid.models.templates import GRAVITY_MPS2
 
 STEP = 0.3  # of a standard deviation: width of the numeric slopes
@@ -70,7 +70,7 @@ class FlightProblem:
     record: Record
     flown: Flown
     airframe: AirframeData
-    data: InstrumentData
+    data: SensorErrorModel
     plant: Powerplant
     condition: tuple[float, float, float]
     faster: tuple[float, float]
@@ -110,7 +110,7 @@ class FlightProblem:
         `signals` are those for the same errors of the sensors, where they are known already.
         """
         table = dict(zip(self.names, errors.tolist(), strict=True))
-        s = signals or corrected(record, table, self.data, self.condition[0])
+        s = signals or apply_sensor_errors(record, table, self.data, self.condition[0])
         found = equations(
             self.model, record, s, table, flown, self.airframe, self.plant, self.condition[2],
             self.every,
@@ -174,7 +174,7 @@ def prepared(
     t: Array,
     windows: Sequence[Window],
     airframe: AirframeData,
-    data: InstrumentData,
+    data: SensorErrorModel,
     plant: Powerplant,
     names: tuple[str, ...],
 ) -> FlightProblem:
@@ -186,7 +186,7 @@ def prepared(
     picked = [np.flatnonzero((t >= w.first_s) & (t <= w.last_s)) for w in windows]
     every = np.unique(np.concatenate(picked))
     speed = np.sqrt(2.0 * np.maximum(record.columns["qbar_pa"], 1.0) / density(record))
-    s = corrected(record, zero, data, float(speed[every].mean()))
+    s = apply_sensor_errors(record, zero, data, float(speed[every].mean()))
     flying = s["V"] * np.cos(s["alpha"])
     driving = (record.columns["throttle"], flying, density(record))
     flown = Flown(

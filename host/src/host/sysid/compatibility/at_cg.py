@@ -14,11 +14,11 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.instrument.deviations import InstrumentData, vane_delay_s
+from host.instrument.deviations import SensorErrorModel, vane_delay_s
 from host.instrument.deviations import deviations as drawn
 from host.sysid.compatibility.flight_path import AIR, DELAYS
-from host.sysid.compatibility.path_data import NOTHING, unfiltered, unstuck
-from host.sysid.compatibility.position_correction import corrected
+from host.sysid.compatibility.path_data import NOTHING, compensate_friction, compensate_lowpass
+from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
 
 VANE_DELAY, PITOT_DELAY = DELAYS
@@ -51,22 +51,24 @@ def at_cg(
     """
     i = found.instrument
     if i is None:
-        return corrected(dict(columns), airframe)
+        return transfer_to_cg(dict(columns), airframe)
     result = dict(columns)
     dt_s = float(columns["t_s"][1] - columns["t_s"][0])
     tau_s, _ = vane_delay(found, i, columns)
     for name in (a for a in ANGLES if a in columns and AIR[0] in columns):
-        result[name] = unswung(unstuck(columns, name, i, dt_s), tau_s, i, columns, dt_s)
+        result[name] = invert_vane_dynamics(
+            compensate_friction(columns, name, i, dt_s), tau_s, i, columns, dt_s
+        )
     for name in (n for n in INERTIAL if n in columns):
-        result[name] = unfiltered(columns[name], i, dt_s)
+        result[name] = compensate_lowpass(columns[name], i, dt_s)
     result = later(result, PRESSURE, i.pitot_lag_s)
-    return corrected(result, airframe)
+    return transfer_to_cg(result, airframe)
 
 
-def unswung(
-    angle: Array, tau_s: float, i: InstrumentData, columns: Mapping[str, Array], dt_s: float
+def invert_vane_dynamics(
+    angle: Array, tau_s: float, i: SensorErrorModel, columns: Mapping[str, Array], dt_s: float
 ) -> Array:
-    """Return a vane's angle without its delay, and without what a spring does beyond a delay."""
+    """Return a vane's angle with its delay and second-order dynamics taken out."""
     t = columns["t_s"]
     prompt = np.interp(t + tau_s, t, angle)
     omega = 2.0 * np.pi * i.vane_hz_per_mps * float(np.median(columns[AIR[0]]))
@@ -75,7 +77,7 @@ def unswung(
 
 
 def vane_delay(
-    found: Compatibility, i: InstrumentData, columns: Mapping[str, Array]
+    found: Compatibility, i: SensorErrorModel, columns: Mapping[str, Array]
 ) -> tuple[float, float]:
     """Return the vanes' delay and its deviation, s: as told, else of the spring by the file."""
     told = next((f for f in found.findings if f.name == VANE_DELAY and f.told), None)
@@ -112,7 +114,9 @@ def without_open(
     if error == FRICTION and i is not None:
         dt_s = float(columns["t_s"][1] - columns["t_s"][0])
         more = replace(i, vane_friction_rad=size * i.vane_friction_rad)
-        return result | {n: unstuck(columns, n, more, dt_s) for n in ANGLES if n in columns}
+        return result | {
+            n: compensate_friction(columns, n, more, dt_s) for n in ANGLES if n in columns
+        }
     if error in PLACES:
         what, axis = error.split("_")[:2]
         size = -size if what == "cg" else size
@@ -123,7 +127,7 @@ def without_open(
             imu_m=here if what != "vane" else NOTHING.imu_m,
             vanes_m=(here,) if what != "imu" else (),
         )
-        return corrected(result, frame)
+        return transfer_to_cg(result, frame)
     return result
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, BoolArray
-from host.instrument.deviations import InstrumentData, deviations, unknown_sensors
+from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.sysid.compatibility.flight_path import (
     AIR,
     DELAYS,
@@ -25,7 +25,7 @@ from host.sysid.compatibility.flight_path import (
     PathProblem,
     Stretch,
 )
-from host.sysid.compatibility.position_correction import corrected
+from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.signals import SLIDING_RADPS
 from host.sysid.compatibility.strapdown import rotation
 from host.sysid.errors import IdentificationError
@@ -57,7 +57,7 @@ GPS_DELAY_S = (0.10, 0.08)
 def prepare(
     columns: Mapping[str, Array],
     airframe: AirframeData | None,
-    instrument: InstrumentData | None,
+    instrument: SensorErrorModel | None,
 ) -> tuple[PathProblem, list[Array], tuple[tuple[float, float], ...]]:
     """Return the problem, what the pilot did in every stretch, and when the stretches were (s).
 
@@ -76,8 +76,8 @@ def prepare(
     data = {k: v for k, v in columns.items() if k in wanted}
     dt_s = float(data["t_s"][1] - data["t_s"][0])
     if instrument is not None:
-        data |= {name: unstuck(data, name, instrument, dt_s) for name in AIR[1:]}
-        data |= {name: unfiltered(data[name], instrument, dt_s) for name in inertial}
+        data |= {name: compensate_friction(data, name, instrument, dt_s) for name in AIR[1:]}
+        data |= {name: compensate_lowpass(data[name], instrument, dt_s) for name in inertial}
     if airframe is not None:
         data = _at_cg(data, airframe, dt_s)
     block = max(1, round(BLOCK_S / dt_s))
@@ -106,7 +106,7 @@ def prepare(
     return problem, [_follows(columns, cut, block) for cut in cuts], when
 
 
-def prior(instrument: InstrumentData | None) -> dict[str, tuple[float, float]]:
+def prior(instrument: SensorErrorModel | None) -> dict[str, tuple[float, float]]:
     """Return mean and standard deviation of every unknown before the flight."""
     i = instrument or unknown_sensors()
     e, sd = i.errors, deviations(i, NOTHING)
@@ -134,13 +134,15 @@ def prior(instrument: InstrumentData | None) -> dict[str, tuple[float, float]]:
     return {name: (float(mean), float(own)) for name, (mean, own) in result.items()}
 
 
-def density_share(instrument: InstrumentData | None) -> float:
+def density_share(instrument: SensorErrorModel | None) -> float:
     """Return one deviation of density as a share: instruments and a fuselage that is warm."""
     e = (instrument or unknown_sensors()).errors
     return float(np.hypot(e["density_share"].of_mean(), e["fuselage_heat_share"].of_mean()))
 
 
-def unstuck(data: Mapping[str, Array], name: str, i: InstrumentData, dt_s: float) -> Array:
+def compensate_friction(
+    data: Mapping[str, Array], name: str, i: SensorErrorModel, dt_s: float
+) -> Array:
     """Return a vane's angle with its dry friction undone: it hangs back where it moves."""
     angle = data[name]
     window = 2 * max(2, round(SMOOTH_S / dt_s)) + 1
@@ -150,7 +152,7 @@ def unstuck(data: Mapping[str, Array], name: str, i: InstrumentData, dt_s: float
     return np.asarray(angle + hold * np.tanh(moving / SLIDING_RADPS))
 
 
-def unfiltered(signal: Array, i: InstrumentData, dt_s: float) -> Array:
+def compensate_lowpass(signal: Array, i: SensorErrorModel, dt_s: float) -> Array:
     """Return an inertial signal with the loss of its low-pass and of interpolation undone."""
     lost_s2 = 0.5 / (2.0 * np.pi * i.imu_bandwidth_hz) ** 2 + dt_s**2 / 12.0
     return np.asarray(signal - lost_s2 * np.gradient(np.gradient(signal, dt_s), dt_s))
@@ -166,7 +168,7 @@ def _at_cg(data: dict[str, Array], airframe: AirframeData, dt_s: float) -> dict[
     for axis in "pqr":
         name = f"{axis}_radps"
         smooth[name] = local_polynomial(data[name][:, None], window, 2)[:, 0]
-    moved = corrected(smooth, replace(airframe, vanes_m=()))
+    moved = transfer_to_cg(smooth, replace(airframe, vanes_m=()))
     straight = np.arctan(np.tan(data["alpha_rad"]) / (1.0 + airframe.upwash))
     rates = {f"{axis}_radps": data[f"{axis}_radps"] for axis in "pqr"}
     return {**moved, **rates, "alpha_rad": straight}

@@ -8,7 +8,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 
 
-def corrected(columns: dict[str, Array], airframe: AirframeData) -> dict[str, Array]:
+def transfer_to_cg(columns: dict[str, Array], airframe: AirframeData) -> dict[str, Array]:
     """Move vanes and accelerometers to the CG.
 
     A vane at r sees the air of the CG plus omega x r, and over-reads by the upwash; an

@@ -16,7 +16,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.instrument.deviations import InstrumentData
+from host.instrument.deviations import SensorErrorModel
 from host.sysid.compatibility.claims import Claim, claim_words, claims
 from host.sysid.compatibility.flight_path import FLOW, GPS, INERTIAL
 from host.sysid.compatibility.path_data import prepare, prior
@@ -79,7 +79,7 @@ class Compatibility:
     stretches : tuple of (from, to), s
         What it rests on.
     gps : bool
-    instrument : InstrumentData, optional
+    instrument : SensorErrorModel, optional
         What the calibration leaves open, as far as it was told.
     claims : tuple of Claim
         What the flight says of the file's own deviations: all together, then group by group.
@@ -89,7 +89,7 @@ class Compatibility:
     rms: dict[str, float]
     stretches: tuple[tuple[float, float], ...]
     gps: bool
-    instrument: InstrumentData | None = None
+    instrument: SensorErrorModel | None = None
     claims: tuple[Claim, ...] = ()
 
     def __getitem__(self, name: str) -> Finding:
@@ -100,7 +100,7 @@ class Compatibility:
 def reconstruct(
     columns: Mapping[str, Array],
     airframe: AirframeData | None = None,
-    instrument: InstrumentData | None = None,
+    instrument: SensorErrorModel | None = None,
 ) -> Compatibility:
     """Reconstruct the flight path and estimate what the sensors are wrong by.
 
@@ -110,7 +110,7 @@ def reconstruct(
         Even SI columns as `tables.read_columns` gives them, not yet corrected for position.
     airframe : AirframeData, optional
         Places of the sensors and upwash; without, vanes and IMU are taken to sit at the CG.
-    instrument : InstrumentData, optional
+    instrument : SensorErrorModel, optional
         What the calibration leaves open; usual values without.
 
     Raises

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.arrays import Array
-from host.instrument.deviations import InstrumentData
+from host.instrument.deviations import SensorErrorModel
 
 PASS_HZ, STOP_HZ = 9.0, 13.0
 THIN_HZ = 33.0  # rate of the fit: nothing is left above 13 Hz, a fit takes a third of the time
@@ -89,7 +89,7 @@ def usable_length(samples: int) -> int:
     return best
 
 
-def thinned(columns: Mapping[str, Array], dt_s: float) -> Record:
+def decimated(columns: Mapping[str, Array], dt_s: float) -> Record:
     """Return a record at the rate of the fit; its first sample keeps its time.
 
     Parameters
@@ -123,8 +123,8 @@ def attitude(record: Record, s: Mapping[str, Array]) -> tuple[Array, Array]:
     return blended[0], blended[1]
 
 
-def corrected(
-    record: Record, errors: Mapping[str, float], data: InstrumentData, airspeed_mps: float
+def apply_sensor_errors(
+    record: Record, errors: Mapping[str, float], data: SensorErrorModel, airspeed_mps: float
 ) -> dict[str, Array]:
     """Return signals at the CG for assumed instrument errors.
 
@@ -133,7 +133,7 @@ def corrected(
     record : Record
     errors : mapping
         Names of `instrument_errors.deviations`.
-    data : InstrumentData
+    data : SensorErrorModel
     airspeed_mps : float
         Mean of the maneuvers: sets the vanes' frequency.
 
@@ -207,7 +207,7 @@ def _inertial(record: Record, delay_s: float, pole_s: float) -> Array:
 
 
 def _vane(
-    record: Record, name: str, e: Mapping[str, float], data: InstrumentData, airspeed_mps: float
+    record: Record, name: str, e: Mapping[str, float], data: SensorErrorModel, airspeed_mps: float
 ) -> Array:
     """Return the flow angle a vane was pushed by: inertia, damping and dry friction undone."""
     omega = 2.0 * np.pi * data.vane_hz_per_mps * airspeed_mps * (1.0 + e[f"{name}_lag_share"])

@@ -37,14 +37,14 @@ SINGULAR = 1e-12  # of the largest eigenvalue of the scaled information
 Follow = Callable[[LinearModel, Trim, Sequence[Maneuver]], Array]
 
 
-def moved_by(
+def systematic_error_shifts(
     result: FitResult,
     maneuvers: Sequence[Maneuver],
     cuts: Sequence[Mapping[str, Array]],
     compatibility: Compatibility,
     trim: Trim,
 ) -> tuple[Moved, ...]:
-    """Return what one deviation of every error that stays open makes of an answer.
+    """Return the shift of the estimate by one deviation of each error of the sensors left open.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def _changed(
 
 
 def follower(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> Follow | None:
-    """Return what tells how far an answer moves with model, trim and data."""
+    """Return a function that gives the one-step change of the estimate for other data."""
     if result.residual_kind == "innovation":
         wide = gust_model(result.model, trim.airspeed_mps)
         found = innovations_of(result, wide, maneuvers)

@@ -10,7 +10,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
-from host.instrument.deviations import InstrumentData, deviations, unknown_sensors
+from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
     CoefficientTable,
@@ -27,14 +27,14 @@ from host.sysid.compatibility.corrections import (
     without_errors,
 )
 from host.sysid.compatibility.path_data import NOTHING
-from host.sysid.compatibility.position_correction import corrected
+from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import VANES, fit_with_gust
 from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.estimators.start import regressed
-from host.sysid.flight.carried import carried, moved_by
+from host.sysid.flight.carried import carried, systematic_error_shifts
 from host.sysid.flight.chosen import moving, once
 from host.sysid.flight.column_map import like
 from host.sysid.flight.departures import departed
@@ -186,7 +186,7 @@ def identify(
     else:
         columns = without_delays(columns, told)
         if airframe is not None:
-            columns = corrected(columns, airframe)
+            columns = transfer_to_cg(columns, airframe)
     if compatibility is not None:
         columns = without_errors(columns, told, pressure_part(compatibility))
     found = list(windows) if windows is not None else find(columns)
@@ -275,7 +275,7 @@ def _answer(
         result, moved = departed(result, fitted, cuts, airframe, trim, powerplant)
         alone = result
     if compatibility is not None:
-        moved += moved_by(result, fitted, cuts, compatibility, trim)
+        moved += systematic_error_shifts(result, fitted, cuts, compatibility, trim)
     result = carried(result, moved)
     # Of frequencies the residuals are not those of samples.
     ours = result.residual_kind == "output" and all(
@@ -341,13 +341,13 @@ def _frees_places(method: str) -> bool:
     return method.startswith("output-error") or method in STAGED
 
 
-def imu_place_m(i: InstrumentData) -> float:
+def imu_place_m(i: SensorErrorModel) -> float:
     """Return one deviation of the IMU's height above the CG, m: tape measure and balance."""
     sd = deviations(i, NOTHING)
     return float(np.hypot(sd["imu_z_m"], sd["cg_z_m"]))
 
 
-def _drag_arm(model: LinearModel, trim: Trim, i: InstrumentData) -> LinearModel:
+def _drag_arm(model: LinearModel, trim: Trim, i: SensorErrorModel) -> LinearModel:
     """Free the height of the accelerometers where drag is told: a pitch rate makes none.
 
     Every other place is carried. This one moves drag by more than its size, and the pitch rate
