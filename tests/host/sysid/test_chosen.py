@@ -131,8 +131,8 @@ def test_one_reason_for_two_models_is_said_once(
     ("model", "words"),
     [
         ("longitudnal", r"no model 'longitudnal' \(did you mean longitudinal\?\); there are"),
-        ("missing.TOML", "missing.TOML: cannot be read"),
-        (".", "cannot be read"),
+        ("missing.TOML", "missing.TOML: no such file or folder"),
+        (".", "a folder; name a file in it"),
     ],
 )
 def test_a_wrong_model_is_said_before_the_data_are_read(
