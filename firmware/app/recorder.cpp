@@ -9,6 +9,8 @@
 
 namespace app {
 
+using frames::EndCause;
+using frames::StartCause;
 using hal::CardStatus;
 using storage::VolumeStatus;
 using Job = storage::Volume::Job;
@@ -24,11 +26,6 @@ constexpr uint32_t kLeastSeconds = 1800;    // with less left, the ground prepar
 constexpr uint32_t kOtherBytesPerS = 1000;  // frames beside the identification frame
 
 constexpr uint32_t kTakeOffUs = 18000000UL;  // as core::Airborne::kAloneS
-
-// Argument of the event `session_end`.
-constexpr uint8_t kEndButton = 0;
-constexpr uint8_t kEndFull = 1;
-constexpr uint8_t kEndDoubt = 3;
 
 // The events of the end and the frame `file`, and what only events may use.
 constexpr uint16_t kLastWords = 2 * frames::kEventWireSize + frames::kFileWireSize + 48;
@@ -106,8 +103,8 @@ void Recorder::decide(const core::PilotInputs& in,
       decide_open_file(in, start_button, airborne, now_us);
       break;
     case State::kReady:
-      if (start_button) start_why_ = 0;
-      if (action == core::RecordAction::kStartThrottle) start_why_ = 1;
+      if (start_button) start_why_ = StartCause::kButton;
+      if (action == core::RecordAction::kStartThrottle) start_why_ = StartCause::kThrottle;
       if (start_why_ != kNoStart) {
         start(start_why_, now_us);
       } else {
@@ -121,7 +118,7 @@ void Recorder::decide(const core::PilotInputs& in,
       if (!end_told_) {
         tell_end();
       } else if (writer_.drained() && stream_.rests() && stream_.ended(now_us)) {
-        if (end_why_ == kEndFull) {
+        if (end_why_ == EndCause::kFileFull) {
           state_ = State::kFileFull;
         } else if (landed_) {
           finish(now_us);
@@ -253,7 +250,7 @@ void Recorder::decide_open_file(const core::PilotInputs& in,
     case core::BootAction::kWait:
       return;
     case core::BootAction::kResume:
-      begin(2, false, now_us);
+      begin(StartCause::kResumed, false, now_us);
       in_doubt_ = !start_pressed && !resume_sure_;
       return;
     case core::BootAction::kClose:
@@ -264,7 +261,7 @@ void Recorder::decide_open_file(const core::PilotInputs& in,
 }
 
 // A search is left at once; a block under way on the card comes to its end first.
-void Recorder::start(uint32_t why, uint32_t now_us) {
+void Recorder::start(StartCause why, uint32_t now_us) {
   if (!volume_.leave()) return;
   start_why_ = kNoStart;
   begin(why, prepared_, now_us);
@@ -277,16 +274,16 @@ uint32_t Recorder::next_session() {
   return largest + 1;
 }
 
-void Recorder::begin(uint32_t why, bool same_session, uint32_t now_us) {
+void Recorder::begin(StartCause why, bool same_session, uint32_t now_us) {
   const storage::FlightFile& file = volume_.file();
   const uint32_t session = same_session ? file.last_session : next_session();
   prepared_ = false;
-  resumed_ = why == 2;
+  resumed_ = why == StartCause::kResumed;
   writer_.start(file.file_id, session, file.next_block, now_us);
   outlet_.open();
   heads_told_ = false;
   put_heads(now_us);
-  outlet_.event(frames::Event::kSessionStart, why, now_us);
+  outlet_.event(frames::Event::kSessionStart, static_cast<uint32_t>(why), now_us);
   outlet_.release_waiting();
   in_doubt_ = false;
   file_low_told_ = false;
@@ -334,7 +331,7 @@ void Recorder::record(core::RecordAction action, uint32_t now_us) {
   if (action == core::RecordAction::kMark) outlet_.event(frames::Event::kMark, ++marks_, now_us);
   watch_room(now_us);
   watch_doubt(now_us);
-  if (action == core::RecordAction::kStop) end(kEndButton, now_us);
+  if (action == core::RecordAction::kStop) end(EndCause::kButton, now_us);
 }
 
 uint32_t Recorder::bytes_per_s() const {
@@ -356,19 +353,19 @@ bool Recorder::room_for(uint32_t seconds, uint32_t next_block) const {
 // A file was continued because this might have been a flight, and it was none.
 void Recorder::watch_doubt(uint32_t now_us) {
   if (flight_ == core::FlightState::kFlying) in_doubt_ = false;
-  if (in_doubt_ && landed_) end(kEndDoubt, now_us);
+  if (in_doubt_ && landed_) end(EndCause::kNoFlight, now_us);
 }
 
 void Recorder::watch_room(uint32_t now_us) {
   const uint32_t next = writer_.sequence();
   if (next + kEndBlocks >= volume_.file().blocks) {
-    end(kEndFull, now_us);
+    end(EndCause::kFileFull, now_us);
     return;
   }
   // The next flight gets a new file rather than the end of this one. (A file that never had so much
   // room is used to its half at least.)
   if (!room_for(kLeastSeconds, next) && next > volume_.file().blocks / 2 && landed_) {
-    end(kEndFull, now_us);
+    end(EndCause::kFileFull, now_us);
     return;
   }
   if (file_low_told_ || room_for(kLowSeconds, next)) return;
@@ -376,15 +373,15 @@ void Recorder::watch_room(uint32_t now_us) {
   outlet_.event(frames::Event::kFileLow, kLowSeconds, now_us);
 }
 
-void Recorder::end(uint32_t why, uint32_t now_us) {
+void Recorder::end(EndCause why, uint32_t now_us) {
   if (state_ != State::kRecording) return;
   outlet_.close();
   hal::set_flight_mark(false);
   state_ = State::kEnding;
   ended_us_ = now_us;
-  end_why_ = static_cast<uint8_t>(why);
+  end_why_ = why;
   end_told_ = false;
-  (void)outlet_.send(frames::Event::kSessionEnd, why, now_us);
+  (void)outlet_.send(frames::Event::kSessionEnd, static_cast<uint32_t>(why), now_us);
   tell_end();
 }
 
@@ -395,7 +392,7 @@ void Recorder::tell_end() {
   const storage::FlightFile& file = volume_.file();
   // The next boot may have to free what is behind the end: it asks the last block how far.
   (void)ring_.push(frames::FileFrame{ended_us_, file.number, file.blocks * hal::kCardBlockBytes});
-  (void)ring_.push_event(frames::Event::kSessionEnd, end_why_, ended_us_);
+  (void)ring_.push_event(frames::Event::kSessionEnd, static_cast<uint32_t>(end_why_), ended_us_);
   writer_.finish();
   end_told_ = true;
 }

@@ -58,7 +58,7 @@ class Recorder {
   void put_health(frames::SystemFrame* out);
 
  private:
-  static constexpr uint8_t kNoStart = 0xFF;
+  static constexpr auto kNoStart = static_cast<frames::StartCause>(0xFF);
 
   bool streams() const { return state_ == State::kRecording || state_ == State::kEnding; }
   void job_ended(storage::Volume::Job job, uint32_t now_us);
@@ -70,10 +70,10 @@ class Recorder {
                         bool start_pressed,
                         const core::Airborne& airborne,
                         uint32_t now_us);
-  void start(uint32_t why, uint32_t now_us);
-  void begin(uint32_t why, bool same_session, uint32_t now_us);
+  void start(frames::StartCause why, uint32_t now_us);
+  void begin(frames::StartCause why, bool same_session, uint32_t now_us);
   void record(core::RecordAction action, uint32_t now_us);
-  void end(uint32_t why, uint32_t now_us);
+  void end(frames::EndCause why, uint32_t now_us);
   void tell_end();
   void finish(uint32_t now_us);
   void fail(hal::CardStatus status, uint32_t now_us);
@@ -107,8 +107,8 @@ class Recorder {
   bool may_write_ = false;    // on the ground, and a second of throttle-up for what was begun
   bool file_wanted_ = false;  // the card is good, a new file waits for room and for the ground
   bool unrecorded_ = false;
-  uint8_t start_why_ = kNoStart;  // a session that begins as soon as the card is free
-  bool prepared_ = false;         // the file's first block carries this power-on's session
+  frames::StartCause start_why_ = kNoStart;  // a session that begins as soon as the card is free
+  bool prepared_ = false;  // the file's first block carries this power-on's session
   bool resumed_ = false;
   bool heads_told_ = false;
   bool file_low_told_ = false;
@@ -116,8 +116,8 @@ class Recorder {
   bool landed_ = false;       // it is the ground, and nobody takes off
   bool resume_sure_ = false;  // an open file is continued because it was being recorded
   bool in_doubt_ = false;     // the session continues an open file, and nobody was seen flying yet
-  uint8_t end_why_ = 0;       // of the session, as its event says
-  bool end_told_ = false;     // by its event
+  frames::EndCause end_why_ = frames::EndCause::kButton;  // of the session, as its event says
+  bool end_told_ = false;                                 // by its event
 };
 
 }  // namespace app

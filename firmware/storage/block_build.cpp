@@ -55,7 +55,7 @@ void build_end_block(uint8_t* block,
   frames::EventFrame event = {};
   event.t_us = made.t_us;
   event.code = static_cast<uint8_t>(frames::Event::kSessionEnd);
-  event.arg = 2;
+  event.arg = static_cast<uint32_t>(frames::EndCause::kNextBoot);
   uint8_t* const payload = block + core::kBlockHeaderSize;
   payload[0] = frames::FileFrame::id();
   memcpy(payload + 1, &made, sizeof made);

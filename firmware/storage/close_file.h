@@ -11,7 +11,7 @@ namespace storage {
 
 class CloseFile {
  public:
-  // Cuts card.file to `used_blocks`. With `end_event` a block saying session_end 2 goes behind
+  // Cuts card.file to `used_blocks`. With `end_event` a block saying session_end goes behind
   // them.
   Wish start(uint32_t used_blocks, bool end_event, uint32_t now_us, CardState& card);
   // Puts right what card.odd says of a closed file: chain_long, chain_short.

@@ -11,7 +11,7 @@
 namespace frames {
 
 constexpr uint8_t kVersion = 1;
-constexpr uint32_t kSchemaHash = 0x7CD9E42Au;
+constexpr uint32_t kSchemaHash = 0x5DF8D341u;
 constexpr size_t kMaxWireSize = 68;  // longest frame with its id
 
 // Bits of `valid`.
@@ -111,6 +111,19 @@ enum class Drive : uint8_t {
   kMega = 5,
   kMegaHolding = 6,
   kDirectRelay = 7,
+};
+
+enum class StartCause : uint8_t {
+  kButton = 0,
+  kThrottle = 1,
+  kResumed = 2,
+};
+
+enum class EndCause : uint8_t {
+  kButton = 0,
+  kFileFull = 1,
+  kNextBoot = 2,
+  kNoFlight = 3,
 };
 
 enum class Event : uint8_t {

@@ -72,6 +72,11 @@ def ids(text: bytes) -> dict[str, int]:
     return {frame["name"]: frame["id"] for frame in json.loads(text)["frames"]}
 
 
+def number(table: str, word: str) -> int:
+    """Return the number of a word of the committed schema's enums."""
+    return int(json.loads(schema_text())["enum"][table][word])
+
+
 def rows(name: str, length: int, /, **columns: object) -> Rows:
     """Make `length` rows of frame `name` of the committed schema; columns not named are 0."""
     text = schema_text()
@@ -185,11 +190,11 @@ class LogWriter:
         self._open = bytearray()
         self._truth = {name: _Truth() for name in self.layouts} if keep_truth else None
 
-    def begin(self, *, rate_hz: int = 100, t_us: int = 0, reason: int = 0) -> None:
+    def begin(self, *, rate_hz: int = 100, t_us: int = 0, cause: str = "button") -> None:
         """Head a session: schema, frames `config`, `identity`, event `session_start`."""
         self.schema()
-        self.head(rate_hz=rate_hz, t_us=t_us, resumed=reason == 2)
-        self.put("event", t_us=t_us, code=1, arg=reason)
+        self.head(rate_hz=rate_hz, t_us=t_us, resumed=cause == "resumed")
+        self.put("event", t_us=t_us, code=1, arg=number("start_cause", cause))
 
     def head(self, *, rate_hz: int = 100, t_us: int = 0, resumed: bool = False) -> None:
         """Write the frames `config`, `identity` and `file`, as at each return of the schema."""
@@ -294,11 +299,11 @@ class LogWriter:
         self.flush()
         self.session = self.session + 1 if session is None else session
         self.dropped = 0
-        self.begin(rate_hz=rate_hz, t_us=t_us, reason=2)
+        self.begin(rate_hz=rate_hz, t_us=t_us, cause="resumed")
 
-    def end(self, *, t_us: int = 0, reason: int = 0) -> None:
+    def end(self, *, t_us: int = 0, cause: str = "button") -> None:
         """End the session with its event and write the open block."""
-        self.put("event", t_us=t_us & 0xFFFFFFFF, code=2, arg=reason)
+        self.put("event", t_us=t_us & 0xFFFFFFFF, code=2, arg=number("end_cause", cause))
         self.flush()
 
     def flush(self) -> None:

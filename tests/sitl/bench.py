@@ -145,6 +145,12 @@ def events(log: FlightLog, name: str) -> list[int]:
     return [int(arg) for arg in found["arg"][found["code"] == EVENTS[name]]]
 
 
+def causes(log: FlightLog, name: str) -> list[str]:
+    """Return why sessions began (`session_start`) or ended (`session_end`), in the log's words."""
+    table = {"session_start": "start_cause", "session_end": "end_cause"}[name]
+    return [log.schema.word(table, arg) for arg in events(log, name)]
+
+
 def missing(count: NDArray[np.uint16]) -> int:
     """Return how many identification frames the 16-bit counter says are missing."""
     return int((np.diff(count).astype(np.uint16) - np.uint16(1)).astype(np.int64).sum())

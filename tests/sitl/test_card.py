@@ -7,7 +7,7 @@ import pytest
 from host.twin.recorder.sitl_library import TICKS_PER_S, CardFault, Level, Recorder, Sitl, Volume
 
 from tests.protocol import oracle
-from tests.sitl.bench import GROUND_S, Bench, events, flight, idle_receiver, missing, spread
+from tests.sitl.bench import GROUND_S, Bench, causes, events, flight, idle_receiver, missing, spread
 from tests.sitl.card_image import BLOCK, format_fat32, new_card, read_file
 
 
@@ -47,7 +47,7 @@ def test_session_that_ends_in_a_stall_tells_its_last_losses(tmp_path: Path) -> N
     blocks = oracle.find_blocks(read_file(bytes(bench.image), "FLT00001.BIN"))
     assert sum(told) == blocks[-1].dropped > 50
     assert log.loss.dropped_frames == sum(told)
-    assert events(log, "session_end") == [0]
+    assert causes(log, "session_end") == ["button"]
     assert int(log.frames["event"]["code"][-1]) == 2
     assert log.complete == "complete"
 
@@ -241,7 +241,7 @@ def test_power_cut_at_a_random_instant_of_flight(tmp_path: Path, seed: int) -> N
     assert bench.state() == Recorder.READY
     closed = bench.log(tmp_path)
     assert closed.complete == "complete"
-    assert events(closed, "session_end") == [2]
+    assert causes(closed, "session_end") == ["next_boot"]
     assert np.array_equal(closed.frames["ident"]["count"], cut)
     assert bench.fsck(tmp_path) == ""
 

@@ -6,7 +6,7 @@ import pytest
 from host.twin.recorder.sitl_library import EEPROM_BYTES, TICKS_PER_S, Recorder
 
 from tests.protocol import oracle
-from tests.sitl.bench import Bench, events, flight, idle_receiver, missing
+from tests.sitl.bench import Bench, causes, events, flight, idle_receiver, missing
 from tests.sitl.card_image import CARD_ID, format_fat32, new_card, read_file, remove_files
 from tests.sitl.compare import NAMES, compare
 
@@ -57,7 +57,7 @@ def test_pulled_battery_is_closed_when_it_is_the_ground_for_sure(tmp_path: Path)
     bench.sitl.run_for(5.0)
     assert bench.state() == Recorder.READY
     log = bench.log(tmp_path)
-    assert events(log, "session_end") == [2]
+    assert causes(log, "session_end") == ["next_boot"]
     assert log.complete == "complete"
     assert len(bench.files()) == 2
     assert bench.files()["FLT00001.BIN"] < 512 * 400
@@ -94,7 +94,7 @@ def test_reset_in_flight_resumes_within_two_seconds_without_metadata(tmp_path: P
     bench.stop()
     log = bench.log(tmp_path)
     assert [session.number for session in log.sessions] == [1, 2, 3]
-    assert events(log, "session_start") == [0, 2]
+    assert causes(log, "session_start") == ["button", "resumed"]
     assert BROWN_OUT in events(log, "reset")
     assert log.complete == "complete"
     second = bench.log(tmp_path, session=3)
@@ -214,7 +214,7 @@ def test_full_file_ends_the_session_and_the_ground_makes_a_new_one(tmp_path: Pat
     bench.sitl.run_for(30.0)
     assert bench.state() == Recorder.FILE_FULL
     log = bench.log(tmp_path)
-    assert events(log, "session_end") == [1]
+    assert causes(log, "session_end") == ["file_full"]
     assert len(bench.files()) == 1
     # Neither throttle nor a reset in flight brings metadata onto the card.
     written = bench.sitl.state().ground_writes

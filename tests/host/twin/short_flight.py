@@ -57,6 +57,14 @@ class Flown:
         event = self.log.frames["event"]
         return [int(arg) for arg in event["arg"][event["code"] == EVENTS[name]]]
 
+    def started(self) -> list[str]:
+        """Why each session began, in the log's words."""
+        return [self.log.schema.word("start_cause", arg) for arg in self.told("session_start")]
+
+    def ended(self) -> list[str]:
+        """Why each session ended, in the log's words."""
+        return [self.log.schema.word("end_cause", arg) for arg in self.told("session_end")]
+
     def valid(self, bit: int, where: NDArray[np.bool_]) -> set[int]:
         """Values a bit of `valid` takes."""
         return set((self.ident["valid"][where] & bit > 0).astype(int).tolist())

@@ -13,8 +13,14 @@ from host.physical.columns import ANALOGUE, COLUMNS, INERTIAL, RESTS_ON
 from host.physical.session import Session
 from host.terminal import command_line
 from host.text import shown
+from host.wire.schema_text import packed_schema
 
 Json = dict[str, Any]
+
+_ENDED = {
+    "next_boot": "closed at the next boot",
+    "no_flight": "continued after a reset in doubt, and it was the ground",
+}
 
 
 def summarise(log: FlightLog) -> Json:
@@ -142,8 +148,10 @@ def _reason(log: FlightLog, session: Session) -> str:
     ends = events[events["code"] == log.schema.number("event", "session_end")]
     if not len(ends):
         return "no end event"
-    reasons = {0: "button", 1: "file full", 2: "closed at the next boot"}
-    return reasons.get(int(ends["arg"][-1]), "unknown")
+    # Logs before these words have the same numbers.
+    words = log.schema if "end_cause" in log.schema.enums else packed_schema()
+    word = words.word("end_cause", int(ends["arg"][-1]))
+    return _ENDED.get(word, shown(word.replace("_", " ")))
 
 
 def _identity(session: Session) -> Json:
