@@ -65,19 +65,19 @@ class _Batch:
             capture_output=True, text=True, check=True,
         ).stdout.strip()  # fmt: skip
         wanted = [str(self.next_seed), str(self._end - self.next_seed), str(self._library)]
-        worker = subprocess.Popen(
+        with subprocess.Popen(
             [sys.executable, __file__, "--worker", *wanted],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             env=os.environ | {"LD_PRELOAD": runtime, "ASAN_OPTIONS": "detect_leaks=0"},
-        )  # fmt: skip
-        assert worker.stdout is not None and worker.stderr is not None
-        for line in worker.stdout:
-            row = json.loads(line)
-            self.next_seed = row["seed"] + 1
-            judgement = Judgement(Stage(row["stage"]), row["message"], row["wrong"])
-            yield Result(row["seed"], judgement, row["altered"])
-        said = worker.stderr.read()
-        code = worker.wait()
+        ) as worker:  # fmt: skip
+            assert worker.stdout is not None and worker.stderr is not None
+            for line in worker.stdout:
+                row = json.loads(line)
+                self.next_seed = row["seed"] + 1
+                judgement = Judgement(Stage(row["stage"]), row["message"], row["wrong"])
+                yield Result(row["seed"], judgement, row["altered"])
+            said = worker.stderr.read()
+            code = worker.wait()
         if self.next_seed < self._end:
             why = "hangs" if code == -signal.SIGVTALRM else _verdict(said) or f"died, code {code}"
             seed = self.next_seed

@@ -17,7 +17,7 @@ from tests.cards.damage import (
 )
 from tests.cards.flights import State, flight_blocks
 from tests.cards.judge import Stage
-from tests.cards.sparse import DIRECTORY, SparseCard
+from tests.cards.sparse import BLOCK, DIRECTORY, SparseCard
 from tests.cards.truth import look_at
 from tests.sitl.card_flight import fly
 
@@ -69,3 +69,18 @@ def test_folder_named_as_a_flight(kilobytes: int) -> None:
         f"FLT{NUMBER + 1:05d}.BIN", flight.first + flight.clusters + 5, 0, attributes=DIRECTORY
     )
     records(card, NUMBER + 2)
+
+
+@pytest.mark.parametrize("kilobytes", KILOBYTES)
+def test_root_folder_whose_chain_comes_back_to_itself(kilobytes: int) -> None:
+    """With no end mark in it: a reader that follows it never ends."""
+    card = SparseCard(kilobytes * 1024 // BLOCK)
+    entries = kilobytes * 1024 // 32
+    for number in range(1, entries + 1):
+        card.image[(at := card.lba(2) * BLOCK + 32 * (number - 1)) : at + 11] = (
+            b"KEEP%04dDAT" % number
+        )
+    card.set_fat(2, [2])
+    judgement = fly(Sitl(), card)
+    assert judgement.message != ""
+    assert [text for text in judgement.wrong if not text.startswith("does not record")] == []

@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from host.twin.recorder.sitl_library import Sitl
 
 from tests.cards.drawn import ALTERATIONS, DrawnCard, draw, good_card
 from tests.cards.judge import Stage, judge, unreadable, untrue
 from tests.cards.sparse import END, SparseCard
+from tests.cards.tally import LEAST_FOUND, LEAST_MOUNTED, Tally
 from tests.cards.truth import look_at
 from tests.sitl.card_flight import fly
+from tests.sitl.card_images import build_sanitized, fly_all
 
 CARDS = 200
 NONE = np.zeros(0, np.int64)
+
+
+def test_cards_drawn_at_random(capsys: pytest.CaptureFixture[str]) -> None:
+    """Under sanitizers; other seeds than those of the campaign."""
+    tally = Tally()
+    for result in fly_all(1_000_001, CARDS, build_sanitized()):
+        tally.show(result)
+    assert [(result.seed, result.judgement.wrong) for result in tally.wrong] == []
+    assert tally.stages.total() == CARDS
+    assert tally.reached(Stage.MOUNTED) >= LEAST_MOUNTED
+    assert tally.reached(Stage.FOUND) >= LEAST_FOUND
 
 
 def test_a_good_card_of_every_kind_records() -> None:
