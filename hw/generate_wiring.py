@@ -1,6 +1,6 @@
 """Make wiring pictures' WireViz sources and the table of cables from harness.toml and pin_map.toml.
 
-python hw/generate_wiring.py           write generated/CABLES.md, wiring.yml, power.yml, imu.yml
+python hw/generate_wiring.py           write generated/CABLES.md and the sources of the pictures
 python hw/generate_wiring.py --check   prove that they, and the pictures made of them, are current
 python hw/generate_wiring.py --draw    draw the pictures too (wireviz from PyPI, graphviz)
 """
@@ -11,6 +11,7 @@ import argparse
 import csv
 import hashlib
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -24,13 +25,19 @@ HERE = Path(__file__).resolve().parent
 OUT = HERE / "generated"
 FIRST_LINE = "# made by hw/generate_wiring.py from hw/harness.toml and hw/pin_map.toml; do not edit"
 MEGA = "Arduino Mega 2560"
+# On the IMU's tray SDA and SCL keep the colours they have towards the Mega.
+_BUS_COLOURS = {
+    "SDA": "BN", "A4": "BN", "HV1": "BN", "LV1": "BN",
+    "SCL": "OG", "A5": "OG", "HV2": "OG", "LV2": "OG", "GPS TX": "YE",
+}  # fmt: skip
+PICTURES = ("control", "sensors", "modules")
 _SUPPLY_COLOURS = {
     "GND": "BK",
     "5V": "RD",
     "VCC": "RD",
     "HV": "RD",
     "+ servo rail": "RD",
-    "3V3": "OG",
+    "3V3": "PK",
 }
 _WIRE_COLOURS = ("BN", "OG", "YE", "GN", "BU", "VT", "GY", "PK", "TQ", "WH")
 
@@ -100,11 +107,22 @@ def _check_rails(table: dict[str, list[dict[str, object]]], devices: list[Device
             raise HarnessError(f"{device.name}: rail '{device.supply}' does not feed it")
 
 
-def signal_picture(harness_text: str, map_text: str) -> str:
-    """Write the WireViz source of the signal wires."""
-    devices = load_devices(harness_text, map_text)
+def shown_in(device: str) -> str:
+    """Return which of the three pictures of the Mega shows a device."""
+    if device in ("Receiver", "Relay board"):
+        return "control"
+    return "sensors" if device.split()[0] in ("Vane", "Pitot", "Pot", "Rail") else "modules"
+
+
+def signal_picture(harness_text: str, map_text: str, picture: str) -> str:
+    """Write the WireViz source of the signal wires of one picture: control, sensors or modules."""
+    devices = [d for d in load_devices(harness_text, map_text) if shown_in(d.name) == picture]
     pins = {str(row["name"]): str(row["pin"]) for row in tomllib.loads(map_text)["signal"]}
-    links = [row for row in tomllib.loads(harness_text)["link"] if "picture" not in row]
+    links = [
+        row
+        for row in tomllib.loads(harness_text)["link"]
+        if row.get("picture", "control") == picture
+    ]
     connectors: dict[str, tuple[str, list[str], str]] = {
         device.name: (device.part, [pin for pin, _ in device.pins], device.supply)
         for device in devices
@@ -158,8 +176,8 @@ def link_picture(harness_text: str, picture: str) -> str:
             held = connectors.setdefault(link[end], [])
             held += [pair[place] for pair in link["pins"] if pair[place] not in held]
         wires = tuple(
-            (a, b, _SUPPLY_COLOURS.get(a, _WIRE_COLOURS[place]))
-            for place, (a, b) in enumerate(link["pins"])
+            (a, b, _SUPPLY_COLOURS.get(a, _BUS_COLOURS.get(a, _WIRE_COLOURS[4])))
+            for a, b in link["pins"]
         )
         cables.append(Cable(link["from"], link["to"], wires, link["length_mm"]))
     lines = [FIRST_LINE, *_style(), "connectors:"]
@@ -191,9 +209,12 @@ def cable_table(harness_text: str, nets_text: str) -> str:
     for device in tomllib.loads(harness_text)["device"]:
         for plug in _plugs(device["connector"]):
             pins = sorted((r for r in rows if r["ref"] == plug), key=lambda row: int(row["pin"]))
-            for place, row in enumerate(pins):
+            words = [re.split(r",| \(| to ", label)[0] for label, _ in device["pins"]]
+            for row in pins:
                 name = row["pin name"]
-                colour = _SUPPLY_COLOURS.get(name, _WIRE_COLOURS[place % len(_WIRE_COLOURS)])
+                colour = _SUPPLY_COLOURS.get(name) or _BUS_COLOURS.get(name)
+                if name in words:  # as in the picture of the Mega's wires
+                    colour = _WIRE_COLOURS[words.index(name)]
                 length = f"{device['length_mm'] / 1000:g}" if device["length_mm"] else "plugged in"
                 lines.append(
                     f"| {plug} | {device['name']} | {row['pin']} | {name} | {colour} | {length} |"
@@ -313,7 +334,12 @@ def main(arguments: list[str] | None = None) -> int:
     harness, pin_map = (HERE / name for name in ("harness.toml", "pin_map.toml"))
     try:
         made = {
-            OUT / "wiring.yml": signal_picture(harness.read_text(), pin_map.read_text()),
+            **{
+                OUT / f"wiring-{name}.yml": signal_picture(
+                    harness.read_text(), pin_map.read_text(), name
+                )
+                for name in PICTURES
+            },
             OUT / "power.yml": power_picture(harness.read_text()),
             OUT / "imu.yml": link_picture(harness.read_text(), "imu"),
         }

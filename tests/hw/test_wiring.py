@@ -32,7 +32,9 @@ def test_committed_pictures_are_current() -> None:
     assert check(HW) == (0, "")
 
 
-@pytest.mark.parametrize("name", ["wiring.yml", "wiring.svg", "power.yml", "imu.svg", "CABLES.md"])
+@pytest.mark.parametrize(
+    "name", ["wiring-control.yml", "wiring-sensors.svg", "power.yml", "imu.svg", "CABLES.md"]
+)
 def test_an_old_picture_is_found(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "hw"
     shutil.copytree(HW, folder)
@@ -62,12 +64,31 @@ def test_wires_that_lead_nowhere_are_refused(before: str, after: str, complaint:
 
 
 def test_every_signal_leaves_the_board_at_its_own_pin() -> None:
-    source = GENERATOR.signal_picture(HARNESS, PIN_MAP)
-    board = re.search(r'"Arduino Mega 2560":\n.*\n.*\n    pins: (.*)\n    pinlabels: (.*)', source)
-    assert board is not None
-    shown = dict(zip(json.loads(board[2]), map(str, json.loads(board[1])), strict=True))
+    shown: dict[str, str] = {}
+    pins: list[str] = []
+    for picture in GENERATOR.PICTURES:
+        source = GENERATOR.signal_picture(HARNESS, PIN_MAP, picture)
+        shown |= labels(source)
+        used = re.findall(r'^    - "Arduino Mega 2560": (.*)$', source, re.M)
+        pins += [str(pin) for row in used for pin in json.loads(row)]
     signals = tomllib.loads(PIN_MAP)["signal"]
     assert shown == {row["name"]: row["pin"] for row in signals}
-    used = re.findall(r'^    - "Arduino Mega 2560": (.*)$', source, re.M)
-    pins = [str(pin) for row in used for pin in json.loads(row)]
     assert sorted(pins) == sorted(row["pin"] for row in signals)
+
+
+def labels(source: str) -> dict[str, str]:
+    """Return the Mega's pin of each signal in a picture's source."""
+    board = re.search(r'"Arduino Mega 2560":\n.*\n.*\n    pins: (.*)\n    pinlabels: (.*)', source)
+    assert board is not None
+    return dict(zip(json.loads(board[2]), map(str, json.loads(board[1])), strict=True))
+
+
+def test_a_wire_has_one_colour_in_table_and_pictures() -> None:
+    nets = (HW / "board/generated/nets.csv").read_text()
+    table = GENERATOR.cable_table(HARNESS, nets)
+    modules = GENERATOR.signal_picture(HARNESS, PIN_MAP, "modules")
+    (cable,) = re.findall(r'- "Arduino Mega 2560": \[16, 17\]\n    - (W\d+)', modules)
+    (colours,) = re.findall(rf"  {cable}:\n    wirecount: 2\n    colors: \[(\w+), (\w+)\]", modules)
+    assert colours == ("BN", "OG")  # GPS: RX first in the harness, then TX
+    assert "| J24 | GPS | 4 | RX | BN |" in table
+    assert "| J24 | GPS | 3 | TX | OG |" in table
