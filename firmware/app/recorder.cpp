@@ -20,6 +20,7 @@ namespace {
 constexpr uint32_t kRetryUs = 2000000UL;
 constexpr uint32_t kSearchUs = 5000000UL;  // then a file of kSmallSeconds is enough, for now
 constexpr uint32_t kSmallSeconds = 900;
+constexpr uint32_t kHurryUs = 30000000UL;  // since power-on: a pilot waits for the file
 constexpr uint32_t kGraceUs = 1000000UL;
 constexpr uint32_t kLowSeconds = 60;
 constexpr uint32_t kLeastSeconds = 1800;    // with less left, the ground prepares a new file
@@ -168,7 +169,7 @@ void Recorder::job_ended(Job job, uint32_t now_us) {
     case Job::kMake:
       state_ = State::kReady;
       volume_status_ = status;
-      file_wanted_ = volume_.smaller_than_new() && !volume_.searched();
+      file_wanted_ = volume_.smaller_than_new();
       if (file_wanted_) volume_.go_on_searching();
       break;
     case Job::kMend:
@@ -230,14 +231,17 @@ void Recorder::make_room(uint32_t now_us) {
   if (volume_.can_mend()) {
     volume_.mend();
   } else {
-    make_file(replace);
+    // A long chain is linked when a file is ready already. (Not later: the small file takes its
+    // room out of what may be the only run.)
+    const bool small_first = !replace && now_us < kHurryUs && volume_.slow_to_make(best);
+    make_file(small_first ? least : volume_.file_blocks(), replace);
   }
 }
 
-void Recorder::make_file(bool replace) {
+void Recorder::make_file(uint32_t blocks, bool replace) {
   const uint32_t session = replace && prepared_ ? volume_.file().last_session : next_session();
   prepared_ = true;
-  volume_.make(session, replace);
+  volume_.make(session, blocks, replace);
   if (volume_.job() == Job::kNone) job_ended(Job::kMake, hal::now_us());
 }
 

@@ -64,7 +64,7 @@ class Recorder {
   void job_ended(storage::Volume::Job job, uint32_t now_us);
   void looked(uint32_t now_us);
   void make_room(uint32_t now_us);
-  void make_file(bool replace);
+  void make_file(uint32_t blocks, bool replace);
   void tell_unrecorded(bool flying, uint32_t now_us);
   void decide_open_file(const core::PilotInputs& in,
                         bool start_pressed,

@@ -13,6 +13,12 @@ void FreeRun::start(const Layout& layout, uint32_t from, uint32_t count, uint32_
   wanted_ = wanted;
 }
 
+void FreeRun::go_on_from(const Layout& layout, uint32_t from) {
+  const Run found = best_;
+  start(layout, from, layout.clusters, wanted_);
+  best_ = found;
+}
+
 bool FreeRun::take(const uint8_t* sector, const Layout& layout) {
   uint16_t index = entry_index(layout, at_);
   uint16_t count = static_cast<uint16_t>((1U << entries_shift(layout)) - index);
@@ -44,6 +50,19 @@ bool FreeRun::take(const uint8_t* sector, const Layout& layout) {
     now_ = {at_, 0};
   }
   return ended();
+}
+
+Run FreeRun::take_best(uint32_t most) {
+  const Run taken = {best_.first, best_.count < most ? best_.count : most};
+  if (now_.first == best_.first) {  // it may go on behind what was looked at
+    now_.first += taken.count;
+    now_.count -= taken.count;
+  } else if (now_.first < taken.first + taken.count && taken.first < at_) {
+    now_ = {at_, 0};  // the same clusters, found a second time
+  }
+  best_.first += taken.count;
+  best_.count -= taken.count;
+  return taken;
 }
 
 }  // namespace storage

@@ -17,17 +17,16 @@ class FreeRun {
  public:
   // Looks at `count` clusters from `from` on, for a run of `wanted`.
   void start(const Layout& layout, uint32_t from, uint32_t count, uint32_t wanted);
+  // All of the layout, from another cluster on; what was found stays found.
+  void go_on_from(const Layout& layout, uint32_t from);
   uint32_t cluster() const { return at_; }  // the sector that holds its entry is looked at next
   // True: a run of `wanted` is found, or all is looked at.
   bool take(const uint8_t* sector, const Layout& layout);
   bool ended() const { return left_ == 0 || best_.count >= wanted_; }
 
   const Run& best() const { return best_; }
-  // It is taken now; what follows is another run.
-  void forget_best() {
-    best_ = {};
-    now_ = {at_, 0};
-  }
+  // Gives the first `most` clusters of the best run away; the rest of it is a run still.
+  Run take_best(uint32_t most);
   uint32_t free_clusters() const { return free_; }
   uint32_t looked_at() const { return total_ - left_; }
   uint32_t total() const { return total_; }

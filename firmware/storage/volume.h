@@ -32,12 +32,15 @@ class Volume {
   // Looks for room; best_blocks() grows. It may be left for another job at any time, and gone on
   // with. Ends with room for a whole file, or with all of the card looked at.
   void search();
-  void go_on_searching() { job_ = Job::kSearch; }
-  // A file of the best room found. The next number, with a first block of its own, so that its id
+  void go_on_searching() { begin(Job::kSearch, more_of_run()); }
+  // A file of at most `blocks` in the best room found; what is left of it is room still. The next
+  // number, with a first block of its own, so that its id
   // is known and no older block behind it can be taken for its content; or, with `replace`, the
   // same file with more room: only one that was never recorded into.
-  void make(uint32_t session, bool replace);
-  // Cuts file() to `used_blocks`. With `end_event` a block saying session_end 2 goes behind them.
+  void make(uint32_t session, uint32_t blocks, bool replace);
+  // Its chain is so long that linking it takes more than a second.
+  bool slow_to_make(uint32_t blocks) const;
+  // Cuts file() to `used_blocks`. With `end_event` a block saying session_end goes behind them.
   void close(uint32_t used_blocks, bool end_event, uint32_t now_us);
   bool can_mend() const { return CloseFile::can_mend(card_); }
   void mend();
@@ -58,7 +61,6 @@ class Volume {
   bool smaller_than_new() const { return card_.file.blocks < file_blocks_; }
   uint32_t file_blocks() const { return file_blocks_; }
   uint32_t best_blocks() const;  // of the search
-  bool searched() const { return run_.ended() && !near_; }
   // Why there is no room for `blocks`, behind a search of the whole card.
   VolumeStatus shortage(uint32_t blocks) const;
 
@@ -68,7 +70,9 @@ class Volume {
   Wish next(uint8_t* sector);
   Wish next_run(const uint8_t* sector);
   Wish read_run() const;
-  uint32_t wanted_clusters() const;
+  Wish more_of_run();
+  uint32_t behind_last() const;  // the cluster behind the newest file; 0: there is none
+  uint32_t clusters_for_new(uint32_t blocks) const;
   void end(VolumeStatus status);
 
   CardState card_;

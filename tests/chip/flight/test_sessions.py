@@ -304,7 +304,7 @@ def test_aircraft_that_stands_still_closes_its_file_when_that_is_sure(
     from flight.rig import IDLE_US, FlightRig
     from simavr_bench.card_journal import CardJournal, copy_sparse
 
-    rig = FlightRig(flight_elf, copy_sparse(open_card[0], tmp_path / "open.img"))
+    rig = FlightRig(flight_elf, copy_sparse(open_card[0], tmp_path / "open.img"), ground_s=30.0)
     journal = CardJournal(rig.card)
     rig.receiver.width_us[3] = IDLE_US
     rig.power_on()

@@ -151,7 +151,7 @@ struct Recorded {
   bool prepare(uint32_t session) {
     volume.search();
     if (!finish(volume)) return false;
-    volume.make(session, false);
+    volume.make(session, kFileBlocks, false);
     return finish(volume);
   }
   // Blocks of a session as the stream would write them; the last names the file's room.
@@ -233,7 +233,7 @@ TEST_CASE("no write is begun while it is not the ground, and it goes on where it
   REQUIRE(one.look());
   one.volume.search();
   REQUIRE(finish(one.volume));
-  one.volume.make(1, false);
+  one.volume.make(1, kFileBlocks, false);
   for (uint16_t steps = 0; steps < 1000; ++steps) CHECK(!one.volume.step(sector, false));
   CHECK_EQ(card.writes, 0U);
   CHECK(one.volume.waits());
@@ -277,7 +277,7 @@ TEST_CASE("a small file is given more room, and what it had is free") {
   for (uint32_t c = 1000; c < 3002; ++c) set_fat(c, kFreeEntry);
   one.volume.search();
   REQUIRE(finish(one.volume));
-  one.volume.make(1, true);
+  one.volume.make(1, kFileBlocks, true);
   REQUIRE(finish(one.volume));
   CHECK_EQ(one.volume.file().blocks, kFileBlocks);
   CHECK_EQ(one.volume.file().number, 1U);
@@ -286,6 +286,47 @@ TEST_CASE("a small file is given more room, and what it had is free") {
   REQUIRE(again.look());
   CHECK(again.volume.state() == FileState::kBlank);
   CHECK_EQ(again.volume.file().blocks, kFileBlocks);
+}
+
+TEST_CASE("a search that was left for a small file goes on at its own sector") {
+  insert(new_card());
+  for (uint32_t c = 512; c < 640; ++c) set_fat(c, kEndEntry);  // a sector of the table
+  Recorded one;
+  REQUIRE(one.look());
+  one.volume.search();
+  while (one.volume.best_blocks() != 509) REQUIRE(!one.volume.step(sector, true));
+  while (!one.volume.leave()) one.volume.step(sector, true);
+  one.volume.make(1, 200, false);
+  REQUIRE(finish(one.volume));
+  CHECK_EQ(one.volume.file().blocks, 200U);
+  one.volume.go_on_searching();
+  REQUIRE(finish(one.volume));
+  one.volume.make(1, kFileBlocks, true);
+  REQUIRE(finish(one.volume));
+  CHECK(one.volume.status() == VolumeStatus::kReady);
+  CHECK_EQ(one.volume.file().first_lba, kDataLba + 640U - 2U);
+  CHECK_EQ(one.volume.file().blocks, kFileBlocks);
+  CHECK_EQ(clusters_in_use(), kFileBlocks + 1 + 128);
+}
+
+TEST_CASE("a small file leaves the rest of its run as room") {
+  insert(new_card());
+  for (uint32_t c = 1000; c < 2 + kClusters; ++c) set_fat(c, kEndEntry);
+  Recorded one;
+  REQUIRE(one.look());
+  one.volume.search();
+  REQUIRE(finish(one.volume));
+  CHECK_EQ(one.volume.best_blocks(), 997U);
+  one.volume.make(1, 200, false);
+  REQUIRE(finish(one.volume));
+  one.volume.go_on_searching();
+  CHECK(one.volume.job() == Volume::Job::kNone);  // all is looked at
+  CHECK_EQ(one.volume.best_blocks(), 797U);
+  one.volume.make(1, kFileBlocks, true);
+  REQUIRE(finish(one.volume));
+  CHECK_EQ(one.volume.file().blocks, 797U);
+  CHECK_EQ(one.volume.file().number, 1U);
+  CHECK_EQ(clusters_in_use(), 1U + 797U + kClusters + 2 - 1000);
 }
 
 namespace {

@@ -275,7 +275,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
   const std::unordered_map<uint32_t, Block> before = g_card.blocks;
   const bool blank = volume.state() == storage::FileState::kBlank;
   const uint32_t number = volume.file().number;
-  volume.make(9, blank);
+  volume.make(9, volume.file_blocks(), blank);
   finish(volume, true);
   if (volume.status() != storage::VolumeStatus::kReady) return 0;
   const storage::FlightFile made = volume.file();
