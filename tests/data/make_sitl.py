@@ -1,8 +1,8 @@
-"""Record format-1-sitl.bin: the firmware in simulated time, its button, a reset, its card.
+"""Record format-1-sitl*.bin: the firmware in simulated time, its button, a reset, its card.
 
 Kept for the record, never run by a test: a released log is never made anew. Needs `make sitl`.
 
-    python tests/data/make_sitl.py FOLDER
+    python tests/data/make_sitl.py FOLDER NAME
 """
 
 import sys
@@ -22,21 +22,19 @@ BROWN_OUT = 3
 
 def main() -> int:
     """Record, reset in flight, record on until the throttle is idle, stop; write log and text."""
-    folder = Path(sys.argv[1])
+    folder, name = Path(sys.argv[1]), sys.argv[2]
     bench = Bench()
     flight(17.8).give(bench.sitl)
-    bench.sitl.power_on()
-    bench.sitl.run_for(0.5)
-    bench.record(0.8)
+    bench.power_on_and_record(1.0)
     bench.sitl.reset(BROWN_OUT)
     bench.sitl.run_for(1.7)
     bench.stop()
     data = read_file(bytes(bench.image), "FLT00001.BIN")
     read = decode(data)
     assert read is not None
-    (folder / "format-1-sitl.bin").write_bytes(data)
+    (folder / f"{name}.bin").write_bytes(data)
     text = text_of_oracle(read, list(LogWriter().layouts))
-    (folder / "format-1-sitl.txt").write_text(text, encoding="ascii")
+    (folder / f"{name}.txt").write_text(text, encoding="ascii")
     return 0
 
 
