@@ -139,12 +139,21 @@ def pictures(folder: Path, out: Path) -> dict[str, str]:
     found: dict[str, str] = {}
     for path in sorted((out / "svg").glob("*.svg")):
         name = path.stem.removeprefix("logger-").replace(", ", "-").replace(" ", "-").lower()
-        text = re.sub(r"<title>.*?</title>", f"<title>{name}</title>", path.read_text("utf-8"))
-        text = _NUMBER.sub(lambda n: f"{float(n[0]):.2f}", text)
-        text = re.sub(r"\s*\n\s*", "\n", text)
-        # A letter is many strokes, each a path of its own: one path says the same in a third.
-        found[f"schematic/{name}.svg"] = re.sub(r'"\s*/>\n<path d="', "\n", text)
+        found[f"schematic/{name}.svg"] = slim(path.read_text(encoding="utf-8"), name)
     return found
+
+
+def slim(picture: str, name: str) -> str:
+    """Return an SVG of KiCad's without date, in hundredths of a millimetre, a third of its size."""
+    text = re.sub(r"<title>.*?</title>", f"<title>{name}</title>", picture)
+    text = _NUMBER.sub(lambda n: f"{float(n[0]):.2f}", text)
+    text = re.sub(r"\s*\n\s*", "\n", text)
+    # A letter is many strokes, each a path of its own: one path says the same.
+    return re.sub(r'(?:<path d="[^"]*"\s*/>\n){2,}', _joined, text)
+
+
+def _joined(paths: re.Match[str]) -> str:
+    return '<path d="' + "\n".join(re.findall(r'd="([^"]*)"', paths[0])) + '" />\n'
 
 
 def outputs(folder: Path) -> tuple[dict[str, str], bytes]:

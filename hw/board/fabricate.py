@@ -15,7 +15,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from export import ExportError, kicad
+import assembly
+from export import ExportError, kicad, slim
 
 HERE = Path(__file__).resolve().parent
 BOARD = "logger.kicad_pcb"
@@ -67,7 +68,15 @@ def outputs(folder: Path) -> dict[str, str]:
         kicad(
             folder, "pcb", "export", "pos", "--format", "csv", "--units", "mm", "-o", places, BOARD
         )
-        return {
+        print_svg = Path(scratch) / "print.svg"
+        kicad(
+            folder,
+            *("pcb", "export", "svg", "-l", "F.Mask,F.SilkS,Edge.Cuts", "--mode-single"),
+            *("--page-size-mode", "2", "--exclude-drawing-sheet", "-o", str(print_svg), BOARD),
+        )
+        picture = slim(print_svg.read_text(encoding="utf-8"), "print")
+        made = {"assembly.html": assembly.page(picture, Path(places).read_text(encoding="utf-8"))}
+        return made | {
             f"fabrication/{path.name}": _DATED.sub("", path.read_text(encoding="utf-8"))
             for path in sorted(out.iterdir())
         }
