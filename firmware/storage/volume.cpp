@@ -143,7 +143,7 @@ bool Volume::step(uint8_t* sector, bool may_write) {
     status = transfer_.step(sector, may_write);  // its sectors are quickly looked at
   }
   if (status == CardStatus::kBusy) {
-    waits_ = job_ != Job::kStart && !transfer_.under_way();
+    waits_ = job_ == Job::kStart || !transfer_.under_way();
     return false;
   }
   end(status == CardStatus::kAbsent ? VolumeStatus::kNoCard : VolumeStatus::kUnreadable);

@@ -88,8 +88,8 @@ class FlightRig:
         Rate of the IMU's packets.
     frame_s, sequential : float, bool
         The receiver.
-    busy_s : float
-        Card busy after every block.
+    busy_s, read_s, init_s : float
+        Card busy after every block, before each block read, before it is ready.
     bootloader : bool
         Start in Debian's Mega bootloader, after the 65 ms of start-up that the fuses ask for.
     in_place : bool
@@ -111,6 +111,8 @@ class FlightRig:
     frame_s: float = 0.020
     sequential: bool = True
     busy_s: float = 0.005
+    read_s: float = 0.0002
+    init_s: float = 0.05
     bootloader: bool = False
     in_place: bool = True
     card_kind: CardKind = CardKind.SDHC
@@ -141,6 +143,8 @@ class FlightRig:
             "PB0",
             image=self.card_image,
             busy_s=self.busy_s,
+            read_s=self.read_s,
+            init_s=self.init_s,
             in_place=self.in_place,
             kind=self.card_kind,
         )

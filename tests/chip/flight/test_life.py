@@ -77,3 +77,35 @@ def test_relay_whose_contact_opens_in_flight_is_released(make_rig: MakeRig, tmp_
     rig.land()
     events = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin")).frames["event"]
     assert events["arg"][events["code"] == 31].tolist() == [1]
+
+
+@pytest.mark.parametrize("where", ["start", "reads", "first write"])
+def test_heartbeat_does_not_rest_while_a_card_stalls_on_the_ground(
+    flight_elf: Path, tmp_path: Path, where: str
+) -> None:
+    """Three seconds without an answer, the Mega driving: when it starts, reads, is written."""
+    from flight.rig import MEGA_US, FlightRig, make_card
+
+    rig = FlightRig(
+        flight_elf,
+        make_card(tmp_path / "card.img"),
+        read_s=3.0 if where == "reads" else 0.0002,
+        init_s=3.0 if where == "start" else 0.05,
+        ground_s=30.0,
+    )
+    if where == "first write":
+        rig.card.stall(3.0)
+    rig.chip.watch("PH5")
+    rig.power_on()
+    rig.chip.run_s(0.4)
+    rig.receiver.width_us[4] = MEGA_US
+    rig.chip.run_s(12.6)
+    assert rig.relay.engaged
+    at, _ = rig.chip.edges("PH5")
+    rests_ms = np.diff(at).astype(np.int64) / 16e3
+    assert rig.beats().wrong() == []
+    assert len(rests_ms) > 5000
+    assert rests_ms.max() <= LONGEST_REST_MS
+    assert np.minimum(rests_ms[1:], rests_ms[:-1]).max() <= LONG_REST_MS
+    assert ("card ready" in rig.status_lines()[-1]) == (where == "first write")
+    rig.land()
