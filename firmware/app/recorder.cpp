@@ -224,7 +224,8 @@ void Recorder::make_room(uint32_t now_us) {
   const uint32_t least = replace ? now_blocks + now_blocks / 4 + 1 : least_blocks();
   const bool most = job == Job::kNone;
   const bool small = !replace || now_blocks < least_blocks();
-  const bool enough = small && now_us - retry_us_ >= kSearchUs && best >= least_blocks();
+  const bool enough =
+      small && now_us - retry_us_ >= kSearchUs && best >= least_blocks() && !volume_.best_grows();
   if (most && best < least) file_wanted_ = false;
   if (best < least || !(most || enough) || !volume_.leave()) return;
   volume_.set_date(sensors_.fat_date());

@@ -25,6 +25,8 @@ class FreeRun {
   bool ended() const { return left_ == 0 || best_.count >= wanted_; }
 
   const Run& best() const { return best_; }
+  // The search is within it: it may be larger than what was looked at.
+  bool best_grows() const { return best_.count != 0 && now_.first == best_.first && !ended(); }
   // Gives the first `most` clusters of the best run away; the rest of it is a run still.
   Run take_best(uint32_t most);
   uint32_t free_clusters() const { return free_; }

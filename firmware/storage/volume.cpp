@@ -12,6 +12,9 @@ namespace {
 // copy of the table included.
 constexpr uint32_t kQuickClusters = 4096;
 
+// Turns of the main loop, 1 ms each: leave() is asked again within 10.
+constexpr uint8_t kPauseTurns = 30;
+
 }  // namespace
 
 void Volume::look() {
@@ -138,6 +141,10 @@ bool Volume::step(uint8_t* sector, bool may_write) {
       return false;
     }
   } else {
+    if (job_ == Job::kSearch && paused_ != 0) {
+      --paused_;
+      return false;
+    }
     follow(next(sector));
     if (job_ != Job::kSearch) return job_ == Job::kNone;
     status = transfer_.step(sector, may_write);  // its sectors are quickly looked at
@@ -170,11 +177,14 @@ Wish Volume::next(uint8_t* sector) {
 
 bool Volume::leave() {
   if (job_ == Job::kNone) return true;
+  // Nearly always a block is under way: without the pause the asking and the blocks may keep step.
+  paused_ = kPauseTurns;
   if (job_ == Job::kStart || transfer_.under_way()) return false;
   // Not behind a block of another job that nobody has looked at: the card may hold more than is
   // known here. A search reads its sector again.
   if (job_ != Job::kSearch && wish_ == Wish::Kind::kAgain) return false;
   job_ = Job::kNone;
+  paused_ = 0;
   return true;
 }
 

@@ -61,6 +61,7 @@ class Volume {
   bool smaller_than_new() const { return card_.file.blocks < file_blocks_; }
   uint32_t file_blocks() const { return file_blocks_; }
   uint32_t best_blocks() const;  // of the search
+  bool best_grows() const { return run_.best_grows(); }
   // Why there is no room for `blocks`, behind a search of the whole card.
   VolumeStatus shortage(uint32_t blocks) const;
 
@@ -88,7 +89,8 @@ class Volume {
   VolumeStatus status_ = VolumeStatus::kNoCard;
   Wish::Kind wish_ = Wish::Kind::kAgain;
   bool waits_ = false;
-  bool near_ = false;  // the search is still where FSInfo points
+  uint8_t paused_ = 0;  // turns that a search rests at its end of a block, so that it can be left
+  bool near_ = false;   // the search is still where FSInfo points
 };
 
 }  // namespace storage

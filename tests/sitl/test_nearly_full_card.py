@@ -10,12 +10,15 @@ from host.twin.recorder.sitl_library import TICKS_PER_S, Port, Recorder, Sitl
 from tests.cards.judge import Stage, message_of
 from tests.cards.nearly_full import LAST_FLIGHT, nearly_full
 from tests.cards.sparse import SparseCard
+from tests.cards.truth import look_at
 from tests.sitl import still_aircraft
 from tests.sitl.card_flight import MESSAGE_S, RECORDING_S, fly
 from tests.sitl.card_image import CARD_ID
 
 GIGABYTES = (16.0, 32.0)
-QUARTER_HOUR = 8_000_000  # bytes of 15 minutes at 100 Hz, with a little room
+QUARTER_HOUR = (
+    10_000_000  # bytes of 15 minutes at 100 Hz, as the recorder reckons, and a little more
+)
 WHOLE_FILE = 64 << 20
 SEARCHING = re.compile(r"searching (\d+) ?%")
 LONGEST_SEARCH_S = 90.0  # of every cluster of 32 GB
@@ -31,6 +34,22 @@ def test_room_at_the_hint_is_found_in_time(gigabytes: float, share: float) -> No
     judgement = fly(Sitl(), card)
     assert (judgement.wrong, judgement.stage) == ([], Stage.RECORDING)
     assert judgement.message == f"ready {LAST_FLIGHT + 1}"
+
+
+@pytest.mark.parametrize("gigabytes", GIGABYTES)
+def test_room_behind_the_last_flight_is_found_without_a_hint(gigabytes: float) -> None:
+    room = round(0.049 * gigabytes * 1e9)
+    card = nearly_full(gigabytes, [(0.7, room)], hint=None, flight_at=0.699)
+    judgement = fly(Sitl(), card)
+    assert (judgement.wrong, judgement.stage) == ([], Stage.RECORDING)
+
+
+@pytest.mark.parametrize("gigabytes", GIGABYTES)
+def test_room_for_a_quarter_of_an_hour_is_taken_before_all_is_searched(gigabytes: float) -> None:
+    """A small run near the hint, a whole one at the other end of the card."""
+    card = nearly_full(gigabytes, [(0.501, QUARTER_HOUR), (0.45, WHOLE_FILE)], hint=0.5)
+    judgement = fly(Sitl(), card)
+    assert (judgement.wrong, judgement.stage) == ([], Stage.RECORDING)
 
 
 def watch(card: SparseCard, seconds: float) -> list[str]:
@@ -61,6 +80,23 @@ def test_search_says_how_far_it_is_and_ends_in_a_file(gigabytes: float) -> None:
     assert len(shares) > 5
     assert shares == sorted(shares)
     assert said[-2:] == [f"ready {LAST_FLIGHT + 1}", "recording"]
+
+
+@pytest.mark.parametrize("gigabytes", GIGABYTES)
+def test_small_file_is_replaced_on_the_ground_by_a_larger_one(gigabytes: float) -> None:
+    card = nearly_full(gigabytes, [(0.501, QUARTER_HOUR), (0.55, WHOLE_FILE)], hint=0.5)
+    said = watch(card, 60.0)
+    assert said[9].startswith("ready")
+    assert said[-1] == "recording"
+    _, newest = look_at(card).flights[-1]
+    assert newest.size == WHOLE_FILE
+
+
+def test_throttle_up_is_recorded_while_a_larger_room_is_searched() -> None:
+    """The search is left within a block: it kept step with the asking, for seconds."""
+    card = nearly_full(32.0, [(0.501, QUARTER_HOUR), (0.45, WHOLE_FILE)], hint=0.5)
+    said = watch(card, 20.0)
+    assert said[-2:] == [f"ready, small {LAST_FLIGHT + 1}", "recording"]
 
 
 def test_card_without_room_says_so_at_the_end_of_the_search() -> None:
