@@ -28,6 +28,7 @@ _TRAY = {
 }
 SUPPLIES = {*RAILS.values(), "GND"}
 _CONTACT = re.compile(r"^\| (K\d) ([ab]) \| (.+?) \| (.+?) \| (.+?) \|$", re.M)
+_VALUE = re.compile(r"^\| ([RC])(\d+)(?: to [RC](\d+))? \| [^|]*\| ([\d.]+) (kohm|ohm|uF)\b", re.M)
 # Contact set a is pins 2, 3, 4 of the relay, b is 9, 8, 7 (data sheet ASCTB14E, seen from below).
 _PINS = {"a": ("2", "4", "3"), "b": ("9", "7", "8")}
 
@@ -114,6 +115,7 @@ def faults(board: Board, map_text: str, harness_text: str, relay_text: str) -> l
         *_device_faults(board, tomllib.loads(harness_text)["device"]),
         *_link_faults(board, tomllib.loads(harness_text)["link"]),
         *_contact_faults(board, relay_text),
+        *_value_faults(board, relay_text),
     ]
 
 
@@ -204,6 +206,21 @@ def _contact_faults(board: Board, relay_text: str) -> list[str]:
             net = board.net_of.get((relay, pin), "no such pin")
             if not _is_wired(board, across, net, what):
                 found.append(f"{relay} pin {pin} is on {net}, relay.md says {what}")
+    return found
+
+
+def _value_faults(board: Board, relay_text: str) -> list[str]:
+    found = []
+    table = _VALUE.findall(relay_text)
+    if not table:
+        return ["relay.md: found no value of a resistor or capacitor"]
+    for kind, first, last, number, unit in table:
+        wanted = number + {"kohm": "k", "ohm": "", "uF": "u"}[unit]
+        for place in range(int(first), int(last or first) + 1):
+            ref = f"{kind}{place}"
+            value = board.parts[ref].value if ref in board.parts else "nothing"
+            if value != wanted:
+                found.append(f"{ref} is {value} in the schematic, {number} {unit} in relay.md")
     return found
 
 

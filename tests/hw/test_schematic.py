@@ -79,6 +79,13 @@ def test_a_map_that_moved_on_is_found(before: str, after: str, complaint: str) -
     assert complaint in "\n".join(faults(pin_map=MAP.replace(before, after)))
 
 
+def test_a_value_of_the_pump_that_differs_is_found() -> None:
+    board = CHECK.load(PARTS.replace("C1,0.33u", "C1,1u").replace("R9,10k", "R9,1k"), NETS)
+    said = CHECK.faults(board, MAP, HARNESS, RELAY)
+    assert "C1 is 1u in the schematic, 0.33 uF in relay.md" in said
+    assert "R9 is 1k in the schematic, 10 kohm in relay.md" in said
+
+
 def test_a_device_the_board_does_not_have_is_found() -> None:
     more = HARNESS.replace('name = "Barometer"', 'name = "Second barometer"', 1)
     assert "Second barometer of harness.toml has no symbol" in faults(harness=more)
