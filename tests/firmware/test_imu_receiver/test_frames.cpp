@@ -130,7 +130,7 @@ TEST_CASE("losses are counted up to a second of silence, to the microsecond") {
 TEST_CASE("an age is known for 262 ms, to the step") {
   ImuReceiver receiver;
   send(receiver, 1, 1, 0);
-  CHECK_EQ(receiver.age_4us(4U * 65534U), 65534U);
+  CHECK_EQ(receiver.age_4us(4UL * 65534UL), 65534U);
   CHECK_EQ(receiver.age_4us(4UL * 65535UL), frames::kIdentImuAgeInvalid);
   CHECK_EQ(receiver.age_4us(4UL * 65536UL), frames::kIdentImuAgeInvalid);
   CHECK_EQ(receiver.age_4us(4UL * 65540UL), frames::kIdentImuAgeInvalid);

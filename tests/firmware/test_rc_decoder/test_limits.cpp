@@ -42,7 +42,7 @@ TEST_CASE("the first look tells the levels alone: a line that is high then ends 
 }
 
 TEST_CASE("each line counts as having fallen at the first look") {
-  for (uint8_t input = 0; input < core::kRcInputs; input += 4) {
+  for (uint8_t input = 0; input < core::kRcInputs; input = static_cast<uint8_t>(input + 4)) {
     Line line;
     line.bit = static_cast<uint8_t>(1U << input);
     CHECK(!line.pulse(RcDecoder::kLowBeforeTicks - 1));
