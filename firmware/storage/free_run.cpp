@@ -54,7 +54,8 @@ bool FreeRun::take(const uint8_t* sector, const Layout& layout) {
 
 Run FreeRun::take_best(uint32_t most) {
   const Run taken = {best_.first, best_.count < most ? best_.count : most};
-  if (now_.first == best_.first) {  // it may go on behind what was looked at
+  if (now_.first == best_.first &&
+      now_.count >= taken.count) {  // it may go on behind what was looked at
     now_.first += taken.count;
     now_.count -= taken.count;
   } else if (now_.first < taken.first + taken.count && taken.first < at_) {

@@ -309,10 +309,44 @@ TEST_CASE("the best so far may be taken and the search goes on behind it") {
   search(run, layout, used, 5);
   CHECK_EQ(run.best().first, 100U);
   CHECK_EQ(run.best().count, 300U);
-  run.forget_best();
+  CHECK(!run.best_grows());
+  CHECK_EQ(run.take_best(250).first, 100U);
+  CHECK_EQ(run.best().first, 350U);
+  CHECK_EQ(run.best().count, 50U);
   search(run, layout, used);
   CHECK_EQ(run.best().first, 2000U);
   CHECK_EQ(run.best().count, 1000U);
+}
+
+TEST_CASE("what is left of a run grows on with what lies behind it") {
+  const Layout layout = small_layout(true, 5000);
+  FreeRun run;
+  run.start(layout, 0, layout.clusters, 1000);
+  const auto used = [](uint32_t c) { return c >= 900; };
+  search(run, layout, used, 5);  // to cluster 640
+  CHECK(run.best_grows());
+  const uint32_t seen = run.best().count;
+  CHECK_EQ(run.take_best(250).count, 250U);
+  CHECK(run.best_grows());
+  CHECK_EQ(run.best().count, seen - 250U);
+  search(run, layout, used);
+  CHECK_EQ(run.best().first, 252U);
+  CHECK_EQ(run.best().count, 900U - 252U);
+}
+
+TEST_CASE("a run taken in the midst of a second look is no room a second time") {
+  const Layout layout = small_layout(true, 5000);
+  FreeRun run;
+  run.start(layout, 3, 600, 1000);
+  search(run, layout, [](uint32_t c) { return c >= 500; });
+  CHECK_EQ(run.best().count, 497U);
+  run.go_on_from(layout, 3);
+  search(
+      run, layout, [](uint32_t c) { return c >= 500; }, 1);
+  CHECK_EQ(run.take_best(300).first, 3U);
+  search(run, layout, [](uint32_t c) { return c < 303 || c >= 500; });
+  CHECK_EQ(run.best().first, 303U);
+  CHECK_EQ(run.best().count, 197U);
 }
 
 TEST_CASE("a run linked and freed, from the back, in every copy") {
