@@ -9,8 +9,9 @@ import sys
 import time
 from pathlib import Path
 
-from build import build_program
 from simavr_bench import ChargePumpRelay, Chip, GpsUart, Receiver, SdCard, cycles
+
+from build import build_program
 
 
 def _send_packets(chip: Chip, number: int = 0) -> None:
