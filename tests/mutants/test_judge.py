@@ -46,7 +46,6 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (suites / "test_clamp" / "test_clamp.cpp").write_text(SUITE)
     monkeypatch.setattr(judge, "CORE", core)
     monkeypatch.setattr(judge, "SUITES", suites)
-    monkeypatch.setattr(judge, "CPU_LIMIT_S", 2)
     return tmp_path
 
 

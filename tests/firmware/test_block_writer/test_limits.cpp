@@ -171,6 +171,12 @@ TEST_CASE("the schema returns a minute after it began, to the microsecond, again
   }
 }
 
+TEST_CASE("a look that comes late still finds the schema due") {
+  Session session;
+  session.start(0);
+  CHECK(session.next_is(BlockKind::kSchema, kMinuteUs + 700));
+}
+
 TEST_CASE("a pass that frames held up for more than a minute does not begin anew") {
   Session session;
   session.start(0);

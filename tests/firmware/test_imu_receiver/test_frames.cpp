@@ -184,3 +184,81 @@ TEST_CASE("west longitudes and south latitudes are places too") {
   CHECK_EQ(out.satellites, 0);
   CHECK(!receiver.take_position(out));
 }
+
+TEST_CASE("an original attitude counts only with all three angles; each pair is one good sample") {
+  for (uint8_t place = 0; place < 3; ++place) {
+    ImuReceiver receiver;
+    float values[8];
+    memcpy(values, kCalm, sizeof values);
+    values[place] = 1000.0F;
+    send_original(receiver, kFirst, values, 0);
+    REQUIRE(send_original(receiver, kSecond, kPlace, 100) == ImuResult::kSample);
+    CHECK_EQ(receiver.sample().flags, 0);
+    CHECK_EQ(receiver.good(), 1);
+  }
+}
+
+TEST_CASE("an auxiliary value of an unknown kind goes nowhere") {
+  ImuReceiver receiver;
+  frames::AttitudeFrame attitude;
+  send(receiver, 1, 5000, 900, 3, frames::kImuFlagsMagValid);
+  REQUIRE(receiver.take_attitude(attitude));
+  CHECK_EQ(attitude.temperature, INT16_MIN);
+  CHECK_EQ(attitude.bias_p, INT16_MIN);
+  frames::MagFrame mag;
+  CHECK(!receiver.take_mag(mag));
+}
+
+TEST_CASE("a restart is told at its first packet alone, though the flag stays") {
+  ImuReceiver receiver;
+  send(receiver, 200, 5000, 900);
+  send(receiver, 0, 100, 5900, 0, frames::kImuFlagsRestarted);
+  CHECK(receiver.take_restarted());
+  send(receiver, 1, 5100, 10900, 0, frames::kImuFlagsRestarted);
+  CHECK(!receiver.take_restarted());
+}
+
+TEST_CASE("losses are counted from the last packet on, late in a flight too") {
+  ImuReceiver receiver;
+  send(receiver, 1, 1, 3000000000U);
+  send(receiver, 3, 2, 3000005000U);
+  CHECK_EQ(receiver.lost(), 1);
+}
+
+TEST_CASE("course, speed and satellites below zero are none, and so is a fix that is no number") {
+  ImuReceiver receiver;
+  frames::GpsFrame out = {};
+  const float below[8] = {9.0F, 1.0F, 1.0F, 1.0F, -0.05F, -0.05F, 1.0F, -5.0F};
+  send_original(receiver, kSecond, below, 700);
+  REQUIRE(receiver.take_position(out));
+  CHECK_EQ(out.course, frames::kGpsCourseInvalid);
+  CHECK_EQ(out.ground_speed, frames::kGpsGroundSpeedInvalid);
+  CHECK_EQ(out.satellites, 0);
+  const float beyond[8] = {9.0F, 1.0F, 181.0F, 1.0F, 361.0F, 700.0F, 256.0F, 7.0F};
+  send_original(receiver, kSecond, beyond, 800);
+  REQUIRE(receiver.take_position(out));
+  CHECK_EQ(out.fix, 0);
+  const float far[8] = {9.0F, 91.0F, 181.0F, 1e6F, 361.0F, 700.0F, 1.0F, 256.0F};
+  send_original(receiver, kSecond, far, 900);
+  REQUIRE(receiver.take_position(out));
+  const int32_t latitude = out.latitude;
+  const int32_t longitude = out.longitude;
+  CHECK(latitude == frames::kGpsLatitudeInvalid);
+  CHECK(longitude == frames::kGpsLongitudeInvalid);
+  CHECK_EQ(out.course, frames::kGpsCourseInvalid);
+  CHECK_EQ(out.ground_speed, frames::kGpsGroundSpeedInvalid);
+  CHECK_EQ(out.satellites, 0);
+}
+
+TEST_CASE("a course is known up to 360 degrees, to the hundredth") {
+  const float courses[] = {360.0F, 360.01F};
+  const uint16_t told[] = {36000, frames::kGpsCourseInvalid};
+  for (uint8_t i = 0; i < 2; ++i) {
+    ImuReceiver receiver;
+    frames::GpsFrame out = {};
+    const float values[8] = {9.0F, 1.0F, 1.0F, 1.0F, courses[i], 1.0F, 1.0F, 7.0F};
+    send_original(receiver, kSecond, values, 700);
+    REQUIRE(receiver.take_position(out));
+    CHECK_EQ(out.course, told[i]);
+  }
+}

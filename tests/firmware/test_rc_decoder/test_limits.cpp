@@ -270,3 +270,90 @@ TEST_CASE("a lost channel leaves the frame time to the others; the last one take
   CHECK_EQ(decoder.valid(), 0);
   CHECK_EQ(decoder.frame_us(), 0);
 }
+
+namespace {
+
+// What is said of pulses of that width with that low time between them.
+uint16_t refused_hz(uint16_t pulses, uint32_t width_ticks, uint32_t low_ticks, bool late = false) {
+  RcDecoder decoder;
+  decoder.edge(kStart, 0, false);
+  uint32_t at = kStart + 20 * kMs;
+  for (; pulses != 0; --pulses) {
+    decoder.edge(at, 1, late);
+    decoder.edge(at + width_ticks, 0, false);
+    at += width_ticks + low_ticks;
+  }
+  return decoder.refused_hz();
+}
+
+}  // namespace
+
+TEST_CASE("a fast receiver is told from noise by the time between its pulses, to the tick") {
+  CHECK_EQ(refused_hz(250, 2000, 2000), 0);  // 249 came too fast
+  CHECK_EQ(refused_hz(251, 2000, 2000), 500);
+  CHECK_EQ(refused_hz(300, 2000, 2000, true), 0);  // no stamp to be trusted
+  CHECK_EQ(refused_hz(300, 2000, RcDecoder::kLowBeforeTicks - 1), 333);
+  CHECK_EQ(refused_hz(300, 2000, RcDecoder::kLowBeforeTicks + 1000), 0);  // long enough a low
+  CHECK_EQ(refused_hz(300, 600, 1000), 1250);
+  CHECK_EQ(refused_hz(300, 600, 999), 0);
+  CHECK_EQ(refused_hz(300, 4401, 3999), 238);
+  CHECK_EQ(refused_hz(300, 4402, 3999), 0);
+}
+
+TEST_CASE("a pulse that is used begins the count of fast ones anew") {
+  Line line;
+  line.frames(3);
+  for (uint8_t i = 0; i < RcDecoder::kRefusedPulses - 1; ++i) {
+    line.pulse(kWidth + 2000);
+  }
+  CHECK_EQ(line.decoder.refused_hz(), 0);
+  line.pulse(kWidth + 2000);
+  CHECK_EQ(line.decoder.refused_hz(), 400);
+}
+
+TEST_CASE("a pulse refused for a dropout does not come back at the next rise") {
+  RcDecoder decoder;
+  decoder.edge(kStart, 0, false);
+  const uint32_t at = kStart + 20 * kMs;
+  decoder.edge(at, 1, false);
+  decoder.edge(at + 2000, 0, false);
+  decoder.edge(at + 2200, 1, false);  // 100 us of dropout
+  decoder.edge(at + 3000, 0, false);
+  decoder.edge(at + 40000, 1, false);
+  CHECK_EQ(decoder.valid(), 0);
+  CHECK_EQ(decoder.width_ticks(0), 0);
+  CHECK_EQ(decoder.glitches(), 2);
+}
+
+TEST_CASE("one look finds all that are lost") {
+  RcDecoder decoder;
+  decoder.edge(kStart, 0, false);
+  decoder.edge(kStart + 10 * kMs, 0b1'1111, false);
+  decoder.edge(kStart + 10 * kMs + kWidth, 0, false);
+  decoder.poll(kStart + 13 * kMs);
+  CHECK_EQ(decoder.valid(), 0b1'1111);
+  decoder.poll(kStart + 10 * kMs + RcDecoder::kFreshTicks + 1);
+  CHECK_EQ(decoder.fresh(), 0);
+  CHECK_EQ(decoder.valid(), 0b1'1111);
+  decoder.poll(kStart + 10 * kMs + RcDecoder::kLostTicks + 1);
+  CHECK_EQ(decoder.valid(), 0);
+}
+
+TEST_CASE("the count of refused pulses stays at its end") {
+  Line line;
+  for (uint32_t i = 0; i < 65600; ++i) {
+    line.pulse(kWidth + 1000);
+  }
+  CHECK_EQ(line.decoder.glitches(), 0xFFFF);
+}
+
+TEST_CASE("the first edge behind a gap begins no pulse: how long the line was low is not known") {
+  Line line;
+  line.frames(5);
+  const uint8_t changes = line.decoder.changes();
+  line.decoder.gap();
+  line.pulse(20 * kMs);
+  CHECK_EQ(line.decoder.changes(), changes);
+  line.pulse(20 * kMs);
+  CHECK(line.decoder.changes() != changes);
+}
