@@ -110,7 +110,7 @@ def load(sizes_text: str, masses_text: str) -> Fin:
 def vane_file(fin: Fin) -> str:
     """Return the vane in the words of an aircraft file's [sensors] table."""
     return (
-        "# made by hw/mechanics/build.py from the solids; do not edit\n"
+        "# made by hw/mechanics/make_parts.py from the solids; do not edit\n"
         "# In the words of an aircraft file's [sensors]: copy these lines there to fly this vane.\n"
         f"vane_frequency_hz_per_mps = {fin.frequency_hz_per_mps:.3f}\n"
         f"vane_damping = {fin.damping:.3f}\n"

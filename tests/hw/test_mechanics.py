@@ -21,7 +21,7 @@ FIN = DYNAMICS.load(SIZES, MASSES)
 
 
 def test_masses_and_vane_file_are_those_of_the_committed_sources() -> None:
-    assert DYNAMICS.sources_hash() in MASSES.splitlines()[0], "run hw/mechanics/build.py"
+    assert DYNAMICS.sources_hash() in MASSES.splitlines()[0], "run hw/mechanics/make_parts.py"
     made = (MECHANICS / "generated" / "vane.toml").read_text(encoding="utf-8")
     assert made == DYNAMICS.vane_file(FIN)
 

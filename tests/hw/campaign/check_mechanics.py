@@ -13,11 +13,11 @@ sys.path.insert(0, str(MECHANICS))
 
 import solids  # noqa: E402
 
-import build  # noqa: E402
+import make_parts  # noqa: E402
 
 
 def test_bodies_fit_and_committed_masses_are_current() -> None:
-    command = [sys.executable, str(MECHANICS / "build.py"), "--check"]
+    command = [sys.executable, str(MECHANICS / "make_parts.py"), "--check"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
 
@@ -34,11 +34,11 @@ def test_bodies_fit_and_committed_masses_are_current() -> None:
 def test_a_planted_fault_is_found(group: str, name: str, value: float, complaint: str) -> None:
     sizes = solids.load_sizes()
     sizes[group][name] = value
-    assert complaint in "\n".join(build.faults(sizes, solids.vane(sizes), []))
+    assert complaint in "\n".join(make_parts.faults(sizes, solids.vane(sizes), []))
 
 
 def test_a_limiter_in_the_wrong_place_is_found() -> None:
     sizes = solids.load_sizes()
     vane = solids.vane(sizes)
     sizes["housing"]["limit_deg"] = 50.0
-    assert "limiter: at 53 deg the hub passes" in "\n".join(build.faults(sizes, vane, []))
+    assert "limiter: at 53 deg the hub passes" in "\n".join(make_parts.faults(sizes, vane, []))

@@ -210,7 +210,8 @@ def file_of(image: mmap.mmap, faults: Sequence[Fault]) -> tuple[bytes, str]:
     except CardImageError:
         files = []
     flights = sorted((f for f in files if f.name.startswith("FLT")), key=lambda f: f.name)
-    if reasons and not flights:
+    # The file that the card came with was never recorded into.
+    if reasons and (not flights or "card_absent" in {fault.kind for fault in faults}):
         return b"", reasons[0]
     if not flights:
         raise UsageError("the recorder made no file on the card: was the flight shorter than 5 s?")

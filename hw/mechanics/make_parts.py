@@ -1,7 +1,7 @@
 """Build the solids, prove that they fit, balance and print, and write what a shop wants.
 
-.venv-hw/bin/python hw/mechanics/build.py           check, then write hw/mechanics/generated
-.venv-hw/bin/python hw/mechanics/build.py --check   check, and compare masses and vane file
+.venv-hw/bin/python hw/mechanics/make_parts.py           check, then write hw/mechanics/generated
+.venv-hw/bin/python hw/mechanics/make_parts.py --check   check, and compare masses and vane file
 
 Needs build123d (`.ci/setup.sh hw`); PDFs need rsvg-convert too.
 """
@@ -104,7 +104,7 @@ def walls(sizes: solids.Sizes) -> dict[str, float]:
 def masses(sizes: solids.Sizes, vane: list[solids.Body], every: list[solids.Body]) -> str:
     """Return masses.csv: inertia and balance, then each body; printed ones as if solid."""
     rows = [
-        f"# made by hw/mechanics/build.py from {', '.join(dynamics.SOURCES)},"
+        f"# made by hw/mechanics/make_parts.py from {', '.join(dynamics.SOURCES)},"
         f" sha256 {dynamics.sources_hash()}",
         f"# inertia_kgm2={solids.inertia_kgm2(vane, sizes):.4e},"
         f" residual_Nm={abs(solids.moment_gmm(vane, sizes)) * 1e-6 * GRAVITY_MPS2:.1e}",
