@@ -263,6 +263,7 @@ TEST_CASE("a lost channel leaves the frame time to the others; the last one take
     decoder.edge(at, sent, false);
     decoder.edge(at + kWidth, 0, false);
     decoder.poll(at + kWidth + RcDecoder::kLowAfterTicks);
+    CHECK_EQ(decoder.frame_us(), frame == 0 ? 0 : 20000);
   }
   CHECK_EQ(decoder.valid(), 1);
   CHECK_EQ(decoder.frame_us(), 20000);
