@@ -74,8 +74,14 @@ Wish Volume::read_run() const {
   return read_block(entry_lba(card_.layout, run_.cluster()));
 }
 
-Wish Volume::next_run(const uint8_t* sector) {
-  run_.take(sector, card_.layout);
+Wish Volume::next_run(uint8_t* sector) {
+  const Layout& layout = card_.layout;
+  const uint32_t folder = card_.folder_end;
+  // Where the root folder stands nothing is free, whatever a damaged table says.
+  if (folder != 0 && entry_lba(layout, folder) == entry_lba(layout, run_.cluster())) {
+    put_entry(sector, layout, entry_index(layout, folder), kEndEntry);
+  }
+  run_.take(sector, layout);
   return more_of_run();
 }
 

@@ -69,7 +69,7 @@ class Volume {
   void begin(Job job, Wish first);
   void follow(Wish wish);
   Wish next(uint8_t* sector);
-  Wish next_run(const uint8_t* sector);
+  Wish next_run(uint8_t* sector);
   Wish read_run() const;
   Wish more_of_run();
   uint32_t behind_last() const;  // the cluster behind the newest file; 0: there is none

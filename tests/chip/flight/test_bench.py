@@ -31,7 +31,7 @@ def test_short_flight_keeps_every_limit(
         rate_hz=rate_hz,
         minutes=0.15,
         folder=tmp_path,
-        ground_s=5.0,
+        ground_s=12.0,
         receivers=RECEIVERS[first : first + 1],
     )
     flight_rows(table, flight, depth, stack_depth.room_bytes(flight_elf))

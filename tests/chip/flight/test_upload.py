@@ -18,7 +18,7 @@ BOOT_SECTION = 0x3E000
 
 def test_uploaded_flash_boots_and_records(flight_elf: Path, tmp_path: Path) -> None:
     card = make_card(tmp_path / "card.img")
-    rig = FlightRig(flight_elf, card, bootloader=True)
+    rig = FlightRig(flight_elf, card, bootloader=True, ground_s=3600.0)
     chip = rig.chip
     ctypes.memset(chip.library.bench_flash(chip.handle), 0xFF, BOOT_SECTION)
     rig.power_on()
@@ -30,7 +30,7 @@ def test_uploaded_flash_boots_and_records(flight_elf: Path, tmp_path: Path) -> N
     for address, piece in read_image(flight_elf).flash.items():
         assert chip.flash(address, len(piece)) == piece
 
-    chip.run_s(8.0)
+    chip.run_s(11.0)
     assert chip.pc < BOOT_SECTION
     assert any("mega2560" in line for line in rig.status_lines())
     rig.receiver.width_us[3] = CRUISE_US

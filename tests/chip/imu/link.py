@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from flight.rig import check_card, take_log
+from flight.rig import GROUND_S, check_card, take_log
 from imu.motion import fly
 from imu.rig import PairRig
 from imu.truth import Match, match
@@ -68,7 +68,8 @@ def run_link(rig: PairRig, time_s: float, folder: Path, *, doubled: bool = False
     import host
 
     board = rig.board
-    fly(board.mpu, board.magnetometer, time_s + 20.0)
+    # On the ground first: a file is made there and nowhere else.
+    fly(board.mpu, board.magnetometer, time_s + 20.0, rest_s=GROUND_S)
     rig.take_off()
     board.chip.clear_statistics()
     rig.mega.clear_statistics()

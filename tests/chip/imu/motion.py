@@ -44,9 +44,15 @@ def swaying(time_s: float, *, seed: int = 1) -> tuple[Array, Array, Array]:
     return at_s, waves(2.5), force
 
 
-def fly(mpu: Mpu6000, magnetometer: Magnetometer, time_s: float, *, seed: int = 1) -> None:
-    """Let both sensors sway for a time from now on, and the field turn."""
+def fly(
+    mpu: Mpu6000, magnetometer: Magnetometer, time_s: float, *, seed: int = 1, rest_s: float = 0.0
+) -> None:
+    """Let both sensors sway for a time, from `rest_s` on, and the field turn."""
     at_s, rates, force = swaying(time_s, seed=seed)
+    if rest_s > 0.0:
+        at_s = np.concatenate(([0.0, rest_s - 0.01], at_s + rest_s))
+        rates = np.vstack((np.zeros((2, 3)), rates))
+        force = np.vstack((np.tile([0.0, 0.0, -9.80665], (2, 1)), force))
     mpu.motion(at_s, rates, force)
     turn = 2 * np.pi * 0.05 * at_s
     field = np.column_stack(

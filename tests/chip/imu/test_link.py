@@ -74,8 +74,9 @@ def test_the_mega_reads_the_compat_packets(mega_elf: Path, imu_elf: Path, tmp_pa
     rates = np.deg2rad([5.0, -8.0, 12.0])
     force = [1.5, -2.5, -9.80665]
     rig.power_on()
+    rig.mega.run_s(11.5)  # on the ground, where a file is made
     rig.board.mpu.motion([0.0], [rates], [force])
-    rig.mega.run_s(3.0)
+    rig.mega.run_s(1.0)
     rig.flight.receiver.width_us[3] = 1500.0
     rig.mega.run_s(4.0)
     rig.mega.power_off()

@@ -11,9 +11,8 @@ import pytest
 MECHANICS = Path(__file__).resolve().parents[3] / "hw" / "mechanics"
 sys.path.insert(0, str(MECHANICS))
 
-import solids  # noqa: E402
-
 import make_parts  # noqa: E402
+import solids  # noqa: E402
 
 
 def test_bodies_fit_and_committed_masses_are_current() -> None:
