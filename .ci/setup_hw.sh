@@ -34,8 +34,14 @@ pictures_ready() { command -v dot >/dev/null && command -v rsvg-convert >/dev/nu
 install_packages() {
   command -v apt-get >/dev/null ||
     stop "no apt here: install KiCad 9 with its symbols and footprints, graphviz, rsvg-convert"
-  say "KiCad 9 comes from Debian's backports (120 MB to fetch, 870 MB on disk). To do by hand:"
-  printf '  echo "deb http://deb.debian.org/debian bookworm-backports main" >/etc/apt/sources.list.d/backports.list\n'
+  # The backports stand beside what this system takes Debian from already.
+  local archive source
+  archive="$(apt-get indextargets --format '$(RELEASE) $(COMPONENT) $(SITE)' 'Created-By: Packages' |
+    sed -n 's/^bookworm main //p' | head -n 1)"
+  [ -n "$archive" ] || stop "no Debian 12 among apt's sources (apt-get update first?): install KiCad 9 by hand, then make hw"
+  printf -v source 'Types: deb\nURIs: %s\nSuites: bookworm-backports\nComponents: main\nSigned-By: /usr/share/keyrings/debian-archive-keyring.gpg' "$archive"
+  say "KiCad 9 comes from Debian's backports (120 MB to fetch, 870 MB on disk). To do by hand, $source_list with"
+  printf '%s\n' "$source" | sed 's/^/    /'
   printf '  apt-get update && apt-get install --no-install-recommends -t bookworm-backports %s\n' "${packages[*]}"
   printf '  apt-get install --no-install-recommends %s\n' "${plain[*]}"
   if [ -z "${CI:-}" ]; then
@@ -51,8 +57,7 @@ install_packages() {
     [ -z "${CI:-}" ] || as_root=(sudo --non-interactive)
   fi
   # Backports have priority 100: nothing else of the system comes from there by itself.
-  printf 'Types: deb\nURIs: http://deb.debian.org/debian\nSuites: bookworm-backports\nComponents: main\nSigned-By: /usr/share/keyrings/debian-archive-keyring.gpg\n' |
-    "${as_root[@]}" tee "$source_list" >/dev/null
+  printf '%s\n' "$source" | "${as_root[@]}" tee "$source_list" >/dev/null
   local apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive
     apt-get --yes -o DPkg::Lock::Timeout=300)
   say "installing"
