@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 from devices.ardu_imu import ArduImu, ImuSample
 from simavr_bench import (
     Bmp085,
@@ -19,6 +20,7 @@ from simavr_bench import (
     SdCard,
 )
 from simavr_bench.heartbeat import Beats, judge_beats
+from simavr_bench.log import LogKind
 
 BOOTLOADER = Path(
     "/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex"
@@ -204,8 +206,12 @@ class FlightRig:
         may_stop : bool
             Whether the Mega may have ceased to drive.
         """
-        until = None if may_stop else self.chip.cycle
-        return judge_beats(*self.chip.edges(HEARTBEAT), may_stop=may_stop, until=until)
+        cycles, levels = self.chip.edges(HEARTBEAT)
+        if not may_stop:
+            return judge_beats(cycles, levels, until=self.chip.cycle)
+        # An edge at the cycle of a reset is the chip letting its pin go, not a beat.
+        beat = ~np.isin(cycles, self.chip.records(LogKind.RESET)["cycle"])
+        return judge_beats(cycles[beat], levels[beat], may_stop=True)
 
     def status_lines(self) -> list[str]:
         """Lines of the USB port so far."""

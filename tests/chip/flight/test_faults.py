@@ -27,6 +27,8 @@ CHOSEN = (
     "all channels lost",
     "60 glitches of 50 to 700 us",
     "supply sags to 4.4 V",
+    "stack overflow",
+    "interrupt storm",
     "GPS week ends",
 )
 
