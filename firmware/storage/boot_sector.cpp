@@ -17,6 +17,7 @@ constexpr uint32_t kInfoHead = 0x41615252UL, kInfoMiddle = 0x61417272UL;
 constexpr uint16_t kInfoMiddleAt = 484, kInfoFreeAt = 488, kInfoNextAt = 492;
 constexpr uint32_t kLeastFat16 = 4085, kMostFat16 = 65524;
 constexpr uint32_t kMostFat32 = 0x0FFFFFF5UL;
+constexpr uint8_t kNameFat16At = 54;
 
 bool is_signed(const uint8_t* sector) {
   return get_le<uint16_t>(sector + kSignatureAt) == kSignature;
@@ -31,6 +32,14 @@ bool is_fat(const uint8_t* sector) {
   const bool jump = sector[0] == 0xEB || sector[0] == 0xE9;
   return is_signed(sector) && jump && get_le<uint16_t>(sector + 11) == kSectorBytes &&
          power_of_two(sector[13]) && get_le<uint16_t>(sector + 14) != 0;
+}
+
+// The numbers of a FAT32 may be damaged into those of a FAT16. The name does not: every formatter
+// writes it, and FAT32 keeps these bytes 0. How long its table is says nothing: some formatters
+// lengthen it to align the clusters.
+bool is_named(const uint8_t* sector) {
+  const uint8_t* const name = sector + kNameFat16At;
+  return name[0] == 'F' && name[1] == 'A' && name[2] == 'T';
 }
 
 }  // namespace
@@ -58,6 +67,7 @@ BootVerdict read_boot(const uint8_t* sector, uint32_t lba, uint32_t card_blocks,
 
   out.clusters = (total - ahead) >> shift;
   if (!wide && out.clusters < kLeastFat16) return BootVerdict::kForeign;  // FAT12
+  if (!wide && !is_named(sector)) return BootVerdict::kDamaged;
   const uint32_t most = wide ? kMostFat32 : kMostFat16;
   const uint32_t in_fat = fat_sectors << (wide ? 7 : 8);
   if (out.clusters > most || out.clusters + kFirstCluster > in_fat) return BootVerdict::kDamaged;

@@ -45,6 +45,7 @@ void boot_fat16() {
   put_le<uint16_t>(sector + 22, 239);
   put_le<uint32_t>(sector + 32, 3911680);  // 2 GB
   put_le<uint32_t>(sector + 36, 0);
+  memcpy(sector + 54, "FAT16   ", 8);
 }
 
 BootVerdict read(Layout& layout) {
@@ -93,6 +94,32 @@ TEST_CASE("a boot sector of FAT16 has its root folder before the clusters") {
   CHECK_EQ(layout.root, 8192U + 1U + 2U * 239U);
   CHECK_EQ(layout.data_lba, layout.root + 32U);
   CHECK_EQ(layout.info_lba, 0U);
+}
+
+// Card 1210 of `make card-images`: 64 bytes of noise gave a FAT32 the numbers of a FAT16.
+TEST_CASE("a FAT32 with a root folder and a table of FAT16 is damaged") {
+  boot_fat32();
+  put_le<uint16_t>(sector + 14, 15);
+  put_le<uint16_t>(sector + 17, 11264);
+  put_le<uint16_t>(sector + 22, 12288);
+  put_le<uint32_t>(sector + 32, 533387);
+  sector[13] = 8;
+  memcpy(sector + 82, "FAT32   ", 8);
+  Layout layout;
+  CHECK(read(layout) == BootVerdict::kDamaged);
+}
+
+TEST_CASE("a table of FAT16 may be longer than its clusters need, never shorter") {
+  boot_fat16();
+  put_le<uint16_t>(sector + 22, 239 + 4096);  // clusters begin at a multiple of 4 MiB
+  Layout layout;
+  CHECK(read(layout) == BootVerdict::kOk);
+  put_le<uint16_t>(sector + 22, 238);
+  CHECK(read(layout) == BootVerdict::kDamaged);
+  boot_fat16();
+  sector[13] = 32;  // 122 000 clusters
+  put_le<uint16_t>(sector + 22, 478);
+  CHECK(read(layout) == BootVerdict::kDamaged);
 }
 
 TEST_CASE("a volume that claims more than the card ends with the card") {
