@@ -65,8 +65,9 @@ void Instrument::step() {
     ascii_row_.step(sensors_, pilot_.channels(), telemetry_, now_us);
     step_slow(now_us);
   }
-  if (outlet_.frames() == frames) recorder_.work_on_card(now_us);
-  pilot_.beat(outlet_, now_us);
+  if (outlet_.frames() == frames) recorder_.work(now_us);
+  // By the time it is now: a rest is at most one turn longer than the least time between edges.
+  pilot_.beat(outlet_, hal::now_us());
 
   const uint32_t end_us = hal::now_us();
   const uint32_t loop_us = end_us - now_us;

@@ -21,6 +21,13 @@ class Outlet {
     telemetry_.offer(Frame::id(), &frame, sizeof frame, frame.t_us);
   }
 
+  // Into the log before all others: open() is to come.
+  template <typename Frame>
+  void put_head(const Frame& frame) {
+    (void)ring_.push(frame);
+    telemetry_.offer(Frame::id(), &frame, sizeof frame, frame.t_us);
+  }
+
   uint8_t frames() const { return frames_; }  // put so far, and round again
 
   // Events of the time before a session wait for it. Of more than eight the first two stay, which

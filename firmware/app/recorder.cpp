@@ -61,7 +61,8 @@ bool Recorder::in_a_hurry() const {
   return volume_.job() != Job::kNone && !volume_.waits();
 }
 
-void Recorder::work_on_card(uint32_t now_us) {
+void Recorder::work(uint32_t now_us) {
+  if (state_ == State::kRecording) tell_heads(now_us);
   if (streams()) return;
   const Job job = volume_.job();
   uint8_t* const sector = ring_.lend();
@@ -268,7 +269,6 @@ void Recorder::decide_open_file(const core::PilotInputs& in,
 // A search is left at once; a block under way on the card comes to its end first.
 void Recorder::start(StartCause why, uint32_t now_us) {
   if (!volume_.leave()) return;
-  start_why_ = kNoStart;
   begin(why, prepared_, now_us);
 }
 
@@ -285,11 +285,8 @@ void Recorder::begin(StartCause why, bool same_session, uint32_t now_us) {
   prepared_ = false;
   resumed_ = why == StartCause::kResumed;
   writer_.start(file.file_id, session, file.next_block, now_us);
-  outlet_.open();
-  heads_told_ = false;
-  put_heads(now_us);
-  outlet_.event(frames::Event::kSessionStart, static_cast<uint32_t>(why), now_us);
-  outlet_.release_waiting();
+  start_why_ = why;
+  heads_ = kHeads;
   in_doubt_ = false;
   file_low_told_ = false;
   marks_ = 0;
@@ -298,20 +295,49 @@ void Recorder::begin(StartCause why, bool same_session, uint32_t now_us) {
   hal::set_flight_mark(true);
 }
 
-void Recorder::put_heads(uint32_t now_us) {
-  frames::ConfigFrame config = *config_;
-  config.t_us = now_us;
-  outlet_.put(config);
-  frames::IdentityFrame who;
-  identity(&who, now_us);
-  outlet_.put(who);
-  const storage::FlightFile& file = volume_.file();
-  const frames::FileFrame made = {now_us, file.number, file.blocks * hal::kCardBlockBytes};
-  outlet_.put(made);
-  const frames::ImageFrame image = {now_us, hal::image_hash()};
-  outlet_.put(image);
-  frames::BaroCoefficientsFrame words;
-  if (sensors_.coefficients(&words, now_us)) outlet_.put(words);
+// One per turn. Other frames follow the first heads of a session, as protocol/README.md says.
+void Recorder::tell_heads(uint32_t now_us) {
+  if (writer_.take_identities_due()) heads_ = 0;
+  if (heads_ == kHeads) return;
+  put_head(heads_, now_us);
+  ++heads_;
+}
+
+void Recorder::put_head(uint8_t which, uint32_t now_us) {
+  switch (which) {
+    case 0: {
+      frames::ConfigFrame config = *config_;
+      config.t_us = now_us;
+      outlet_.put_head(config);
+      return;
+    }
+    case 1: {
+      frames::IdentityFrame who;
+      identity(&who, now_us);
+      outlet_.put_head(who);
+      return;
+    }
+    case 2: {
+      const storage::FlightFile& file = volume_.file();
+      outlet_.put_head(frames::FileFrame{now_us, file.number, file.blocks * hal::kCardBlockBytes});
+      return;
+    }
+    case 3:
+      outlet_.put_head(frames::ImageFrame{now_us, hal::image_hash()});
+      return;
+    case 4: {
+      frames::BaroCoefficientsFrame words;
+      if (sensors_.coefficients(&words, now_us)) outlet_.put_head(words);
+      return;
+    }
+    default:
+      if (start_why_ == kNoStart) return;
+      outlet_.open();
+      outlet_.event(frames::Event::kSessionStart, static_cast<uint32_t>(start_why_), now_us);
+      outlet_.release_waiting();
+      start_why_ = kNoStart;
+      return;
+  }
 }
 
 void Recorder::identity(frames::IdentityFrame* out, uint32_t now_us) const {
@@ -328,11 +354,7 @@ void Recorder::identity(frames::IdentityFrame* out, uint32_t now_us) const {
 }
 
 void Recorder::record(core::RecordAction action, uint32_t now_us) {
-  if (writer_.take_identities_due()) {
-    // The first pass of the schema comes with the heads that begin() has put already.
-    if (heads_told_) put_heads(now_us);
-    heads_told_ = true;
-  }
+  if (start_why_ != kNoStart) return;  // its heads are under way
   if (action == core::RecordAction::kMark) outlet_.event(frames::Event::kMark, ++marks_, now_us);
   watch_room(now_us);
   watch_doubt(now_us);

@@ -32,9 +32,10 @@ class Recorder {
   void set_file_blocks(uint32_t blocks) { volume_.set_file_blocks(blocks); }
   // Once per turn of the main loop: carries the session's block under way on.
   void step(uint32_t now_us);
-  // Between sessions, in a turn that has done little else: one step of what the card needs, at
-  // most 1.2 ms.
-  void work_on_card(uint32_t now_us);
+  // In a turn that has done little else. Between sessions one step of what the card needs, at most
+  // 1.2 ms; in one, the next of the frames that are due at its head and with each return of the
+  // schema: together they would stretch the heartbeat by 2 ms.
+  void work(uint32_t now_us);
   // The card gives the next block at once: no sleep between two turns.
   bool in_a_hurry() const;
   // Every 10 ms or so: start, stop, resume. Looks for the card at the first call.
@@ -59,6 +60,7 @@ class Recorder {
 
  private:
   static constexpr auto kNoStart = static_cast<frames::StartCause>(0xFF);
+  static constexpr uint8_t kHeads = 6;  // the last opens the session to all other frames
 
   bool streams() const { return state_ == State::kRecording || state_ == State::kEnding; }
   void job_ended(storage::Volume::Job job, uint32_t now_us);
@@ -77,7 +79,8 @@ class Recorder {
   void tell_end();
   void finish(uint32_t now_us);
   void fail(hal::CardStatus status, uint32_t now_us);
-  void put_heads(uint32_t now_us);
+  void tell_heads(uint32_t now_us);
+  void put_head(uint8_t which, uint32_t now_us);
   void watch_room(uint32_t now_us);
   void watch_doubt(uint32_t now_us);
   static bool kept_power();
@@ -107,10 +110,11 @@ class Recorder {
   bool may_write_ = false;    // on the ground, and a second of throttle-up for what was begun
   bool file_wanted_ = false;  // the card is good, a new file waits for room and for the ground
   bool unrecorded_ = false;
-  frames::StartCause start_why_ = kNoStart;  // a session that begins as soon as the card is free
+  // A session that begins as soon as the card is free, until its event has been told.
+  frames::StartCause start_why_ = kNoStart;
   bool prepared_ = false;  // the file's first block carries this power-on's session
   bool resumed_ = false;
-  bool heads_told_ = false;
+  uint8_t heads_ = kHeads;  // put of those that are due
   bool file_low_told_ = false;
   uint32_t high_us_ = 0;      // the throttle was last not above idle
   bool landed_ = false;       // it is the ground, and nobody takes off

@@ -1,6 +1,7 @@
-// Proof of life: one heartbeat edge and one watchdog feed, at most every millisecond, only after
-// every task has reported that it ran. What a task found out (a dead card, a silent IMU) is not
-// asked here.
+// Proof of life: one heartbeat edge and one watchdog feed, at most every half millisecond, only
+// after every task has reported that it ran. What a task found out (a dead card, a silent IMU) is
+// not asked here. With a whole millisecond, two turns of 0.9 ms before one of 2.7 ms left a rest of
+// 3.8 ms.
 #pragma once
 
 #include <stdint.h>
@@ -9,7 +10,7 @@ namespace core {
 
 class HealthGate {
  public:
-  static constexpr uint16_t kEdgeUs = 1000;
+  static constexpr uint16_t kEdgeUs = 500;
 
   explicit constexpr HealthGate(uint8_t tasks)
       : required_(static_cast<uint8_t>((1U << tasks) - 1)) {}

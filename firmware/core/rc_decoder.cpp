@@ -189,7 +189,13 @@ void RcDecoder::poll(uint32_t now_ticks) {
     const uint32_t age_ticks = now_ticks - input.accepted;
     if (age_ticks > kLostTicks) {
       lose(i);
-    } else if (age_ticks > kFreshTicks && (fresh_ & bit) != 0) {
+      continue;
+    }
+    if (age_ticks > kUnsteadyTicks && (steady_ & bit) != 0) {
+      set(steady_, bit, false);
+      ++changes_;
+    }
+    if (age_ticks > kFreshTicks && (fresh_ & bit) != 0) {
       set(fresh_, bit, false);
       ++changes_;
     }

@@ -30,6 +30,9 @@ class RcDecoder {
   static constexpr uint32_t kMinPeriodTicks = 9000UL * kTicksPerUs;
   static constexpr uint32_t kMaxPeriodTicks = 25000UL * kTicksPerUs;
   static constexpr uint32_t kFreshTicks = 45000UL * kTicksPerUs;  // one frame missed, not two
+  // With 2 ms of kAgeTicks, 3 ms of a turn and 46 ms of the slowest pump and relay (hw/relay.md)
+  // the relay lets go within 100 ms of the last pulse.
+  static constexpr uint32_t kUnsteadyTicks = 49000UL * kTicksPerUs;
   static constexpr uint32_t kLostTicks = 60000UL * kTicksPerUs;
   static constexpr uint32_t kAgeTicks = 2000UL * kTicksPerUs;  // between two looks at all ages
   static constexpr uint8_t kSteadyPulses = 3;
@@ -48,9 +51,10 @@ class RcDecoder {
 
   // 0: no pulse accepted within 60 ms, seen 2 ms later at most.
   uint16_t width_ticks(uint8_t input) const { return inputs_[input].width; }
-  uint8_t valid() const { return valid_; }         // bit per input: width is not 0
-  uint8_t fresh() const { return fresh_; }         // bit per input: last pulse at most 45 ms old
-  uint8_t steady() const { return steady_; }       // bit per input: three accepted in a row
+  uint8_t valid() const { return valid_; }  // bit per input: width is not 0
+  uint8_t fresh() const { return fresh_; }  // bit per input: last pulse at most 45 ms old
+  // Bit per input: three accepted in a row, the last at most 49 ms ago.
+  uint8_t steady() const { return steady_; }
   uint16_t frame_us() const { return frame_us_; }  // 0: not known
   // Rate in Hz of pulses that follow each other too fast to be used, while none is accepted; else
   // 0.

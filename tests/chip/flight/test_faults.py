@@ -71,6 +71,7 @@ def test_card_that_cannot_be_recorded_on(flight_elf: Path, tmp_path: Path, injec
     [
         "closing cut, chain first, 4 kB",
         "newest chain cyclic at its begin",
+        "first cluster out of range",
         "3 s stall while mounting",
     ],
 )

@@ -194,7 +194,7 @@ TEST_CASE("a line stays steady however long it is") {
   }
 }
 
-TEST_CASE("fresh for 45 ms, valid for 60, looked at each 2 ms") {
+TEST_CASE("fresh for 45 ms, steady for 49, valid for 60, looked at each 2 ms") {
   Line line;
   line.frames(5);
   const uint32_t accepted_ticks = line.rise_ticks;
@@ -208,12 +208,27 @@ TEST_CASE("fresh for 45 ms, valid for 60, looked at each 2 ms") {
   line.decoder.poll(accepted_ticks + RcDecoder::kFreshTicks + RcDecoder::kAgeTicks);
   CHECK_EQ(line.decoder.fresh(), 0);
   CHECK_EQ(line.decoder.changes(), changes + 1);
+  line.decoder.poll(accepted_ticks + RcDecoder::kUnsteadyTicks);
+  CHECK_EQ(line.decoder.steady(), 1);
+  line.decoder.poll(accepted_ticks + RcDecoder::kUnsteadyTicks + RcDecoder::kAgeTicks);
+  CHECK_EQ(line.decoder.steady(), 0);
+  CHECK_EQ(line.decoder.changes(), changes + 2);
   line.decoder.poll(accepted_ticks + RcDecoder::kLostTicks);
   CHECK_EQ(line.decoder.valid(), 1);
-  CHECK_EQ(line.decoder.changes(), changes + 1);
+  CHECK_EQ(line.decoder.changes(), changes + 2);
   line.decoder.poll(accepted_ticks + RcDecoder::kLostTicks + RcDecoder::kAgeTicks);
   CHECK_EQ(line.decoder.valid(), 0);
-  CHECK_EQ(line.decoder.changes(), changes + 2);
+  CHECK_EQ(line.decoder.changes(), changes + 3);
+}
+
+TEST_CASE("a pulse behind two missed frames of 17 ms makes the channel steady again") {
+  Line line;
+  line.frames(5);
+  line.decoder.poll(line.rise_ticks + RcDecoder::kUnsteadyTicks + RcDecoder::kAgeTicks);
+  CHECK_EQ(line.decoder.steady(), 0);
+  CHECK_EQ(line.decoder.valid(), 1);
+  line.pulse(54 * kMs);
+  CHECK_EQ(line.decoder.steady(), 1);
 }
 
 TEST_CASE("a pulse waits for its low time, to the tick, and only while its line is low") {
