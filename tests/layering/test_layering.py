@@ -57,7 +57,7 @@ HOST_FLOORS: dict[str, tuple[str, ...]] = {
     "host.twin": ("faults", "testcard", "flight", "sensors", "recorder", "outcome"),
     "host.sysid": (
         *("models", "numerics", "estimators", "aerodynamics", "compatibility"),
-        *("flight", "coefficients", "answer"),
+        *("flight", "coefficients", "answer", "pipeline"),
     ),
 }
 # Modules beside the rooms that start programs or give the package its names.

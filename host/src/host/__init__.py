@@ -3,25 +3,47 @@
 >>> import host
 >>> log = host.read_log("flight.bin")  # doctest: +SKIP
 >>> table = log.table()  # doctest: +SKIP
+>>> found = host.identify("flight.bin", aircraft="ultrastick25e")  # doctest: +SKIP
 """
 
 TYPE_CHECKING = False  # of `typing`, whose import takes longer than the rest of this file
 if TYPE_CHECKING:
     from host.errors import CalibrationError, LogError, NotALogError
     from host.log import FlightLog, read_log
+    from host.sysid.errors import IdentificationError
+    from host.sysid.pipeline.identification import Identification
+    from host.sysid.pipeline.identify import identify
 
-__all__ = ["CalibrationError", "FlightLog", "LogError", "NotALogError", "__version__", "read_log"]
+__all__ = [
+    "CalibrationError",
+    "FlightLog",
+    "Identification",
+    "IdentificationError",
+    "LogError",
+    "NotALogError",
+    "__version__",
+    "identify",
+    "read_log",
+]
 __version__ = "0.1.0"
 
 
+# Loaded on first use: numpy, pandas and scipy keep `host --help` from its 0.3 s.
+_HOMES = {
+    "CalibrationError": "host.errors",
+    "FlightLog": "host.log",
+    "Identification": "host.sysid.pipeline.identification",
+    "IdentificationError": "host.sysid.errors",
+    "LogError": "host.errors",
+    "NotALogError": "host.errors",
+    "identify": "host.sysid.pipeline.identify",
+    "read_log": "host.log",
+}
+
+
 def __getattr__(name: str) -> object:
-    # numpy and pandas are loaded on first use, so that `host --help` stays under 0.3 s.
-    if name in ("FlightLog", "read_log"):
-        import host.log
+    if name not in _HOMES:
+        raise AttributeError(f"module 'host' has no attribute {name!r}")
+    import importlib
 
-        return getattr(host.log, name)
-    if name in ("CalibrationError", "LogError", "NotALogError"):
-        import host.errors
-
-        return getattr(host.errors, name)
-    raise AttributeError(f"module 'host' has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOMES[name]), name)

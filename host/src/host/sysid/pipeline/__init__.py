@@ -1,0 +1,1 @@
+"""Identification as one pipeline: flights in, one answer out."""

@@ -1,0 +1,112 @@
+"""What a user wants identified: models by name or file, methods by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from host.sysid.coefficients.model import (
+    CoefficientModel,
+    is_coefficient_model,
+    read_coefficient_model,
+    standard_model,
+)
+from host.sysid.errors import IdentificationError
+from host.sysid.estimators.fit import methods as single_methods
+from host.sysid.flight.column_map import like
+from host.sysid.flight.linear import AXIS_OF, DEFAULT_METHOD, STAGED
+from host.sysid.models.model import LinearModel
+from host.sysid.models.model_file import read_model
+
+COEFFICIENTS = "coefficients"
+DEFAULT_MODELS = ("longitudinal", "lateral")
+ModelName = str | Path | LinearModel | CoefficientModel
+
+
+@dataclass(frozen=True, slots=True)
+class Models:
+    """Linear models, a template by its name or one of the user's own; terms of the coefficients."""
+
+    linear: tuple[tuple[str, LinearModel | None], ...]
+    coefficients: CoefficientModel | None
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Inputs and outputs of the user's own models."""
+        own = {s for _, m in self.linear if m is not None for s in (*m.inputs, *m.outputs)}
+        return tuple(sorted(own))
+
+
+def wanted_models(given: ModelName | Iterable[ModelName] | None) -> Models:
+    """Return the models asked for; the two four-state ones where nothing is.
+
+    Parameters
+    ----------
+    given : str, Path, LinearModel, CoefficientModel or several of them, optional
+        Name of a template, ``coefficients``, or a TOML file.
+
+    Raises
+    ------
+    IdentificationError
+        If there is no such model, or there are two sets of coefficients.
+    """
+    names = _several(given) or list(DEFAULT_MODELS)
+    linear: list[tuple[str, LinearModel | None]] = []
+    terms: list[CoefficientModel | Path | str] = []
+    for name in names:
+        if isinstance(name, LinearModel):
+            linear.append((name.name, name))
+        elif isinstance(name, CoefficientModel) or name == COEFFICIENTS:
+            terms.append(name)
+        elif is_coefficient_model(Path(name)):
+            terms.append(Path(name))
+        elif name in AXIS_OF:
+            linear.append((str(name), None))
+        elif Path(name).exists() or str(name).lower().endswith(".toml"):
+            linear.append((str(name), read_model(Path(name))))
+        else:
+            raise IdentificationError(
+                f"no model '{name}'{like(str(name), tuple(AXIS_OF))}; there are"
+                f" {', '.join(AXIS_OF)}, coefficients, or a TOML file"
+            )
+    if len([t for t in terms if t != COEFFICIENTS]) + (COEFFICIENTS in terms) > 1:
+        raise IdentificationError("one model of the coefficients at a time; --model names several")
+    return Models(tuple(linear), _terms(terms[0]) if terms else None)
+
+
+def _terms(given: CoefficientModel | Path | str) -> CoefficientModel:
+    if isinstance(given, CoefficientModel):
+        return given
+    return standard_model() if given == COEFFICIENTS else read_coefficient_model(Path(given))
+
+
+def known_methods() -> dict[str, str]:
+    """Return every method of linear models with a line about it."""
+    return {**STAGED, **single_methods()}
+
+
+def wanted_methods(given: str | Iterable[str] | None) -> tuple[str, ...]:
+    """Return the methods asked for, each once; the default one where none is.
+
+    Raises
+    ------
+    IdentificationError
+        If there is no such method.
+    """
+    wanted = tuple(dict.fromkeys(_several(given) or [DEFAULT_METHOD]))
+    known = known_methods()
+    unknown = [m for m in wanted if m not in known]
+    if unknown:
+        raise IdentificationError(f"unknown method {', '.join(unknown)}; known: {', '.join(known)}")
+    return wanted
+
+
+def _several(given: Any) -> list[Any]:
+    """Return what was given one by one; a name alone is one thing."""
+    if given is None:
+        return []
+    if isinstance(given, Sequence) and not isinstance(given, str):
+        return list(given)
+    return [given]
