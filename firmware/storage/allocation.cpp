@@ -4,7 +4,6 @@ namespace storage {
 
 Wish Allocation::start(Edit edit, uint32_t first, uint32_t last, const CardState& card) {
   chain_.start(edit, first, last);
-  edit_ = edit;
   if (card.layout.info_lba == 0 || card.free_clusters == kUnknown) return this->edit(card);
   phase_ = Phase::kForget;
   return read_block(card.layout.info_lba);
@@ -51,10 +50,10 @@ Wish Allocation::next(uint8_t* sector, CardState& card) {
 }
 
 void Allocation::count(uint8_t* sector, CardState& card) const {
-  const uint32_t changed = edit_ == Edit::kTrim ? chain_.count() - 1 : chain_.count();
+  const uint32_t changed = chain_.changed();
   uint32_t& free_clusters = card.free_clusters;
   if (free_clusters != kUnknown) {
-    const bool taken = edit_ == Edit::kLink;
+    const bool taken = chain_.links();
     const uint32_t most = taken ? free_clusters : card.layout.clusters - free_clusters;
     // A count that contradicts what was found free is none.
     free_clusters = changed > most ? kUnknown

@@ -25,7 +25,6 @@ class Allocation {
 
   ChainEdit chain_;
   Phase phase_;
-  Edit edit_;
 };
 
 }  // namespace storage

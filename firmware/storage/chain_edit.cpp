@@ -18,8 +18,9 @@ bool ChainEdit::edit(uint8_t* sector, const Layout& layout) const {
   uint16_t index = entry_index(layout, cluster);
   for (; cluster <= at_; ++cluster, ++index) {
     uint32_t value = kFreeEntry;
-    if (edit_ == Edit::kLink) {
-      if (entry(sector, layout, index) != kFreeEntry) return false;
+    if (links()) {
+      const bool ours = edit_ == Edit::kExtend && cluster == first_;
+      if (!ours && entry(sector, layout, index) != kFreeEntry) return false;
       value = cluster == last_ ? kEndEntry : cluster + 1;
     } else if (edit_ == Edit::kTrim && cluster == first_) {
       value = kEndEntry;

@@ -10,9 +10,10 @@
 namespace storage {
 
 enum class Edit : uint8_t {
-  kLink,  // one chain of all; they must be free
-  kFree,  // all of them
-  kTrim,  // all but the first, which becomes the end of its chain
+  kLink,    // one chain of all; they must be free
+  kExtend,  // the same, behind the first, which is the end of a chain
+  kFree,    // all of them
+  kTrim,    // all but the first, which becomes the end of its chain
 };
 
 class ChainEdit {
@@ -39,9 +40,14 @@ class ChainEdit {
 
   // The first cluster behind what is in use now.
   uint32_t next_free() const {
-    return edit_ == Edit::kLink ? last_ + 1 : edit_ == Edit::kTrim ? first_ + 1 : first_;
+    return links() ? last_ + 1 : edit_ == Edit::kTrim ? first_ + 1 : first_;
   }
   uint32_t count() const { return last_ - first_ + 1; }
+  // Clusters that become used or free.
+  uint32_t changed() const {
+    return edit_ == Edit::kExtend || edit_ == Edit::kTrim ? last_ - first_ : count();
+  }
+  bool links() const { return edit_ == Edit::kLink || edit_ == Edit::kExtend; }
   uint32_t left() const { return at_ - first_ + 1; }
 
  private:

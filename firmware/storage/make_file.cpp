@@ -11,12 +11,21 @@
 namespace storage {
 
 Wish MakeFile::start(
-    const Run& run, uint32_t blocks, uint32_t session, bool replace, CardState& card) {
+    const Run& run, uint32_t blocks, uint32_t session, Kind kind, CardState& card) {
   run_ = run;
   blocks_ = blocks;
   session_ = session;
-  replace_ = replace;
-  if (replace || card.free_entry.lba != 0) return link(card);
+  kind_ = kind;
+  if (kind == Kind::kGrow) {
+    // Its first block stays, and so does its id.
+    file_id_ = card.file.file_id;
+    session_ = card.file.last_session;
+    run_.first = card.first_cluster();
+    phase_ = Phase::kLink;
+    const uint32_t last = run_.first + card.layout.clusters_for(blocks) - 1;
+    return allocation_.start(Edit::kExtend, run.first - 1, last, card);
+  }
+  if (kind == Kind::kReplace || card.free_entry.lba != 0) return link(card);
   // The root folder is full: the first cluster becomes its next.
   phase_ = Phase::kFolderLink;
   return allocation_.start(Edit::kLink, run.first, run.first, card);
@@ -76,6 +85,7 @@ Wish MakeFile::next(uint8_t* sector, CardState& card) {
     case Phase::kLink: {
       const Wish wish = allocation_.next(sector, card);
       if (wish.kind != Wish::Kind::kDone) return wish;
+      if (kind_ == Kind::kGrow) return read_folder(card);
       phase_ = Phase::kOldBlock;
       return read_block(first_lba);
     }
@@ -95,8 +105,7 @@ Wish MakeFile::next(uint8_t* sector, CardState& card) {
       phase_ = Phase::kBlock;
       return write_block(first_lba);
     case Phase::kBlock:
-      phase_ = Phase::kEntry;
-      return read_block(replace_ ? card.entry.lba : card.free_entry.lba);
+      return read_folder(card);
     case Phase::kEntry:
       return enter(sector, card);
     case Phase::kEntryWritten:
@@ -107,10 +116,15 @@ Wish MakeFile::next(uint8_t* sector, CardState& card) {
   return failed();
 }
 
+Wish MakeFile::read_folder(const CardState& card) {
+  phase_ = Phase::kEntry;
+  return read_block(kind_ == Kind::kNew ? card.free_entry.lba : card.entry.lba);
+}
+
 Wish MakeFile::enter(uint8_t* sector, CardState& card) {
   phase_ = Phase::kEntryWritten;
   const uint32_t bytes = blocks_ * kSectorBytes;
-  if (replace_) {
+  if (kind_ != Kind::kNew) {
     set_cluster(sector, card.entry.index, run_.first);
     set_size(sector, card.entry.index, bytes, card.fat_date());
     return write_block(card.entry.lba);
@@ -126,7 +140,8 @@ Wish MakeFile::entered(CardState& card) {
   card.file = made(card);
   card.state = FileState::kBlank;
   card.odd = frames::FileState::kGood;
-  if (replace_) {
+  if (kind_ == Kind::kGrow) return done();
+  if (kind_ == Kind::kReplace) {
     phase_ = Phase::kFreeOld;
     return allocation_.start(Edit::kFree, old_first, old_first + old_count - 1, card);
   }
@@ -142,7 +157,7 @@ FlightFile MakeFile::made(const CardState& card) const {
   file.next_block = 1;
   file.file_id = file_id_;
   file.last_session = session_;
-  file.number = card.file.number + (replace_ ? 0 : 1);
+  file.number = card.file.number + (kind_ == Kind::kNew ? 1 : 0);
   return file;
 }
 

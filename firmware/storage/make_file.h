@@ -1,5 +1,6 @@
 // Job: makes a flight file of a run of free clusters, or gives a file that was never recorded into
-// another, larger run. Every power cut leaves the file whole, or clusters that belong to none.
+// more room: the run behind it, or another, larger one. Every power cut leaves the file whole, and
+// clusters behind it or clusters that belong to none.
 #pragma once
 
 #include <stdint.h>
@@ -12,8 +13,12 @@ namespace storage {
 
 class MakeFile {
  public:
-  // With `replace` card.file keeps its number and entry; else the next number is taken.
-  Wish start(const Run& run, uint32_t blocks, uint32_t session, bool replace, CardState& card);
+  enum class Kind : uint8_t {
+    kNew,      // with the next number
+    kReplace,  // card.file keeps its number and entry
+    kGrow,     // and its place: the run begins behind it
+  };
+  Wish start(const Run& run, uint32_t blocks, uint32_t session, Kind kind, CardState& card);
   Wish next(uint8_t* sector, CardState& card);
   uint8_t percent() const;
 
@@ -35,6 +40,7 @@ class MakeFile {
   Wish link(const CardState& card);
   Wish lengthen_folder(uint8_t* sector, CardState& card);
   FlightFile made(const CardState& card) const;
+  Wish read_folder(const CardState& card);
   Wish enter(uint8_t* sector, CardState& card);
   Wish entered(CardState& card);
 
@@ -47,7 +53,7 @@ class MakeFile {
     uint32_t lba_;  // of the folder's new cluster or table
   };
   Phase phase_;
-  bool replace_;
+  Kind kind_;
 };
 
 }  // namespace storage

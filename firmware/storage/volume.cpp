@@ -28,7 +28,9 @@ void Volume::look_again() {
 }
 
 void Volume::make(uint32_t session, uint32_t blocks, bool replace) {
-  const Run run = run_.take_best(clusters_for_new(blocks));
+  const bool grow = replace && may_grow();
+  const uint32_t has = grow ? card_.layout.clusters_for(card_.file.blocks) : 0;
+  const Run run = run_.take_best(clusters_for_new(blocks) - has);
   // FAT32's root folder can be made longer by a cluster.
   const bool place = replace || card_.free_entry.lba != 0 || (card_.layout.wide && run.count > 1);
   if (run.count == 0 || !place || (!replace && card_.file.number >= kMaxNumber)) {
@@ -36,9 +38,12 @@ void Volume::make(uint32_t session, uint32_t blocks, bool replace) {
     status_ = VolumeStatus::kFull;
     return;
   }
-  const uint32_t room = run.count << card_.layout.cluster_shift;
+  const uint32_t room = (has + run.count) << card_.layout.cluster_shift;
   if (blocks > room) blocks = room;
-  begin(Job::kMake, make_.start(run, blocks, session, replace, card_));
+  const MakeFile::Kind kind = grow      ? MakeFile::Kind::kGrow
+                              : replace ? MakeFile::Kind::kReplace
+                                        : MakeFile::Kind::kNew;
+  begin(Job::kMake, make_.start(run, blocks, session, kind, card_));
 }
 
 void Volume::close(uint32_t used_blocks, bool end_event, uint32_t now_us) {
@@ -64,9 +69,10 @@ void Volume::search() {
   follow(read_run());
 }
 
-// Of a file, and one for a root folder that is full.
+// Of a file, and one for a root folder that is full; a blank file has its entry.
 uint32_t Volume::clusters_for_new(uint32_t blocks) const {
-  const bool folder_full = card_.layout.wide && card_.free_entry.lba == 0;
+  const bool has_entry = card_.free_entry.lba != 0 || card_.state == FileState::kBlank;
+  const bool folder_full = card_.layout.wide && !has_entry;
   return card_.layout.clusters_for(blocks) + (folder_full ? 1 : 0);
 }
 
@@ -86,9 +92,9 @@ Wish Volume::next_run(uint8_t* sector) {
 }
 
 Wish Volume::more_of_run() {
-  const uint32_t wanted = clusters_for_new(file_blocks_);
+  if (found_clusters() >= clusters_for_new(file_blocks_)) return done();
   if (!run_.ended()) return read_run();
-  if (!near_ || run_.best().count >= wanted) return done();
+  if (!near_) return done();
   near_ = false;
   run_.go_on_from(card_.layout, behind_last());
   return read_run();
@@ -198,8 +204,17 @@ bool Volume::slow_to_make(uint32_t blocks) const {
   return card_.layout.clusters_for(blocks) > kQuickClusters;
 }
 
+// The rest of the run that a small file was made of, or clusters that became free behind it.
+bool Volume::may_grow() const {
+  return card_.state == FileState::kBlank && run_.best().first == behind_last();
+}
+
+uint32_t Volume::found_clusters() const {
+  return run_.best().count + (may_grow() ? card_.layout.clusters_for(card_.file.blocks) : 0);
+}
+
 uint32_t Volume::best_blocks() const {
-  const uint32_t room = run_.best().count << card_.layout.cluster_shift;
+  const uint32_t room = found_clusters() << card_.layout.cluster_shift;
   return room < file_blocks_ ? room : file_blocks_;
 }
 

@@ -36,7 +36,8 @@ class Volume {
   // A file of at most `blocks` in the best room found; what is left of it is room still. The next
   // number, with a first block of its own, so that its id
   // is known and no older block behind it can be taken for its content; or, with `replace`, the
-  // same file with more room: only one that was never recorded into.
+  // same file with more room: only one that was never recorded into. Where the room is behind it
+  // it stays where it is.
   void make(uint32_t session, uint32_t blocks, bool replace);
   // Its chain is so long that linking it takes more than a second.
   bool slow_to_make(uint32_t blocks) const;
@@ -60,7 +61,8 @@ class Volume {
   const FlightFile& file() const { return card_.file; }
   bool smaller_than_new() const { return card_.file.blocks < file_blocks_; }
   uint32_t file_blocks() const { return file_blocks_; }
-  uint32_t best_blocks() const;  // of the search
+  // Of a file in the room found so far; behind a file that may be given more, of both together.
+  uint32_t best_blocks() const;
   bool best_grows() const { return run_.best_grows(); }
   // Why there is no room for `blocks`, behind a search of the whole card.
   VolumeStatus shortage(uint32_t blocks) const;
@@ -72,6 +74,8 @@ class Volume {
   Wish next_run(uint8_t* sector);
   Wish read_run() const;
   Wish more_of_run();
+  bool may_grow() const;
+  uint32_t found_clusters() const;
   uint32_t behind_last() const;  // the cluster behind the newest file; 0: there is none
   uint32_t clusters_for_new(uint32_t blocks) const;
   void end(VolumeStatus status);

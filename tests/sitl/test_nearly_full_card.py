@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 from host.twin.recorder.sitl_library import TICKS_PER_S, Port, Recorder, Sitl
 
@@ -90,6 +91,16 @@ def test_small_file_is_replaced_on_the_ground_by_a_larger_one(gigabytes: float) 
     assert said[-1] == "recording"
     _, newest = look_at(card).flights[-1]
     assert newest.size == WHOLE_FILE
+
+
+def test_the_only_run_of_a_whole_file_becomes_a_whole_file() -> None:
+    """The quarter hour is taken out of it first, then grows where it stands."""
+    card = nearly_full(16.0, [(0.3, WHOLE_FILE)], hint=0.3)
+    free = np.flatnonzero(look_at(card).fat == 0)
+    said = watch(card, 20.0)
+    assert said[-2:] == [f"ready {LAST_FLIGHT + 1}", "recording"]
+    _, newest = look_at(card).flights[-1]
+    assert (newest.size, newest.first) == (WHOLE_FILE, free[0])
 
 
 def test_throttle_up_is_recorded_while_a_larger_room_is_searched() -> None:

@@ -309,26 +309,6 @@ TEST_CASE("a search that was left for a small file goes on at its own sector") {
   CHECK_EQ(clusters_in_use(), kFileBlocks + 1 + 128);
 }
 
-TEST_CASE("a small file leaves the rest of its run as room") {
-  insert(new_card());
-  for (uint32_t c = 1000; c < 2 + kClusters; ++c) set_fat(c, kEndEntry);
-  Recorded one;
-  REQUIRE(one.look());
-  one.volume.search();
-  REQUIRE(finish(one.volume));
-  CHECK_EQ(one.volume.best_blocks(), 997U);
-  one.volume.make(1, 200, false);
-  REQUIRE(finish(one.volume));
-  one.volume.go_on_searching();
-  CHECK(one.volume.job() == Volume::Job::kNone);  // all is looked at
-  CHECK_EQ(one.volume.best_blocks(), 797U);
-  one.volume.make(1, kFileBlocks, true);
-  REQUIRE(finish(one.volume));
-  CHECK_EQ(one.volume.file().blocks, 797U);
-  CHECK_EQ(one.volume.file().number, 1U);
-  CHECK_EQ(clusters_in_use(), 1U + 797U + kClusters + 2 - 1000);
-}
-
 namespace {
 
 // The next boot records: it looks, mends, closes what is open, prepares.
@@ -369,6 +349,115 @@ bool readable(uint8_t index) {
   }
   return entry.bytes > 0 && fat(cluster) >= kLeastEndEntry;
 }
+
+// One run of 997 clusters, a file of 200 in it; another run from `other` on.
+Image small_in_a_run(uint32_t other = 2 + kClusters) {
+  insert(new_card());
+  for (uint32_t c = 1000; c < other; ++c) set_fat(c, kEndEntry);
+  Recorded one;
+  one.look();
+  one.volume.search();
+  finish(one.volume);
+  one.volume.make(1, 200, false);
+  finish(one.volume);
+  return card.image;
+}
+constexpr uint32_t kBesideRun = 1 + kClusters + 2 - 1000;
+
+}  // namespace
+
+TEST_CASE("a small file grows where it stands: the whole run is its own") {
+  insert(new_card());
+  for (uint32_t c = 1000; c < 2 + kClusters; ++c) set_fat(c, kEndEntry);
+  Recorded one;
+  REQUIRE(one.look());
+  one.volume.search();
+  REQUIRE(finish(one.volume));
+  CHECK_EQ(one.volume.best_blocks(), 997U);
+  one.volume.make(1, 200, false);
+  REQUIRE(finish(one.volume));
+  const FlightFile small = one.volume.file();
+  one.volume.go_on_searching();
+  CHECK(one.volume.job() == Volume::Job::kNone);  // all is looked at
+  CHECK_EQ(one.volume.best_blocks(), 997U);
+  one.volume.make(1, kFileBlocks, true);
+  REQUIRE(finish(one.volume));
+  const FlightFile& file = one.volume.file();
+  CHECK_EQ(file.blocks, 997U);
+  CHECK_EQ(file.number, 1U);
+  CHECK_EQ(file.first_lba, small.first_lba);
+  CHECK_EQ(file.file_id, small.file_id);
+  CHECK_EQ(clusters_in_use(), kBesideRun + 997U);
+  CHECK(copies_alike());
+  CHECK(readable(0));
+  CHECK_EQ(get_le<uint32_t>(&card.image[512 + 488]), kClusters - 1 - 997);
+}
+
+TEST_CASE("a small file with room for a whole one behind it grows without a further search") {
+  insert(new_card());
+  Recorded one;
+  REQUIRE(one.look());
+  one.volume.search();
+  REQUIRE(finish(one.volume));
+  one.volume.make(1, 200, false);
+  REQUIRE(finish(one.volume));
+  one.volume.go_on_searching();
+  CHECK(one.volume.job() == Volume::Job::kNone);
+  CHECK_EQ(one.volume.best_blocks(), kFileBlocks);
+  one.volume.make(1, kFileBlocks, true);
+  REQUIRE(finish(one.volume));
+  CHECK_EQ(one.volume.file().blocks, kFileBlocks);
+  CHECK_EQ(clusters_in_use(), 1U + kFileBlocks);
+  CHECK(readable(0));
+}
+
+TEST_CASE("a small file of the power-on before grows too, and keeps its session") {
+  const Image image = small_in_a_run();
+  insert(image);
+  Recorded one;
+  REQUIRE(one.look());
+  REQUIRE(one.volume.state() == FileState::kBlank);
+  one.volume.search();
+  REQUIRE(finish(one.volume));
+  one.volume.make(7, kFileBlocks, true);
+  REQUIRE(finish(one.volume));
+  CHECK_EQ(one.volume.file().blocks, 997U);
+  CHECK_EQ(one.volume.file().last_session, 1U);
+  one.record(500);
+  Recorded again;
+  REQUIRE(again.look());
+  CHECK(again.volume.state() == FileState::kOpen);
+  CHECK_EQ(again.volume.file().next_block, 500U);
+}
+
+TEST_CASE("growing is left at any step: what is recorded is closed and readable") {
+  const Image image = small_in_a_run();
+  uint32_t left_at = 0;
+  for (bool ended = false; !ended; left_at += 3) {
+    insert(image);
+    Recorded one;
+    REQUIRE(one.look());
+    one.volume.search();
+    REQUIRE(finish(one.volume));
+    one.volume.make(1, kFileBlocks, true);
+    for (uint32_t step = 0; step < left_at && !ended; ++step) {
+      ended = one.volume.step(sector, true);
+    }
+    while (!one.volume.leave()) one.volume.step(sector, true);
+    const uint32_t blocks = one.volume.file().blocks;
+    CHECK((blocks == 200U || blocks == 997U));
+    one.record(150);
+    Recorded boot;
+    REQUIRE(next_boot_records(boot));
+    CHECK_EQ(boot.volume.file().number, 2U);
+    CHECK_EQ(whole_blocks(1), 150U);
+    CHECK(readable(0));
+    CHECK(copies_alike());
+  }
+  CHECK(left_at > 30);
+}
+
+namespace {
 
 // Cuts at every write of `work` on `image`; `judge` sees the card behind the next boot.
 template <typename Work, typename Judge>
@@ -417,6 +506,28 @@ TEST_CASE("power cut at every write of preparing: the next boot records, nothing
         CHECK(clusters_in_use() <= 1U + 700U + 301U + 2 * kFileBlocks);
       });
   CHECK(writes > 20);
+}
+
+TEST_CASE("power cut at every write of growing: the next boot records") {
+  const uint32_t writes = cut_everywhere(
+      small_in_a_run(2400),
+      [] {
+        Recorded boot;
+        boot.look();
+        boot.volume.search();
+        finish(boot.volume);
+        boot.volume.make(3, kFileBlocks, true);
+        finish(boot.volume);
+      },
+      [](bool garbage) {
+        if (garbage) return;
+        CHECK(clusters_in_use() <= kBesideRun + 997U);
+        Recorded boot;
+        CHECK(boot.look());
+        CHECK(boot.volume.state() == FileState::kBlank);
+        CHECK(boot.volume.file().blocks >= 200U);
+      });
+  CHECK(writes > 10);
 }
 
 TEST_CASE("power cut at every write of closing: the next boot mends, nothing is lost") {
