@@ -3,6 +3,7 @@
     make card-images                            10 000 cards
     make card-images IMAGES="--count 200"       a look
     make card-images IMAGES="--seed 17 --count 1"    one card again
+    make card-images IMAGES="--kept build/cards"     what is done is kept; the next run goes on
 
 Every card must end in recording or in a true message within ten seconds, and the pilot must never
 notice. The flights are flown by processes of their own: one that dies (a sanitizer's verdict) or
@@ -12,6 +13,7 @@ that hangs on a card is started again behind it.
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 import signal
@@ -19,6 +21,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 if __name__ == "__main__":
@@ -72,10 +75,9 @@ class _Batch:
         ) as worker:  # fmt: skip
             assert worker.stdout is not None and worker.stderr is not None
             for line in worker.stdout:
-                row = json.loads(line)
-                self.next_seed = row["seed"] + 1
-                judgement = Judgement(Stage(row["stage"]), row["message"], row["wrong"])
-                yield Result(row["seed"], judgement, row["altered"])
+                result = _result(json.loads(line))
+                self.next_seed = result.seed + 1
+                yield result
             said = worker.stderr.read()
             code = worker.wait()
         if self.next_seed < self._end:
@@ -83,6 +85,59 @@ class _Batch:
             seed = self.next_seed
             self.next_seed += 1
             yield Result(seed, Judgement(Stage.REFUSED, "", [why]), draw(seed).altered)
+
+
+class Kept:
+    """Results in a file, a line of JSON each: a campaign that was stopped goes on behind them.
+
+    They are of one image: those of another are thrown away.
+
+    Parameters
+    ----------
+    path : Path or None
+        None: nothing is kept.
+    library : Path
+        Whose results they are.
+    """
+
+    def __init__(self, path: Path | None, library: Path) -> None:
+        self._path = path
+        self._image = hashlib.sha256(library.read_bytes()).hexdigest()[:12]
+        self._results: dict[int, Result] = {}
+        for line in path.read_text().splitlines() if path and path.exists() else ():
+            row = json.loads(line)
+            if row.pop("image") == self._image:
+                result = _result(row)
+                self._results[result.seed] = result
+
+    def fly_all(self, first: int, count: int, library: Path) -> Iterator[Result]:
+        """Give what is kept, fly beside the cards from the first on that is not."""
+        seed = first
+        while seed < first + count and seed in self._results:
+            yield self._results[seed]
+            seed += 1
+        if seed > first:
+            print(f"{seed - first} cards of image {self._image} were kept", file=sys.stderr)
+        for result in fly_all(seed, first + count - seed, library):
+            if self._path is not None:
+                with self._path.open("a") as file:
+                    file.write(json.dumps({"image": self._image} | _row(result)) + "\n")
+            yield result
+
+
+def _row(result: Result) -> dict[str, object]:
+    """Lay a result out for JSON."""
+    judgement = result.judgement
+    return {
+        "seed": result.seed, "stage": judgement.stage, "message": judgement.message,
+        "wrong": judgement.wrong, "altered": result.altered,
+    }  # fmt: skip
+
+
+def _result(row: dict[str, Any]) -> Result:
+    """Make a result of what `_row` laid out."""
+    judgement = Judgement(Stage(row["stage"]), row["message"], row["wrong"])
+    return Result(row["seed"], judgement, row["altered"])
 
 
 def _verdict(said: str) -> str:
@@ -100,11 +155,7 @@ def work(seed: int, count: int, library: Path) -> None:
         judgement = fly(Sitl(library), drawn.card)
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
         drawn.card.close()
-        row = {
-            "seed": number, "stage": judgement.stage, "message": judgement.message,
-            "wrong": judgement.wrong, "altered": drawn.altered,
-        }  # fmt: skip
-        print(json.dumps(row), flush=True)
+        print(json.dumps(_row(Result(number, judgement, drawn.altered))), flush=True)
 
 
 def main() -> int:
@@ -112,14 +163,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--count", type=int, default=10_000, help="cards (default 10000)")
     parser.add_argument("--seed", type=int, default=1, help="of the first card (default 1)")
+    parser.add_argument("--kept", type=Path, help="file of results; a run that was cut goes on")
     parser.add_argument("--worker", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.worker:
         seed, count, library = options.worker
         work(int(seed), int(count), Path(library))
         return 0
-    tally = Tally()
-    for result in fly_all(options.seed, options.count, build_sanitized()):
+    tally, library = Tally(), build_sanitized()
+    kept = Kept(options.kept, library)
+    for result in kept.fly_all(options.seed, options.count, library):
         tally.show(result)
     print(tally.table())
     print(f"{options.count} cards, seeds from {options.seed}: {len(tally.wrong)} are wrong")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from host.twin.recorder.sitl_library import Sitl
@@ -12,7 +14,7 @@ from tests.cards.sparse import END, SparseCard
 from tests.cards.tally import LEAST_FOUND, LEAST_MOUNTED, Tally
 from tests.cards.truth import look_at
 from tests.sitl.card_flight import fly
-from tests.sitl.card_images import build_sanitized, fly_all
+from tests.sitl.card_images import Kept, build_sanitized, fly_all
 
 CARDS = 200
 NONE = np.zeros(0, np.int64)
@@ -27,6 +29,18 @@ def test_cards_drawn_at_random(capsys: pytest.CaptureFixture[str]) -> None:
     assert tally.stages.total() == CARDS
     assert tally.reached(Stage.MOUNTED) >= LEAST_MOUNTED
     assert tally.reached(Stage.FOUND) >= LEAST_FOUND
+
+
+def test_a_campaign_that_was_stopped_goes_on(tmp_path: Path) -> None:
+    library, path = build_sanitized(), tmp_path / "cards"
+    first = list(Kept(path, library).fly_all(1_000_001, 3, library))
+    assert len(path.read_text().splitlines()) == 3
+    assert list(Kept(path, library).fly_all(1_000_001, 5, library))[:3] == first
+    assert len(path.read_text().splitlines()) == 5
+    other = tmp_path / "libsitl.so"
+    other.write_bytes(library.read_bytes() + b"\0")
+    assert len(list(Kept(path, other).fly_all(1_000_001, 2, library))) == 2
+    assert len(path.read_text().splitlines()) == 7  # another image: nothing of these counts
 
 
 def test_a_good_card_of_every_kind_records() -> None:
