@@ -196,6 +196,7 @@ void Recorder::looked(uint32_t now_us) {
   switch (volume_.state()) {
     case storage::FileState::kNone:
     case storage::FileState::kClosed:
+      volume_status_ = VolumeStatus::kReady;
       state_ = State::kNoFile;
       file_wanted_ = true;
       break;

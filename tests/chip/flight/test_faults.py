@@ -73,6 +73,7 @@ def test_card_that_cannot_be_recorded_on(flight_elf: Path, tmp_path: Path, injec
         "newest chain cyclic at its begin",
         "first cluster out of range",
         "3 s stall while mounting",
+        "3 s stall in the search",
     ],
 )
 def test_strange_card_at_power_on(flight_elf: Path, tmp_path: Path, injected: str) -> None:

@@ -98,6 +98,12 @@ def slow_reads(rig: FlightRig) -> None:
     rig.chip.at(rig.chip.cycle + cycles(STALL_S), rig.card.delay)
 
 
+def stall_in_search(rig: FlightRig) -> None:
+    """No block comes out from 4 to 7 s, while the FAT is searched."""
+    for at_s, read_s in ((4.0, STALL_S), (4.0 + STALL_S, 0.0002)):
+        rig.chip.at(rig.chip.cycle + cycles(at_s), partial(rig.card.delay, read_s=read_s))
+
+
 STRANGE_CARDS = (
     StrangeCard("closing cut, chain first, 4 kB",
                 partial(closing_cut, 4, State.CUT_CHAIN_FIRST, 130)),
@@ -116,11 +122,14 @@ STRANGE_CARDS = (
     StrangeCard("16 GB 95 % full, room at hint",
                 lambda: nearly_full(16.0, [(0.95, 700 << 20)], hint=0.95), "ready 42"),
     StrangeCard("32 GB 95 % full, no hint",
-                lambda: nearly_full(32.0, [(0.9, 700 << 20)], hint=None, flight_at=0.92),
+                lambda: nearly_full(32.0, [(0.9, 700 << 20)], hint=None, flight_at=0.1),
                 "searching", records=False),
     StrangeCard("3 s stall while the card starts", good, "ready 8", slow_start),
     StrangeCard("card put in after 3 s", good, "ready 8", late_card),
     StrangeCard("3 s stall while mounting", good, "ready 8", slow_reads),
+    StrangeCard("3 s stall in the search",
+                lambda: nearly_full(32.0, [(0.9, 700 << 20)], hint=None, flight_at=0.1),
+                "searching", stall_in_search, records=False),
 )  # fmt: skip
 
 
