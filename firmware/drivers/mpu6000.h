@@ -7,17 +7,9 @@
 #include <string.h>
 
 #include "core/bytes.h"
+#include "core/imu/sample.h"
 
 namespace drivers {
-
-struct MpuSample {
-  // Body axes; 65.5 LSB per deg/s, 8192 LSB per g (specific force).
-  int16_t rates[3];
-  int16_t force[3];
-  int16_t temperature_cdegc;  // 0.01 degC
-  bool gyro_saturated;
-  bool accel_saturated;
-};
 
 enum class MpuStatus : uint8_t { kSample, kNotReady, kBusError, kGarbage, kStuck };
 
@@ -64,7 +56,7 @@ class Mpu6000 {
   }
 
   // After data-ready. Anything but a sample leaves `out` untouched.
-  MpuStatus read(MpuSample& out) {
+  MpuStatus read(core::ImuRawSample& out) {
     if (step_ != Step::kRun) {
       return MpuStatus::kNotReady;
     }
@@ -167,7 +159,7 @@ class Mpu6000 {
                                                     : wide);
   }
 
-  void decode(const uint8_t* bytes, MpuSample& out) const {
+  void decode(const uint8_t* bytes, core::ImuRawSample& out) const {
     const bool revision_c = is_revision_c(product_id_);
     out.gyro_saturated = false;
     out.accel_saturated = false;

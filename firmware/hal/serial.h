@@ -5,6 +5,7 @@
 
 namespace hal {
 
+// The IMU's board has one, kGps: the receiver in flight, the console on the ground.
 enum class Port : uint8_t { kUsb, kGps, kTelemetry };
 
 void open_port(Port port, uint32_t baud);

@@ -17,7 +17,7 @@ void set_flight_mark(bool flying);
 bool flight_mark();
 
 // From here the chip resets itself 48 ms after the last feed_watchdog(), 64 ms if interrupts are
-// off.
+// off. The IMU's restarts its program after 0.5 s and resets itself after 1 s.
 void start_watchdog();
 void feed_watchdog();
 
@@ -30,6 +30,9 @@ uint16_t idle_until_interrupt();
 
 // Stack never touched since boot; 65535: unknown.
 uint16_t stack_free_bytes();
+
+// Restarts by the watchdog or a reset since the supply came; the IMU's board only.
+uint16_t restarts();
 
 // What the image calls itself, at most 11 characters (frames.toml, identity.board).
 const char* board_name();

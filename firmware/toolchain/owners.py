@@ -30,6 +30,7 @@ ROOMS = {
     "drivers": "firmware/drivers",
     "storage": "firmware/storage",
     "app": "firmware/app",
+    "imu": "firmware/imu",
     "avr": "firmware/boards/avr",
     "mega": "firmware/boards/mega2560",
     "hal": "firmware/boards",

@@ -2,8 +2,8 @@
 // samples.
 #include <stdint.h>
 
-#include "core/attitude.h"
-#include "core/rest_detector.h"
+#include "core/imu/attitude.h"
+#include "core/imu/rest_detector.h"
 
 extern "C" {
 

@@ -16,9 +16,9 @@ ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = ROOT / "build" / "attitude" / "libattitude.so"
 SOURCES = (
     "tests/attitude/attitude_library.cpp",
-    "firmware/core/attitude.cpp",
-    "firmware/core/fixed_point.cpp",
-    "firmware/core/rest_detector.cpp",
+    "firmware/core/imu/attitude.cpp",
+    "firmware/core/imu/fixed_point.cpp",
+    "firmware/core/imu/rest_detector.cpp",
 )
 FLAGS = ("-std=gnu++14", "-O2", "-fPIC", "-shared", "-Wall", "-Wextra", "-Wconversion", "-Werror")
 CDEG_RAD = np.deg2rad(0.01)

@@ -56,7 +56,7 @@ TARGETS = {
     ),
     "ubx": Target(("core/gps_receiver", "core/ubx"), 1500),
     "settings": Target(
-        ("core/settings", "core/imu_record", "core/session_record", "core/crc"), 300
+        ("core/settings", "core/imu/record", "core/session_record", "core/crc"), 300
     ),
     "block_writer": Target(_BLOCKS, 1000),
     "fat": Target(("storage/*", "core/block", "core/crc"), 300),
@@ -84,7 +84,7 @@ def build(name: str, *, extra_flags: tuple[str, ...] = ()) -> Path:
     sources = [SOURCES / f"{name}.cpp"]
     sources += [path for unit in target.units for path in sorted(firmware.glob(f"{unit}.cpp"))]
     headers = [path for room in ("core", "drivers", "hal", "storage", "generated")
-               for path in sorted((ROOT / "firmware" / room).glob("*.h"))]  # fmt: skip
+               for path in sorted((ROOT / "firmware" / room).rglob("*.h"))]  # fmt: skip
     headers += [*sorted(SOURCES.glob("*.h")), *sorted((ROOT / "protocol/generated").glob("*.h"))]
     state = sha256(" ".join((*FLAGS, *extra_flags)).encode())
     for path in (*sources, *headers):

@@ -24,6 +24,7 @@ ROOMS: dict[str, tuple[set[str], set[str]]] = {
     "drivers": ({"core", "generated", "hal", "drivers"}, STANDARD),
     "storage": ({"core", "generated", "hal", "drivers", "storage"}, STANDARD),
     "app": ({"core", "generated", "hal", "drivers", "storage", "app"}, STANDARD),
+    "imu": ({"core", "generated", "hal", "drivers", "imu"}, STANDARD),
 }
 # Of firmware/boards: what boards with the same kind of chip share. It knows none of them.
 SHARED_BOARDS = {"avr"}
@@ -244,6 +245,10 @@ PLANTED = [
     (include_breaches, "firmware/storage/volume.cpp", '#include "app/recorder.h"'),
     (include_breaches, "firmware/app/recorder.cpp", '#include "ff.h"'),
     (include_breaches, "firmware/app/recorder.cpp", '#include "boards/mega2560/pins.h"'),
+    (include_breaches, "firmware/imu/unit.cpp", '#include "app/text_out.h"'),
+    (include_breaches, "firmware/imu/unit.cpp", "#include <avr/io.h>"),
+    (include_breaches, "firmware/core/imu/node.cpp", '#include "drivers/mpu6000.h"'),
+    (include_breaches, "firmware/core/imu/console.cpp", '#include "imu/unit.h"'),
     (board_breaches, "firmware/boards/sitl/clock.cpp", '#include "boards/mega2560/pins.h"'),
     (board_breaches, "firmware/boards/avr/eeprom.cpp", '#include "boards/mega2560/board.h"'),
     (word_breaches, "firmware/core/relay.h", "virtual void tick();"),

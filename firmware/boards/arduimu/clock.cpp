@@ -5,6 +5,8 @@
 #include "boards/arduimu/board.h"
 #include "boards/avr/awake.h"
 #include "boards/avr/interrupts_off.h"
+#include "hal/clock.h"
+#include "hal/data_ready.h"
 
 namespace {
 
@@ -28,7 +30,7 @@ inline __attribute__((always_inline)) uint32_t us_of(const uint32_t turns, const
 
 }  // namespace
 
-// Cycles, entry included, seen at most in flight (tests/simavr/imu): 58, 31, 29 and 86.
+// Cycles, entry included, seen at most in flight (tests/chip/imu): 58, 31, 29 and 86.
 ISR(TIMER1_OVF_vect) {
   ++g_turns;
 }
@@ -63,6 +65,10 @@ void start_clock() {
   TIMSK0 = _BV(OCIE0A);
 }
 
+}  // namespace arduimu
+
+namespace hal {
+
 uint32_t now_us() {
   uint32_t turns;
   uint16_t ticks;
@@ -81,14 +87,14 @@ void wake_at(const uint32_t at_us) {
   TIMSK1 = _BV(TOIE1) | _BV(OCIE1A);
 }
 
-void start_ready() {
-  DDRD &= uint8_t(~kReady);
+void start_data_ready() {
+  DDRD &= uint8_t(~arduimu::kReady);
   EICRA = _BV(ISC01) | _BV(ISC00);  // rising edge
   EIFR = _BV(INTF0);
   EIMSK = _BV(INT0);
 }
 
-bool take_ready(uint32_t& at_us, uint8_t& edges) {
+bool take_data_ready(uint32_t& at_us, uint8_t& edges) {
   uint32_t turns;
   uint16_t ticks;
   {
@@ -102,4 +108,4 @@ bool take_ready(uint32_t& at_us, uint8_t& edges) {
   return edges != 0;
 }
 
-}  // namespace arduimu
+}  // namespace hal

@@ -1,4 +1,5 @@
-#include "boards/arduimu/serial.h"
+// The UART: a GPS receiver in flight, the console on the ground.
+#include "hal/serial.h"
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
@@ -20,7 +21,7 @@ volatile uint8_t g_out_tail;
 
 }  // namespace
 
-// 60 cycles at most, seen in flight (tests/simavr/imu).
+// 60 cycles at most, seen in flight (tests/chip/imu).
 ISR(USART_RX_vect) {
   const uint8_t byte = UDR0;
   const uint8_t head = g_in_head;
@@ -41,39 +42,36 @@ ISR(USART_UDRE_vect) {
   g_out_tail = (tail + 1U) & (kOutSize - 1U);
 }
 
-namespace arduimu {
+namespace hal {
 
-void SerialPort::set_baud(uint32_t baud) {
+void open_port(Port, const uint32_t baud) {
   UCSR0A = _BV(U2X0);
   UBRR0 = avr::usart_divider(baud);
   UCSR0B = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0) | _BV(UDRIE0);
 }
 
-bool SerialPort::send(const uint8_t* bytes, uint8_t size) {
+uint16_t send_room(Port) {
   const uint8_t used = (g_out_head - g_out_tail) & (kOutSize - 1U);
-  if (size > kOutSize - 1U - used) {
-    return false;
-  }
-  uint8_t head = g_out_head;
-  for (uint8_t i = 0; i < size; ++i) {
-    g_out[head] = bytes[i];
-    head = (head + 1U) & (kOutSize - 1U);
-  }
-  __asm__ __volatile__("" ::: "memory");
-  g_out_head = head;
-  UCSR0B |= _BV(UDRIE0);
-  return true;
+  return uint16_t(kOutSize - 1U - used);
 }
 
-bool take_byte(uint8_t& byte) {
+void send_byte(Port, const uint8_t byte) {
+  const uint8_t head = g_out_head;
+  g_out[head] = byte;
+  __asm__ __volatile__("" ::: "memory");
+  g_out_head = (head + 1U) & (kOutSize - 1U);
+  UCSR0B |= _BV(UDRIE0);
+}
+
+bool take_byte(Port, uint8_t* const byte) {
   const uint8_t tail = g_in_tail;
   if (tail == g_in_head) {
     return false;
   }
-  byte = g_in[tail];
+  *byte = g_in[tail];
   __asm__ __volatile__("" ::: "memory");
   g_in_tail = (tail + 1U) & (kInSize - 1U);
   return true;
 }
 
-}  // namespace arduimu
+}  // namespace hal

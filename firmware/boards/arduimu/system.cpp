@@ -3,8 +3,8 @@
 #include <avr/io.h>
 #include <avr/wdt.h>
 
-#include "boards/arduimu/board.h"
 #include "boards/avr/interrupts_off.h"
+#include "hal/system.h"
 
 namespace {
 
@@ -36,7 +36,7 @@ ISR(WDT_vect, ISR_NAKED) {
       "jmp 0 \n\t");
 }
 
-namespace arduimu {
+namespace hal {
 
 void start_watchdog() {
   if (g_mark != kMark) {
@@ -51,8 +51,8 @@ void start_watchdog() {
   WDTCSR = _BV(WDE) | _BV(WDIE) | _BV(WDP2) | _BV(WDP0);  // 0.5 s, and as much again to the reset
 }
 
-uint16_t resets() {
+uint16_t restarts() {
   return g_resets;
 }
 
-}  // namespace arduimu
+}  // namespace hal

@@ -150,7 +150,7 @@ def hang_imu(rig: PairRig) -> None:
     from simavr_bench import Image
 
     chip = rig.board.chip
-    address, size = chip.symbols["_ZN7arduimu13poll_transferEv"]
+    address, size = chip.symbols["_ZN3hal13poll_transferEv"]
     code = chip.flash(address, size)
     chip.load(Image({address: b"\xff\xcf"}))  # rjmp to itself
     rig.mega.run_s(0.6)  # the watchdog, after 0.5 s, meets the same jump

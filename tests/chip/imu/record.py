@@ -1,4 +1,4 @@
-"""The IMU's record in EEPROM (firmware/core/imu_record.h): offsets and what the user chose."""
+"""The IMU's record in EEPROM (firmware/core/imu/record.h): offsets and what the user chose."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 // Fixed-point trigonometry against tables, the attitude filter against motions known in advance.
 #include "check.h"
-#include "core/attitude.h"
-#include "core/fixed_point.h"
-#include "core/rest_detector.h"
+#include "core/imu/attitude.h"
+#include "core/imu/fixed_point.h"
+#include "core/imu/rest_detector.h"
 #include "random_numbers.h"
 
 namespace {

@@ -7,7 +7,6 @@ namespace {
 
 using drivers::MagChip;
 using drivers::MagSample;
-using drivers::MpuSample;
 using drivers::MpuStatus;
 
 // Registers of one chip; what was written can be read back.
@@ -133,7 +132,7 @@ TEST_CASE("the set-up waits for the chip's own times and writes the ranges") {
 TEST_CASE("one burst, datasheet vectors, axes of the board turned to the body's") {
   MpuBus bus;
   Mpu mpu(bus, 3);
-  MpuSample sample = {};
+  core::ImuRawSample sample = {};
   CHECK(mpu.read(sample) == MpuStatus::kNotReady);
   uint32_t now_us = 0;
   REQUIRE(start(mpu, now_us));
@@ -157,7 +156,7 @@ TEST_CASE("saturation is told for the sensor it befalls, and INT16_MIN never com
   Mpu mpu(bus, 2);
   uint32_t now_us = 0;
   REQUIRE(start(mpu, now_us));
-  MpuSample sample = {};
+  core::ImuRawSample sample = {};
   bus.put({1, 2, 3, 4, INT16_MIN, 6, 7});
   REQUIRE(mpu.read(sample) == MpuStatus::kSample);
   CHECK(sample.gyro_saturated);
@@ -184,7 +183,7 @@ TEST_CASE("revision C's accelerations are brought to 8192 LSB per g") {
   Mpu mpu(bus, 2);
   uint32_t now_us = 0;
   REQUIRE(start(mpu, now_us));
-  MpuSample sample = {};
+  core::ImuRawSample sample = {};
   bus.put({-4096, 0, 4096, 0, 0, 0, 1});
   REQUIRE(mpu.read(sample) == MpuStatus::kSample);
   CHECK_EQ(sample.force[0], -8192);
@@ -219,7 +218,7 @@ TEST_CASE("silence, garbage and a stuck converter are not samples") {
   Mpu mpu(bus, 2);
   uint32_t now_us = 0;
   REQUIRE(start(mpu, now_us));
-  MpuSample sample = {};
+  core::ImuRawSample sample = {};
   sample.rates[0] = 77;
   CHECK(mpu.read(sample) == MpuStatus::kGarbage);  // zeros throughout
   bus.put({-1, -1, -1, -1, -1, -1, -1});
@@ -253,7 +252,7 @@ TEST_CASE("a chip that lost its ranges, or a line that garbles them, gives no sa
     uint32_t now_us = 0;
     REQUIRE(start(mpu, now_us));
     bus.put({1, 2, 8192, 4, 5, 6, 7});
-    MpuSample sample = {};
+    core::ImuRawSample sample = {};
     CHECK(mpu.read(sample) == MpuStatus::kSample);
     bus.registers[lost] = 0;
     bus.put({1, 2, 8192, 4, 500, 6, 7});

@@ -3,8 +3,8 @@
 
 #include "check.h"
 #include "core/bytes.h"
-#include "core/imu_console.h"
-#include "core/imu_node.h"
+#include "core/imu/console.h"
+#include "core/imu/node.h"
 #include "core/imu_receiver.h"
 #include "random_numbers.h"
 

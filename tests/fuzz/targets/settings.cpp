@@ -3,7 +3,7 @@
 #include "core/settings.h"
 #include "core/bytes.h"
 #include "core/crc.h"
-#include "core/imu_record.h"
+#include "core/imu/record.h"
 #include "core/session_record.h"
 #include "feed.h"
 

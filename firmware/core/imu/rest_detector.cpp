@@ -1,6 +1,6 @@
-#include "core/rest_detector.h"
+#include "core/imu/rest_detector.h"
 
-#include "core/fixed_point.h"
+#include "core/imu/fixed_point.h"
 
 namespace core {
 

@@ -1,4 +1,4 @@
-#include "core/fixed_point.h"
+#include "core/imu/fixed_point.h"
 
 namespace core {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/imu_node.h"
+#include "core/imu/node.h"
 
 #include <string.h>
 

@@ -1,11 +1,11 @@
-// Registers of the MPU-6000 over SPI, or of an MPU-6050 over the bus to the Mega; and of the
-// magnetometer over that bus.
+// The buses that drivers/mpu6000.h and drivers/hmc5883l.h ask for, on the hal.
 #pragma once
 
 #include <stdint.h>
 
-namespace arduimu {
+namespace imu {
 
+// Registers of an MPU-6000 over SPI, or of an MPU-6050 over the bus to the Mega.
 class MpuBus {
  public:
   bool read(uint8_t reg, uint8_t* out, uint8_t size);
@@ -17,11 +17,10 @@ class MpuBus {
   bool spi_ = true;
 };
 
+// Registers of the magnetometer, over the bus to the Mega.
 struct MagBus {
   bool read(uint8_t address, uint8_t reg, uint8_t* out, uint8_t size);
   bool write(uint8_t address, uint8_t reg, uint8_t value);
 };
 
-void start_spi();
-
-}  // namespace arduimu
+}  // namespace imu

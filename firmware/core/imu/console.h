@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#include "core/imu_node.h"
+#include "core/imu/node.h"
 
 namespace core {
 

@@ -1,6 +1,6 @@
-#include "core/attitude.h"
+#include "core/imu/attitude.h"
 
-#include "core/fixed_point.h"
+#include "core/imu/fixed_point.h"
 
 namespace core {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/imu_record.h"
+#include "core/imu/record.h"
 
 #include <string.h>
 

@@ -4,21 +4,14 @@
 
 #include <stdint.h>
 
-#include "core/attitude.h"
-#include "core/imu_record.h"
-#include "core/original_packets.h"
-#include "core/rest_detector.h"
+#include "core/imu/attitude.h"
+#include "core/imu/original_packets.h"
+#include "core/imu/record.h"
+#include "core/imu/rest_detector.h"
+#include "core/imu/sample.h"
 #include "generated/frames.h"
 
 namespace core {
-
-struct ImuRawSample {
-  int16_t rates[3];  // body axes, nothing taken off
-  int16_t force[3];
-  int16_t temperature_cdegc;
-  bool gyro_saturated;
-  bool accel_saturated;
-};
 
 class ImuNode {
  public:

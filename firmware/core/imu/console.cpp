@@ -1,4 +1,4 @@
-#include "core/imu_console.h"
+#include "core/imu/console.h"
 
 #include <string.h>
 

@@ -1,18 +1,17 @@
 // TWI as a master at 400 kHz: ATmega328P datasheet (DS40002061B) sections 22.5 and 22.7.
-#include "boards/arduimu/twi_master.h"
-
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <util/delay.h>
 #include <util/twi.h>
 
-#include "boards/arduimu/board.h"
 #include "boards/avr/awake.h"
+#include "hal/bus_master.h"
+#include "hal/clock.h"
 #include "hal/system.h"
 
 namespace {
 
-using arduimu::TwiStatus;
+using hal::TransferStatus;
 
 constexpr uint8_t kSda = 1U << 4;  // PC4
 constexpr uint8_t kScl = 1U << 5;  // PC5
@@ -26,14 +25,14 @@ volatile uint8_t g_out;
 volatile uint8_t g_in;
 volatile uint8_t g_at;
 volatile uint8_t g_steps;  // of the hardware
-volatile TwiStatus g_status = TwiStatus::kDone;
+volatile TransferStatus g_status = TransferStatus::kDone;
 
 // Main loop only.
 uint8_t g_steps_seen;
 uint32_t g_step_us;
 uint32_t g_begin_us;
 
-void end(const TwiStatus status) {
+void end(const TransferStatus status) {
   TWCR = kStop;
   g_status = status;
   avr::g_awake = true;
@@ -50,7 +49,7 @@ void put_next() {
     g_out = 0;
     TWCR = kGo | _BV(TWSTA);
   } else {
-    end(TwiStatus::kDone);
+    end(TransferStatus::kDone);
   }
 }
 
@@ -84,7 +83,7 @@ void free_lines() {
 
 // Everything but the START; false while a transfer is under way.
 bool prepare(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size) {
-  if (arduimu::poll_transfer() == TwiStatus::kBusy) {
+  if (hal::poll_transfer() == TransferStatus::kBusy) {
     return false;
   }
   // The STOP of the last transfer takes 2.5 us at most; START behind it waits in the hardware.
@@ -93,15 +92,15 @@ bool prepare(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size
   g_out = out_size;
   g_in = in_size;
   g_at = 0;
-  g_status = TwiStatus::kBusy;
+  g_status = TransferStatus::kBusy;
   g_steps_seen = g_steps;
-  g_begin_us = g_step_us = arduimu::now_us();
+  g_begin_us = g_step_us = hal::now_us();
   return true;
 }
 
 }  // namespace
 
-// About 3 us a byte, of 22.5 us on the wire; 139 cycles at most, seen in flight (tests/simavr/imu).
+// About 3 us a byte, of 22.5 us on the wire; 139 cycles at most, seen in flight (tests/chip/imu).
 ISR(TWI_vect) {
   ++g_steps;
   switch (TW_STATUS) {
@@ -123,27 +122,27 @@ ISR(TWI_vect) {
       break;
     case TW_MR_DATA_NACK:
       take_byte();
-      end(TwiStatus::kDone);
+      end(TransferStatus::kDone);
       break;
     case TW_MT_SLA_NACK:
     case TW_MT_DATA_NACK:
     case TW_MR_SLA_NACK:
-      end(TwiStatus::kNack);
+      end(TransferStatus::kNoAck);
       break;
     default:  // arbitration lost (there is no other master: a disturbance), bus error
-      end(TwiStatus::kStuck);
+      end(TransferStatus::kStuck);
       break;
   }
 }
 
-namespace arduimu {
+namespace hal {
 
-void start_twi() {
+void start_bus_master() {
   free_lines();
   TWSR = 0;
   TWBR = 12;  // 16 MHz / (16 + 2 * 12)
   TWCR = _BV(TWEN);
-  g_status = TwiStatus::kDone;
+  g_status = TransferStatus::kDone;
 }
 
 bool begin_transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size) {
@@ -166,8 +165,8 @@ bool begin_transfer_at(uint32_t start_us, uint8_t address, uint8_t* buffer, uint
   return true;
 }
 
-TwiStatus poll_transfer() {
-  if (g_status != TwiStatus::kBusy) {
+TransferStatus poll_transfer() {
+  if (g_status != TransferStatus::kBusy) {
     return g_status;
   }
   const uint32_t at_us = now_us();
@@ -176,24 +175,24 @@ TwiStatus poll_transfer() {
     g_steps_seen = steps;
     g_step_us = at_us;
   }
-  if (at_us - g_step_us > kTwiStepUs || at_us - g_begin_us > kTwiTotalUs) {
+  if (at_us - g_step_us > kTransferStepUs || at_us - g_begin_us > kTransferTotalUs) {
     free_lines();
     TWCR = _BV(TWEN);
-    g_status = TwiStatus::kStuck;
+    g_status = TransferStatus::kStuck;
   }
   return g_status;
 }
 
-TwiStatus transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size) {
-  while (poll_transfer() == TwiStatus::kBusy) {
-    hal::sleep_until_interrupt();
+TransferStatus transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t in_size) {
+  while (poll_transfer() == TransferStatus::kBusy) {
+    sleep_until_interrupt();
   }
   begin_transfer(address, buffer, out_size, in_size);
-  while (poll_transfer() == TwiStatus::kBusy) {
-    hal::sleep_until_interrupt();
+  while (poll_transfer() == TransferStatus::kBusy) {
+    sleep_until_interrupt();
   }
   avr::g_awake = true;  // something for the main loop may have ended these sleeps
   return poll_transfer();
 }
 
-}  // namespace arduimu
+}  // namespace hal

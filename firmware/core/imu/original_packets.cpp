@@ -1,9 +1,9 @@
-#include "core/original_packets.h"
+#include "core/imu/original_packets.h"
 
 #include <string.h>
 
 #include "core/bytes.h"
-#include "core/fixed_point.h"
+#include "core/imu/fixed_point.h"
 
 namespace core {
 namespace {
