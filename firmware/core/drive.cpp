@@ -6,7 +6,7 @@ namespace core {
 namespace {
 
 // A shift by a variable is a loop on the AVR: bits come from here, or go along with a loop.
-constexpr uint8_t kBitOf[8] CORE_FLASH = {1, 2, 4, 8, 16, 32, 64, 128};
+constexpr uint8_t kBitOf[kRcInputs] CORE_FLASH = {1, 2, 4, 8, 16};
 
 constexpr uint8_t kAllChannels = (1U << kChannels) - 1;
 constexpr uint8_t kServoChannels = (1U << kServos) - 1;
