@@ -21,7 +21,8 @@ from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.errors import IdentificationError
-from host.sysid.flight.linear import AXIS_OF, DEFAULT_METHOD, from_zero, identify
+from host.sysid.flight.linear import from_zero, identify
+from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD
 from host.sysid.flight.tables import even_columns
 from host.twin.virtual import VirtualFlight, virtual_flight
 

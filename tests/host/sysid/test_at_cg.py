@@ -119,7 +119,7 @@ def test_one_step_of_filter_error_foretells_the_fit_of_disturbed_data() -> None:
     assert result.residual_kind == "innovation"
     found = told(0.007)
     moved = {
-        m.error: m for m in systematic_error_shifts(result, [maneuver], [columns], found, trim)
+        m.error: m for m in systematic_error_shifts(result, [maneuver], [columns], [found], trim)
     }
     sizes = open_errors(found, columns)
     for error in (IMU_DELAY, "imu_x_m", "elevator_scale"):

@@ -24,7 +24,7 @@ from host.sysid.compatibility.corrections import (
     without_errors,
 )
 from host.sysid.compatibility.reconstruction import Compatibility, Finding, reconstruct
-from host.sysid.flight import linear
+from host.sysid.flight import linear, linear_model
 from host.sysid.flight.carried import carried, systematic_error_shifts
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns
@@ -156,7 +156,7 @@ def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
         tuple(finding(n, 0.0, 1.96 * s, 1.96 * s) for n, s in size.items()), {}, (), gps=True
     )
     moved = {
-        m.error: m for m in systematic_error_shifts(result, [maneuver], [columns], found, trim)
+        m.error: m for m in systematic_error_shifts(result, [maneuver], [columns], [found], trim)
     }
     assert set(moved) == set(size)
     for error, deviation in size.items():
@@ -274,7 +274,8 @@ def test_a_delay_at_its_bound_is_called_so(
 ) -> None:
     columns, _, _ = flown
     tight = tuple(replace(d, limit_s=0.001) if d.name == "delay_vanes_s" else d for d in DELAYS)
-    monkeypatch.setattr(linear, "DELAYS", tight)
+    for module in (linear, linear_model):
+        monkeypatch.setattr(module, "DELAYS", tight)
     answers = identify(columns, airframe=airframe_data(NAME))
     for answer in answers:
         assert "delay_vanes_s" in answer.at_bound

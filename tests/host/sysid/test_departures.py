@@ -9,13 +9,15 @@ import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import unknown_sensors
-from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
+from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.estimators.start import regressed, start_values
 from host.sysid.flight import linear
 from host.sysid.flight.departures import spin_of
 from host.sysid.flight.finder import Found
-from host.sysid.flight.linear import identify, imu_place_m
+from host.sysid.flight.linear import identify
+from host.sysid.flight.linear_model import imu_place_m, without_attitude
+from host.sysid.flight.reconstructed import flown_maneuvers, reconstructed
 from host.sysid.flight.tables import even_columns
 from host.sysid.models.delays import DELAYS
 from host.sysid.models.result import FitResult
@@ -80,10 +82,7 @@ def test_airspeed_that_falls_with_the_rudder_is_not_taken_for_a_derivative(
 
     moved = misses()
 
-    def stay(result: Any, *_: object) -> tuple[Any, tuple[Moved, ...]]:
-        return result, ()
-
-    monkeypatch.setattr(linear, "departed", stay)
+    monkeypatch.setattr(linear, "departure", lambda *_: None)
     plain = misses()
     for name in ("Cn_p", "Cn_da"):
         assert plain[name] > 0.2, name
@@ -100,7 +99,9 @@ def test_equation_error_gives_the_start_though_places_and_delays_are_free(
     full = template(
         "lateral", Trim(20.0, 0.07, 0.07), imu_sd_m=imu_place_m(unknown_sensors()), delays=DELAYS
     )
-    cut = [linear._cut(columns, full, f) for f in windows(maneuvers)]
+    found = windows(maneuvers)
+    flown = flown_maneuvers([reconstructed(columns, found)], [found])
+    cut = [m.cut(full) for m in flown]
     told = regressed(full, cut)
     assert "imu_x_m" not in told
     airframe, qbar = bare(), float(np.mean(columns["qbar_pa"]))
@@ -110,7 +111,7 @@ def test_equation_error_gives_the_start_though_places_and_delays_are_free(
     start = dict(zip(problem.names, start_values(problem), strict=True))
     assert start["L_da"] == told["L_da"]
     assert start["imu_x_m"] == start["delay_imu_s"] == 0.0
-    led = linear._without_attitude(columns, full, windows(maneuvers))
+    led = without_attitude(full, flown)
     begun = {p.name: p.start for p in led.parameters}
     assert begun["L_da"] == told["L_da"]
     assert begun["N_beta"] == told["N_beta"]

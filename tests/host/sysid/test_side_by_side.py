@@ -9,7 +9,8 @@ from host.sysid.answer.side_by_side import side_by_side
 from host.sysid.answer.verdict import words
 from host.sysid.estimators.fit import methods
 from host.sysid.flight.chosen import chosen
-from host.sysid.flight.linear import STAGED, Answer, identify
+from host.sysid.flight.linear import Answer, identify
+from host.sysid.flight.linear_model import STAGED
 from host.sysid.flight.tables import read_columns
 
 SLOW = {"hopfield-line-search", "genetic", "unscented-kalman", "filter-error"}

@@ -15,6 +15,7 @@ from host.sysid.coefficients.answer import METHOD
 from host.sysid.compatibility.corrections import correction_document
 from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer
+from host.sysid.flight.reconstructed import found_name
 from host.sysid.models.modes import Mode
 
 if TYPE_CHECKING:
@@ -220,8 +221,3 @@ def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dic
         "repeats": _repeats_document(answer.fit.repeats),
         "maneuvers": [found_name(f) for f in answer.used],
     }
-
-
-def found_name(item: Found) -> str:
-    """Return what a maneuver is called in an answer."""
-    return f"{item.kind} on {item.axis.split('_')[0]} at {item.start_s:.1f} s"

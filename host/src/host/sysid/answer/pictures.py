@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.answer.json import found_name
 from host.sysid.answer.panels import (
     Bar,
     Cloud,
@@ -26,6 +25,7 @@ from host.sysid.answer.units import parameter_unit
 from host.sysid.answer.verdict import not_relied_on
 from host.sysid.compatibility.signals import THIN_HZ
 from host.sysid.flight.linear import Answer
+from host.sysid.flight.reconstructed import found_name
 from host.sysid.models.diagnostics import references
 from host.sysid.models.modes import Mode
 

@@ -13,7 +13,8 @@ from host.files.document import read_toml
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.mat import labels
 from host.sysid.errors import IdentificationError
-from host.sysid.flight.linear import AXIS_OF, Answer
+from host.sysid.flight.linear import Answer
+from host.sysid.flight.linear_model import AXIS_OF
 from host.sysid.models.modes import Mode
 
 if TYPE_CHECKING:

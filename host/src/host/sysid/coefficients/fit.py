@@ -24,7 +24,13 @@ from host.sysid.coefficients.gust_free import gust_free
 from host.sysid.coefficients.joint import LastStep
 from host.sysid.coefficients.local import Local
 from host.sysid.coefficients.model import CoefficientModel, standard_model
-from host.sysid.coefficients.outcome import Searched, local, outcome
+from host.sysid.coefficients.outcome import (
+    Searched,
+    coefficient_fit,
+    intervals,
+    local,
+    validation,
+)
 from host.sysid.coefficients.problem import (
     FlightProblem,
     Rows,
@@ -57,14 +63,14 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def fit_coefficients(
+def search_coefficients(
     columns: Mapping[str, Array],
     windows: Sequence[Window],
     airframe: AirframeData,
     data: SensorErrorModel,
     plant: Powerplant,
     model: CoefficientModel | None = None,
-) -> CoefficientFit:
+) -> Searched:
     """Find the coefficients of lift, drag, side force and moments.
 
     Parameters
@@ -102,7 +108,20 @@ def fit_coefficients(
     prior = deviations(data, airframe)
     names = tuple(prior)
     problem = prepared(model or standard_model(), record, t, windows, airframe, data, plant, names)
-    return outcome(problem, _search(problem, np.array(list(prior.values()))))
+    return _search(problem, np.array(list(prior.values())))
+
+
+def fit_coefficients(
+    columns: Mapping[str, Array],
+    windows: Sequence[Window],
+    airframe: AirframeData,
+    data: SensorErrorModel,
+    plant: Powerplant,
+    model: CoefficientModel | None = None,
+) -> CoefficientFit:
+    """Return coefficients with intervals and prediction; arguments of `search_coefficients`."""
+    found = search_coefficients(columns, windows, airframe, data, plant, model)
+    return coefficient_fit(found, intervals(found), validation(found))
 
 
 @dataclass(slots=True)
@@ -147,7 +166,7 @@ def _search(problem: FlightProblem, sd: Array) -> Searched:
         state.errors = state.errors + solved.step[unknowns.first_error :]
         left_over = (((part.name, part.window), part.left(solved.step)) for part in parts)
         state.noise = noise_spectra(problem.blocks, left_over, state.noise)
-    return Searched(state.theta, state.errors, state.levels, last)
+    return Searched(problem, state.theta, state.errors, state.levels, last)
 
 
 def _sides(

@@ -8,17 +8,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData, airframe_data
-from host.aircraft.powerplant import NoPropulsionError, powerplant
+from host.aircraft.powerplant import NoPropulsionError, Powerplant, powerplant
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.coefficients.answer import METHOD, QUANTILE, CoefficientFit
-from host.sysid.coefficients.fit import fit_coefficients
+from host.sysid.coefficients.fit import search_coefficients
+from host.sysid.coefficients.joint import Prediction
 from host.sysid.coefficients.model import BODY, WIND, CoefficientModel, standard_model
 from host.sysid.coefficients.modes import System, coefficient_modes, dimensional
+from host.sysid.coefficients.outcome import (
+    CoefficientIntervals,
+    Searched,
+    coefficient_fit,
+    intervals,
+    validation,
+)
 from host.sysid.coefficients.windows import LEAST_S, Window
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import FLYING_SHARE, Found, find
+from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
 from host.sysid.models.modes import Mode
 
 NAME = "coefficients"
@@ -85,6 +94,116 @@ class CoefficientAnswer:
         )
 
 
+@dataclass(frozen=True)
+class CoefficientEstimate:
+    """What estimation made of one flight: where the search ended, and the maneuvers it rests on."""
+
+    searched: Searched
+    used: tuple[Found, ...]
+    windows: tuple[Window, ...]
+
+
+@dataclass(frozen=True)
+class CoefficientEstimator:
+    """Force and moment equations with the errors of the instrument, in the stages of the pipeline.
+
+    Attributes
+    ----------
+    airframe : AirframeData
+    powerplant : Powerplant
+    instrument : SensorErrorModel
+        What the sensors may be wrong by.
+    model : CoefficientModel
+        The terms of every coefficient.
+    """
+
+    airframe: AirframeData
+    powerplant: Powerplant
+    instrument: SensorErrorModel
+    model: CoefficientModel
+
+    def estimate(self, flights: Sequence[ReconstructedFlight]) -> CoefficientEstimate:
+        """Search coefficients and errors of the instrument together.
+
+        Raises
+        ------
+        IdentificationError
+            If a column or an axis is missing, or a term cannot be told at all.
+        """
+        [flight] = flights
+        columns = flight.recorded
+        if "airspeed_mps" not in columns:
+            raise IdentificationError("coefficients need the columns airspeed_mps and qbar_pa")
+        flying = _airborne(columns)
+        t = columns["t_s"][flying]
+        if len(t) == 0:
+            raise IdentificationError(
+                f"coefficients need more than the {SETTLED_S:.0f} s after the launch, which are"
+                " left out; the flight ends before"
+            )
+        found = [
+            f
+            for f in flight.maneuvers
+            if f.axis != "throttle" and f.end_s - f.start_s + LEAD_S >= LEAST_S
+            and t[0] <= f.start_s - LEAD_S and f.end_s <= t[-1]
+        ]  # fmt: skip
+        spans = joined(found)
+        ended = search_coefficients(
+            {k: v[flying] for k, v in columns.items()},
+            spans,
+            self.airframe,
+            self.instrument,
+            self.powerplant,
+            self.model,
+        )
+        return CoefficientEstimate(ended, tuple(found), tuple(spans))
+
+    def intervals(self, estimate: CoefficientEstimate) -> CoefficientIntervals:
+        """Return derivatives with their intervals: geometry, scatter and every error counted."""
+        return intervals(estimate.searched)
+
+    def validation(
+        self, estimate: CoefficientEstimate, widths: CoefficientIntervals
+    ) -> Prediction | None:
+        """Predict each maneuver by all others."""
+        return validation(estimate.searched)
+
+    def answer(
+        self,
+        estimate: CoefficientEstimate,
+        widths: CoefficientIntervals,
+        predicted: Prediction | None,
+    ) -> CoefficientAnswer:
+        """Return the parts of all stages as one answer, with modes and what widens it most."""
+        fit = coefficient_fit(estimate.searched, widths, predicted)
+        return CoefficientAnswer(
+            model=self.model,
+            fit=fit,
+            used=estimate.used,
+            windows=estimate.windows,
+            causes=_causes(fit),
+            modes=coefficient_modes(fit, self.airframe),
+            systems=dimensional(fit, self.airframe),
+            delays=_delays(fit, self.instrument),
+        )
+
+
+def coefficient_estimator(
+    aircraft: str,
+    *,
+    model: CoefficientModel | None = None,
+    airframe: AirframeData | None = None,
+    instrument: SensorErrorModel | None = None,
+) -> CoefficientEstimator:
+    """Return the estimator of an aircraft by name or file; arguments of `identify_coefficients`."""
+    airframe, data = airframe or airframe_data(aircraft), instrument or sensor_error_model(aircraft)
+    try:
+        plant = powerplant(aircraft)
+    except NoPropulsionError as error:
+        raise IdentificationError(str(error)) from error
+    return CoefficientEstimator(airframe, plant, data, model or standard_model())
+
+
 def identify_coefficients(
     columns: Mapping[str, Array],
     aircraft: str,
@@ -117,45 +236,11 @@ def identify_coefficients(
     IdentificationError
         If a column or an axis is missing, or the aircraft file lacks what is needed.
     """
-    airframe, data = airframe or airframe_data(aircraft), instrument or sensor_error_model(aircraft)
-    try:
-        propulsion = powerplant(aircraft)
-    except NoPropulsionError as error:
-        raise IdentificationError(str(error)) from error
-    if "airspeed_mps" not in columns:
-        raise IdentificationError("coefficients need the columns airspeed_mps and qbar_pa")
-    flying = _airborne(columns)
-    t = columns["t_s"][flying]
-    if len(t) == 0:
-        raise IdentificationError(
-            f"coefficients need more than the {SETTLED_S:.0f} s after the launch, which are left"
-            " out; the flight ends before"
-        )
-    found = [
-        f
-        for f in (windows if windows is not None else find(columns))
-        if f.axis != "throttle" and f.end_s - f.start_s + LEAD_S >= LEAST_S
-        and t[0] <= f.start_s - LEAD_S and f.end_s <= t[-1]
-    ]  # fmt: skip
-    spans = joined(found)
-    fit = fit_coefficients(
-        {k: v[flying] for k, v in columns.items()},
-        spans,
-        airframe,
-        data,
-        propulsion,
-        model,
-    )
-    return CoefficientAnswer(
-        model=model or standard_model(),
-        fit=fit,
-        used=tuple(found),
-        windows=tuple(spans),
-        causes=_causes(fit),
-        modes=coefficient_modes(fit, airframe),
-        systems=dimensional(fit, airframe),
-        delays=_delays(fit, data),
-    )
+    by = coefficient_estimator(aircraft, model=model, airframe=airframe, instrument=instrument)
+    found = find(columns) if windows is None else windows
+    estimate = by.estimate([reconstructed(columns, found)])
+    widths = by.intervals(estimate)
+    return by.answer(estimate, widths, by.validation(estimate, widths))
 
 
 def joined(found: Sequence[Found]) -> list[Window]:

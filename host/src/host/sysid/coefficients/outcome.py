@@ -1,14 +1,16 @@
-"""From where a search ended to a fit: the drawing heard, drag at zero lift, maneuvers compared."""
+"""From where a search ended to a fit: intervals with geometry in them, validation, both in one."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from host.arrays import Array
 from host.sysid.coefficients.answer import (
     CoefficientFit,
+    Derivative,
     Flight,
     Pull,
     Trace,
@@ -16,7 +18,7 @@ from host.sysid.coefficients.answer import (
     informed,
     trace,
 )
-from host.sysid.coefficients.joint import LastStep, prediction, pulls
+from host.sysid.coefficients.joint import LastStep, Prediction, prediction, pulls
 from host.sysid.coefficients.local import Local, Mean, local_derivatives, zero_lift_drag
 from host.sysid.coefficients.problem import (
     FlightProblem,
@@ -28,17 +30,23 @@ from host.sysid.coefficients.problem import (
     regressor_sizes,
 )
 from host.sysid.coefficients.rows import KINEMATIC
-from host.sysid.numerics.repeats import scatter
+from host.sysid.numerics.repeats import Repeats, scatter
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Searched:
     """Coefficients and errors of the instrument found; how mean levels move with the errors."""
 
+    problem: FlightProblem
     theta: Array
     errors: Array
     levels: Array
     last: LastStep
+
+    @cached_property
+    def rows(self) -> Rows:
+        """The equations at the errors found."""
+        return self.problem.rows(self.problem.record, self.problem.flown, self.errors)
 
 
 def local(problem: FlightProblem, rows: Rows, state: Array, levels: Array | None = None) -> Local:
@@ -51,10 +59,25 @@ def local(problem: FlightProblem, rows: Rows, state: Array, levels: Array | None
     return local_derivatives(problem.model, state, problem.position, mean)
 
 
-def outcome(problem: FlightProblem, ended: Searched) -> CoefficientFit:
-    """Add what geometry says, then drag at zero lift."""
-    last, levels, position = ended.last, ended.levels, problem.position
-    rows = problem.rows(problem.record, problem.flown, ended.errors)
+@dataclass(frozen=True, slots=True)
+class CoefficientIntervals:
+    """Derivatives with their intervals, the errors of the instrument, and their joint covariance.
+
+    `state` is the estimate once the airframe's drawing is counted in; `repeats` is how single
+    maneuvers scatter about it.
+    """
+
+    state: Array
+    derivatives: tuple[Derivative, ...]
+    errors: dict[str, tuple[float, float]]
+    covariance: Array
+    repeats: Repeats
+
+
+def intervals(ended: Searched) -> CoefficientIntervals:
+    """Add what geometry says, drag at zero lift, and what maneuvers scatter beyond chance."""
+    problem, last, levels = ended.problem, ended.last, ended.levels
+    rows, position = ended.rows, problem.position
     state = np.concatenate([ended.theta, np.zeros(last.unknowns.gusts), ended.errors])
     before = local(problem, rows, state)
     state, covariance, kept = informed(state, last.solved.covariance, before, problem.airframe)
@@ -72,21 +95,37 @@ def outcome(problem: FlightProblem, ended: Searched) -> CoefficientFit:
     own[np.diag_indices(len(values))] += agreement.extra_variance
     left = np.sqrt(np.maximum(np.diag(covariance)[errors], 0.0))
     pairs = zip(state[errors].tolist(), left.tolist(), strict=True)
-    return CoefficientFit(
+    return CoefficientIntervals(
+        state,
         derivatives(values, own[: len(values), : len(values)], regressor_sizes(problem, rows)),
-        own,
         dict(zip(problem.names, pairs, strict=True)),
-        Flight(
-            *problem.condition,
-            lift,
-            drag,
-            _pull(problem),
-            flown_range(problem, rows),
-            problem.faster,
-        ),
-        _traces(problem, rows, state),
-        prediction(last, problem.blocks),
+        own,
         agreement,
+    )
+
+
+def validation(ended: Searched) -> Prediction | None:
+    """Return how well each maneuver is predicted by all others; None where none can be."""
+    return prediction(ended.last, ended.problem.blocks)
+
+
+def coefficient_fit(
+    ended: Searched, widths: CoefficientIntervals, predicted: Prediction | None
+) -> CoefficientFit:
+    """Return the parts of all stages as one fit."""
+    problem, rows = ended.problem, ended.rows
+    _, drag, lift = mean_levels(problem, rows)
+    flight = Flight(
+        *problem.condition, lift, drag, _pull(problem), flown_range(problem, rows), problem.faster
+    )
+    return CoefficientFit(
+        widths.derivatives,
+        widths.covariance,
+        widths.errors,
+        flight,
+        _traces(problem, rows, widths.state),
+        predicted,
+        widths.repeats,
     )
 
 

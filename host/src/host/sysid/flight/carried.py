@@ -41,7 +41,7 @@ def systematic_error_shifts(
     result: FitResult,
     maneuvers: Sequence[Maneuver],
     cuts: Sequence[Mapping[str, Array]],
-    compatibility: Compatibility,
+    known: Sequence[Compatibility],
     trim: Trim,
 ) -> tuple[Moved, ...]:
     """Return the shift of the estimate by one deviation of each error of the sensors left open.
@@ -54,7 +54,9 @@ def systematic_error_shifts(
         As fitted.
     cuts : sequence of mapping
         All columns of each maneuver.
-    compatibility : Compatibility
+    known : sequence of Compatibility
+        Of the flight of each maneuver. An error is one of all flights, in each of them by its own
+        deviation there: what is new at every power-on counts as if it were not.
     trim : Trim
 
     Returns
@@ -65,16 +67,17 @@ def systematic_error_shifts(
     follow = follower(result, maneuvers, trim)
     if follow is None:
         return ()
-    part, still = pressure_part(compatibility), _mean_of(cuts)
-    told = {e: sd for e, sd in deviations(compatibility).items() if e in IN_COLUMNS}
-    errors = {e: sd for e, sd in (told | open_errors(compatibility, cuts[0])).items() if sd > 0.0}
+    still = _mean_of(cuts)
+    flights = {id(c): (c, cut) for c, cut in zip(reversed(known), reversed(cuts), strict=True)}
+    sizes = {key: _open_deviations(*flight) for key, flight in flights.items()}
+    errors = list(dict.fromkeys(e for c in known for e in sizes[id(c)]))
     fresh = _is_template(result.model, trim)
     steps, gains = [], []
-    for error, deviation in errors.items():
-        if error in told:
-            other = [without_errors(c, {error: deviation}, part) for c in cuts]
-        else:
-            other = [without_open(c, error, deviation, compatibility) for c in cuts]
+    for error in errors:
+        other = [
+            _without_one(cut, error, sizes[id(c)].get(error, 0.0), c)
+            for cut, c in zip(cuts, known, strict=True)
+        ]
         changed = [
             _changed(result.model, m, c, o) for m, c, o in zip(maneuvers, cuts, other, strict=True)
         ]
@@ -92,6 +95,21 @@ def systematic_error_shifts(
         Moved(error, result.estimate + step, *gain)
         for error, step, gain in zip(errors, steps, gains, strict=True)
     )
+
+
+def _open_deviations(known: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
+    """Return one deviation of every error that stays open in a flight, by name."""
+    told = {e: sd for e, sd in deviations(known).items() if e in IN_COLUMNS}
+    return {e: sd for e, sd in (told | open_errors(known, columns)).items() if sd > 0.0}
+
+
+def _without_one(
+    columns: Mapping[str, Array], error: str, deviation: float, known: Compatibility
+) -> dict[str, Array]:
+    """Return columns with one error less."""
+    if error in IN_COLUMNS:
+        return without_errors(columns, {error: deviation}, pressure_part(known))
+    return without_open(columns, error, deviation, known)
 
 
 def carried(result: FitResult, moved: Sequence[Moved]) -> FitResult:

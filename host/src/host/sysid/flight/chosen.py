@@ -23,8 +23,8 @@ def chosen(
     from_s: float | None = None,
     to_s: float | None = None,
     numbers: Sequence[int] = (),
-) -> list[Found] | None:
-    """Return the maneuvers the user asked for; None leaves the choice to identification.
+) -> list[Found]:
+    """Return the maneuvers the user asked for; all that are found where nothing was asked.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def chosen(
         If there is no such maneuver, or the stretch holds nothing to fit.
     """
     if from_s is None and to_s is None:
-        return _numbered(columns, numbers) if numbers else None
+        return _numbered(columns, numbers) if numbers else find(columns)
     if numbers:
         raise IdentificationError("--maneuver and --from/--to exclude each other: give one of them")
     return _stretch(columns, from_s, to_s)

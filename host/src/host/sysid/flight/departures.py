@@ -10,7 +10,7 @@ then 0.5, N_da 11 and L_dr 5 % off.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,15 +28,23 @@ LEFT = 0.25  # of the step: what one step and terms of second order leave open
 DEPARTURES = "departures from the linear model"
 
 
-def departed(
+@dataclass(frozen=True, slots=True)
+class Departure:
+    """By how much an estimate moves (P,), and what one step and second order leave open of it."""
+
+    step: Array
+    remainder: Moved
+
+
+def departure(
     result: FitResult,
     maneuvers: Sequence[Maneuver],
     cuts: Sequence[Mapping[str, Array]],
     airframe: AirframeData,
     trim: Trim,
     powerplant: Powerplant | None = None,
-) -> tuple[FitResult, tuple[Moved, ...]]:
-    """Return the result of a template moved to its trim, and what stays open of that.
+) -> Departure | None:
+    """Return what the departures from its trim move the result of a template by.
 
     Parameters
     ----------
@@ -52,15 +60,15 @@ def departed(
 
     Returns
     -------
-    FitResult, tuple of Moved
-        The same and nothing where departures of the model are not known or not measured.
+    Departure or None
+        None where departures of the model are not known or not measured.
     """
     base = result.model
     if base.name not in BENDS or not all(name in cuts[0] for name in MEASURED):
-        return result, ()
+        return None
     follow = follower(result, maneuvers, trim)
     if follow is None:
-        return result, ()
+        return None
     varying = VaryingModel(base, base.name, trim, airframe, spin_of(powerplant, cuts))
     count = len(base.parameters)
     bends = {p.name for p in varying.model.parameters[count:]}
@@ -76,10 +84,8 @@ def departed(
     ]
     step = follow(wide, trim, data)
     if not np.isfinite(step).all():
-        return result, ()
-    estimate = result.estimate + step
-    result = replace(result, estimate=estimate)
-    return result, (Moved(DEPARTURES, estimate + LEFT * step, 1.0, 1.0),)
+        return None
+    return Departure(step, Moved(DEPARTURES, result.estimate + step + LEFT * step, 1.0, 1.0))
 
 
 def spin_of(

@@ -1,4 +1,8 @@
-"""From the columns of a flight to answers: maneuvers, joint fits, validation, coefficients."""
+"""Linear models of a flight: estimation, intervals, validation, each a stage that adds its part.
+
+A stage hands on what it made; none changes what an earlier one said. `LinearEstimator` is what the
+pipeline runs, `identify` the same for columns that are at hand.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,6 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
-from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
     CoefficientTable,
@@ -18,27 +21,31 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficients,
     trim_of,
 )
-from host.sysid.compatibility.at_cg import at_cg
-from host.sysid.compatibility.corrections import (
-    Correction,
-    corrections,
-    pressure_part,
-    without_delays,
-    without_errors,
-)
-from host.sysid.compatibility.path_data import NOTHING
-from host.sysid.compatibility.position_correction import transfer_to_cg
+from host.sysid.compatibility.corrections import Correction, corrections
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.fit import fit
 from host.sysid.estimators.gust import VANES, fit_with_gust
-from host.sysid.estimators.output_error_fit import fit_output_error
-from host.sysid.estimators.start import regressed
 from host.sysid.flight.carried import carried, systematic_error_shifts
 from host.sysid.flight.chosen import moving, once
-from host.sysid.flight.column_map import like
-from host.sysid.flight.departures import departed
+from host.sysid.flight.departures import Departure, departure
 from host.sysid.flight.finder import Found, Grade, find, grade
+from host.sysid.flight.free_simulation import fits_of, free_simulation
+from host.sysid.flight.linear_model import (
+    AXIS_OF,
+    DEFAULT_METHOD,
+    GUST,
+    frees_places,
+    template_at,
+    with_drag_arm,
+    without_attitude,
+)
+from host.sysid.flight.reconstructed import (
+    FlownManeuver,
+    ReconstructedFlight,
+    flown_maneuvers,
+    reconstructed,
+)
 from host.sysid.models.delays import DELAYS, without_usual_delays
 from host.sysid.models.diagnostics import (
     Collinearity,
@@ -47,38 +54,21 @@ from host.sysid.models.diagnostics import (
     collinearity,
     constant_inputs,
     judge,
-    signal_fits,
 )
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel, without_outputs
+from host.sysid.models.model import LinearModel
 from host.sysid.models.modes import Mode, modes
 from host.sysid.models.result import FitResult
-from host.sysid.models.templates import TEMPLATES, Trim, template
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.models.templates import Trim
 from host.sysid.numerics.repeats import repeats, widened
 
-AXIS_OF = {
-    "longitudinal": ("elevator_rad",),
-    "short-period": ("elevator_rad",),
-    "phugoid": ("elevator_rad",),
-    "lateral": ("aileron_rad", "rudder_rad"),
-    "roll": ("aileron_rad",),
-    "dutch-roll": ("rudder_rad",),
-}
+
+class NoManeuverError(IdentificationError):
+    """No maneuver that a model could be fitted to."""
+
+
 FREE = ("output", "innovation")  # residuals of methods that simulate
 WEAK_GRADE = 0.2
-# Output error takes turbulence for sensor noise. Simulated flights of the demonstration card, error
-# of Cm_alpha, Cm_q, Cm_de: 5, 10, 7 % by white output error, 2, 3, 3 % with the gust as a state.
-# Laterally the gust hardly moves the wings, and the filter leans on high frequencies where attitude
-# and rate filters are modelled worst: Cl_p 18 % low against 13 %, 6 of 15 intervals hold, not 12.
-GUST = "filter-error-gust"
-DEFAULT_METHOD = "flight"
-# One equation at a time: accelerations repeat the entries of others, and are left out.
-UNTIED = ("equation-error-total", "recursive", "neural-delta")
-STAGED = {
-    "flight": "gust filter where alpha is a state, white output error else (default)",
-    GUST: "delays by output error, then filter error with the gust as a state",
-}
 
 
 @dataclass(frozen=True)
@@ -123,6 +113,242 @@ class Answer:
         return CoefficientTable(self.template, self.method, self.trim.alpha_rad, self.coefficients)
 
 
+@dataclass(frozen=True)
+class LinearEstimate:
+    """What estimation made: a model, its fit, and the data both rest on.
+
+    Attributes
+    ----------
+    template, method : str
+    model : LinearModel
+        As fitted.
+    trim, condition
+        Means over the maneuvers of the fit.
+    used, held_out : tuple of FlownManeuver
+        In the fit, and kept for validation.
+    maneuvers : tuple of Maneuver
+        Those used, as fitted.
+    cuts : tuple of mapping
+        All corrected columns of each.
+    fit : FitResult
+        As the method returned it.
+    departure : Departure or None
+        By how much airspeed and attitude that varied move the estimate.
+    delays : dict
+        Estimated before the fit: value and 95 % half-width, s.
+    """
+
+    template: str
+    method: str
+    model: LinearModel
+    trim: Trim
+    condition: Condition
+    used: tuple[FlownManeuver, ...]
+    held_out: tuple[FlownManeuver, ...]
+    maneuvers: tuple[Maneuver, ...]
+    cuts: tuple[Mapping[str, Array], ...]
+    fit: FitResult
+    departure: Departure | None
+    delays: dict[str, tuple[float, float]]
+
+    @property
+    def estimate(self) -> Array:
+        """All parameters, (P,)."""
+        return self.fit.estimate + (0.0 if self.departure is None else self.departure.step)
+
+
+@dataclass(frozen=True)
+class LinearIntervals:
+    """What the intervals count: `statistical` noise and scatter of maneuvers, `total` with every
+    systematic error of `shifts`; coefficients with mass and inertia in theirs."""
+
+    statistical: FitResult
+    shifts: tuple[Moved, ...]
+    total: FitResult
+    coefficients: tuple[Coefficient, ...]
+
+
+@dataclass(frozen=True)
+class LinearValidation:
+    """Free simulation of the maneuvers fitted, and of those held out."""
+
+    simulated: tuple[Array, ...]
+    fits: tuple[SignalFit, ...]
+    held_out: tuple[SignalFit, ...]
+
+
+@dataclass(frozen=True)
+class LinearEstimator:
+    """One linear model by one method, in the stages of the pipeline.
+
+    Attributes
+    ----------
+    template : str
+        A template's name; of a model of the user's own what it is called in messages.
+    own : LinearModel, optional
+        Fit this in place of a template, to every maneuver where one of its inputs moved.
+    method : str
+    airframe : AirframeData, optional
+        Gives coefficients.
+    powerplant : Powerplant, optional
+        Gives the rotor's spin.
+    """
+
+    template: str
+    own: LinearModel | None = None
+    method: str = DEFAULT_METHOD
+    airframe: AirframeData | None = None
+    powerplant: Powerplant | None = None
+
+    def estimate(self, flights: Sequence[ReconstructedFlight]) -> LinearEstimate:
+        """Fit the model to the maneuvers of its axes, the last of an axis held out.
+
+        Raises
+        ------
+        IdentificationError
+            If there is no such maneuver, a column is missing, or the fit does not come about.
+        """
+        used, held = self._maneuvers(flights)
+        trim, condition = trim_of(_together(used))
+        model, method = self._model(used, trim)
+        data = [m.cut(model) for m in used]
+        delays: dict[str, tuple[float, float]] = {}
+        if method == GUST and self.own is None and set(model.states) & set(VANES):
+            staged = fit_with_gust(model, data, trim.airspeed_mps)
+            found, model, delays = staged.result, staged.model, staged.delays
+            data = list(staged.maneuvers)
+        else:
+            single = "output-error-white" if method == GUST else method
+            calm: dict[str, object] = (
+                {"doubting": False} if single.startswith("output-error") else {}
+            )
+            found = fit(single, model, data, **calm)
+        cuts = [m.inside() for m in used]
+        left = None
+        if self.airframe is not None and self.own is None and found.residual_kind in FREE:
+            left = departure(found, data, cuts, self.airframe, trim, self.powerplant)
+        return LinearEstimate(
+            template=self.template if self.own is None else model.name,
+            method=method,
+            model=model,
+            trim=trim,
+            condition=condition,
+            used=tuple(used),
+            held_out=tuple(held),
+            maneuvers=tuple(data),
+            cuts=tuple(cuts),
+            fit=found,
+            departure=left,
+            delays=delays,
+        )
+
+    def intervals(self, estimate: LinearEstimate) -> LinearIntervals:
+        """Return the covariance from noise and repeats, and from every systematic error."""
+        e = estimate
+        scattered = widened(e.fit, repeats(e.fit))
+        statistical = replace(scattered, estimate=e.estimate)
+        shifts: tuple[Moved, ...] = () if e.departure is None else (e.departure.remainder,)
+        carriers = [m.flight.compatibility for m in e.used]
+        known = [c for c in carriers if c is not None]
+        if len(known) == len(carriers):
+            shifts += systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
+        found: tuple[Coefficient, ...] = ()
+        if self.airframe is not None:
+            found = coefficients(statistical, self.airframe, e.condition, shifts)
+        return LinearIntervals(statistical, shifts, carried(statistical, shifts), found)
+
+    def validation(self, estimate: LinearEstimate, intervals: LinearIntervals) -> LinearValidation:
+        """Simulate the model freely over the maneuvers fitted and those held out."""
+        e, total = estimate, intervals.total
+        # Of frequencies the residuals are not those of samples.
+        ours = total.residual_kind == "output" and all(
+            y.shape == m.outputs.shape for y, m in zip(total.fitted, e.maneuvers, strict=True)
+        )
+        same = ours and not intervals.shifts
+        simulated = list(total.fitted) if same else free_simulation(e.model, total, e.maneuvers)
+        unseen = [m.cut(e.model) for m in e.held_out]
+        return LinearValidation(
+            tuple(simulated),
+            fits_of(e.model, e.maneuvers, simulated),
+            fits_of(e.model, unseen, free_simulation(e.model, total, unseen)),
+        )
+
+    def answer(
+        self, estimate: LinearEstimate, intervals: LinearIntervals, validation: LinearValidation
+    ) -> Answer:
+        """Return the parts of all stages as one answer, judged."""
+        e, total = estimate, intervals.total
+        carrier = e.used[0].flight.compatibility
+        return Answer(
+            template=e.template,
+            method=e.method,
+            model=e.model,
+            trim=e.trim,
+            condition=e.condition,
+            maneuvers=e.maneuvers,
+            used=tuple(m.found for m in e.used),
+            held_out=tuple(m.found for m in e.held_out),
+            result=total,
+            fits=validation.fits,
+            validation=validation.held_out,
+            refused=judge(total, e.maneuvers).named,
+            together=collinearity(intervals.statistical),
+            modes=modes(total),
+            coefficients=intervals.coefficients,
+            still=constant_inputs(e.model, e.maneuvers),
+            delays=e.delays,
+            corrections=() if carrier is None else corrections(carrier),
+            simulated=validation.simulated,
+        )
+
+    def _maneuvers(
+        self, flights: Sequence[ReconstructedFlight]
+    ) -> tuple[list[FlownManeuver], list[FlownManeuver]]:
+        """Return the maneuvers to fit and those to hold out."""
+        if not all("airspeed_mps" in flight.corrected for flight in flights):
+            raise IdentificationError(
+                "identification needs airspeed_mps, which the data do not have; name its column in"
+                " a map (--map)"
+            )
+        every = [f for flight in flights for f in flight.maneuvers]
+        if not every:
+            raise NoManeuverError(
+                "no maneuver found: no surface moved by more than 1.4 degrees at once; give --from"
+                " and --to, or fly a doublet or 3-2-1-1 of 3 degrees or more"
+            )
+        axes = AXIS_OF[self.template] if self.own is None else moving(self.own.inputs)
+        mine = flown_maneuvers(
+            flights, [once([f for f in x.maneuvers if f.axis in axes]) for x in flights]
+        )
+        if not mine:
+            raise NoManeuverError(
+                f"no maneuver of {', '.join(axes)} for {self.template}; found"
+                f" only {', '.join(sorted({f.axis for f in every}))}"
+            )
+        good = [m for m in mine if grade(m.flight.corrected, m.found).score >= WEAK_GRADE] or mine
+        held = _held_out(good)
+        return [m for m in good if m not in held], held
+
+    def _model(self, used: Sequence[FlownManeuver], trim: Trim) -> tuple[LinearModel, str]:
+        """Return the model to fit, and the method that the default one comes to."""
+        flight = used[0].flight
+        free = frees_places(self.method)
+        able = free and all(m.flight.delays_open for m in used)
+        if self.own is None:
+            model = template_at(flight.corrected, self.template, trim, self.method, able=able)
+        else:
+            model = self.own if able else without_usual_delays(self.own)
+        instrument = None if flight.compatibility is None else flight.compatibility.instrument
+        if self.own is None and instrument is not None and free:
+            model = with_drag_arm(model, trim, instrument)
+        method = self.method
+        if method == DEFAULT_METHOD:
+            method = GUST if "alpha_rad" in model.states else "output-error-white"
+            if self.own is None and method != GUST and self.template == "lateral":
+                model = without_attitude(model, used)
+        return model, method
+
+
 def maneuvers_of(columns: Mapping[str, Array]) -> list[tuple[Found, Grade]]:
     """Return the maneuvers of a flight with their grades."""
     return [(item, grade(columns, item)) for item in find(columns)]
@@ -140,7 +366,7 @@ def identify(
     compatibility: Compatibility | None = None,
     powerplant: Powerplant | None = None,
 ) -> list[Answer]:
-    """Fit every model that has maneuvers.
+    """Fit every model that has maneuvers to the columns of one flight.
 
     Parameters
     ----------
@@ -174,136 +400,27 @@ def identify(
         raise IdentificationError(
             f"no template '{strangers[0]}'; there are {', '.join(AXIS_OF)}, or give a TOML file"
         )
-    if "airspeed_mps" not in columns:
-        raise IdentificationError(
-            "identification needs airspeed_mps, which the data do not have; name its column in a"
-            " map (--map)"
-        )
-    told = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
-    if airframe is not None and compatibility is not None and compatibility.instrument is not None:
-        columns = at_cg(columns, airframe, compatibility)
-        with_delays = False
-    else:
-        columns = without_delays(columns, told)
-        if airframe is not None:
-            columns = transfer_to_cg(columns, airframe)
-    if compatibility is not None:
-        columns = without_errors(columns, told, pressure_part(compatibility))
-    found = list(windows) if windows is not None else find(columns)
-    if not found:
-        raise IdentificationError(
-            "no maneuver found: no surface moved by more than 1.4 degrees at once; give --from and"
-            " --to, or fly a doublet or 3-2-1-1 of 3 degrees or more"
-        )
+    found = find(columns) if windows is None else windows
+    flight = reconstructed(columns, found, airframe=airframe, compatibility=compatibility)
+    flight = replace(flight, delays_open=flight.delays_open and with_delays)
     answers: list[Answer] = []
-    needed: list[str] = []
+    failed: list[str] = []
     for name in names:
-        axes = AXIS_OF[name] if user_model is None else moving(user_model.inputs)
-        mine = once([f for f in found if f.axis in axes])
-        needed += axes
-        if mine:
-            answers.append(
-                _answer(
-                    columns,
-                    name,
-                    method,
-                    airframe,
-                    mine,
-                    user_model,
-                    with_delays,
-                    compatibility,
-                    powerplant,
-                )
-            )
+        estimator = LinearEstimator(name, user_model, method, airframe, powerplant)
+        try:
+            answers.append(linear_answer(estimator, [flight]))
+        except NoManeuverError as error:
+            failed.append(str(error))
     if not answers:
-        raise IdentificationError(
-            f"no maneuver of {', '.join(dict.fromkeys(needed))} for {', '.join(names)}; found"
-            f" only {', '.join(sorted({f.axis for f in found}))}"
-        )
+        raise NoManeuverError("; ".join(dict.fromkeys(failed)))
     return answers
 
 
-def _answer(
-    columns: dict[str, Array],
-    name: str,
-    method: str,
-    airframe: AirframeData | None,
-    found: list[Found],
-    user_model: LinearModel | None,
-    with_delays: bool,
-    compatibility: Compatibility | None,
-    powerplant: Powerplant | None,
-) -> Answer:
-    graded = [(f, grade(columns, f)) for f in found]
-    good = [f for f, g in graded if g.score >= WEAK_GRADE] or found
-    held = _held_out(good)
-    used = [f for f in good if f not in held]
-    t = columns["t_s"]
-    cut = np.zeros(len(t), dtype=bool)
-    for f in used:
-        cut |= (t >= f.start_s) & (t <= f.end_s)
-    trim, condition = trim_of({k: v[cut] for k, v in columns.items() if k != "t_s"})
-    able = with_delays and _frees_places(method)
-    if user_model is None:
-        model = _template(columns, name, trim, method, able)
-    else:
-        model = user_model if able else without_usual_delays(user_model)
-    known = None if compatibility is None else compatibility.instrument
-    if user_model is None and known is not None and _frees_places(method):
-        model = _drag_arm(model, trim, known)
-    if method == DEFAULT_METHOD:
-        method = GUST if "alpha_rad" in model.states else "output-error-white"
-        if user_model is None and method != GUST and name == "lateral":
-            model = _without_attitude(columns, model, used)
-    fitted = [_cut(columns, model, f) for f in used]
-    delays: dict[str, tuple[float, float]] = {}
-    unseen = [_cut(columns, model, f) for f in held]
-    if method == GUST and user_model is None and set(model.states) & set(VANES):
-        staged = fit_with_gust(model, fitted, trim.airspeed_mps)
-        result, model, fitted, delays = (
-            staged.result, staged.model, list(staged.maneuvers), staged.delays,
-        )  # fmt: skip
-    else:
-        single = "output-error-white" if method == GUST else method
-        calm: dict[str, object] = {"doubting": False} if single.startswith("output-error") else {}
-        result = fit(single, model, fitted, **calm)
-    result = widened(result, repeats(result))
-    alone = result
-    moved: tuple[Moved, ...] = ()
-    cuts = [_inside(columns, f) for f in used]
-    if airframe is not None and user_model is None and result.residual_kind in FREE:
-        result, moved = departed(result, fitted, cuts, airframe, trim, powerplant)
-        alone = result
-    if compatibility is not None:
-        moved += systematic_error_shifts(result, fitted, cuts, compatibility, trim)
-    result = carried(result, moved)
-    # Of frequencies the residuals are not those of samples.
-    ours = result.residual_kind == "output" and all(
-        y.shape == m.outputs.shape for y, m in zip(result.fitted, fitted, strict=True)
-    )
-    simulated = list(result.fitted) if ours and not moved else _simulated(model, result, fitted)
-    residuals = [m.outputs - y for m, y in zip(fitted, simulated, strict=True)]
-    return Answer(
-        template=name if user_model is None else model.name,
-        method=method,
-        model=model,
-        trim=trim,
-        condition=condition,
-        maneuvers=tuple(fitted),
-        used=tuple(used),
-        held_out=tuple(held),
-        result=result,
-        fits=signal_fits(model.outputs, [m.outputs for m in fitted], residuals),
-        validation=_validate(model, result, unseen),
-        refused=judge(result, fitted).named,
-        together=collinearity(alone),
-        modes=modes(result),
-        coefficients=(() if airframe is None else coefficients(alone, airframe, condition, moved)),
-        still=constant_inputs(model, fitted),
-        delays=delays,
-        corrections=() if compatibility is None else corrections(compatibility),
-        simulated=tuple(simulated),
-    )
+def linear_answer(estimator: LinearEstimator, flights: Sequence[ReconstructedFlight]) -> Answer:
+    """Return what all stages of one estimator make of some flights."""
+    estimate = estimator.estimate(flights)
+    intervals = estimator.intervals(estimate)
+    return estimator.answer(estimate, intervals, estimator.validation(estimate, intervals))
 
 
 def from_zero(coefficient: Coefficient) -> bool:
@@ -311,129 +428,27 @@ def from_zero(coefficient: Coefficient) -> bool:
     return abs(coefficient.value) > coefficient.half_width
 
 
-def _held_out(found: list[Found]) -> list[Found]:
+def _together(used: Sequence[FlownManeuver]) -> dict[str, Array]:
+    """Return the corrected columns within the maneuvers, every sample once."""
+    kept: dict[str, list[Array]] = {}
+    flights = list({id(m.flight): m.flight for m in used}.values())
+    for flight in flights:
+        t = flight.corrected["t_s"]
+        cut = np.zeros(len(t), dtype=bool)
+        for m in used:
+            if m.flight is flight:
+                cut |= (t >= m.found.start_s) & (t <= m.found.end_s)
+        for name, values in flight.corrected.items():
+            if name != "t_s":
+                kept.setdefault(name, []).append(values[cut])
+    return {k: np.concatenate(v) for k, v in kept.items() if len(v) == len(flights)}
+
+
+def _held_out(found: list[FlownManeuver]) -> list[FlownManeuver]:
     """Hold out the last maneuver of every axis that was flown at least three times."""
     held = []
-    for axis in dict.fromkeys(f.axis for f in found):
-        mine = [f for f in found if f.axis == axis]
+    for axis in dict.fromkeys(m.found.axis for m in found):
+        mine = [m for m in found if m.found.axis == axis]
         if len(mine) >= 3:
             held.append(mine[-1])
     return held
-
-
-def _template(
-    columns: Mapping[str, Array], name: str, trim: Trim, method: str, able: bool
-) -> LinearModel:
-    if name not in TEMPLATES:
-        raise IdentificationError(f"no template '{name}'; there are {', '.join(TEMPLATES)}")
-    forces = ("ax_mps2", "az_mps2") if "elevator_rad" in AXIS_OF[name] else ("ay_mps2",)
-    return template(
-        name,
-        trim,
-        accelerometers=method not in UNTIED and all(c in columns for c in forces),
-        delays=DELAYS if able else (),
-        imu_sd_m=imu_place_m(unknown_sensors()) if able else 0.0,
-    )
-
-
-def _frees_places(method: str) -> bool:
-    """Return whether a method can estimate delays and places of accelerometers."""
-    return method.startswith("output-error") or method in STAGED
-
-
-def imu_place_m(i: SensorErrorModel) -> float:
-    """Return one deviation of the IMU's height above the CG, m: tape measure and balance."""
-    sd = deviations(i, NOTHING)
-    return float(np.hypot(sd["imu_z_m"], sd["cg_z_m"]))
-
-
-def _drag_arm(model: LinearModel, trim: Trim, i: SensorErrorModel) -> LinearModel:
-    """Free the height of the accelerometers where drag is told: a pitch rate makes none.
-
-    Every other place is carried. This one moves drag by more than its size, and the pitch rate
-    beside angle and elevator tells it.
-    """
-    if "ax_mps2" not in model.outputs:
-        return model
-    sd_m = imu_place_m(i)
-    free = template(model.name, trim, accelerometers=True, imu_sd_m=sd_m)
-    kept = [x for x in free.levers if x.output == "ax_mps2"]
-    names = {x.parameter for x in free.levers} - {x.parameter for x in kept}
-    return replace(
-        model,
-        levers=tuple(kept),
-        parameters=tuple(p for p in free.parameters if p.name not in names),
-    )
-
-
-def _without_attitude(
-    columns: Mapping[str, Array], model: LinearModel, used: Sequence[Found]
-) -> LinearModel:
-    """Leave the bank angle of the attitude filter out of the fit, started from one with it.
-
-    It is made of the same gyro and of accelerometers that take side force for gravity: on the
-    recorded demonstration flight 15 of 15 intervals hold the truth without it, 12 with it.
-    """
-    told = regressed(model, [_cut(columns, model, f) for f in used])
-    model = model.with_start([told.get(p.name, p.start) for p in model.parameters])
-    reduced = without_outputs(model, ("phi_rad",))
-    return replace(reduced, state_biases=tuple(s for s in reduced.state_biases if s != "phi_rad"))
-
-
-def _cut(columns: Mapping[str, Array], model: LinearModel, item: Found) -> Maneuver:
-    missing = [c for c in (*model.inputs, *model.outputs) if c not in columns]
-    if missing:
-        meant = like(missing[0], tuple(columns))
-        raise IdentificationError(
-            f"model {model.name} needs {', '.join(missing)}{meant}, which the data do not have"
-        )
-    cut = _inside(columns, item)
-    return Maneuver(
-        dt_s=float(cut["t_s"][1] - cut["t_s"][0]),
-        inputs=np.column_stack([cut[c] for c in model.inputs]),
-        outputs=np.column_stack([cut[c] for c in model.outputs]),
-        name=f"{item.kind} on {item.axis.split('_')[0]} at {item.start_s:.1f} s",
-    )
-
-
-def _inside(columns: Mapping[str, Array], item: Found) -> dict[str, Array]:
-    t = columns["t_s"]
-    first, last = item.fit_window()
-    inside = (t >= first) & (t <= last)
-    return {name: values[inside] for name, values in columns.items()}
-
-
-def _constants_only(model: LinearModel, result: FitResult) -> tuple[LinearModel, Array]:
-    """Return the model frozen at the estimate, biases and start states left free."""
-    count = len(model.parameters)
-    A, B, C, D = model.matrices(result.estimate[:count])
-    frozen = replace(model, A=A, B=B, C=C, D=D, terms=(), parameters=(), delays=(), levers=())
-    return frozen, A
-
-
-def _simulated(model: LinearModel, result: FitResult, maneuvers: Sequence[Maneuver]) -> list[Array]:
-    """Return free simulations of a fitted model, constants fitted to each maneuver."""
-    frozen, _ = _constants_only(model, result)
-    simulated = []
-    for maneuver in maneuvers:
-        try:
-            problem = OutputProblem(frozen, [maneuver])
-            # Nothing but constants is free here, which the door would refuse.
-            best = fit_output_error(
-                frozen, [maneuver], memory=False, start=problem.first_guess(), doubting=False
-            )
-            simulated.append(best.fitted[0])
-        except IdentificationError:
-            simulated.append(np.full_like(maneuver.outputs, np.nan))
-    return simulated
-
-
-def _validate(
-    model: LinearModel, result: FitResult, unseen: Sequence[Maneuver]
-) -> tuple[SignalFit, ...]:
-    """Predict unseen maneuvers: dynamics frozen, only biases and start states are free."""
-    if not unseen:
-        return ()
-    simulated = _simulated(model, result, unseen)
-    residuals = [m.outputs - y for m, y in zip(unseen, simulated, strict=True)]
-    return signal_fits(model.outputs, [m.outputs for m in unseen], residuals)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from host.aircraft.prior.prior_table import PriorTable
-from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.json import answer_document, coefficient_document, json_text
 from host.sysid.answer.prior_comparison import prior_document, prior_lines
@@ -24,26 +23,17 @@ from host.sysid.answer.verdict import (
 from host.sysid.coefficients.flight import CoefficientAnswer
 from host.sysid.compatibility.reconstruction import Compatibility, document
 from host.sysid.compatibility.reconstruction import words as agreement_words
-from host.sysid.flight.finder import Found
 from host.sysid.flight.linear import Answer
+from host.sysid.flight.reconstructed import ReconstructedFlight
 from host.sysid.pipeline.aircraft_known import AircraftKnown
-
-
-@dataclass(frozen=True, slots=True)
-class Flight:
-    """A flight as it was read, its maneuvers, and what its sensors say of each other."""
-
-    source: str
-    columns: dict[str, Array]
-    maneuvers: tuple[Found, ...]
-    compatibility: Compatibility | None
 
 
 @dataclass(frozen=True)
 class Identification:
     """What one identification found."""
 
-    flights: tuple[Flight, ...]
+    flights: tuple[ReconstructedFlight, ...]
+    agreement: Compatibility | None
     aircraft: AircraftKnown | None
     methods: tuple[str, ...]
     notes: tuple[str, ...]
@@ -60,7 +50,7 @@ class Identification:
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain lists, numbers and strings."""
-        direct, agreement = self.coefficients, self.flights[0].compatibility
+        direct, agreement = self.coefficients, self.agreement
         documents = [answer_document(a, words([a], []) + taken_out([a])) for a in self.linear]
         if direct:
             documents.append(coefficient_document(direct, coefficient_words(direct)))
@@ -96,9 +86,8 @@ class Identification:
                 lines += ["", *model_lines(answer)]
         if self.coefficients:
             lines += ["", *coefficient_lines(self.coefficients)]
-        agreement = self.flights[0].compatibility
-        if agreement:
-            lines += ["", *agreement_words(agreement)]
+        if self.agreement:
+            lines += ["", *agreement_words(self.agreement)]
         if self.prior is not None:
             lines += ["", *prior_lines(self.tables, self.prior)]
         if self.truth is not None:
@@ -107,4 +96,4 @@ class Identification:
 
     def write(self, places: Places) -> list[Path]:
         """Write every file asked for and return them."""
-        return write(places, self.linear, self.coefficients, self.flights[0].columns, self.truth)
+        return write(places, self.linear, self.coefficients, self.flights[0].recorded, self.truth)

@@ -9,16 +9,17 @@ from typing import Any
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorTable
 from host.sysid.answer.truth import read_truth
-from host.sysid.coefficients.flight import identify_coefficients
+from host.sysid.coefficients.flight import CoefficientAnswer, coefficient_estimator
 from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.chosen import chosen
-from host.sysid.flight.linear import Answer
-from host.sysid.flight.linear import identify as identify_linear
+from host.sysid.flight.linear import Answer, LinearEstimator
+from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
 from host.sysid.flight.tables import read_columns
 from host.sysid.pipeline.aircraft_known import AircraftKnown, aircraft_known
-from host.sysid.pipeline.identification import Flight, Identification
-from host.sysid.pipeline.wanted import ModelName, wanted_methods, wanted_models
+from host.sysid.pipeline.estimator import answer_of
+from host.sysid.pipeline.identification import Identification
+from host.sysid.pipeline.wanted import ModelName, Models, wanted_methods, wanted_models
 
 Source = str | Path
 
@@ -83,58 +84,72 @@ def identify(
     notes += known.doubts if known else ()
     true = read_truth(Path(truth)) if truth is not None else None
     expected = _prior(prior, columns, known)
-    windows = chosen(columns, from_s=from_s, to_s=to_s, numbers=maneuvers)
+    found = chosen(columns, from_s=from_s, to_s=to_s, numbers=maneuvers)
     agreement = _agreement(columns, known, notes)
-    # Without the places of the sensors a vane ahead of the CG passes for a late one.
-    taken_out = agreement if known is not None and corrections else None
-    flight = Flight(str(flights), columns, tuple(windows or ()), agreement)
-    direct = None
-    if asked.coefficients is not None:
-        if known is None:
-            raise IdentificationError(
-                "--model coefficients needs mass and sensors; give --aircraft"
-            )
-        try:
-            direct = identify_coefficients(
-                columns,
-                known.source,
-                windows=windows,
-                model=asked.coefficients,
-                instrument=known.instrument,
-            )
-        except IdentificationError as error:
-            notes.append(f"coefficients: {error}")
-    answers: list[Answer] = []
-    failed: dict[str, list[str]] = {}  # why, and of which models
-    for method in by:
-        for name, own in asked.linear:
-            try:
-                answers += identify_linear(
-                    columns,
-                    names=(name,),
-                    method=method,
-                    airframe=known.airframe if known else None,
-                    windows=windows,
-                    user_model=own,
-                    compatibility=taken_out,
-                    powerplant=known.powerplant if known else None,
-                )
-            except IdentificationError as error:
-                label = name if len(by) == 1 else f"{name} by {method}"
-                failed.setdefault(str(error), []).append(label)
-    unfit = [f"{', '.join(labels)}: {error}" for error, labels in failed.items()]
-    if not answers and direct is None:
+    flight = reconstructed(
+        columns,
+        found,
+        source=str(flights),
+        airframe=known.airframe if known else None,
+        # Without the places of the sensors a vane ahead of the CG passes for a late one.
+        compatibility=agreement if known is not None and corrections else None,
+    )
+    direct, doubts = _coefficients(asked, known, flight)
+    linear, unfit = _linear(asked, by, known, flight)
+    notes += doubts
+    if not linear and direct is None:
         raise IdentificationError("; ".join([*unfit, *notes]))
     return Identification(
         flights=(flight,),
+        agreement=agreement,
         aircraft=known,
         methods=by,
         notes=(*notes, *unfit),
-        linear=tuple(answers),
+        linear=tuple(linear),
         coefficients=direct,
         truth=true,
         prior=expected,
     )
+
+
+def _coefficients(
+    asked: Models, known: AircraftKnown | None, flight: ReconstructedFlight
+) -> tuple[CoefficientAnswer | None, list[str]]:
+    """Fit coefficients directly; None with a note if that cannot be done."""
+    if asked.coefficients is None:
+        return None, []
+    if known is None:
+        raise IdentificationError("--model coefficients needs mass and sensors; give --aircraft")
+    try:
+        by = coefficient_estimator(
+            known.source, model=asked.coefficients, instrument=known.instrument
+        )
+        return answer_of(by, [flight]), []
+    except IdentificationError as error:
+        return None, [f"coefficients: {error}"]
+
+
+def _linear(
+    asked: Models, by: Sequence[str], known: AircraftKnown | None, flight: ReconstructedFlight
+) -> tuple[list[Answer], list[str]]:
+    """Fit every linear model by every method; a note for each reason why one was not."""
+    answers: list[Answer] = []
+    failed: dict[str, list[str]] = {}  # why, and of which models
+    for method in by:
+        for name, own in asked.linear:
+            estimator = LinearEstimator(
+                name,
+                own,
+                method,
+                airframe=known.airframe if known else None,
+                powerplant=known.powerplant if known else None,
+            )
+            try:
+                answers.append(answer_of(estimator, [flight]))
+            except IdentificationError as error:
+                label = name if len(by) == 1 else f"{name} by {method}"
+                failed.setdefault(str(error), []).append(label)
+    return answers, [f"{', '.join(labels)}: {error}" for error, labels in failed.items()]
 
 
 def _path(given: str | Path | None) -> Path | None:

@@ -16,7 +16,7 @@ from host.sysid.coefficients.model import (
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.fit import methods as single_methods
 from host.sysid.flight.column_map import like
-from host.sysid.flight.linear import AXIS_OF, DEFAULT_METHOD, STAGED
+from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
 from host.sysid.models.model import LinearModel
 from host.sysid.models.model_file import read_model
 

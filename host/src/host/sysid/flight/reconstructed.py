@@ -1,0 +1,152 @@
+"""A flight as estimation takes it: columns as recorded and as the air met the CG, its maneuvers.
+
+The columns of linear fits are corrected here, once for every model and method: what the aircraft
+file says of places and dynamics of the sensors, and what the reconstruction tells of their errors.
+Coefficients take the columns as recorded, for they estimate those errors themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.aircraft.mass_properties import AirframeData
+from host.arrays import Array
+from host.sysid.compatibility.at_cg import at_cg
+from host.sysid.compatibility.corrections import (
+    corrections,
+    pressure_part,
+    without_delays,
+    without_errors,
+)
+from host.sysid.compatibility.position_correction import transfer_to_cg
+from host.sysid.compatibility.reconstruction import Compatibility
+from host.sysid.errors import IdentificationError
+from host.sysid.flight.column_map import like
+from host.sysid.flight.finder import Found
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model import LinearModel
+
+
+@dataclass(frozen=True, slots=True)
+class ReconstructedFlight:
+    """One flight after its reconstruction.
+
+    Attributes
+    ----------
+    source : str
+        What it was read from.
+    recorded, corrected : mapping of (n,) Array
+        SI columns on an even grid: as decoded, and as perfect sensors at the CG had written them.
+    maneuvers : tuple of Found
+    compatibility : Compatibility or None
+        What was taken out of `corrected`, and what stays open of it.
+    delays_open : bool
+        Whether delays and places of the sensors are left for a fit to estimate.
+    """
+
+    source: str
+    recorded: Mapping[str, Array]
+    corrected: Mapping[str, Array]
+    maneuvers: tuple[Found, ...]
+    compatibility: Compatibility | None
+    delays_open: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FlownManeuver:
+    """A maneuver in its flight; `label` is what an answer calls it."""
+
+    found: Found
+    flight: ReconstructedFlight
+    label: str
+
+    def inside(self) -> dict[str, Array]:
+        """Return all corrected columns of it, a moment of trim before the input included."""
+        t = self.flight.corrected["t_s"]
+        first, last = self.found.fit_window()
+        inside = (t >= first) & (t <= last)
+        return {name: values[inside] for name, values in self.flight.corrected.items()}
+
+    def cut(self, model: LinearModel) -> Maneuver:
+        """Return inputs and outputs of a model over it.
+
+        Raises
+        ------
+        IdentificationError
+            If the flight lacks one of them.
+        """
+        columns = self.flight.corrected
+        missing = [c for c in (*model.inputs, *model.outputs) if c not in columns]
+        if missing:
+            meant = like(missing[0], tuple(columns))
+            raise IdentificationError(
+                f"model {model.name} needs {', '.join(missing)}{meant}, which the data do not have"
+            )
+        cut = self.inside()
+        return Maneuver(
+            dt_s=float(cut["t_s"][1] - cut["t_s"][0]),
+            inputs=np.column_stack([cut[c] for c in model.inputs]),
+            outputs=np.column_stack([cut[c] for c in model.outputs]),
+            name=self.label,
+        )
+
+
+def reconstructed(
+    columns: Mapping[str, Array],
+    maneuvers: Sequence[Found],
+    *,
+    source: str = "",
+    airframe: AirframeData | None = None,
+    compatibility: Compatibility | None = None,
+) -> ReconstructedFlight:
+    """Return a flight with its columns corrected by all that is known.
+
+    Parameters
+    ----------
+    columns : mapping of (n,) Array
+        SI columns on an even grid, as decoded.
+    maneuvers : sequence of Found
+    source : str
+        What it was read from.
+    airframe : AirframeData, optional
+        Gives places of the sensors.
+    compatibility : Compatibility, optional
+        What the sensors say of each other; told errors are taken out.
+    """
+    told = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
+    delays_open = True
+    if airframe is not None and compatibility is not None and compatibility.instrument is not None:
+        corrected = at_cg(columns, airframe, compatibility)
+        delays_open = False
+    else:
+        corrected = without_delays(columns, told)
+        if airframe is not None:
+            corrected = transfer_to_cg(corrected, airframe)
+    if compatibility is not None:
+        corrected = without_errors(corrected, told, pressure_part(compatibility))
+    return ReconstructedFlight(
+        source, columns, corrected, tuple(maneuvers), compatibility, delays_open
+    )
+
+
+def found_name(item: Found) -> str:
+    """Return what a maneuver is called in an answer."""
+    return f"{item.kind} on {item.axis.split('_')[0]} at {item.start_s:.1f} s"
+
+
+def flown_maneuvers(
+    flights: Sequence[ReconstructedFlight], found: Sequence[Sequence[Found]]
+) -> list[FlownManeuver]:
+    """Return the maneuvers of several flights one behind the other, each by its own name."""
+    return [
+        FlownManeuver(
+            item,
+            flight,
+            found_name(item) + (f" of flight {number}" if len(flights) > 1 else ""),
+        )
+        for number, (flight, items) in enumerate(zip(flights, found, strict=True), start=1)
+        for item in items
+    ]
