@@ -273,11 +273,9 @@ def noise_in_the_folder(drawn: DrawnCard) -> str:
     if rng.random() < 0.5:
         card.write(block, rng.bytes(BLOCK))
         return f"block {block}"
-    fill = directory_entry("KEEP.DAT", 0, 0) * (card.cluster_blocks * BLOCK // ENTRY_BYTES)
-    end = card.entry_end()
-    card.image[end : end + len(fill) - (end - card.lba(ROOT_CLUSTER) * BLOCK)] = fill[
-        : len(fill) - (end - card.lba(ROOT_CLUSTER) * BLOCK)
-    ]
+    behind = card.lba(ROOT_CLUSTER + 1) * BLOCK
+    end = min(card.entry_end(), behind)  # it may be full already
+    card.image[end:behind] = directory_entry("KEEP.DAT", 0, 0) * ((behind - end) // ENTRY_BYTES)
     if rng.random() < 0.5:
         card.set_fat(ROOT_CLUSTER, [int(rng.choice([ROOT_CLUSTER, 0, 1, drawn.cluster()]))])
     return "no end mark"

@@ -63,6 +63,13 @@ def test_every_alteration_is_drawn_and_the_same_seed_gives_the_same_card() -> No
     assert found == wanted
 
 
+def test_a_folder_without_an_end_is_filled_once_more() -> None:
+    """Two alterations that both fill it."""
+    drawn = draw(6368)
+    assert [text.partition(":")[0] for text in drawn.altered].count("noise in the folder") > 1
+    drawn.card.close()
+
+
 def test_a_message_that_is_not_true_is_noticed() -> None:
     card = SparseCard(8)
     empty = look_at(card)
