@@ -46,17 +46,32 @@ class FlightFile:
     entry: int
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=1024)
 def flight_blocks(session: int, blocks: int, *, ended: bool) -> bytes:
     """Write a flight of so many blocks; block 0 belongs to the schema, as in a prepared file."""
-    writer = LogWriter(session=session, card_block=1000 * session, keep_truth=False)
-    writer.begin(t_us=1_000_000)
-    while writer.sequence < blocks - ended:
+    writer = _flight(session)
+    while writer.sequence < blocks:
         writer.put("event", t_us=1_000_000 + 10_000 * writer.sequence, code=24)
         writer.flush()
-    if ended:
-        writer.end(t_us=1_000_000 + 10_000 * blocks)
-    return writer.data()[: blocks * BLOCK]
+    written = writer.data()
+    if not ended:
+        return written[: blocks * BLOCK]
+    last = _writer(session)
+    last.sequence = blocks - 1
+    last.end(t_us=1_000_000 + 10_000 * blocks)
+    return written[: (blocks - 1) * BLOCK] + last.data()
+
+
+@lru_cache(maxsize=512)
+def _flight(session: int) -> LogWriter:
+    """Begin a flight, which grows as far as cards need it: ten times faster than one for each."""
+    writer = _writer(session)
+    writer.begin(t_us=1_000_000)
+    return writer
+
+
+def _writer(session: int) -> LogWriter:
+    return LogWriter(session=session, card_block=1000 * session, keep_truth=False)
 
 
 def add_flight(
