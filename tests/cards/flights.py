@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
 
+import numpy as np
+
 from tests.cards.sparse import BLOCK, END, SparseCard
-from tests.protocol.log_writer import LogWriter
+from tests.protocol.log_writer import KIND_FRAMES, LogWriter, block
 
 FILE_BLOCKS = 131_072  # 64 MiB, as the recorder prepares
 
@@ -46,32 +48,28 @@ class FlightFile:
     entry: int
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=32)
 def flight_blocks(session: int, blocks: int, *, ended: bool) -> bytes:
     """Write a flight of so many blocks; block 0 belongs to the schema, as in a prepared file."""
-    writer = _flight(session)
-    while writer.sequence < blocks:
-        writer.put("event", t_us=1_000_000 + 10_000 * writer.sequence, code=24)
-        writer.flush()
-    written = writer.data()
-    if not ended:
-        return written[: blocks * BLOCK]
-    last = _writer(session)
-    last.sequence = blocks - 1
-    last.end(t_us=1_000_000 + 10_000 * blocks)
-    return written[: (blocks - 1) * BLOCK] + last.data()
-
-
-@lru_cache(maxsize=512)
-def _flight(session: int) -> LogWriter:
-    """Begin a flight, which grows as far as cards need it: ten times faster than one for each."""
-    writer = _writer(session)
+    writer = LogWriter(session=session, card_block=1000 * session, keep_truth=False)
     writer.begin(t_us=1_000_000)
-    return writer
-
-
-def _writer(session: int) -> LogWriter:
-    return LogWriter(session=session, card_block=1000 * session, keep_truth=False)
+    writer.put("event", t_us=1_000_000 + 10_000 * writer.sequence, code=24)
+    writer.flush()
+    # An event in each of the others: as put() and flush() would write them, in a tenth of the time.
+    sequences = range(writer.sequence, blocks - ended)
+    rows = np.zeros(len(sequences), writer.layouts["event"])
+    rows["id"], rows["code"] = writer.ids["event"], 24
+    rows["t_us"] = 1_000_000 + 10_000 * np.array(sequences)
+    for sequence, row in zip(sequences, rows, strict=True):
+        content = block(
+            row.tobytes(), file_id=writer.file_id, session=session, sequence=sequence,
+            schema_hash=writer.schema_hash, dropped=0, kind=KIND_FRAMES,
+        )  # fmt: skip
+        writer.tail(content)
+    writer.sequence += len(sequences)
+    if ended:
+        writer.end(t_us=1_000_000 + 10_000 * blocks)
+    return writer.data()[: blocks * BLOCK]
 
 
 def add_flight(
