@@ -11,13 +11,15 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "host/src"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from host.wire.schema_text import packed_schema
+
 from tests.protocol.expected_text import text_of_oracle
 from tests.protocol.log_writer import LogWriter
 from tests.protocol.oracle import decode
 from tests.sitl.bench import Bench, flight
 from tests.sitl.card_image import read_file
 
-BROWN_OUT = 3
+BROWN_OUT = packed_schema().number("reset_cause", "brown_out")
 
 
 def main() -> int:

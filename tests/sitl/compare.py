@@ -158,7 +158,7 @@ def _servos(ident: NDArray[np.void]) -> list[Difference]:
 
 def _mag(mag: NDArray[np.void], script: Script) -> list[Difference]:
     row = _packet_at(mag, script)
-    kept = script.imu.aux_kind[row] == 0
+    kept = script.imu.aux_kind[row] == scripted.MAGNETOMETER
     return [
         _difference(name, mag[name][kept], script.imu.aux[row[kept], k])
         for k, name in enumerate(("mx", "my", "mz"))
@@ -172,7 +172,8 @@ def _attitude(attitude: NDArray[np.void], script: Script) -> list[Difference]:
         _difference("imu_t_us", attitude["imu_t_us"], imu.t_us[row]),
         _difference("attitude imu_seq", attitude["imu_seq"], row & 0xFF),
     ]
-    bias, status = _last_of(imu.aux_kind == 1, row), _last_of(imu.aux_kind == 2, row)
+    bias = _last_of(imu.aux_kind == scripted.GYRO_BIAS, row)
+    status = _last_of(imu.aux_kind == scripted.STATUS, row)
     out += [
         _difference(name, attitude[name], imu.aux[bias, k])
         for k, name in enumerate(("bias_p", "bias_q", "bias_r"))

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from host.twin.recorder.sitl_library import TICKS_PER_S, Sitl
 from host.wire.packets import packet
+from host.wire.schema_text import packed_schema
 from numpy.typing import NDArray
 
 Integers = NDArray[np.int64]
@@ -41,7 +42,13 @@ COEFFICIENTS = (408, -72, -14383, 32741, 32757, 23153, 6190, 4, -32768, -8711, 2
 
 IMU_ADDRESS = packet("imu").address
 ORIGINAL_1, ORIGINAL_2 = (packet(f"original_imu_{n}").address for n in (1, 2))
-IMU_FLAGS = 0x1C  # attitude, magnetometer and offsets valid
+IMU_FLAGS = sum(
+    packed_schema().bit("imu_flags", word)
+    for word in ("attitude_valid", "mag_valid", "offsets_valid")
+)
+MAGNETOMETER, GYRO_BIAS, STATUS = (
+    packed_schema().number("imu_aux", word) for word in ("magnetometer", "gyro_bias", "status")
+)
 PACKET_US = 5000
 PACKET_AGE_US = 900
 
@@ -157,15 +164,15 @@ def imu(seconds: float, *, still_from_s: float | None = None) -> Imu:
         raw[:, channel] = np.round(triangle(index, period, -limit, limit))
     if still_from_s is not None:
         raw[index * PACKET_US >= still_from_s * 1e6] = LEVEL
-    kind = np.select([index % 12 == 4, index % 12 == 8], [1, 2], 0)
+    kind = np.select([index % 12 == 4, index % 12 == 8], [GYRO_BIAS, STATUS], MAGNETOMETER)
     aux = np.empty((len(index), 3), dtype=np.int64)
     for k in range(3):
         values = triangle(index + 50 * k, 307 + 40 * k, -2047, 2047)
         bias = triangle(index + 70 * k, 353 + 30 * k, -32767, 32767)
-        aux[:, k] = np.round(np.where(kind == 1, bias, values))
+        aux[:, k] = np.round(np.where(kind == GYRO_BIAS, bias, values))
     status = np.stack([triangle(index, 911, -4000, 8500), np.full(len(index), 0x54 + 256 * 3),
                        np.full(len(index), 7)], axis=1)  # fmt: skip
-    aux = np.where((kind == 2)[:, None], np.round(status), aux).astype(np.int64)
+    aux = np.where((kind == STATUS)[:, None], np.round(status), aux).astype(np.int64)
     age = np.round((PACKET_AGE_US + 40 * (index % 5)) / 4).astype(np.int64)
     start = (index * PACKET_US + 3000 + 10 * (index % 7)) * 2
     t_us = (start // 2 - age * 4 + 1_000_000) & 0xFFFFFFFF

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from host.original import rows as original_rows
 from host.twin.recorder.sitl_library import TICKS_PER_S, Level, Port
+from host.wire.schema_text import packed_schema
 
 from tests.protocol import oracle
 from tests.sitl.bench import Bench, config_places, events, flight, idle_receiver
 from tests.sitl.script import Receiver
 
-MEGA, DIRECT_LOST, DIRECT_RELAY = 5, 3, 7
-TELEMETRY_BYTE = 20  # in the fields of frame config
+MEGA, DIRECT_LOST, DIRECT_RELAY = (
+    packed_schema().number("drive", word)
+    for word in ("mega", "direct_receiver_lost", "direct_relay")
+)
 
 
 def ticks(seconds: float) -> int:
@@ -91,7 +94,7 @@ def test_hung_program_releases_the_relay() -> None:
     flight(34.0).give(bench.sitl)
     bench.sitl.power_on()
     bench.sitl.run_until(ticks(5.0))
-    bench.sitl.reset(4)
+    bench.sitl.reset(packed_schema().number("reset_cause", "watchdog"))
     bench.sitl.run_for(0.5)
     when, level = bench.sitl.levels(Level.RELAY)
     assert level.tolist() == [1, 0]
@@ -121,9 +124,7 @@ def test_original_rows_for_the_original_station() -> None:
     bench = Bench()
     plan = flight(34.0)
     plan.give(bench.sitl)
-    config = bench.sitl.default_config()
-    config[TELEMETRY_BYTE] = 2
-    bench.sitl.set_config(config)
+    bench.configure(telemetry=packed_schema().number("telemetry", "ascii"))
     bench.sitl.power_on()
     bench.sitl.run_until(ticks(18.0))
     sent = bench.sitl.sent(Port.TELEMETRY)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from host.twin.recorder.sitl_library import EEPROM_BYTES, TICKS_PER_S, Recorder
+from host.wire.schema_text import packed_schema
 
 from tests.protocol import oracle
 from tests.sitl.bench import Bench, causes, events, flight, idle_receiver, missing
@@ -11,7 +12,7 @@ from tests.sitl.card_image import CARD_ID, format_fat32, new_card, read_file, re
 from tests.sitl.compare import NAMES, compare
 
 ERASED = b"\xff" * EEPROM_BYTES
-BROWN_OUT = 3
+BROWN_OUT = packed_schema().number("reset_cause", "brown_out")
 
 
 def power_cycle(bench: Bench) -> None:

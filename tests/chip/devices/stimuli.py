@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from host.wire.schema_text import packed_schema
 from numpy.typing import NDArray
 from simavr_bench.barometer import Bmp085
 from simavr_bench.chip import Chip
@@ -26,10 +27,13 @@ ANALOG = (
 RECEIVER = ("rc_0", "rc_1", "rc_2", "rc_3", "rc_4")
 SUPPLY_V, BANDGAP_V = 5.0, 1.1
 CAUSES = {
-    2: ResetCause.EXTERNAL,
-    3: ResetCause.BROWN_OUT,
-    4: ResetCause.WATCHDOG,
-}  # reset_cause of protocol/frames.toml
+    packed_schema().number("reset_cause", word): cause
+    for word, cause in (
+        ("external", ResetCause.EXTERNAL),
+        ("brown_out", ResetCause.BROWN_OUT),
+        ("watchdog", ResetCause.WATCHDOG),
+    )
+}
 _AHEAD = 1_600_000  # cycles: stimuli are handed to the chip 0.1 s before their time
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from devices.ardu_imu import ArduImu, ImuSample
+from host.wire.schema_text import packed_schema
 from simavr_bench import (
     Bmp085,
     CardKind,
@@ -24,6 +25,9 @@ from simavr_bench.log import LogKind
 
 BOOTLOADER = Path(
     "/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex"
+)
+IMU_FLAGS = sum(
+    packed_schema().bit("imu_flags", word) for word in ("attitude_valid", "offsets_valid")
 )
 HEARTBEAT = "PH5"
 THRESHOLDS_VOLT = (0.8, 1.5)  # BSS138, least and most
@@ -155,7 +159,7 @@ class FlightRig:
         )
         self.receiver.width_us = [CRUISE_US, CRUISE_US, CRUISE_US, IDLE_US, DIRECT_US]
         self.imu = ArduImu(
-            self.chip, rate_hz=self.imu_hz, scl_hz=400_000.0, source=self._sample, flags=0x14
+            self.chip, rate_hz=self.imu_hz, scl_hz=400_000.0, source=self._sample, flags=IMU_FLAGS
         )
         self.gps = GpsUart(self.chip, 2, knows_pvt=True, velocity_cmps=STANDING_CMPS)
         self.baro = Bmp085(self.chip, "PA2", "PA3")

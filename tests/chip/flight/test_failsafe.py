@@ -32,7 +32,6 @@ HANG_WITHOUT_INTERRUPTS = b"\xf8\x94\xff\xcf"  # cli before it
 RECURSE = b"\xff\xdf"  # rcall to itself: the stack grows through all of RAM
 STS_PINH = 0x100
 ALL_TASKS = 0b111  # of app/pilot_link.h
-CRASH = 20  # event of protocol/frames.toml
 
 
 def patch(rig: FlightRig, address: int, code: bytes) -> None:
@@ -382,7 +381,9 @@ def test_crash_and_flight_are_remembered_through_the_bootloader(
     identity = log.frames["identity"]
     assert identity["reset_cause"].tolist() == [1, 5]
     assert identity["resumed"].tolist() == [0, 1]
-    crashes = log.frames["event"][log.frames["event"]["code"] == CRASH]
+    crashes = log.frames["event"][
+        log.frames["event"]["code"] == log.schema.number("event", "crash")
+    ]
     assert len(crashes) == 1
     assert start <= int(crashes["arg"][0]) < start + size
 

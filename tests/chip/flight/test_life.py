@@ -75,8 +75,9 @@ def test_relay_whose_contact_opens_in_flight_is_released(make_rig: MakeRig, tmp_
     at, _ = rig.chip.edges("PH5")
     assert int(at[-1]) > rig.chip.cycle - 16_000_000 // 10  # it drives again
     rig.land()
-    events = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin")).frames["event"]
-    assert events["arg"][events["code"] == 31].tolist() == [1]
+    log = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin"))
+    events, lost = log.frames["event"], log.schema.number("event", "relay_lost")
+    assert events["arg"][events["code"] == lost].tolist() == [1]
 
 
 @pytest.mark.parametrize("where", ["start", "reads", "first write"])

@@ -167,7 +167,8 @@ def test_full_file_stops_with_an_alarm_and_is_closed_on_the_ground(
     assert size_of(image, "FLT00002.BIN") == FILE_BYTES
     log = host.read_log(take_log(image, tmp_path / "full.bin"))
     assert log.complete == "complete"
-    ends = log.frames["event"][log.frames["event"]["code"] == 2]
+    events = log.frames["event"]
+    ends = events[events["code"] == log.schema.number("event", "session_end")]
     assert log.schema.word("end_cause", int(ends["arg"][-1])) == "file_full"
     assert not log.loss.dropped_frames
 

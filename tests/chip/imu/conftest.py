@@ -47,6 +47,7 @@ def mega_elf(request: pytest.FixtureRequest) -> Path:
 @pytest.fixture
 def make_board(imu_elf: Path) -> Iterator[MakeBoard]:
     """A maker of IMU boards; frees their chips afterwards."""
+    from imu.packets import ADDRESSES
     from imu.rig import ImuBoard
 
     boards: list[ImuBoard] = []
@@ -64,7 +65,7 @@ def make_board(imu_elf: Path) -> Iterator[MakeBoard]:
         if record is not None:
             board.chip.load(record.image())
         if mega:
-            board.bus.listen(27, 42, 43)
+            board.bus.listen(*ADDRESSES)
         board.bus.log_bytes()
         board.power_on()
         return board

@@ -22,6 +22,7 @@ import numpy as np
 from flight.images import build_image
 from flight.rig import check_card, make_card, take_log
 from flight.servos import LONGEST_GAP_MS, worst_gap_ms
+from host.wire.schema_text import packed_schema
 from imu.motion import fly, swaying
 from imu.record import ImuRecord, read_record
 from imu.rig import PairRig
@@ -33,10 +34,15 @@ CLOCK_PPM, MPU_PPM = 3000.0, -8000.0
 RATE_HZ = 200 * (1 + CLOCK_PPM * 1e-6) * (1 + MPU_PPM * 1e-6)
 FAULT_S = 3.0
 AFTER_S = 3.0
-EVENT_NAMES = {8: "imu_lost", 9: "imu_found", 10: "imu_restarted", 18: "reset"}
+EVENT_NAMES = {
+    packed_schema().number("event", word): word
+    for word in ("imu_lost", "imu_found", "imu_restarted", "reset")
+}
 # Behind the parking attitude and the last zeroing: what a reset in flight must not touch.
 RECORD = ImuRecord(rate_offset=(40, -30, 20), force_offset=(150, -90, 60), offsets_valid=1)
-FRESH, UNSATURATED, ATTITUDE = 1 << 10, 1 << 11, 1 << 12
+FRESH, UNSATURATED, ATTITUDE = (
+    packed_schema().bit("valid", word) for word in ("imu_fresh", "imu_unsaturated", "attitude")
+)
 IMU_WATCHDOG = 6
 LOAD_LIMIT = 0.60  # of the IMU's cycles, whatever happens
 IMU_DATA_READY = 1

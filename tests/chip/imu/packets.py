@@ -6,9 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from devices.ardu_imu import ANGLES, FIRST, FORCES, RATES, SECOND, SEQUENCED
+from host.wire.schema_text import packed_schema
 from simavr_bench import I2cBus
 
-STATUS_AUX = 2
+MAGNETOMETER, GYRO_BIAS, STATUS = (
+    packed_schema().number("imu_aux", word) for word in ("magnetometer", "gyro_bias", "status")
+)
+ADDRESSES = (SEQUENCED.address, FIRST.address, SECOND.address)
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,7 +35,7 @@ def ask(board: ImuBoard, line: str) -> str:
 
 def test_every_sample_becomes_a_packet_that_states_its_age(make_board: MakeBoard) -> None:
     from imu.motion import fly
-    from imu.packets import imu_packets
+    from imu.packets import GYRO_BIAS, MAGNETOMETER, STATUS, imu_packets
 
     board = make_board()
     fly(board.mpu, board.magnetometer, 5.0)
@@ -52,8 +52,8 @@ def test_every_sample_becomes_a_packet_that_states_its_age(make_board: MakeBoard
         assert tuple(sample["force"] * turn) == p.force
         # 2 us of the step of 4, and the loop that waits for START
         assert abs((p.start - int(sample["cycle"])) / 16 - p.age_us) <= 15
-    assert {p.aux_kind for p in packets} == {0, 1, 2}
-    status = next(p.aux for p in packets if p.aux_kind == 2)
+    assert {p.aux_kind for p in packets} == {MAGNETOMETER, GYRO_BIAS, STATUS}
+    status = next(p.aux for p in packets if p.aux_kind == STATUS)
     assert abs(status[0] - 3100) < 30  # 31 degC
     assert status[1] == 0x58 | 2 << 8  # product id, low-pass
     assert all(p.flags & RESTARTED for p in packets[:380])
@@ -63,11 +63,12 @@ def test_every_sample_becomes_a_packet_that_states_its_age(make_board: MakeBoard
 
 
 def test_a_packet_takes_its_bits_at_400_khz(make_board: MakeBoard) -> None:
+    from devices.ardu_imu import SEQUENCED
     from simavr_bench.log import LogKind, TwiNote
 
     board = make_board()
     board.chip.run_s(0.6)
-    writes = [w for w in board.bus.writes() if w.address == 43]
+    writes = [w for w in board.bus.writes() if w.address == SEQUENCED.address]
     records = board.chip.records(LogKind.TWI)
     done = records[records["source"] == TwiNote.DONE]["cycle"].astype(np.int64)
     for write in writes:
@@ -81,19 +82,19 @@ def test_a_packet_takes_its_bits_at_400_khz(make_board: MakeBoard) -> None:
 def test_revision_c_is_told_and_its_counts_doubled(
     make_board: MakeBoard, product_id: int, factor: int
 ) -> None:
-    from imu.packets import STATUS_AUX, imu_packets
+    from imu.packets import STATUS, imu_packets
 
     board = make_board(product_id=product_id)
     board.chip.run_s(1.0)
     packets = imu_packets(board.bus)
     assert board.mpu.samples()["force"][-1][2] * factor == pytest.approx(8192, abs=100)
     assert packets[-1].force[2] == pytest.approx(-8192, abs=100)
-    assert {p.aux[1] & 0xFF for p in packets if p.aux_kind == STATUS_AUX} == {product_id}
+    assert {p.aux[1] & 0xFF for p in packets if p.aux_kind == STATUS} == {product_id}
 
 
 @pytest.mark.parametrize("qmc", [False, True])
 def test_mpu6050_and_either_magnetometer_on_one_bus(make_board: MakeBoard, qmc: bool) -> None:
-    from imu.packets import imu_packets
+    from imu.packets import MAGNETOMETER, imu_packets
 
     board = make_board(over_i2c=True, qmc=qmc)
     board.chip.run_s(1.5)
@@ -101,7 +102,7 @@ def test_mpu6050_and_either_magnetometer_on_one_bus(make_board: MakeBoard, qmc: 
     board.chip.run_s(3.0)
     packets = imu_packets(board.bus)[-500:]
     assert set(np.diff([p.seq for p in packets]) % 256) == {1}
-    fields = [p.aux for p in packets if p.aux_kind == 0]
+    fields = [p.aux for p in packets if p.aux_kind == MAGNETOMETER]
     assert len(fields) > 30
     assert fields[-1] == pytest.approx((273, 0, 414), abs=8)  # 0.25, 0, 0.38 gauss
     assert board.chip.load_now().busy_fraction <= 0.60
@@ -276,13 +277,13 @@ def test_compat_sends_the_original_packets_with_their_meaning(make_board: MakeBo
 @pytest.mark.parametrize("bootloader", [False, True])
 def test_hang_with_interrupts_off_ends_in_a_reset(imu_elf: Path, bootloader: bool) -> None:
     """`cli` and a jump to itself: the watchdog's interrupt cannot run, its reset can."""
-    from imu.packets import imu_packets
+    from imu.packets import ADDRESSES, imu_packets
     from imu.rig import ImuBoard
     from simavr_bench import Image
     from simavr_bench.log import LogKind
 
     board = ImuBoard(imu_elf, bootloader=bootloader)
-    board.bus.listen(27, 42, 43)
+    board.bus.listen(*ADDRESSES)
     board.bus.log_bytes()
     board.power_on()
     board.chip.run_s(5.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from pathlib import Path
 
+from devices.ardu_imu import SEQUENCED
 from flight.images import upload
 from imu.packets import imu_packets
 from imu.record import ImuRecord, read_record
@@ -22,7 +23,7 @@ def test_uploaded_flash_sends_samples_and_keeps_the_offsets(imu_elf: Path) -> No
         ctypes.memset(chip.library.bench_flash(chip.handle), 0xFF, BOOT_SECTION)
         chip.load(kept.image())
         bus = I2cBus(chip)
-        bus.listen(43)
+        bus.listen(SEQUENCED.address)
         bus.log_bytes()
         Mpu6000(chip)
         chip.power_on()

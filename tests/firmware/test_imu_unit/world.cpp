@@ -175,8 +175,10 @@ bool begin_transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint8_t)
   }
   world.packet_awaited = false;
   ++world.starts;
-  world.firsts = static_cast<uint16_t>(world.firsts + (address == 42 ? 1 : 0));
-  world.seconds = static_cast<uint16_t>(world.seconds + (address == 27 ? 1 : 0));
+  world.firsts =
+      static_cast<uint16_t>(world.firsts + (address == frames::kOriginalImu1PacketAddress ? 1 : 0));
+  world.seconds = static_cast<uint16_t>(world.seconds +
+                                        (address == frames::kOriginalImu2PacketAddress ? 1 : 0));
   return true;
 }
 

@@ -44,8 +44,8 @@ struct World {
   uint32_t start_us = 0;
   uint32_t took_us = 820;
   uint16_t starts = 0;
-  uint16_t firsts = 0;     // to 42
-  uint16_t seconds = 0;    // to 27
+  uint16_t firsts = 0;  // of two original packets
+  uint16_t seconds = 0;
   uint16_t refused = 0;    // begun while one was under way
   uint16_t samples = 0;    // as the Mega counts them
   uint32_t behind_us = 0;  // the last START behind its data-ready

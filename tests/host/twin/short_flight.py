@@ -14,6 +14,7 @@ from host.twin.recorder.stimuli import Stimuli, stimuli
 from host.twin.sensors.airdata import air_data
 from host.twin.testcard import cards
 from host.twin.testcard.cards import Card
+from host.wire.schema_text import packed_schema
 from numpy.typing import NDArray
 
 CARD = {
@@ -25,12 +26,7 @@ CARD = {
     "segment": [{"kind": "trim", "duration_s": 8.0}],
 }
 AT_S, FOR_S = 6.0, 2.0
-EVENTS = {
-    "session_start": 1, "session_end": 2, "frames_dropped": 3, "block_skipped": 4, "card_stall": 5,
-    "card_removed": 7, "imu_lost": 8, "imu_found": 9, "imu_restarted": 10, "baro_lost": 11,
-    "baro_found": 12, "gps_lost": 13, "gps_found": 14, "receiver_lost": 15, "receiver_found": 16,
-    "drive_changed": 17, "reset": 18, "settings_default": 19,
-}  # fmt: skip
+EVENTS = packed_schema().enums["event"]
 
 
 @dataclass

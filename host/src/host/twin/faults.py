@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.aircraft.airframe import Array
+from host.wire.schema_text import packed_schema
 
 VANES = ("alpha_a", "alpha_b", "beta_a", "beta_b")
 PITOTS = ("dp_a", "dp_b")
@@ -23,7 +24,7 @@ GYROS = ("p", "q", "r")
 FOREVER_S = 1e9
 SUPPLY_V = 5.0
 LONGEST_FLOOD_S = 600.0
-RESETS = {"brown_out": 3, "watchdog_reset": 4}  # enum reset_cause of protocol/frames.toml
+RESETS = {"brown_out": "brown_out", "watchdog_reset": "watchdog"}  # enum reset_cause
 RADIO_BYTEPS = 57_600 / 10
 ENDS = {"card_removed": "card_inserted", "supply_sag": "supply", "baro_off": "baro_on",
         "baro_bus_stuck": "baro_bus_free"}  # fmt: skip
@@ -184,7 +185,8 @@ def recorder_actions(faults: Sequence[Fault]) -> list[Action]:
         if fault.kind in ("card_busy", "card_reject", "card_removed"):
             found.append(Action(fault.at_s, fault.kind, fault.amount))
         elif fault.kind in RESETS:
-            found.append(Action(fault.at_s, "reset", RESETS[fault.kind]))
+            cause = packed_schema().number("reset_cause", RESETS[fault.kind])
+            found.append(Action(fault.at_s, "reset", cause))
         elif fault.kind == "supply_sag":
             found.append(Action(fault.at_s, "supply", fault.amount))
         elif fault.kind in ("baro_off", "baro_bus_stuck"):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from flight.rig import MEGA_US
+from host.wire.schema_text import packed_schema
 from numpy.typing import NDArray
 
 CYCLES_PER_S = 16_000_000
@@ -16,8 +17,13 @@ IMU_DELAY_US = 3000.0  # from a sample to its START
 # No two clocks agree: every phase between IMU, receiver, servos and loop is met in ten minutes.
 IMU_PPM = -1100.0
 RECEIVER_PPM = 270.0
-IMU_FLAGS = 0x1C  # attitude, magnetometer and offsets valid
-MAGNETOMETER, GYRO_BIAS, STATUS = 0, 1, 2
+IMU_FLAGS = sum(
+    packed_schema().bit("imu_flags", word)
+    for word in ("attitude_valid", "mag_valid", "offsets_valid")
+)
+MAGNETOMETER, GYRO_BIAS, STATUS = (
+    packed_schema().number("imu_aux", word) for word in ("magnetometer", "gyro_bias", "status")
+)
 PACKETS_PER_FIELD = 13  # 15.4 a second
 STALL_S = {100: 0.500, 200: 0.250}
 STALL_EVERY_S = 3.0
