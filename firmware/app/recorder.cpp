@@ -196,7 +196,10 @@ void Recorder::looked(uint32_t now_us) {
   switch (volume_.state()) {
     case storage::FileState::kNone:
     case storage::FileState::kClosed:
-      volume_status_ = VolumeStatus::kReady;
+      // The card answers. That it is full stays said until room is found.
+      if (volume_status_ != VolumeStatus::kFull && volume_status_ != VolumeStatus::kFragmented) {
+        volume_status_ = VolumeStatus::kReady;
+      }
       state_ = State::kNoFile;
       file_wanted_ = true;
       break;

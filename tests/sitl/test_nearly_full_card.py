@@ -113,3 +113,8 @@ def test_throttle_up_is_recorded_while_a_larger_room_is_searched() -> None:
 def test_card_without_room_says_so_at_the_end_of_the_search() -> None:
     card = nearly_full(16.0, [(0.3, 4_000_000), (0.6, 4_000_000)], hint=0.2)
     assert watch(card, LONGEST_SEARCH_S)[-1] in ("full", "fragmented")
+
+
+def test_a_full_card_goes_on_saying_so_while_it_is_searched_again() -> None:
+    said = watch(nearly_full(0.5, [], hint=None), 24.0)
+    assert set(said[10:24]) == {"full"}
