@@ -1,48 +1,75 @@
-"""A cache of compiled kernels that is of other code, or cut short, costs time and nothing else."""
+"""Kernels: when they are compiled, what is said, and that kept code is never of other code."""
 
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
+from host.compiled import compiled
 
 KERNEL = """
 import sys
-import numpy as np
 from host.compiled import compiled
+from parts import times
 
 @compiled
 def double(x):
-    return 2.0 * x
+    return times(x)
 
-print(double(21.0), len(double.stats.cache_hits), len(double.stats.cache_misses))
+assert sys.modules.get("numba") is None
+value = double(21.0)
+stats = double.machine().stats if sys.modules.get("numba") else None
+print(value, *([len(stats.cache_hits), len(stats.cache_misses)] if stats else []))
 """
+PARTS = """
+from host.compiled import compiled_part
+
+FACTOR = 2.0
+
+@compiled_part
+def times(x):
+    return FACTOR * x
+"""
+SAID = re.compile(r"host: compiling double, once, about \d+ s\n")
 
 
-def run(folder: Path) -> str:
-    """Call the kernel in a process of its own; give what it printed."""
+def run(folder: Path, *, without: bool = False) -> tuple[str, str]:
+    """Call the kernel in a process of its own; give what it printed and what it said."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
-    done = subprocess.run(
-        [sys.executable, str(folder / "kernel.py")],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = [sys.executable, str(folder / "kernel.py")]
+    if without:
+        blocked = f"import sys, runpy; sys.modules['numba'] = None; sys.path[0] = {str(folder)!r}"
+        command = [sys.executable, "-c", f"{blocked}; runpy.run_path({command[1]!r})"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
+    return done.stdout.strip(), done.stderr
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    (tmp_path / "parts.py").write_text(PARTS)
+    return tmp_path
+
+
+def test_it_says_that_it_compiles_and_does_so_once(folder: Path) -> None:
+    printed, said = run(folder)
+    assert printed == "42.0 0 1"
+    assert SAID.fullmatch(said)
+    assert run(folder) == ("42.0 1 0", "")
 
 
 @pytest.mark.parametrize("damage", ["index of a module that moved", "cut index", "cut code"])
-def test_kernel_is_compiled_anew(tmp_path: Path, damage: str) -> None:
-    (tmp_path / "kernel.py").write_text(KERNEL)
-    assert run(tmp_path) == "42.0 0 1"
-    assert run(tmp_path) == "42.0 1 0"
-    (index,) = (tmp_path / "cache").rglob("*.nbi")
-    (code,) = (tmp_path / "cache").rglob("*.nbc")
+def test_kernel_is_compiled_anew(folder: Path, damage: str) -> None:
+    run(folder)
+    (index,) = (folder / "cache").rglob("kernel.double*.nbi")
+    (code,) = (folder / "cache").rglob("kernel.double*.nbc")
     if damage == "cut code":
         code.write_bytes(code.read_bytes()[:40])
     elif damage == "cut index":
@@ -52,5 +79,31 @@ def test_kernel_is_compiled_anew(tmp_path: Path, damage: str) -> None:
         moved = index.read_bytes().replace(b"numba.core.types.scalars", b"numba.core.types.sca1ars")
         assert moved != index.read_bytes()
         index.write_bytes(moved)
-    assert run(tmp_path) == "42.0 0 1"
-    assert run(tmp_path) == "42.0 1 0"
+    assert run(folder)[0].startswith("42.0")
+    assert run(folder)[0] == "42.0 1 0"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"), [("2.0", "3.0", "63.0"), ("* x", "+ x", "23.0")]
+)
+def test_what_a_kernel_calls_in_another_file_has_changed(
+    folder: Path, old: str, new: str, expected: str
+) -> None:
+    run(folder)
+    (folder / "parts.py").write_text(PARTS.replace(old, new))
+    assert run(folder)[0] == f"{expected} 0 1"
+    kept = list((folder / "cache" / "kernels").glob("kernel.double.*"))
+    assert len(kept) == 1  # what it was before is gone
+
+
+def test_without_numba_it_says_at_once_how_slow_it_is(folder: Path) -> None:
+    printed, said = run(folder, without=True)
+    assert printed == "42.0"
+    assert said.startswith("host: without numba this takes 100 times as long: ")
+
+
+def test_a_kernel_is_compiled_where_no_cache_can_be() -> None:
+    found: dict[str, Callable[[float], Any]] = {}
+    # Code of no file is not kept, as of a file where nobody may write.
+    exec("def kernel(x):\n    return 2.0 * x\n", found)
+    assert compiled(found["kernel"])(3.0) == 6.0

@@ -1,114 +1,244 @@
-"""The one place that knows how a function is compiled: machine code with numba, Python without.
+"""Functions that become machine code where numba is installed and the work is worth it.
 
-Kernels are written in the subset both understand. Compiled code is cached beside its source, so
-that only set-up (`python -m host.twin`, `python -m host.sysid`) pays for the compiler.
+Kernels are written in the subset that Python and numba both understand. Nothing here loads numba
+before a kernel is called, and only that kernel is compiled: once per install, with a line that says
+so, for the code is kept beside its source.
 """
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable
-from typing import Any, TypeVar
+import contextlib
+import functools
+import hashlib
+import importlib.util
+import os
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import CodeType, FunctionType
+from typing import Any, Generic, ParamSpec, TypeVar
 
-Kernel = TypeVar("Kernel", bound=Callable[..., Any])
-DIRECT_WITH = ("0.68.",)
+from host.extras import install_hint
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+LOADING_S, S_PER_BYTE = 0.7, 0.0006  # numba's own start, and a kernel by the size of its byte code
+SLOWER = 100  # 60 s of the card `calm` in flight, the printed Hopfield iteration
+KEPT = "kernels"  # folder in the `__pycache__` of the source
 
 
-def _load_compiler() -> Callable[..., Any] | None:
-    try:
-        import numba
-    except ImportError:
-        return None
-    compiler: Callable[..., Any] = numba.njit
-    return compiler
-
-
-_COMPILER = _load_compiler()
-
-
-def compiled(function: Kernel) -> Kernel:
-    """Return the compiled form of `function`, or `function` itself without numba.
+class Kernel(Generic[Arguments, Result]):
+    """A function that is compiled when it is first called; without numba it stays what it is.
 
     Parameters
     ----------
     function : callable
-        Of scalars and arrays.
+        Of scalars and arrays; raises nothing of its own.
+    reordered : bool
+        Let the compiler reorder sums.
+    part : bool
+        Only other kernels are worth compiling it for; called from Python it is Python.
+    """
 
-    Returns
-    -------
-    callable
-        The same function, with the same signature and the same arithmetic.
+    def __init__(
+        self, function: Callable[Arguments, Result], *, reordered: bool, part: bool = False
+    ) -> None:
+        functools.update_wrapper(self, function)
+        self.function: Any = function
+        self.name = self.function.__name__
+        self.place = f"{function.__module__} {self.function.__qualname__}"
+        self._reordered = reordered
+        self._run: Any = function if part else None
+        self._machine: Any = None
+        self._kept: Path | None = None
+        self._work = 0.0
+
+    def __call__(self, *arguments: Arguments.args, **named: Arguments.kwargs) -> Result:
+        """Run, compiled."""
+        if self._run is None and has_compiler():
+            self._run = self.machine(said=True)
+        elif self._run is None:
+            self._run = self.function
+            _say_slow()
+        try:
+            result: Result = self._run(*arguments, **named)
+        except Exception:
+            if self._kept is None:
+                raise
+            # Kept code was cut short by a full disk, or names what another release of numba had.
+            self._forget()
+            self._run = self.machine()
+            self._kept = None  # a second failure is not the cache's
+            result = self._run(*arguments, **named)
+        return result
+
+    def _forget(self) -> None:
+        for kernel in _all_of(self):
+            kernel._machine = None
+            if kernel._kept is not None:
+                shutil.rmtree(kernel._kept, ignore_errors=True)
+
+    def pays(self, work: float, worth: float) -> bool:
+        """Return whether this process has had so much work that machine code pays.
+
+        Parameters
+        ----------
+        work : float
+            Of the call to come, in the caller's own unit.
+        worth : float
+            Sum that takes Python as long as loading and compiling machine code.
+        """
+        self._work += work
+        return self._work >= worth and has_compiler()
+
+    def machine(self, *, said: bool = False) -> Any:
+        """Return what numba makes of it; `said`: after a line to stderr if that takes a while."""
+        if self._machine is None:
+            self._kept = _folder(self)
+            fresh = self._kept is None or not any(self._kept.rglob("*.nbc"))
+            if said and fresh:
+                left = [k.function.__code__ for k in _all_of(self) if k._machine is None]
+                size = sum(len(code.co_code) for code in left)
+                _say(f"compiling {self.name}, once, about {LOADING_S + S_PER_BYTE * size:.0f} s")
+            self._machine = _jit(self._linked(), self._reordered, self._kept)
+        return self._machine
+
+    def _linked(self) -> FunctionType:
+        """Return the function with the machine code of the kernels that it calls."""
+        own = self.function
+        places = own.__globals__ | {name: k.machine() for name, k in _called(own)}
+        linked = FunctionType(own.__code__, places, own.__name__, own.__defaults__, own.__closure__)
+        linked.__module__, linked.__qualname__ = own.__module__, own.__qualname__
+        return linked
+
+
+def compiled(function: Callable[Arguments, Result]) -> Kernel[Arguments, Result]:
+    """Return the function as a kernel.
 
     Notes
     -----
     Division by zero gives infinity as in numpy, not an exception.
     """
-    return _compile(function, reordered=False)
+    return Kernel(function, reordered=False)
 
 
-def compiled_fast(function: Kernel) -> Kernel:
+def compiled_fast(function: Callable[Arguments, Result]) -> Kernel[Arguments, Result]:
     """Do the same as `compiled`, and let the compiler reorder sums (fastmath).
 
     A fifth faster in the virtual flight, and still the same bits for the same seed on one machine;
     but NaN and infinity must not be relied on, which a divergence guard does.
     """
-    return _compile(function, reordered=True)
+    return Kernel(function, reordered=True)
 
 
-def _compile(function: Kernel, *, reordered: bool) -> Kernel:
-    if _COMPILER is None:
-        return function
-    how = {"error_model": "numpy", "fastmath": reordered}
-    try:
-        kernel = _COMPILER(cache=True, **how)(function)
-    except RuntimeError:  # neither beside the source nor at home is room for a cache
-        kernel = _COMPILER(**how)(function)
-    else:
-        _load_directly(kernel)
-        _load_what_fits(kernel)
-    compiled_kernel: Kernel = kernel
-    return compiled_kernel
+def compiled_part(function: Callable[Arguments, Result]) -> Kernel[Arguments, Result]:
+    """Do the same as `compiled_fast` for what kernels call; called from Python it stays Python."""
+    return Kernel(function, reordered=True, part=True)
 
 
-def _load_what_fits(kernel: Any) -> None:
-    """Compile anew where the cache is of other code: numba takes a file's date for its content.
-
-    A module that moved since, or a file cut short by a full disk, ended every command in a
-    traceback (ModuleNotFoundError, UnpicklingError, EOFError).
-    """
-    cache = kernel._cache
-    load = cache.load_overload
-
-    def load_or_none(signature: Any, target: Any) -> Any:
-        try:
-            return load(signature, target)
-        except Exception:
-            cache.flush()
-            return None
-
-    cache.load_overload = load_or_none
+@functools.cache
+def has_compiler() -> bool:
+    """Return whether numba is installed."""
+    return importlib.util.find_spec("numba") is not None
 
 
-def _load_directly(kernel: Any) -> None:
-    """Let a kernel take its machine code from the cache without waking the compiler.
-
-    numba readies the types and code of all it can compile before it looks into its cache: 0.15 s
-    of a process that finds everything there. All such code needs is its runtime, by name. This goes
-    through inner doors of numba: versions it was not tried with load as they always do.
-    """
+def _jit(function: FunctionType, reordered: bool, folder: Path | None) -> Any:
     import numba
 
-    if not numba.__version__.startswith(DIRECT_WITH):
-        return
-    binding = importlib.import_module("llvmlite.binding")
-    runtime = importlib.import_module("numba.core.runtime._nrt_python")
-    inner = kernel._cache
-    wake = inner.load_overload
+    jit: Any = functools.partial(numba.njit, error_model="numpy", fastmath=reordered)
+    if folder is None:
+        return jit()(function)
+    with _cache_in(folder):
+        try:
+            return jit(cache=True)(function)
+        except RuntimeError:  # no room for it after all
+            return jit()(function)
 
-    def load(signature: Any, target: Any) -> Any:
-        for name, address in runtime.c_helpers.items():
-            binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
-        found = inner._load_overload(signature, target)
-        return wake(signature, target) if found is None else found
 
-    inner.load_overload = load
+@contextlib.contextmanager
+def _cache_in(folder: Path) -> Iterator[None]:
+    """Let numba keep what is decorated meanwhile in a folder (its setting NUMBA_CACHE_DIR)."""
+    import numba
+
+    config: Any = numba.config
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
+
+
+def _folder(kernel: Kernel[..., Any]) -> Path | None:
+    """Return where its code is kept; None where nobody may write, or of no file.
+
+    The folder's name holds a digest of all that the code depends on: numba itself takes a file's
+    date for its content and does not see that a kernel in another file has changed. Folders of
+    what this source was before are removed.
+    """
+    source = Path(kernel.function.__code__.co_filename)
+    if not source.is_file():
+        return None
+    asked = os.environ.get("NUMBA_CACHE_DIR")
+    place = Path(asked) / KEPT if asked else source.parent / "__pycache__" / KEPT
+    name = f"{source.stem}.{kernel.name}.{sys.implementation.cache_tag}"
+    folder = place / f"{name}.{_digest(kernel)}"
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        for old in place.glob(f"{name}.*"):
+            if old != folder:
+                shutil.rmtree(old, ignore_errors=True)
+    except OSError:
+        return None
+    return folder if os.access(place, os.W_OK) else None
+
+
+def _digest(kernel: Kernel[..., Any]) -> str:
+    import numba
+
+    digest = hashlib.sha256(numba.__version__.encode())
+    for part in sorted(_all_of(kernel), key=lambda k: k.place):
+        code = part.function.__code__
+        digest.update(f"{part.place} {part._reordered}".encode())
+        for text in _instructions(code):
+            digest.update(text)
+        for name in sorted(code.co_names):
+            value = part.function.__globals__.get(name)
+            if isinstance(value, (int, float, str, tuple)):
+                digest.update(f"{name} {value!r}".encode())
+    return digest.hexdigest()[:16]
+
+
+def _instructions(code: CodeType) -> Iterator[bytes]:
+    """Return byte code and constants, of functions within too."""
+    yield code.co_code
+    yield repr((code.co_names, code.co_varnames)).encode()
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _instructions(constant)
+        else:
+            yield repr(constant).encode()
+
+
+def _called(function: Any) -> list[tuple[str, Kernel[..., Any]]]:
+    """Return the kernels that a function names."""
+    found = ((name, function.__globals__.get(name)) for name in function.__code__.co_names)
+    return [(name, value) for name, value in found if isinstance(value, Kernel)]
+
+
+def _all_of(kernel: Kernel[..., Any]) -> set[Kernel[..., Any]]:
+    """Return a kernel, those that it calls, and those that they call."""
+    found: set[Kernel[..., Any]] = {kernel}
+    for _, part in _called(kernel.function):
+        found |= _all_of(part)
+    return found
+
+
+@functools.cache
+def _say_slow() -> None:
+    _say(f"without numba this takes {SLOWER} times as long: {install_hint('numba')}")
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"host: {text}\n")
+    sys.stderr.flush()

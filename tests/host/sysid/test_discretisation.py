@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import DelayGroup, LinearModel, Parameter, Term
-from host.sysid.numerics.kernels import ar_filter, delayed
-from host.sysid.numerics.noise import OutputNoise, autocovariance
+from host.sysid.numerics.delay import delayed
+from host.sysid.numerics.noise import OutputNoise, ar_filter, autocovariance
 from host.sysid.numerics.problem import OutputProblem
 from scipy import signal
 

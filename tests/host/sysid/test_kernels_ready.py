@@ -1,84 +1,111 @@
-"""After `python -m host.sysid` no answer waits for the compiler."""
+"""A first answer waits for no compiler; who identifies many times gets machine code that agrees."""
 
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-from host.compiled import compiled
+import numpy as np
+import pytest
+from host.aircraft import propulsion
+from host.aircraft.powerplant import powerplant
+from host.sysid.numerics import recursion
 
 STUDIES = Path(__file__).parents[3] / "host"
-SCRIPT = """
-import importlib, json, pkgutil
-import host.sysid
-from host.sysid.__main__ import build_kernels
+METHODS = """
+import json, sys
 from host.sysid.estimators.fit import fit
 from studies.aircraft import navion_structured
 from studies.data import TRUTH, with_rates
 
-kernels = {}
-for module in pkgutil.walk_packages(host.sysid.__path__, "host.sysid."):
-    if module.name.endswith("__main__"):
-        continue
-    for name, thing in vars(importlib.import_module(module.name)).items():
-        if hasattr(thing, "signatures") and thing.__module__ == module.name:
-            kernels[f"{module.name}.{name}"] = thing
-build_kernels()
-built = {name: len(kernel.signatures) for name, kernel in kernels.items()}
 model = navion_structured().with_start(1.1 * TRUTH)
 data = [with_rates(1, snr=10.0), with_rates(2, snr=10.0)]
 for method in ("output-error", "output-error-white", "filter-error", "frequency-output-error",
                "recursive", "recursive-fourier", "extended-kalman", "unscented-kalman"):
     fit(method, model, data)
-fit("hopfield-whitened", model, data)
-print(json.dumps([built, {name: len(kernel.signatures) for name, kernel in kernels.items()}]))
+print("numba" in sys.modules)
 """
+BUILT = """
+import json
+from host.aircraft import propulsion
+from host.compiled import Kernel
+from host.sysid.__main__ import build_kernels
+from host.sysid.estimators import hopfield
+from host.sysid.numerics import recursion
+recursion.WORTH_COMPILING = propulsion.WORTH_COMPILING = 0.0
+build_kernels()
+
+def codes():
+    found = {}
+    for module in (recursion, propulsion, hopfield):
+        for name, thing in vars(module).items():
+            if isinstance(thing, Kernel) and thing._machine is not None:
+                found[name] = len(thing._machine.signatures)
+    return found
+
+built = codes()
+import numpy as np
+from host.aircraft.powerplant import powerplant
+from host.sysid.estimators.fit import fit
+from studies.aircraft import navion_structured
+from studies.data import TRUTH, with_rates
+model = navion_structured().with_start(1.1 * TRUTH)
+for method in ("output-error", "filter-error", "hopfield-whitened"):
+    fit(method, model, [with_rates(1, snr=10.0)])
+powerplant("ultrastick25e").run(*np.full((3, 9), 0.5), 0.03)
+print(json.dumps([built, codes()]))
+"""
+
+
+def printed(script: str) -> str:
+    """Run a script in a process of its own and return what it printed."""
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(STUDIES)}
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_few_fits_load_no_compiler() -> None:
+    assert printed(METHODS) == "False\n"
 
 
 def test_every_kernel_is_built_in_the_types_that_methods_use() -> None:
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(STUDIES)}
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=environment, check=True
-    )
-    built, used = json.loads(done.stdout)
-    assert len(built) >= 11
-    # A private kernel may be part of the kernel that calls it; if Python calls it, the end says so.
-    entered = {name: n for name, n in built.items() if not name.rpartition(".")[2].startswith("_")}
-    assert min(entered.values()) >= 1, built
+    built, used = json.loads(printed(BUILT))
+    assert set(built) >= {"one_block", "rotor_steps", "iterate", "iterate_until"}
     assert used == built
 
 
-AGAIN = """
-import numpy as np
-from host.sysid.numerics.kernels import ar_filter
-from numba.core.runtime import rtsys
-
-x = np.arange(8.0).reshape(4, 2)
-print(ar_filter(x, np.array([0.5, -0.2]), np.eye(2)).sum(), rtsys._init)
-"""
-
-
-def test_machine_code_from_the_cache_does_not_wake_the_compiler(tmp_path: Path) -> None:
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    seen = [
-        subprocess.run(
-            [sys.executable, "-c", AGAIN],
-            capture_output=True,
-            text=True,
-            env=environment,
-            check=True,
-        ).stdout.split()
-        for _ in range(2)
-    ]
-    assert seen[0][0] == seen[1][0]
-    assert [awake for _, awake in seen] == ["True", "False"]
+@pytest.mark.parametrize("samples", [1, 2, 7, 255, 256, 600])
+def test_slopes_by_pieces_and_by_machine_code_agree(
+    samples: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(samples)
+    n, wide, p, free = 4, 6, 3, 11
+    step = np.hstack([0.97 * np.eye(n) + 0.02 * rng.standard_normal((n, n)), np.zeros((n, 2))])
+    slopes = rng.standard_normal((n, wide, free))
+    z, C = rng.standard_normal((samples, wide)), rng.standard_normal((p, n))
+    start = rng.standard_normal((n, free))
+    found = []
+    for worth in (np.inf, 0.0):
+        monkeypatch.setattr(recursion, "WORTH_COMPILING", worth)
+        out = np.full((p, samples, free), np.nan)
+        recursion.propagate(step, slopes, z, C, start, out)
+        found.append(out)
+    S = start
+    for k in range(samples):
+        np.testing.assert_allclose(found[0][:, k], C @ S, rtol=1e-9, atol=1e-9)
+        S = step[:, :n] @ S + np.einsum("c,icq->iq", z[k], slopes)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9, atol=1e-9)
 
 
-def test_a_kernel_is_compiled_where_no_cache_can_be() -> None:
-    found: dict[str, Callable[[float], Any]] = {}
-    # numba keeps no cache of what stands in no file, as of a file where nobody may write.
-    exec("def kernel(x):\n    return 2.0 * x\n", found)
-    assert compiled(found["kernel"])(3.0) == 6.0
+def test_a_rotor_in_python_and_as_machine_code_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    throttle = 0.5 + 0.5 * np.sin(np.arange(200) * 0.1)  # to full and to nothing
+    found = []
+    for worth in (np.inf, 0.0):
+        monkeypatch.setattr(propulsion, "WORTH_COMPILING", worth)
+        found.append(
+            powerplant("ultrastick25e").run(throttle, np.full(200, 17.0), np.full(200, 1.2), 0.03)
+        )
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-10)

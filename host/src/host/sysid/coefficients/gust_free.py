@@ -19,7 +19,8 @@ from host.sysid.coefficients.rows import Flown
 from host.sysid.compatibility.signals import BLEND_RADPS, Record
 from host.sysid.errors import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
-from host.sysid.numerics.kernels import simulate, transition
+from host.sysid.numerics.discretisation import transition
+from host.sysid.numerics.recursion import simulate
 
 LEVELLING_PERS = 0.3  # the pilot brings the wings back
 DRAG = 0.04  # only sets the mean of a force whose mean is taken out again

@@ -175,9 +175,7 @@ class PathProblem:
         through = v - np.append(self._value(local, WITH_GPS[1:]), 0.0)
         mean_C = self._mean(C)
         width = common + len(own)
-        ground, air = np.empty((2, len(mean_C), 3, width))
-        fall = np.empty((len(mean_C), width))
-        path_slopes(
+        ground, fall, air = path_slopes(
             mean_C,
             self._mean(plain[0]),
             self._mean(plain[1]),
@@ -189,9 +187,7 @@ class PathProblem:
             common,
             step_s,
             0.5 / self.block,  # the first block begins half a sample early
-            ground,
-            fall,
-            air,
+            width,
         )
 
         y, slopes = [], []

@@ -8,11 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.compiled import compiled
 from host.sysid.models.templates import GRAVITY_MPS2
 
 
-@compiled
 def strapdown(
     rates: Array, force: Array, attitude: Array, velocity: Array, dt_s: float
 ) -> tuple[Array, Array]:
@@ -28,46 +26,60 @@ def strapdown(
         At the first sample, north-east-down, m/s.
     dt_s : float
     """
-    n = rates.shape[0]
-    turn = np.zeros((n, 3, 3))
-    moved = np.zeros((n, 3))
-    turned = np.zeros((3, 3))
-    for i in range(3):
-        moved[0, i] = velocity[i]
-        for j in range(3):
-            turn[0, i, j] = attitude[i, j]
-    for k in range(n - 1):
-        x = 0.5 * dt_s * (rates[k, 0] + rates[k + 1, 0])
-        y = 0.5 * dt_s * (rates[k, 1] + rates[k + 1, 1])
-        z = 0.5 * dt_s * (rates[k, 2] + rates[k + 1, 2])
-        angle = np.sqrt(x * x + y * y + z * z)
-        s, c = 1.0, 0.5
-        if angle > 1e-9:
-            s = np.sin(angle) / angle
-            c = (1.0 - np.cos(angle)) / (angle * angle)
-        turned[0, 0] = 1.0 - c * (y * y + z * z)
-        turned[0, 1] = c * x * y - s * z
-        turned[0, 2] = c * x * z + s * y
-        turned[1, 0] = c * x * y + s * z
-        turned[1, 1] = 1.0 - c * (x * x + z * z)
-        turned[1, 2] = c * y * z - s * x
-        turned[2, 0] = c * x * z - s * y
-        turned[2, 1] = c * y * z + s * x
-        turned[2, 2] = 1.0 - c * (x * x + y * y)
-        for i in range(3):
-            felt = 0.0
-            for j in range(3):
-                value = 0.0
-                for m in range(3):
-                    value += turn[k, i, m] * turned[m, j]
-                turn[k + 1, i, j] = value
-                felt += turn[k, i, j] * force[k, j] + value * force[k + 1, j]
-            moved[k + 1, i] = moved[k, i] + 0.5 * dt_s * felt
-        moved[k + 1, 2] += GRAVITY_MPS2 * dt_s
-    return turn, moved
+    turn = _turned_on(attitude, _turns(0.5 * dt_s * (rates[:-1] + rates[1:])))
+    push = np.einsum("nij,nj->ni", turn, force)
+    gained = 0.5 * dt_s * (push[:-1] + push[1:])
+    gained[:, 2] += GRAVITY_MPS2 * dt_s
+    return turn, np.cumsum(np.vstack([velocity, gained]), axis=0)
 
 
-@compiled
+def _turns(angle: Array) -> Array:
+    """Return the matrices (n, 3, 3) of turns by rotation vectors (n, 3), rad.
+
+    Rodrigues' formula, I + sin(a)/a K + (1 - cos(a))/a^2 K^2.
+    """
+    x, y, z = angle.T
+    size = np.sqrt(x * x + y * y + z * z)
+    small = size <= 1e-9
+    safe = np.where(small, 1.0, size)
+    s = np.where(small, 1.0, np.sin(safe) / safe)
+    c = np.where(small, 0.5, (1.0 - np.cos(safe)) / (safe * safe))
+    turn = np.empty((len(angle), 3, 3))
+    turn[:, 0, 0] = 1.0 - c * (y * y + z * z)
+    turn[:, 0, 1] = c * x * y - s * z
+    turn[:, 0, 2] = c * x * z + s * y
+    turn[:, 1, 0] = c * x * y + s * z
+    turn[:, 1, 1] = 1.0 - c * (x * x + z * z)
+    turn[:, 1, 2] = c * y * z - s * x
+    turn[:, 2, 0] = c * x * z - s * y
+    turn[:, 2, 1] = c * y * z + s * x
+    turn[:, 2, 2] = 1.0 - c * (x * x + y * y)
+    return turn
+
+
+def _turned_on(attitude: Array, turns: Array) -> Array:
+    """Return an attitude and what it becomes by every turn in a row, (n + 1, 3, 3).
+
+    The record is cut into about as many pieces as each has samples, all multiplied side by side.
+    """
+    length = max(1, round(len(turns) ** 0.5))
+    pieces = -(-len(turns) // length)
+    rows = np.empty((pieces * length, 3, 3))
+    rows[: len(turns)] = turns
+    rows[len(turns) :] = np.eye(3)
+    rows = rows.reshape(pieces, length, 3, 3)
+    for k in range(1, length):
+        rows[:, k] = rows[:, k - 1] @ rows[:, k]
+    begins = np.empty((pieces + 1, 3, 3))
+    begins[0] = attitude
+    for k in range(pieces):
+        begins[k + 1] = begins[k] @ rows[k, -1]
+    result = np.empty((len(turns) + 1, 3, 3))
+    result[0] = attitude
+    result[1:] = (begins[:-1, None] @ rows).reshape(-1, 3, 3)[: len(turns)]
+    return result
+
+
 def path_slopes(
     C: Array,
     rates: Array,
@@ -80,11 +92,9 @@ def path_slopes(
     own: int,
     step_s: float,
     early: float,
-    velocity: Array,
-    fall: Array,
-    air: Array,
-) -> None:
-    """Integrate how errors of the inertial sensors turn and move the path, block by block.
+    width: int,
+) -> tuple[Array, Array, Array]:
+    """Integrate how errors of the inertial sensors turn and move the path.
 
     Parameters
     ----------
@@ -104,69 +114,49 @@ def path_slopes(
         First column of the errors of the start: of velocity, then of attitude.
     step_s, early : float
         Length of a block, and the share of the first that lies before the first sample.
-    velocity, air : Array, shape (blocks, 3, unknowns)
-        Overwritten: slopes over the ground, and through the air in body axes.
-    fall : Array, shape (blocks, unknowns)
-        Overwritten: slopes of the way downwards, m.
+    width : int
+        Unknowns.
+
+    Returns
+    -------
+    Array, shape (blocks, 3, width)
+        Slopes of the velocity over the ground.
+    Array, shape (blocks, width)
+        Of the way downwards, m.
+    Array, shape (blocks, 3, width)
+        Of the velocity through the air, body axes.
     """
-    free = velocity.shape[2]
-    turned, moved, fallen = np.zeros((3, free)), np.zeros((3, free)), np.zeros((1, free))
-    E, by_rates, by_force = np.zeros((3, free)), np.zeros((3, free)), np.zeros((3, free))
-    for k in range(C.shape[0]):
-        _shares(C[k], rates[k], size[0], place[0], by_rates)
-        _to_middle(by_rates, step_s, early if k == 0 else 0.0, turned, E)
-        for i in range(3):
-            E[i, own + 3 + i] += 1.0
-        _shares(C[k], force[k], size[1], place[1], by_force)
-        V = velocity[k]
-        for i in range(3):
-            a, b = (i + 1) % 3, (i + 2) % 3
-            for q in range(free):
-                by_force[i, q] -= felt[k, a] * E[b, q] - felt[k, b] * E[a, q]
-        _to_middle(by_force, step_s, early if k == 0 else 0.0, moved, V)
-        for i in range(3):
-            V[i, own + i] += 1.0
-        _to_middle(V[2:], step_s, early if k == 0 else 0.0, fallen, fall[k : k + 1])
-        for i in range(3):
-            a, b = (i + 1) % 3, (i + 2) % 3
-            for q in range(free):
-                by_force[i, q] = V[i, q] + through[k, a] * E[b, q] - through[k, b] * E[a, q]
-        for i in range(2):
-            if wind[i] >= 0:
-                by_force[i, wind[i]] -= 1.0
-        for i in range(3):
-            for q in range(free):
-                air[k, i, q] = (
-                    C[k, 0, i] * by_force[0, q]
-                    + C[k, 1, i] * by_force[1, q]
-                    + C[k, 2, i] * by_force[2, q]
-                )
+    axes = np.arange(3)
+    E = _to_middle(_shares(C, rates, size[0], place[0], width), step_s, early)
+    E[:, axes, own + 3 + axes] += 1.0
+    pushed = _shares(C, force, size[1], place[1], width) - np.cross(felt[:, :, None], E, axis=1)
+    ground = _to_middle(pushed, step_s, early)
+    ground[:, axes, own + axes] += 1.0
+    fall = _to_middle(ground[:, 2], step_s, early)
+    moved = ground + np.cross(through[:, :, None], E, axis=1)
+    for axis in np.flatnonzero(wind >= 0):
+        moved[:, axis, wind[axis]] -= 1.0
+    return ground, fall, C.transpose(0, 2, 1) @ moved
 
 
-@compiled
-def _shares(C: Array, signal: Array, size: Array, place: IntArray, out: Array) -> None:
-    """Put what errors of a triple of sensors make of its signal, turned by C, into `out`."""
-    for i in range(3):
-        for q in range(out.shape[1]):
-            out[i, q] = 0.0
-        for axis in range(3):
-            a, b = (axis + 1) % 3, (axis + 2) % 3
-            if place[axis, 0] >= 0:
-                out[i, place[axis, 0]] -= C[i, axis] / size[axis]
-            if place[axis, 1] >= 0:
-                out[i, place[axis, 1]] -= C[i, axis] * signal[axis] / size[axis]
-            if place[axis, 2] >= 0:  # a turn about the axis
-                out[i, place[axis, 2]] += C[i, b] * signal[a] - C[i, a] * signal[b]
+def _shares(C: Array, signal: Array, size: Array, place: IntArray, width: int) -> Array:
+    """Return what errors of a triple of sensors make of its signal, turned by C."""
+    out = np.zeros((len(C), 3, width))
+    for axis in range(3):
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        bias, scale, tilt = place[axis]
+        if bias >= 0:
+            out[:, :, bias] -= C[:, :, axis] / size[axis]
+        if scale >= 0:
+            out[:, :, scale] -= C[:, :, axis] * (signal[:, axis, None] / size[axis])
+        if tilt >= 0:  # a turn about the axis
+            out[:, :, tilt] += C[:, :, b] * signal[:, a, None] - C[:, :, a] * signal[:, b, None]
+    return out
 
 
-@compiled
-def _to_middle(mean: Array, step_s: float, early: float, total: Array, out: Array) -> None:
-    """Integrate a block's mean to its middle into `out`, to its end into `total`."""
-    for i in range(mean.shape[0]):
-        for q in range(mean.shape[1]):
-            total[i, q] -= early * mean[i, q]
-            out[i, q] = step_s * (total[i, q] + 0.5 * mean[i, q])
-            total[i, q] += mean[i, q]
+def _to_middle(mean: Array, step_s: float, early: float) -> Array:
+    """Integrate means of blocks to the middle of each."""
+    return np.asarray(step_s * (np.cumsum(mean, axis=0) - 0.5 * mean - early * mean[0]))
 
 
 def rotation(phi: float, theta: float, psi: float) -> Array:

@@ -23,8 +23,8 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 from host.sysid.numerics.differentiation import signal_bandwidth_hz
+from host.sysid.numerics.discretisation import transition
 from host.sysid.numerics.inverse import covariance_of
-from host.sysid.numerics.kernels import transition
 from host.sysid.numerics.problem import check_shapes
 
 Spectrum = NDArray[np.complexfloating]

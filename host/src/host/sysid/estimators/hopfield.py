@@ -28,7 +28,8 @@ from host.sysid.models.diagnostics import thesis_program_error_percent
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
-from host.sysid.numerics.kernels import simulate, transition
+from host.sysid.numerics.discretisation import transition
+from host.sysid.numerics.recursion import simulate
 
 LAMBDA = 0.001  # thesis, section 3.2.3
 RHO = 200.0

@@ -19,7 +19,7 @@ from host.sysid.estimators.start import start_values_of
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
-from host.sysid.numerics.kernels import transition
+from host.sysid.numerics.discretisation import transition
 from host.sysid.numerics.problem import check_shapes
 
 PASSES = 2  # over the record: the second starts from the parameters of the first

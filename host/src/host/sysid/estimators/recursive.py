@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.arrays import Array
-from host.compiled import compiled
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
 from host.sysid.estimators.rows import Row, regression_rows, solve_normal
@@ -28,36 +27,34 @@ START_VARIANCE = 1e8  # of scaled regressors: a start that weighs nothing
 SPREAD_HZ = 0.04  # spacing of the running transforms
 
 
-@compiled
 def update(theta: Array, P: Array, regressors: Array, targets: Array, forgetting: float) -> Array:
-    """Run recursive least squares over samples, in place; returns the history of theta."""
-    samples, n = regressors.shape
-    history = np.zeros((samples, n))
-    gain = np.zeros(n)
-    for k in range(samples):
-        x = regressors[k]
-        total = forgetting
-        for i in range(n):
-            value = 0.0
-            for j in range(n):
-                value += P[i, j] * x[j]
-            gain[i] = value
-            total += x[i] * value
-        miss = targets[k]
-        for i in range(n):
-            miss -= x[i] * theta[i]
-        for i in range(n):
-            theta[i] += gain[i] / total * miss
-        for i in range(n):
-            for j in range(n):
-                P[i, j] = (P[i, j] - gain[i] * gain[j] / total) / forgetting
-        for i in range(n):
-            for j in range(i):
-                mean = 0.5 * (P[i, j] + P[j, i])
-                P[i, j] = mean
-                P[j, i] = mean
-        for i in range(n):
-            history[k, i] = theta[i]
+    """Run recursive least squares over samples, in place.
+
+    Parameters
+    ----------
+    theta : Array, shape (n,)
+        Estimate before and after.
+    P : Array, shape (n, n)
+        Its covariance in units of the residuals' variance, before and after.
+    regressors : Array, shape (samples, n)
+    targets : Array, shape (samples,)
+    forgetting : float
+        Weight of the past per sample.
+
+    Returns
+    -------
+    Array, shape (samples, n)
+        The estimate after every sample.
+    """
+    history = np.empty_like(regressors)
+    for x, target, after in zip(regressors, targets, history, strict=True):
+        gain = P @ x
+        total = forgetting + x @ gain
+        theta += gain / total * (target - x @ theta)
+        P -= np.outer(gain, gain / total)
+        P /= forgetting
+        P[...] = 0.5 * (P + P.T)
+        after[:] = theta
     return history
 
 

@@ -23,9 +23,9 @@ from host.sysid.estimators.rows import Row, regression_rows, solve_rows
 from host.sysid.models.diagnostics import CONDITION_LIMIT
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
-from host.sysid.numerics.kernels import simulate
 from host.sysid.numerics.output_error import Optimum, minimise
 from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.recursion import simulate
 
 LADDERS_RADPS = ((2.0, 0.5), (6.0, 1.5, 0.4))  # rates of following, one search each
 CORNERS_RADPS = (0.5, 2.0, 6.0, 20.0)  # of the lag: slow and fast motions of small aircraft

@@ -16,7 +16,7 @@ from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
-from host.sysid.numerics.kernels import transition
+from host.sysid.numerics.discretisation import transition
 from host.sysid.numerics.problem import OutputProblem
 from host.sysid.numerics.riccati import innovations, predicted_covariance
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array, IntArray
+from host.sysid.numerics.discretisation import transition
 from host.sysid.numerics.filter_problem import FilterProblem, Gain, Likelihood
 from host.sysid.numerics.filter_slopes import GainSlopes, gain_slopes, matrix_slopes
-from host.sysid.numerics.kernels import transition
-from host.sysid.numerics.riccati import innovation_slopes
+from host.sysid.numerics.recursion import propagate
 
 
 def scoring(
@@ -137,13 +137,15 @@ def _innovation_slopes(
     push[n + w :, :, :common] = np.einsum("iaq,aj->jiq", step_slopes[:, :n, :common], gain.K)
     for part, own in ((slice(0, common), slice(0, common)), (noise, slice(common, None))):
         push[n + w :, :, part] += np.einsum("ia,qaj->jiq", gain.F, by.K[own])
-    # A row of z drives all sensitivities by one product; only what depends on the last is a loop.
     z = point.z[number]
-    drive = (z @ push.reshape(len(push), -1)).reshape(len(z), n, width)
-    seen = -(gain.whitener @ tap).reshape(n + w, -1)
-    out = (z[:, : n + w] @ seen).reshape(len(z), p, width)
-    innovation_slopes(gain.F - FK @ CD[:, :n], gain.whitener @ CD[:, :n], start, drive, out)
-    return out.reshape(-1, width)
+    out = np.empty((p, len(z), width))
+    whitened_C = gain.whitener @ CD[:, :n]
+    propagate(gain.F - FK @ CD[:, :n], push.transpose(1, 0, 2), z, whitened_C, start, out)
+    # What an innovation feels at a known state; the rest it feels by the state.
+    known_state = -(gain.whitener @ tap).reshape(n + w, -1)
+    slopes = (z[:, : n + w] @ known_state).reshape(len(z), p, width)
+    slopes -= out.transpose(1, 0, 2)
+    return np.asarray(slopes.reshape(-1, width))
 
 
 def summed(

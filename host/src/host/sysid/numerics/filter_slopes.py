@@ -8,8 +8,8 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.models.model import LinearModel
+from host.sysid.numerics.discretisation import transition
 from host.sysid.numerics.filter_problem import FilterProblem, Gain, van_loan
-from host.sysid.numerics.kernels import transition
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,9 @@ from host.arrays import Array, IntArray
 from host.sysid.errors import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import EntryTable, LinearModel
-from host.sysid.numerics.kernels import delayed, propagate, simulate, transition
+from host.sysid.numerics.delay import delayed
+from host.sysid.numerics.discretisation import transition
+from host.sysid.numerics.recursion import propagate, simulate
 
 
 @dataclass(frozen=True, slots=True)

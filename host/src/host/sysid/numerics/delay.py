@@ -1,0 +1,47 @@
+"""Signals read a fraction of a sample earlier or later."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from host.arrays import Array
+
+
+def delayed(values: Array, shift: float) -> tuple[Array, Array]:
+    """Delay each column by `shift` samples with cubic interpolation.
+
+    Parameters
+    ----------
+    values : Array, shape (samples, columns)
+        Four samples or more; the first and last lean on the nearest four.
+    shift : float
+        Samples.
+
+    Returns
+    -------
+    Array, Array
+        The delayed columns and their slope by the shift, of the shape of `values`.
+    """
+    samples = len(values)
+    position = np.arange(samples) - shift
+    base = np.clip(np.floor(position).astype(np.int64), 1, samples - 3)
+    s = position - base
+    # Lagrange's polynomials of the samples at -1, 0, 1, 2, and their derivatives.
+    weights = (
+        -s * (s - 1.0) * (s - 2.0) / 6.0,
+        (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0,
+        -(s + 1.0) * s * (s - 2.0) / 2.0,
+        (s + 1.0) * s * (s - 1.0) / 6.0,
+    )
+    rates = (
+        -(3.0 * s * s - 6.0 * s + 2.0) / 6.0,
+        (3.0 * s * s - 4.0 * s - 1.0) / 2.0,
+        -(3.0 * s * s - 2.0 * s - 2.0) / 2.0,
+        (3.0 * s * s - 1.0) / 6.0,
+    )
+    late, slope = np.zeros_like(values), np.zeros_like(values)
+    for k, (weight, rate) in enumerate(zip(weights, rates, strict=True), start=-1):
+        near = values[base + k]
+        late += weight[:, None] * near
+        slope -= rate[:, None] * near
+    return late, slope

@@ -1,0 +1,106 @@
+"""From continuous matrices to a sample's transition, with exact derivatives.
+
+One block exponential gives [Phi Gamma] for inputs that are held or run linearly (Van Loan, IEEE
+Transactions on Automatic Control 23 (1978)), by scaling, a Taylor series and squaring.
+"""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+
+from host.arrays import Array, IntArray
+
+TAYLOR_ORDER = 14  # 0.5^15 / 15! = 2e-17: below double precision for a scaled norm of 0.5
+SCALED_NORM = 0.5
+MOST_SQUARINGS = 40
+TAYLOR = np.array([1.0 / factorial(k) for k in range(TAYLOR_ORDER + 1)])
+# The slope of M^k/k! is the sum of M^a dM M^b / k! over a + b = k - 1: 1/(a + b + 1)! for a and b.
+BOTH_SIDES = np.array(
+    [
+        [TAYLOR[a + b + 1] if a + b < TAYLOR_ORDER else 0.0 for b in range(TAYLOR_ORDER)]
+        for a in range(TAYLOR_ORDER)
+    ]
+)
+
+
+def transition(
+    AB: Array,
+    n_states: int,
+    n_inputs: int,
+    foh: bool,
+    dt_s: float,
+    row: IntArray,
+    column: IntArray,
+    parameter: IntArray,
+    gain: Array,
+    n_parameters: int,
+) -> tuple[Array, Array]:
+    """Discretise [A B b] and its derivatives.
+
+    Parameters
+    ----------
+    AB : Array, shape (n, n + inputs + 1)
+        Per second; the last column is a constant rate.
+    n_states, n_inputs : int
+    foh : bool
+        Inputs run linearly between samples (first-order hold); held otherwise.
+    dt_s : float
+        Sample period, s.
+    row, column, parameter : IntArray, shape (entries,)
+        Which entry of `AB` moves with which parameter.
+    gain : Array, shape (entries,)
+        By how much.
+    n_parameters : int
+
+    Returns
+    -------
+    Array, shape (n, n + w)
+        [Phi Gamma]; w = inputs + 1, or 2 inputs + 1 with inputs running linearly (the last `inputs`
+        columns act on the increments).
+    Array, shape (n, n + w, parameters)
+        Derivatives.
+    """
+    wide = n_states + n_inputs + 1
+    size = wide + n_inputs if foh else wide
+    M = np.zeros((size, size))
+    M[:n_states, :wide] = AB * dt_s
+    if foh:
+        ramp = np.arange(n_inputs)
+        M[n_states + ramp, wide + ramp] = 1.0
+    norm = float(np.max(np.sum(np.abs(M), axis=1)))
+    squarings = 0
+    while norm > SCALED_NORM and squarings < MOST_SQUARINGS:
+        norm *= 0.5
+        squarings += 1
+    scale = 0.5**squarings
+    powers = _powers(M * scale)
+    E = (TAYLOR @ powers.reshape(len(TAYLOR), -1)).reshape(size, size)
+    slopes = np.zeros((n_states, size, n_parameters))
+    if n_parameters:
+        # Rows below the states never depend on a parameter.
+        left = powers[:-1, :n_states, :n_states].reshape(TAYLOR_ORDER, -1)
+        right = powers[:-1].reshape(TAYLOR_ORDER, -1)
+        by_entry = (left.T @ (BOTH_SIDES @ right)).reshape(n_states, n_states, size, size)
+        share = np.zeros((len(row), n_parameters))
+        share[np.arange(len(row)), parameter] = gain * (dt_s * scale)
+        slopes = by_entry[:, row, column].transpose(0, 2, 1) @ share
+    for _ in range(squarings):
+        if n_parameters:
+            above = E[:n_states, :n_states] @ slopes.reshape(n_states, -1)
+            slopes = above.reshape(slopes.shape) + E.T @ slopes
+        E = E @ E
+    return E[:n_states].copy(), slopes
+
+
+def _powers(M: Array) -> Array:
+    """Return M^0 to M^`TAYLOR_ORDER`, by doubling."""
+    powers = np.empty((TAYLOR_ORDER + 1, *M.shape))
+    powers[0], powers[1] = np.eye(len(M)), M
+    known = 1
+    while known < TAYLOR_ORDER:
+        more = min(known, TAYLOR_ORDER - known)
+        np.matmul(powers[known], powers[1 : more + 1], out=powers[known + 1 : known + more + 1])
+        known += more
+    return powers
