@@ -202,6 +202,20 @@ TEST_CASE("fresh says that at most one frame is missing") {
   CHECK_EQ(receiver.decoder.valid(), kAll);
 }
 
+TEST_CASE("channels that rise at once are unsteady at once") {
+  Receiver receiver;
+  receiver.sequential = false;
+  receiver.frames(5);
+  receiver.sent = 0;
+  uint8_t turns = 0;
+  for (; turns < 100 && receiver.decoder.steady() == kAll; ++turns) {
+    receiver.wait_until(receiver.now + kMs);
+  }
+  CHECK(turns < 100);
+  CHECK_EQ(receiver.decoder.steady(), 0);
+  CHECK_EQ(receiver.decoder.valid(), kAll);
+}
+
 TEST_CASE("a late stamp costs its pulse, never a wrong width") {
   Receiver receiver;
   receiver.sequential = false;
@@ -285,6 +299,8 @@ TEST_CASE("a storm loses every channel at once") {
   receiver.frames(5);
   receiver.decoder.storm();
   CHECK_EQ(receiver.decoder.valid(), 0);
+  CHECK_EQ(receiver.decoder.fresh(), 0);
+  CHECK_EQ(receiver.decoder.steady(), 0);
   CHECK_EQ(receiver.decoder.width_ticks(4), 0);
   receiver.frames(4);
   CHECK(receiver.all_right());
