@@ -9,7 +9,7 @@ import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
 from host.sysid.aerodynamics.conversion import Place, to_derivatives
-from host.sysid.answer.panels import Bar, interval_bars
+from host.sysid.answer.panels import Bar, interval_bars, save
 from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.coefficients.flight import CoefficientAnswer, identify_coefficients, joined
 from host.sysid.coefficients.modes import coefficient_modes, quantities
@@ -217,14 +217,14 @@ def test_aileron_and_rudder_flown_together_are_one_window() -> None:
 def test_bars_that_are_marked_are_red(tmp_path: Path) -> None:
     path = tmp_path / "bars.svg"
     known = [Bar("Y_v", -0.9, 0.1, 0.9, marked=False), Bar("Y_p", 0.1, 0.09, 0.1, marked=False)]
-    assert RED not in interval_bars(known, "refused", path).read_text()
+    assert RED not in save(interval_bars(known, "refused"), path).read_text()
     marked = Bar("Z_q", 1.0, 0.1, 1.0, marked=True)
-    assert RED in interval_bars([*known, marked], "refused", path).read_text()
+    assert RED in save(interval_bars([*known, marked], "refused"), path).read_text()
 
 
 def test_the_truth_of_a_simulated_flight_is_a_diamond(tmp_path: Path) -> None:
     def words(bar: Bar) -> str:
-        return interval_bars([bar], "flagged", tmp_path / "bars.svg").read_text()
+        return save(interval_bars([bar], "flagged"), tmp_path / "bars.svg").read_text()
 
     plain = words(Bar("Cm_q", -11.0, 1.4, 11.0, marked=False))
     assert "simulated" not in plain

@@ -14,10 +14,11 @@ from host.sysid.answer.panels import (
     histories,
     interval_bars,
     pole_map,
+    save,
     shown,
     spectra,
 )
-from host.sysid.answer.pictures import draw
+from host.sysid.answer.pictures import draw, save_all
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import read_columns
 
@@ -41,7 +42,7 @@ def test_every_method_shows_outputs_beside_outputs(
         assert simulated.shape == maneuver.outputs.shape
         gap = np.std(simulated - maneuver.outputs, axis=0) / np.std(maneuver.outputs, axis=0)
         assert gap.max() < 0.6
-    written = draw(answer, tmp_path, "x")
+    written = save_all(draw(answer, "x"), tmp_path)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in written)
     words = (tmp_path / "x_fit.svg").read_text()
     kind = "one step" if method == "extended-kalman" else "free simulation"
@@ -64,13 +65,16 @@ def test_the_largest_and_the_emptiest_are_drawn(tmp_path: Path) -> None:
     bars = [Bar("a", 1.0, 9.0, 1.0, True, -50.0), Bar("b", 0.0, 0.0, 1e-300, False)]
     close = [Cloud(n, p, np.full(9, p.real), np.full(9, p.imag)) for n, p in
              (("phugoid", -0.3 + 0.7j), ("spiral", 0.1 + 0j), ("roll", -20.0 + 0j))]  # fmt: skip
-    for path in (
-        histories({"p_radps": many}, "many", tmp_path / "a.svg"),
-        spectra(inputs, [("roll", 3.0)], "many", tmp_path / "b.svg"),
-        spectra([], [], "none", tmp_path / "c.svg"),
-        interval_bars(bars, "two", tmp_path / "d.svg"),
-        interval_bars([], "none", tmp_path / "e.svg"),
-        pole_map(close, "close", tmp_path / "f.svg"),
-        pole_map([], "none", tmp_path / "g.svg"),
+    for number, figure in enumerate(
+        (
+            histories({"p_radps": many}, "many"),
+            spectra(inputs, [("roll", 3.0)], "many"),
+            spectra([], [], "none"),
+            interval_bars(bars, "two"),
+            interval_bars([], "none"),
+            pole_map(close, "close"),
+            pole_map([], "none"),
+        )
     ):
+        path = save(figure, tmp_path / f"{number}.svg")
         assert path.read_text().rstrip().endswith("</svg>")

@@ -102,12 +102,12 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         text = found.to_json()
         # What was written is said before the answer, so that no answer follows an error.
-        _say(found.write(places))
+        _say(found.save(places))
         print(text)
         return int(ExitCode.OK)
     text = found.to_text(shutil.get_terminal_size().columns)
     try:
-        written = found.write(places)
+        written = found.save(places)
     finally:
         print(text)  # the answer is not lost with its file
     _say(written)

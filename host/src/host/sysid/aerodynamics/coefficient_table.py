@@ -14,19 +14,21 @@ import numpy as np
 from host.aircraft.gains import dimensional_name, from_dimensional
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
-from host.sysid.models.result import FitResult
+from host.sysid.models.result import NORMAL_95, FitResult
+from host.sysid.models.systematic import main_cause, systematic_covariance
 from host.sysid.models.templates import Trim
 
 
 @dataclass(frozen=True, slots=True)
 class Coefficient:
     """A non-dimensional derivative: value, standard error of the fit alone, 95 % half-width with
-    everything."""
+    everything, and what widens that most."""
 
     name: str
     value: float
     fit_error: float
     half_width: float
+    widened_by: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,40 +80,64 @@ def coefficients(
         own. Errors of pitot and vanes are what pressure and upwash allow for: the larger counts.
     """
 
-    def converted(derivatives: Array, a: AirframeData, at: Condition) -> dict[str, float]:
-        return from_dimensional(dict(zip(result.names, derivatives.tolist(), strict=True)), a, at)
+    def converted(derivatives: Array, a: AirframeData, at: Condition) -> Array:
+        table = from_dimensional(dict(zip(result.names, derivatives.tolist(), strict=True)), a, at)
+        return np.array([table[name] for name in names])
 
-    found = converted(result.estimate, airframe, condition)
+    names = list(
+        from_dimensional(
+            dict(zip(result.names, result.estimate.tolist(), strict=True)), airframe, condition
+        )
+    )
+    value = converted(result.estimate, airframe, condition)
     # Coefficients go with derivatives in proportion.
-    slopes = [converted(row, airframe, condition) for row in np.eye(len(result.names))]
-    wrong = {
-        cause: (share, converted(result.estimate, a, at))
+    slopes = np.stack(
+        [converted(row, airframe, condition) for row in np.eye(len(result.names))], axis=1
+    )
+    fit_error = np.sqrt(np.einsum("ij,jk,ik->i", slopes, result.covariance, slopes))
+    assumed: dict[str, Array] = {
+        cause: (converted(result.estimate, a, at) - value) / WIGGLE * share
         for cause, (share, a, at) in _assumed(airframe, condition).items()
     }
-    elsewhere = []
+    turned = np.array([name.endswith(("_alpha", "_beta")) for name in names])
+    assumed[VANE] = np.asarray(turned * value * airframe.upwash * airframe.upwash_share)
+    sensed: dict[str, list[Array]] = {}
     for m in moved:
         there = Condition(condition.airspeed_mps * m.airspeed_gain, condition.qbar_pa * m.qbar_gain)
-        elsewhere.append((SHARED.get(m.error, m.error), converted(m.estimate, airframe, there)))
+        shift = converted(m.estimate, airframe, there) - value
+        sensed.setdefault(SHARED.get(m.error, m.error), []).append(shift)
+    parts = _variances(assumed, sensed)
+    extra = sum(parts.values(), np.zeros(len(names)))
     quantile = result.half_width() / np.maximum(result.standard_error, 1e-300)
-    answer = []
-    for name, value in found.items():
-        slope = np.array([row[name] for row in slopes])
-        fit_error = float(np.sqrt(slope @ result.covariance @ slope))
-        allowed = {
-            cause: ((other[name] - value) / WIGGLE * share) ** 2
-            for cause, (share, other) in wrong.items()
-        }
-        if name.endswith(("_alpha", "_beta")):
-            allowed[VANE] = (value * airframe.upwash * airframe.upwash_share) ** 2
-        by_sensors: dict[str, float] = {}
-        for cause, other in elsewhere:
-            by_sensors[cause] = by_sensors.get(cause, 0.0) + (other[name] - value) ** 2
-        extra = sum(max(part, by_sensors.pop(cause, 0.0)) for cause, part in allowed.items())
-        extra += sum(by_sensors.values())
-        main = float(quantile[result.names.index(dimensional_name(name))])
-        half = float(np.hypot(main * fit_error, 1.96 * np.sqrt(extra)))
-        answer.append(Coefficient(name, value, fit_error, half))
-    return tuple(answer)
+    main = np.array([quantile[result.names.index(dimensional_name(name))] for name in names])
+    half = np.hypot(main * fit_error, NORMAL_95 * np.sqrt(extra))
+    return tuple(
+        Coefficient(
+            name,
+            float(value[k]),
+            float(fit_error[k]),
+            float(half[k]),
+            main_cause(
+                {cause: float(part[k]) for cause, part in parts.items()},
+                float(fit_error[k] ** 2 + extra[k]),
+            ),
+        )
+        for k, name in enumerate(names)
+    )
+
+
+def _variances(assumed: dict[str, Array], sensed: dict[str, list[Array]]) -> dict[str, Array]:
+    """Return what each cause adds to the variances of all coefficients.
+
+    Errors of pitot and vanes are what pressure and upwash allow for: the larger counts.
+    """
+    found = {
+        cause: np.diag(systematic_covariance(np.stack(shifts))) for cause, shifts in sensed.items()
+    }
+    for cause, shift in assumed.items():
+        allowed = np.diag(systematic_covariance(shift[None]))
+        found[cause] = np.maximum(allowed, found.get(cause, 0.0))
+    return found
 
 
 WIGGLE = 1e-4  # share by which what is known is moved, to see what that does

@@ -31,9 +31,9 @@ from host.sysid.answer.units import parameter_unit
 from host.sysid.errors import IdentificationError
 from host.sysid.models.document import read_document
 from host.sysid.models.model_file import read_model, read_trim
+from host.sysid.models.result import NORMAL_95
 from host.sysid.models.templates import Trim, template
 
-QUANTILE = 1.96
 STANDARD_KGPM3 = 1.225  # of the standard atmosphere at sea level
 NAMED_SHARE = 0.25  # of the variance: a smaller part is not worth naming
 IN_WORDS = {
@@ -85,7 +85,7 @@ class Converted:
 
     def half_width(self, name: str) -> float:
         """Return the 95 % half-width of a converted number."""
-        return QUANTILE * self.found.deviation(name)
+        return NORMAL_95 * self.found.deviation(name)
 
     def widened_by(self, name: str) -> str:
         """Return in words what known error widens a converted number most; nothing if little."""
@@ -131,7 +131,7 @@ def convert(path: Path, aircraft: str, at: At) -> Converted:
     quantities = Quantities(
         tuple(given),
         np.array([value for value, _ in given.values()]),
-        np.diag([(half / QUANTILE) ** 2 for _, half in given.values()]),
+        np.diag([(half / NORMAL_95) ** 2 for _, half in given.values()]),
     )
     place = Place(airframe, Condition(speed, 0.5 * at.density_kgpm3 * speed**2), alpha)
     turn = to_coefficients if dimensional else to_derivatives
@@ -199,7 +199,7 @@ def conversion_lines(done: Converted) -> list[str]:
     ]
     for name in done.given.names:
         other = OTHER[name]
-        half = QUANTILE * done.given.deviation(name)
+        half = NORMAL_95 * done.given.deviation(name)
         lines.append(
             f"  {name:9s} {done.given.value(name):10.4g} +- {half:8.2g} {_unit(name):6s}"
             f"  {other:9s} {done.found.value(other):10.4g} +- {done.half_width(other):8.2g}"
@@ -224,7 +224,7 @@ def conversion_document(done: Converted) -> dict[str, Any]:
         "density_kgpm3": done.density_kgpm3,
         "to": "coefficients" if done.dimensional else "derivatives",
         "given": {
-            n: {"value": done.given.value(n), "half_width": QUANTILE * done.given.deviation(n)}
+            n: {"value": done.given.value(n), "half_width": NORMAL_95 * done.given.deviation(n)}
             for n in done.given.names
         },
         "converted": {

@@ -65,9 +65,9 @@ def mode_document(modes: Sequence[Mode]) -> list[dict[str, Any]]:
             "name": m.name,
             "eigenvalue": [m.eigenvalue.real, m.eigenvalue.imag],
             "frequency_radps": m.frequency_radps,
-            "frequency_half_width_radps": 1.96 * m.frequency_sd_radps,
+            "frequency_half_width_radps": m.frequency_half_width_radps,
             "damping": m.damping,
-            "damping_half_width": 1.96 * m.damping_sd,
+            "damping_half_width": m.damping_half_width,
         }
         for m in modes
     ]

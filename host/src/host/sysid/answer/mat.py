@@ -154,9 +154,9 @@ def _modes(modes: Sequence[Mode]) -> dict[str, Any]:
         "names": _cells(m.name for m in modes),
         "eigenvalue": np.array([m.eigenvalue for m in modes]),
         "frequency_radps": np.array([m.frequency_radps for m in modes]),
-        "frequency_half_width_radps": np.array([1.96 * m.frequency_sd_radps for m in modes]),
+        "frequency_half_width_radps": np.array([m.frequency_half_width_radps for m in modes]),
         "damping": np.array([m.damping for m in modes]),
-        "damping_half_width": np.array([1.96 * m.damping_sd for m in modes]),
+        "damping_half_width": np.array([m.damping_half_width for m in modes]),
     }
 
 

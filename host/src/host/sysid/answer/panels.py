@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -76,40 +75,40 @@ class Excitation:
     values: Array
 
 
-def histories(signals: dict[str, list[Trace]], title: str, path: Path) -> Path:
+def histories(signals: dict[str, list[Trace]], title: str) -> Figure:
     """Draw each signal measured and by the model, the difference beneath; angles in degrees."""
     rows = len(signals)
     count = max((len(traces) for traces in signals.values()), default=1)
-    with _figure(path, (max(9.0, 1.1 * count), 2.2 * rows)) as figure:
-        panels = figure.subplots(2 * rows, 1, squeeze=False, height_ratios=[3, 1] * rows)
-        axes = list(panels[:, 0])
-        for k, (name, traces) in enumerate(signals.items()):
-            over, under = axes[2 * k], axes[2 * k + 1]
-            label, scale = shown(name)
-            for trace in traces:
-                measured, model = scale * trace.measured, scale * trace.model
-                over.plot(trace.t_s, measured, color=MEASURED, lw=2.4)
-                over.plot(trace.t_s, model, color=MODEL, lw=0.8)
-                under.plot(trace.t_s, measured - model, color=RESIDUAL, lw=0.6)
-            under.axhline(0.0, color="0.8", lw=0.6, zorder=0)
-            over.set_ylabel(label, fontsize=8)
-            under.set_ylabel("difference", fontsize=6)
-            for axis in (over, under):
-                axis.tick_params(labelsize=7, labelbottom=axis is axes[-1])
-                axis.set_xlim(over.get_xlim())
-            for trace in traces:
-                over.annotate(
-                    _broken(trace.title) if count > IN_A_LINE else trace.title,
-                    (float(trace.t_s[0]), 1.0),
-                    xycoords=("data", "axes fraction"),
-                    xytext=(0, 2),
-                    textcoords="offset points",
-                    fontsize=6,
-                )
-        figure.suptitle(title, fontsize=10)
-        axes[-1].set_xlabel("time, maneuvers one behind the other, s", fontsize=8)
-        figure.align_ylabels(axes)
-    return path
+    figure = _figure((max(9.0, 1.1 * count), 2.2 * rows))
+    panels = figure.subplots(2 * rows, 1, squeeze=False, height_ratios=[3, 1] * rows)
+    axes = list(panels[:, 0])
+    for k, (name, traces) in enumerate(signals.items()):
+        over, under = axes[2 * k], axes[2 * k + 1]
+        label, scale = shown(name)
+        for trace in traces:
+            measured, model = scale * trace.measured, scale * trace.model
+            over.plot(trace.t_s, measured, color=MEASURED, lw=2.4)
+            over.plot(trace.t_s, model, color=MODEL, lw=0.8)
+            under.plot(trace.t_s, measured - model, color=RESIDUAL, lw=0.6)
+        under.axhline(0.0, color="0.8", lw=0.6, zorder=0)
+        over.set_ylabel(label, fontsize=8)
+        under.set_ylabel("difference", fontsize=6)
+        for axis in (over, under):
+            axis.tick_params(labelsize=7, labelbottom=axis is axes[-1])
+            axis.set_xlim(over.get_xlim())
+        for trace in traces:
+            over.annotate(
+                _broken(trace.title) if count > IN_A_LINE else trace.title,
+                (float(trace.t_s[0]), 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(0, 2),
+                textcoords="offset points",
+                fontsize=6,
+            )
+    figure.suptitle(title, fontsize=10)
+    axes[-1].set_xlabel("time, maneuvers one behind the other, s", fontsize=8)
+    figure.align_ylabels(axes)
+    return figure
 
 
 def shown(name: str) -> tuple[str, float]:
@@ -125,127 +124,125 @@ def _broken(title: str) -> str:
     return title.replace(" on ", "\n").replace(" at ", "\n")
 
 
-def pole_map(clouds: Sequence[Cloud], title: str, path: Path) -> Path:
+def pole_map(clouds: Sequence[Cloud], title: str) -> Figure:
     """Draw all poles, and each mode with its scatter in a panel of its own scale."""
     rows = (len(clouds) + 1) // 2
-    with _figure(path, (8.0, 3.4 + 2.4 * rows)) as figure:
-        grid = figure.add_gridspec(1 + rows, 2, height_ratios=[3] + [2] * rows)
-        whole = figure.add_subplot(grid[0, :])
-        for cloud in clouds:
-            _cloud(whole, cloud)
-        whole.axvline(0.0, color="0.7", lw=0.8)
-        whole.axhline(0.0, color="0.9", lw=0.8, zorder=0)
-        whole.margins(x=0.08, y=0.12)
-        if not any(abs(cloud.pole.imag) > 0.0 for cloud in clouds):
-            whole.set_ylim(-1.0, 1.0)  # else the scale is that of rounding
-        _name_poles(whole, [(c.name, c.pole) for c in clouds])
-        whole.set_xlabel("real, 1/s")
-        whole.set_ylabel("imaginary, rad/s")
-        whole.set_title(title, fontsize=10)
-        for k, cloud in enumerate(clouds):
-            near = figure.add_subplot(grid[1 + k // 2, k % 2])
-            if cloud.pole.imag:
-                _cloud(near, cloud, mirrored=False)
-                near.set_ylabel("imaginary, rad/s", fontsize=7)
-            else:
-                near.hist(cloud.real, bins=24, color=RESIDUAL, alpha=0.5)
-                near.axvline(cloud.pole.real, color=MODEL, lw=1.6)
-                near.set_ylabel("draws", fontsize=7)
-            near.set_title(cloud.name, fontsize=8)
-            near.set_xlabel("real, 1/s", fontsize=7)
-            near.tick_params(labelsize=7)
-            near.locator_params(axis="x", nbins=5)
-            if near.get_xlim()[1] > 0.0:
-                near.axvline(0.0, color="0.7", lw=0.8)
-    return path
+    figure = _figure((8.0, 3.4 + 2.4 * rows))
+    grid = figure.add_gridspec(1 + rows, 2, height_ratios=[3] + [2] * rows)
+    whole = figure.add_subplot(grid[0, :])
+    for cloud in clouds:
+        _cloud(whole, cloud)
+    whole.axvline(0.0, color="0.7", lw=0.8)
+    whole.axhline(0.0, color="0.9", lw=0.8, zorder=0)
+    whole.margins(x=0.08, y=0.12)
+    if not any(abs(cloud.pole.imag) > 0.0 for cloud in clouds):
+        whole.set_ylim(-1.0, 1.0)  # else the scale is that of rounding
+    _name_poles(whole, [(c.name, c.pole) for c in clouds])
+    whole.set_xlabel("real, 1/s")
+    whole.set_ylabel("imaginary, rad/s")
+    whole.set_title(title, fontsize=10)
+    for k, cloud in enumerate(clouds):
+        near = figure.add_subplot(grid[1 + k // 2, k % 2])
+        if cloud.pole.imag:
+            _cloud(near, cloud, mirrored=False)
+            near.set_ylabel("imaginary, rad/s", fontsize=7)
+        else:
+            near.hist(cloud.real, bins=24, color=RESIDUAL, alpha=0.5)
+            near.axvline(cloud.pole.real, color=MODEL, lw=1.6)
+            near.set_ylabel("draws", fontsize=7)
+        near.set_title(cloud.name, fontsize=8)
+        near.set_xlabel("real, 1/s", fontsize=7)
+        near.tick_params(labelsize=7)
+        near.locator_params(axis="x", nbins=5)
+        if near.get_xlim()[1] > 0.0:
+            near.axvline(0.0, color="0.7", lw=0.8)
+    return figure
 
 
-def interval_bars(bars: Sequence[Bar], title: str, path: Path) -> Path:
+def interval_bars(bars: Sequence[Bar], title: str) -> Figure:
     """Draw each parameter's interval as a share of its scale; red where it is marked.
 
     The scale is the estimate, or what would contribute 5 % of its row's largest.
     """
-    with _figure(path, (8.5, 0.32 * len(bars) + 1.8)) as figure:
-        axis = figure.subplots()
-        widest = max((100.0 * b.half_width / b.scale for b in bars), default=0.0)
-        reach = float(np.clip(1.15 * widest, 15.0, REACH))
-        axis.axvspan(-TRUSTED, TRUSTED, color="0.93", lw=0.0, zorder=0)
-        for position, bar in enumerate(reversed(bars)):
-            share = 100.0 * bar.half_width / bar.scale
-            colour = REFUSED if bar.marked else RESIDUAL
-            axis.errorbar(0.0, position, xerr=min(share, reach), color=colour, fmt="o", ms=4)
-            if share > reach:
-                for side in (-reach, reach):
-                    axis.plot(side, position, "<" if side < 0.0 else ">", color=colour, ms=5)
-            if bar.truth is not None:
-                off = 100.0 * (bar.truth - bar.value) / bar.scale
-                axis.plot(np.clip(off, -reach, reach), position, "D", color=TRUTH, ms=4, mfc="none")
-            axis.annotate(
-                f"{bar.value:.4g} ± {bar.half_width:.2g}",
-                (1.01, position),
-                xycoords=("axes fraction", "data"),
-                fontsize=7,
-                va="center",
-            )
-        axis.set_xlim(-1.05 * reach, 1.05 * reach)
-        axis.set_ylim(-0.7, len(bars) - 0.3)
-        axis.set_yticks(range(len(bars)), [b.name for b in reversed(bars)], fontsize=8)
-        axis.tick_params(axis="x", labelsize=7)
-        axis.axvline(0.0, color="0.85", lw=0.8, zorder=0)
-        axis.set_title(title, fontsize=10)
-        known = any(bar.truth is not None for bar in bars)
-        axis.set_xlabel(
-            "95 % interval about the estimate, % of it, or of what would contribute 5 % of its"
-            " row's largest\ngrey: within 10 %; red: not to be relied on; arrows: beyond the scale"
-            + ("; diamonds: the simulated aircraft" if known else ""),
-            fontsize=8,
+    figure = _figure((8.5, 0.32 * len(bars) + 1.8))
+    axis = figure.subplots()
+    widest = max((100.0 * b.half_width / b.scale for b in bars), default=0.0)
+    reach = float(np.clip(1.15 * widest, 15.0, REACH))
+    axis.axvspan(-TRUSTED, TRUSTED, color="0.93", lw=0.0, zorder=0)
+    for position, bar in enumerate(reversed(bars)):
+        share = 100.0 * bar.half_width / bar.scale
+        colour = REFUSED if bar.marked else RESIDUAL
+        axis.errorbar(0.0, position, xerr=min(share, reach), color=colour, fmt="o", ms=4)
+        if share > reach:
+            for side in (-reach, reach):
+                axis.plot(side, position, "<" if side < 0.0 else ">", color=colour, ms=5)
+        if bar.truth is not None:
+            off = 100.0 * (bar.truth - bar.value) / bar.scale
+            axis.plot(np.clip(off, -reach, reach), position, "D", color=TRUTH, ms=4, mfc="none")
+        axis.annotate(
+            f"{bar.value:.4g} ± {bar.half_width:.2g}",
+            (1.01, position),
+            xycoords=("axes fraction", "data"),
+            fontsize=7,
+            va="center",
         )
-    return path
+    axis.set_xlim(-1.05 * reach, 1.05 * reach)
+    axis.set_ylim(-0.7, len(bars) - 0.3)
+    axis.set_yticks(range(len(bars)), [b.name for b in reversed(bars)], fontsize=8)
+    axis.tick_params(axis="x", labelsize=7)
+    axis.axvline(0.0, color="0.85", lw=0.8, zorder=0)
+    axis.set_title(title, fontsize=10)
+    known = any(bar.truth is not None for bar in bars)
+    axis.set_xlabel(
+        "95 % interval about the estimate, % of it, or of what would contribute 5 % of its"
+        " row's largest\ngrey: within 10 %; red: not to be relied on; arrows: beyond the scale"
+        + ("; diamonds: the simulated aircraft" if known else ""),
+        fontsize=8,
+    )
+    return figure
 
 
-def spectra(
-    inputs: Sequence[Excitation], modes: Sequence[tuple[str, float]], title: str, path: Path
-) -> Path:
+def spectra(inputs: Sequence[Excitation], modes: Sequence[tuple[str, float]], title: str) -> Figure:
     """Draw the spectra of inputs and the modes, name and Hz, that they should excite."""
     lines = (len(inputs) + 1) // 2
-    with _figure(path, (8.0, 4.2 + 0.16 * lines)) as figure:
-        axis = figure.subplots()
-        for number, item in enumerate(inputs):
-            series = np.degrees(item.values - item.values.mean())
-            padded = 8 * len(series)
-            size = np.abs(np.fft.rfft(series, padded)) * item.dt_s
-            axis.semilogx(
-                np.fft.rfftfreq(padded, item.dt_s)[1:],
-                size[1:],
-                lw=1.1,
-                color=f"C{number % COLOURS}",
-                ls=STROKES[number // COLOURS % len(STROKES)],
-                label=item.label,
+    figure = _figure((8.0, 4.2 + 0.16 * lines))
+    axis = figure.subplots()
+    for number, item in enumerate(inputs):
+        series = np.degrees(item.values - item.values.mean())
+        padded = 8 * len(series)
+        size = np.abs(np.fft.rfft(series, padded)) * item.dt_s
+        axis.semilogx(
+            np.fft.rfftfreq(padded, item.dt_s)[1:],
+            size[1:],
+            lw=1.1,
+            color=f"C{number % COLOURS}",
+            ls=STROKES[number // COLOURS % len(STROKES)],
+            label=item.label,
+        )
+    low, high = SHOWN_HZ
+    for name, hertz in modes:
+        if low < hertz < high:
+            axis.axvline(hertz, color="0.5", lw=0.8, ls="--", zorder=0)
+            axis.annotate(
+                name,
+                (hertz, 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(0, 3),
+                textcoords="offset points",
+                rotation=90,
+                fontsize=7,
+                ha="center",
+                va="bottom",
             )
-        low, high = SHOWN_HZ
-        for name, hertz in modes:
-            if low < hertz < high:
-                axis.axvline(hertz, color="0.5", lw=0.8, ls="--", zorder=0)
-                axis.annotate(
-                    name,
-                    (hertz, 1.0),
-                    xycoords=("data", "axes fraction"),
-                    xytext=(0, 3),
-                    textcoords="offset points",
-                    rotation=90,
-                    fontsize=7,
-                    ha="center",
-                    va="bottom",
-                )
-        axis.set_xlim(low, high)
-        axis.set_ylim(bottom=0.0)
-        axis.tick_params(labelsize=7)
-        axis.set_xlabel("frequency, Hz", fontsize=8)
-        axis.set_ylabel("spectrum of the input, deg s", fontsize=8)
-        figure.suptitle(title, fontsize=10)
-        if inputs:
-            figure.legend(loc="outside lower center", ncols=2, fontsize=7, frameon=False)
-    return path
+    axis.set_xlim(low, high)
+    axis.set_ylim(bottom=0.0)
+    axis.tick_params(labelsize=7)
+    axis.set_xlabel("frequency, Hz", fontsize=8)
+    axis.set_ylabel("spectrum of the input, deg s", fontsize=8)
+    figure.suptitle(title, fontsize=10)
+    if inputs:
+        figure.legend(loc="outside lower center", ncols=2, fontsize=7, frameon=False)
+    return figure
 
 
 def _name_poles(axis: Axes, poles: Sequence[tuple[str, complex]]) -> None:
@@ -274,9 +271,8 @@ def _cloud(axis: Axes, cloud: Cloud, *, mirrored: bool = True) -> None:
         axis.plot(cloud.pole.real, side * cloud.pole.imag, "x", color=MODEL, ms=8, mew=1.6)
 
 
-@contextmanager
-def _figure(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
-    """Give an empty figure, save it at the end.
+def _figure(size: tuple[float, float]) -> Figure:
+    """Return an empty figure.
 
     Raises
     ------
@@ -292,6 +288,17 @@ def _figure(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
         ) from error
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasSVG(figure)
-    yield figure
+    return figure
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure, whole or not at all; return where.
+
+    Raises
+    ------
+    IdentificationError
+        If it cannot be written.
+    """
     with whole(path) as part:
         figure.savefig(part)
+    return path

@@ -18,6 +18,7 @@ from host.sysid.answer.panels import (
     histories,
     interval_bars,
     pole_map,
+    save,
     spectra,
 )
 from host.sysid.answer.truth import true_coefficients
@@ -30,6 +31,8 @@ from host.sysid.models.diagnostics import references
 from host.sysid.models.modes import Mode
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from host.sysid.coefficients.flight import CoefficientAnswer
 
 SCATTER = 300
@@ -38,25 +41,44 @@ EXCITED = "inputs (lines) and the modes they should excite (dashed)"
 GAP_S = 0.5  # between the maneuvers of a picture
 
 
-def draw_all(answers: Sequence[Answer], folder: Path) -> list[Path]:
-    """Write the pictures of several answers; those of one model by several methods side by side.
+def draw_all(
+    answers: Sequence[Answer],
+    direct: CoefficientAnswer | None,
+    columns: Mapping[str, Array],
+    truth: dict[str, Any] | None = None,
+) -> dict[str, Figure]:
+    """Return the pictures of several answers by name; of one model by several methods apart.
+
+    Parameters
+    ----------
+    answers : sequence of Answer
+    direct : CoefficientAnswer or None
+    columns : mapping
+        The flight the coefficients were made of; its surfaces give the spectrum of the inputs.
+    truth : dict, optional
+        Truth file of a simulated flight, drawn beside the intervals.
 
     Raises
     ------
     IdentificationError
         If matplotlib is missing.
     """
-    written = []
+    found: dict[str, Figure] = {}
     for template, same in groupby(sorted(answers, key=lambda a: a.template), _template):
         several = list(same)
         for answer in several:
             name = template if len(several) == 1 else f"{template}_{answer.method}"
-            written += draw(answer, folder, name)
-    return written
+            found |= draw(answer, name)
+    return found | (draw_coefficients(direct, columns, truth) if direct else {})
 
 
-def draw(answer: Answer, folder: Path, name: str) -> list[Path]:
-    """Write all pictures of one answer as SVG, their names beginning with `name`.
+def save_all(pictures: Mapping[str, Figure], folder: Path) -> list[Path]:
+    """Write pictures as SVG under their names and return where."""
+    return [save(figure, folder / f"{name}.svg") for name, figure in pictures.items()]
+
+
+def draw(answer: Answer, name: str) -> dict[str, Figure]:
+    """Return all pictures of one answer, their names beginning with `name`.
 
     Raises
     ------
@@ -90,39 +112,29 @@ def draw(answer: Answer, folder: Path, name: str) -> list[Path]:
         for j, column in enumerate(answer.model.inputs)
         if np.ptp(maneuver.inputs[:, j]) > MOVED_SHARE * np.max(np.ptp(maneuver.inputs, axis=0))
     ]
-    return [
-        histories(traces, title, folder / f"{name}_fit.svg"),
-        pole_map(
-            _clouds(answer.modes),
-            f"{answer.template}, {answer.method}: poles, scatter from the covariance",
-            folder / f"{name}_poles.svg",
+    about = f"{answer.template}, {answer.method}"
+    return {
+        f"{name}_fit": histories(traces, title),
+        f"{name}_poles": pole_map(
+            _clouds(answer.modes), f"{about}: poles, scatter from the covariance"
         ),
-        interval_bars(
-            bars, f"{answer.template}, {answer.method}", folder / f"{name}_intervals.svg"
-        ),
-        spectra(
-            inputs,
-            _hertz(answer.modes),
-            f"{answer.template}: {EXCITED}",
-            folder / f"{name}_input.svg",
-        ),
-    ]
+        f"{name}_intervals": interval_bars(bars, about),
+        f"{name}_input": spectra(inputs, _hertz(answer.modes), f"{answer.template}: {EXCITED}"),
+    }
 
 
 def draw_coefficients(
     answer: CoefficientAnswer,
     columns: Mapping[str, Array],
-    folder: Path,
     truth: dict[str, Any] | None = None,
-) -> list[Path]:
-    """Write the pictures of a direct fit of coefficients as SVG and return their paths.
+) -> dict[str, Figure]:
+    """Return the pictures of a direct fit of coefficients by name.
 
     Parameters
     ----------
     answer : CoefficientAnswer
     columns : mapping
         The flight it was made of; its surfaces give the spectrum of the inputs.
-    folder : Path
     truth : dict, optional
         Truth file of a simulated flight, drawn beside the intervals.
 
@@ -151,25 +163,15 @@ def draw_coefficients(
         )
         for f in answer.used
     ]
-    return [
-        histories(
-            signals,
-            "coefficients: measured (grey), one step by the derivatives found (red), fitted data",
-            folder / "coefficients_fit.svg",
+    title = "coefficients: measured (grey), one step by the derivatives found (red), fitted data"
+    return {
+        "coefficients_fit": histories(signals, title),
+        "coefficients_poles": pole_map(
+            _clouds(answer.modes), "coefficients: poles, scatter from the covariance"
         ),
-        pole_map(
-            _clouds(answer.modes),
-            "coefficients: poles, scatter from the covariance",
-            folder / "coefficients_poles.svg",
-        ),
-        interval_bars(bars, "coefficients", folder / "coefficients_intervals.svg"),
-        spectra(
-            inputs,
-            _hertz(answer.modes),
-            f"coefficients: {EXCITED}",
-            folder / "coefficients_input.svg",
-        ),
-    ]
+        "coefficients_intervals": interval_bars(bars, "coefficients"),
+        "coefficients_input": spectra(inputs, _hertz(answer.modes), f"coefficients: {EXCITED}"),
+    }
 
 
 def _template(answer: Answer) -> str:

@@ -132,11 +132,9 @@ def write(
     elif places.model is not None and places.model.suffix.lower() == ".toml":
         written += _write_models(places.model, answers, (*places.given, *written))
     if places.plots is not None:
-        from host.sysid.answer.pictures import draw_all, draw_coefficients
+        from host.sysid.answer.pictures import draw_all, save_all
 
-        written += draw_all(answers, places.plots)
-        if direct:
-            written += draw_coefficients(direct, columns, places.plots, truth)
+        written += save_all(draw_all(answers, direct, columns, truth), places.plots)
     return written
 
 

@@ -134,10 +134,10 @@ def compared_modes(
         if mode.name not in true:
             continue
         frequency, damping = true[mode.name]
-        half = 1.96 * mode.frequency_sd_radps
+        half = mode.frequency_half_width_radps
         if mode.oscillatory and abs(damping) < 1.0:
             found.append(Compared(mode.name, mode.frequency_radps, half, frequency, frequency))
-            half = 1.96 * mode.damping_sd
+            half = mode.damping_half_width
             label = f"{mode.name}, damping"
             found.append(Compared(label, mode.damping, half, damping, abs(damping)))
         elif not mode.oscillatory and abs(damping) == 1.0:

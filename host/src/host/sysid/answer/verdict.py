@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,10 @@ UNPREDICTED = 0.5  # NRMSE of an output of an unseen maneuver
 PART = 0.25  # of a mode's participation: a state that makes it what it is
 MIXED = 0.98  # correlation of two inputs
 WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
+# What a parameter may be used for, best first.
+MARKS = TRUSTED, CAREFUL, SMALL, UNSURE, USELESS = (
+    "trust", "use with care", "less than 5 % of the row", "do not rely on", "do not use",
+)  # fmt: skip
 NEEDS = {
     "alpha": "an elevator 3-2-1-1 at the short-period frequency",
     "q": "a quicker elevator 3-2-1-1",
@@ -55,11 +60,35 @@ def maneuver_lines(graded: Sequence[tuple[Found, Grade]]) -> list[str]:
     return lines
 
 
-def words(answers: Sequence[Answer], notes: Sequence[str]) -> list[str]:
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What of one model may be relied on.
+
+    Attributes
+    ----------
+    heading : str
+        The model, its maneuvers and method.
+    marks : dict
+        Parameter to one of `MARKS`; what is neither derivative nor coefficient has none.
+    lines : tuple of str
+        The same in words, with the reasons and what to fly again; the heading is the first.
+    """
+
+    heading: str
+    marks: dict[str, str]
+    lines: tuple[str, ...]
+
+
+def verdict_of(answer: Answer | CoefficientAnswer) -> Verdict:
+    """Return the verdict of one answer, a linear model or coefficients fitted directly."""
+    return _linear_verdict(answer) if isinstance(answer, Answer) else _direct_verdict(answer)
+
+
+def words(answers: Sequence[Answer | CoefficientAnswer], notes: Sequence[str]) -> list[str]:
     """Return the verdict: notes first, then per model what to trust and what to re-fly."""
     lines = [f"note: {note}" for note in notes]
     for answer in answers:
-        lines += _verdict(answer)
+        lines += verdict_of(answer).lines
     return lines
 
 
@@ -68,7 +97,20 @@ def taken_out(answers: Sequence[Answer]) -> list[str]:
     return correction_words(answers[0].corrections) if answers else []
 
 
-def _verdict(answer: Answer) -> list[str]:
+def _headed(marks: Mapping[str, str], mark: str) -> list[str]:
+    """Return the names under a heading."""
+    return [name for name, own in marks.items() if own == mark]
+
+
+def _first_lines(heading: str, marks: Mapping[str, str], fair: float) -> list[str]:
+    """Return the heading, then what is within a tenth and what within `fair` of its size."""
+    lines = [heading, f"  trust (within 10 %):  {', '.join(_headed(marks, TRUSTED)) or 'nothing'}"]
+    if careful := _headed(marks, CAREFUL):
+        lines.append(f"  use with care (10 to {100.0 * fair:.0f} %):  {', '.join(careful)}")
+    return lines
+
+
+def _linear_verdict(answer: Answer) -> Verdict:
     result = answer.result
     half = result.half_width()
     refused = {r.name for r in answer.refused}
@@ -76,39 +118,50 @@ def _verdict(answer: Answer) -> list[str]:
     lost = unpredicted(answer)
     doubted = _entries_of(answer, lost)
     both = _of_both(answer)
-    trusted, fair, loose, little = [], [], [], []
-    for k, parameter in enumerate(answer.model.parameters):
-        name = parameter.name
-        if name in refused or name.startswith("imu_") or half[k] == 0.0:  # on a bound: warned of
-            continue
-        if name in doubted or name in both:
-            continue
-        share = float(half[k]) / max(float(size[k]), 1e-300)
-        if share <= FAIR and size[k] > abs(float(result.estimate[k])):
-            little.append(name)
-        elif share <= TRUST:
-            trusted.append(name)
-        elif share <= FAIR:
-            fair.append(name)
-        else:
-            loose.append(f"{name} ({ceil(100.0 * share)} %)")
-    lines = [
+    heading = (
         f"{answer.template}: {_fitted(len(answer.used))} by"
         f" {result.method}, {len(answer.held_out)} held out"
-    ]
+    )
+    marks, loose = {}, []
+    for k, parameter in enumerate(answer.model.parameters):
+        name = parameter.name
+        if name.startswith("imu_"):  # a place of a sensor, not of the aircraft
+            continue
+        share = float(half[k]) / max(float(size[k]), 1e-300)
+        if not result.converged:
+            marks[name] = USELESS
+        elif name in refused:
+            grade = next(r.grade for r in answer.refused if r.name == name)
+            marks[name] = USELESS if grade == CANNOT else UNSURE
+        elif half[k] == 0.0 or name in doubted or name in both:  # on a bound: warned of
+            marks[name] = UNSURE
+        elif share <= FAIR and size[k] > abs(float(result.estimate[k])):
+            marks[name] = SMALL
+        elif share <= FAIR:
+            marks[name] = TRUSTED if share <= TRUST else CAREFUL
+        else:
+            marks[name] = UNSURE
+            loose.append(f"{name} ({ceil(100.0 * share)} %)")
+    lines = _first_lines(heading, marks, FAIR)
     if not result.converged:
-        lines.append("  no convergence: estimates and intervals mean nothing, use another method")
-        trusted, fair, loose, little = [], [], [], []
-    lines.append(f"  trust (within 10 %):  {', '.join(trusted) or 'nothing'}")
-    if fair:
-        lines.append(f"  use with care (10 to 30 %):  {', '.join(fair)}")
+        wrong = "  no convergence: estimates and intervals mean nothing, use another method"
+        lines.insert(1, wrong)
     if loose:
         lines.append(f"  do not rely on (above 30 %):  {', '.join(loose)}")
-    if little:
+    if little := _headed(marks, SMALL):
         lines.append(f"  less than 5 % of their row, known to be:  {', '.join(little)}")
     if doubted - refused:
         names = ", ".join(n for n in answer.model.parameter_names if n in doubted - refused)
         lines.append(f"  do not rely on {names}, whatever the interval: {_why(answer, lost)}")
+    lines += _refusals(answer)
+    lines += _inputs(answer, both)
+    lines += _data(answer)
+    return Verdict(heading, marks, tuple(lines))
+
+
+def _refusals(answer: Answer) -> list[str]:
+    """Return what cannot be told and why, and what to fly to learn it."""
+    lines = []
     for refusal in answer.refused:
         if not refusal.name.startswith("imu_"):
             warning = "do not use" if refusal.grade == CANNOT else "doubtful,"
@@ -118,26 +171,37 @@ def _verdict(answer: Answer) -> list[str]:
     }
     if flights:
         lines.append(f"  to learn them, fly {'; '.join(sorted(flights))}")
-    for one, other in together(answer):
-        lines.append(
-            f"  {one} and {other} move together: fly them one at a time, without a mixer, or leave"
-            " one out of a model of your own"
-        )
+    return lines
+
+
+def _inputs(answer: Answer, both: set[str]) -> list[str]:
+    """Return what is said of inputs that moved together, or not at all."""
+    lines = [
+        f"  {one} and {other} move together: fly them one at a time, without a mixer, or leave"
+        " one out of a model of your own"
+        for one, other in together(answer)
+    ]
     if both:
         lines.append(
             f"  do not rely on {', '.join(sorted(both))}: of both inputs, one was left out"
         )
-    for name in answer.still:
-        lines.append(f"  {name} never moved: its derivatives are the bias under another name")
+    lines += [
+        f"  {name} never moved: its derivatives are the bias under another name"
+        for name in answer.still
+    ]
     if answer.together.severe:
         pairs = ", ".join(f"{a} with {b}" for a, b, _ in answer.together.pairs[:3])
         lines.append("  the data are close to collinear" + (f" ({pairs})" if pairs else ""))
-    for name in answer.at_bound:
-        lines.append(
-            f"  {name} is at its bound: no delay of that sensor, but what the model lacks there"
-        )
-    for warning in result.warnings:
-        lines.append(f"  warning: {warning}")
+    return lines
+
+
+def _data(answer: Answer) -> list[str]:
+    """Return what bounds and warnings say, and whether unseen data were predicted."""
+    lines = [
+        f"  {name} is at its bound: no delay of that sensor, but what the model lacks there"
+        for name in answer.at_bound
+    ]
+    lines += [f"  warning: {warning}" for warning in answer.result.warnings]
     poor = [f.name for f in answer.validation if not f.nrmse < UNPREDICTED]
     if answer.validation:
         lines.append(
@@ -277,28 +341,25 @@ def model_lines(answer: Answer) -> list[str]:
     return lines
 
 
-def coefficient_words(answer: CoefficientAnswer) -> list[str]:
-    """Return the verdict of a direct fit of coefficients."""
+def _direct_verdict(answer: CoefficientAnswer) -> Verdict:
     along = sum(w.longitudinal for w in answer.windows)
     own = "" if answer.model == standard_model() else f" by the terms of '{answer.model.name}'"
-    derivatives = answer.fit.derivatives
-    trusted = [d.name for d in derivatives if d.share <= TRUST]
-    fair = [d.name for d in derivatives if d.share > TRUST and not d.flagged]
-    lines = [
+    heading = (
         f"coefficients{own}: {along} maneuvers of the elevator, {len(answer.windows) - along} of"
-        " aileron and rudder fitted jointly, errors of the instrument beside them",
-        f"  trust (within 10 %):  {', '.join(trusted) or 'nothing'}",
-    ]
-    if fair:
-        lines.append(f"  use with care (10 to {100.0 * FLAG_SHARE:.0f} %):  {', '.join(fair)}")
+        " aileron and rudder fitted jointly, errors of the instrument beside them"
+    )
+    marks = {}
+    for d in answer.fit.derivatives:
+        sharp = TRUSTED if d.share <= TRUST else CAREFUL
+        marks[d.name] = sharp if not d.flagged else USELESS if d.share > 1.0 else UNSURE
+    lines = _first_lines(heading, marks, FLAG_SHARE)
     needs = set()
-    for d in derivatives:
+    for d in answer.fit.derivatives:
         if not d.flagged:
             continue
         cause, part = answer.causes.get(d.name, ("", 0.0))
         why = f"{100.0 * part:.0f} % of the variance is {cause}" if cause else "excited too little"
-        known = "do not use" if d.share > 1.0 else "do not rely on"
-        lines.append(f"  {known} {d.name}: +- {100.0 * min(d.share, 99.99):.0f} %, {why}")
+        lines.append(f"  {marks[d.name]} {d.name}: +- {100.0 * min(d.share, 99.99):.0f} %, {why}")
         label = d.name.split("_")[-1]
         needs.add(
             f"measure {cause} better" if cause else f"fly {NEEDS.get(label, 'a larger input')}"
@@ -313,7 +374,7 @@ def coefficient_words(answer: CoefficientAnswer) -> list[str]:
         for k, name in enumerate(repeats.names)
         if repeats.factor[k] > 1.0
     ]
-    return [*lines, _prediction_words(answer)]
+    return Verdict(heading, marks, (*lines, _prediction_words(answer)))
 
 
 def _prediction_words(answer: CoefficientAnswer) -> str:
@@ -373,10 +434,10 @@ def _fitted(count: int) -> str:
 
 
 def _mode_line(mode: Mode) -> str:
-    half = 1.96 * mode.frequency_sd_radps
+    half = mode.frequency_half_width_radps
     if not mode.oscillatory:
         return f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {half:.3f} 1/s"
     return (
         f"  {mode.name}: {mode.frequency_radps:.3f} +- {half:.3f} rad/s,"
-        f" damping {mode.damping:.3f} +- {1.96 * mode.damping_sd:.3f}"
+        f" damping {mode.damping:.3f} +- {mode.damping_half_width:.3f}"
     )

@@ -18,10 +18,10 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, IntArray
 from host.sysid.coefficients.joint import Prediction
 from host.sysid.coefficients.local import Local
+from host.sysid.models.result import NORMAL_95
 from host.sysid.numerics.repeats import Repeats
 
 METHOD = "equation error with instrument errors"
-QUANTILE = 1.96
 FLAG_SHARE = 0.12  # up to it an error beyond 15 % is a case of one in seventy
 SMALL_SHARE = 0.05  # of the row's largest contribution
 SIDEWASH_SHARE = 0.1  # standard deviation of CY_da over CY_beta
@@ -161,7 +161,7 @@ def derivatives(
 
     `sizes` is the rms of each coefficient's regressor; one without is judged by its value alone.
     """
-    halves = QUANTILE * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    halves = NORMAL_95 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     largest: dict[str, float] = {}
     for name, size in sizes.items():
         row = name.split("_")[0]

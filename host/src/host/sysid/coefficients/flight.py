@@ -12,7 +12,7 @@ from host.aircraft.powerplant import NoPropulsionError, Powerplant, powerplant
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
-from host.sysid.coefficients.answer import METHOD, QUANTILE, CoefficientFit
+from host.sysid.coefficients.answer import METHOD, CoefficientFit
 from host.sysid.coefficients.fit import search_coefficients
 from host.sysid.coefficients.joint import Prediction
 from host.sysid.coefficients.model import BODY, WIND, CoefficientModel, standard_model
@@ -24,17 +24,19 @@ from host.sysid.coefficients.outcome import (
     intervals,
     validation,
 )
+from host.sysid.coefficients.pooled import pooled
 from host.sysid.coefficients.windows import LEAST_S, Window
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import FLYING_SHARE, Found, find
 from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
 from host.sysid.models.modes import Mode
+from host.sysid.models.result import NORMAL_95
+from host.sysid.models.systematic import main_cause
 
 NAME = "coefficients"
 LEAD_S = 0.5  # of trim before a maneuver
 SETTLED_S = 3.0  # after the launch
 LONGITUDINAL = (*WIND, *BODY, "Cm")
-NAMED_SHARE = 0.25  # of the variance: a smaller part is not worth naming
 CAUSES = {
     "mass": ("mass_share",),
     "Ixx": ("ixx_share",),
@@ -75,10 +77,15 @@ class CoefficientAnswer:
     delays: dict[str, tuple[float, float]]
 
     @property
+    def template(self) -> str:
+        """What it is called beside linear models."""
+        return NAME
+
+    @property
     def coefficients(self) -> tuple[Coefficient, ...]:
         """The derivatives as the rest of the package takes them."""
         return tuple(
-            Coefficient(d.name, d.value, d.half_width / QUANTILE, d.half_width)
+            Coefficient(d.name, d.value, d.half_width / NORMAL_95, d.half_width)
             for d in self.fit.derivatives
         )
 
@@ -122,15 +129,54 @@ class CoefficientEstimator:
     instrument: SensorErrorModel
     model: CoefficientModel
 
-    def estimate(self, flights: Sequence[ReconstructedFlight]) -> CoefficientEstimate:
-        """Search coefficients and errors of the instrument together.
+    def estimate(self, flights: Sequence[ReconstructedFlight]) -> tuple[CoefficientEstimate, ...]:
+        """Search coefficients and errors of the instrument together, flight by flight.
 
         Raises
         ------
         IdentificationError
             If a column or an axis is missing, or a term cannot be told at all.
         """
-        [flight] = flights
+        return tuple(self._of_one(flight) for flight in flights)
+
+    def intervals(
+        self, estimate: tuple[CoefficientEstimate, ...]
+    ) -> tuple[CoefficientIntervals, ...]:
+        """Return derivatives with their intervals: geometry, scatter and every error counted."""
+        return tuple(intervals(one.searched) for one in estimate)
+
+    def validation(
+        self,
+        estimate: tuple[CoefficientEstimate, ...],
+        widths: tuple[CoefficientIntervals, ...],
+    ) -> tuple[Prediction | None, ...]:
+        """Predict each maneuver by all others of its flight."""
+        return tuple(validation(one.searched) for one in estimate)
+
+    def answer(
+        self,
+        estimate: tuple[CoefficientEstimate, ...],
+        widths: tuple[CoefficientIntervals, ...],
+        predicted: tuple[Prediction | None, ...],
+    ) -> CoefficientAnswer:
+        """Return the parts of all stages as one answer, with modes and what widens it most."""
+        fits = [
+            coefficient_fit(one.searched, width, unseen)
+            for one, width, unseen in zip(estimate, widths, predicted, strict=True)
+        ]
+        fit = pooled(fits)
+        return CoefficientAnswer(
+            model=self.model,
+            fit=fit,
+            used=tuple(f for one in estimate for f in one.used),
+            windows=tuple(w for one in estimate for w in one.windows),
+            causes=_causes(fit),
+            modes=coefficient_modes(fit, self.airframe),
+            systems=dimensional(fit, self.airframe),
+            delays=_delays(fit, self.instrument),
+        )
+
+    def _of_one(self, flight: ReconstructedFlight) -> CoefficientEstimate:
         columns = flight.recorded
         if "airspeed_mps" not in columns:
             raise IdentificationError("coefficients need the columns airspeed_mps and qbar_pa")
@@ -157,35 +203,6 @@ class CoefficientEstimator:
             self.model,
         )
         return CoefficientEstimate(ended, tuple(found), tuple(spans))
-
-    def intervals(self, estimate: CoefficientEstimate) -> CoefficientIntervals:
-        """Return derivatives with their intervals: geometry, scatter and every error counted."""
-        return intervals(estimate.searched)
-
-    def validation(
-        self, estimate: CoefficientEstimate, widths: CoefficientIntervals
-    ) -> Prediction | None:
-        """Predict each maneuver by all others."""
-        return validation(estimate.searched)
-
-    def answer(
-        self,
-        estimate: CoefficientEstimate,
-        widths: CoefficientIntervals,
-        predicted: Prediction | None,
-    ) -> CoefficientAnswer:
-        """Return the parts of all stages as one answer, with modes and what widens it most."""
-        fit = coefficient_fit(estimate.searched, widths, predicted)
-        return CoefficientAnswer(
-            model=self.model,
-            fit=fit,
-            used=estimate.used,
-            windows=estimate.windows,
-            causes=_causes(fit),
-            modes=coefficient_modes(fit, self.airframe),
-            systems=dimensional(fit, self.airframe),
-            delays=_delays(fit, self.instrument),
-        )
 
 
 def coefficient_estimator(
@@ -277,8 +294,7 @@ def _causes(fit: CoefficientFit) -> dict[str, tuple[str, float]]:
             with_them = fit.covariance[k, at]
             narrowed = with_them @ np.linalg.solve(fit.covariance[np.ix_(at, at)], with_them)
             shares[cause] = float(narrowed / max(fit.covariance[k, k], 1e-300))
-        cause = max(shares, key=shares.__getitem__)
-        if shares[cause] >= NAMED_SHARE:
+        if cause := main_cause(shares, 1.0):
             result[d.name] = (cause, shares[cause])
     return result
 
@@ -289,6 +305,6 @@ def _delays(fit: CoefficientFit, data: SensorErrorModel) -> dict[str, tuple[floa
     table = {"delay_imu_s": ("imu_delay_s", 1.0)}
     table |= {f"delay_{k}_s": (f"{k}_lag_share", -vane_s) for k in ("alpha", "beta")}
     return {
-        name: (scale * fit.errors[key][0], QUANTILE * abs(scale) * fit.errors[key][1])
+        name: (scale * fit.errors[key][0], NORMAL_95 * abs(scale) * fit.errors[key][1])
         for name, (key, scale) in table.items()
     }

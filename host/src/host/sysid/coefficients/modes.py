@@ -14,8 +14,9 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.sysid.aerodynamics.conversion import Quantities
-from host.sysid.coefficients.answer import QUANTILE, CoefficientFit
+from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.models.modes import Mode, longitudinal_names, mode_of
+from host.sysid.models.result import NORMAL_95
 from host.sysid.models.templates import GRAVITY_MPS2
 
 PAIRS = ("dutch roll", "roll and spiral")
@@ -120,7 +121,7 @@ def dimensional(fit: CoefficientFit, airframe: AirframeData) -> dict[str, System
                 [(m[k][part] - base[k][part]) / s for m, s in zip(moved, steps, strict=True)]
             )
             variance = np.einsum("iab,ij,jab->ab", slope, fit.covariance, slope)
-            halves.append(QUANTILE * np.sqrt(np.maximum(variance, 0.0)))
+            halves.append(NORMAL_95 * np.sqrt(np.maximum(variance, 0.0)))
         found[name] = System(states, inputs, *base[k], *halves)
     return found
 

@@ -10,6 +10,7 @@ import numpy as np
 from host.arrays import Array, BoolArray, IntArray
 from host.sysid.coefficients.stretches import Sums
 from host.sysid.errors import IdentificationError
+from host.sysid.models.systematic import systematic_covariance
 
 LOST = 1e12  # by which a variance grows where a regressor never moves, or is the same as others
 STILL = 1e-30  # a sum of squares below it is rounding
@@ -63,7 +64,7 @@ def stepped(
     drawn = -inverse @ sums.normal[:, considered]
     drawn[considered] = np.eye(len(considered))
     covariance = inverse @ (sums.meat + known.information) @ inverse.T
-    covariance += (drawn * sd**2) @ drawn.T
+    covariance += systematic_covariance((drawn * sd).T)
     return Step(inverse @ right, covariance, normal, right, inverse)
 
 

@@ -28,6 +28,7 @@ from host.sysid.estimators.innovations import innovations_of
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel, without_outputs
 from host.sysid.models.result import FitResult
+from host.sysid.models.systematic import systematic_covariance
 from host.sysid.models.templates import TEMPLATES, Trim, template
 from host.sysid.numerics.problem import OutputProblem
 
@@ -117,7 +118,7 @@ def carried(result: FitResult, moved: Sequence[Moved]) -> FitResult:
     if not moved:
         return result
     shifts = np.stack([m.estimate - result.estimate for m in moved])
-    covariance = result.covariance + shifts.T @ shifts
+    covariance = result.covariance + systematic_covariance(shifts)
     # Welch-Satterthwaite: what is carried is no small sample of maneuvers.
     own = np.diag(result.covariance) / np.maximum(np.diag(covariance), 1e-300)
     freedom = result.degrees_of_freedom / np.maximum(own, 1e-6) ** 2

@@ -225,7 +225,7 @@ def _no_column(array: Any) -> str:
     return f"a {size} array, not one column" if array.ndim > 1 else ""
 
 
-def same_length(columns: Mapping[str, Array], source: Path) -> None:
+def same_length(columns: Mapping[str, Array], source: str) -> None:
     """Refuse columns of different lengths.
 
     Raises

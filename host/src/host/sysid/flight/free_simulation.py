@@ -17,14 +17,11 @@ from host.sysid.models.result import FitResult
 from host.sysid.numerics.problem import OutputProblem
 
 
-def free_simulation(
-    model: LinearModel, result: FitResult, maneuvers: Sequence[Maneuver]
-) -> list[Array]:
-    """Return the outputs of a fitted model over maneuvers, each (samples, outputs).
+def free_simulation(frozen: LinearModel, maneuvers: Sequence[Maneuver]) -> list[Array]:
+    """Return the outputs of a model without free parameters over maneuvers, (samples, outputs).
 
-    Dynamics are frozen at the estimate; NaN where the model diverges.
+    Biases and start states that the model has are fitted to each; NaN where it diverges.
     """
-    frozen = _frozen(model, result)
     simulated = []
     for maneuver in maneuvers:
         try:
@@ -49,7 +46,7 @@ def fits_of(
     return signal_fits(model.outputs, [m.outputs for m in maneuvers], residuals)
 
 
-def _frozen(model: LinearModel, result: FitResult) -> LinearModel:
+def frozen_model(model: LinearModel, result: FitResult) -> LinearModel:
     """Return the model frozen at the estimate, biases and start states left free."""
     count = len(model.parameters)
     A, B, C, D = model.matrices(result.estimate[:count])

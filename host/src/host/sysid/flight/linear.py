@@ -30,7 +30,7 @@ from host.sysid.flight.carried import carried, systematic_error_shifts
 from host.sysid.flight.chosen import moving, once
 from host.sysid.flight.departures import Departure, departure
 from host.sysid.flight.finder import Found, Grade, find, grade
-from host.sysid.flight.free_simulation import fits_of, free_simulation
+from host.sysid.flight.free_simulation import fits_of, free_simulation, frozen_model
 from host.sysid.flight.linear_model import (
     AXIS_OF,
     DEFAULT_METHOD,
@@ -265,12 +265,13 @@ class LinearEstimator:
             y.shape == m.outputs.shape for y, m in zip(total.fitted, e.maneuvers, strict=True)
         )
         same = ours and not intervals.shifts
-        simulated = list(total.fitted) if same else free_simulation(e.model, total, e.maneuvers)
+        frozen = frozen_model(e.model, total)
+        simulated = list(total.fitted) if same else free_simulation(frozen, e.maneuvers)
         unseen = [m.cut(e.model) for m in e.held_out]
         return LinearValidation(
             tuple(simulated),
             fits_of(e.model, e.maneuvers, simulated),
-            fits_of(e.model, unseen, free_simulation(e.model, total, unseen)),
+            fits_of(e.model, unseen, free_simulation(frozen, unseen)),
         )
 
     def answer(

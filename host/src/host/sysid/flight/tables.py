@@ -32,6 +32,8 @@ from host.terminal import command_line
 if TYPE_CHECKING:
     import pandas as pd
 
+    from host.log import FlightLog
+
 ANGLES = ("alpha_rad", "beta_rad", "phi_rad", "theta_rad", "psi_rad")
 USED = (
     "airspeed_mps", "alpha_rad", "beta_rad", "p_radps", "q_radps", "r_radps",
@@ -58,7 +60,7 @@ MOST_EMPTY = 20  # rows of the even grid for each row that was recorded
 
 
 def read_columns(
-    source: Path,
+    source: Path | FlightLog | pd.DataFrame,
     mapping: Path | None = None,
     *,
     calibration: Path | None = None,
@@ -68,8 +70,9 @@ def read_columns(
 
     Parameters
     ----------
-    source : Path
-        ``.bin`` log, ``.csv``, ``.parquet`` or ``.mat``; a folder is read as a log.
+    source : Path, FlightLog or DataFrame
+        ``.bin`` log, ``.csv``, ``.parquet`` or ``.mat``; a folder is read as a log. What
+        `host.read_log` returns, its table, or any table of SI columns.
     mapping : Path, optional
         TOML map of foreign names, units and signs.
     calibration : Path, optional
@@ -83,16 +86,8 @@ def read_columns(
         If the file or the map cannot be used.
     """
     wanted = ("t_s", *USED, *(name for name in also if name not in USED))
-    file_or_folder(source, IdentificationError)
-    kind = source.suffix.lower()
-    found = None
-    if kind not in READ or (kind in TEXT_KINDS[1:] and mapping is None):  # rows of the original
-        found = _recorded(source, calibration, wanted, maybe_table=kind != ".bin")
-    recorded = found is not None
-    if found is None:
-        found = read_foreign(source)
-        if calibration is not None:
-            found.notes.append("--calibration is for logs: here only its standard deviations count")
+    found, recorded = _read(source, mapping, calibration, wanted)
+    called = source_name(source)
     raw, notes = dict(found.columns), found.notes
     if mapping is not None:
         lines = read_map(mapping, wanted)
@@ -102,21 +97,64 @@ def read_columns(
         theirs = {}
     if "t_s" not in raw:
         raise IdentificationError(
-            f"{source}: no column t_s; name it in a map (--map); "
+            f"{called}: no column t_s; name it in a map (--map); "
             + listed(found.columns, found.unusable)
         )
     used = {k: raw[k] for k in wanted if k in raw}
     both = [k for k in used if k in found.twice and k not in theirs]
     if both:
-        raise IdentificationError(f"{source}: several columns '{both[0]}': rename them")
+        raise IdentificationError(f"{called}: several columns '{both[0]}': rename them")
     for name in used:
         remark = found.remarks.get(theirs.get(name, name))
         notes += [f"{name}: {remark}"] if remark else []
-    same_length(used, source)
+    same_length(used, called)
     columns = _even(used, notes, foreign=not recorded)
     if not recorded:
         notes += check(columns)
     return columns, notes
+
+
+def source_name(source: str | Path | FlightLog | pd.DataFrame) -> str:
+    """Return what a source is called in an answer: where it was read from, or ``table``."""
+    if isinstance(source, str | Path):
+        return str(source)
+    return str(getattr(source, "path", "table"))
+
+
+def _read(
+    source: Path | FlightLog | pd.DataFrame,
+    mapping: Path | None,
+    calibration: Path | None,
+    wanted: Collection[str],
+) -> tuple[Foreign, bool]:
+    """Return the columns of a source, and whether our logger recorded them."""
+    from host.log import FlightLog
+
+    if isinstance(source, FlightLog):
+        columns, notes = _columns_of(source, wanted)
+        return Foreign(columns, notes=notes), True
+    if not isinstance(source, Path):
+        found = from_frame(_with_its_index(source))
+        if "calibration" in source.attrs:  # of `FlightLog.table`
+            return found, True
+    else:
+        file_or_folder(source, IdentificationError)
+        kind = source.suffix.lower()
+        if kind not in READ or (kind in TEXT_KINDS[1:] and mapping is None):  # original rows
+            log = _recorded(source, calibration, wanted, maybe_table=kind != ".bin")
+            if log is not None:
+                return log, True
+        found = read_foreign(source)
+    if calibration is not None:
+        found.notes.append("--calibration is for logs: here only its standard deviations count")
+    return found, False
+
+
+def _with_its_index(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table with its index as a column, unless that only counts rows."""
+    import pandas as pd
+
+    return table if isinstance(table.index, pd.RangeIndex) else table.reset_index()
 
 
 def _recorded(
@@ -139,7 +177,6 @@ def _recorded(
 def _log(
     source: Path, calibration: Path | None, wanted: Collection[str]
 ) -> tuple[dict[str, Array], list[str]]:
-    from host.decode.summary import calibration_note
     from host.log import read_log
     from host.log.source import find_flights, newest
 
@@ -150,17 +187,29 @@ def _log(
         if len(flights) > 1:
             notes.append(f"{source.name} is the newest of {len(flights)} logs in the folder")
     log = read_log(source, calibration=calibration)
+    raw, found = _columns_of(log, wanted)
+    lost = 0 if log.complete == "complete" else 1  # what is lost is said first
+    return raw, [*found[:lost], *notes, *found[lost:]]
+
+
+def _columns_of(log: FlightLog, wanted: Collection[str]) -> tuple[dict[str, Array], list[str]]:
+    """Return the columns of a log, and what is lost, uncalibrated or only commanded of them."""
+    from host.decode.summary import calibration_note
+
+    notes: list[str] = []
     raw: dict[str, Array] = {
         k: np.asarray(v, dtype=np.float64) for k, v in log.columns().items() if k in wanted
     }
     if not len(raw.get("t_s", ())):
-        look = command_line("host", "info", source)
-        raise IdentificationError(f"{source}: nothing was recorded in it; `{look}` says what it is")
+        look = command_line("host", "info", log.path)
+        raise IdentificationError(
+            f"{log.path}: nothing was recorded in it; `{look}` says what it is"
+        )
     if log.complete != "complete":
         loss = log.loss
         lost = f"{loss.seconds:.2f} s and {loss.lost_bytes} bytes lost" if loss.any else ""
         said = "; ".join(filter(None, (lost, loss.ending)))
-        notes.insert(0, f"the log is {log.complete}: {said} (`host decode` names every place)")
+        notes.append(f"the log is {log.complete}: {said} (`host decode` names every place)")
     poor_columns = [c for c in calibration_note(log)["default_columns"] if c in USED]
     if poor_columns:
         notes.append(

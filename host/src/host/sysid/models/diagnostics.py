@@ -14,7 +14,7 @@ from scipy import special
 from host.arrays import Array
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
+from host.sysid.models.result import NORMAL_95, FitResult
 
 CORRELATED = 0.9
 CONDITION_LIMIT = 1e5  # of the scaled information: correlations beyond all digits of a sensor
@@ -88,7 +88,7 @@ def whiteness(residuals: Sequence[Array], lags: int = 25) -> tuple[float, float]
     correlation = np.array(
         [sum(float(e[k:] @ e[:-k]) for e in residuals) / power for k in range(1, lags + 1)]
     )
-    outside = float(np.mean(np.abs(correlation) > 1.96 / np.sqrt(total)))
+    outside = float(np.mean(np.abs(correlation) > NORMAL_95 / np.sqrt(total)))
     statistic = (
         total * (total + 2.0) * float(np.sum(correlation**2 / (total - np.arange(1, lags + 1))))
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
+from host.sysid.models.result import NORMAL_95, FitResult
 
 REAL = 1e-9  # relative imaginary part below which an eigenvalue is called real
 
@@ -30,6 +30,16 @@ class Mode:
     frequency_sd_radps: float
     damping: float
     damping_sd: float
+
+    @property
+    def frequency_half_width_radps(self) -> float:
+        """Half-width of the 95 % interval of the natural frequency or rate constant."""
+        return NORMAL_95 * self.frequency_sd_radps
+
+    @property
+    def damping_half_width(self) -> float:
+        """Half-width of the 95 % interval of the damping ratio."""
+        return NORMAL_95 * self.damping_sd
 
     @property
     def oscillatory(self) -> bool:

@@ -11,6 +11,8 @@ from host.arrays import Array
 from host.sysid.errors import IdentificationError
 from host.sysid.models.model import LinearModel
 
+NORMAL_95 = 1.96  # standard deviations to either side of a normal distribution that hold 95 %
+
 
 @dataclass(frozen=True)
 class FitResult:

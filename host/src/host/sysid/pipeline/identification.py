@@ -2,65 +2,140 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from host.aircraft.prior.prior_table import PriorTable
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.json import answer_document, coefficient_document, json_text
+from host.sysid.answer.pictures import draw_all
 from host.sysid.answer.prior_comparison import prior_document, prior_lines
-from host.sysid.answer.save import Places, write
+from host.sysid.answer.save import Places, check, write
 from host.sysid.answer.side_by_side import side_by_side
 from host.sysid.answer.truth import against_truth, truth_document
-from host.sysid.answer.verdict import (
-    coefficient_lines,
-    coefficient_words,
-    model_lines,
-    taken_out,
-    words,
-)
+from host.sysid.answer.verdict import coefficient_lines, model_lines, taken_out, words
 from host.sysid.coefficients.flight import CoefficientAnswer
 from host.sysid.compatibility.reconstruction import Compatibility, document
 from host.sysid.compatibility.reconstruction import words as agreement_words
 from host.sysid.flight.linear import Answer
 from host.sysid.flight.reconstructed import ReconstructedFlight
 from host.sysid.pipeline.aircraft_known import AircraftKnown
+from host.sysid.pipeline.html import answer_html
+from host.sysid.pipeline.pictures import Pictures
+from host.sysid.pipeline.prepared import Reading, prepare
+from host.sysid.pipeline.simulation import Simulation, simulate
+from host.sysid.pipeline.table import estimate_table, mode_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from host.sysid.pipeline.prepared import Source
 
 
 @dataclass(frozen=True)
 class Identification:
-    """What one identification found."""
+    """What one identification found.
+
+    Attributes
+    ----------
+    flights : tuple of ReconstructedFlight
+        As recorded and corrected, with the maneuvers found.
+    agreements : tuple of Compatibility or None
+        What the sensors of each flight say of each other.
+    linear : tuple of Answer
+        Of linear models, one of each model and method.
+    coefficients : CoefficientAnswer or None
+        Fitted directly.
+    notes : tuple of str
+        What was done to the data, and which models could not be fitted.
+    """
 
     flights: tuple[ReconstructedFlight, ...]
-    agreement: Compatibility | None
-    aircraft: AircraftKnown | None
-    methods: tuple[str, ...]
-    notes: tuple[str, ...]
+    agreements: tuple[Compatibility | None, ...]
     linear: tuple[Answer, ...]
     coefficients: CoefficientAnswer | None
-    truth: dict[str, Any] | None
-    prior: PriorTable | None
+    notes: tuple[str, ...]
+    methods: tuple[str, ...]
+    reading: Reading
+    aircraft: AircraftKnown | None = None
+    truth: dict[str, Any] | None = None
+    prior: PriorTable | None = None
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Every estimate by model and name: value, 95 % half-width, unit, verdict, main cause."""
+        return estimate_table(self.linear, self.coefficients)
+
+    @cached_property
+    def modes(self) -> pd.DataFrame:
+        """Every mode by model and name, with 95 % half-widths."""
+        return mode_table(self.linear, self.coefficients)
 
     @property
-    def tables(self) -> list[CoefficientTable]:
+    def verdict(self) -> tuple[str, ...]:
+        """What to trust, what not and why, and what to fly again, in lines."""
+        return (*words(self.answers, self.notes), *taken_out(self.linear))
+
+    @property
+    def answers(self) -> tuple[Answer | CoefficientAnswer, ...]:
+        """Every answer: linear models first, then the coefficients fitted directly."""
+        return (*self.linear, self.coefficients) if self.coefficients else self.linear
+
+    @property
+    def coefficient_tables(self) -> list[CoefficientTable]:
         """Coefficients: fitted directly, else those of the linear models."""
         direct = self.coefficients
         return list(direct.tables) if direct else [a.table for a in self.linear]
 
+    def plot(self) -> Pictures:
+        """Return all pictures: time histories, poles, intervals, spectra of the inputs.
+
+        Raises
+        ------
+        IdentificationError
+            If matplotlib is missing.
+        """
+        columns = self.flights[0].recorded
+        return Pictures(draw_all(self.linear, self.coefficients, columns, self.truth))
+
+    def simulate(self, flight: Source, **how: Any) -> Simulation:
+        """Fly every model over another flight by its measured surfaces, biases fitted to each.
+
+        Parameters
+        ----------
+        flight : path, FlightLog or DataFrame
+            Read and corrected as this one was.
+        **how
+            Of `Reading`, where it differs: `calibration`, `mapping`, `maneuvers`, `from_s`, `to_s`.
+
+        Raises
+        ------
+        host.errors.HostError
+            If it cannot be read, or no model can be run over it.
+        """
+        paths = {k: Path(v) for k, v in how.items() if k in ("calibration", "mapping") and v}
+        chosen = {"maneuvers": (), "from_s": None, "to_s": None, **how, **paths}
+        found = prepare(flight, replace(self.reading, **chosen), self.aircraft)
+        return simulate(self.linear, self.coefficients, found.flight, found.notes)
+
     def document(self) -> dict[str, Any]:
-        """Return everything as plain lists, numbers and strings."""
-        direct, agreement = self.coefficients, self.agreement
+        """Return everything as plain lists, numbers and strings; several flights are lists."""
+        direct = self.coefficients
         documents = [answer_document(a, words([a], []) + taken_out([a])) for a in self.linear]
         if direct:
-            documents.append(coefficient_document(direct, coefficient_words(direct)))
+            documents.append(coefficient_document(direct, words([direct], [])))
+        sources = [flight.source for flight in self.flights]
+        agreements = [document(a) if a else None for a in self.agreements]
+        one = len(sources) == 1
         return {
-            "source": self.flights[0].source,
+            "source": sources[0] if one else sources,
             "notes": list(self.notes),
-            "data_compatibility": document(agreement) if agreement else None,
+            "data_compatibility": agreements[0] if one else agreements,
             "answers": documents,
             "truth": truth_document(self.linear, direct, self.truth) if self.truth else None,
-            "prior": prior_document(self.tables, self.prior) if self.prior else None,
+            "prior": prior_document(self.coefficient_tables, self.prior) if self.prior else None,
         }
 
     def to_json(self) -> str:
@@ -75,10 +150,7 @@ class Identification:
         width : int
             Characters of a line of the table of several methods.
         """
-        lines = words(self.linear, self.notes)
-        if self.coefficients:
-            lines += coefficient_words(self.coefficients)
-        lines += taken_out(self.linear)
+        lines = list(self.verdict)
         if len(self.methods) > 1:
             lines += ["", *side_by_side(self.linear, width)]
         else:
@@ -86,14 +158,38 @@ class Identification:
                 lines += ["", *model_lines(answer)]
         if self.coefficients:
             lines += ["", *coefficient_lines(self.coefficients)]
-        if self.agreement:
-            lines += ["", *agreement_words(self.agreement)]
+        for flight, agreement in zip(self.flights, self.agreements, strict=True):
+            if agreement:
+                named = [flight.source] if len(self.flights) > 1 else []
+                lines += ["", *named, *agreement_words(agreement)]
         if self.prior is not None:
-            lines += ["", *prior_lines(self.tables, self.prior)]
+            lines += ["", *prior_lines(self.coefficient_tables, self.prior)]
         if self.truth is not None:
             lines += ["", *against_truth(self.linear, self.coefficients, self.truth)]
         return "\n".join(lines)
 
-    def write(self, places: Places) -> list[Path]:
-        """Write every file asked for and return them."""
-        return write(places, self.linear, self.coefficients, self.flights[0].recorded, self.truth)
+    def save(self, places: Places) -> list[Path]:
+        """Write every file asked for and return them.
+
+        Raises
+        ------
+        IdentificationError
+            If a place cannot be written to, or holds what the answer is made from.
+        """
+        check(places)
+        columns = self.flights[0].recorded
+        return write(places, self.linear, self.coefficients, columns, self.truth)
+
+    def __str__(self) -> str:
+        """Return the answer as people read it."""
+        return self.to_text()
+
+    def __repr__(self) -> str:
+        """Return in a line what was identified of what."""
+        named = ", ".join(a.template for a in self.answers)
+        return f"<Identification of {', '.join(f.source for f in self.flights)}: {named}>"
+
+    def _repr_html_(self) -> str:
+        sources = ", ".join(flight.source for flight in self.flights)
+        tables = {"estimates, 95 % half-widths": self.table, "modes": self.modes}
+        return answer_html(f"identified from {sources}", self.verdict, tables)

@@ -4,28 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorTable
 from host.sysid.answer.truth import read_truth
 from host.sysid.coefficients.flight import CoefficientAnswer, coefficient_estimator
-from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
 from host.sysid.errors import IdentificationError
-from host.sysid.flight.chosen import chosen
 from host.sysid.flight.linear import Answer, LinearEstimator
-from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.reconstructed import ReconstructedFlight
 from host.sysid.pipeline.aircraft_known import AircraftKnown, aircraft_known
 from host.sysid.pipeline.estimator import answer_of
 from host.sysid.pipeline.identification import Identification
+from host.sysid.pipeline.prepared import Reading, prepare, several, told
 from host.sysid.pipeline.wanted import ModelName, Models, wanted_methods, wanted_models
 
-Source = str | Path
+if TYPE_CHECKING:
+    from host.sysid.pipeline.prepared import Source
 
 
 def identify(
-    flights: Source,
+    flights: Source | Sequence[Source],
     *,
     aircraft: str | Path | None = None,
     models: ModelName | Iterable[ModelName] | None = None,
@@ -36,15 +35,17 @@ def identify(
     from_s: float | None = None,
     to_s: float | None = None,
     corrections: bool = True,
-    truth: str | Path | None = None,
+    truth: str | Path | Sequence[str | Path] | None = None,
     prior: str | Path | None = None,
 ) -> Identification:
-    """Find the maneuvers of a flight, fit models to them jointly, check and judge the answer.
+    """Find the maneuvers of flights, fit models to them jointly, check and judge the answer.
 
     Parameters
     ----------
-    flights : str or Path
-        Log, folder or card, CSV, Parquet or MAT.
+    flights : path, FlightLog, DataFrame or list of them
+        Log, folder or card, CSV, Parquet or MAT; what `host.read_log` returns, or its table. All
+        maneuvers of several flights are fitted together; each keeps its own biases and its own
+        sensor errors.
     aircraft : str or Path, optional
         Name or file; gives coefficients, places of the sensors and their deviations.
     models : str, Path or several, optional
@@ -56,13 +57,13 @@ def identify(
     mapping : path, optional
         Foreign names, units and signs of a table.
     maneuvers : sequence of int
-        Only these, as `host maneuvers` counts them.
+        Only these of each flight, as `host maneuvers` counts them.
     from_s, to_s : float, optional
         One stretch of time in place of the maneuvers found.
     corrections : bool
         Take sensor errors that the flight tells out of the data.
-    truth : path, optional
-        Of a simulated flight: compared with.
+    truth : path or several, optional
+        Of simulated flights: compared with.
     prior : path, optional
         Coefficients to compare with: TOML, AVL, Datcom.
 
@@ -74,46 +75,36 @@ def identify(
         If a file cannot be read.
     """
     asked, by = wanted_models(models), wanted_methods(methods)
-    columns, notes = read_columns(
-        Path(flights),
-        _path(mapping),
-        calibration=_path(calibration),
-        also=asked.signals,
-    )
+    how = Reading(
+        _path(calibration), _path(mapping), tuple(maneuvers), from_s, to_s, corrections,
+        asked.signals,
+    )  # fmt: skip
     known = aircraft_known(aircraft, calibration) if aircraft is not None else None
-    notes += known.doubts if known else ()
-    true = read_truth(Path(truth)) if truth is not None else None
-    expected = _prior(prior, columns, known)
-    found = chosen(columns, from_s=from_s, to_s=to_s, numbers=maneuvers)
-    agreement = _agreement(columns, known, notes)
-    flight = reconstructed(
-        columns,
-        found,
-        source=str(flights),
-        airframe=known.airframe if known else None,
-        # Without the places of the sensors a vane ahead of the CG passes for a late one.
-        compatibility=agreement if known is not None and corrections else None,
-    )
-    direct, doubts = _coefficients(asked, known, flight)
-    linear, unfit = _linear(asked, by, known, flight)
-    notes += doubts
+    ready = [prepare(source, how, known) for source in several(flights)]
+    notes = told(ready, known.doubts if known else ())
+    recorded = [one.flight for one in ready]
+    true = _truth(truth)
+    expected = _prior(prior, recorded, known)
+    direct, doubts = _coefficients(asked, known, recorded)
+    linear, unfit = _linear(asked, by, known, recorded)
     if not linear and direct is None:
-        raise IdentificationError("; ".join([*unfit, *notes]))
+        raise IdentificationError("; ".join([*unfit, *notes, *doubts]))
     return Identification(
-        flights=(flight,),
-        agreement=agreement,
-        aircraft=known,
-        methods=by,
-        notes=(*notes, *unfit),
+        flights=tuple(recorded),
+        agreements=tuple(one.agreement for one in ready),
         linear=tuple(linear),
         coefficients=direct,
+        notes=(*notes, *doubts, *unfit),
+        methods=by,
+        reading=how,
+        aircraft=known,
         truth=true,
         prior=expected,
     )
 
 
 def _coefficients(
-    asked: Models, known: AircraftKnown | None, flight: ReconstructedFlight
+    asked: Models, known: AircraftKnown | None, flights: Sequence[ReconstructedFlight]
 ) -> tuple[CoefficientAnswer | None, list[str]]:
     """Fit coefficients directly; None with a note if that cannot be done."""
     if asked.coefficients is None:
@@ -124,13 +115,16 @@ def _coefficients(
         by = coefficient_estimator(
             known.source, model=asked.coefficients, instrument=known.instrument
         )
-        return answer_of(by, [flight]), []
+        return answer_of(by, flights), []
     except IdentificationError as error:
         return None, [f"coefficients: {error}"]
 
 
 def _linear(
-    asked: Models, by: Sequence[str], known: AircraftKnown | None, flight: ReconstructedFlight
+    asked: Models,
+    by: Sequence[str],
+    known: AircraftKnown | None,
+    flights: Sequence[ReconstructedFlight],
 ) -> tuple[list[Answer], list[str]]:
     """Fit every linear model by every method; a note for each reason why one was not."""
     answers: list[Answer] = []
@@ -145,7 +139,7 @@ def _linear(
                 powerplant=known.powerplant if known else None,
             )
             try:
-                answers.append(answer_of(estimator, [flight]))
+                answers.append(answer_of(estimator, flights))
             except IdentificationError as error:
                 label = name if len(by) == 1 else f"{name} by {method}"
                 failed.setdefault(str(error), []).append(label)
@@ -156,27 +150,25 @@ def _path(given: str | Path | None) -> Path | None:
     return None if given is None else Path(given)
 
 
+def _truth(given: str | Path | Sequence[str | Path] | None) -> dict[str, Any] | None:
+    """Return the truth of all flights as one: their maneuvers one behind the other."""
+    if given is None:
+        return None
+    paths = [given] if isinstance(given, str | Path) else given
+    documents = [read_truth(Path(path)) for path in paths]
+    if len(documents) == 1:
+        return documents[0]
+    return {"maneuver": [m for document in documents for m in document["maneuver"]]}
+
+
 def _prior(
-    prior: str | Path | None, columns: dict[str, Any], known: AircraftKnown | None
+    prior: str | Path | None, flights: Sequence[ReconstructedFlight], known: AircraftKnown | None
 ) -> PriorTable | None:
-    """Return coefficients to compare with, read at the flight's median airspeed."""
+    """Return coefficients to compare with, read at the median airspeed of the first flight."""
     if prior is None:
         return None
-    speed = columns.get("airspeed_mps", ())
+    speed = flights[0].recorded.get("airspeed_mps", ())
     found = read_prior(Path(prior), sorted(speed)[len(speed) // 2] if len(speed) else 0.0)
     if known is None:
         raise IdentificationError("--prior compares coefficients; they need --aircraft")
     return found
-
-
-def _agreement(
-    columns: dict[str, Any], known: AircraftKnown | None, notes: list[str]
-) -> Compatibility | None:
-    """Return what sensors are wrong by; None with a note where it cannot be told."""
-    try:
-        return reconstruct(
-            columns, known.airframe if known else None, known.instrument if known else None
-        )
-    except IdentificationError as error:
-        notes.append(str(error))
-        return None

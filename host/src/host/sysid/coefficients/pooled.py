@@ -1,0 +1,132 @@
+"""Fits of several flights as one: noise averages out, errors of the instrument do not.
+
+Each flight is fitted alone. Of its covariance P the part that goes with the errors of the
+instrument, L L' with L = P_xe P_ee^(-1/2), is the same error in every flight and is not averaged;
+the rest is the flight's own noise, and the flights are weighted by it. An error that is new at
+every power-on counts as if it were the same: intervals are rather too wide. Where flights scatter
+more than noise and errors allow, the interval is widened to it (`numerics/repeats`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from host.arrays import Array
+from host.sysid.coefficients.answer import CoefficientFit, Derivative, Flight, Pull, Trace
+from host.sysid.coefficients.joint import Prediction
+from host.sysid.models.result import NORMAL_95
+from host.sysid.models.systematic import systematic_covariance
+from host.sysid.numerics.repeats import scatter
+
+LEAST = 1e-12  # of the largest: an eigenvalue below it is rounding
+
+
+def pooled(fits: Sequence[CoefficientFit]) -> CoefficientFit:
+    """Return one fit of several flights by the same terms and instrument.
+
+    Parameters
+    ----------
+    fits : sequence of CoefficientFit
+        At least one; one alone is returned as it is.
+    """
+    if len(fits) == 1:
+        return fits[0]
+    count = len(fits[0].derivatives)
+    names = [d.name for d in fits[0].derivatives]
+    found = np.stack([_state(fit) for fit in fits])
+    common = np.stack([_common(fit.covariance, count) for fit in fits])
+    own = np.stack([f.covariance - c @ c.T for f, c in zip(fits, common, strict=True)])
+    noise = np.maximum(np.einsum("kii->ki", own), 1e-300)
+    weight = np.full_like(found, 1.0 / len(fits))
+    weight[:, :count] = (1.0 / noise / np.sum(1.0 / noise, axis=0))[:, :count]
+    state = np.sum(weight * found, axis=0)
+    covariance = np.einsum("ki,kij,kj->ij", weight, own, weight)
+    moved = weight[:, :count] * (found - state)[:, :count]
+    whole = np.einsum("kii->ki", np.stack([fit.covariance for fit in fits]))
+    expected = np.sum(weight**2 * whole, axis=0)[:count]
+    agreement = scatter(tuple(names), moved, weight[:, :count], expected)
+    covariance += systematic_covariance(np.einsum("ki,kij->ji", weight, common))
+    covariance[np.diag_indices(count)] += agreement.extra_variance
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    floors = np.mean([[_floor(d) for d in fit.derivatives] for fit in fits], axis=0)
+    sizes = np.maximum(np.abs(state[:count]), floors)
+    errors = zip(fits[0].errors, state[count:].tolist(), sd[count:].tolist(), strict=True)
+    return CoefficientFit(
+        derivatives=tuple(
+            Derivative(name, float(state[k]), float(NORMAL_95 * sd[k]), float(sizes[k]))
+            for k, name in enumerate(names)
+        ),
+        covariance=covariance,
+        errors={name: (value, deviation) for name, value, deviation in errors},
+        flight=_mean_flight([fit.flight for fit in fits]),
+        traces={
+            name: Trace(
+                np.concatenate([fit.traces[name].measured for fit in fits]),
+                np.concatenate([fit.traces[name].model for fit in fits]),
+            )
+            for name in fits[0].traces
+        },
+        prediction=_predictions([fit.prediction for fit in fits]),
+        repeats=agreement,
+    )
+
+
+def _state(fit: CoefficientFit) -> Array:
+    """Return derivatives, then errors of the instrument."""
+    errors = [value for value, _ in fit.errors.values()]
+    return np.array([*(d.value for d in fit.derivatives), *errors])
+
+
+def _floor(d: Derivative) -> float:
+    """Return what would contribute 5 % of the row, where a derivative contributes less."""
+    return d.reference if d.reference > abs(d.value) else 0.0
+
+
+def _common(covariance: Array, count: int) -> Array:
+    """Return L, (n, errors): what one deviation of each combination of errors does."""
+    errors = covariance[count:, count:]
+    size, vectors = np.linalg.eigh(errors)
+    kept = size > LEAST * size[-1]
+    root = (vectors[:, kept] / np.sqrt(size[kept])) @ vectors[:, kept].T
+    return np.asarray(covariance[:, count:] @ root)
+
+
+def _mean_flight(flights: Sequence[Flight]) -> Flight:
+    def mean(*values: float) -> float:
+        return float(np.mean(values))
+
+    pulls = [f.pull for f in flights]
+    return Flight(
+        mean(*(f.airspeed_mps for f in flights)),
+        mean(*(f.qbar_pa for f in flights)),
+        mean(*(f.alpha_rad for f in flights)),
+        mean(*(f.lift for f in flights)),
+        mean(*(f.drag for f in flights)),
+        Pull(
+            mean(*(p.thrust_n for p in pulls)),
+            mean(*(p.slope_npmps for p in pulls)),
+            mean(*(p.arm_m for p in pulls)),
+        ),
+        (min(f.alpha_range_rad[0] for f in flights), max(f.alpha_range_rad[1] for f in flights)),
+        (mean(*(f.faster[0] for f in flights)), mean(*(f.faster[1] for f in flights))),
+    )
+
+
+def _predictions(found: Sequence[Prediction | None]) -> Prediction | None:
+    """Return how maneuvers are predicted by the others of their flight, all flights together."""
+    known = [p for p in found if p is not None]
+    if not known:
+        return None
+    counts = [len(p.windows) for p in known]
+
+    def rms(tables: Sequence[dict[str, float]]) -> dict[str, float]:
+        shared = [n for n in tables[0] if all(n in t for t in tables)]
+        return {
+            n: float(np.sqrt(np.average([t[n] ** 2 for t in tables], weights=counts)))
+            for n in shared
+        }
+
+    windows = tuple(range(sum(counts)))
+    return Prediction(windows, rms([p.fitted for p in known]), rms([p.unseen for p in known]))

@@ -1,0 +1,111 @@
+"""The first stages, one flight at a time: read it, find its maneuvers, reconstruct it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
+from host.sysid.errors import IdentificationError
+from host.sysid.flight.chosen import chosen
+from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
+from host.sysid.flight.tables import read_columns, source_name
+from host.sysid.pipeline.aircraft_known import AircraftKnown
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from host.log import FlightLog
+
+    Source = str | Path | FlightLog | pd.DataFrame
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How flights are read.
+
+    Attributes
+    ----------
+    calibration : Path, optional
+        Counts to SI of a log.
+    mapping : Path, optional
+        Foreign names, units and signs of a table.
+    maneuvers : tuple of int
+        Only these of each flight, counted from 1; all without.
+    from_s, to_s : float, optional
+        One stretch of time in place of maneuvers.
+    corrections : bool
+        Take sensor errors that a flight tells out of its columns.
+    also : tuple of str
+        Signals beside those that are always looked for.
+    """
+
+    calibration: Path | None = None
+    mapping: Path | None = None
+    maneuvers: tuple[int, ...] = ()
+    from_s: float | None = None
+    to_s: float | None = None
+    corrections: bool = True
+    also: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedFlight:
+    """A flight ready for estimation, what its sensors say of each other, and notes."""
+
+    flight: ReconstructedFlight
+    agreement: Compatibility | None
+    notes: tuple[str, ...]
+
+
+def prepare(source: Source, how: Reading, known: AircraftKnown | None) -> PreparedFlight:
+    """Read a flight, find its maneuvers once, and reconstruct it.
+
+    Raises
+    ------
+    host.errors.HostError
+        If it cannot be read, or what was asked for is not in it.
+    """
+    opened = Path(source) if isinstance(source, str) else source
+    columns, notes = read_columns(opened, how.mapping, calibration=how.calibration, also=how.also)
+    found = chosen(columns, from_s=how.from_s, to_s=how.to_s, numbers=how.maneuvers)
+    agreement = None
+    try:
+        agreement = reconstruct(
+            columns, known.airframe if known else None, known.instrument if known else None
+        )
+    except IdentificationError as error:
+        notes.append(str(error))
+    flight = reconstructed(
+        columns,
+        found,
+        source=source_name(source),
+        airframe=known.airframe if known else None,
+        # Without the places of the sensors a vane ahead of the CG passes for a late one.
+        compatibility=agreement if known is not None and how.corrections else None,
+    )
+    return PreparedFlight(flight, agreement, tuple(notes))
+
+
+def several(flights: Source | Sequence[Source]) -> list[Source]:
+    """Return flights one by one; a path, a log or a table is one.
+
+    Raises
+    ------
+    IdentificationError
+        If there is none.
+    """
+    listed: list[Any] = list(flights) if isinstance(flights, list | tuple) else [flights]
+    if not listed:
+        raise IdentificationError("no flight given; name a log, a table, or several")
+    return listed
+
+
+def told(flights: Sequence[PreparedFlight], doubts: Collection[str]) -> list[str]:
+    """Return all notes; of several flights each begins with what it was read from."""
+    if len(flights) == 1:
+        return [*flights[0].notes, *doubts]
+    own = [f"{f.flight.source}: {note}" for f in flights for note in f.notes]
+    return [*own, *doubts]

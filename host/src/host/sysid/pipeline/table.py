@@ -1,0 +1,112 @@
+"""The numbers of an answer as tables for a notebook: estimates and modes with units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from host.sysid.answer.mat import labels
+from host.sysid.answer.units import parameter_unit
+from host.sysid.answer.verdict import verdict_of
+from host.sysid.coefficients.flight import CoefficientAnswer
+from host.sysid.flight.linear import Answer
+from host.sysid.models.diagnostics import references
+from host.sysid.models.modes import Mode
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = ("value", "half_width", "unit", "relative_half_width", "verdict", "widened_by")
+MODE_COLUMNS = (
+    "real_1ps", "imaginary_radps", "frequency_radps", "frequency_half_width_radps",
+    "damping", "damping_half_width",
+)  # fmt: skip
+PLAIN = "1"  # unit of a number
+NO_CAUSE = ("", 0.0)
+
+
+def estimate_table(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> pd.DataFrame:
+    """Return every estimate, a row each: derivatives, delays, coefficients.
+
+    Parameters
+    ----------
+    linear : sequence of Answer
+    direct : CoefficientAnswer or None
+
+    Returns
+    -------
+    pandas.DataFrame
+        By model and name. `half_width` is of the two-sided 95 % interval; `relative_half_width` is
+        over the value, or over what would contribute 5 % of its row's largest; `unit` is SI and
+        radian, ``1`` of a pure number; `verdict` is one of `host.sysid.answer.verdict.MARKS`, empty
+        where nothing is judged; `widened_by` is what widens the interval most.
+    """
+    rows: dict[tuple[str, str], tuple[Any, ...]] = {}
+    for answer, label in zip(linear, labels(linear), strict=True):
+        rows |= {(label, name): row for name, row in _linear_rows(answer)}
+    if direct:
+        rows |= {(direct.template, name): row for name, row in _direct_rows(direct)}
+    return _frame(rows, ("model", "name"), COLUMNS)
+
+
+def mode_table(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> pd.DataFrame:
+    """Return every mode by model and name, with 95 % half-widths; a real mode has damping +-1."""
+    rows: dict[tuple[str, str], tuple[Any, ...]] = {}
+    for answer, label in zip(linear, labels(linear), strict=True):
+        rows |= {(label, m.name): _mode_row(m) for m in answer.modes}
+    if direct:
+        rows |= {(direct.template, m.name): _mode_row(m) for m in direct.modes}
+    return _frame(rows, ("model", "mode"), MODE_COLUMNS)
+
+
+def _linear_rows(answer: Answer) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    result, marks = answer.result, verdict_of(answer).marks
+    half = result.half_width()
+    size = references(answer.model, answer.maneuvers, result.estimate)
+    for k, p in enumerate(answer.model.parameters):
+        share = float(half[k]) / max(float(size[k]), 1e-300)
+        unit = parameter_unit(answer.model, p.name)
+        value = float(result.estimate[k])
+        yield p.name, (value, float(half[k]), unit, share, marks.get(p.name, ""), "")
+    for name, (value, width) in answer.delays.items():
+        yield name, (value, width, "s", _share(value, width), "", "")
+    for d in (x for x in answer.model.delays if x.name in result.names):
+        k = result.index(d.name)
+        value, width = float(result.estimate[k]), float(half[k])
+        yield d.name, (value, width, "s", _share(value, width), "", "")
+    for c in answer.coefficients:
+        share = _share(c.value, c.half_width)
+        yield c.name, (c.value, c.half_width, PLAIN, share, "", c.widened_by)
+
+
+def _direct_rows(answer: CoefficientAnswer) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    marks = verdict_of(answer).marks
+    for d in answer.fit.derivatives:
+        cause = answer.causes.get(d.name, NO_CAUSE)[0]
+        yield d.name, (d.value, d.half_width, PLAIN, d.share, marks[d.name], cause)
+    for name, (value, width) in answer.delays.items():
+        yield name, (value, width, "s", _share(value, width), "", "")
+
+
+def _share(value: float, half_width: float) -> float:
+    return half_width / max(abs(value), 1e-300)
+
+
+def _mode_row(mode: Mode) -> tuple[float, ...]:
+    return (
+        mode.eigenvalue.real,
+        mode.eigenvalue.imag,
+        mode.frequency_radps,
+        mode.frequency_half_width_radps,
+        mode.damping,
+        mode.damping_half_width,
+    )
+
+
+def _frame(
+    rows: dict[tuple[str, str], tuple[Any, ...]], index: Sequence[str], columns: Sequence[str]
+) -> pd.DataFrame:
+    import pandas as pd
+
+    places = pd.MultiIndex.from_tuples(list(rows), names=list(index))
+    return pd.DataFrame(list(rows.values()), index=places, columns=list(columns))

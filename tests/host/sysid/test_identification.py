@@ -1,0 +1,288 @@
+"""`host.identify` in a notebook: what it takes, what it gives, one flight or several."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.cli import main
+from host.errors import HostError
+from host.sysid.answer.truth import read_truth, true_coefficients
+from host.sysid.answer.verdict import MARKS
+from host.sysid.flight import chosen, finder
+from host.sysid.flight.linear import LinearEstimator
+from host.sysid.pipeline.identification import Identification
+from host.sysid.pipeline.pictures import Pictures
+from host.sysid.pipeline.prepared import Reading, prepare
+
+import host
+
+NAME = "ultrastick25e"
+MODELS = ("longitudinal", "lateral", "coefficients")
+
+
+def loose(table: object) -> Any:
+    """Return a table whose cells are of any type, as a notebook takes them."""
+    return table
+
+
+@pytest.fixture(scope="module")
+def flights(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Two flights of one card without a recorder, with what is true of each beside it."""
+    made = []
+    for seed in (3, 4):
+        folder = tmp_path_factory.mktemp(f"seed{seed}")
+        options = ["--seed", str(seed), "--firmware", "none", "--no-picture", "-o", str(folder)]
+        assert main(["simulate", "demo", *options]) == 0
+        made.append(folder)
+    return made[0], made[1]
+
+
+@pytest.fixture(scope="module")
+def one(flights: tuple[Path, Path]) -> Identification:
+    return host.identify(flights[0] / "flight.csv", aircraft=NAME, models=MODELS)
+
+
+@pytest.fixture(scope="module")
+def both(flights: tuple[Path, Path]) -> Identification:
+    sources = [folder / "flight.csv" for folder in flights]
+    truths = [folder / "flight.truth.toml" for folder in flights]
+    return host.identify(sources, aircraft=NAME, models=MODELS, truth=truths)
+
+
+def test_it_says_what_the_verb_says(
+    one: Identification, flights: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    models = [word for name in MODELS for word in ("--model", name)]
+    options = ["identify", str(flights[0] / "flight.csv"), "--aircraft", NAME, *models]
+    assert main([*options, "--json"]) == 0
+    assert capsys.readouterr().out.rstrip("\n") == one.to_json()
+    assert main(options) == 0
+    assert capsys.readouterr().out.rstrip("\n") == str(one)
+
+
+def test_the_table_has_every_estimate_with_its_unit(one: Identification) -> None:
+    table = loose(one.table)
+    assert list(table.columns[:3]) == ["value", "half_width", "unit"]
+    assert set(table.index.get_level_values("model")) == set(MODELS)
+    units = {"Z_alpha": "1/s", "M_alpha": "1/s2", "D_alpha": "m/s2", "M_V": "1/(m s)", "Z_q": "1"}
+    for name, unit in units.items():
+        assert table.loc[("longitudinal", name), "unit"] == unit
+    assert table.loc[("coefficients", "Cm_q"), "unit"] == "1"
+    assert table.loc[("coefficients", "delay_imu_s"), "unit"] == "s"
+    document = {a["template"]: a for a in json.loads(one.to_json())["answers"]}
+    for model, key in (("longitudinal", "parameters"), ("coefficients", "coefficients")):
+        for name, said in document[model][key].items():
+            if (model, name) in table.index:
+                row = table.loc[(model, name)]
+                assert (row["value"], row["half_width"]) == (said["value"], said["half_width"])
+    assert set(table["verdict"]) <= {*MARKS, ""}
+    judged = table.loc["coefficients"]
+    assert (judged.loc[judged["verdict"] == "trust", "relative_half_width"] <= 0.1).all()
+    assert judged.loc["Cn_p", "widened_by"] == "IMU tilt and vane zero about y"
+    assert table.loc[("longitudinal", "Cm_de"), "widened_by"] == "Iyy"
+
+
+def test_modes_are_a_table_too(one: Identification) -> None:
+    modes = loose(one.modes)
+    assert list(modes.loc["longitudinal"].index) == ["short period", "phugoid"]
+    row = modes.loc[("coefficients", "short period")]
+    size = float(np.hypot(row["real_1ps"], row["imaginary_radps"]))
+    assert row["frequency_radps"] == pytest.approx(size)
+    assert 0.0 < row["frequency_half_width_radps"] < 0.1 * size
+
+
+def test_the_verdict_is_lines_and_the_answer_reads_itself(one: Identification) -> None:
+    assert any(line.startswith("longitudinal: 2 maneuvers fitted jointly") for line in one.verdict)
+    assert all("\n" not in line for line in one.verdict)
+    assert repr(one).startswith("<Identification of ")
+    assert "M_alpha" in str(one)
+
+
+def test_a_table_at_hand_gives_the_same_numbers(
+    one: Identification, flights: tuple[Path, Path]
+) -> None:
+    table = pd.read_csv(flights[0] / "flight.csv")
+    found = host.identify(table, aircraft=NAME, models="longitudinal")
+    assert found.flights[0].source == "table"
+    ours, theirs = loose(found.table).loc["longitudinal"], loose(one.table).loc["longitudinal"]
+    np.testing.assert_allclose(ours["value"], theirs["value"], rtol=1e-9)
+    np.testing.assert_allclose(ours["half_width"], theirs["half_width"], rtol=1e-9)
+    with_index = host.identify(table.set_index("t_s"), models="short-period")
+    assert "M_alpha" in loose(with_index.table).loc["short-period"].index
+
+
+def test_several_flights_are_fitted_together(one: Identification, both: Identification) -> None:
+    alone, joint = one.linear[0], both.linear[0]
+    assert len(joint.used) + len(joint.held_out) == 6
+    assert {m.name[-len("of flight 2") :] for m in joint.maneuvers} == {
+        "of flight 1", "of flight 2",
+    }  # fmt: skip
+    assert not any("flight" in m.name for m in alone.maneuvers)
+    document = json.loads(both.to_json())
+    assert len(document["source"]) == len(document["data_compatibility"]) == 2
+    direct = both.coefficients
+    assert direct is not None
+    assert one.coefficients is not None
+    assert len(direct.windows) == 2 * len(one.coefficients.windows)
+    narrow, wide = loose(both.table).loc["coefficients"], loose(one.table).loc["coefficients"]
+    assert narrow.loc["CL_q", "half_width"] < 0.95 * wide.loc["CL_q", "half_width"]  # gusts
+    assert narrow.loc["Cn_p", "half_width"] > 0.85 * wide.loc["Cn_p", "half_width"]  # the IMU
+
+
+def test_several_flights_hold_the_truth(both: Identification, flights: tuple[Path, Path]) -> None:
+    held = [c["inside"] for c in json.loads(both.to_json())["truth"]["coefficients"].values()]
+    assert len(held) == 32
+    assert sum(held) >= 29
+    [truth, other] = [read_truth(folder / "flight.truth.toml") for folder in flights]
+    merged = true_coefficients({"maneuver": truth["maneuver"] + other["maneuver"]}, "lateral")
+    assert both.truth is not None
+    assert true_coefficients(both.truth, "lateral") == merged
+
+
+def test_maneuvers_are_found_once_a_flight(
+    flights: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+
+    def counted(columns: Mapping[str, Any]) -> list[finder.Found]:
+        calls.append(1)
+        return finder.find(columns)
+
+    monkeypatch.setattr(chosen, "find", counted)
+    monkeypatch.setattr("host.sysid.flight.linear.find", counted)
+    monkeypatch.setattr("host.sysid.coefficients.flight.find", counted)
+    source = flights[0] / "flight.csv"
+    methods = ("equation-error", "equation-error-robust")
+    host.identify(source, aircraft=NAME, models=MODELS, methods=methods)
+    assert len(calls) == 1
+
+
+def test_a_stage_adds_and_changes_nothing_before_it(flights: tuple[Path, Path]) -> None:
+    from host.sysid.pipeline.aircraft_known import aircraft_known
+
+    known = aircraft_known(NAME)
+    flight = prepare(flights[0] / "flight.csv", Reading(), known).flight
+    estimator = LinearEstimator("lateral", airframe=known.airframe, powerplant=known.powerplant)
+    estimate = estimator.estimate([flight])
+    fit = estimate.fit
+    before = fit.estimate.copy(), fit.covariance.copy(), estimate.estimate.copy()
+    intervals = estimator.intervals(estimate)
+    validation = estimator.validation(estimate, intervals)
+    answer = estimator.answer(estimate, intervals, validation)
+    for ours, kept in zip((fit.estimate, fit.covariance, estimate.estimate), before, strict=True):
+        np.testing.assert_array_equal(ours, kept)
+    np.testing.assert_array_equal(answer.result.estimate, estimate.estimate)
+    assert estimate.departure is not None
+    np.testing.assert_array_equal(fit.estimate + estimate.departure.step, answer.result.estimate)
+    # Systematic errors add to the covariance, each by what its one deviation does.
+    shifts = np.stack([m.estimate - answer.result.estimate for m in intervals.shifts])
+    total = intervals.statistical.covariance + shifts.T @ shifts
+    np.testing.assert_allclose(answer.result.covariance, total, rtol=1e-12)
+
+
+def test_another_flight_is_simulated_and_a_wrong_model_is_worse(
+    one: Identification, flights: tuple[Path, Path]
+) -> None:
+    other = flights[1] / "flight.csv"
+    found = one.simulate(other)
+    assert loose(found.table).loc[("longitudinal", "q_radps"), "nrmse"] < 0.2
+    assert loose(found.table).loc[("coefficients_lateral", "p_radps"), "nrmse"] < 0.25
+    right = loose(found.histories).query("model == 'longitudinal' and signal == 'q_radps'")
+    measured = right["measured"] - right.groupby("maneuver")["measured"].transform("mean")
+    assert float(np.std(right["measured"] - right["simulated"]) / np.std(measured)) < 0.3
+    answer = one.linear[0]
+    wrong = answer.result.estimate.copy()
+    wrong[answer.result.index("M_alpha")] *= 0.6
+    spoilt = replace(answer, result=replace(answer.result, estimate=wrong))
+    worse = replace(one, linear=(spoilt,), coefficients=None).simulate(other)
+    name = ("longitudinal", "q_radps")
+    assert loose(worse.table).loc[name, "nrmse"] > 2.0 * loose(found.table).loc[name, "nrmse"]
+
+
+def test_what_was_true_is_simulated(one: Identification, flights: tuple[Path, Path]) -> None:
+    """Sensors without errors: what is left is gust and model."""
+    truth = pd.read_csv(flights[1] / "flight.true.csv")
+    found = replace(one, aircraft=None).simulate(truth)
+    for signal in ("q_radps", "alpha_rad"):
+        assert loose(found.table).loc[("coefficients_longitudinal", signal), "nrmse"] < 0.25
+    for signal in ("p_radps", "r_radps"):
+        assert loose(found.table).loc[("coefficients_lateral", signal), "nrmse"] < 0.25
+
+
+def test_pictures_are_shown_and_saved(one: Identification, tmp_path: Path) -> None:
+    pictures = one.plot()
+    assert isinstance(pictures, Pictures)
+    assert "longitudinal_fit" in pictures
+    assert "coefficients_intervals" in pictures
+    page = pictures._repr_html_()
+    assert page.count("<img ") == len(pictures) == 12
+    assert page.count("data:image/svg+xml;base64,") == len(pictures)
+    written = Pictures({"lateral_poles": pictures["lateral_poles"]}).save(tmp_path)
+    assert [p.name for p in written] == ["lateral_poles.svg"]
+    assert written[0].read_text().rstrip().endswith("</svg>")
+
+
+def test_a_hostile_name_is_text_on_the_page(flights: tuple[Path, Path], tmp_path: Path) -> None:
+    hostile = tmp_path / '<img src=x onerror="alert(1)">&\x1b[2J\u202e.csv'
+    hostile.write_bytes((flights[0] / "flight.csv").read_bytes())
+    found = host.identify(hostile, models="short-period")
+    simulated = found.simulate(hostile)
+    noted = replace(found, notes=("<script>alert(2)</script>",))
+    for page in (noted._repr_html_(), simulated._repr_html_()):
+        assert "<img" not in page
+        assert "\x1b" not in page
+        assert "\u202e" not in page
+        assert "&lt;img src=x onerror=&quot;alert(1)&quot;&gt;&amp;\\x1b[2J\\u202e.csv" in page
+    assert "&lt;script&gt;alert(2)&lt;/script&gt;" in noted._repr_html_()
+    assert "<script" not in noted._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "said"),
+    [
+        ("nothing.bin", {}, "nothing.bin: no such file or folder"),
+        ([], {}, "no flight given"),
+        (pd.DataFrame({"q_radps": np.zeros(9)}), {}, "table: no column t_s"),
+        (pd.DataFrame({"t_s": np.arange(99.0) / 50.0}), {}, "needs airspeed_mps"),
+        ("x.csv", {"models": "longitudnal"}, "did you mean longitudinal"),
+        ("x.csv", {"methods": ["nothing"]}, "unknown method nothing"),
+        ("x.csv", {"aircraft": "nobody"}, "no aircraft 'nobody'"),
+        ("x.csv", {"truth": "no.toml", "calibration": "no.toml"}, "x.csv"),
+    ],
+)
+def test_an_error_is_one_line_of_our_own(
+    source: Any, options: dict[str, Any], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(HostError) as caught:
+        host.identify(source, **options)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_wrong_part_of_a_flight_is_said(one: Identification, flights: tuple[Path, Path]) -> None:
+    with pytest.raises(host.IdentificationError, match="no maneuver 99"):
+        host.identify(flights[0] / "flight.csv", maneuvers=[99])
+    with pytest.raises(host.IdentificationError, match="give --aircraft"):
+        host.identify(flights[0] / "flight.csv", models="coefficients")
+    with pytest.raises(host.IdentificationError, match="no maneuver of elevator_rad"):
+        replace(one, linear=one.linear[:1], coefficients=None).simulate(
+            flights[1] / "flight.csv", maneuvers=[5]
+        )
+
+
+def test_the_package_stays_cheap_to_import() -> None:
+    heavy = "{'numpy', 'pandas', 'scipy', 'numba', 'matplotlib'}"
+    code = f"import host, sys; assert not {heavy} & set(sys.modules), 'heavy'"
+    subprocess.run([sys.executable, "-c", code], check=True)
+    for name in host.__all__:
+        assert getattr(host, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'identity'"):
+        host.identity  # noqa: B018
