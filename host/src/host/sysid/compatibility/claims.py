@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy import special
 
 from host.arrays import Array
 from host.sysid.compatibility.flight_path import FLOW, INERTIAL, PITOT, PLACES
@@ -91,7 +91,7 @@ def _claim(name: str, own: Sequence[int], z: Array, P: Array) -> Claim:
     if not count:
         return Claim(name, 0.0, 0, 1.0)
     square = float(np.sum((directions[:, kept].T @ z[own]) ** 2 / told[kept]))
-    return Claim(name, float(np.sqrt(square / count)), count, float(chi2.sf(square, count)))
+    return Claim(name, float(np.sqrt(square / count)), count, float(special.chdtrc(count, square)))
 
 
 def claim_words(found: Sequence[Claim]) -> list[str]:

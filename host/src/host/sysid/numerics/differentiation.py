@@ -2,7 +2,8 @@
 
 A local polynomial is a linear-phase filter: it delays nothing. Its window is chosen from the
 frequency at which the smoothed signal has fallen to half power, computed from the filter itself.
-Written out in numpy: `scipy.signal` has the same filter and takes 0.4 s to import.
+Written out in numpy: `scipy.signal.savgol_filter` is the same, and its import takes a third of an
+answer's processor time (1.0 of 3.0 s for the card `demo`, measured together).
 """
 
 from __future__ import annotations

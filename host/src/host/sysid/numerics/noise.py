@@ -86,7 +86,7 @@ def ar_filter(values: Array, coefficient: Array, head: Array) -> Array:
 
     Notes
     -----
-    `scipy.signal.lfilter` does the same and takes 0.4 s to import.
+    `scipy.signal.lfilter` filters from rest; its import takes 1.0 s where an answer takes 3.0.
     """
     order = len(coefficient)
     first = min(order, len(values))

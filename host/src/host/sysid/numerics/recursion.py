@@ -15,7 +15,8 @@ from host.arrays import Array
 from host.compiled import compiled
 
 STATE_LIMIT = 1e8  # a trial response beyond it is called divergent
-WORTH_COMPILING = 4e7  # slopes of states computed, about 0.25 s of numpy
+WORTH_COMPILING = 1.5e8  # about a second of numpy, in values of states and slopes
+OVERHEAD = 100  # the same, what a sample costs beside them
 BLOCK = 256  # samples: what drives 96 slopes of one block is 200 kB
 
 
@@ -37,7 +38,8 @@ def simulate(step: Array, drive: Array, start: Array) -> tuple[bool, Array]:
         State and drive of each sample.
     """
     n = len(start)
-    x = _in_pieces(step[:, :n], step[:, n:, None], drive, np.eye(n), start[:, None])
+    x = np.empty((n, len(drive), 1))
+    propagate(step, step[:, n:, None], drive, np.eye(n), start[:, None], x)
     z = np.hstack([x[:, :, 0].T, drive])
     return bool(np.max(np.abs(z[:, :n]), initial=0.0) < STATE_LIMIT), z
 
@@ -63,7 +65,7 @@ def propagate(
     """
     samples, wide = z.shape
     n, _, free = step_slopes.shape
-    if not one_block.pays(samples * n * free, WORTH_COMPILING):
+    if not one_block.pays(samples * (n * free + OVERHEAD), WORTH_COMPILING):
         out[...] = _in_pieces(step[:, :n], step_slopes, z, C, start_slopes)
         return
     F = np.ascontiguousarray(step[:, :n])
