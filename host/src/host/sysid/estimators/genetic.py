@@ -57,9 +57,13 @@ def fit_genetic(
     people = lower + (upper - lower) * np.random.default_rng(seed).random((population, count))
     people[0] = np.clip(start, lower, upper)
     base = problem.first_guess()
+
+    def score(person: Array) -> float:
+        return _score(problem, base, person)
+
     found = optimize.differential_evolution(
-        lambda person: _score(problem, base, person),
-        list(zip(lower, upper, strict=True)),
+        score,
+        optimize.Bounds(lower, upper),
         maxiter=generations,
         tol=0.0,
         rng=seed,
