@@ -21,12 +21,11 @@ from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 from host.sysid.numerics.filter_problem import FilterProblem, Likelihood
 from host.sysid.numerics.filter_scoring import scoring, summed, whitened_slopes
+from host.sysid.numerics.gauss_newton import Objective, free_of_bounds, gauss_newton
 from host.sysid.numerics.inverse import covariance_of
 from host.sysid.numerics.output_error import minimise
-from host.sysid.numerics.problem import OutputProblem
 from host.sysid.numerics.repeats import pulls
 
-STEP_LIMIT = 0.01
 # Fisher's information overstates the curvature by the noise of a sensor that is smoother than any:
 # steps towards zero are all too short, by the same share. A longer one is tried for a fifth of what
 # new slopes cost: 12 to 20 iterations instead of 22 to 60.
@@ -77,44 +76,17 @@ def fit_filter_error(
     problem = FilterProblem(model, maneuvers, process)
     first = start_values(problem.inner) if start is None else np.asarray(start, dtype=np.float64)
     theta = _first_guess(problem, first, fit_first=start is None)
-    point = problem.evaluate(theta)
-    if point is None:
-        raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
     quiet = np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
     # Noise that the data do not show would walk to nothing for ever, and the search with it.
     floor = np.log(NOISE_FLOOR) + np.concatenate(
         [theta[problem.n_model : problem.n_model + len(process)], np.log(quiet)]
     )
-    noise = slice(problem.n_model, None)
-    damping, converged, iterations, size = 0.0, False, 0, np.inf
-    parts, scores = scoring(problem, theta, point)
-    information, gradient = summed(problem, theta, parts, scores)
-    while iterations < MAX_ITERATIONS:
-        held = np.zeros(len(theta), dtype=bool)
-        held[noise] = (theta[noise] <= floor) & (gradient[noise] < 0.0)
-        held[: problem.n_model] = ~_free(problem.inner, theta, gradient)
-        step, size = _step(information, gradient, damping, ~held)
-        trial_theta = _reached(problem, theta, step, floor)
-        trial = problem.evaluate(trial_theta)
-        if trial is None or trial.cost > point.cost + 1e-9 * abs(point.cost):
-            if size < STEP_LIMIT:
-                converged = True
-                break
-            damping = max(4.0 * damping, 1e-3)
-            if damping > 1e8:
-                break
-            continue
-        if size > FAR_FROM and damping == 0.0:
-            trial_theta, trial = _farther(problem, theta, step, floor, (trial_theta, trial))
-        theta, point = trial_theta, trial
-        iterations += 1
-        if size < STEP_LIMIT and damping < 1e-2:
-            converged = True
-            break
-        damping = 0.0 if damping < 1e-3 else damping / 8.0
-        parts, scores = scoring(problem, theta, point)
-        information, gradient = summed(problem, theta, parts, scores)
-    covariance = covariance_of(information)
+    objective = _FilterError(problem, floor)
+    found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS)
+    if found is None:
+        raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
+    theta, point = found.theta, found.trial
+    covariance = covariance_of(found.information)
     factor: Array = np.ones(len(theta))
     if misfit:
         white = [
@@ -123,7 +95,9 @@ def fit_filter_error(
         steps_s = [m.dt_s for m in maneuvers]
         factor = misfit_factor(whitened_slopes(problem, theta, point), white, steps_s, covariance)
     kept = problem.n_model
-    warnings = [] if converged else [f"no convergence: last step {size:.3g} bounds long"]
+    warnings = []
+    if not found.converged:
+        warnings.append(f"no convergence: last step {found.step:.3g} bounds long")
     warnings += widened_names(model, factor)
     result = FitResult(
         method="filter error",
@@ -137,15 +111,15 @@ def fit_filter_error(
         fitted=tuple(m.outputs - e for m, e in zip(maneuvers, point.e, strict=True)),
         residual_kind="innovation",
         noise_covariance=np.atleast_2d(np.cov(np.vstack(point.e).T)),
-        iterations=iterations,
-        converged=converged,
+        iterations=found.iterations,
+        converged=found.converged,
         warnings=tuple(warnings),
         details={
             "cost": point.cost,
             "misfit": factor,
             "process_deviation": np.exp(theta[kept : kept + len(process)]),
             "noise_deviation": np.exp(theta[kept + len(process) :]),
-            **pulls(parts, scores, covariance),
+            **pulls(objective.parts, objective.scores, covariance),
         },
     )
     return against_coloured_noise(result, maneuvers, first) if rival else result
@@ -190,52 +164,43 @@ def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> Ar
     return np.concatenate([optimum.theta, np.log(process), np.log(NOISE_SHARE * deviation)])
 
 
-def _reached(
-    problem: FilterProblem, theta: Array, step: Array, floor: Array, far: float = 1.0
-) -> Array:
-    """Return where a step leads: noise moves by its variance, which may come to nothing at once."""
-    inner, noise = problem.inner, slice(problem.n_model, None)
-    goal = theta + far * step
-    goal[noise] = theta[noise] + 0.5 * np.log(np.clip(1.0 + 2.0 * far * step[noise], *VARIANCE))
-    goal[: problem.n_model] = np.clip(goal[: problem.n_model], inner.lower, inner.upper)
-    goal[noise] = np.maximum(goal[noise], floor)
-    return goal
+class _FilterError(Objective[Likelihood]):
+    """Innovations of the steady filter; deviations of the noise never fall below `floor`."""
 
+    def __init__(self, problem: FilterProblem, floor: Array) -> None:
+        self._problem, self._noise = problem, slice(problem.n_model, None)
+        inner = problem.inner
+        self._lower = np.concatenate([inner.lower, floor])
+        self._upper = np.concatenate([inner.upper, np.full(len(floor), np.inf)])
+        self.parts: list[Array] = []  # Fisher's information by maneuver where last asked for
+        self.scores: list[Array] = []
 
-def _farther(
-    problem: FilterProblem,
-    theta: Array,
-    step: Array,
-    floor: Array,
-    best: tuple[Array, Likelihood],
-) -> tuple[Array, Likelihood]:
-    """Return the best of a step and its doubles, as long as they gain."""
-    far = 2.0
-    while far <= FARTHEST:
-        goal = _reached(problem, theta, step, floor, far)
-        trial = problem.evaluate(goal)
-        if trial is None or trial.cost >= best[1].cost:
-            break
-        best = goal, trial
-        far *= 2.0
-    return best
+    def evaluate(self, theta: Array) -> Likelihood | None:
+        return self._problem.evaluate(theta)
 
+    def normal(self, theta: Array, trial: Likelihood) -> tuple[Array, Array]:
+        self.parts, self.scores = scoring(self._problem, theta, trial)
+        return summed(self._problem, theta, self.parts, self.scores)
 
-def _free(inner: OutputProblem, theta: Array, gradient: Array) -> BoolArray:
-    own, slope = theta[: len(inner.names)], gradient[: len(inner.names)]
-    return ~(((own <= inner.lower) & (slope < 0.0)) | ((own >= inner.upper) & (slope > 0.0)))
+    def free(self, theta: Array, gradient: Array) -> BoolArray:
+        return free_of_bounds(theta, gradient, self._lower, self._upper)
 
+    def reached(self, theta: Array, step: Array, far: float = 1.0) -> Array:
+        """Return where `far` steps lead: noise moves by its variance, which may come to nothing."""
+        goal, noise = theta + far * step, self._noise
+        goal[noise] = theta[noise] + 0.5 * np.log(np.clip(1.0 + 2.0 * far * step[noise], *VARIANCE))
+        return np.clip(goal, self._lower, self._upper)
 
-def _step(
-    information: Array, gradient: Array, damping: float, free: BoolArray
-) -> tuple[Array, float]:
-    full = np.zeros(len(gradient))
-    information, gradient = information[np.ix_(free, free)], gradient[free]
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    scaled = information / np.outer(scale, scale)
-    value, vector = np.linalg.eigh(scaled)
-    value = np.maximum(value, 1e-12 * value[-1])
-    bound = np.sqrt(np.einsum("ij,j,ij->i", vector, 1.0 / value, vector))
-    move = vector @ ((vector.T @ (gradient / scale)) / (value + damping))
-    full[free] = move / scale
-    return full, float(np.max(np.abs(move) / bound, initial=0.0))
+    def farther(
+        self, theta: Array, step: Array, size: float, reached: tuple[Array, Likelihood]
+    ) -> tuple[Array, Likelihood]:
+        """Return the best of a long step and its doubles, as long as they gain."""
+        best, far = reached, 2.0
+        while size > FAR_FROM and far <= FARTHEST:
+            goal = self.reached(theta, step, far)
+            trial = self._problem.evaluate(goal)
+            if trial is None or trial.cost >= best[1].cost:
+                break
+            best = goal, trial
+            far *= 2.0
+        return best

@@ -24,12 +24,12 @@ from host.sysid.models.model import LinearModel
 from host.sysid.models.result import FitResult
 from host.sysid.numerics.differentiation import signal_bandwidth_hz
 from host.sysid.numerics.discretisation import transition
+from host.sysid.numerics.gauss_newton import Objective, gauss_newton
 from host.sysid.numerics.inverse import covariance_of
 from host.sysid.numerics.problem import check_shapes
 
 Spectrum = NDArray[np.complexfloating]
 MAX_ITERATIONS = 40
-STEP_LIMIT = 0.01
 
 
 def transform(values: Array, dt_s: float, frequency_hz: Array) -> Spectrum:
@@ -170,7 +170,6 @@ class _Record:
     z: Spectrum  # e^(j w dt), (frequencies,)
     drive: Spectrum  # inputs, one and increments, (frequencies, w)
     y: Spectrum  # (frequencies, p)
-    end: Spectrum  # z^-N
     samples: int
     dt_s: float
 
@@ -197,8 +196,7 @@ def fit_frequency_output_error(
         raise IdentificationError(
             "frequency output error has no delays or levers: use output-error"
         )
-    n, m = len(model.states), len(model.inputs)
-    count, p = len(model.parameters), len(model.outputs)
+    n, count = len(model.states), len(model.parameters)
     foh = model.hold == "foh"
     records = []
     for maneuver in maneuvers:
@@ -213,102 +211,108 @@ def fit_frequency_output_error(
                 z=z,
                 drive=transform(np.hstack(columns), maneuver.dt_s, f),
                 y=transform(maneuver.outputs, maneuver.dt_s, f),
-                end=z ** (-maneuver.samples),
                 samples=maneuver.samples,
                 dt_s=maneuver.dt_s,
             )
         )
-    # Per maneuver: x0 - xN (harmonics of the record see only their difference).
-    width = count + n
-    theta = start_values_of(model, maneuvers)[:count] if start is None else np.array(start)
-    ends: list[Array] = [np.zeros(n) for _ in records]
-    entries = model.entries("AB")
-    outputs = model.entries("CD")
-    variance = np.ones(p)
-    cost, converged, iterations, damping = np.inf, False, 0, 0.0
-    accepted: tuple[Array, list[Array], Array, Array, list[Spectrum]] | None = None
-    trial, trial_ends = theta, ends
-    while iterations < MAX_ITERATIONS:
-        A, B, C, D = model.matrices(trial)
-        AB = np.hstack([A, B, np.zeros((n, 1))])
-        J_all: list[Spectrum] = []
-        r_all: list[Spectrum] = []
-        for number, record in enumerate(records):
-            step, slopes = transition(
-                AB, n, m, foh, record.dt_s, entries.row, entries.column,
-                entries.parameter, entries.gain, count,
-            )  # fmt: skip
-            inverse = np.linalg.inv(record.z[:, None, None] * np.eye(n) - step[:, :n])
-            push = record.drive @ step[:, n:].T + record.z[:, None] * trial_ends[number]
-            X = np.einsum("fij,fj->fi", inverse, push)
-            wide = np.hstack([X, record.drive])
-            dX = np.zeros((len(record.z), n, width), dtype=np.complex128)
-            dX[:, :, :count] = inverse @ np.einsum("ijq,fj->fiq", slopes, wide)
-            dX[:, :, count:] = inverse * record.z[:, None, None]
-            y = X @ C.T + record.drive[:, :m] @ D.T
-            J = np.einsum("ji,fiq->fjq", C, dX)
-            for k in range(len(outputs.row)):
-                J[:, outputs.row[k], outputs.parameter[k]] += (
-                    outputs.gain[k] * wide[:, outputs.column[k]]
-                )
-            J_all.append(J / np.sqrt(record.samples))
-            r_all.append((record.y - y) / np.sqrt(record.samples))
-        points = sum(len(r) for r in r_all)
-        fresh = np.sum([np.sum(np.abs(r) ** 2, axis=0) for r in r_all], axis=0) / points
-        trial_cost = float(points * np.sum(np.log(np.maximum(fresh, 1e-300))))
-        if not np.isfinite(trial_cost) or trial_cost > cost + 1e-9 * abs(cost):
-            damping = max(4.0 * damping, 1e-3)
-            if accepted is None or damping > 1e8:
-                break
-        else:
-            done = accepted is not None and damping < 1e-2 and _small(accepted, trial, trial_ends)
-            theta, ends, cost, variance = trial, trial_ends, trial_cost, fresh
-            damping = 0.0 if damping < 1e-3 else damping / 8.0
-            iterations += 1
-            information, gradient = _normal(J_all, r_all, variance, count, n)
-            accepted = (theta, ends, information, gradient, r_all)
-            if done:
-                converged = True
-                break
-        assert accepted is not None
-        information, gradient = accepted[2], accepted[3]
-        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-        matrix = information / np.outer(scale, scale) + max(damping, 1e-13) * np.eye(len(scale))
-        move = np.linalg.solve(matrix, gradient / scale) / scale
-        trial = theta + move[:count]
-        trial_ends = [end + move[count + k * n : count + (k + 1) * n] for k, end in enumerate(ends)]
-    if accepted is None:
+    objective = _Spectra(model, records)
+    theta = np.concatenate(
+        [
+            start_values_of(model, maneuvers)[:count] if start is None else np.array(start),
+            np.zeros(n * len(records)),
+        ]
+    )
+    found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS)
+    if found is None:
         raise IdentificationError(f"model {model.name}: no finite response at the start")
-    covariance = covariance_of(accepted[2])[:count, :count]
-    residuals = tuple(np.vstack([r.real, r.imag]) for r in accepted[4])
+    information, _ = objective.normal(found.theta, found.trial)
+    covariance = covariance_of(information)[:count, :count]
+    left = found.trial.residuals
+    residuals = tuple(np.vstack([r.real, r.imag]) for r in left)
+    lines = 2 * sum(map(len, left)) - count - n
     return FitResult(
         method="frequency output error",
         model=model,
         names=model.parameter_names[:count],
-        estimate=theta,
+        estimate=found.theta[:count],
         covariance=covariance,
         covariance_white=covariance,
-        degrees_of_freedom=np.full(count, float(max(2 * sum(map(len, accepted[4])) - width, 1))),
+        degrees_of_freedom=np.full(count, float(max(lines, 1))),
         residuals=residuals,
         fitted=residuals,
         residual_kind="spectrum",
-        noise_covariance=np.diag(variance),
-        iterations=iterations,
-        converged=converged,
-        warnings=() if converged else ("no convergence",),
-        details={"noise_variance": variance},
+        noise_covariance=np.diag(found.trial.variance),
+        iterations=found.iterations,
+        converged=found.converged,
+        warnings=() if found.converged else ("no convergence",),
+        details={"noise_variance": found.trial.variance},
     )
 
 
-def _small(
-    accepted: tuple[Array, list[Array], Array, Array, list[Spectrum]],
-    trial: Array,
-    ends: list[Array],
-) -> bool:
-    theta, old_ends, information, _, _ = accepted
-    bound = np.sqrt(np.abs(np.diag(covariance_of(information))))
-    step = np.concatenate([trial - theta, *[a - b for a, b in zip(ends, old_ends, strict=True)]])
-    return bool(np.all(np.abs(step) <= STEP_LIMIT * bound + 1e-300))
+@dataclass(slots=True)
+class _Trial:
+    """Residuals (frequencies, p) and slopes (frequencies, p, P) of the record of each maneuver."""
+
+    residuals: list[Spectrum]
+    slopes: list[Spectrum]
+    variance: Array
+    cost: float
+
+
+class _Spectra(Objective[_Trial]):
+    """Spectra of the outputs.
+
+    Unknown are the model's parameters and, per maneuver, x0 - xN: harmonics of the record see only
+    their difference.
+    """
+
+    def __init__(self, model: LinearModel, records: list[_Record]) -> None:
+        self._model, self._records = model, records
+        self._entries, self._outputs = model.entries("AB"), model.entries("CD")
+
+    def evaluate(self, theta: Array) -> _Trial | None:
+        model, n, count = self._model, len(self._model.states), len(self._model.parameters)
+        A, B, C, D = model.matrices(theta[:count])
+        AB = np.hstack([A, B, np.zeros((n, 1))])
+        ends = theta[count:].reshape(-1, n)
+        found = [
+            self._one(record, AB, C, D, end)
+            for record, end in zip(self._records, ends, strict=True)
+        ]
+        residuals, slopes = [r for r, _ in found], [J for _, J in found]
+        points = sum(len(r) for r in residuals)
+        variance = np.sum([np.sum(np.abs(r) ** 2, axis=0) for r in residuals], axis=0) / points
+        cost = float(points * np.sum(np.log(np.maximum(variance, 1e-300))))
+        return _Trial(residuals, slopes, variance, cost) if np.isfinite(cost) else None
+
+    def _one(
+        self, record: _Record, AB: Array, C: Array, D: Array, end: Array
+    ) -> tuple[Spectrum, Spectrum]:
+        model, entries, outputs = self._model, self._entries, self._outputs
+        n, m, count = len(model.states), len(model.inputs), len(model.parameters)
+        step, step_slopes = transition(
+            AB, n, m, model.hold == "foh", record.dt_s, entries.row, entries.column,
+            entries.parameter, entries.gain, count,
+        )  # fmt: skip
+        inverse = np.linalg.inv(record.z[:, None, None] * np.eye(n) - step[:, :n])
+        push = record.drive @ step[:, n:].T + record.z[:, None] * end
+        X = np.einsum("fij,fj->fi", inverse, push)
+        wide = np.hstack([X, record.drive])
+        dX = np.zeros((len(record.z), n, count + n), dtype=np.complex128)
+        dX[:, :, :count] = inverse @ np.einsum("ijq,fj->fiq", step_slopes, wide)
+        dX[:, :, count:] = inverse * record.z[:, None, None]
+        y = X @ C.T + record.drive[:, :m] @ D.T
+        J = np.einsum("ji,fiq->fjq", C, dX)
+        for k in range(len(outputs.row)):
+            J[:, outputs.row[k], outputs.parameter[k]] += (
+                outputs.gain[k] * wide[:, outputs.column[k]]
+            )
+        size = np.sqrt(record.samples)
+        return (record.y - y) / size, J / size
+
+    def normal(self, theta: Array, trial: _Trial) -> tuple[Array, Array]:
+        n, count = len(self._model.states), len(self._model.parameters)
+        return _normal(trial.slopes, trial.residuals, trial.variance, count, n)
 
 
 def _normal(

@@ -1,8 +1,8 @@
-"""Output error by maximum likelihood: Gauss-Newton with exact sensitivities.
+"""Output error by maximum likelihood, with exact sensitivities.
 
 Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 4; Klein & Morelli, Aircraft System
 Identification, ch. 6. The noise covariance is re-estimated in every iteration (relaxation of the
-concentrated likelihood), steps are damped only when they fail, bounds freeze and release.
+concentrated likelihood).
 """
 
 from __future__ import annotations
@@ -11,22 +11,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lapack
 
 from host.arrays import Array, BoolArray
 from host.sysid.errors import IdentificationError
+from host.sysid.numerics.gauss_newton import (
+    STEP_LIMIT,
+    Objective,
+    free_of_bounds,
+    gauss_newton,
+)
 from host.sysid.numerics.noise import OutputNoise
 from host.sysid.numerics.problem import OutputProblem, Response
 
-STEP_LIMIT = 0.01  # in Cramer-Rao bounds: below it an iteration is not worth another
 MAX_ITERATIONS = 60
-MAX_DAMPING = 1e8
-FIRST_DAMPING = 1e-4
-LEAST_DAMPING = 1e-8
-DAMPED = 1e-2  # from here on a short step may be short because it is damped
 SINGULAR = 1e-15  # of the largest eigenvalue of the scaled information
 UNSEEN = 1e-12  # the same: below, a product of two inverses holds no digit
-NOT_FINITE = "the information matrix is not finite; scale or bound the parameters"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +50,6 @@ class Optimum:
 
 @dataclass(slots=True)
 class _Point:
-    theta: Array
     responses: list[Response]
     residuals: list[Array]  # (p, samples), measured minus model
     whitened: list[Array]
@@ -93,62 +91,54 @@ def minimise(
     memory = (
         list(noise) if noise is not None else [OutputNoise.white()] * len(problem.model.outputs)
     )
-    theta = np.clip(theta, problem.lower, problem.upper)
-    point = _evaluate(problem, theta, memory, variance)
-    if point is None:
+    found = gauss_newton(
+        _OutputError(problem, memory, variance),
+        np.clip(theta, problem.lower, problem.upper),
+        max_iterations=max_iterations,
+        step_limit=step_limit,
+    )
+    if found is None:
         raise IdentificationError(
             f"model {problem.model.name} diverges at its start values; give other start values"
             " or bounds that keep it finite over the maneuver"
         )
-    damping, growth = 0.0, 2.0
-    converged = False
-    step_size = np.inf
-    iterations = 0
-    information, gradient = _normal(problem, point, memory)
-    while iterations < max_iterations:
-        step, free, size = _step(problem, point.theta, information, gradient, damping)
-        trial_theta = np.clip(point.theta + step, problem.lower, problem.upper)
-        trial = _evaluate(problem, trial_theta, memory, variance)
-        tolerance = 1e-9 * (1.0 + abs(point.cost))
-        if trial is None or not trial.cost <= point.cost + tolerance:
-            if trial is not None:
-                problem.release(trial.responses)
-            if size < step_limit and damping < DAMPED:
-                converged = True
-                step_size = size
-                break
-            damping, growth = max(growth * damping, FIRST_DAMPING), 2.0 * growth
-            if damping > MAX_DAMPING:
-                break
-            continue
-        iterations += 1
-        foreseen = float(gradient @ step - 0.5 * step @ information @ step)
-        gain = (point.cost - trial.cost) / foreseen if foreseen > 0.0 else 0.0
-        problem.release(point.responses)
-        point = trial
-        step_size = size
-        accepted_damping = damping
-        # Nielsen, report IMM-REP-1999-05 (DTU): steps that keep less than they promise run from
-        # wall to wall of a bent valley, so the damping follows the gain and not mere success.
-        damping *= max(0.2, 1.0 - (2.0 * gain - 1.0) ** 3)
-        damping, growth = (damping if damping > LEAST_DAMPING else 0.0), 2.0
-        if size < step_limit and accepted_damping < DAMPED:
-            converged = True
-            break
-        information, gradient = _normal(problem, point, memory)
-    free = _free(problem, point.theta, gradient)
+    point = found.trial
     return Optimum(
-        theta=point.theta,
-        information=information,
-        free=free,
+        theta=found.theta,
+        information=found.information,
+        free=found.free,
         variance=point.variance,
         residuals=point.residuals,
         responses=point.responses,
         cost=point.cost,
-        iterations=iterations,
-        converged=converged,
-        step=float(step_size),
+        iterations=found.iterations,
+        converged=found.converged,
+        step=found.step,
     )
+
+
+class _OutputError(Objective[_Point]):
+    """Residuals of outputs whose noise variance is concentrated out, or known."""
+
+    def __init__(
+        self, problem: OutputProblem, noise: Sequence[OutputNoise], variance: Array | None
+    ) -> None:
+        self._problem, self._noise, self._variance = problem, noise, variance
+
+    def evaluate(self, theta: Array) -> _Point | None:
+        return _evaluate(self._problem, theta, self._noise, self._variance)
+
+    def normal(self, theta: Array, trial: _Point) -> tuple[Array, Array]:
+        return _normal(self._problem, theta, trial, self._noise)
+
+    def free(self, theta: Array, gradient: Array) -> BoolArray:
+        return free_of_bounds(theta, gradient, self._problem.lower, self._problem.upper)
+
+    def reached(self, theta: Array, step: Array) -> Array:
+        return np.clip(theta + step, self._problem.lower, self._problem.upper)
+
+    def release(self, trial: _Point) -> None:
+        self._problem.release(trial.responses)
 
 
 def whitened_slopes(
@@ -236,7 +226,7 @@ def _evaluate(
         cost = 0.5 * float(np.sum(squares / variance))
     if not np.isfinite(cost):
         return None
-    return _Point(theta, responses, residuals, whitened, estimated, cost + prior)
+    return _Point(responses, residuals, whitened, estimated, cost + prior)
 
 
 def _whitened(residual: Array, noise: Sequence[OutputNoise]) -> Array:
@@ -246,11 +236,11 @@ def _whitened(residual: Array, noise: Sequence[OutputNoise]) -> Array:
 
 
 def _normal(
-    problem: OutputProblem, point: _Point, noise: Sequence[OutputNoise]
+    problem: OutputProblem, theta: Array, point: _Point, noise: Sequence[OutputNoise]
 ) -> tuple[Array, Array]:
     size = len(problem.names)
     information = np.diag(problem.prior_precision)
-    gradient = problem.prior_precision * (problem.prior_mean - point.theta)
+    gradient = problem.prior_precision * (problem.prior_mean - theta)
     for number, slopes in enumerate(whitened_slopes(problem, point.responses, noise)):
         columns = problem.columns(number)
         block = np.zeros((len(columns), len(columns)))
@@ -266,36 +256,3 @@ def _normal(
             information[np.ix_(columns, columns)] += block
             gradient[columns] += right
     return information, gradient
-
-
-def _free(problem: OutputProblem, theta: Array, gradient: Array) -> BoolArray:
-    low = (theta <= problem.lower) & (gradient < 0.0)
-    high = (theta >= problem.upper) & (gradient > 0.0)
-    return ~(low | high)
-
-
-def _step(
-    problem: OutputProblem, theta: Array, information: Array, gradient: Array, damping: float
-) -> tuple[Array, BoolArray, float]:
-    """Solve for the step over parameters not held by a bound; size is in Cramer-Rao bounds."""
-    free = _free(problem, theta, gradient)
-    step = np.zeros(len(theta))
-    if not free.any():
-        return step, free, 0.0
-    block = information[np.ix_(free, free)]
-    if not np.isfinite(block).all():  # dpotrf factors NaN without a word
-        raise IdentificationError(NOT_FINITE)
-    scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
-    scaled = block / np.outer(scale, scale)
-    ridge = max(damping, 1e-14)
-    factor, failed = lapack.dpotrf(scaled + ridge * np.eye(len(block)), lower=1)
-    while failed:
-        ridge *= 10.0
-        if not ridge <= MAX_DAMPING:
-            raise IdentificationError(NOT_FINITE)
-        factor, failed = lapack.dpotrf(scaled + ridge * np.eye(len(block)), lower=1)
-    inverse = np.tril(lapack.dtrtri(factor, lower=1)[0])
-    move = inverse.T @ (inverse @ (gradient[free] / scale))
-    bound = np.sqrt(np.einsum("ij,ij->j", inverse, inverse))
-    step[free] = move / scale
-    return step, free, float(np.max(np.abs(move) / bound, initial=0.0))
