@@ -61,6 +61,9 @@ HOST_FLOORS: dict[str, tuple[str, ...]] = {
         *("flight", "coefficients", "answer", "pipeline"),
     ),
 }
+# Of a function of `host.verbs`, in lines without its docstring; and what only work needs.
+VERB_BODY = 60
+COMPUTING = {"numpy", "pandas", "scipy", "numba", "matplotlib"}
 # Modules beside the rooms that start programs or give the package its names.
 PROGRAMS = {"__init__", "__main__", "cli", "virtual"}
 # Whatever the order above: the virtual flight and identification meet in `planning` and in the
@@ -170,7 +173,25 @@ def simulator_breaches(root: Path) -> Iterator[str]:
                 yield f"{path.relative_to(root)}:{number}: the simulator may not know {found[0]}"
 
 
+def verb_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every verb that works: a long body, or a library that computes."""
+    for path in _files(root / "host" / "src" / "host" / "verbs", {".py"}):
+        tree, name = ast.parse(path.read_text(encoding="utf-8")), path.relative_to(root)
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                continue
+            body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+            size = (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
+            if size > VERB_BODY:
+                more = f"{size} lines of body, at most {VERB_BODY}: arguments and printing only"
+                yield f"{name}:{node.lineno}: {node.name} has {more}"
+        for number, module in _imports(tree, path):
+            if module.split(".")[0] in COMPUTING:
+                yield f"{name}:{number}: a verb does no work: may not import {module}"
+
+
 RULES = (
+    verb_breaches,
     include_breaches,
     board_breaches,
     word_breaches,
@@ -297,6 +318,12 @@ PLANTED = [
     (floor_breaches, "host/src/host/log/head.py", "from host.decode.summary import summarise"),
     (import_breaches, "tests/simulator/simavr_bench/relay.py", "from flight.rig import make_card"),
     (simulator_breaches, "tests/simulator/speed.py", 'PINS = "hw/pin_map.toml"'),
+    (
+        verb_breaches,
+        "host/src/host/verbs/identify.py",
+        'def run(args):\n    """Run."""\n' + "    print()\n" * 61,
+    ),
+    (verb_breaches, "host/src/host/verbs/plan.py", "def run(args):\n    import numpy as np"),
     (link_breaches, "host/src/host/twin/recorder/mega.py", 'LIBRARY = "libsimavr.so"'),
 ]
 
@@ -321,6 +348,10 @@ ALLOWED = [
     ("tests/firmware/test_a/test_a.cpp", 'TEST_CASE("INFO") { CHECK_EQ(1, 1); REQUIRE(true); }'),
     ("host/src/host/sysid/flight/linear.py", "from host.sysid.models.model import Term"),
     ("host/src/host/decode.py", "import numpy\nfrom host.wire.schema import load"),
+    (
+        "host/src/host/verbs/info.py",
+        'def run(args):\n    """Run."""\n' + "    print()\n" * 60,
+    ),
     (
         "host/src/host/planning/plan.py",
         "from host.twin.virtual import a\nimport host.sysid.errors",

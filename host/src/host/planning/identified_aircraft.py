@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from host.aircraft.file import Aircraft, AircraftError
-from host.aircraft.linear_aircraft import flown_straight
+from host.aircraft.linear_aircraft import flown_straight, load
 from host.aircraft.linearisation import linearise
 from host.aircraft.straight import Straight
 from host.aircraft.trim import solve
+from host.errors import UsageError
 from host.files.document import read_text
 from host.sysid.models.model_file import read_model, read_trim
 
@@ -114,3 +115,29 @@ def _axis(path: Path, states: tuple[str, ...], inputs: tuple[str, ...]) -> str:
         f" expected of {', '.join(AXES['longitudinal'])} (alpha_rad among them) or"
         f" {', '.join(AXES['lateral'])}"
     )
+
+
+def named_aircraft(given: Sequence[str], usual: str) -> Aircraft | None:
+    """Return the aircraft that names and saved models stand for; None where nothing is given.
+
+    Parameters
+    ----------
+    given : sequence of str
+        At most one aircraft by name or file, and models of `host identify --save-model` that it
+        becomes the aircraft of.
+    usual : str
+        The aircraft of the models where none is named.
+
+    Raises
+    ------
+    host.errors.UsageError
+        If two aircraft are named, or one cannot be read.
+    """
+    models = [Path(name) for name in given if is_model(name)]
+    named = [name for name in given if not is_model(name)]
+    if len(named) > 1:
+        raise UsageError(f"{named[1]}: one aircraft flies, {named[0]} is given already")
+    if not given:
+        return None
+    base = load(named[0] if named else usual)
+    return with_models(base, models) if models else base

@@ -7,17 +7,10 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from host.errors import CheckError, ExitCode, UsageError
+from host.errors import ExitCode, UsageError
 from host.extras import install_hint
 from host.progress import draw_share
-
-if TYPE_CHECKING:
-    from host.aircraft.file import Aircraft
-
-# Faults that leave every decoded value right.
-HARMLESS = ("motor_cut", "card_busy")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -56,9 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Fly, and print what was written; return an exit code."""
     try:
-        from host.twin.faults import without_recorder
-        from host.twin.outcome import report
-        from host.twin.recorder import sitl
+        from host.twin.outcome import report, summary
         from host.twin.testcard import cards
     except ImportError as error:
         raise UsageError(
@@ -71,12 +62,14 @@ def run(args: argparse.Namespace) -> int:
     card = cards.load(args.card)
     if args.seed < 0:
         raise UsageError(f"seed is {args.seed}, expected 0 or more")
+    from host.planning.identified_aircraft import named_aircraft
+
     try:
         outcome = report.simulate(
             card,
             args.output,
             seed=args.seed,
-            aircraft=_aircraft(args.aircraft, card.aircraft),
+            aircraft=named_aircraft(args.aircraft, card.aircraft),
             firmware=args.firmware,
             pictures=not args.no_picture,
             both=args.both,
@@ -86,83 +79,14 @@ def run(args: argparse.Namespace) -> int:
         if error.filename is None and error.errno is not None:  # a write, which names no file
             error.filename = f"{args.output}: not all files of the flight were written"
         raise
-    record = outcome.record
-    for doubt in record.aircraft.doubts:
+    for doubt in outcome.record.aircraft.doubts:
         print(f"host: {doubt}", file=sys.stderr)
-    duration = float(record.t_s[-1])
-    planned_s = cards.duration_s(card)
-    # The chip simulator is another process: its time is only on the wall.
-    spent = outcome.wall_s if args.firmware == "avr" else outcome.processor_s
-    busy = sum(s for stage, s in spent.items() if stage not in ("load", "picture"))
-    flown = [w for w in record.schedule.windows if w.end_s <= duration]
     if args.json:
-        print(
-            json.dumps(
-                {
-                    "card": card.name,
-                    "aircraft": record.aircraft.name,
-                    "seed": args.seed,
-                    "firmware": args.firmware,
-                    "duration_s": duration,
-                    "ended_on_ground": record.touched_ground,
-                    "maneuvers": len(flown),
-                    "files": [str(path) for path in outcome.files],
-                    "wall_s": outcome.wall_s,
-                    "processor_s": outcome.processor_s,
-                    "times_real_time": duration / busy,
-                    "deviations": {
-                        d.column: [d.mean, d.spread, d.mean_limit, d.spread_limit]
-                        for d in outcome.deviations
-                    },
-                }
-            )
-        )
+        print(json.dumps(summary.document(outcome, args.firmware)))
         return ExitCode.OK
-    print(f"{card.title}\n  {record.aircraft.title}, {duration:.1f} s, {len(flown)} maneuvers,"
-          f" seed {args.seed}, simulated")  # fmt: skip
-    if record.touched_ground:
-        print(f"  on the ground after {duration:.1f} s, sinking at {record.sink_mps:.1f} m/s:"
-              f" the flight ends there, {card.name} asked for {planned_s:.1f} s")  # fmt: skip
-    stages = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in spent.items())
-    print(
-        f"  {duration / busy:.0f} times real time on one core, loading and picture apart ({stages})"
-    )
-    left = without_recorder(card.faults) if outcome.recording is None else []
-    if left:
-        print(f"  without the recorder nothing comes of {', '.join(f.kind for f in left)}")
-    rate_hz = card.flight.rate_hz
-    if outcome.recording is not None and rate_hz not in sitl.RATES_HZ:
-        print(f"  recorded at {sitl.recorder_rate_hz(rate_hz)} Hz: {rate_hz:g} Hz of the card is"
-              f" none of {', '.join(map(str, sitl.RATES_HZ))}")  # fmt: skip
-    if outcome.recording is not None and not outcome.recording.log:
-        print(f"  nothing was recorded: the recorder found {outcome.recording.name}")
-    if outcome.deviations:
-        print("  decoded log against the truth, in flight (mean and spread of the error, limits):")
-    for d in outcome.deviations:
-        verdict = "" if d.within else "  BEYOND ITS ERROR MODEL"
-        print(f"    {d.column:14s} {d.mean:+9.4f} {d.spread:8.4f}"
-              f"   {d.mean_limit:8.4f} {d.spread_limit:8.4f}{verdict}")  # fmt: skip
-    for path in outcome.files:
-        print(f"  wrote {path}")
-    broken = any(fault.kind not in HARMLESS for fault in card.faults)
-    beyond = [d.column for d in outcome.deviations if not d.within]
-    if beyond and not broken:
-        raise CheckError(f"{', '.join(beyond)}: decoded values are beyond what the sensors explain")
+    print("\n".join(summary.lines(outcome, args.firmware)))
+    summary.check(outcome)
     return ExitCode.OK
-
-
-def _aircraft(given: list[str], usual: str) -> Aircraft | None:
-    from host.aircraft.linear_aircraft import load
-    from host.planning.identified_aircraft import is_model, with_models
-
-    models = [Path(name) for name in given if is_model(name)]
-    named = [name for name in given if not is_model(name)]
-    if len(named) > 1:
-        raise UsageError(f"{named[1]}: one aircraft flies, {named[0]} is given already")
-    if not given:
-        return None
-    base = load(named[0] if named else usual)
-    return with_models(base, models) if models else base
 
 
 def _list(*, as_json: bool) -> int:
