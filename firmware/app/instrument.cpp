@@ -54,8 +54,8 @@ void Instrument::step() {
   sensors_.step(config_, pilot_, outlet_, now_us);
   const bool made_frame = outlet_.frames() != frames;
   pilot_.ran(kTaskSensors);
-  // A receiver pulse that ends behind the pilot's step waits for the next, and 2 ms is all it may:
-  // making a frame takes more than half of that, and the card's portion comes on top.
+  // A receiver pulse that ends behind the pilot's step, or 0.3 ms before it, waits for the next, and
+  // 2 ms is all it may: making a frame takes more than half of that, and so do the slow tasks.
   if (made_frame) pilot_.step(config_, supply_.good(), outlet_, hal::now_us());
   recorder_.step(now_us);
   pilot_.ran(kTaskRecorder);
@@ -64,6 +64,7 @@ void Instrument::step() {
     // A reading per turn: a row is 30 ms long, and no turn is.
     ascii_row_.step(sensors_, pilot_.channels(), telemetry_, now_us);
     step_slow(now_us);
+    pilot_.step(config_, supply_.good(), outlet_, hal::now_us());
   }
   if (outlet_.frames() == frames) recorder_.work(now_us);
   // By the time it is now: a rest is at most one turn longer than the least time between edges.
