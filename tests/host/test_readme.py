@@ -7,6 +7,7 @@ import pytest
 from host.cli import main
 from host.errors import ExitCode
 
+import host
 from tests.host.logs import ROOT
 from tests.protocol.flights import simple_log
 
@@ -18,7 +19,7 @@ def test_example_runs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("flight.bin").write_bytes(simple_log(25.0).data())
-    (code,) = re.findall(r"```python\n(.*?)```", TEXT, re.S)
+    code, _ = re.findall(r"```python\n(.*?)```", TEXT, re.S)
     exec(compile(code, "README.md", "exec"), {})
     said = capsys.readouterr().out
     assert "Pa measured" in said
@@ -36,3 +37,20 @@ def test_every_option_of_decode_is_documented(capsys: pytest.CaptureFixture[str]
     assert caught.value.code == 0
     helped = set(re.findall(r"--[a-z-]+", capsys.readouterr().out)) - {"--help", "--output"}
     assert helped <= set(re.findall(r"--[a-z-]+", TEXT))
+
+
+def test_the_notebook_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On tables of two virtual flights in place of logs, whose recorder is not always built."""
+    monkeypatch.chdir(tmp_path)
+    for name, seed in (("other", "4"), ("flight", "3")):
+        options = ["--seed", seed, "--firmware", "none", "--no-picture", "-o", "."]
+        assert main(["simulate", "demo", *options]) == 0
+        Path("flight.csv").rename(f"{name}.csv")
+    _, code = re.findall(r"```python\n(.*?)```", TEXT, re.S)
+    capsys.readouterr()
+    place: dict[str, object] = {"host": host}
+    exec(compile(code.replace(".bin", ".csv"), "README.md", "exec"), place)
+    assert "longitudinal: 2 maneuvers fitted jointly" in capsys.readouterr().out
+    assert isinstance(place["found"], host.Identification)

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.errors import HostError
+from host.sysid.answer.pictures import draw_coefficients
 from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.answer.verdict import MARKS
 from host.sysid.flight import chosen, finder
@@ -144,6 +145,25 @@ def test_several_flights_hold_the_truth(both: Identification, flights: tuple[Pat
     merged = true_coefficients({"maneuver": truth["maneuver"] + other["maneuver"]}, "lateral")
     assert both.truth is not None
     assert true_coefficients(both.truth, "lateral") == merged
+
+
+def test_the_verb_takes_several_flights(
+    both: Identification, flights: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    sources = [str(folder / "flight.csv") for folder in flights]
+    assert main(["identify", *sources, "--model", "lateral", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["source"] == sources
+    assert {m[-len("of flight 2") :] for m in answer["answers"][0]["maneuvers"]} == {
+        "of flight 1", "of flight 2",
+    }  # fmt: skip
+    assert both.coefficients is not None
+    assert both.coefficients.maneuvers[0].endswith("of flight 1")
+    drawn = draw_coefficients(both.coefficients, [f.recorded for f in both.flights])
+    axes = drawn["coefficients_input"].axes[0]
+    moved = [float(np.max(np.asarray(line.get_ydata()))) for line in axes.get_lines()]
+    count = len(both.coefficients.used)
+    assert min(moved[:count]) > 0.5  # deg s: each of them is an input, not a stretch without
 
 
 def test_maneuvers_are_found_once_a_flight(

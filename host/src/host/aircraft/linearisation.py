@@ -9,6 +9,7 @@ import numpy as np
 
 from host.aircraft.airframe import ELEVATOR, Q0, STATE_COUNT, Airframe, Array
 from host.aircraft.attitude import euler, quaternion
+from host.aircraft.mode_names import DUTCH_ROLL, PHUGOID, ROLL, ROLL_SPIRAL, SHORT_PERIOD, SPIRAL
 from host.aircraft.rigid_body import derivative
 from host.aircraft.trim import Trim
 
@@ -129,7 +130,7 @@ def modes(linear: Linear) -> list[Mode]:
     """
     found = []
     for matrix, fast, slow in (
-        (linear.longitudinal_a, "short period", "phugoid"),
+        (linear.longitudinal_a, SHORT_PERIOD, PHUGOID),
         (linear.lateral_a, "", ""),
     ):
         roots = np.linalg.eigvals(matrix)
@@ -141,8 +142,8 @@ def modes(linear: Linear) -> list[Mode]:
             spare = fast if len(pairs) < 2 else slow
             named += [(f"{spare} {i + 1}", s) for i, s in enumerate(real)]
         else:
-            named = [("dutch roll", s) for s in pairs[:1]] + [("roll-spiral", s) for s in pairs[1:]]
-            named += list(zip(("roll", "spiral", "third", "fourth"), real, strict=False))
+            named = [(DUTCH_ROLL, s) for s in pairs[:1]] + [(ROLL_SPIRAL, s) for s in pairs[1:]]
+            named += list(zip((ROLL, SPIRAL, "third", "fourth"), real, strict=False))
         found += [
             Mode(name, complex(s), abs(s), float(-s.real / abs(s)) if abs(s) > 0 else 0.0)
             for name, s in named

@@ -19,6 +19,7 @@ from host.aircraft.attitude import euler
 from host.aircraft.file import Aircraft
 from host.aircraft.linear_aircraft import load
 from host.aircraft.linearisation import linearise, modes
+from host.aircraft.mode_names import DUTCH_ROLL, SHORT_PERIOD
 from host.aircraft.trim import solve
 from host.sysid.errors import IdentificationError
 from host.sysid.estimators.start import start_values
@@ -264,8 +265,8 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
     speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")
     frame = aircraft.airframe()
     found = {m.name: m for m in modes(linearise(frame, solve(frame, speed)))}
-    short = 2.0 * math.pi / found["short period"].frequency_radps
-    dutch = 2.0 * math.pi / found["dutch roll"].frequency_radps
+    short = 2.0 * math.pi / found[SHORT_PERIOD].frequency_radps
+    dutch = 2.0 * math.pi / found[DUTCH_ROLL].frequency_radps
     hand = 0.2  # a thumb is no faster
     draft = (
         Segment("3211", axes=("elevator",), amplitudes=(2.0,), width_s=max(0.3 * short, hand)),

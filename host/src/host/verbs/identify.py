@@ -21,7 +21,8 @@ def add_parser(subparsers: Any) -> None:
         description="Find the maneuvers of a flight, fit a model to them jointly, check it on"
         " maneuvers it has not seen, and say what of it can be trusted.",
     )
-    parser.add_argument("source", type=Path, nargs="?", help="log, CSV, Parquet or MAT file")
+    parser.add_argument("source", type=Path, nargs="*",
+                        help="log, CSV, Parquet, MAT; several are fitted together")  # fmt: skip
     parser.add_argument("--map", type=Path, metavar="TOML", help="foreign names, units and signs")
     parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
     parser.add_argument(
@@ -41,8 +42,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: mass, sizes, sensors;"
                         " gives coefficients")  # fmt: skip
-    parser.add_argument("--truth", type=Path, metavar="TOML",
-                        help="truth of a simulated flight: compare with it")  # fmt: skip
+    parser.add_argument("--truth", type=Path, metavar="TOML", action="append",
+                        help="truth of a simulated flight: compare with it; of several flights"
+                        " repeatable")  # fmt: skip
     parser.add_argument("--prior", type=Path, metavar="FILE",
                         help="coefficients to compare with: TOML, AVL, Datcom")  # fmt: skip
     parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="start of the fit")
@@ -81,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     if "list" in (args.method or ()):
         print("\n".join(f"{name:26s} {about}" for name, about in known_methods().items()))
         return int(ExitCode.OK)
-    if args.source is None:
+    if not args.source:
         raise IdentificationError("name the flight: a log, CSV, Parquet or MAT file")
     places = _places(args)
     check(places)
@@ -118,7 +120,7 @@ def _places(args: argparse.Namespace) -> Places:
     """Return where files go, and every file that the answer is made from."""
     from host.sysid.answer.save import Places
 
-    given = [args.source, args.map, args.calibration, args.truth, args.prior]
+    given = [*args.source, args.map, args.calibration, *(args.truth or ()), args.prior]
     given += [Path(name) for name in (args.aircraft, *(args.model or ())) if name]
     return Places(
         plots=args.plots,

@@ -219,5 +219,5 @@ def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dic
         "fit": {"one_step": {n: {"nrmse": x.nrmse} for n, x in answer.fit.traces.items()}},
         "unseen": _prediction_document(answer.fit.prediction),
         "repeats": _repeats_document(answer.fit.repeats),
-        "maneuvers": [found_name(f) for f in answer.used],
+        "maneuvers": list(answer.maneuvers),
     }

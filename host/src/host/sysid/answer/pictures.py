@@ -26,7 +26,6 @@ from host.sysid.answer.units import parameter_unit
 from host.sysid.answer.verdict import not_relied_on
 from host.sysid.compatibility.signals import THIN_HZ
 from host.sysid.flight.linear import Answer
-from host.sysid.flight.reconstructed import found_name
 from host.sysid.models.diagnostics import references
 from host.sysid.models.modes import Mode
 
@@ -44,7 +43,7 @@ GAP_S = 0.5  # between the maneuvers of a picture
 def draw_all(
     answers: Sequence[Answer],
     direct: CoefficientAnswer | None,
-    columns: Mapping[str, Array],
+    flights: Sequence[Mapping[str, Array]],
     truth: dict[str, Any] | None = None,
 ) -> dict[str, Figure]:
     """Return the pictures of several answers by name; of one model by several methods apart.
@@ -53,8 +52,8 @@ def draw_all(
     ----------
     answers : sequence of Answer
     direct : CoefficientAnswer or None
-    columns : mapping
-        The flight the coefficients were made of; its surfaces give the spectrum of the inputs.
+    flights : sequence of mapping
+        Columns of what the coefficients were made of; surfaces give the spectrum of the inputs.
     truth : dict, optional
         Truth file of a simulated flight, drawn beside the intervals.
 
@@ -69,7 +68,7 @@ def draw_all(
         for answer in several:
             name = template if len(several) == 1 else f"{template}_{answer.method}"
             found |= draw(answer, name)
-    return found | (draw_coefficients(direct, columns, truth) if direct else {})
+    return found | (draw_coefficients(direct, flights, truth) if direct else {})
 
 
 def save_all(pictures: Mapping[str, Figure], folder: Path) -> list[Path]:
@@ -125,7 +124,7 @@ def draw(answer: Answer, name: str) -> dict[str, Figure]:
 
 def draw_coefficients(
     answer: CoefficientAnswer,
-    columns: Mapping[str, Array],
+    flights: Sequence[Mapping[str, Array]],
     truth: dict[str, Any] | None = None,
 ) -> dict[str, Figure]:
     """Return the pictures of a direct fit of coefficients by name.
@@ -133,8 +132,8 @@ def draw_coefficients(
     Parameters
     ----------
     answer : CoefficientAnswer
-    columns : mapping
-        The flight it was made of; its surfaces give the spectrum of the inputs.
+    flights : sequence of mapping
+        Columns of what it was made of; surfaces give the spectrum of the inputs.
     truth : dict, optional
         Truth file of a simulated flight, drawn beside the intervals.
 
@@ -154,15 +153,11 @@ def draw_coefficients(
         Bar(d.name, d.value, d.half_width, d.reference, d.flagged, true.get(d.name))
         for d in answer.fit.derivatives
     ]
-    t = columns["t_s"]
-    inputs = [
-        Excitation(
-            found_name(f),
-            float(t[1] - t[0]),
-            columns[f.axis][(t >= f.start_s) & (t <= f.end_s)],
-        )
-        for f in answer.used
-    ]
+    inputs = []
+    for name, f, k in zip(answer.maneuvers, answer.used, answer.flights, strict=True):
+        t = flights[k]["t_s"]
+        inside = (t >= f.start_s) & (t <= f.end_s)
+        inputs.append(Excitation(name, float(t[1] - t[0]), flights[k][f.axis][inside]))
     title = "coefficients: measured (grey), one step by the derivatives found (red), fitted data"
     return {
         "coefficients_fit": histories(signals, title),

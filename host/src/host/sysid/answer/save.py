@@ -91,7 +91,7 @@ def write(
     places: Places,
     answers: Sequence[Answer],
     direct: CoefficientAnswer | None,
-    columns: Mapping[str, Array],
+    flights: Sequence[Mapping[str, Array]],
     truth: dict[str, Any] | None,
 ) -> list[Path]:
     """Write everything asked for and return the files.
@@ -104,8 +104,8 @@ def write(
         Linear models.
     direct : CoefficientAnswer or None
         A direct fit of coefficients.
-    columns : mapping
-        The flight, whose surfaces give the spectrum of the inputs.
+    flights : sequence of mapping
+        Columns of each, whose surfaces give the spectrum of the inputs.
     truth : dict or None
         Of a simulated flight, for the pictures.
 
@@ -134,7 +134,7 @@ def write(
     if places.plots is not None:
         from host.sysid.answer.pictures import draw_all, save_all
 
-        written += save_all(draw_all(answers, direct, columns, truth), places.plots)
+        written += save_all(draw_all(answers, direct, flights, truth), places.plots)
     return written
 
 

@@ -9,6 +9,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from host.aircraft.mode_names import LATERAL, LONGITUDINAL
 from host.files.document import read_toml
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.mat import labels
@@ -19,9 +20,6 @@ from host.sysid.models.modes import Mode
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.flight import CoefficientAnswer
-
-LONGITUDINAL = ("short period", "phugoid")
-LATERAL = ("dutch roll", "roll", "spiral")
 
 
 def read_truth(path: Path) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from host.sysid.coefficients.pooled import pooled
 from host.sysid.coefficients.windows import LEAST_S, Window
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import FLYING_SHARE, Found, find
-from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
+from host.sysid.flight.reconstructed import ReconstructedFlight, found_name, reconstructed
 from host.sysid.models.modes import Mode
 from host.sysid.models.result import NORMAL_95
 from host.sysid.models.systematic import main_cause
@@ -63,13 +63,15 @@ CAUSES = {
 class CoefficientAnswer:
     """What the equations of motion say straight from a flight.
 
-    `used` are the inputs found, `windows` what was fitted; `causes` is what widens each coefficient
-    most, with its share of the variance; `delays` are residual (s) with 95 % half-width.
+    `used` are the inputs found, `flights` which flight each is of, from 0; `windows` what was
+    fitted; `causes` is what widens each coefficient most, with its share of the variance; `delays`
+    are residual (s) with 95 % half-width.
     """
 
     model: CoefficientModel
     fit: CoefficientFit
     used: tuple[Found, ...]
+    flights: tuple[int, ...]
     windows: tuple[Window, ...]
     causes: dict[str, tuple[str, float]]
     modes: tuple[Mode, ...]
@@ -80,6 +82,15 @@ class CoefficientAnswer:
     def template(self) -> str:
         """What it is called beside linear models."""
         return NAME
+
+    @property
+    def maneuvers(self) -> tuple[str, ...]:
+        """What the inputs are called, of several flights with the number of theirs."""
+        several = max(self.flights, default=0) > 0
+        return tuple(
+            found_name(item) + (f" of flight {k + 1}" if several else "")
+            for item, k in zip(self.used, self.flights, strict=True)
+        )
 
     @property
     def coefficients(self) -> tuple[Coefficient, ...]:
@@ -169,6 +180,7 @@ class CoefficientEstimator:
             model=self.model,
             fit=fit,
             used=tuple(f for one in estimate for f in one.used),
+            flights=tuple(k for k, one in enumerate(estimate) for _ in one.used),
             windows=tuple(w for one in estimate for w in one.windows),
             causes=_causes(fit),
             modes=coefficient_modes(fit, self.airframe),

@@ -6,7 +6,7 @@ in the motion it stands for, and the joint covariance of both says so.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +15,10 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.sysid.aerodynamics.conversion import Quantities
 from host.sysid.coefficients.answer import CoefficientFit
-from host.sysid.models.modes import Mode, longitudinal_names, mode_of
+from host.sysid.models.modes import Mode, eigenmodes, lateral_names, longitudinal_names
 from host.sysid.models.result import NORMAL_95
 from host.sysid.models.templates import GRAVITY_MPS2
 
-PAIRS = ("dutch roll", "roll and spiral")
-SINGLE = ("roll", "spiral")
 SIGNALS = {
     "longitudinal": (("airspeed_mps", "alpha_rad", "q_radps", "theta_rad"), ("elevator_rad",)),
     "lateral": (("beta_rad", "p_radps", "r_radps", "phi_rad"), ("aileron_rad", "rudder_rad")),
@@ -47,35 +45,14 @@ def coefficient_modes(fit: CoefficientFit, airframe: AirframeData) -> tuple[Mode
         The one the fit was made with.
     """
     base, moved, steps = _moved(fit, airframe)
-    found = []
-    for k in range(2):
-        values, right = np.linalg.eig(base[k][0])
-        left = np.linalg.inv(right)
+    found: list[Mode] = []
+    for k, named in enumerate((longitudinal_names, lateral_names)):
         slopes = [(m[k][0] - base[k][0]) / step for m, step in zip(moved, steps, strict=True)]
-        own: list[Mode] = []  # fastest first
-        for j in np.argsort(-np.abs(values)):
-            value = complex(values[j])
-            if value.imag < 0.0:
-                continue
-            gradient = np.array([left[j] @ slope @ right[:, j] for slope in slopes])
-            J = np.vstack([gradient.real, gradient.imag])
-            own.append(mode_of("", value, J @ fit.covariance @ J.T))
-        swings = [m.eigenvalue.imag > 0.0 for m in own]
-        names = _lateral_names(swings) if k else longitudinal_names(swings)
-        named = [replace(m, name=name) for m, name in zip(own, names, strict=True)]
-        found += sorted(named, key=lambda m: m.eigenvalue.imag <= 0.0)
+        own = eigenmodes(base[k][0], slopes, fit.covariance)
+        names = named([m.oscillatory for m in own])
+        called = [replace(m, name=name) for m, name in zip(own, names, strict=True)]
+        found += sorted(called, key=lambda m: not m.oscillatory)
     return tuple(found)
-
-
-def _lateral_names(swings: Sequence[bool]) -> list[str]:
-    """Return dutch roll, roll and spiral, or what has become of them, fastest first."""
-    pairs, single = list(PAIRS), list(SINGLE)
-    return [
-        (pairs.pop(0) if len(pairs) > 1 else pairs[0])
-        if swing
-        else (single.pop(0) if len(single) > 1 else single[0])
-        for swing in swings
-    ]
 
 
 @dataclass(frozen=True, slots=True)

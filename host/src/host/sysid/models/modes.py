@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from host.aircraft.mode_names import DUTCH_ROLL, LONGITUDINAL, ROLL, ROLL_SPIRAL, SPIRAL
 from host.arrays import Array
 from host.sysid.models.model import LinearModel
 from host.sysid.models.result import NORMAL_95, FitResult
 
+PAIR, ROOT = "oscillatory mode", "real mode"  # without a name of their own
 REAL = 1e-9  # relative imaginary part below which an eigenvalue is called real
 
 
@@ -61,9 +63,24 @@ def modes(result: FitResult) -> tuple[Mode, ...]:
 
 def modes_of(model: LinearModel, A: Array, covariance: Array) -> tuple[Mode, ...]:
     """Return the modes of a system matrix whose parameters have the given covariance."""
+    found = eigenmodes(A, [model.gradient("A", p.name) for p in model.parameters], covariance)
+    names = _names(model, found)
+    return tuple(replace(m, name=name) for name, m in zip(names, found, strict=True))
+
+
+def eigenmodes(A: Array, slopes: Sequence[Array], covariance: Array) -> list[Mode]:
+    """Return the modes of a matrix without names, fastest first.
+
+    Parameters
+    ----------
+    A : (n, n) Array
+    slopes : sequence of (n, n) Array
+        Of the matrix with each unknown: d lambda = w' dA v / (w' v) with left and right
+        eigenvectors (Stevens & Lewis, Aircraft Control and Simulation, sec. 1.3).
+    covariance : (unknowns, unknowns) Array
+    """
     values, right = np.linalg.eig(A)
     left = np.linalg.inv(right)
-    slopes = [model.gradient("A", p.name) for p in model.parameters]
     found = []
     for k in range(len(values)):
         value = complex(values[k])
@@ -71,22 +88,8 @@ def modes_of(model: LinearModel, A: Array, covariance: Array) -> tuple[Mode, ...
             continue
         gradient = np.array([left[k] @ slope @ right[:, k] for slope in slopes])
         J = np.vstack([gradient.real, gradient.imag])
-        spread = J @ covariance @ J.T
-        found.append(mode_of("", value, spread))
-    found.sort(key=lambda mode: -mode.frequency_radps)
-    names = _names(model, found)
-    return tuple(
-        Mode(
-            name,
-            m.eigenvalue,
-            m.covariance,
-            m.frequency_radps,
-            m.frequency_sd_radps,
-            m.damping,
-            m.damping_sd,
-        )
-        for name, m in zip(names, found, strict=True)
-    )
+        found.append(mode_of("", value, J @ covariance @ J.T))
+    return sorted(found, key=lambda mode: -mode.frequency_radps)
 
 
 def mode_of(name: str, value: complex, spread: Array) -> Mode:
@@ -116,29 +119,43 @@ def longitudinal_names(oscillatory: Sequence[bool]) -> list[str]:
     """
     names, roots = [], 0
     for pair in oscillatory:
-        label = "short period" if roots < 2 else "phugoid"
+        label = LONGITUDINAL[0] if roots < 2 else LONGITUDINAL[1]
         if pair:
-            names.append("oscillatory mode" if roots % 2 else label)
+            names.append(PAIR if roots % 2 else label)
         else:
             names.append(f"root of the {label}")
         roots += 2 if pair else 1
     return names
 
 
-def _names(model: LinearModel, found: list[Mode]) -> list[str]:
-    pairs = [m for m in found if m.oscillatory]
-    single = [m for m in found if not m.oscillatory]
-    names: dict[int, str] = {}
+def lateral_names(oscillatory: Sequence[bool], *, yaw: bool = True) -> list[str]:
+    """Return the names of lateral modes, fastest first, by whether each is a pair.
+
+    The fastest pair is the dutch roll, another one roll and spiral coupled; the fastest real root
+    is the roll, the slowest the spiral. Without `yaw` that is the integration of roll rate to bank.
+    """
+    pairs = [k for k, pair in enumerate(oscillatory) if pair]
+    single = [k for k, pair in enumerate(oscillatory) if not pair]
+    names = [PAIR if pair else ROOT for pair in oscillatory]
+    for k, name in zip(pairs, (DUTCH_ROLL, ROLL_SPIRAL), strict=False):
+        names[k] = name
+    if single:
+        names[single[0]] = ROLL
+    if len(single) > 1:
+        names[single[-1]] = SPIRAL if yaw else "bank"
+    return names
+
+
+def _names(model: LinearModel, found: Sequence[Mode]) -> list[str]:
+    """Return what modes are called by the states of their model."""
+    pairs = [m.oscillatory for m in found]
+    names = [PAIR if pair else ROOT for pair in pairs]
     if "q_radps" in model.states:
-        return longitudinal_names([m.oscillatory for m in found])
-    if "airspeed_mps" in model.states and pairs:
-        names[id(pairs[0])] = "phugoid"
-    elif "r_radps" in model.states or "p_radps" in model.states:
-        if pairs:
-            names[id(pairs[0])] = "dutch roll"
-        if "p_radps" in model.states and single:
-            names[id(single[0])] = "roll"
-            if len(single) > 1:
-                # Without yaw the second root is the integration of roll rate to bank.
-                names[id(single[-1])] = "spiral" if "r_radps" in model.states else "bank"
-    return [names.get(id(m), "oscillatory mode" if m.oscillatory else "real mode") for m in found]
+        return longitudinal_names(pairs)
+    if "p_radps" in model.states:
+        return lateral_names(pairs, yaw="r_radps" in model.states)
+    if any(pairs) and "airspeed_mps" in model.states:
+        names[pairs.index(True)] = LONGITUDINAL[1]
+    elif any(pairs) and "r_radps" in model.states:
+        names[pairs.index(True)] = DUTCH_ROLL
+    return names

@@ -97,8 +97,8 @@ class Identification:
         IdentificationError
             If matplotlib is missing.
         """
-        columns = self.flights[0].recorded
-        return Pictures(draw_all(self.linear, self.coefficients, columns, self.truth))
+        recorded = [flight.recorded for flight in self.flights]
+        return Pictures(draw_all(self.linear, self.coefficients, recorded, self.truth))
 
     def simulate(self, flight: Source, **how: Any) -> Simulation:
         """Fly every model over another flight by its measured surfaces, biases fitted to each.
@@ -177,8 +177,8 @@ class Identification:
             If a place cannot be written to, or holds what the answer is made from.
         """
         check(places)
-        columns = self.flights[0].recorded
-        return write(places, self.linear, self.coefficients, columns, self.truth)
+        recorded = [flight.recorded for flight in self.flights]
+        return write(places, self.linear, self.coefficients, recorded, self.truth)
 
     def __str__(self) -> str:
         """Return the answer as people read it."""
