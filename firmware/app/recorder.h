@@ -36,6 +36,7 @@ class Recorder {
   // 1.2 ms; in one, the next of the frames that are due at its head and with each return of the
   // schema: together they would stretch the heartbeat by 2 ms.
   void work(uint32_t now_us);
+  storage::Volume::Job card_job() const { return volume_.job(); }
   // The card gives the next block at once: no sleep between two turns.
   bool in_a_hurry() const;
   // Every 10 ms or so: start, stop, resume. Looks for the card at the first call.
