@@ -189,6 +189,8 @@ TEST_CASE("all lost: no width is held, and steadiness starts over") {
   CHECK_EQ(receiver.decoder.steady(), 0);
   receiver.frame();
   CHECK_EQ(receiver.decoder.steady(), kAll);
+  CHECK(receiver.decoder.frame_us() >= 19990);
+  CHECK(receiver.decoder.frame_us() <= 20010);
 }
 
 TEST_CASE("fresh says that at most one frame is missing") {
@@ -304,6 +306,29 @@ TEST_CASE("a storm loses every channel at once") {
   CHECK_EQ(receiver.decoder.width_ticks(4), 0);
   receiver.frames(4);
   CHECK(receiver.all_right());
+}
+
+TEST_CASE("a pulse begun before a storm does not count") {
+  Receiver receiver;
+  receiver.frames(5);
+  receiver.set(1, true);
+  receiver.wait_until(receiver.now + 1500);
+  receiver.decoder.storm();
+  receiver.wait_until(receiver.now + 1500);
+  receiver.set(1, false);
+  receiver.wait_until(receiver.now + 10 * kMs);
+  CHECK_EQ(receiver.decoder.width_ticks(0), 0);
+}
+
+TEST_CASE("behind lost edges no channel's waiting pulse counts") {
+  Receiver receiver;
+  receiver.frames(5);
+  receiver.pulse(2, 3100);
+  receiver.decoder.gap();
+  receiver.pulse(1, 3000);
+  receiver.set(2, true);
+  receiver.wait_until(receiver.now + kMs);
+  CHECK_EQ(receiver.decoder.width_ticks(1), receiver.widths[1]);
 }
 
 TEST_CASE("edges lost in the ring cost one frame, not a wrong width") {
