@@ -192,7 +192,8 @@ def _change_schema(schema: dict[str, Any], rng: np.random.Generator) -> None:
     def pick(values: Any) -> Any:
         return values[int(rng.integers(len(values)))]
 
-    frame: Any = pick(schema["frames"]) if isinstance(schema.get("frames"), list) else None
+    frames = schema.get("frames")
+    frame: Any = pick(frames) if isinstance(frames, list) and frames else None
     rows = frame.get("fields") if isinstance(frame, dict) else None
     row: Any = pick(rows) if isinstance(rows, list) and rows else None
     if not isinstance(rows, list) or not isinstance(row, list) or len(row) < 2:
