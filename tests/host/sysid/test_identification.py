@@ -16,8 +16,10 @@ from host.errors import HostError
 from host.sysid.answer.pictures import draw_coefficients
 from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.answer.verdict import MARKS
+from host.sysid.coefficients.model import standard_model
 from host.sysid.flight import chosen, finder
 from host.sysid.flight.linear import LinearEstimator
+from host.sysid.models.templates import Trim, template
 from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.pictures import Pictures
 from host.sysid.pipeline.prepared import Reading, prepare
@@ -117,6 +119,19 @@ def test_a_table_at_hand_gives_the_same_numbers(
     np.testing.assert_allclose(ours["half_width"], theirs["half_width"], rtol=1e-9)
     with_index = host.identify(table.set_index("t_s"), models="short-period")
     assert "M_alpha" in loose(with_index.table).loc["short-period"].index
+
+
+def test_a_model_at_hand_is_as_good_as_its_name(
+    one: Identification, flights: tuple[Path, Path]
+) -> None:
+    source = flights[0] / "flight.csv"
+    made = template("short-period", Trim(17.0, 0.1, 0.1))
+    own, terms = replace(made, name="mine"), replace(standard_model(), name="ours")
+    found = host.identify(source, aircraft=NAME, models=[own, terms], methods="output-error-white")
+    assert set(found.table.index.get_level_values("model")) == {"mine", "coefficients"}
+    assert "by the terms of 'ours'" in str(found)
+    ours, theirs = loose(found.table).loc["coefficients"], loose(one.table).loc["coefficients"]
+    np.testing.assert_allclose(ours["value"], theirs["value"], rtol=1e-9)
 
 
 def test_several_flights_are_fitted_together(one: Identification, both: Identification) -> None:
@@ -269,6 +284,10 @@ def test_a_hostile_name_is_text_on_the_page(flights: tuple[Path, Path], tmp_path
     [
         ("nothing.bin", {}, "nothing.bin: no such file or folder"),
         ([], {}, "no flight given"),
+        (3, {}, "flight 1 is of type int, expected a path"),
+        (["x.csv", {"t_s": []}], {}, "flight 2 is of type dict"),
+        ("x.csv", {"models": [3]}, "a model is of type int, expected a name"),
+        ("x.csv", {"methods": 3}, "unknown method 3"),
         (pd.DataFrame({"q_radps": np.zeros(9)}), {}, "table: no column t_s"),
         (pd.DataFrame({"t_s": np.arange(99.0) / 50.0}), {}, "needs airspeed_mps"),
         ("x.csv", {"models": "longitudnal"}, "did you mean longitudinal"),

@@ -27,6 +27,7 @@ from host.sysid.coefficients.outcome import (
 from host.sysid.coefficients.pooled import pooled
 from host.sysid.coefficients.windows import LEAST_S, Window
 from host.sysid.errors import IdentificationError
+from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.finder import FLYING_SHARE, Found, find
 from host.sysid.flight.reconstructed import ReconstructedFlight, found_name, reconstructed
 from host.sysid.models.modes import Mode
@@ -267,9 +268,7 @@ def identify_coefficients(
     """
     by = coefficient_estimator(aircraft, model=model, airframe=airframe, instrument=instrument)
     found = find(columns) if windows is None else windows
-    estimate = by.estimate([reconstructed(columns, found)])
-    widths = by.intervals(estimate)
-    return by.answer(estimate, widths, by.validation(estimate, widths))
+    return answer_of(by, [reconstructed(columns, found)])
 
 
 def joined(found: Sequence[Found]) -> list[Window]:

@@ -29,6 +29,7 @@ from host.sysid.estimators.gust import VANES, fit_with_gust
 from host.sysid.flight.carried import carried, systematic_error_shifts
 from host.sysid.flight.chosen import moving, once
 from host.sysid.flight.departures import Departure, departure
+from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.finder import Found, Grade, find, grade
 from host.sysid.flight.free_simulation import fits_of, free_simulation, frozen_model
 from host.sysid.flight.linear_model import (
@@ -409,19 +410,12 @@ def identify(
     for name in names:
         estimator = LinearEstimator(name, user_model, method, airframe, powerplant)
         try:
-            answers.append(linear_answer(estimator, [flight]))
+            answers.append(answer_of(estimator, [flight]))
         except NoManeuverError as error:
             failed.append(str(error))
     if not answers:
         raise NoManeuverError("; ".join(dict.fromkeys(failed)))
     return answers
-
-
-def linear_answer(estimator: LinearEstimator, flights: Sequence[ReconstructedFlight]) -> Answer:
-    """Return what all stages of one estimator make of some flights."""
-    estimate = estimator.estimate(flights)
-    intervals = estimator.intervals(estimate)
-    return estimator.answer(estimate, intervals, estimator.validation(estimate, intervals))
 
 
 def from_zero(coefficient: Coefficient) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -24,7 +25,7 @@ from host.sysid.flight.reconstructed import ReconstructedFlight
 from host.sysid.pipeline.aircraft_known import AircraftKnown
 from host.sysid.pipeline.html import answer_html
 from host.sysid.pipeline.pictures import Pictures
-from host.sysid.pipeline.prepared import Reading, prepare
+from host.sysid.pipeline.prepared import Reading, prepare, several
 from host.sysid.pipeline.simulation import Simulation, simulate
 from host.sysid.pipeline.table import estimate_table, mode_table
 
@@ -100,24 +101,42 @@ class Identification:
         recorded = [flight.recorded for flight in self.flights]
         return Pictures(draw_all(self.linear, self.coefficients, recorded, self.truth))
 
-    def simulate(self, flight: Source, **how: Any) -> Simulation:
+    def simulate(
+        self,
+        flight: Source,
+        *,
+        calibration: str | Path | None = None,
+        mapping: str | Path | None = None,
+        maneuvers: Sequence[int] = (),
+        from_s: float | None = None,
+        to_s: float | None = None,
+    ) -> Simulation:
         """Fly every model over another flight by its measured surfaces, biases fitted to each.
 
         Parameters
         ----------
         flight : path, FlightLog or DataFrame
-            Read and corrected as this one was.
-        **how
-            Of `Reading`, where it differs: `calibration`, `mapping`, `maneuvers`, `from_s`, `to_s`.
+            Read and corrected as those identified from.
+        calibration, mapping : path, optional
+            Where they are not those of this identification.
+        maneuvers, from_s, to_s
+            As in `host.identify`; all maneuvers without.
 
         Raises
         ------
         host.errors.HostError
             If it cannot be read, or no model can be run over it.
         """
-        paths = {k: Path(v) for k, v in how.items() if k in ("calibration", "mapping") and v}
-        chosen = {"maneuvers": (), "from_s": None, "to_s": None, **how, **paths}
-        found = prepare(flight, replace(self.reading, **chosen), self.aircraft)
+        how = replace(
+            self.reading,
+            calibration=Path(calibration) if calibration else self.reading.calibration,
+            mapping=Path(mapping) if mapping else self.reading.mapping,
+            maneuvers=tuple(maneuvers),
+            from_s=from_s,
+            to_s=to_s,
+        )
+        [source] = several([flight])
+        found = prepare(source, how, self.aircraft)
         return simulate(self.linear, self.coefficients, found.flight, found.notes)
 
     def document(self) -> dict[str, Any]:

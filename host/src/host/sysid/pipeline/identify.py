@@ -11,10 +11,10 @@ from host.aircraft.prior.prior_table import PriorTable
 from host.sysid.answer.truth import read_truth
 from host.sysid.coefficients.flight import CoefficientAnswer, coefficient_estimator
 from host.sysid.errors import IdentificationError
+from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear import Answer, LinearEstimator
 from host.sysid.flight.reconstructed import ReconstructedFlight
 from host.sysid.pipeline.aircraft_known import AircraftKnown, aircraft_known
-from host.sysid.pipeline.estimator import answer_of
 from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.prepared import Reading, prepare, several, told
 from host.sysid.pipeline.wanted import ModelName, Models, wanted_methods, wanted_models

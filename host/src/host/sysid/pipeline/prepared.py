@@ -95,11 +95,21 @@ def several(flights: Source | Sequence[Source]) -> list[Source]:
     Raises
     ------
     IdentificationError
-        If there is none.
+        If there is none, or one is something else.
     """
+    import pandas as pd
+
+    from host.log import FlightLog
+
     listed: list[Any] = list(flights) if isinstance(flights, list | tuple) else [flights]
     if not listed:
         raise IdentificationError("no flight given; name a log, a table, or several")
+    for number, one in enumerate(listed, start=1):
+        if not isinstance(one, str | Path | FlightLog | pd.DataFrame):
+            raise IdentificationError(
+                f"flight {number} is of type {type(one).__name__}, expected a path, what"
+                " host.read_log returns, or a table (DataFrame)"
+            )
     return listed
 
 

@@ -60,6 +60,11 @@ def wanted_models(given: ModelName | Iterable[ModelName] | None) -> Models:
             linear.append((name.name, name))
         elif isinstance(name, CoefficientModel) or name == COEFFICIENTS:
             terms.append(name)
+        elif not isinstance(name, str | Path):
+            raise IdentificationError(
+                f"a model is of type {type(name).__name__}, expected a name, a path, a LinearModel"
+                " or a CoefficientModel"
+            )
         elif is_coefficient_model(Path(name)):
             terms.append(Path(name))
         elif name in AXIS_OF:
@@ -95,7 +100,7 @@ def wanted_methods(given: str | Iterable[str] | None) -> tuple[str, ...]:
     IdentificationError
         If there is no such method.
     """
-    wanted = tuple(dict.fromkeys(_several(given) or [DEFAULT_METHOD]))
+    wanted = tuple(dict.fromkeys(map(str, _several(given) or [DEFAULT_METHOD])))
     known = known_methods()
     unknown = [m for m in wanted if m not in known]
     if unknown:
