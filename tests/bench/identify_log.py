@@ -31,6 +31,7 @@ DEFAULT: tuple[str, ...] = ()
 WHOLE = tuple(f"--model={m}" for m in ("longitudinal", "lateral", "coefficients"))
 RUNS = 3
 IMPORT_LIMIT_S = 1.5
+FIRST_LIMIT_S = 7.0  # a third of what compiling every kernel took
 STARTER = """
 import os, sys, time
 begin = time.perf_counter()
@@ -73,13 +74,13 @@ def card(maneuvers: int, rest_s: float) -> str:
     return text
 
 
-def spawn(arguments: list[str]) -> tuple[int, float, float, float]:
+def spawn(arguments: list[str], **settings: str) -> tuple[int, float, float, float]:
     """Run `host` with one BLAS thread; return status, wall s, processor s and peak MB.
 
     A small process starts it: Linux counts what the starter held as the peak of the started.
     """
     command = [sys.executable, "-c", STARTER, sys.executable, "-m", "host", *arguments]
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", **settings}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
     status, wall_s, processor_s, peak_mb = map(float, done.stdout.split())
     return int(status), wall_s, processor_s, peak_mb
@@ -104,6 +105,25 @@ def measure(folder: Path, minutes: float, asked: tuple[str, ...]) -> Run:
     status, wall_s, processor_s, peak_mb = (list(column) for column in zip(*runs, strict=True))
     size_mb = log.stat().st_size / 1e6
     return Run(minutes, size_mb, wall_s, processor_s, max(peak_mb), answered=not any(status))
+
+
+def first_answers(folder: Path) -> bool:
+    """Print what an answer takes on a fresh install and without numba; return whether too long."""
+    missed = False
+    arguments = ["identify", str(folder / "flight.bin"), "--aircraft", "ultrastick25e"]
+    arguments += ["--calibration", str(folder / "calibration.toml"), *WHOLE]
+    # Found before the real one, it cannot be imported.
+    hidden = folder / "hidden" / "numba"
+    hidden.mkdir(parents=True)
+    (hidden / "__init__.py").write_text("raise ImportError\n")
+    for what, settings in (
+        ("on a fresh install", {"NUMBA_CACHE_DIR": str(folder / "cache")}),
+        ("without numba", {"PYTHONPATH": str(hidden.parent)}),
+    ):
+        status, _, processor_s, _ = spawn(arguments, **settings)
+        print(f"  {what}: {processor_s:.2f} s processor (limit {FIRST_LIMIT_S:.0f} s)")
+        missed |= bool(status) or processor_s > FIRST_LIMIT_S
+    return missed
 
 
 def imports_s() -> float:
@@ -141,5 +161,7 @@ def report() -> bool:
                     f" (limit {limit_s:.0f} s, {run.median_s / limit_s:.2f} of it),"
                     f" {run.peak_mb:.0f} MB (limit {most:.0f} MB, {run.peak_mb / most:.2f} of it)"
                 )
+                if minutes == CASES[0][0] and asked:
+                    missed |= first_answers(Path(name))
                 missed |= not run.answered or run.median_s > limit_s or run.peak_mb > most
     return missed

@@ -99,7 +99,7 @@ def test_what_a_kernel_calls_in_another_file_has_changed(
 def test_without_numba_it_says_at_once_how_slow_it_is(folder: Path) -> None:
     printed, said = run(folder, without=True)
     assert printed == "42.0"
-    assert said.startswith("host: without numba this takes 100 times as long: ")
+    assert said.startswith("host: without numba this takes 100 to 400 times as long: ")
 
 
 def test_a_kernel_is_compiled_where_no_cache_can_be() -> None:

@@ -24,7 +24,7 @@ from host.extras import install_hint
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 LOADING_S, S_PER_BYTE = 0.7, 0.0006  # numba's own start, and a kernel by the size of its byte code
-SLOWER = 100  # 60 s of the card `calm` in flight, the printed Hopfield iteration
+SLOWER = "100 to 400"  # times: the card `calm` in flight 103, the printed Hopfield iteration 410
 KEPT = "kernels"  # folder in the `__pycache__` of the source
 
 
