@@ -75,7 +75,7 @@ def transition(
         norm *= 0.5
         squarings += 1
     scale = 0.5**squarings
-    powers = _powers(M * scale)
+    powers = powers_of(M * scale, TAYLOR_ORDER)
     E = (TAYLOR @ powers.reshape(len(TAYLOR), -1)).reshape(size, size)
     slopes = np.zeros((n_states, size, n_parameters))
     if n_parameters:
@@ -94,13 +94,13 @@ def transition(
     return E[:n_states].copy(), slopes
 
 
-def _powers(M: Array) -> Array:
-    """Return M^0 to M^`TAYLOR_ORDER`, by doubling."""
-    powers = np.empty((TAYLOR_ORDER + 1, *M.shape))
+def powers_of(M: Array, highest: int) -> Array:
+    """Return M^0 to M^highest (1 or more), by doubling, shape (highest + 1, n, n)."""
+    powers = np.empty((highest + 1, *M.shape))
     powers[0], powers[1] = np.eye(len(M)), M
     known = 1
-    while known < TAYLOR_ORDER:
-        more = min(known, TAYLOR_ORDER - known)
+    while known < highest:
+        more = min(known, highest - known)
         np.matmul(powers[known], powers[1 : more + 1], out=powers[known + 1 : known + more + 1])
         known += more
     return powers

@@ -13,6 +13,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.compiled import compiled
+from host.sysid.numerics.discretisation import powers_of
 
 STATE_LIMIT = 1e8  # a trial response beyond it is called divergent
 WORTH_COMPILING = 1.5e8  # about a second of numpy, in values of states and slopes
@@ -127,10 +128,7 @@ def _in_pieces(F: Array, G: Array, z: Array, C: Array, start: Array) -> Array:
         X = (rows @ G).reshape(n, length, pieces * free)
         for k in range(1, length):
             X[:, k] += F @ X[:, k - 1]
-        powers = np.empty((length + 1, n, n))
-        powers[0] = np.eye(n)
-        for k in range(length):
-            powers[k + 1] = powers[k] @ F
+        powers = powers_of(F, length)
         ends = np.ascontiguousarray(X[:, -1].reshape(n, pieces, free).transpose(1, 0, 2))
         begins = np.empty((pieces, n, free))
         begins[0] = start
