@@ -102,6 +102,22 @@ def test_without_numba_it_says_at_once_how_slow_it_is(folder: Path) -> None:
     assert said.startswith("host: without numba this takes 100 to 400 times as long: ")
 
 
+def test_code_of_a_source_that_nobody_may_write_is_kept_with_the_user(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = tmp_path / "installed" / "kernel.py"
+    source.parent.mkdir()
+    source.write_text("def twice(x):\n    return 2.0 * x\n")
+    (source.parent / "__pycache__").write_text("where a folder would be")
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.delenv("LOCALAPPDATA", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "own"))
+    found: dict[str, Callable[[float], Any]] = {}
+    exec(compile(source.read_text(), str(source), "exec"), found)
+    assert compiled(found["twice"])(3.0) == 6.0
+    assert list((tmp_path / "own" / "flight-test-host").rglob("*.nbc"))
+
+
 def test_a_kernel_is_compiled_where_no_cache_can_be() -> None:
     found: dict[str, Callable[[float], Any]] = {}
     # Code of no file is not kept, as of a file where nobody may write.

@@ -179,18 +179,29 @@ def _folder(kernel: Kernel[..., Any]) -> Path | None:
     source = Path(kernel.function.__code__.co_filename)
     if not source.is_file():
         return None
-    asked = os.environ.get("NUMBA_CACHE_DIR")
-    place = Path(asked) / KEPT if asked else source.parent / "__pycache__" / KEPT
     name = f"{source.stem}.{kernel.name}.{sys.implementation.cache_tag}"
-    folder = place / f"{name}.{_digest(kernel)}"
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-        for old in place.glob(f"{name}.*"):
-            if old != folder:
-                shutil.rmtree(old, ignore_errors=True)
-    except OSError:
-        return None
-    return folder if os.access(place, os.W_OK) else None
+    digest = _digest(kernel)
+    for place in _places(source):
+        with contextlib.suppress(OSError):
+            place.mkdir(parents=True, exist_ok=True)
+            if not os.access(place, os.W_OK):
+                continue
+            for old in place.glob(f"{name}.*"):
+                if old.name != f"{name}.{digest}":
+                    shutil.rmtree(old, ignore_errors=True)
+            return place / f"{name}.{digest}"
+    return None
+
+
+def _places(source: Path) -> Iterator[Path]:
+    """Return where code may be kept: where asked, beside its source, in the user's own cache."""
+    asked = os.environ.get("NUMBA_CACHE_DIR")
+    if asked:
+        yield Path(asked) / KEPT
+    yield source.parent / "__pycache__" / KEPT
+    own = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    with contextlib.suppress(RuntimeError):  # nobody's home
+        yield Path(own).expanduser() / "flight-test-host" / KEPT
 
 
 def _digest(kernel: Kernel[..., Any]) -> str:
