@@ -17,7 +17,7 @@ import numpy as np
 from host.aircraft import air, trim
 from host.aircraft import file as aircraft
 from host.aircraft import local_derivatives as local
-from host.aircraft.air import Air
+from host.aircraft.air import Air, gust_step
 from host.aircraft.airframe import (
     AILERON,
     ELEVATOR,
@@ -120,7 +120,7 @@ def _advance(
         u, v, w = x[0] - moving[3], x[1] - moving[4], x[2] - moving[5]
         speed = np.sqrt(u * u + v * v + w * w)
         step(frame, x, command, moving, density_kgpm3, step_s, work)
-        air.gust_step(gusts, filters, noise[k], speed, frame.span_m, step_s, moving[3:])
+        gust_step(gusts, filters, noise[k], speed, frame.span_m, step_s, moving[3:])
 
 
 def _fly(
@@ -132,7 +132,7 @@ def _fly(
     step_s, samples = DT_S / FINE, round(DURATION_S / DT_S)
     filters, moving, work = np.zeros(air.GUST_STATES), np.zeros(9), np.zeros((5, STATE_COUNT + 4))
     for row in rng.standard_normal((round(BEFORE_S / step_s), 4)):
-        air.gust_step(gusts, filters, row, steady.airspeed_mps, frame.span_m, step_s, moving[3:])
+        gust_step(gusts, filters, row, steady.airspeed_mps, frame.span_m, step_s, moving[3:])
     noise = rng.standard_normal((samples, FINE, 4))
     test, late = program(axis), round(PILOT_DELAY_S / DT_S)
     bank_gain, pitch_gain = pilot.gains(frame, steady)

@@ -34,7 +34,8 @@ class Kernel(Generic[Arguments, Result]):
     Parameters
     ----------
     function : callable
-        Of scalars and arrays; raises nothing of its own.
+        Of scalars and arrays; raises nothing of its own. It names the kernels that it calls, not a
+        module and a kernel in it.
     reordered : bool
         Let the compiler reorder sums.
     part : bool
