@@ -31,6 +31,21 @@ def test_cards_drawn_at_random(capsys: pytest.CaptureFixture[str]) -> None:
     assert tally.reached(Stage.FOUND) >= LEAST_FOUND
 
 
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(379, id="the table calls the root folder's cluster free"),
+        pytest.param(2463, id="the same behind noise"),
+        pytest.param(1210, id="a damaged FAT32 with the numbers of a FAT16"),
+        pytest.param(1_000_135, id="full, and searched again every two seconds"),
+    ],
+)
+def test_a_card_that_was_wrong_once(seed: int) -> None:
+    card = draw(seed).card
+    assert fly(Sitl(), card).wrong == []
+    card.close()
+
+
 def test_a_campaign_that_was_stopped_goes_on(tmp_path: Path) -> None:
     library, path = build_sanitized(), tmp_path / "cards"
     first = list(Kept(path, library).fly_all(1_000_001, 3, library))
