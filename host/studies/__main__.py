@@ -11,6 +11,7 @@ from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
+from host.compiled import prefer_machine_code
 from host.errors import ExitCode
 from host.extras import install_hint
 from host.sysid.estimators.fit import METHODS
@@ -146,6 +147,7 @@ def main(arguments: list[str] | None = None) -> int:
         sys.stderr.write(f"pictures need matplotlib: {install_hint('matplotlib')}\n")
         return int(ExitCode.USAGE)
     options.folder.mkdir(parents=True, exist_ok=True)
+    prefer_machine_code()
     for name in options.only or STUDIES:
         begin = time.perf_counter()
         paths = STUDIES[name](options.folder / name, ("small", "full").index(options.size))

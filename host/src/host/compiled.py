@@ -53,7 +53,6 @@ class Kernel(Generic[Arguments, Result]):
         self._run: Any = function if part else None
         self._machine: Any = None
         self._kept: Path | None = None
-        self._work = 0.0
 
     def __call__(self, *arguments: Arguments.args, **named: Arguments.kwargs) -> Result:
         """Run, compiled."""
@@ -81,17 +80,19 @@ class Kernel(Generic[Arguments, Result]):
                 shutil.rmtree(kernel._kept, ignore_errors=True)
 
     def pays(self, work: float, worth: float) -> bool:
-        """Return whether this process has had so much work that machine code pays.
+        """Return whether a call has so much work that machine code pays.
+
+        The call itself decides, or the program (`prefer_machine_code`), never what a process did
+        before: the two round differently, and the same call gives the same answer.
 
         Parameters
         ----------
         work : float
             Of the call to come, in the caller's own unit.
         worth : float
-            Sum that takes Python as long as loading and compiling machine code.
+            Work from which on machine code pays.
         """
-        self._work += work
-        return self._work >= worth and has_compiler()
+        return (_preferred or work >= worth) and has_compiler()
 
     def machine(self, *, said: bool = False) -> Any:
         """Return what numba makes of it; `said`: after a line to stderr if that takes a while."""
@@ -136,6 +137,15 @@ def compiled_fast(function: Callable[Arguments, Result]) -> Kernel[Arguments, Re
 def compiled_part(function: Callable[Arguments, Result]) -> Kernel[Arguments, Result]:
     """Do the same as `compiled_fast` for what kernels call; called from Python it stays Python."""
     return Kernel(function, reordered=True, part=True)
+
+
+_preferred = False
+
+
+def prefer_machine_code() -> None:
+    """Run every kernel as machine code from now on: for programs of many fits, at their start."""
+    global _preferred
+    _preferred = True
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""A first answer waits for no compiler; who identifies many times gets machine code that agrees."""
+"""A first answer waits for no compiler; a program of many fits gets machine code that agrees."""
 
 import json
 import os
@@ -69,6 +69,22 @@ def printed(script: str) -> str:
 
 def test_a_few_fits_load_no_compiler() -> None:
     assert printed(METHODS) == "False\n"
+
+
+def test_what_a_process_did_before_changes_no_answer() -> None:
+    rng = np.random.default_rng(1)
+    step, slopes = np.hstack([0.9 * np.eye(4), np.zeros((4, 2))]), rng.standard_normal((4, 6, 24))
+    z, C, start = rng.standard_normal((2000, 6)), np.eye(4), np.zeros((4, 24))
+    first, again = np.empty((2, 4, 2000, 24))
+    recursion.propagate(step, slopes, z, C, start, first)
+    # Forty of these and a thousand of those once brought machine code, which rounds differently.
+    for _ in range(500):
+        recursion.one_block.pays(2000 * 200, recursion.WORTH_COMPILING)
+        propulsion.rotor_steps.pays(5000, propulsion.WORTH_COMPILING)
+    recursion.propagate(step, slopes, z, C, start, again)
+    np.testing.assert_array_equal(first, again)
+    assert not recursion.one_block.pays(1.0, recursion.WORTH_COMPILING)
+    assert not propulsion.rotor_steps.pays(1.0, propulsion.WORTH_COMPILING)
 
 
 def test_every_kernel_is_built_in_the_types_that_methods_use() -> None:

@@ -4,7 +4,8 @@ A loop over samples is what an interpreter is slow at, so the record is cut into
 pieces as each has samples: all pieces run side by side from rest, then each is given the state it
 began with. The same loop as machine code takes a fifth of the time (1.1 against 0.23 ms for 24
 parameters, 4 states and 2000 samples), but a process pays 0.4 s to load it and a fresh install
-1.2 s to compile it: one flight never earns that back, a study does within seconds.
+1.2 s to compile it: one flight's maneuvers never earn that back, a study does within seconds and
+asks for it (`prefer_machine_code`).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from host.compiled import compiled
 from host.sysid.numerics.discretisation import powers_of
 
 STATE_LIMIT = 1e8  # a trial response beyond it is called divergent
-WORTH_COMPILING = 1.5e8  # about a second of numpy, in values of states and slopes
+WORTH_COMPILING = 1.5e7  # 0.1 s of numpy ten times a search, in values of states and slopes
 OVERHEAD = 100  # the same, what a sample costs beside them
 BLOCK = 256  # samples: what drives 96 slopes of one block is 200 kB
 
