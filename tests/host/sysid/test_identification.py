@@ -1,6 +1,7 @@
 """`host.identify` in a notebook: what it takes, what it gives, one flight or several."""
 
 import json
+import pickle
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -294,6 +295,12 @@ def test_a_hostile_name_is_text_on_the_page(flights: tuple[Path, Path], tmp_path
         ("x.csv", {"methods": ["nothing"]}, "unknown method nothing"),
         ("x.csv", {"aircraft": "nobody"}, "no aircraft 'nobody'"),
         ("x.csv", {"truth": "no.toml", "calibration": "no.toml"}, "x.csv"),
+        ("x.csv", {"calibration": 3}, "calibration is of type int, expected a path"),
+        ("x.csv", {"mapping": {"t_s": "t"}}, "mapping is of type dict, expected a path"),
+        ("x.csv", {"maneuvers": "1"}, "maneuvers is of type str, expected whole numbers"),
+        ("x.csv", {"maneuvers": [1.0]}, "maneuvers is of type float, expected whole numbers"),
+        ("x.csv", {"from_s": "3"}, "from_s is of type str, expected a number of seconds"),
+        (pd.DataFrame(np.zeros((9, 2)), columns=["t_s", "t_s"]), {}, "two columns are called t_s"),
     ],
 )
 def test_an_error_is_one_line_of_our_own(
@@ -313,8 +320,40 @@ def test_a_wrong_part_of_a_flight_is_said(one: Identification, flights: tuple[Pa
         host.identify(flights[0] / "flight.csv", models="coefficients")
     with pytest.raises(host.IdentificationError, match="no maneuver of elevator_rad"):
         replace(one, linear=one.linear[:1], coefficients=None).simulate(
-            flights[1] / "flight.csv", maneuvers=[5]
+            flights[1] / "flight.csv", maneuvers=5
         )
+    with pytest.raises(host.IdentificationError, match="maneuvers is of type float"):
+        one.simulate(flights[1] / "flight.csv", maneuvers=[5.0])  # type: ignore[list-item]
+    with pytest.raises(host.IdentificationError, match="flights 1 and 2 are the same samples"):
+        host.identify([flights[0] / "flight.csv", pd.read_csv(flights[0] / "flight.csv")])
+    truths = [folder / "flight.truth.toml" for folder in flights]
+    with pytest.raises(host.IdentificationError, match="2 files of truth for 1 flights"):
+        host.identify(flights[0] / "flight.csv", truth=truths)
+
+
+def test_several_may_be_named_in_any_collection(flights: tuple[Path, Path]) -> None:
+    source = flights[0] / "flight.csv"
+    found = host.identify(
+        source, models=iter(["short-period"]), methods={"equation-error"}, maneuvers=range(1, 11)
+    )
+    assert [a.template for a in found.answers] == ["short-period"]
+    assert found.methods == ("equation-error",)
+
+
+def test_an_answer_is_kept_copied_and_compared(
+    one: Identification, flights: tuple[Path, Path]
+) -> None:
+    """A notebook's kernel is restarted, its tables are written into."""
+    kept = pickle.loads(pickle.dumps(one))
+    assert kept.to_json() == one.to_json()
+    other = flights[1] / "flight.csv"
+    assert loose(kept.simulate(other).table).equals(loose(one.simulate(other).table))
+    assert one in [kept, one]
+    assert len({one, kept}) == 2
+    page = one._repr_html_()
+    for own in (one.table, one.modes):
+        own.iloc[:, 0] = 0.0
+    assert one._repr_html_() == page
 
 
 def test_the_package_stays_cheap_to_import() -> None:

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from host.aircraft.airframe import Airframe
 from host.aircraft.file import AircraftError, load_measured
 from host.aircraft.propulsion import motor_torque, propeller, rotor_history
 from host.arrays import Array
@@ -100,17 +101,21 @@ def powerplant(source: str) -> Powerplant:
             " flight need the thrust: add it, or leave '--model coefficients' out"
         )
     frame = loaded.airframe()
-
-    def step(
-        spin_radps: float, throttle: float, airspeed_mps: float, density_kgpm3: float
-    ) -> tuple[float, float, float]:
-        thrust, load = propeller(frame, spin_radps, airspeed_mps, density_kgpm3)
-        return thrust, load, motor_torque(frame, throttle, spin_radps)
-
     return Powerplant(
-        step,
+        partial(_step, frame),
         partial(rotor_history, frame),
         frame.rotor_inertia_kgm2,
         frame.thrust_axis,
         frame.hub_m - frame.cg_m,
     )
+
+
+def _step(
+    frame: Airframe,
+    spin_radps: float,
+    throttle: float,
+    airspeed_mps: float,
+    density_kgpm3: float,
+) -> tuple[float, float, float]:
+    thrust, load = propeller(frame, spin_radps, airspeed_mps, density_kgpm3)
+    return thrust, load, motor_torque(frame, throttle, spin_radps)

@@ -30,7 +30,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.model import LinearModel
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ReconstructedFlight:
     """One flight after its reconstruction.
 

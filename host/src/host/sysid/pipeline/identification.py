@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +22,7 @@ from host.sysid.compatibility.reconstruction import words as agreement_words
 from host.sysid.flight.linear import Answer
 from host.sysid.flight.reconstructed import ReconstructedFlight
 from host.sysid.pipeline.aircraft_known import AircraftKnown
+from host.sysid.pipeline.arguments import numbers_of, path_of, seconds_of
 from host.sysid.pipeline.html import answer_html
 from host.sysid.pipeline.pictures import Pictures
 from host.sysid.pipeline.prepared import Reading, prepare, several
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from host.sysid.pipeline.prepared import Source
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Identification:
     """What one identification found.
 
@@ -64,12 +64,15 @@ class Identification:
     truth: dict[str, Any] | None = None
     prior: PriorTable | None = None
 
-    @cached_property
+    @property
     def table(self) -> pd.DataFrame:
-        """Every estimate by model and name: value, 95 % half-width, unit, verdict, main cause."""
+        """Every estimate by model and name: value, 95 % half-width, unit, verdict, main cause.
+
+        A table of the caller's own: what is written into it changes no answer.
+        """
         return estimate_table(self.linear, self.coefficients)
 
-    @cached_property
+    @property
     def modes(self) -> pd.DataFrame:
         """Every mode by model and name, with 95 % half-widths."""
         return mode_table(self.linear, self.coefficients)
@@ -107,7 +110,7 @@ class Identification:
         *,
         calibration: str | Path | None = None,
         mapping: str | Path | None = None,
-        maneuvers: Sequence[int] = (),
+        maneuvers: int | Sequence[int] = (),
         from_s: float | None = None,
         to_s: float | None = None,
     ) -> Simulation:
@@ -129,11 +132,11 @@ class Identification:
         """
         how = replace(
             self.reading,
-            calibration=Path(calibration) if calibration else self.reading.calibration,
-            mapping=Path(mapping) if mapping else self.reading.mapping,
-            maneuvers=tuple(maneuvers),
-            from_s=from_s,
-            to_s=to_s,
+            calibration=path_of("calibration", calibration) or self.reading.calibration,
+            mapping=path_of("mapping", mapping) or self.reading.mapping,
+            maneuvers=numbers_of("maneuvers", maneuvers),
+            from_s=seconds_of("from_s", from_s),
+            to_s=seconds_of("to_s", to_s),
         )
         [source] = several([flight])
         found = prepare(source, how, self.aircraft)

@@ -15,8 +15,9 @@ from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear import Answer, LinearEstimator
 from host.sysid.flight.reconstructed import ReconstructedFlight
 from host.sysid.pipeline.aircraft_known import AircraftKnown, aircraft_known
+from host.sysid.pipeline.arguments import numbers_of, path_of, paths_of, seconds_of
 from host.sysid.pipeline.identification import Identification
-from host.sysid.pipeline.prepared import Reading, prepare, several, told
+from host.sysid.pipeline.prepared import Reading, apart, prepare, several, told
 from host.sysid.pipeline.wanted import ModelName, Models, wanted_methods, wanted_models
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def identify(
     methods: str | Iterable[str] | None = None,
     calibration: str | Path | None = None,
     mapping: str | Path | None = None,
-    maneuvers: Sequence[int] = (),
+    maneuvers: int | Sequence[int] = (),
     from_s: float | None = None,
     to_s: float | None = None,
     corrections: bool = True,
@@ -56,34 +57,39 @@ def identify(
         Counts to SI of a log, and what the instrument may be wrong by.
     mapping : path, optional
         Foreign names, units and signs of a table.
-    maneuvers : sequence of int
+    maneuvers : int or several
         Only these of each flight, as `host maneuvers` counts them.
     from_s, to_s : float, optional
         One stretch of time in place of the maneuvers found.
     corrections : bool
         Take sensor errors that the flight tells out of the data.
     truth : path or several, optional
-        Of simulated flights: compared with.
+        Of simulated flights, one of each: compared with.
     prior : path, optional
         Coefficients to compare with: TOML, AVL, Datcom.
 
     Raises
     ------
     IdentificationError
-        If nothing can be identified, with every reason.
+        If nothing can be identified, with every reason; if an argument is not what it should be.
     host.errors.HostError
         If a file cannot be read.
     """
     asked, by = wanted_models(models), wanted_methods(methods)
     how = Reading(
-        _path(calibration), _path(mapping), tuple(maneuvers), from_s, to_s, corrections,
+        path_of("calibration", calibration),
+        path_of("mapping", mapping),
+        numbers_of("maneuvers", maneuvers),
+        seconds_of("from_s", from_s),
+        seconds_of("to_s", to_s),
+        corrections,
         asked.signals,
-    )  # fmt: skip
+    )
     known = aircraft_known(aircraft, calibration) if aircraft is not None else None
     ready = [prepare(source, how, known) for source in several(flights)]
     notes = told(ready, known.doubts if known else ())
-    recorded = [one.flight for one in ready]
-    true = _truth(truth)
+    recorded = apart([one.flight for one in ready])
+    true = _truth(truth, len(recorded))
     expected = _prior(prior, recorded, known)
     direct, doubts = _coefficients(asked, known, recorded)
     linear, unfit = _linear(asked, by, known, recorded)
@@ -146,16 +152,16 @@ def _linear(
     return answers, [f"{', '.join(labels)}: {error}" for error, labels in failed.items()]
 
 
-def _path(given: str | Path | None) -> Path | None:
-    return None if given is None else Path(given)
-
-
-def _truth(given: str | Path | Sequence[str | Path] | None) -> dict[str, Any] | None:
+def _truth(given: str | Path | Sequence[str | Path] | None, flights: int) -> dict[str, Any] | None:
     """Return the truth of all flights as one: their maneuvers one behind the other."""
-    if given is None:
+    paths = paths_of("truth", given)
+    if not paths:
         return None
-    paths = [given] if isinstance(given, str | Path) else given
-    documents = [read_truth(Path(path)) for path in paths]
+    documents = [read_truth(path) for path in paths]
+    if len(documents) != flights:
+        raise IdentificationError(
+            f"{len(documents)} files of truth for {flights} flights; give one of each flight"
+        )
     if len(documents) == 1:
         return documents[0]
     return {"maneuver": [m for document in documents for m in document["maneuver"]]}
@@ -165,10 +171,11 @@ def _prior(
     prior: str | Path | None, flights: Sequence[ReconstructedFlight], known: AircraftKnown | None
 ) -> PriorTable | None:
     """Return coefficients to compare with, read at the median airspeed of the first flight."""
-    if prior is None:
+    source = path_of("prior", prior)
+    if source is None:
         return None
     speed = flights[0].recorded.get("airspeed_mps", ())
-    found = read_prior(Path(prior), sorted(speed)[len(speed) // 2] if len(speed) else 0.0)
+    found = read_prior(source, sorted(speed)[len(speed) // 2] if len(speed) else 0.0)
     if known is None:
         raise IdentificationError("--prior compares coefficients; they need --aircraft")
     return found

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.chosen import chosen
@@ -111,6 +113,27 @@ def several(flights: Source | Sequence[Source]) -> list[Source]:
                 " host.read_log returns, or a table (DataFrame)"
             )
     return listed
+
+
+def apart(flights: Sequence[ReconstructedFlight]) -> list[ReconstructedFlight]:
+    """Return the flights, none twice: the same samples counted twice would halve a variance.
+
+    Raises
+    ------
+    IdentificationError
+        If two are the same.
+    """
+    for number, one in enumerate(flights, start=1):
+        for before, other in enumerate(flights[: number - 1], start=1):
+            if one.recorded.keys() == other.recorded.keys() and all(
+                np.array_equal(values, other.recorded[name], equal_nan=True)
+                for name, values in one.recorded.items()
+            ):
+                raise IdentificationError(
+                    f"flights {before} and {number} are the same samples ({other.source},"
+                    f" {one.source}); give each flight once"
+                )
+    return list(flights)
 
 
 def told(flights: Sequence[PreparedFlight], doubts: Collection[str]) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +32,7 @@ KINEMATIC = ("theta_rad", "phi_rad")  # their rates are known
 GAP_S = 0.5  # between the maneuvers of a picture
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SimulatedModel:
     """One model over the maneuvers of its axes: measured, simulated, and how well."""
 
@@ -48,7 +47,7 @@ class SimulatedModel:
         return fits_of(self.model, self.maneuvers, self.simulated)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Simulation:
     """Free simulations of every identified model over another flight.
 
@@ -65,7 +64,7 @@ class Simulation:
     models: tuple[SimulatedModel, ...]
     notes: tuple[str, ...]
 
-    @cached_property
+    @property
     def table(self) -> pd.DataFrame:
         """NRMSE, R squared and Theil's coefficient of each output, by model and signal."""
         import pandas as pd
@@ -76,7 +75,7 @@ class Simulation:
         index = pd.MultiIndex.from_tuples(list(rows), names=["model", "signal"])
         return pd.DataFrame(list(rows.values()), index=index, columns=list(FIGURES))
 
-    @cached_property
+    @property
     def histories(self) -> pd.DataFrame:
         """Every sample: model, maneuver, `t_s` from its begin, signal, measured, simulated."""
         import pandas as pd

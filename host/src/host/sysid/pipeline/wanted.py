@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from host.sysid.coefficients.model import (
     CoefficientModel,
@@ -19,6 +18,7 @@ from host.sysid.flight.column_map import like
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
 from host.sysid.models.model import LinearModel
 from host.sysid.models.model_file import read_model
+from host.sysid.pipeline.arguments import listed
 
 COEFFICIENTS = "coefficients"
 DEFAULT_MODELS = ("longitudinal", "lateral")
@@ -52,7 +52,7 @@ def wanted_models(given: ModelName | Iterable[ModelName] | None) -> Models:
     IdentificationError
         If there is no such model, or there are two sets of coefficients.
     """
-    names = _several(given) or list(DEFAULT_MODELS)
+    names = listed(given) or list(DEFAULT_MODELS)
     linear: list[tuple[str, LinearModel | None]] = []
     terms: list[CoefficientModel | Path | str] = []
     for name in names:
@@ -100,18 +100,9 @@ def wanted_methods(given: str | Iterable[str] | None) -> tuple[str, ...]:
     IdentificationError
         If there is no such method.
     """
-    wanted = tuple(dict.fromkeys(map(str, _several(given) or [DEFAULT_METHOD])))
+    wanted = tuple(dict.fromkeys(map(str, listed(given) or [DEFAULT_METHOD])))
     known = known_methods()
     unknown = [m for m in wanted if m not in known]
     if unknown:
         raise IdentificationError(f"unknown method {', '.join(unknown)}; known: {', '.join(known)}")
     return wanted
-
-
-def _several(given: Any) -> list[Any]:
-    """Return what was given one by one; a name alone is one thing."""
-    if given is None:
-        return []
-    if isinstance(given, Sequence) and not isinstance(given, str):
-        return list(given)
-    return [given]
