@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import AirframeData
 from host.instrument.deviations import sensor_error_model
+from host.instrument.words import IN_WORDS
 from host.sysid import Maneuver
 from host.sysid.compatibility.at_cg import IMU_DELAY, at_cg, open_errors, without_open
+from host.sysid.compatibility.corrections import IN_COLUMNS
 from host.sysid.compatibility.reconstruction import Compatibility, Finding
 from host.sysid.estimators.gust import fit_with_gust, gust_model
 from host.sysid.flight.carried import systematic_error_shifts
@@ -68,6 +70,12 @@ def test_what_stays_open_is_what_tolerances_leave() -> None:
     assert left["elevator_scale"] == pytest.approx(0.01 / np.sqrt(3.0))
     assert left[IMU_DELAY] > 0.0005
     assert not open_errors(replace(found, instrument=None), still(10))
+
+
+def test_every_error_that_moves_an_answer_has_words() -> None:
+    """A table says 'delay of the vanes', not the name of a variable."""
+    assert {*IN_COLUMNS, *open_errors(told(0.007), still(10))} <= IN_WORDS.keys()
+    assert not any("_" in words for words in IN_WORDS.values())
 
 
 def test_a_place_is_felt_by_what_sits_there() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from host.aircraft.gains import dimensional_name, from_dimensional
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
+from host.instrument.words import IN_WORDS
 from host.sysid.models.result import NORMAL_95, FitResult
 from host.sysid.models.systematic import main_cause, systematic_covariance
 from host.sysid.models.templates import Trim
@@ -105,7 +106,8 @@ def coefficients(
     for m in moved:
         there = Condition(condition.airspeed_mps * m.airspeed_gain, condition.qbar_pa * m.qbar_gain)
         shift = converted(m.estimate, airframe, there) - value
-        sensed.setdefault(SHARED.get(m.error, m.error), []).append(shift)
+        cause = SHARED.get(m.error) or IN_WORDS.get(m.error, m.error)
+        sensed.setdefault(cause, []).append(shift)
     parts = _variances(assumed, sensed)
     extra = sum(parts.values(), np.zeros(len(names)))
     quantile = result.half_width() / np.maximum(result.standard_error, 1e-300)

@@ -17,6 +17,7 @@ from host.aircraft.prior.prior_file import read_prior
 from host.files.document import shown
 from host.files.quantities import Quantity
 from host.instrument.deviations import sensor_error_model
+from host.instrument.words import IN_WORDS
 from host.sysid.aerodynamics.conversion import (
     CARRIED,
     COEFFICIENTS,
@@ -36,15 +37,6 @@ from host.sysid.models.templates import Trim, template
 
 STANDARD_KGPM3 = 1.225  # of the standard atmosphere at sea level
 NAMED_SHARE = 0.25  # of the variance: a smaller part is not worth naming
-IN_WORDS = {
-    "mass_share": "mass", "ixx_share": "Ixx", "iyy_share": "Iyy", "izz_share": "Izz",
-    "cg_x_m": "place of the CG along x", "cg_z_m": "place of the CG along z",
-    "pitot_scale": "scale of the pitot", "pitot_drift_pa": "drift of the pitot",
-    "density_share": "density", "alpha_scale": "scale of the alpha vane",
-    "beta_scale": "scale of the beta vane", "upwash_share": "upwash",
-    "elevator_scale": "pot of the elevator", "aileron_scale": "pot of the ailerons",
-    "rudder_scale": "pot of the rudder",
-}  # fmt: skip
 OTHER = dict(zip(DERIVATIVES, COEFFICIENTS, strict=True))
 OTHER |= {coefficient: derivative for derivative, coefficient in OTHER.items()}
 AXES = ("longitudinal", "lateral")

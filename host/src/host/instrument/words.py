@@ -1,0 +1,27 @@
+"""What an error of instrument or aircraft is called in a sentence."""
+
+from __future__ import annotations
+
+IN_WORDS = {
+    "mass_share": "mass", "ixx_share": "Ixx", "iyy_share": "Iyy", "izz_share": "Izz",
+    "pitot_scale": "scale of the pitot", "pitot_zero_pa": "zero of the pitot",
+    "pitot_drift_pa": "drift of the pitot", "pitot_delay_s": "delay of the pitot",
+    "density_share": "density", "upwash_share": "upwash",
+    "alpha_scale": "scale of the alpha vane", "alpha_zero_rad": "zero of the alpha vane",
+    "beta_scale": "scale of the beta vane", "beta_zero_rad": "zero of the beta vane",
+    "vane_delay_s": "delay of the vanes", "friction_share": "friction of the vanes",
+    "imu_delay_s": "delay of the IMU",
+    "elevator_scale": "pot of the elevator", "aileron_scale": "pot of the ailerons",
+    "rudder_scale": "pot of the rudder",
+}  # fmt: skip
+_ALONG = {
+    "cg_{}_m": "place of the CG along {}", "imu_{}_m": "place of the IMU along {}",
+    "vane_{}_m": "place of the vanes along {}", "imu_tilt_{}_rad": "tilt of the IMU about {}",
+    "gyro_bias_{}_radps": "zero of the gyro about {}",
+    "gyro_scale_{}": "scale of the gyro about {}",
+    "accel_bias_{}_mps2": "zero of the accelerometer along {}",
+    "accel_scale_{}": "scale of the accelerometer along {}",
+}  # fmt: skip
+IN_WORDS |= {
+    name.format(axis): words.format(axis) for name, words in _ALONG.items() for axis in "xyz"
+}
