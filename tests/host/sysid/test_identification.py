@@ -15,6 +15,7 @@ import pytest
 from host.cli import main
 from host.errors import HostError
 from host.sysid.answer.pictures import draw_coefficients
+from host.sysid.answer.save import Places
 from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.answer.verdict import MARKS
 from host.sysid.coefficients.model import standard_model
@@ -282,6 +283,23 @@ def test_a_hostile_name_is_text_on_the_page(flights: tuple[Path, Path], tmp_path
     assert "<script" not in noted._repr_html_()
 
 
+def test_a_hostile_model_writes_into_its_folder_only(
+    flights: tuple[Path, Path], tmp_path: Path
+) -> None:
+    made = template("short-period", Trim(17.0, 0.1, 0.1))
+    names = ("../../evil", "/evil", "Mine", "mine", "mine", "mine", "a\\b")
+    models = [replace(made, name=name) for name in names]
+    found = host.identify(flights[0] / "flight.csv", models=models, methods="equation-error")
+    folder, saved = tmp_path / "a" / "b" / "c", tmp_path / "d" / "model.toml"
+    written = found.plot().save(folder)
+    assert found.table.index.get_level_values("model").nunique() == len(names)
+    assert {p.resolve().parent for p in written} == {folder}
+    assert len({p.name.lower() for p in written}) == len(written) == 4 * len(names)
+    written = found.save(Places(None, None, saved, None, None, ()))
+    assert {p.resolve().parent for p in written} == {saved.parent}
+    assert len({p.name.lower() for p in written}) == len(names)
+
+
 @pytest.mark.parametrize(
     ("source", "options", "said"),
     [
@@ -302,7 +320,11 @@ def test_a_hostile_name_is_text_on_the_page(flights: tuple[Path, Path], tmp_path
         ("x.csv", {"maneuvers": "1"}, "maneuvers is of type str, expected whole numbers"),
         ("x.csv", {"maneuvers": [1.0]}, "maneuvers is of type float, expected whole numbers"),
         ("x.csv", {"from_s": "3"}, "from_s is of type str, expected a number of seconds"),
-        (pd.DataFrame(np.zeros((9, 2)), columns=["t_s", "t_s"]), {}, "two columns are called t_s"),
+        (
+            pd.DataFrame(np.zeros((9, 2)), columns=["t_s", "t_s"]),
+            {},
+            "several columns 't_s'",
+        ),
     ],
 )
 def test_an_error_is_one_line_of_our_own(

@@ -195,6 +195,8 @@ def test_names_of_any_letters_survive_a_file(tmp_path: Path) -> None:
     path.write_text(model_text(model), encoding="utf-8")
     back = read_model(path)
     assert (back.name, back.states, back.parameters) == (model.name, ("α",), model.parameters)
+    path.write_text(model_text(replace(model, name="clear\x1b[2J\n")), encoding="utf-8")
+    assert read_model(path).name == r"clear\x1b[2J\x0a"  # what a terminal would act on is text
 
 
 def test_model_refuses_contradictions() -> None:

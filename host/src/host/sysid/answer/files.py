@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from host.export.unfinished import unfinished
 from host.sysid.errors import IdentificationError
+
+LONGEST_NAME = 100  # characters; file systems take 255 bytes
 
 
 @contextmanager
@@ -61,3 +64,20 @@ def refuse_place(option: str, path: Path, *, folder: bool) -> None:
     for place in (above, above.parent) if above.is_file() else (above,):
         if not os.access(place, os.W_OK):
             raise IdentificationError(f"{option} {path}: no permission to write to {place}")
+
+
+def file_names(labels: Iterable[str]) -> list[str]:
+    """Return a file's name without ending for each label, each another in any case of letters.
+
+    A model's name is a stranger's: nothing of it may lead out of the folder.
+    """
+    found: list[str] = []
+    for label in labels:
+        plain = re.sub(r"[^\w.+-]", "_", label)[:LONGEST_NAME].lstrip(".")
+        taken = {name.lower() for name in found}
+        name, number = plain, 1
+        while name.lower() in taken:
+            number += 1
+            name = f"{plain}_{number}"
+        found.append(name)
+    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,11 +58,12 @@ def labels(answers: Sequence[Answer]) -> list[str]:
     """Return a name for each answer that no other has: template, and method where several."""
     templates = [a.template for a in answers]
     found: list[str] = []
+    seen: Counter[str] = Counter()  # models of one name
     for answer, template in zip(answers, templates, strict=True):
         several = templates.count(template) > 1
         label = f"{template}_{answer.method}" if several else template
-        again = found.count(label)  # two models of one name
-        found.append(f"{label}_{again + 1}" if again else label)
+        seen[label] += 1
+        found.append(f"{label}_{seen[label]}" if seen[label] > 1 else label)
     return found
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from host.arrays import Array
+from host.sysid.answer.files import file_names
+from host.sysid.answer.mat import labels
 from host.sysid.answer.panels import (
     Bar,
     Cloud,
@@ -63,17 +64,15 @@ def draw_all(
         If matplotlib is missing.
     """
     found: dict[str, Figure] = {}
-    for template, same in groupby(sorted(answers, key=lambda a: a.template), _template):
-        several = list(same)
-        for answer in several:
-            name = template if len(several) == 1 else f"{template}_{answer.method}"
-            found |= draw(answer, name)
+    for answer, label in zip(answers, labels(answers), strict=True):
+        found |= draw(answer, label)
     return found | (draw_coefficients(direct, flights, truth) if direct else {})
 
 
 def save_all(pictures: Mapping[str, Figure], folder: Path) -> list[Path]:
     """Write pictures as SVG under their names and return where."""
-    return [save(figure, folder / f"{name}.svg") for name, figure in pictures.items()]
+    named = zip(file_names(pictures), pictures.values(), strict=True)
+    return [save(figure, folder / f"{name}.svg") for name, figure in named]
 
 
 def draw(answer: Answer, name: str) -> dict[str, Figure]:
@@ -167,10 +166,6 @@ def draw_coefficients(
         "coefficients_intervals": interval_bars(bars, "coefficients"),
         "coefficients_input": spectra(inputs, _hertz(answer.modes), f"coefficients: {EXCITED}"),
     }
-
-
-def _template(answer: Answer) -> str:
-    return answer.template
 
 
 def _hertz(modes: Sequence[Mode]) -> list[tuple[str, float]]:

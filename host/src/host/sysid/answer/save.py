@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from host.arrays import Array
 from host.extras import install_hint
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
-from host.sysid.answer.files import refuse_place, whole
+from host.sysid.answer.files import file_names, refuse_place, whole
 from host.sysid.answer.mat import labels, write_mat
 from host.sysid.errors import IdentificationError
 from host.sysid.flight.linear import Answer
@@ -160,8 +160,9 @@ def _write_models(path: Path, answers: Sequence[Answer], kept: Sequence[Path]) -
     from host.sysid.models.model_text import model_text
 
     named = {}
-    for number, (answer, label) in enumerate(zip(answers, labels(answers), strict=True)):
-        behind = label.replace(" ", "_").replace("/", "_")
+    called = labels(answers)
+    each = zip(answers, called, file_names(called), strict=True)
+    for number, (answer, label, behind) in enumerate(each):
         own = path.with_name(f"{path.stem}_{behind}{path.suffix}") if number else path
         if own.exists() and any(k.exists() and own.samefile(k) for k in kept):
             raise IdentificationError(

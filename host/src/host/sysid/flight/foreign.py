@@ -109,17 +109,10 @@ def _parquet(source: Path) -> pd.DataFrame:
 
 
 def from_frame(frame: pd.DataFrame) -> Foreign:
-    """Return the columns of a table that are numbers, or text that says numbers or instants.
-
-    Raises
-    ------
-    IdentificationError
-        If two columns have one name.
-    """
-    twice = frame.columns[frame.columns.duplicated()]
-    if len(twice):
-        raise IdentificationError(f"table: two columns are called {twice[0]}; leave one out")
-    found = Foreign()
+    """Return the columns of a table that are numbers, or text that says numbers or instants."""
+    again = frame.columns.duplicated()
+    found = Foreign(twice=frozenset(str(label).strip() for label in frame.columns[again]))
+    frame = frame.loc[:, ~again]
     for label in frame.columns:
         name, values = str(label).strip(), frame[label]
         if values.dtype.kind in "fiub":

@@ -49,6 +49,7 @@ from host.sysid.models.delays import delays_of
 from host.sysid.models.document import read_document
 from host.sysid.models.model import MATRICES, DelayGroup, Lever, LinearModel, Parameter, Term
 from host.sysid.models.templates import Trim
+from host.text import shown as in_a_line
 
 _PIECE = re.compile(
     r"\s*(?P<sign>[+-]?)\s*(?:(?P<gain>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s*\*\s*(?P<scaled>[A-Za-z_]\w*))?"
@@ -130,7 +131,7 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
     used = list(dict.fromkeys([t.parameter for t in terms] + [x.parameter for x in levers]))
     parameters = _parameters(document.get("parameters", {}), used, source)
     return LinearModel(
-        name=str(document.get("name", Path(source).stem)),
+        name=in_a_line(str(document.get("name", Path(source).stem))),
         states=signals["states"],
         inputs=signals["inputs"],
         outputs=signals["outputs"],
