@@ -312,6 +312,8 @@ def test_a_hostile_model_writes_into_its_folder_only(
         (pd.DataFrame({"q_radps": np.zeros(9)}), {}, "table: no column t_s"),
         (pd.DataFrame({"t_s": np.arange(99.0) / 50.0}), {}, "needs airspeed_mps"),
         ("x.csv", {"models": "longitudnal"}, "did you mean longitudinal"),
+        ("x.csv", {"models": "coefficents"}, "did you mean coefficients"),
+        ("x.csv", {"models": ""}, "no model ''"),
         ("x.csv", {"methods": ["nothing"]}, "unknown method nothing"),
         ("x.csv", {"aircraft": "nobody"}, "no aircraft 'nobody'"),
         ("x.csv", {"truth": "no.toml", "calibration": "no.toml"}, "x.csv"),
@@ -350,6 +352,8 @@ def test_a_wrong_part_of_a_flight_is_said(one: Identification, flights: tuple[Pa
         one.simulate(flights[1] / "flight.csv", maneuvers=[5.0])  # type: ignore[list-item]
     with pytest.raises(host.IdentificationError, match="flights 1 and 2 are the same samples"):
         host.identify([flights[0] / "flight.csv", pd.read_csv(flights[0] / "flight.csv")])
+    with pytest.raises(HostError, match=r"no\.toml: no such file"):
+        host.identify(flights[0] / "flight.csv", calibration="no.toml")
     truths = [folder / "flight.truth.toml" for folder in flights]
     with pytest.raises(host.IdentificationError, match="2 files of truth for 1 flights"):
         host.identify(flights[0] / "flight.csv", truth=truths)

@@ -93,12 +93,13 @@ def test_every_kernel_is_built_in_the_types_that_methods_use() -> None:
     assert used == built
 
 
+@pytest.mark.parametrize("free", [0, 11])  # none: a model without constants, run as it is
 @pytest.mark.parametrize("samples", [1, 2, 7, 255, 256, 600])
 def test_slopes_by_pieces_and_by_machine_code_agree(
-    samples: int, monkeypatch: pytest.MonkeyPatch
+    samples: int, free: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rng = np.random.default_rng(samples)
-    n, wide, p, free = 4, 6, 3, 11
+    n, wide, p = 4, 6, 3
     step = np.hstack([0.97 * np.eye(n) + 0.02 * rng.standard_normal((n, n)), np.zeros((n, 2))])
     slopes = rng.standard_normal((n, wide, free))
     z, C = rng.standard_normal((samples, wide)), rng.standard_normal((p, n))

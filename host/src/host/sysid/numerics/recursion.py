@@ -140,4 +140,4 @@ def _in_pieces(F: Array, G: Array, z: Array, C: Array, start: Array) -> Array:
         out = (lines @ first).reshape(len(C), length, pieces * free)
         out[:, 1:] += (C @ X[:, :-1].reshape(n, -1)).reshape(len(C), length - 1, pieces * free)
     in_order = out.reshape(len(C), length, pieces, free).transpose(0, 2, 1, 3)
-    return np.asarray(in_order.reshape(len(C), -1, free)[:, :samples])
+    return np.asarray(in_order.reshape(len(C), pieces * length, free)[:, :samples])

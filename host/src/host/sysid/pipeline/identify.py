@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorTable
+from host.physical.calibration import load_calibration
 from host.sysid.answer.truth import read_truth
 from host.sysid.coefficients.flight import CoefficientAnswer, coefficient_estimator
 from host.sysid.errors import IdentificationError
@@ -87,6 +88,8 @@ def identify(
     )
     known = aircraft_known(aircraft, calibration) if aircraft is not None else None
     ready = [prepare(source, how, known) for source in several(flights)]
+    if known is None and how.calibration is not None:
+        load_calibration(how.calibration)  # no table needs it, a misspelt one is said all the same
     notes = told(ready, known.doubts if known else ())
     recorded = apart([one.flight for one in ready])
     true = _truth(truth, len(recorded))

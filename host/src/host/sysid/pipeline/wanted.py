@@ -69,11 +69,11 @@ def wanted_models(given: ModelName | Iterable[ModelName] | None) -> Models:
             terms.append(Path(name))
         elif name in AXIS_OF:
             linear.append((str(name), None))
-        elif Path(name).exists() or str(name).lower().endswith(".toml"):
+        elif (str(name) and Path(name).exists()) or str(name).lower().endswith(".toml"):
             linear.append((str(name), read_model(Path(name))))
         else:
             raise IdentificationError(
-                f"no model '{name}'{like(str(name), tuple(AXIS_OF))}; there are"
+                f"no model '{name}'{like(str(name), (*AXIS_OF, COEFFICIENTS))}; there are"
                 f" {', '.join(AXIS_OF)}, coefficients, or a TOML file"
             )
     if len([t for t in terms if t != COEFFICIENTS]) + (COEFFICIENTS in terms) > 1:
