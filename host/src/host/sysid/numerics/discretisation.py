@@ -86,11 +86,13 @@ def transition(
         share = np.zeros((len(row), n_parameters))
         share[np.arange(len(row)), parameter] = gain * (dt_s * scale)
         slopes = by_entry[:, row, column].transpose(0, 2, 1) @ share
-    for _ in range(squarings):
-        if n_parameters:
-            above = E[:n_states, :n_states] @ slopes.reshape(n_states, -1)
-            slopes = above.reshape(slopes.shape) + E.T @ slopes
-        E = E @ E
+    # A step of a search may be far out; it refuses what is no longer finite.
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(squarings):
+            if n_parameters:
+                above = E[:n_states, :n_states] @ slopes.reshape(n_states, -1)
+                slopes = above.reshape(slopes.shape) + E.T @ slopes
+            E = E @ E
     return E[:n_states].copy(), slopes
 
 
