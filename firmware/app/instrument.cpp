@@ -55,8 +55,8 @@ void Instrument::step() {
   sensors_.step(config_, pilot_, outlet_, now_us);
   const bool made_frame = outlet_.frames() != frames;
   pilot_.ran(kTaskSensors);
-  // A receiver pulse that ends behind the pilot's step, or 0.3 ms before it, waits for the next, and
-  // 2 ms is all it may: making a frame takes more than half of that, and so do the slow tasks.
+  // A receiver pulse that ends behind the pilot's step, or 0.3 ms before it, waits for the next,
+  // and 2 ms is all it may: making a frame takes more than half of that, and so do the slow tasks.
   if (made_frame) pilot_.step(config_, supply_.good(), outlet_, hal::now_us());
   recorder_.step(now_us);
   pilot_.ran(kTaskRecorder);
