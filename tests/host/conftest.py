@@ -1,9 +1,21 @@
-"""One thread of linear algebra per process, before numpy is loaded.
+"""One thread of linear algebra per process, before numpy is loaded; one way of running loops.
 
 The matrices here are small: on a busy machine threads that spin for them make a fit ten times
 slower.
 """
 
 import os
+from collections.abc import Iterator
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import pytest
+
+from host import compiled
+
+
+@pytest.fixture(autouse=True)
+def loops_as_a_user_has_them() -> Iterator[None]:
+    """Forget behind each test that a program asked for machine code, as the studies do."""
+    yield
+    compiled._preferred = False
