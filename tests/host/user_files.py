@@ -319,9 +319,7 @@ def sources(kind: str) -> list[bytes]:
     if kind == "model":
         return [MODEL, (package / "sysid/coefficients/standard.toml").read_bytes()]
     if kind == "prior":
-        layout = ROOT / "tests/host/sysid"
-        datcom = sorted(layout.rglob("datcom_layout.dat"))
-        return [PRIOR, DERIVATIVES, *(p.read_bytes() for p in datcom)]
+        return [PRIOR, DERIVATIVES]
     return [p.read_bytes() for p in sorted((package / "twin/testcard/cards").glob("*.toml"))]
 
 

@@ -1,4 +1,4 @@
-"""A direction without information has no small variance, and mixed surfaces are refused."""
+"""Surfaces that move as one are refused, whatever the method."""
 
 from pathlib import Path
 
@@ -8,22 +8,7 @@ import pytest
 from host.sysid.answer.verdict import words
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import read_columns
-from host.sysid.numerics.inverse import covariance_of
 from scipy.signal import lsim
-
-
-def test_what_is_not_known_is_not_known_exactly() -> None:
-    rng = np.random.default_rng(1)
-    X = rng.standard_normal((50, 4)) * [1.0, 1e6, 1e-6, 1.0]
-    np.testing.assert_allclose(covariance_of(X.T @ X), np.linalg.inv(X.T @ X), rtol=1e-8)
-    X[:, 3] = 0.5 * X[:, 0]  # the same column twice
-    covariance = covariance_of(X.T @ X)
-    alone = np.linalg.inv(X[:, 1:3].T @ X[:, 1:3])
-    assert np.diag(covariance)[[0, 3]].min() > 1e9
-    np.testing.assert_allclose(np.diag(covariance)[1:3], np.diag(alone), rtol=0.2)
-    X[:, 3] = 0.0  # a parameter that nothing depends on, or one held on its bound
-    assert not covariance_of(X.T @ X)[3].any()
-    assert not covariance_of(np.zeros((2, 2))).any()
 
 
 @pytest.mark.parametrize("method", ["flight", "output-error", "stepwise"])
