@@ -11,7 +11,8 @@ namespace core {
 
 class GpsReceiver {
  public:
-  // True: `frame` holds a whole epoch, until the next byte; `fix` and `satellites` for longer.
+  // True: `frame` holds a whole epoch, until the next byte; `fix`, `satellites` and `ground_speed`
+  // until the next epoch has its own.
   bool byte(uint8_t value, uint32_t now_us);
 
   const frames::GpsFrame& frame() const { return frame_; }

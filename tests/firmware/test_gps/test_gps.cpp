@@ -127,6 +127,24 @@ TEST_CASE("a message of another epoch starts over") {
   CHECK(feed(gps, wire.bytes, wire.sol(kItowMs + 200, 3, 0b1101)));
 }
 
+TEST_CASE("between two epochs fix, satellites and ground speed are the last") {
+  core::GpsReceiver gps;
+  Wire wire;
+  feed(gps, wire.bytes, wire.posllh(kItowMs, 1, 1));
+  feed(gps, wire.bytes, wire.sol(kItowMs, 3, 0b1101));
+  CHECK_EQ(gps.frame().ground_speed, frames::kGpsGroundSpeedInvalid);
+  CHECK_EQ(feed(gps, wire.bytes, wire.velned(kItowMs)), 1);
+  const uint8_t size = wire.posllh(kItowMs + 200, 1, 1);
+  uint8_t holes = 0;
+  for (uint8_t i = 0; i < size; ++i) {
+    gps.byte(wire.bytes[i], 0);
+    const frames::GpsFrame& seen = gps.frame();
+    holes = static_cast<uint8_t>(holes + (seen.ground_speed != 1358 || seen.fix != 3));
+  }
+  CHECK_EQ(holes, 0);
+  CHECK_EQ(gps.frame().satellites, 9);
+}
+
 TEST_CASE("a damaged message takes its epoch with it, never mixes into the next") {
   core::GpsReceiver gps;
   Wire wire;
