@@ -71,9 +71,9 @@ void Instrument::step() {
   // last block together took 3.7 ms.
   if (outlet_.frames() == frames && recorder_.card_job() == job) recorder_.work(now_us);
   // By the time it is now: a rest is at most one turn longer than the least time between edges.
-  pilot_.beat(outlet_, hal::now_us());
-
   const uint32_t end_us = hal::now_us();
+  pilot_.beat(outlet_, end_us);
+
   const uint32_t loop_us = end_us - now_us;
   if (loop_us > loop_max_us_) {
     loop_max_us_ = static_cast<uint16_t>(loop_us > 65535U ? 65535U : loop_us);
