@@ -14,8 +14,8 @@ from pathlib import Path
 from host.compiled import prefer_machine_code
 from host.errors import ExitCode
 from host.extras import install_hint
-from host.sysid.estimators.fit import METHODS
 from host.sysid.estimators.hopfield import ITERATIONS
+from host.sysid.estimators.method_registry import METHODS
 
 from studies import (
     accuracy,

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.hopfield import network
-from host.sysid.estimators.rows import regression_rows, solve_rows
-from host.sysid.estimators.start import start_values
+from host.sysid.estimators.regression import regression_rows, solve_rows
+from host.sysid.estimators.start_values import start_values
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import references
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.output_error import covariance_of, minimise
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 from studies.aircraft import navion, navion_free, navion_structured
 from studies.data import clean

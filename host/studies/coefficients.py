@@ -18,10 +18,10 @@ import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.coefficients.flight import CoefficientAnswer, identify_coefficients
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import Found
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns
+from host.sysid.identification_error import IdentificationError
 from host.twin.sensors.delays import dlpf_for, sensor_delays
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight

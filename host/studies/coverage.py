@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.intervals import fit_with_memory
-from host.sysid.estimators.start import start_values
+from host.sysid.estimators.output_error_ar_noise import fit_with_memory
+from host.sysid.estimators.start_values import start_values
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.numerics.noise import OutputNoise, autocovariance
+from host.sysid.numerics.ar_noise import OutputNoise, autocovariance
 from host.sysid.numerics.output_error import covariance_of, minimise
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import signal, stats
 
 from studies.aircraft import navion_structured

@@ -22,10 +22,10 @@ from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.truth import read_truth, true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import Found, find
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import read_columns
+from host.sysid.identification_error import IdentificationError
 
 FIRST_SEED = 200
 OVERLAP = 0.8

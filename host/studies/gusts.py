@@ -23,7 +23,7 @@ from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.arrays import Array
 from host.sysid.aerodynamics.in_coefficients import in_coefficients
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import MATRICES, LinearModel
+from host.sysid.models.state_space_model import MATRICES, LinearModel
 from host.sysid.models.templates import Trim, template
 from host.twin.flight import pilot
 from scipy import linalg

@@ -27,8 +27,8 @@ from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.instrument.errors import InstrumentErrors, instrument_errors
 from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.tables import even_columns
+from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import VirtualFlight, virtual_flight
 

@@ -20,10 +20,10 @@ from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.linear import from_zero, identify
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD
 from host.sysid.flight.tables import even_columns
+from host.sysid.identification_error import IdentificationError
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 from studies.flights import Tally

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.fit import fit
+from host.sysid.estimators.method_registry import fit
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
     CANNOT,
     DOUBTFUL,
@@ -25,9 +25,9 @@ from host.sysid.models.diagnostics import (
     references,
 )
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel, free_model
+from host.sysid.models.state_space_model import LinearModel, free_model
 from host.sysid.numerics.output_error import covariance_of, minimise
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import special
 
 from studies.aircraft import TABLE_31_A, TABLE_31_B, navion, navion_structured

@@ -25,7 +25,7 @@ from host.sysid.estimators.hopfield import (
 )
 from host.sysid.models.diagnostics import thesis_program_error_percent
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import free_model
+from host.sysid.models.state_space_model import free_model
 
 from studies.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B
 from studies.inputs import SHAPES

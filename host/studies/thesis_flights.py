@@ -17,17 +17,17 @@ from typing import Any
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
 from host.sysid.estimators.hopfield import free_run, line_search, network
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
     thesis_program_error_percent,
     thesis_sum_of_mean_errors,
 )
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel, free_model
+from host.sysid.models.state_space_model import LinearModel, free_model
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 FIRST_SEED = 500

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array, BoolArray
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.filter_error import information_at
-from host.sysid.estimators.fit import fit
-from host.sysid.estimators.gust import ROLLING, gust_model
+from host.sysid.estimators.filter_error_gust import ROLLING, gust_model
+from host.sysid.estimators.method_registry import fit
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 
 from studies.gusts import AXES, NOISE, fly, gusty_aircraft, spectrum
 from studies.nonlinear_gusts import fly_nonlinear, varying

@@ -23,10 +23,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "host/src"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
-from host.sysid.estimators.start import start_values
+from host.sysid.estimators.start_values import start_values
 from host.sysid.numerics import recursion
 from host.sysid.numerics.output_error import covariance_of, minimise
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_free
 from studies.data import noisy
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import aeroid
 import numpy as np
 from host.arrays import Array
-from host.sysid.estimators.start import start_values
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.estimators.start_values import start_values
+from host.sysid.numerics.output_error_problem import OutputProblem
 from numpy.typing import NDArray
 from scipy import optimize, signal
 

@@ -10,7 +10,7 @@ TYPE_CHECKING = False  # of `typing`, whose import takes longer than the rest of
 if TYPE_CHECKING:
     from host.errors import CalibrationError, LogError, NotALogError
     from host.log import FlightLog, read_log
-    from host.sysid.errors import IdentificationError
+    from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.identification import Identification
     from host.sysid.pipeline.identify import identify
 
@@ -33,7 +33,7 @@ _HOMES = {
     "CalibrationError": "host.errors",
     "FlightLog": "host.log",
     "Identification": "host.sysid.pipeline.identification",
-    "IdentificationError": "host.sysid.errors",
+    "IdentificationError": "host.sysid.identification_error",
     "LogError": "host.errors",
     "NotALogError": "host.errors",
     "identify": "host.sysid.pipeline.identify",

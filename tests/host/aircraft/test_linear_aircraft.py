@@ -18,9 +18,9 @@ from host.aircraft.rigid_body import run
 from host.aircraft.trim import solve
 from host.cli import main
 from host.planning.identified_aircraft import is_model, with_models
-from host.sysid.errors import IdentificationError
-from host.sysid.models.model import LinearModel
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_text import model_text
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim, template
 from host.twin.faults import Fault
 from host.twin.flight.fly import fly

@@ -12,7 +12,7 @@ from host.instrument.deviations import deviations, sensor_error_model
 from host.instrument.errors import EVEN, instrument_errors, standard_errors
 from host.physical.calibration import load_calibration
 from host.resources import resource
-from host.sysid.compatibility.path_data import prior
+from host.sysid.compatibility.path_preparation import prior
 from host.twin.flight.draws import DRAWN, draw
 from host.twin.outcome.instrument import calibration
 

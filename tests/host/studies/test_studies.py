@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from host.sysid.estimators.fit import METHODS
 from host.sysid.estimators.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
+from host.sysid.estimators.method_registry import METHODS
 from host.sysid.flight.finder import Found
 from host.sysid.models.diagnostics import CANNOT, GRADES
-from host.sysid.models.model import free_model
+from host.sysid.models.state_space_model import free_model
 from studies.__main__ import main
 from studies.accuracy import run_case as accuracy
 from studies.aircraft import INPUTS, STATES, TABLE_31_A, TABLE_31_B

@@ -8,7 +8,7 @@ from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.estimators.hopfield import free_run
 from host.sysid.flight.tables import even_columns
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import free_model
+from host.sysid.models.state_space_model import free_model
 from host.twin.virtual import VirtualFlight, virtual_flight
 from studies.coefficients import CoefficientTally, true_delays, truths
 from studies.flights import PRINCIPAL

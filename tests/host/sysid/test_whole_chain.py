@@ -13,13 +13,13 @@ from host.cli import main
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.compatibility.position_correction import transfer_to_cg
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import find, grade
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import read_columns
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
 from host.sysid.models.templates import Trim, longitudinal
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 
 @pytest.fixture(scope="module")

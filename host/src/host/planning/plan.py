@@ -21,14 +21,14 @@ from host.aircraft.linear_aircraft import load
 from host.aircraft.linearisation import linearise, modes
 from host.aircraft.mode_names import DUTCH_ROLL, SHORT_PERIOD
 from host.aircraft.trim import solve
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.start import start_values
+from host.sysid.estimators.start_values import start_values
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim as Condition
 from host.sysid.models.templates import lateral, longitudinal
 from host.sysid.numerics.output_error import covariance_of, minimise
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.flight.pilot import Window
 from host.twin.outcome.ideal import true_table

@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
     from host.sysid.answer.save import check
-    from host.sysid.errors import IdentificationError
+    from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.identify import identify
     from host.sysid.pipeline.wanted import known_methods
 

@@ -19,9 +19,9 @@ from host.sysid.aerodynamics.conversion import (
     to_coefficients,
     to_derivatives,
 )
-from host.sysid.errors import IdentificationError
-from host.sysid.models.model import free_model
-from host.sysid.models.result import FitResult
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.state_space_model import free_model
 
 NAME = "ultrastick25e"
 AIRFRAME = airframe_data(NAME)

@@ -12,9 +12,9 @@ from host.cli import main
 from host.sysid.answer.files import whole
 from host.sysid.answer.mat import labels, mat_name, write_mat
 from host.sysid.answer.save import Places, check
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.linear import Answer, identify
 from host.sysid.flight.tables import read_columns
+from host.sysid.identification_error import IdentificationError
 from scipy import io
 
 

@@ -7,7 +7,7 @@ import pytest
 from host.cli import main
 from host.sysid.answer.side_by_side import side_by_side
 from host.sysid.answer.verdict import words
-from host.sysid.estimators.fit import methods
+from host.sysid.estimators.method_registry import methods
 from host.sysid.flight.chosen import chosen
 from host.sysid.flight.linear import Answer, identify
 from host.sysid.flight.linear_model import STAGED

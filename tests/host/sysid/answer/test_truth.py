@@ -12,7 +12,7 @@ from host.sysid.answer.truth import (
     truth_lines,
     truth_summary,
 )
-from host.sysid.models.modes import mode_of
+from host.sysid.models.modal_analysis import mode_of
 
 DOCUMENT = {
     "maneuver": [

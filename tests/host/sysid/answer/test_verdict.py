@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
 from host.sysid.answer.verdict import model_lines, unpredicted, words
-from host.sysid.estimators.fit import fit
+from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.linear import Answer
-from host.sysid.models.delays import DELAYS
 from host.sysid.models.diagnostics import SignalFit, collinearity, references
-from host.sysid.models.modes import modes, modes_of
+from host.sysid.models.modal_analysis import modes, modes_of
+from host.sysid.models.residual_delays import DELAYS
 from host.sysid.models.templates import TEMPLATES, Trim
 from studies.aircraft import navion_structured
 from studies.data import noisy

@@ -12,7 +12,7 @@ from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.model import standard_model
 from host.sysid.coefficients.rows import KINEMATIC, Equation, Flown, equations
 from host.sysid.coefficients.windows import Window
-from host.sysid.compatibility.signals import Record
+from host.sysid.compatibility.inverse_sensor_model import Record
 from host.sysid.flight.tables import even_columns
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight

@@ -14,9 +14,9 @@ from host.sysid.coefficients.joint import LastStep, prediction, pulls
 from host.sysid.coefficients.step import Known, stepped
 from host.sysid.coefficients.stretches import Side, Unknowns, stretches, summed
 from host.sysid.coefficients.windows import Block, Key, Window, window_block
-from host.sysid.compatibility.signals import Spectrum
+from host.sysid.compatibility.inverse_sensor_model import Spectrum
 from host.sysid.flight.tables import even_columns
-from host.sysid.numerics.repeats import scatter
+from host.sysid.numerics.maneuver_agreement import scatter
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 

@@ -24,8 +24,8 @@ from host.sysid.coefficients.model import (
     standard_model,
 )
 from host.sysid.coefficients.windows import Window
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.tables import even_columns
+from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 

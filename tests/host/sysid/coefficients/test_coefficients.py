@@ -13,10 +13,10 @@ from host.sysid.coefficients.answer import CoefficientFit
 from host.sysid.coefficients.fit import fit_coefficients
 from host.sysid.coefficients.flight import identify_coefficients
 from host.sysid.coefficients.windows import Window
-from host.sysid.compatibility.signals import Record, apply_sensor_errors, usable_length
-from host.sysid.errors import IdentificationError
+from host.sysid.compatibility.inverse_sensor_model import Record, apply_sensor_errors, usable_length
 from host.sysid.flight.finder import Found
 from host.sysid.flight.tables import even_columns
+from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 from studies.flights import PRINCIPAL, Tally

@@ -8,7 +8,7 @@ from host.arrays import Array
 from host.sysid.coefficients.answer import CoefficientFit, Derivative, Flight, Pull, Trace
 from host.sysid.coefficients.joint import Prediction
 from host.sysid.coefficients.pooled import pooled
-from host.sysid.numerics.repeats import scatter
+from host.sysid.numerics.maneuver_agreement import scatter
 
 NOISE = np.array([0.04, 0.02])
 SHARED = np.array([[0.0, 0.0], [0.06, 0.0]])  # derivatives by one deviation of each error

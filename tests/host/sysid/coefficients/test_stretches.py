@@ -9,8 +9,8 @@ from host.arrays import Array
 from host.sysid.coefficients.step import Known, stepped
 from host.sysid.coefficients.stretches import Side, Stretch, Unknowns, stretches, summed
 from host.sysid.coefficients.windows import Block, Key, Window, window_block
-from host.sysid.compatibility.signals import Spectrum
-from host.sysid.errors import IdentificationError
+from host.sysid.compatibility.inverse_sensor_model import Spectrum
+from host.sysid.identification_error import IdentificationError
 
 PLACES = {"Cm": np.array([0, 1]), "w": np.zeros(0, dtype=np.int64)}
 TERMS, GUSTS, ERRORS = 2, 3, 4  # gusts of one window

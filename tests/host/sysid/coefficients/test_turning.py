@@ -16,7 +16,7 @@ from host.sysid.coefficients.turning import (
     turned,
 )
 from host.sysid.coefficients.windows import Block, Window, window_block
-from host.sysid.compatibility.signals import Record
+from host.sysid.compatibility.inverse_sensor_model import Record
 from host.sysid.models.templates import GRAVITY_MPS2
 from numpy.polynomial import legendre
 

@@ -8,13 +8,13 @@ from host.aircraft.mass_properties import AirframeData
 from host.instrument.deviations import sensor_error_model
 from host.instrument.words import IN_WORDS
 from host.sysid import Maneuver
-from host.sysid.compatibility.at_cg import IMU_DELAY, at_cg, open_errors, without_open
-from host.sysid.compatibility.corrections import IN_COLUMNS
 from host.sysid.compatibility.reconstruction import Compatibility, Finding
-from host.sysid.estimators.gust import fit_with_gust, gust_model
+from host.sysid.compatibility.sensor_corrections import IN_COLUMNS
+from host.sysid.compatibility.sensor_dynamics import IMU_DELAY, at_cg, open_errors, without_open
+from host.sysid.estimators.filter_error_gust import fit_with_gust, gust_model
 from host.sysid.flight.carried import systematic_error_shifts
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim, template
 
 NAME = "ultrastick25e"

@@ -5,8 +5,14 @@ import pytest
 from host.aircraft.mass_properties import airframe_data
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
-from host.sysid.compatibility.claims import ALARM, VISIBLE, Claim, claim_words, claims
-from host.sysid.compatibility.path_data import prior
+from host.sysid.compatibility.calibration_consistency import (
+    ALARM,
+    VISIBLE,
+    Claim,
+    claim_words,
+    claims,
+)
+from host.sysid.compatibility.path_preparation import prior
 from host.sysid.compatibility.reconstruction import document, reconstruct, words
 from host.sysid.flight.tables import even_columns
 from host.twin.virtual import virtual_flight

@@ -14,12 +14,12 @@ from host.sysid.compatibility.flight_path import (
     PathProblem,
     Stretch,
 )
-from host.sysid.compatibility.path_data import prepare
 from host.sysid.compatibility.path_fit import fit_path
+from host.sysid.compatibility.path_preparation import prepare
 from host.sysid.compatibility.reconstruction import document, reconstruct, words
 from host.sysid.compatibility.strapdown import rotation, strapdown
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.tables import even_columns
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors.delays import FILTERS, sensor_delays

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term, fit
-from host.sysid.errors import IdentificationError
-from host.sysid.numerics.colour import coloured_middle
+from host.sysid.identification_error import IdentificationError
+from host.sysid.numerics.coloured_residuals import coloured_middle
 from host.sysid.numerics.differentiation import (
     bandwidth_hz,
     local_polynomial,

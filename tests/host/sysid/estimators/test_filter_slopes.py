@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from host.sysid.estimators.filter_error import fit_filter_error
-from host.sysid.estimators.gust import gust_model
+from host.sysid.estimators.filter_error_gust import gust_model
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.filter_problem import FilterProblem, Likelihood
 from host.sysid.numerics.filter_scoring import scoring, summed, whitened_slopes
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 KNOWN = {"Z_alpha": -8.0, "M_alpha": -60.0, "M_q": -8.0, "M_de": -70.0, "Z_de": -0.5}
 KNOWN |= {"D_V": -0.2, "D_alpha": -5.0, "Z_V": -0.07, "imu_x_m": 0.02, "imu_z_m": -0.01}

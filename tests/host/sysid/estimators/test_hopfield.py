@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from host.sysid import fit
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.hopfield import (
     LAMBDA,
     RHO,
@@ -12,8 +11,9 @@ from host.sysid.estimators.hopfield import (
     line_search,
     network,
 )
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import thesis_program_error_percent
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_free
 from studies.data import with_rates
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.sysid import fit
-from host.sysid.numerics.noise import choose_order, lagged_moments, regress, stabilised
+from host.sysid.numerics.ar_noise import choose_order, lagged_moments, regress, stabilised
 from scipy import signal
 from studies.aircraft import navion_structured
 from studies.coverage import NOISES, coloured_noise, run_case

@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 from host.sysid import FitResult, Maneuver, fit, methods
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.frequency import transform
+from host.sysid.estimators.frequency_domain import transform
 from host.sysid.estimators.kalman import inflation
+from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.output_error import minimise
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.riccati import predicted_covariance
 from scipy import linalg, signal
 from studies.aircraft import navion, navion_free, navion_structured

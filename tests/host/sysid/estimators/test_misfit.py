@@ -1,7 +1,7 @@
 """Intervals widened by what neighbouring scores have in common."""
 
 import numpy as np
-from host.sysid.estimators.misfit import misfit_factor, widened_names
+from host.sysid.estimators.hac_inflation import misfit_factor, widened_names
 from scipy import signal
 from studies.gusts import fly, gusty_aircraft
 from studies.turbulence import fit_both, linear_setup

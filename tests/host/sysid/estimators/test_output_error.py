@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 from host.sysid import Maneuver, Parameter, fit
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error
-from host.sysid.estimators.start import start_values
+from host.sysid.estimators.start_values import start_values
+from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.output_error import covariance_of, minimise
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import optimize
 from studies.aircraft import navion_free, navion_structured
 from studies.data import TRUTH, clean, noisy

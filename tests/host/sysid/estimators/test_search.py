@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators import search as searching
-from host.sysid.estimators.following import following_start, led_model
-from host.sysid.estimators.search import search, white_cost
-from host.sysid.estimators.start import start_values
+from host.sysid.estimators import multistart as searching
+from host.sysid.estimators.homotopy import following_start, led_model
+from host.sysid.estimators.multistart import search, white_cost
+from host.sysid.estimators.start_values import start_values
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel, free_model
+from host.sysid.models.state_space_model import LinearModel, free_model
 from host.sysid.numerics.output_error import Optimum, minimise
-from host.sysid.numerics.problem import OutputProblem, Response
+from host.sysid.numerics.output_error_problem import OutputProblem, Response
 from studies.aircraft import navion_free
 from studies.data import noisy
 from studies.inputs import SHAPES

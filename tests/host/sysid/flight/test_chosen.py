@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from host.cli import main
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.chosen import chosen, moving
 from host.sysid.flight.finder import AXES, find, grade
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import read_columns
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import model_from
 
 Columns = dict[str, np.ndarray]

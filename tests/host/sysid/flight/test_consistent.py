@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from host.cli import main
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.plausible import check
 from host.sysid.flight.tables import read_columns
+from host.sysid.identification_error import IdentificationError
 
 Columns = dict[str, np.ndarray]
 DEG = 180.0 / np.pi

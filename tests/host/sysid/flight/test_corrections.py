@@ -15,7 +15,8 @@ from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.answer.verdict import model_lines, words
-from host.sysid.compatibility.corrections import (
+from host.sysid.compatibility.reconstruction import Compatibility, Finding, reconstruct
+from host.sysid.compatibility.sensor_corrections import (
     IN_COLUMNS,
     corrections,
     deviations,
@@ -23,14 +24,13 @@ from host.sysid.compatibility.corrections import (
     without_delays,
     without_errors,
 )
-from host.sysid.compatibility.reconstruction import Compatibility, Finding, reconstruct
 from host.sysid.flight import linear, linear_model
 from host.sysid.flight.carried import carried, systematic_error_shifts
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns
-from host.sysid.models.delays import DELAYS
+from host.sysid.models.residual_delays import DELAYS
 from host.sysid.models.templates import Trim, template
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from host.twin.virtual import virtual_flight
 
 NAME = "ultrastick25e"

@@ -11,7 +11,7 @@ from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.answer.truth import true_coefficients
-from host.sysid.estimators.start import regressed, start_values
+from host.sysid.estimators.start_values import regressed, start_values
 from host.sysid.flight import linear
 from host.sysid.flight.departures import spin_of
 from host.sysid.flight.finder import Found
@@ -19,10 +19,10 @@ from host.sysid.flight.linear import identify
 from host.sysid.flight.linear_model import imu_place_m, without_attitude
 from host.sysid.flight.reconstructed import flown_maneuvers, reconstructed
 from host.sysid.flight.tables import even_columns
-from host.sysid.models.delays import DELAYS
-from host.sysid.models.result import FitResult
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.residual_delays import DELAYS
 from host.sysid.models.templates import Trim, template
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 from studies.linear import derivatives

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import find
 from host.sysid.flight.tables import read_columns
+from host.sysid.identification_error import IdentificationError
 from scipy import io
 
 LINES = {

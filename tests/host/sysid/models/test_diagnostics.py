@@ -23,8 +23,8 @@ from host.sysid.models.diagnostics import (
     thesis_sum_of_mean_errors,
     whiteness,
 )
-from host.sysid.models.model import Parameter, Term
-from host.sysid.models.modes import modes, modes_of
+from host.sysid.models.modal_analysis import modes, modes_of
+from host.sysid.models.state_space_model import Parameter, Term
 from host.sysid.models.templates import Trim
 from scipy import signal, stats
 from studies.aircraft import navion, navion_free, navion_structured

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term
-from host.sysid.errors import IdentificationError
-from host.sysid.models.delays import without_usual_delays
-from host.sysid.models.model import DelayGroup, without_outputs
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.modal_analysis import longitudinal_names
 from host.sysid.models.model_file import model_from, parse_entry, read_model
 from host.sysid.models.model_text import model_text
-from host.sysid.models.modes import longitudinal_names
+from host.sysid.models.residual_delays import without_usual_delays
+from host.sysid.models.state_space_model import DelayGroup, without_outputs
 from host.sysid.models.templates import (
     GRAVITY_MPS2,
     TEMPLATES,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import DelayGroup, LinearModel, Parameter, Term
-from host.sysid.numerics.delay import delayed
-from host.sysid.numerics.noise import OutputNoise, ar_filter, autocovariance
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.models.state_space_model import DelayGroup, LinearModel, Parameter, Term
+from host.sysid.numerics.ar_noise import OutputNoise, ar_filter, autocovariance
+from host.sysid.numerics.fractional_delay import delayed
+from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import signal
 
 STATES = ("alpha_rad", "q_radps")

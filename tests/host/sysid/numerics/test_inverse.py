@@ -1,7 +1,7 @@
 """A direction without information has no small variance."""
 
 import numpy as np
-from host.sysid.numerics.inverse import covariance_of
+from host.sysid.numerics.information_inverse import covariance_of
 
 
 def test_what_is_not_known_is_not_known_exactly() -> None:

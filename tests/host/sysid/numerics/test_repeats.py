@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from host.sysid import FitResult, Maneuver, fit
-from host.sysid.numerics.problem import OutputProblem
-from host.sysid.numerics.repeats import repeats, widened
+from host.sysid.numerics.maneuver_agreement import repeats, widened
+from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_structured
 from studies.data import TRUTH, noisy
 

@@ -6,17 +6,17 @@ import control
 import numpy as np
 import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term, fit
-from host.sysid.models.model import DelayGroup
-from host.sysid.models.modes import modes_of
-from host.sysid.numerics.filter_problem import FilterProblem, discrete_noise
-from host.sysid.numerics.noise import (
+from host.sysid.models.modal_analysis import modes_of
+from host.sysid.models.state_space_model import DelayGroup
+from host.sysid.numerics.ar_noise import (
     OutputNoise,
     autocovariance,
     choose_order,
     lagged_moments,
     regress,
 )
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.filter_problem import FilterProblem, discrete_noise
+from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.riccati import predicted_covariance
 from scipy import signal
 from statsmodels.regression.linear_model import yule_walker

@@ -5,7 +5,7 @@ import pytest
 import statsmodels.api as sm
 from host.sysid import FitResult, LinearModel, Maneuver, Parameter, Term, fit
 from host.sysid.estimators.recursive import START_VARIANCE, update
-from host.sysid.estimators.rows import regression_rows
+from host.sysid.estimators.regression import regression_rows
 from host.sysid.estimators.stepwise import F_IN, GAIN_LIMIT, choose_terms
 from host.sysid.models.diagnostics import signal_fits, whiteness
 from scipy import linalg, signal

@@ -15,8 +15,8 @@ from host.aircraft.gains import dimensional_name, from_dimensional
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
 from host.instrument.words import IN_WORDS
-from host.sysid.models.result import NORMAL_95, FitResult
-from host.sysid.models.systematic import main_cause, systematic_covariance
+from host.sysid.models.consider_covariance import main_cause, systematic_covariance
+from host.sysid.models.fit_result import NORMAL_95, FitResult
 from host.sysid.models.templates import Trim
 
 

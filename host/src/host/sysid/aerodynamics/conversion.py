@@ -25,7 +25,7 @@ from host.aircraft.gains import (
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, deviations
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
 
 CARRIED = (

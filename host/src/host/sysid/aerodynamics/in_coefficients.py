@@ -13,7 +13,7 @@ import numpy as np
 
 from host.aircraft.gains import dimensional_gains
 from host.aircraft.mass_properties import AirframeData, Condition
-from host.sysid.models.model import LinearModel, Parameter, Term
+from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 
 
 def in_coefficients(

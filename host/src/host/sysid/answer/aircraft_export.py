@@ -20,7 +20,7 @@ from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.files import whole
 from host.sysid.coefficients.answer import Flight
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 
 # Names of the aircraft file for the names of the answer.
 AXES = {"CL": "cl", "Cm": "cm", "CY": "cy", "Cl": "croll", "Cn": "cn"}

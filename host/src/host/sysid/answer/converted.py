@@ -29,11 +29,11 @@ from host.sysid.aerodynamics.conversion import (
     to_derivatives,
 )
 from host.sysid.answer.units import parameter_unit
-from host.sysid.errors import IdentificationError
-from host.sysid.models.document import read_document
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.models.model_file import read_model, read_trim
-from host.sysid.models.result import NORMAL_95
 from host.sysid.models.templates import Trim, template
+from host.sysid.models.toml_document import read_document
 
 STANDARD_KGPM3 = 1.225  # of the standard atmosphere at sea level
 NAMED_SHARE = 0.25  # of the variance: a smaller part is not worth naming

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from host.export.unfinished import unfinished
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 
 LONGEST_NAME = 100  # characters; file systems take 255 bytes
 

@@ -12,16 +12,16 @@ import numpy as np
 from host.sysid.answer.units import parameter_unit
 from host.sysid.answer.verdict import unpredicted
 from host.sysid.coefficients.answer import METHOD
-from host.sysid.compatibility.corrections import correction_document
+from host.sysid.compatibility.sensor_corrections import correction_document
 from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer
 from host.sysid.flight.reconstructed import found_name
-from host.sysid.models.modes import Mode
+from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.flight import CoefficientAnswer
     from host.sysid.coefficients.joint import Prediction
-    from host.sysid.numerics.repeats import Repeats
+    from host.sysid.numerics.maneuver_agreement import Repeats
 
 
 def json_text(document: Mapping[str, Any]) -> str:

@@ -13,9 +13,9 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.answer.files import whole
 from host.sysid.answer.units import parameter_unit
-from host.sysid.compatibility.signals import THIN_HZ
+from host.sysid.compatibility.inverse_sensor_model import THIN_HZ
 from host.sysid.flight.linear import Answer
-from host.sysid.models.modes import Mode
+from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.flight import CoefficientAnswer

@@ -25,10 +25,10 @@ from host.sysid.answer.panels import (
 from host.sysid.answer.truth import true_coefficients
 from host.sysid.answer.units import parameter_unit
 from host.sysid.answer.verdict import not_relied_on
-from host.sysid.compatibility.signals import THIN_HZ
+from host.sysid.compatibility.inverse_sensor_model import THIN_HZ
 from host.sysid.flight.linear import Answer
 from host.sysid.models.diagnostics import references
-from host.sysid.models.modes import Mode
+from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -13,8 +13,8 @@ from host.extras import install_hint
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.files import file_names, refuse_place, whole
 from host.sysid.answer.mat import labels, write_mat
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.linear import Answer
+from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.flight import CoefficientAnswer

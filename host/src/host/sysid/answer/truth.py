@@ -13,10 +13,10 @@ from host.aircraft.mode_names import LATERAL, LONGITUDINAL
 from host.files.document import read_toml
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.mat import labels
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.linear import Answer
 from host.sysid.flight.linear_model import AXIS_OF
-from host.sysid.models.modes import Mode
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.flight import CoefficientAnswer

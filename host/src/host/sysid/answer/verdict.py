@@ -13,12 +13,12 @@ import numpy as np
 from host.sysid.answer.units import parameter_unit
 from host.sysid.coefficients.answer import FLAG_SHARE
 from host.sysid.coefficients.model import standard_model
-from host.sysid.compatibility.corrections import correction_words
+from host.sysid.compatibility.sensor_corrections import correction_words
 from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer, from_zero
-from host.sysid.models.delays import DELAYS
 from host.sysid.models.diagnostics import CANNOT, references
-from host.sysid.models.modes import Mode
+from host.sysid.models.modal_analysis import Mode
+from host.sysid.models.residual_delays import DELAYS
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.flight import CoefficientAnswer

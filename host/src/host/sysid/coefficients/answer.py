@@ -18,8 +18,8 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, IntArray
 from host.sysid.coefficients.joint import Prediction
 from host.sysid.coefficients.local import Local
-from host.sysid.models.result import NORMAL_95
-from host.sysid.numerics.repeats import Repeats
+from host.sysid.models.fit_result import NORMAL_95
+from host.sysid.numerics.maneuver_agreement import Repeats
 
 METHOD = "equation error with instrument errors"
 FLAG_SHARE = 0.12  # up to it an error beyond 15 % is a case of one in seventy

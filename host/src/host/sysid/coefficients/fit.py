@@ -43,8 +43,8 @@ from host.sysid.coefficients.step import Known, stepped
 from host.sysid.coefficients.stretches import Side, Unknowns, stretches, summed
 from host.sysid.coefficients.turning import gust_information, gust_strength, turned
 from host.sysid.coefficients.windows import Window, noise_spectra
-from host.sysid.compatibility.signals import decimated, usable_length
-from host.sysid.errors import IdentificationError
+from host.sysid.compatibility.inverse_sensor_model import decimated, usable_length
+from host.sysid.identification_error import IdentificationError
 
 PLAIN_ROUNDS, FULL_ROUNDS = 3, 2  # without errors of the instrument and slow gusts, with them
 # Not estimated, only carried into the intervals: a vane's lag of 0.5 ms looks like an arm of 8 mm,

@@ -26,13 +26,13 @@ from host.sysid.coefficients.outcome import (
 )
 from host.sysid.coefficients.pooled import pooled
 from host.sysid.coefficients.windows import LEAST_S, Window
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.finder import FLYING_SHARE, Found, find
 from host.sysid.flight.reconstructed import ReconstructedFlight, found_name, reconstructed
-from host.sysid.models.modes import Mode
-from host.sysid.models.result import NORMAL_95
-from host.sysid.models.systematic import main_cause
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.consider_covariance import main_cause
+from host.sysid.models.fit_result import NORMAL_95
+from host.sysid.models.modal_analysis import Mode
 
 NAME = "coefficients"
 LEAD_S = 0.5  # of trim before a maneuver

@@ -16,8 +16,8 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
 from host.sysid.coefficients.rows import Flown
-from host.sysid.compatibility.signals import BLEND_RADPS, Record
-from host.sysid.errors import IdentificationError
+from host.sysid.compatibility.inverse_sensor_model import BLEND_RADPS, Record
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
 from host.sysid.numerics.discretisation import transition
 from host.sysid.numerics.recursion import simulate

@@ -12,7 +12,7 @@ from host.sysid.coefficients.rows import KINEMATIC
 from host.sysid.coefficients.step import STILL, Step
 from host.sysid.coefficients.stretches import Stretch, Unknowns, summed
 from host.sysid.coefficients.windows import FLAT, Block, Key, row_weight, used
-from host.sysid.compatibility.signals import Spectrum
+from host.sysid.compatibility.inverse_sensor_model import Spectrum
 
 LEAST_ELSEWHERE = 0.1  # of what is known of each term: a maneuver that alone tells it must stay
 

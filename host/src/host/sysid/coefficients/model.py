@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.models.document import read_document
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.toml_document import read_document
 
 SIGNALS = ("alpha", "beta", "p", "q", "r", "de", "da", "dr", "V")
 LIFT = "CL"  # as a signal: the polar's

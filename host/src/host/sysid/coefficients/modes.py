@@ -15,8 +15,8 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.sysid.aerodynamics.conversion import Quantities
 from host.sysid.coefficients.answer import CoefficientFit
-from host.sysid.models.modes import Mode, eigenmodes, lateral_names, longitudinal_names
-from host.sysid.models.result import NORMAL_95
+from host.sysid.models.fit_result import NORMAL_95
+from host.sysid.models.modal_analysis import Mode, eigenmodes, lateral_names, longitudinal_names
 from host.sysid.models.templates import GRAVITY_MPS2
 
 SIGNALS = {

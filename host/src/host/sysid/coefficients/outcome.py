@@ -30,7 +30,7 @@ from host.sysid.coefficients.problem import (
     regressor_sizes,
 )
 from host.sysid.coefficients.rows import KINEMATIC
-from host.sysid.numerics.repeats import Repeats, scatter
+from host.sysid.numerics.maneuver_agreement import Repeats, scatter
 
 
 @dataclass(frozen=True)

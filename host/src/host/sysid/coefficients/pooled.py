@@ -16,9 +16,9 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.coefficients.answer import CoefficientFit, Derivative, Flight, Pull, Trace
 from host.sysid.coefficients.joint import Prediction
-from host.sysid.models.result import NORMAL_95
-from host.sysid.models.systematic import systematic_covariance
-from host.sysid.numerics.repeats import scatter
+from host.sysid.models.consider_covariance import systematic_covariance
+from host.sysid.models.fit_result import NORMAL_95
+from host.sysid.numerics.maneuver_agreement import scatter
 
 LEAST = 1e-12  # of the largest: an eigenvalue below it is rounding
 

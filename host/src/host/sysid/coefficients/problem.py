@@ -19,7 +19,12 @@ from host.sysid.coefficients.model import CoefficientModel
 from host.sysid.coefficients.rows import KINEMATIC, Equation, Flown, equations
 from host.sysid.coefficients.turning import LENGTH_M
 from host.sysid.coefficients.windows import Block, Key, Window, transformed, window_block
-from host.sysid.compatibility.signals import Record, Spectrum, apply_sensor_errors, attitude
+from host.sysid.compatibility.inverse_sensor_model import (
+    Record,
+    Spectrum,
+    apply_sensor_errors,
+    attitude,
+)
 from host.sysid.models.templates import GRAVITY_MPS2
 
 STEP = 0.3  # of a standard deviation: width of the numeric slopes

@@ -15,7 +15,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array, IntArray
 from host.sysid.coefficients.model import CoefficientModel
-from host.sysid.compatibility.signals import Record
+from host.sysid.compatibility.inverse_sensor_model import Record
 from host.sysid.models.templates import GRAVITY_MPS2
 
 # Roll under the elevator: lift beside a CG off the plane of symmetry, its only clear trace.

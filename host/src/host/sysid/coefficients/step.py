@@ -9,8 +9,8 @@ import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
 from host.sysid.coefficients.stretches import Sums
-from host.sysid.errors import IdentificationError
-from host.sysid.models.systematic import systematic_covariance
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.consider_covariance import systematic_covariance
 
 LOST = 1e12  # by which a variance grows where a regressor never moves, or is the same as others
 STILL = 1e-30  # a sum of squares below it is rounding

@@ -15,7 +15,7 @@ import numpy as np
 
 from host.arrays import Array, IntArray
 from host.sysid.coefficients.windows import FLAT, Block, Key, degree, row_weight, used
-from host.sysid.compatibility.signals import Spectrum
+from host.sysid.compatibility.inverse_sensor_model import Spectrum
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.coefficients.windows import Block, Key
-from host.sysid.compatibility.signals import Spectrum
+from host.sysid.compatibility.inverse_sensor_model import Spectrum
 
 SHAPES = 3  # mean, slope and bend of a gust over a maneuver; faster ones are noise
 # Along and vertical at 100 m over the ground, MIL-F-8785C 3.7.3.

@@ -9,8 +9,8 @@ import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
 from host.sysid.coefficients.rows import KINEMATIC, LATERAL, LONGITUDINAL, Equation
-from host.sysid.compatibility.signals import Spectrum
-from host.sysid.errors import IdentificationError
+from host.sysid.compatibility.inverse_sensor_model import Spectrum
+from host.sysid.identification_error import IdentificationError
 
 LOW_HZ, HIGH_HZ = 0.1, 4.5
 KINEMATIC_LOW_HZ = 0.4  # below, the attitude filter's own errors rule

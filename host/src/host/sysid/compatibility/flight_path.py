@@ -15,7 +15,7 @@ import numpy as np
 
 from host.arrays import Array, IntArray
 from host.sysid.compatibility.strapdown import cross, path_slopes, small_turn, strapdown
-from host.sysid.numerics.problem import Response
+from host.sysid.numerics.output_error_problem import Response
 
 # Errors of the inertial sensors, in the order of their slopes.
 INERTIAL = (

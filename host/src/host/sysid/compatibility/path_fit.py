@@ -17,8 +17,8 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, GPS, PITOT, PLACES, PathProblem
-from host.sysid.errors import IdentificationError
-from host.sysid.numerics.noise import OutputNoise, lagged_moments, regress
+from host.sysid.identification_error import IdentificationError
+from host.sysid.numerics.ar_noise import OutputNoise, lagged_moments, regress
 
 ORDER = 2  # memory of the residuals: a gust and a sensor
 MOST_ITERATIONS = 25

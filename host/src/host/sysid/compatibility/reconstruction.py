@@ -17,11 +17,11 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
-from host.sysid.compatibility.claims import Claim, claim_words, claims
+from host.sysid.compatibility.calibration_consistency import Claim, claim_words, claims
 from host.sysid.compatibility.flight_path import FLOW, GPS, INERTIAL
-from host.sysid.compatibility.path_data import prepare, prior
 from host.sysid.compatibility.path_fit import fit_path
-from host.sysid.errors import IdentificationError
+from host.sysid.compatibility.path_preparation import prepare, prior
+from host.sysid.identification_error import IdentificationError
 
 TOLD = 0.7  # of the prior's deviation: what stays above is the calibration's word, not the data's
 VANE_MODEL = 0.006  # of scale: dry friction known to 20 % of its 3 %

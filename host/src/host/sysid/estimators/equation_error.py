@@ -13,19 +13,19 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.rows import (
+from host.sysid.estimators.regression import (
     NEVER_MOVED,
     Row,
     normal_equations,
     regression_rows,
     solve_rows,
 )
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
-from host.sysid.numerics.colour import coloured_middle
-from host.sysid.numerics.inverse import covariance_of
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.coloured_residuals import coloured_middle
+from host.sysid.numerics.information_inverse import covariance_of
 
 HUBER_LIMIT = 1.345  # 95 % efficiency on normal residuals (Huber 1981)
 MAD_TO_SIGMA = 1.4826

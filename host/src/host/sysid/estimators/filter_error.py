@@ -12,19 +12,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array, BoolArray
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.misfit import misfit_factor, widened_names
-from host.sysid.estimators.rival import against_coloured_noise
-from host.sysid.estimators.start import start_values
+from host.sysid.estimators.hac_inflation import misfit_factor, widened_names
+from host.sysid.estimators.noise_model_comparison import against_coloured_noise
+from host.sysid.estimators.start_values import start_values
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.filter_problem import FilterProblem, Likelihood
 from host.sysid.numerics.filter_scoring import scoring, summed, whitened_slopes
 from host.sysid.numerics.gauss_newton import Objective, free_of_bounds, gauss_newton
-from host.sysid.numerics.inverse import covariance_of
+from host.sysid.numerics.information_inverse import covariance_of
+from host.sysid.numerics.maneuver_agreement import pulls
 from host.sysid.numerics.output_error import minimise
-from host.sysid.numerics.repeats import pulls
 
 # Fisher's information overstates the curvature by the noise of a sensor that is smoother than any:
 # steps towards zero are all too short, by the same share. A longer one is tried for a fifth of what

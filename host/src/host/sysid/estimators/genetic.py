@@ -14,12 +14,12 @@ import numpy as np
 from scipy import optimize
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 POPULATION = 40
 GENERATIONS = 60  # from far away the best is then within 3 % of the valley, six seeds of six

@@ -21,13 +21,13 @@ import numpy as np
 
 from host.arrays import Array
 from host.compiled import compiled
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.rows import normal_equations, regression_rows
+from host.sysid.estimators.regression import normal_equations, regression_rows
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import thesis_program_error_percent
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import transition
 from host.sysid.numerics.recursion import simulate
 

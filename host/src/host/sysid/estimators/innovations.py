@@ -1,7 +1,7 @@
 """What the innovations of a filter-error answer say beside it: their slopes, their colour.
 
 Filter error takes its innovations for white. Where the model lacks something they are not, and
-their memory stands between the slopes as it does for output error (`numerics/colour.py`).
+their memory stands between the slopes as for output error (`numerics/coloured_residuals.py`).
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
-from host.sysid.numerics.colour import coloured_middle
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.coloured_residuals import coloured_middle
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.filter_scoring import whitened_slopes
-from host.sysid.numerics.inverse import covariance_of
+from host.sysid.numerics.information_inverse import covariance_of
 
 PROCESS = "log_process."
 

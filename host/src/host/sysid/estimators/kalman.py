@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.start import start_values_of
+from host.sysid.estimators.start_values import start_values_of
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import transition
-from host.sysid.numerics.problem import check_shapes
+from host.sysid.numerics.output_error_problem import check_shapes
 
 PASSES = 2  # over the record: the second starts from the parameters of the first
 START_SHARE = 0.5  # first standard deviation of a parameter, relative to its size

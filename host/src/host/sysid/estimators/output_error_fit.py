@@ -7,16 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.intervals import HIGHEST_ORDER, Interval, fit_with_memory
-from host.sysid.estimators.start import start_values
+from host.sysid.estimators.output_error_ar_noise import HIGHEST_ORDER, Interval, fit_with_memory
+from host.sysid.estimators.start_values import start_values
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
-from host.sysid.numerics.colour import coloured_middle
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.coloured_residuals import coloured_middle
+from host.sysid.numerics.maneuver_agreement import pulls
 from host.sysid.numerics.output_error import unseen, whitened_slopes
-from host.sysid.numerics.problem import OutputProblem
-from host.sysid.numerics.repeats import pulls
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 
 def fit_output_error(

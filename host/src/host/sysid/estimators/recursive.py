@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.rows import Row, regression_rows, solve_normal
+from host.sysid.estimators.regression import Row, regression_rows, solve_normal
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
-from host.sysid.numerics.inverse import covariance_of
-from host.sysid.numerics.problem import check_shapes
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.information_inverse import covariance_of
+from host.sysid.numerics.output_error_problem import check_shapes
 
 Spectrum = NDArray[np.complexfloating]
 START_VARIANCE = 1e8  # of scaled regressors: a start that weighs nothing

@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array, BoolArray
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.rows import regression_rows
+from host.sysid.estimators.regression import regression_rows
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
+from host.sysid.models.state_space_model import LinearModel
 
 F_IN = 20.0  # sec. 5.4.1: far above the 95 % point, because model error is no white noise
 GAIN_LIMIT = 0.005  # a term must also lift R2 by half a percent

@@ -15,22 +15,22 @@ import numpy as np
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Moved, trim_of
-from host.sysid.compatibility.at_cg import open_errors, without_open
-from host.sysid.compatibility.corrections import (
+from host.sysid.compatibility.reconstruction import Compatibility
+from host.sysid.compatibility.sensor_corrections import (
     IN_COLUMNS,
     deviations,
     pressure_part,
     without_errors,
 )
-from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.estimators.gust import gust_model
+from host.sysid.compatibility.sensor_dynamics import open_errors, without_open
+from host.sysid.estimators.filter_error_gust import gust_model
 from host.sysid.estimators.innovations import innovations_of
+from host.sysid.models.consider_covariance import systematic_covariance
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel, without_outputs
-from host.sysid.models.result import FitResult
-from host.sysid.models.systematic import systematic_covariance
+from host.sysid.models.state_space_model import LinearModel, without_outputs
 from host.sysid.models.templates import TEMPLATES, Trim, template
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 TRIMMING = ("airspeed_mps", "alpha_rad", "theta_rad", "qbar_pa", "density_kgpm3")
 SINGULAR = 1e-12  # of the largest eigenvalue of the scaled information

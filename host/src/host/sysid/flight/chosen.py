@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.finder import AXES, Found, find
+from host.sysid.identification_error import IdentificationError
 
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 FEWEST = 8  # samples, as a maneuver needs

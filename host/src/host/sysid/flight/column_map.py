@@ -21,7 +21,7 @@ import numpy as np
 from host.arrays import Array
 from host.files.document import read_toml
 from host.files.quantities import Quantity
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 
 DEG, FOOT, POUND_PA = np.pi / 180.0, 0.3048, 6894.757
 # What a column of ours may come in, by the end of its name.

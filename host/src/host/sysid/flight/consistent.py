@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
 
 SURE, SOME = 0.5, 0.25  # partial correlation: less tells nothing about a sign, about a factor

@@ -20,8 +20,8 @@ from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Moved
 from host.sysid.aerodynamics.varying import BENDS, MEASURED, VaryingModel
 from host.sysid.flight.carried import follower
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.result import FitResult
 from host.sysid.models.templates import Trim
 
 LEFT = 0.25  # of the step: what one step and terms of second order leave open

@@ -12,8 +12,8 @@ import numpy as np
 
 from host.arrays import Array
 from host.extras import install_hint
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.text_table import HEAD_BYTES, read_text
+from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import SignalFit, signal_fits
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 
 def free_simulation(frozen: LinearModel, maneuvers: Sequence[Maneuver]) -> list[Array]:

@@ -21,11 +21,10 @@ from host.sysid.aerodynamics.coefficient_table import (
     coefficients,
     trim_of,
 )
-from host.sysid.compatibility.corrections import Correction, corrections
 from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.fit import fit
-from host.sysid.estimators.gust import VANES, fit_with_gust
+from host.sysid.compatibility.sensor_corrections import Correction, corrections
+from host.sysid.estimators.filter_error_gust import VANES, fit_with_gust
+from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.carried import carried, systematic_error_shifts
 from host.sysid.flight.chosen import moving, once
 from host.sysid.flight.departures import Departure, departure
@@ -47,7 +46,7 @@ from host.sysid.flight.reconstructed import (
     flown_maneuvers,
     reconstructed,
 )
-from host.sysid.models.delays import DELAYS, without_usual_delays
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
     Collinearity,
     Refusal,
@@ -56,12 +55,13 @@ from host.sysid.models.diagnostics import (
     constant_inputs,
     judge,
 )
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.modes import Mode, modes
-from host.sysid.models.result import FitResult
+from host.sysid.models.modal_analysis import Mode, modes
+from host.sysid.models.residual_delays import DELAYS, without_usual_delays
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
-from host.sysid.numerics.repeats import repeats, widened
+from host.sysid.numerics.maneuver_agreement import repeats, widened
 
 
 class NoManeuverError(IdentificationError):

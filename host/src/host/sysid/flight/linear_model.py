@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
-from host.sysid.compatibility.path_data import NOTHING
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.start import regressed
+from host.sysid.compatibility.path_preparation import NOTHING
+from host.sysid.estimators.start_values import regressed
 from host.sysid.flight.reconstructed import FlownManeuver
-from host.sysid.models.delays import DELAYS
-from host.sysid.models.model import LinearModel, without_outputs
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.residual_delays import DELAYS
+from host.sysid.models.state_space_model import LinearModel, without_outputs
 from host.sysid.models.templates import TEMPLATES, Trim, template
 
 AXIS_OF = {

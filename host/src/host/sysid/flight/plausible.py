@@ -11,8 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.consistent import BLOCK_S, FEWEST, HINT, SURE, block_means, consistent
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")

@@ -14,20 +14,20 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.sysid.compatibility.at_cg import at_cg
-from host.sysid.compatibility.corrections import (
+from host.sysid.compatibility.position_correction import transfer_to_cg
+from host.sysid.compatibility.reconstruction import Compatibility
+from host.sysid.compatibility.sensor_corrections import (
     corrections,
     pressure_part,
     without_delays,
     without_errors,
 )
-from host.sysid.compatibility.position_correction import transfer_to_cg
-from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.errors import IdentificationError
+from host.sysid.compatibility.sensor_dynamics import at_cg
 from host.sysid.flight.column_map import like
 from host.sysid.flight.finder import Found
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,6 @@ import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
 from host.files.regular import file_or_folder
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.column_map import listed, mapped, read_map
 from host.sysid.flight.consistent import HINT
 from host.sysid.flight.foreign import (
@@ -27,6 +26,7 @@ from host.sysid.flight.foreign import (
 )
 from host.sysid.flight.measured import measured
 from host.sysid.flight.plausible import SURFACES, check
+from host.sysid.identification_error import IdentificationError
 from host.terminal import command_line
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
+from host.sysid.models.fit_result import NORMAL_95, FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import NORMAL_95, FitResult
+from host.sysid.models.state_space_model import LinearModel
 
 CORRELATED = 0.9
 CONDITION_LIMIT = 1e5  # of the scaled information: correlations beyond all digits of a sensor

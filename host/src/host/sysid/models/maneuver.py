@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from host.sysid.models.model import LinearModel
+    from host.sysid.models.state_space_model import LinearModel
 
 LARGEST = 1e30  # in any unit: beyond it lies no quantity of flight, and its powers overflow
 JITTER_LIMIT = 0.02  # of one sample: beyond it the record is not on a uniform grid

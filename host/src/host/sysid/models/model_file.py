@@ -44,11 +44,18 @@ import numpy as np
 from host.arrays import Array
 from host.files.document import shown
 from host.files.quantities import Quantity
-from host.sysid.errors import IdentificationError
-from host.sysid.models.delays import delays_of
-from host.sysid.models.document import read_document
-from host.sysid.models.model import MATRICES, DelayGroup, Lever, LinearModel, Parameter, Term
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.residual_delays import delays_of
+from host.sysid.models.state_space_model import (
+    MATRICES,
+    DelayGroup,
+    Lever,
+    LinearModel,
+    Parameter,
+    Term,
+)
 from host.sysid.models.templates import Trim
+from host.sysid.models.toml_document import read_document
 from host.text import shown as in_a_line
 
 _PIECE = re.compile(

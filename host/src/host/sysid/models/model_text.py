@@ -6,8 +6,8 @@ import json
 
 import numpy as np
 
-from host.sysid.models.model import MATRICES, LinearModel
-from host.sysid.models.result import FitResult
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.state_space_model import MATRICES, LinearModel
 from host.sysid.models.templates import Trim
 
 

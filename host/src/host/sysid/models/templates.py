@@ -18,9 +18,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from host.sysid.errors import IdentificationError
-from host.sysid.models.delays import delays_of
-from host.sysid.models.model import DelayGroup, Lever, LinearModel, Parameter, Term
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.residual_delays import delays_of
+from host.sysid.models.state_space_model import DelayGroup, Lever, LinearModel, Parameter, Term
 
 GRAVITY_MPS2 = 9.80665
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import transition
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.riccati import innovations, predicted_covariance
 
 SAME_PERIOD = 1e-9

@@ -9,7 +9,7 @@ import numpy as np
 from host.arrays import Array, IntArray
 from host.sysid.numerics.discretisation import transition
 from host.sysid.numerics.filter_problem import FilterProblem, Gain, Likelihood
-from host.sysid.numerics.filter_slopes import GainSlopes, gain_slopes, matrix_slopes
+from host.sysid.numerics.filter_sensitivities import GainSlopes, gain_slopes, matrix_slopes
 from host.sysid.numerics.recursion import propagate
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from host.arrays import Array, BoolArray
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 
 STEP_LIMIT = 0.01  # in Cramer-Rao bounds: below it an iteration is not worth another
 MAX_DAMPING = 1e8

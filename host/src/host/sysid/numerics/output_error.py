@@ -13,15 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, BoolArray
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
+from host.sysid.numerics.ar_noise import OutputNoise
 from host.sysid.numerics.gauss_newton import (
     STEP_LIMIT,
     Objective,
     free_of_bounds,
     gauss_newton,
 )
-from host.sysid.numerics.noise import OutputNoise
-from host.sysid.numerics.problem import OutputProblem, Response
+from host.sysid.numerics.output_error_problem import OutputProblem, Response
 
 MAX_ITERATIONS = 60
 SINGULAR = 1e-15  # of the largest eigenvalue of the scaled information

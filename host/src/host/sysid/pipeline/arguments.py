@@ -8,7 +8,7 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 
 
 def path_of(name: str, given: Any) -> Path | None:

@@ -11,10 +11,10 @@ from host.aircraft.prior.prior_table import PriorTable
 from host.physical.calibration import load_calibration
 from host.sysid.answer.truth import read_truth
 from host.sysid.coefficients.flight import CoefficientAnswer, coefficient_estimator
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear import Answer, LinearEstimator
 from host.sysid.flight.reconstructed import ReconstructedFlight
+from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_known import AircraftKnown, aircraft_known
 from host.sysid.pipeline.arguments import numbers_of, path_of, paths_of, seconds_of
 from host.sysid.pipeline.identification import Identification

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.chosen import chosen
 from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
 from host.sysid.flight.tables import read_columns, source_name
+from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_known import AircraftKnown
 
 if TYPE_CHECKING:

@@ -13,14 +13,14 @@ from host.sysid.answer.mat import labels
 from host.sysid.answer.panels import Trace, histories
 from host.sysid.coefficients.flight import CoefficientAnswer
 from host.sysid.coefficients.modes import System
-from host.sysid.errors import IdentificationError
 from host.sysid.flight.chosen import moving, once
 from host.sysid.flight.free_simulation import fits_of, free_simulation, frozen_model
 from host.sysid.flight.linear import Answer
 from host.sysid.flight.reconstructed import ReconstructedFlight, flown_maneuvers
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.pipeline.html import answer_html
 from host.sysid.pipeline.pictures import Pictures
 

@@ -11,7 +11,7 @@ from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.flight import CoefficientAnswer
 from host.sysid.flight.linear import Answer
 from host.sysid.models.diagnostics import references
-from host.sysid.models.modes import Mode
+from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,12 +12,12 @@ from host.sysid.coefficients.model import (
     read_coefficient_model,
     standard_model,
 )
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.fit import methods as single_methods
+from host.sysid.estimators.method_registry import methods as single_methods
 from host.sysid.flight.column_map import like
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
-from host.sysid.models.model import LinearModel
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.pipeline.arguments import listed
 
 COEFFICIENTS = "coefficients"

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 
 MATRICES = ("A", "B", "C", "D")
 

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.estimators.search import search
-from host.sysid.numerics.noise import OutputNoise, choose_order, lagged_moments, regress
+from host.sysid.estimators.multistart import search
+from host.sysid.numerics.ar_noise import OutputNoise, choose_order, lagged_moments, regress
 from host.sysid.numerics.output_error import Optimum, covariance_of, minimise, whitened_slopes
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 HIGHEST_ORDER = 6
 REFITS = 4

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import EntryTable, LinearModel
-from host.sysid.numerics.delay import delayed
+from host.sysid.models.state_space_model import EntryTable, LinearModel
 from host.sysid.numerics.discretisation import transition
+from host.sysid.numerics.fractional_delay import delayed
 from host.sysid.numerics.recursion import propagate, simulate
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
-from host.sysid.models.result import FitResult
+from host.sysid.models.fit_result import FitResult
 
 SIGNIFICANCE = 0.01
 LEAST_REPEATS = 1.5  # effective number of maneuvers that tell something of a parameter

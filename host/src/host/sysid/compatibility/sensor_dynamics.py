@@ -17,7 +17,11 @@ from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, vane_delay_s
 from host.instrument.deviations import deviations as drawn
 from host.sysid.compatibility.flight_path import AIR, DELAYS
-from host.sysid.compatibility.path_data import NOTHING, compensate_friction, compensate_lowpass
+from host.sysid.compatibility.path_preparation import (
+    NOTHING,
+    compensate_friction,
+    compensate_lowpass,
+)
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
 

@@ -13,15 +13,15 @@ import numpy as np
 from scipy import linalg
 
 from host.arrays import Array, IntArray
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.differentiation import (
     signal_bandwidth_hz,
     smooth,
     smooth_and_differentiate,
 )
-from host.sysid.numerics.problem import check_shapes
+from host.sysid.numerics.output_error_problem import check_shapes
 
 NEVER_MOVED = "a parameter has no regressor: its state or input never moved"
 

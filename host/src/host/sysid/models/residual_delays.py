@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from host.sysid.models.model import DelayGroup, LinearModel
+from host.sysid.models.state_space_model import DelayGroup, LinearModel
 
 # Deviation of what is left of each sensor's delay once the nominal one is taken out, s.
 DELAYS = (

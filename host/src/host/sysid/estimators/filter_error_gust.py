@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.filter_error import fit_filter_error
-from host.sysid.estimators.fit import fit
 from host.sysid.estimators.innovations import innovations_of
-from host.sysid.estimators.start import start_values_of
+from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.start_values import start_values_of
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel, Parameter, Term
-from host.sysid.models.result import FitResult
+from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 
 SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, low altitude)
 VANES = ("alpha_rad", "beta_rad")

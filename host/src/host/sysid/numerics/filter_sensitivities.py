@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import transition
 from host.sysid.numerics.filter_problem import FilterProblem, Gain, van_loan
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from host.files.document import read_toml
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 
 
 def read_document(path: Path) -> dict[str, Any]:

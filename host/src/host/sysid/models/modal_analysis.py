@@ -9,8 +9,8 @@ import numpy as np
 
 from host.aircraft.mode_names import DUTCH_ROLL, LONGITUDINAL, ROLL, ROLL_SPIRAL, SPIRAL
 from host.arrays import Array
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import NORMAL_95, FitResult
+from host.sysid.models.fit_result import NORMAL_95, FitResult
+from host.sysid.models.state_space_model import LinearModel
 
 PAIR, ROOT = "oscillatory mode", "real mode"  # without a name of their own
 REAL = 1e-9  # relative imaginary part below which an eigenvalue is called real

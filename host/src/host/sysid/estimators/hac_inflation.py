@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 
 WINDOW_S = 1.0  # longest memory looked for: more than a short period, most of a dutch roll
 WORTH_SAYING = 1.25  # times wider

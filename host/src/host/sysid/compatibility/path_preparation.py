@@ -25,10 +25,10 @@ from host.sysid.compatibility.flight_path import (
     PathProblem,
     Stretch,
 )
+from host.sysid.compatibility.inverse_sensor_model import SLIDING_RADPS
 from host.sysid.compatibility.position_correction import transfer_to_cg
-from host.sysid.compatibility.signals import SLIDING_RADPS
 from host.sysid.compatibility.strapdown import rotation
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.differentiation import local_polynomial
 
 BLOCK_S = 0.05  # samples are averaged to this: a trainer's motion is far below 10 Hz

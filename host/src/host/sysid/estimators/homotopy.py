@@ -16,9 +16,9 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.output_error import minimise
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 STEPS = 15  # of each search but the last: its end is only the next one's start
 ROUGH = 0.3  # Cramer-Rao bounds: nearer than that the next rate moves it anyway

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.rows import regression_rows, solve_rows
+from host.sysid.estimators.regression import regression_rows, solve_rows
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 
 def start_values(problem: OutputProblem) -> Array:

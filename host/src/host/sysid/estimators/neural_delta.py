@@ -15,12 +15,12 @@ import numpy as np
 from scipy import optimize
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.rows import Row, regression_rows
+from host.sysid.estimators.regression import Row, regression_rows
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
+from host.sysid.models.state_space_model import LinearModel
 
 NEURONS = 6
 DECAY_LEAST = 1e-3

@@ -15,7 +15,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, INERTIAL, PITOT
-from host.sysid.compatibility.path_data import density_share
+from host.sysid.compatibility.path_preparation import density_share
 from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
 
 RATES = tuple(f"{a}_radps" for a in "pqr")

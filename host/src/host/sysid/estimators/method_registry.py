@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from host.sysid.errors import IdentificationError
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
-from host.sysid.numerics.problem import check_shapes
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.output_error_problem import check_shapes
 
 STILL = 1e-30  # in any unit: an output that moves less holds nothing, and its square underflows
 
@@ -63,10 +63,10 @@ METHODS: dict[str, Method] = {
         "filter_error", "fit_filter_error", "maximum likelihood with process noise"
     ),
     "frequency-equation-error": Method(
-        "frequency", "fit_frequency_equation_error", "least squares on chirp-z transforms"
+        "frequency_domain", "fit_frequency_equation_error", "least squares on chirp-z transforms"
     ),
     "frequency-output-error": Method(
-        "frequency", "fit_frequency_output_error", "maximum likelihood on chirp-z transforms"
+        "frequency_domain", "fit_frequency_output_error", "maximum likelihood on chirp-z transforms"
     ),
     "stepwise": Method("stepwise", "fit_stepwise", "terms chosen by partial F"),
     "recursive": Method(
@@ -80,7 +80,7 @@ METHODS: dict[str, Method] = {
         "kalman", "fit_unscented", "joint states and parameters, sigma points"
     ),
     "genetic": Method("genetic", "fit_genetic", "differential evolution, polished"),
-    "neural-delta": Method("neural", "fit_neural", "derivatives of a trained network"),
+    "neural-delta": Method("neural_delta", "fit_neural", "derivatives of a trained network"),
     "hopfield": Method("hopfield", "fit_hopfield", "the printed network iteration"),
     "hopfield-line-search": Method(
         "hopfield", "fit_hopfield", "the original program", (("variant", "line-search"),)

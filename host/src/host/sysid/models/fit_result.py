@@ -8,8 +8,8 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.models.model import LinearModel
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.state_space_model import LinearModel
 
 NORMAL_95 = 1.96  # standard deviations to either side of a normal distribution that hold 95 %
 

@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.rows import solve_normal
-from host.sysid.estimators.start import start_values_of
+from host.sysid.estimators.regression import solve_normal
+from host.sysid.estimators.start_values import start_values_of
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
-from host.sysid.models.result import FitResult
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.differentiation import signal_bandwidth_hz
 from host.sysid.numerics.discretisation import transition
 from host.sysid.numerics.gauss_newton import Objective, gauss_newton
-from host.sysid.numerics.inverse import covariance_of
-from host.sysid.numerics.problem import check_shapes
+from host.sysid.numerics.information_inverse import covariance_of
+from host.sysid.numerics.output_error_problem import check_shapes
 
 Spectrum = NDArray[np.complexfloating]
 MAX_ITERATIONS = 40

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
 from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.result import FitResult
 
 DECISIVE = 10.0  # Kass & Raftery, JASA 90 (1995): "very strong" on the scale of 2 log odds
 

@@ -16,15 +16,15 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.errors import IdentificationError
-from host.sysid.estimators.following import following_start
+from host.sysid.estimators.homotopy import following_start
 from host.sysid.estimators.kalman import noise_deviation
-from host.sysid.estimators.rows import Row, regression_rows, solve_rows
+from host.sysid.estimators.regression import Row, regression_rows, solve_rows
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import CONDITION_LIMIT
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.model import LinearModel
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.output_error import Optimum, minimise
-from host.sysid.numerics.problem import OutputProblem
+from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.recursion import simulate
 
 LADDERS_RADPS = ((2.0, 0.5), (6.0, 1.5, 0.4))  # rates of following, one search each
