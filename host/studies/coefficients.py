@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
-from host.sysid.answer.truth import true_coefficients
-from host.sysid.coefficients.flight import CoefficientAnswer, identify_coefficients
+from host.sysid.answer.truth_comparison import true_coefficients
+from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, identify_coefficients
 from host.sysid.flight.finder import Found
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns

@@ -20,7 +20,7 @@ import numpy as np
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import sensor_error_model
-from host.sysid.answer.truth import read_truth, true_coefficients
+from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.finder import Found, find
 from host.sysid.flight.linear import identify

@@ -21,7 +21,7 @@ from host.aircraft.gains import dimensional_gains
 from host.aircraft.linearisation import linearise
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.arrays import Array
-from host.sysid.aerodynamics.in_coefficients import in_coefficients
+from host.sysid.aerodynamics.coefficient_template import in_coefficients
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import MATRICES, LinearModel
 from host.sysid.models.templates import Trim, template

@@ -16,7 +16,7 @@ from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
-from host.sysid.coefficients.flight import identify_coefficients
+from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns

@@ -25,7 +25,7 @@ from host.aircraft.file import load as load_aircraft
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.instrument.errors import InstrumentErrors, instrument_errors
-from host.sysid.coefficients.flight import identify_coefficients
+from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.tables import even_columns
 from host.sysid.identification_error import IdentificationError

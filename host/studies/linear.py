@@ -18,7 +18,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import sensor_error_model
-from host.sysid.answer.truth import true_coefficients
+from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.linear import from_zero, identify
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD

@@ -302,7 +302,7 @@ PLANTED = [
     ),
     (
         never_breaches,
-        "host/src/host/sysid/answer/truth.py",
+        "host/src/host/sysid/answer/truth_comparison.py",
         "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from host import twin",
     ),
     (never_breaches, "host/src/host/sysid/models/model.py", "from ... import twin"),

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from host.log import FlightLog, read_log
     from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.identification import Identification
-    from host.sysid.pipeline.identify import identify
+    from host.sysid.pipeline.stages import identify
 
 __all__ = [
     "CalibrationError",
@@ -36,7 +36,7 @@ _HOMES = {
     "IdentificationError": "host.sysid.identification_error",
     "LogError": "host.errors",
     "NotALogError": "host.errors",
-    "identify": "host.sysid.pipeline.identify",
+    "identify": "host.sysid.pipeline.stages",
     "read_log": "host.log",
 }
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from host.sysid.coefficients.flight import identify_coefficients
+from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.estimators.hopfield import free_run
 from host.sysid.flight.tables import even_columns
 from host.sysid.models.maneuver import Maneuver

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from host.sysid.answer.save import Places
+    from host.sysid.answer.output_files import Places
 
 
 def add_parser(subparsers: Any) -> None:
@@ -75,10 +75,10 @@ def run(args: argparse.Namespace) -> int:
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
-    from host.sysid.answer.save import check
+    from host.sysid.answer.output_files import check
     from host.sysid.identification_error import IdentificationError
-    from host.sysid.pipeline.identify import identify
-    from host.sysid.pipeline.wanted import known_methods
+    from host.sysid.pipeline.requested_models import known_methods
+    from host.sysid.pipeline.stages import identify
 
     if "list" in (args.method or ()):
         print("\n".join(f"{name:26s} {about}" for name, about in known_methods().items()))
@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _places(args: argparse.Namespace) -> Places:
     """Return where files go, and every file that the answer is made from."""
-    from host.sysid.answer.save import Places
+    from host.sysid.answer.output_files import Places
 
     given = [*args.source, args.map, args.calibration, *(args.truth or ()), args.prior]
     given += [Path(name) for name in (args.aircraft, *(args.model or ())) if name]

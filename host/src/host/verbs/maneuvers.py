@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
-    from host.sysid.answer.json import json_text, maneuver_document
+    from host.sysid.answer.json_document import json_text, maneuver_document
     from host.sysid.answer.verdict import maneuver_lines
     from host.sysid.flight.linear import maneuvers_of
     from host.sysid.flight.tables import read_columns

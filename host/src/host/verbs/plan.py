@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _save(path: Path, text: str) -> None:
-    from host.sysid.answer.files import refuse_place, whole
+    from host.sysid.answer.atomic_files import refuse_place, whole
 
     if path.suffix != ".toml":
         raise UsageError(f"--save {path}: ends in '{path.suffix}', expected .toml")

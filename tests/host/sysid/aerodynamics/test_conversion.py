@@ -11,7 +11,7 @@ from host.aircraft.mass_properties import Condition, airframe_data
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import coefficients
-from host.sysid.aerodynamics.conversion import (
+from host.sysid.aerodynamics.derivative_conversion import (
     CARRIED,
     Place,
     Quantities,

@@ -21,9 +21,9 @@ from host.cli import main
 from host.export import toml as tomlout
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document
-from host.sysid.answer.truth import read_truth, true_coefficients
-from host.sysid.coefficients.answer import Flight, Pull
-from host.sysid.coefficients.flight import identify_coefficients
+from host.sysid.answer.truth_comparison import read_truth, true_coefficients
+from host.sysid.coefficients.coefficient_estimator import identify_coefficients
+from host.sysid.coefficients.coefficient_fit import Flight, Pull
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns, read_columns
 from host.twin.testcard.cards import load

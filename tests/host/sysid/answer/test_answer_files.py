@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.cli import main
-from host.sysid.answer.files import whole
-from host.sysid.answer.mat import labels, mat_name, write_mat
-from host.sysid.answer.save import Places, check
+from host.sysid.answer.atomic_files import whole
+from host.sysid.answer.mat_file import labels, mat_name, write_mat
+from host.sysid.answer.output_files import Places, check
 from host.sysid.flight.linear import Answer, identify
 from host.sysid.flight.tables import read_columns
 from host.sysid.identification_error import IdentificationError

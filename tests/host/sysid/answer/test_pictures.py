@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from host.arrays import Array
 from host.cli import main
-from host.sysid.answer.panels import (
+from host.sysid.answer.answer_figures import draw, save_all
+from host.sysid.answer.figure_kinds import (
     Bar,
     Cloud,
     Excitation,
@@ -18,7 +19,6 @@ from host.sysid.answer.panels import (
     shown,
     spectra,
 )
-from host.sysid.answer.pictures import draw, save_all
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import read_columns
 

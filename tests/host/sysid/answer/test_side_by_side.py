@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from host.cli import main
-from host.sysid.answer.side_by_side import side_by_side
+from host.sysid.answer.method_comparison import side_by_side
 from host.sysid.answer.verdict import words
 from host.sysid.estimators.method_registry import methods
 from host.sysid.flight.chosen import chosen

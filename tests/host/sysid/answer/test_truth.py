@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
-from host.sysid.answer.truth import (
+from host.sysid.answer.truth_comparison import (
     compared,
     compared_modes,
     mode_truth_lines,

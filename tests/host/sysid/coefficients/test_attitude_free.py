@@ -7,11 +7,11 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
-from host.sysid.coefficients.answer import CoefficientFit
-from host.sysid.coefficients.fit import fit_coefficients
-from host.sysid.coefficients.model import standard_model
-from host.sysid.coefficients.rows import KINEMATIC, Equation, Flown, equations
-from host.sysid.coefficients.windows import Window
+from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, Flown, equations
+from host.sysid.coefficients.coefficient_fit import CoefficientFit
+from host.sysid.coefficients.coefficient_model import standard_model
+from host.sysid.coefficients.coefficient_search import fit_coefficients
+from host.sysid.coefficients.window_spectra import Window
 from host.sysid.compatibility.inverse_sensor_model import Record
 from host.sysid.flight.tables import even_columns
 from host.twin.testcard.cards import load

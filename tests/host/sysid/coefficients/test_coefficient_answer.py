@@ -8,11 +8,15 @@ from pathlib import Path
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
-from host.sysid.aerodynamics.conversion import Place, to_derivatives
-from host.sysid.answer.panels import Bar, interval_bars, save
-from host.sysid.answer.truth import read_truth, true_coefficients
-from host.sysid.coefficients.flight import CoefficientAnswer, identify_coefficients, joined
-from host.sysid.coefficients.modes import coefficient_modes, quantities
+from host.sysid.aerodynamics.derivative_conversion import Place, to_derivatives
+from host.sysid.answer.figure_kinds import Bar, interval_bars, save
+from host.sysid.answer.truth_comparison import read_truth, true_coefficients
+from host.sysid.coefficients.coefficient_estimator import (
+    CoefficientAnswer,
+    identify_coefficients,
+    joined,
+)
+from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
 from host.sysid.flight.finder import Found
 from host.sysid.flight.tables import read_columns
 from scipy import io

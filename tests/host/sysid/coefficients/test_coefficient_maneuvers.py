@@ -8,12 +8,12 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
-from host.sysid.coefficients.answer import CoefficientFit
-from host.sysid.coefficients.fit import fit_coefficients
-from host.sysid.coefficients.joint import LastStep, prediction, pulls
-from host.sysid.coefficients.step import Known, stepped
-from host.sysid.coefficients.stretches import Side, Unknowns, stretches, summed
-from host.sysid.coefficients.windows import Block, Key, Window, window_block
+from host.sysid.coefficients.coefficient_fit import CoefficientFit
+from host.sysid.coefficients.coefficient_search import fit_coefficients
+from host.sysid.coefficients.deletion_diagnostics import LastStep, prediction, pulls
+from host.sysid.coefficients.equation_blocks import Side, Unknowns, stretches, summed
+from host.sysid.coefficients.normal_equations import Known, stepped
+from host.sysid.coefficients.window_spectra import Block, Key, Window, window_block
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
 from host.sysid.flight.tables import even_columns
 from host.sysid.numerics.maneuver_agreement import scatter

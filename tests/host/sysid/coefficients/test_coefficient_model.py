@@ -14,16 +14,16 @@ from host.arrays import Array
 from host.cli import main
 from host.export import toml as tomlout
 from host.instrument.deviations import sensor_error_model
-from host.sysid.coefficients.answer import CoefficientFit, Derivative
-from host.sysid.coefficients.fit import fit_coefficients
-from host.sysid.coefficients.local import Mean, local_derivatives
-from host.sysid.coefficients.model import (
+from host.sysid.coefficients.coefficient_fit import CoefficientFit, Derivative
+from host.sysid.coefficients.coefficient_model import (
     CoefficientModel,
     parse_term,
     read_coefficient_model,
     standard_model,
 )
-from host.sysid.coefficients.windows import Window
+from host.sysid.coefficients.coefficient_search import fit_coefficients
+from host.sysid.coefficients.trim_derivatives import Mean, local_derivatives
+from host.sysid.coefficients.window_spectra import Window
 from host.sysid.flight.tables import even_columns
 from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import load

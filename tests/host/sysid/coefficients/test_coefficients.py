@@ -9,10 +9,10 @@ from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
-from host.sysid.coefficients.answer import CoefficientFit
-from host.sysid.coefficients.fit import fit_coefficients
-from host.sysid.coefficients.flight import identify_coefficients
-from host.sysid.coefficients.windows import Window
+from host.sysid.coefficients.coefficient_estimator import identify_coefficients
+from host.sysid.coefficients.coefficient_fit import CoefficientFit
+from host.sysid.coefficients.coefficient_search import fit_coefficients
+from host.sysid.coefficients.window_spectra import Window
 from host.sysid.compatibility.inverse_sensor_model import Record, apply_sensor_errors, usable_length
 from host.sysid.flight.finder import Found
 from host.sysid.flight.tables import even_columns

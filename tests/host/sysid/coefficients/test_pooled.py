@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.coefficients.answer import CoefficientFit, Derivative, Flight, Pull, Trace
-from host.sysid.coefficients.joint import Prediction
-from host.sysid.coefficients.pooled import pooled
+from host.sysid.coefficients.coefficient_fit import CoefficientFit, Derivative, Flight, Pull, Trace
+from host.sysid.coefficients.deletion_diagnostics import Prediction
+from host.sysid.coefficients.pooled_flights import pooled
 from host.sysid.numerics.maneuver_agreement import scatter
 
 NOISE = np.array([0.04, 0.02])

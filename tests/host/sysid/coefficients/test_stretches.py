@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.coefficients.step import Known, stepped
-from host.sysid.coefficients.stretches import Side, Stretch, Unknowns, stretches, summed
-from host.sysid.coefficients.windows import Block, Key, Window, window_block
+from host.sysid.coefficients.equation_blocks import Side, Stretch, Unknowns, stretches, summed
+from host.sysid.coefficients.normal_equations import Known, stepped
+from host.sysid.coefficients.window_spectra import Block, Key, Window, window_block
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
 from host.sysid.identification_error import IdentificationError
 

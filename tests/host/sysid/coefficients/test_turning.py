@@ -6,16 +6,16 @@ from host.aircraft.air import Turbulence, gusts
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
-from host.sysid.coefficients.model import standard_model
-from host.sysid.coefficients.rows import Flown, equations
-from host.sysid.coefficients.turning import (
+from host.sysid.coefficients.aero_equations import Flown, equations
+from host.sysid.coefficients.coefficient_model import standard_model
+from host.sysid.coefficients.slow_gusts import (
     SHAPES,
     TURNED,
     gust_information,
     gust_strength,
     turned,
 )
-from host.sysid.coefficients.windows import Block, Window, window_block
+from host.sysid.coefficients.window_spectra import Block, Window, window_block
 from host.sysid.compatibility.inverse_sensor_model import Record
 from host.sysid.models.templates import GRAVITY_MPS2
 from numpy.polynomial import legendre

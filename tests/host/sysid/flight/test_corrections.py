@@ -13,7 +13,7 @@ from host.cli import main
 from host.instrument.deviations import sensor_error_model
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
-from host.sysid.answer.truth import true_coefficients
+from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.answer.verdict import model_lines, words
 from host.sysid.compatibility.reconstruction import Compatibility, Finding, reconstruct
 from host.sysid.compatibility.sensor_corrections import (

@@ -10,7 +10,7 @@ from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import coefficients
-from host.sysid.answer.truth import true_coefficients
+from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.estimators.start_values import regressed, start_values
 from host.sysid.flight import linear
 from host.sysid.flight.departures import spin_of

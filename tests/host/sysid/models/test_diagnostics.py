@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
 from host.sysid import Maneuver, fit
-from host.sysid.answer.json import answer_document
+from host.sysid.answer.json_document import answer_document
 from host.sysid.answer.verdict import model_lines, words
 from host.sysid.flight.linear import Answer
 from host.sysid.models.diagnostics import (

@@ -14,17 +14,17 @@ import pandas as pd
 import pytest
 from host.cli import main
 from host.errors import HostError
-from host.sysid.answer.pictures import draw_coefficients
-from host.sysid.answer.save import Places
-from host.sysid.answer.truth import read_truth, true_coefficients
+from host.sysid.answer.answer_figures import draw_coefficients
+from host.sysid.answer.output_files import Places
+from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.answer.verdict import MARKS
-from host.sysid.coefficients.model import standard_model
+from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.flight import chosen, finder
 from host.sysid.flight.linear import LinearEstimator
 from host.sysid.models.templates import Trim, template
+from host.sysid.pipeline.flight_preparation import Reading, prepare
 from host.sysid.pipeline.identification import Identification
-from host.sysid.pipeline.pictures import Pictures
-from host.sysid.pipeline.prepared import Reading, prepare
+from host.sysid.pipeline.notebook_pictures import Pictures
 
 import host
 
@@ -196,7 +196,7 @@ def test_maneuvers_are_found_once_a_flight(
 
     monkeypatch.setattr(chosen, "find", counted)
     monkeypatch.setattr("host.sysid.flight.linear.find", counted)
-    monkeypatch.setattr("host.sysid.coefficients.flight.find", counted)
+    monkeypatch.setattr("host.sysid.coefficients.coefficient_estimator.find", counted)
     source = flights[0] / "flight.csv"
     methods = ("equation-error", "equation-error-robust")
     host.identify(source, aircraft=NAME, models=MODELS, methods=methods)
@@ -204,7 +204,7 @@ def test_maneuvers_are_found_once_a_flight(
 
 
 def test_a_stage_adds_and_changes_nothing_before_it(flights: tuple[Path, Path]) -> None:
-    from host.sysid.pipeline.aircraft_known import aircraft_known
+    from host.sysid.pipeline.aircraft_data import aircraft_known
 
     known = aircraft_known(NAME)
     flight = prepare(flights[0] / "flight.csv", Reading(), known).flight

@@ -18,8 +18,8 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
-from host.sysid.answer.files import whole
-from host.sysid.coefficients.answer import Flight
+from host.sysid.answer.atomic_files import whole
+from host.sysid.coefficients.coefficient_fit import Flight
 from host.sysid.identification_error import IdentificationError
 
 # Names of the aircraft file for the names of the answer.

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.sysid.answer.units import parameter_unit
-from host.sysid.coefficients.answer import FLAG_SHARE
-from host.sysid.coefficients.model import standard_model
+from host.sysid.answer.parameter_units import parameter_unit
+from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
+from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.compatibility.sensor_corrections import correction_words
 from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer, from_zero
@@ -21,7 +21,7 @@ from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.residual_delays import DELAYS
 
 if TYPE_CHECKING:
-    from host.sysid.coefficients.flight import CoefficientAnswer
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 TRUST = 0.10  # 95 % half-width over value: good enough to design with
 FAIR = 0.30

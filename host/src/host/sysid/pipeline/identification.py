@@ -9,30 +9,30 @@ from typing import TYPE_CHECKING, Any
 
 from host.aircraft.prior.prior_table import PriorTable
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
-from host.sysid.answer.json import answer_document, coefficient_document, json_text
-from host.sysid.answer.pictures import draw_all
+from host.sysid.answer.answer_figures import draw_all
+from host.sysid.answer.json_document import answer_document, coefficient_document, json_text
+from host.sysid.answer.method_comparison import side_by_side
+from host.sysid.answer.output_files import Places, check, write
 from host.sysid.answer.prior_comparison import prior_document, prior_lines
-from host.sysid.answer.save import Places, check, write
-from host.sysid.answer.side_by_side import side_by_side
-from host.sysid.answer.truth import against_truth, truth_document
+from host.sysid.answer.truth_comparison import against_truth, truth_document
 from host.sysid.answer.verdict import coefficient_lines, model_lines, taken_out, words
-from host.sysid.coefficients.flight import CoefficientAnswer
+from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.compatibility.reconstruction import Compatibility, document
 from host.sysid.compatibility.reconstruction import words as agreement_words
 from host.sysid.flight.linear import Answer
 from host.sysid.flight.reconstructed import ReconstructedFlight
-from host.sysid.pipeline.aircraft_known import AircraftKnown
+from host.sysid.pipeline.aircraft_data import AircraftKnown
 from host.sysid.pipeline.arguments import numbers_of, path_of, seconds_of
-from host.sysid.pipeline.html import answer_html
-from host.sysid.pipeline.pictures import Pictures
-from host.sysid.pipeline.prepared import Reading, prepare, several
+from host.sysid.pipeline.estimate_table import estimate_table, mode_table
+from host.sysid.pipeline.flight_preparation import Reading, prepare, several
+from host.sysid.pipeline.notebook_html import answer_html
+from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.simulation import Simulation, simulate
-from host.sysid.pipeline.table import estimate_table, mode_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from host.sysid.pipeline.prepared import Source
+    from host.sysid.pipeline.flight_preparation import Source
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.answer.mat import labels
-from host.sysid.answer.panels import Trace, histories
-from host.sysid.coefficients.flight import CoefficientAnswer
-from host.sysid.coefficients.modes import System
+from host.sysid.answer.figure_kinds import Trace, histories
+from host.sysid.answer.mat_file import labels
+from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+from host.sysid.coefficients.coefficient_modes import System
 from host.sysid.flight.chosen import moving, once
 from host.sysid.flight.free_simulation import fits_of, free_simulation, frozen_model
 from host.sysid.flight.linear import Answer
@@ -21,8 +21,8 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.pipeline.html import answer_html
-from host.sysid.pipeline.pictures import Pictures
+from host.sysid.pipeline.notebook_html import answer_html
+from host.sysid.pipeline.notebook_pictures import Pictures
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
-from host.sysid.coefficients.stretches import Sums
+from host.sysid.coefficients.equation_blocks import Sums
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.consider_covariance import systematic_covariance
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.extras import install_hint
-from host.sysid.answer.files import whole
+from host.sysid.answer.atomic_files import whole
 from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from host.sysid.coefficients.model import (
+from host.sysid.coefficients.coefficient_model import (
     CoefficientModel,
     is_coefficient_model,
     read_coefficient_model,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from host.sysid.answer.mat import labels
-from host.sysid.answer.units import parameter_unit
+from host.sysid.answer.mat_file import labels
+from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.verdict import verdict_of
-from host.sysid.coefficients.flight import CoefficientAnswer
+from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.linear import Answer
 from host.sysid.models.diagnostics import references
 from host.sysid.models.modal_analysis import Mode

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.coefficients.windows import Block, Key
+from host.sysid.coefficients.window_spectra import Block, Key
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
 
 SHAPES = 3  # mean, slope and bend of a gust over a maneuver; faster ones are noise

@@ -15,10 +15,10 @@ from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array, IntArray
 from host.instrument.deviations import SensorErrorModel
-from host.sysid.coefficients.model import CoefficientModel
-from host.sysid.coefficients.rows import KINEMATIC, Equation, Flown, equations
-from host.sysid.coefficients.turning import LENGTH_M
-from host.sysid.coefficients.windows import Block, Key, Window, transformed, window_block
+from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, Flown, equations
+from host.sysid.coefficients.coefficient_model import CoefficientModel
+from host.sysid.coefficients.slow_gusts import LENGTH_M
+from host.sysid.coefficients.window_spectra import Block, Key, Window, transformed, window_block
 from host.sysid.compatibility.inverse_sensor_model import (
     Record,
     Spectrum,

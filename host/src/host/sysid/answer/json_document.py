@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.sysid.answer.units import parameter_unit
+from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.verdict import unpredicted
-from host.sysid.coefficients.answer import METHOD
+from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.compatibility.sensor_corrections import correction_document
 from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer
@@ -19,8 +19,8 @@ from host.sysid.flight.reconstructed import found_name
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
-    from host.sysid.coefficients.flight import CoefficientAnswer
-    from host.sysid.coefficients.joint import Prediction
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+    from host.sysid.coefficients.deletion_diagnostics import Prediction
     from host.sysid.numerics.maneuver_agreement import Repeats
 
 

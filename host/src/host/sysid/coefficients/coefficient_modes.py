@@ -13,8 +13,8 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.sysid.aerodynamics.conversion import Quantities
-from host.sysid.coefficients.answer import CoefficientFit
+from host.sysid.aerodynamics.derivative_conversion import Quantities
+from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.models.modal_analysis import Mode, eigenmodes, lateral_names, longitudinal_names
 from host.sysid.models.templates import GRAVITY_MPS2

@@ -15,7 +15,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
-from host.sysid.coefficients.rows import Flown
+from host.sysid.coefficients.aero_equations import Flown
 from host.sysid.compatibility.inverse_sensor_model import BLEND_RADPS, Record
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2

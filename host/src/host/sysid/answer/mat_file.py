@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.answer.files import whole
-from host.sysid.answer.units import parameter_unit
+from host.sysid.answer.atomic_files import whole
+from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.compatibility.inverse_sensor_model import THIN_HZ
 from host.sysid.flight.linear import Answer
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
-    from host.sysid.coefficients.flight import CoefficientAnswer
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 LONGEST = 31  # characters of a name in a MAT file that every reader takes
 

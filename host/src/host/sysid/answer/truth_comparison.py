@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 from host.aircraft.mode_names import LATERAL, LONGITUDINAL
 from host.files.document import read_toml
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
-from host.sysid.answer.mat import labels
+from host.sysid.answer.mat_file import labels
 from host.sysid.flight.linear import Answer
 from host.sysid.flight.linear_model import AXIS_OF
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
-    from host.sysid.coefficients.flight import CoefficientAnswer
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 
 def read_truth(path: Path) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
-from host.sysid.coefficients.rows import KINEMATIC, LATERAL, LONGITUDINAL, Equation
+from host.sysid.coefficients.aero_equations import KINEMATIC, LATERAL, LONGITUDINAL, Equation
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
 from host.sysid.identification_error import IdentificationError
 

@@ -14,7 +14,7 @@ from host.sysid.flight.chosen import chosen
 from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
 from host.sysid.flight.tables import read_columns, source_name
 from host.sysid.identification_error import IdentificationError
-from host.sysid.pipeline.aircraft_known import AircraftKnown
+from host.sysid.pipeline.aircraft_data import AircraftKnown
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,11 +1,4 @@
-"""What a fit of coefficients says, and what the airframe's drawing adds to it.
-
-The arm between accelerometers and CG shows in the data only together with lift: a longer arm and
-a larger CL_de are the same flight. What tells them apart is where a control surface's force acts:
-between a quarter of the tail's chord and the hinge line, so moment over force is an arm that a tape
-measure knows. Ailerons on a straight wing make side force only by their sidewash on the fin, which
-says as much of the arm along z. Both enter as measurements with their uncertainty (Kalman update).
-"""
+"""The result of a fit of coefficients: derivatives, sensor errors, mean condition, histories."""
 
 from __future__ import annotations
 
@@ -14,17 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, IntArray
-from host.sysid.coefficients.joint import Prediction
-from host.sysid.coefficients.local import Local
+from host.sysid.coefficients.deletion_diagnostics import Prediction
 from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.numerics.maneuver_agreement import Repeats
 
 METHOD = "equation error with instrument errors"
 FLAG_SHARE = 0.12  # up to it an error beyond 15 % is a case of one in seventy
 SMALL_SHARE = 0.05  # of the row's largest contribution
-SIDEWASH_SHARE = 0.1  # standard deviation of CY_da over CY_beta
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,50 +98,6 @@ class CoefficientFit:
     traces: dict[str, Trace]
     prediction: Prediction | None
     repeats: Repeats
-
-
-def informed(
-    state: Array, covariance: Array, told: Local, airframe: AirframeData
-) -> tuple[Array, Array, Array]:
-    """Return state and covariance once the airframe's drawing has been heard, and what is kept.
-
-    Parameters
-    ----------
-    state, covariance : (n,) and (n, n) Array
-        Of the fit.
-    told : dict
-        Of `local_derivatives`: what the drawing says nothing of may be absent.
-
-    Returns
-    -------
-    state, covariance : (n,) and (n, n) Array
-    kept : (n, n) Array
-        How both move with what the flight alone said.
-    airframe : AirframeData
-        Arms of 0 are not known and say nothing.
-    """
-    a = airframe
-    chord, span = a.chord_m, a.span_m
-    known: list[tuple[dict[str, float], float]] = []
-    kept = np.eye(len(state))
-    if a.elevator_arm_m > 0.0 and {"CL_de", "Cm_de"} <= told.keys():
-        sd = a.arm_share * abs(told["Cm_de"][0])
-        known.append(({"CL_de": a.elevator_arm_m / chord, "Cm_de": 1.0}, sd))
-    if a.rudder_arm_m > 0.0 and {"CY_dr", "Cn_dr"} <= told.keys():
-        sd = a.arm_share * abs(told["Cn_dr"][0])
-        known.append(({"CY_dr": a.rudder_arm_m / span, "Cn_dr": 1.0}, sd))
-    if {"CY_da", "CY_beta"} <= told.keys():
-        known.append(({"CY_da": 1.0}, SIDEWASH_SHARE * abs(told["CY_beta"][0])))
-    for weights, sd in known:
-        row = np.zeros(len(state))
-        for name, weight in weights.items():
-            row += weight * told[name][1]
-        gain = covariance @ row / (row @ covariance @ row + sd**2)
-        state = state - gain * (row @ state)
-        keep = np.eye(len(state)) - np.outer(gain, row)
-        covariance = keep @ covariance @ keep.T + np.outer(gain, gain) * sd**2
-        kept = keep @ kept
-    return state, covariance, kept
 
 
 def derivatives(

@@ -14,7 +14,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array, IntArray
-from host.sysid.coefficients.model import CoefficientModel
+from host.sysid.coefficients.coefficient_model import CoefficientModel
 from host.sysid.compatibility.inverse_sensor_model import Record
 from host.sysid.models.templates import GRAVITY_MPS2
 

@@ -8,19 +8,17 @@ from functools import cached_property
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.coefficients.answer import (
+from host.sysid.coefficients.aero_equations import KINEMATIC
+from host.sysid.coefficients.coefficient_fit import (
     CoefficientFit,
     Derivative,
     Flight,
     Pull,
     Trace,
     derivatives,
-    informed,
     trace,
 )
-from host.sysid.coefficients.joint import LastStep, Prediction, prediction, pulls
-from host.sysid.coefficients.local import Local, Mean, local_derivatives, zero_lift_drag
-from host.sysid.coefficients.problem import (
+from host.sysid.coefficients.coefficient_problem import (
     FlightProblem,
     Rows,
     density,
@@ -29,7 +27,9 @@ from host.sysid.coefficients.problem import (
     mean_levels,
     regressor_sizes,
 )
-from host.sysid.coefficients.rows import KINEMATIC
+from host.sysid.coefficients.deletion_diagnostics import LastStep, Prediction, prediction, pulls
+from host.sysid.coefficients.geometry_prior import apply_geometry_prior
+from host.sysid.coefficients.trim_derivatives import Local, Mean, local_derivatives, zero_lift_drag
 from host.sysid.numerics.maneuver_agreement import Repeats, scatter
 
 
@@ -80,7 +80,9 @@ def intervals(ended: Searched) -> CoefficientIntervals:
     rows, position = ended.rows, problem.position
     state = np.concatenate([ended.theta, np.zeros(last.unknowns.gusts), ended.errors])
     before = local(problem, rows, state)
-    state, covariance, kept = informed(state, last.solved.covariance, before, problem.airframe)
+    state, covariance, kept = apply_geometry_prior(
+        state, last.solved.covariance, before, problem.airframe
+    )
     found = local(problem, rows, state, levels)
     _, drag, lift = mean_levels(problem, rows)
     if "CL_alpha" in found and "CD_alpha" in found:

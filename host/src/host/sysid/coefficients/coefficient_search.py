@@ -19,19 +19,17 @@ from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, deviations
-from host.sysid.coefficients.answer import CoefficientFit
-from host.sysid.coefficients.gust_free import gust_free
-from host.sysid.coefficients.joint import LastStep
-from host.sysid.coefficients.local import Local
-from host.sysid.coefficients.model import CoefficientModel, standard_model
-from host.sysid.coefficients.outcome import (
+from host.sysid.coefficients.auxiliary_model import gust_free
+from host.sysid.coefficients.coefficient_fit import CoefficientFit
+from host.sysid.coefficients.coefficient_intervals import (
     Searched,
     coefficient_fit,
     intervals,
     local,
     validation,
 )
-from host.sysid.coefficients.problem import (
+from host.sysid.coefficients.coefficient_model import CoefficientModel, standard_model
+from host.sysid.coefficients.coefficient_problem import (
     FlightProblem,
     Rows,
     Slopes,
@@ -39,10 +37,12 @@ from host.sysid.coefficients.problem import (
     moved_by_errors,
     prepared,
 )
-from host.sysid.coefficients.step import Known, stepped
-from host.sysid.coefficients.stretches import Side, Unknowns, stretches, summed
-from host.sysid.coefficients.turning import gust_information, gust_strength, turned
-from host.sysid.coefficients.windows import Window, noise_spectra
+from host.sysid.coefficients.deletion_diagnostics import LastStep
+from host.sysid.coefficients.equation_blocks import Side, Unknowns, stretches, summed
+from host.sysid.coefficients.normal_equations import Known, stepped
+from host.sysid.coefficients.slow_gusts import gust_information, gust_strength, turned
+from host.sysid.coefficients.trim_derivatives import Local
+from host.sysid.coefficients.window_spectra import Window, noise_spectra
 from host.sysid.compatibility.inverse_sensor_model import decimated, usable_length
 from host.sysid.identification_error import IdentificationError
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.coefficients.windows import FLAT, Block, Key, degree, row_weight, used
+from host.sysid.coefficients.window_spectra import FLAT, Block, Key, degree, row_weight, used
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
 
 

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorTable
 from host.physical.calibration import load_calibration
-from host.sysid.answer.truth import read_truth
-from host.sysid.coefficients.flight import CoefficientAnswer, coefficient_estimator
+from host.sysid.answer.truth_comparison import read_truth
+from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear import Answer, LinearEstimator
 from host.sysid.flight.reconstructed import ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
-from host.sysid.pipeline.aircraft_known import AircraftKnown, aircraft_known
+from host.sysid.pipeline.aircraft_data import AircraftKnown, aircraft_known
 from host.sysid.pipeline.arguments import numbers_of, path_of, paths_of, seconds_of
+from host.sysid.pipeline.flight_preparation import Reading, apart, prepare, several, told
 from host.sysid.pipeline.identification import Identification
-from host.sysid.pipeline.prepared import Reading, apart, prepare, several, told
-from host.sysid.pipeline.wanted import ModelName, Models, wanted_methods, wanted_models
+from host.sysid.pipeline.requested_models import ModelName, Models, wanted_methods, wanted_models
 
 if TYPE_CHECKING:
-    from host.sysid.pipeline.prepared import Source
+    from host.sysid.pipeline.flight_preparation import Source
 
 
 def identify(

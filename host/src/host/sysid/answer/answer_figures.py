@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.answer.files import file_names
-from host.sysid.answer.mat import labels
-from host.sysid.answer.panels import (
+from host.sysid.answer.atomic_files import file_names
+from host.sysid.answer.figure_kinds import (
     Bar,
     Cloud,
     Excitation,
@@ -22,8 +21,9 @@ from host.sysid.answer.panels import (
     save,
     spectra,
 )
-from host.sysid.answer.truth import true_coefficients
-from host.sysid.answer.units import parameter_unit
+from host.sysid.answer.mat_file import labels
+from host.sysid.answer.parameter_units import parameter_unit
+from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.answer.verdict import not_relied_on
 from host.sysid.compatibility.inverse_sensor_model import THIN_HZ
 from host.sysid.flight.linear import Answer
@@ -33,7 +33,7 @@ from host.sysid.models.modal_analysis import Mode
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from host.sysid.coefficients.flight import CoefficientAnswer
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 SCATTER = 300
 MOVED_SHARE = 0.2  # of the largest input: less is an answer of the pilot, not the test

@@ -12,20 +12,20 @@ from host.aircraft.powerplant import NoPropulsionError, Powerplant, powerplant
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
-from host.sysid.coefficients.answer import METHOD, CoefficientFit
-from host.sysid.coefficients.fit import search_coefficients
-from host.sysid.coefficients.joint import Prediction
-from host.sysid.coefficients.model import BODY, WIND, CoefficientModel, standard_model
-from host.sysid.coefficients.modes import System, coefficient_modes, dimensional
-from host.sysid.coefficients.outcome import (
+from host.sysid.coefficients.coefficient_fit import METHOD, CoefficientFit
+from host.sysid.coefficients.coefficient_intervals import (
     CoefficientIntervals,
     Searched,
     coefficient_fit,
     intervals,
     validation,
 )
-from host.sysid.coefficients.pooled import pooled
-from host.sysid.coefficients.windows import LEAST_S, Window
+from host.sysid.coefficients.coefficient_model import BODY, WIND, CoefficientModel, standard_model
+from host.sysid.coefficients.coefficient_modes import System, coefficient_modes, dimensional
+from host.sysid.coefficients.coefficient_search import search_coefficients
+from host.sysid.coefficients.deletion_diagnostics import Prediction
+from host.sysid.coefficients.pooled_flights import pooled
+from host.sysid.coefficients.window_spectra import LEAST_S, Window
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.finder import FLYING_SHARE, Found, find
 from host.sysid.flight.reconstructed import ReconstructedFlight, found_name, reconstructed

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from host.arrays import Array
 from host.extras import install_hint
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
-from host.sysid.answer.files import file_names, refuse_place, whole
-from host.sysid.answer.mat import labels, write_mat
+from host.sysid.answer.atomic_files import file_names, refuse_place, whole
+from host.sysid.answer.mat_file import labels, write_mat
 from host.sysid.flight.linear import Answer
 from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:
-    from host.sysid.coefficients.flight import CoefficientAnswer
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 ENDINGS = {
     "--mat": (".mat",),
@@ -132,7 +132,7 @@ def write(
     elif places.model is not None and places.model.suffix.lower() == ".toml":
         written += _write_models(places.model, answers, (*places.given, *written))
     if places.plots is not None:
-        from host.sysid.answer.pictures import draw_all, save_all
+        from host.sysid.answer.answer_figures import draw_all, save_all
 
         written += save_all(draw_all(answers, direct, flights, truth), places.plots)
     return written

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.coefficients.answer import CoefficientFit, Derivative, Flight, Pull, Trace
-from host.sysid.coefficients.joint import Prediction
+from host.sysid.coefficients.coefficient_fit import CoefficientFit, Derivative, Flight, Pull, Trace
+from host.sysid.coefficients.deletion_diagnostics import Prediction
 from host.sysid.models.consider_covariance import systematic_covariance
 from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.numerics.maneuver_agreement import scatter

@@ -18,7 +18,7 @@ from host.files.document import shown
 from host.files.quantities import Quantity
 from host.instrument.deviations import sensor_error_model
 from host.instrument.words import IN_WORDS
-from host.sysid.aerodynamics.conversion import (
+from host.sysid.aerodynamics.derivative_conversion import (
     CARRIED,
     COEFFICIENTS,
     DERIVATIVES,
@@ -28,7 +28,7 @@ from host.sysid.aerodynamics.conversion import (
     to_coefficients,
     to_derivatives,
 )
-from host.sysid.answer.units import parameter_unit
+from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.models.model_file import read_model, read_trim

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from host.sysid.answer.pictures import save_all
-from host.sysid.pipeline.html import escaped
+from host.sysid.answer.answer_figures import save_all
+from host.sysid.pipeline.notebook_html import escaped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

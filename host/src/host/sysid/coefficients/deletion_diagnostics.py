@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.coefficients.rows import KINEMATIC
-from host.sysid.coefficients.step import STILL, Step
-from host.sysid.coefficients.stretches import Stretch, Unknowns, summed
-from host.sysid.coefficients.windows import FLAT, Block, Key, row_weight, used
+from host.sysid.coefficients.aero_equations import KINEMATIC
+from host.sysid.coefficients.equation_blocks import Stretch, Unknowns, summed
+from host.sysid.coefficients.normal_equations import STILL, Step
+from host.sysid.coefficients.window_spectra import FLAT, Block, Key, row_weight, used
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
 
 LEAST_ELSEWHERE = 0.1  # of what is known of each term: a maneuver that alone tells it must stay

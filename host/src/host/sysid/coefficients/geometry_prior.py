@@ -1,0 +1,70 @@
+"""What a drawing of the airframe adds to a fit of coefficients: arms of the control forces.
+
+The arm between accelerometers and CG shows in the data only together with lift: a longer arm and
+a larger CL_de are the same flight. Where a control surface's force acts separates the two: it acts
+between a quarter of the tail's chord and the hinge line, so moment over force is an arm that a tape
+measure knows. Ailerons on a straight wing make side force only by their sidewash on the fin, which
+says as much about the arm along z.
+
+Each of these is a measurement with its uncertainty (mixed estimation with prior information; Klein
+& Morelli, Aircraft System Identification, ch. 5), applied by a Kalman update.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from host.aircraft.mass_properties import AirframeData
+from host.arrays import Array
+from host.sysid.coefficients.trim_derivatives import Local
+
+SIDEWASH_SHARE = 0.1  # standard deviation of CY_da over CY_beta
+
+
+def apply_geometry_prior(
+    state: Array, covariance: Array, at_trim: Local, airframe: AirframeData
+) -> tuple[Array, Array, Array]:
+    """Update estimate and covariance with the geometry of the control surfaces.
+
+    Parameters
+    ----------
+    state : Array, shape (n,)
+        Estimate of the fit: coefficients, slow gusts, sensor errors.
+    covariance : Array, shape (n, n)
+    at_trim : dict
+        From `derivatives_at_trim`. A relation whose derivatives are absent is left out.
+    airframe : AirframeData
+        An arm of 0 is not known and adds nothing.
+
+    Returns
+    -------
+    state : Array, shape (n,)
+    covariance : Array, shape (n, n)
+    gain_complement : Array, shape (n, n)
+        The product of all I - K H: the derivative of the updated estimate by that of the flight
+        alone.
+    """
+    a = airframe
+    chord, span = a.chord_m, a.span_m
+    relations: list[tuple[dict[str, float], float]] = []
+    gain_complement = np.eye(len(state))
+    if a.elevator_arm_m > 0.0 and {"CL_de", "Cm_de"} <= at_trim.keys():
+        sd = a.arm_share * abs(at_trim["Cm_de"][0])
+        relations.append(({"CL_de": a.elevator_arm_m / chord, "Cm_de": 1.0}, sd))
+    if a.rudder_arm_m > 0.0 and {"CY_dr", "Cn_dr"} <= at_trim.keys():
+        sd = a.arm_share * abs(at_trim["Cn_dr"][0])
+        relations.append(({"CY_dr": a.rudder_arm_m / span, "Cn_dr": 1.0}, sd))
+    if {"CY_da", "CY_beta"} <= at_trim.keys():
+        relations.append(({"CY_da": 1.0}, SIDEWASH_SHARE * abs(at_trim["CY_beta"][0])))
+    for weights, sd in relations:
+        # One row h of H: the relation sum(weight * derivative) = 0 is measured with variance sd^2.
+        h = np.zeros(len(state))
+        for name, weight in weights.items():
+            h += weight * at_trim[name][1]
+        gain = covariance @ h / (h @ covariance @ h + sd**2)
+        state = state - gain * (h @ state)
+        complement = np.eye(len(state)) - np.outer(gain, h)
+        # Joseph's form: symmetric and positive for any gain.
+        covariance = complement @ covariance @ complement.T + np.outer(gain, gain) * sd**2
+        gain_complement = complement @ gain_complement
+    return state, covariance, gain_complement
