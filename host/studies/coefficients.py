@@ -22,7 +22,7 @@ from host.sysid.flight.finder import Found
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns
 from host.sysid.identification_error import IdentificationError
-from host.twin.sensors.delays import dlpf_for, sensor_delays
+from host.twin.sensors.sensor_delays import dlpf_for, sensor_delays
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
 

@@ -9,9 +9,9 @@ import numpy as np
 from host.aircraft.airframe import DOWN, NORTH, Q0, Q3
 from host.aircraft.attitude import euler
 from host.twin.flight.fly import STEP_S, FlightRecord, fly
-from host.twin.sensors.airdata import AirData, air_data
 from host.twin.sensors.filters import delayed
 from host.twin.sensors.imu import FIELD_NED_T, imu
+from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.testcard.cards import load
 from numpy.typing import NDArray
 

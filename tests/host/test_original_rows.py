@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.errors import NotALogError
+from host.original.row_table import make_table, printed_vane, undo_relative_vane, undo_vane
 from host.original.rows import VARIANTS, looks_like_rows, parse_rows, read_rows
-from host.original.table import make_table, printed_vane, undo_relative_vane, undo_vane
 from host.physical.calibration import load_calibration
 from hypothesis import given
 from hypothesis import strategies as st

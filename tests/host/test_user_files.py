@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from host.aircraft import file as aircraft
 from host.aircraft import linear_aircraft
+from host.aircraft.aircraft_ranges import RANGES
 from host.aircraft.file import AircraftError, load_measured
-from host.aircraft.ranges import RANGES
 from host.cli import main
 from host.twin.testcard import cards
 

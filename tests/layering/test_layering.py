@@ -293,7 +293,11 @@ PLANTED = [
     (floor_breaches, "host/src/host/twin/flight/fly.py", "import host.sysid.models.model"),
     (floor_breaches, "host/src/host/twin/flight/fly.py", "from ...sysid.models import model"),
     (floor_breaches, "host/src/host/twin/flight/fly.py", 'import_module("host.sysid.models")'),
-    (floor_breaches, "host/src/host/sysid/flight/linear.py", "from host.planning import plan"),
+    (
+        floor_breaches,
+        "host/src/host/sysid/flight/linear.py",
+        "from host.planning import card_planning",
+    ),
     (floor_breaches, "host/src/host/errors.py", "from host.aircraft.file import AircraftError"),
     (
         never_breaches,
@@ -315,7 +319,7 @@ PLANTED = [
     (import_breaches, "host/src/host/sysid/flight/linear.py", "from studies import linear"),
     (import_breaches, "host/studies/linear.py", "from tests.host import logs"),
     (floor_breaches, "host/src/host/log/head.py", "from host.sysid.models.model import Term"),
-    (floor_breaches, "host/src/host/log/head.py", "from host.decode.summary import summarise"),
+    (floor_breaches, "host/src/host/log/head.py", "from host.decode.log_summary import summarise"),
     (import_breaches, "tests/simulator/simavr_bench/relay.py", "from flight.rig import make_card"),
     (simulator_breaches, "tests/simulator/speed.py", 'PINS = "hw/pin_map.toml"'),
     (
@@ -353,7 +357,7 @@ ALLOWED = [
         'def run(args):\n    """Run."""\n' + "    print()\n" * 60,
     ),
     (
-        "host/src/host/planning/plan.py",
+        "host/src/host/planning/card_planning.py",
         "from host.twin.virtual import a\nimport host.sysid.errors",
     ),
     ("host/src/host/sysid/models/model.py", "from . import result\nfrom host.aircraft import file"),

@@ -27,7 +27,7 @@ MOST_BYTES, MOST_PER_BYTE = 300 << 20, 8
 READ = """
 import json, resource, sys, time, warnings
 import pandas, scipy.io
-from host.decode.summary import summarise
+from host.decode.log_summary import summarise
 from host.errors import HostError
 from host.log import read_log
 from host.physical.calibration import load_calibration

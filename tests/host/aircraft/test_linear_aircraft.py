@@ -24,8 +24,8 @@ from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim, template
 from host.twin.faults import Fault
 from host.twin.flight.fly import fly
-from host.twin.outcome.truth import maneuvers
-from host.twin.sensors.airdata import air_data
+from host.twin.outcome.truth_files import maneuvers
+from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
 from scipy.signal import lsim
 

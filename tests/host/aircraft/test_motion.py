@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from host.aircraft import file as aircraft
 from host.aircraft.airframe import GRAVITY_MPS2, ROTOR, STATE_COUNT, Airframe, Array
+from host.aircraft.analytic_derivatives import hand_matrices
 from host.aircraft.attitude import euler, quaternion, to_body
-from host.aircraft.dimensional import hand_matrices
 from host.aircraft.file import Aircraft
 from host.aircraft.linearisation import linearise, modes
 from host.aircraft.local_derivatives import local_derivatives

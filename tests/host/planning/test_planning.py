@@ -14,7 +14,7 @@ from host.aircraft.linearisation import linearise
 from host.aircraft.trim import solve
 from host.cli import main
 from host.export.toml import dumps
-from host.planning import plan as planning
+from host.planning import card_planning as planning
 from host.twin.testcard import cards
 from host.twin.testcard.cards import parse
 
@@ -129,7 +129,7 @@ def test_a_full_disk_names_the_folder_of_the_flight(
     def full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("host.twin.outcome.truth.np.savez", full)
+    monkeypatch.setattr("host.twin.outcome.truth_files.np.savez", full)
     arguments = ["simulate", "calm", "-o", str(tmp_path), "--firmware", "none", "--no-picture"]
     assert main(arguments) == 2
     error = capsys.readouterr().err.strip()

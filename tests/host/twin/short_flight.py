@@ -11,7 +11,7 @@ from host.twin.faults import FAULTS, Fault
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import Stimuli, stimuli
-from host.twin.sensors.airdata import air_data
+from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
 from host.twin.testcard.cards import Card
 from host.wire.schema_text import packed_schema

@@ -12,7 +12,7 @@ from host.twin.flight.fly import fly
 from host.twin.outcome import compare
 from host.twin.recorder import avr, sitl
 from host.twin.recorder.stimuli import stimuli
-from host.twin.sensors.airdata import air_data
+from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
 
 CARD = {

@@ -21,14 +21,14 @@ from host.physical.channels import constant_delay_us
 from host.twin.flight.draws import delay_s
 from host.twin.flight.fly import STEP_S, FlightRecord, fly
 from host.twin.outcome import compare, instrument
-from host.twin.outcome.truth import summary
+from host.twin.outcome.truth_files import summary
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
-from host.twin.sensors.airdata import AirData, air_data
-from host.twin.sensors.delays import FILTERS, GPS_LATENCY_S
 from host.twin.sensors.filters import first_order, vane
 from host.twin.sensors.imu import complementary
+from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.sensors.mega_clock import clock_share
+from host.twin.sensors.sensor_delays import FILTERS, GPS_LATENCY_S
 from host.twin.sensors.ubx import FIRST_ITOW_MS
 from host.twin.testcard import cards
 from numpy.typing import NDArray

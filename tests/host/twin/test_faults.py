@@ -18,7 +18,7 @@ from host.twin.flight.fly import fly
 from host.twin.outcome import compare
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
-from host.twin.sensors.airdata import air_data
+from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
 
 from tests.host.twin.short_flight import AT_S, CARD, FOR_S, Flown, fly_with, make

@@ -14,11 +14,11 @@ from host.aircraft.local_derivatives import local_derivatives
 from host.twin.flight.fly import NEUTRAL_US, THROW_US, fly
 from host.twin.flight.pilot import schedule
 from host.twin.outcome import thesis
-from host.twin.outcome.truth import maneuvers, series, write
-from host.twin.sensors.airdata import air_data
+from host.twin.outcome.truth_files import maneuvers, series, write
+from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
 from host.twin.testcard.cards import duration_s
-from host.twin.testcard.maneuvers import multisine, multisine_signal, sweep_signal
+from host.twin.testcard.input_shapes import multisine, multisine_signal, sweep_signal
 
 MINIMAL = {"format": 1, "aircraft": "ultrastick25e", "segment": [{"kind": "trim", "duration_s": 2}]}
 

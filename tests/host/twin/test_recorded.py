@@ -15,8 +15,8 @@ from host.twin.outcome import compare, instrument
 from host.twin.recorder import sitl
 from host.twin.recorder.fat32 import SECTOR, CardImageError, CardReader, format_card
 from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli, stimuli
-from host.twin.sensors.airdata import AirData, air_data
 from host.twin.sensors.bmp085 import compensate
+from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.sensors.mega_clock import TICKS_PER_S, clock_share
 from host.twin.testcard import cards
 from host.twin.virtual import virtual_flight

@@ -12,12 +12,12 @@ from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.ideal import measured_table, true_table
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors import bmp085
-from host.twin.sensors.airdata import AirData, air_data
 from host.twin.sensors.analog import analog, convert, nominal
-from host.twin.sensors.delays import FILTERS
 from host.twin.sensors.filters import delayed, first_order, vane
 from host.twin.sensors.imu import imu
+from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.sensors.mega_clock import ticks
+from host.twin.sensors.sensor_delays import FILTERS
 from host.twin.sensors.ubx import packet
 from host.twin.testcard.cards import Card, Sensors, load
 from host.wire.packets import packet as imu_packet

@@ -13,10 +13,10 @@ from host.twin.flight.fly import fly
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors import analog, bmp085, imu, ubx
-from host.twin.sensors.airdata import air_data
 from host.twin.sensors.analog import CHANNELS
-from host.twin.sensors.delays import FILTERS
+from host.twin.sensors.local_flow import air_data
 from host.twin.sensors.mega_clock import clock_share
+from host.twin.sensors.sensor_delays import FILTERS
 from host.twin.testcard import cards
 
 CARD = {

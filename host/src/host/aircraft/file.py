@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from host.aircraft.aircraft_ranges import RANGES
 from host.aircraft.airframe import COEFFICIENTS, GRAVITY_MPS2, Airframe, Array
-from host.aircraft.plausible import doubts, impossible
-from host.aircraft.ranges import RANGES
-from host.aircraft.straight import Straight
+from host.aircraft.linear_dynamics import Straight
+from host.aircraft.size_ratios import doubts, impossible
 from host.errors import UsageError
 from host.files import toml_reader
 

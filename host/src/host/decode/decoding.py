@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from host.decode.report import lines
-from host.decode.summary import summarise
+from host.decode.log_summary import summarise
+from host.decode.summary_text import lines
 from host.decode.writing import Request, destination, write_frames, write_table
 from host.errors import ExitCode, UsageError
 from host.export.writer import Meta
 from host.log import FlightLog, read_log
 from host.log.source import check_source, find_flights, newest
+from host.original.row_summary import row_lines, row_meta, summarise_rows
+from host.original.row_table import make_table
 from host.original.rows import looks_like_rows, read_rows
-from host.original.summary import row_lines, row_meta, summarise_rows
-from host.original.table import make_table
 from host.physical.calibration import load_calibration
 from host.physical.columns import COLUMNS, UNITS
 from host.progress import progress_bar

@@ -60,12 +60,12 @@ def _parquet(path: Path, meta: Meta) -> TableWriter:
 
 
 def _mat(path: Path, meta: Meta) -> TableWriter:
-    from host.export.arrays import MatWriter
+    from host.export.array_files import MatWriter
 
     return MatWriter(path, meta)
 
 
 def _npz(path: Path, meta: Meta) -> TableWriter:
-    from host.export.arrays import NpzWriter
+    from host.export.array_files import NpzWriter
 
     return NpzWriter(path, meta)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from host.errors import UsageError
-from host.files.document import shown
+from host.files.user_text import shown
 
 
 @dataclass(frozen=True, slots=True)

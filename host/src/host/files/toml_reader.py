@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from host.errors import UsageError
-from host.files.document import read_toml, shown
+from host.files.user_text import read_toml, shown
 
 FORMAT = 1
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from host.errors import CalibrationError
-from host.files.document import parse_toml, read_text, shown
 from host.files.quantities import Quantity
+from host.files.user_text import parse_toml, read_text, shown
 from host.resources import resource
 
 FORMAT = "flight-test-calibration"

@@ -10,11 +10,11 @@ import numpy as np
 
 from host.aircraft.file import Aircraft, AircraftError
 from host.aircraft.linear_aircraft import flown_straight, load
+from host.aircraft.linear_dynamics import Straight
 from host.aircraft.linearisation import linearise
-from host.aircraft.straight import Straight
 from host.aircraft.trim import solve
 from host.errors import UsageError
-from host.files.document import read_text
+from host.files.user_text import read_text
 from host.sysid.models.model_file import read_model, read_trim
 
 # States of identified models, and those of the equations of motion they stand for.

@@ -8,8 +8,8 @@ import time
 
 from host.twin.flight.fly import fly
 from host.twin.outcome import ideal
-from host.twin.outcome.report import load_kernels
-from host.twin.sensors.airdata import air_data
+from host.twin.outcome.flight_outcome import load_kernels
+from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
 
 

@@ -12,11 +12,11 @@ from host.errors import UsageError
 from host.instrument.errors import InstrumentErrors
 from host.log import read_log
 from host.twin.flight.fly import FlightRecord, fly
-from host.twin.outcome import compare, ideal, thesis, truth
+from host.twin.outcome import compare, ideal, thesis, truth_files
 from host.twin.outcome.instrument import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
-from host.twin.sensors.airdata import air_data
+from host.twin.sensors.local_flow import air_data
 from host.twin.testcard.cards import Card, load
 
 CHAINS = ("sitl", "none", "true", "thesis")
@@ -107,4 +107,4 @@ def virtual_flight(
             table = decoded.table()
             first_us = int(decoded.frames["ident"]["t_us"][0])
         table["t_s"] = compare.true_times(record, table, first_us)
-    return VirtualFlight(table, truth.maneuvers(record, data), record)
+    return VirtualFlight(table, truth_files.maneuvers(record, data), record)

@@ -44,8 +44,8 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from math import radians
 
+    from host.aircraft.aircraft_ranges import AIRSPEED, ALPHA_DEG, DENSITY
     from host.aircraft.file import load_measured
-    from host.aircraft.ranges import AIRSPEED, ALPHA_DEG, DENSITY
     from host.errors import ExitCode, UsageError
     from host.sysid.answer.conversion_table import (
         At,

@@ -14,7 +14,7 @@ from host.extras import install_hint
 from host.terminal import command_line
 
 if TYPE_CHECKING:
-    from host.planning.plan import Plan, Point
+    from host.planning.card_planning import Plan, Point
 
 # A derivative whose predicted half-width is above this is named.
 WEAK_PERCENT = 20.0
@@ -49,9 +49,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Judge or design a card and print it; return an exit code."""
     try:
-        from host.aircraft.ranges import AIRSPEED
+        from host.aircraft.aircraft_ranges import AIRSPEED
         from host.export.toml import dumps
-        from host.planning import plan as planning
+        from host.planning import card_planning as planning
         from host.twin.testcard import cards
     except ImportError as error:
         raise UsageError(f"planning needs {error.name}: {install_hint(error.name)}") from None

@@ -49,7 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Fly, and print what was written; return an exit code."""
     try:
-        from host.twin.outcome import report, summary
+        from host.twin.outcome import flight_outcome, outcome_summary
         from host.twin.testcard import cards
     except ImportError as error:
         raise UsageError(
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     from host.planning.identified_aircraft import named_aircraft
 
     try:
-        outcome = report.simulate(
+        outcome = flight_outcome.simulate(
             card,
             args.output,
             seed=args.seed,
@@ -82,10 +82,10 @@ def run(args: argparse.Namespace) -> int:
     for doubt in outcome.record.aircraft.doubts:
         print(f"host: {doubt}", file=sys.stderr)
     if args.json:
-        print(json.dumps(summary.document(outcome, args.firmware)))
+        print(json.dumps(outcome_summary.document(outcome, args.firmware)))
         return ExitCode.OK
-    print("\n".join(summary.lines(outcome, args.firmware)))
-    summary.check(outcome)
+    print("\n".join(outcome_summary.lines(outcome, args.firmware)))
+    outcome_summary.check(outcome)
     return ExitCode.OK
 
 

@@ -22,7 +22,7 @@ from host.sysid.flight.tables import even_columns
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
 from host.twin.flight.fly import FlightRecord
-from host.twin.sensors.delays import FILTERS, sensor_delays
+from host.twin.sensors.sensor_delays import FILTERS, sensor_delays
 from host.twin.virtual import virtual_flight
 
 NAME = "ultrastick25e"

@@ -18,8 +18,8 @@ import numpy as np
 from host.aircraft.prior.avl import is_avl, read_avl
 from host.aircraft.prior.datcom import is_datcom, read_datcom
 from host.aircraft.prior.prior_table import Points, PriorError, PriorTable
-from host.files.document import parse_toml, read_text, shown
 from host.files.quantities import Quantity
+from host.files.user_text import parse_toml, read_text, shown
 
 _ALPHA = Quantity("deg", -180.0, 180.0, "half a turn")
 # Roskam, Heffley: Cm_q -40, Cm_alphadot -20; per degree they would be 57 times smaller.

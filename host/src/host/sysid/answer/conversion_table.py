@@ -14,8 +14,8 @@ import numpy as np
 
 from host.aircraft.mass_properties import Condition, airframe_data
 from host.aircraft.prior.prior_file import read_prior
-from host.files.document import shown
 from host.files.quantities import Quantity
+from host.files.user_text import shown
 from host.instrument.deviations import sensor_error_model
 from host.instrument.words import IN_WORDS
 from host.sysid.aerodynamics.derivative_conversion import (

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from host.aircraft.mode_names import LATERAL, LONGITUDINAL
-from host.files.document import read_toml
+from host.files.user_text import read_toml
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.mat_file import labels
 from host.sysid.flight.linear import Answer

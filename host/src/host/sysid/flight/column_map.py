@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from host.arrays import Array
-from host.files.document import read_toml
 from host.files.quantities import Quantity
+from host.files.user_text import read_toml
 from host.sysid.identification_error import IdentificationError
 
 DEG, FOOT, POUND_PA = np.pi / 180.0, 0.3048, 6894.757

@@ -194,7 +194,7 @@ def _log(
 
 def _columns_of(log: FlightLog, wanted: Collection[str]) -> tuple[dict[str, Array], list[str]]:
     """Return the columns of a log, and what is lost, uncalibrated or only commanded of them."""
-    from host.decode.summary import calibration_note
+    from host.decode.log_summary import calibration_note
 
     notes: list[str] = []
     raw: dict[str, Array] = {

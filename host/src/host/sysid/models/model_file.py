@@ -42,8 +42,8 @@ from typing import cast
 import numpy as np
 
 from host.arrays import Array
-from host.files.document import shown
 from host.files.quantities import Quantity
+from host.files.user_text import shown
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.residual_delays import delays_of
 from host.sysid.models.state_space_model import (

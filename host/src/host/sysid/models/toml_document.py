@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from host.files.document import read_toml
+from host.files.user_text import read_toml
 from host.sysid.identification_error import IdentificationError
 
 

@@ -11,7 +11,7 @@ from host.aircraft.airframe import Airframe, Array
 from host.aircraft.linearisation import linearise
 from host.aircraft.trim import Trim
 from host.twin.testcard.cards import AXES, Card, Segment, duration_s, length_s
-from host.twin.testcard.maneuvers import (
+from host.twin.testcard.input_shapes import (
     STEPS,
     multisine,
     multisine_signal,

@@ -12,10 +12,10 @@ import pandas as pd
 from host.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, Array
 from host.aircraft.attitude import euler
 from host.twin.flight.fly import IDLE_US, NEUTRAL_US, THROW_US, FlightRecord
-from host.twin.sensors.airdata import AirData, air_data
 from host.twin.sensors.analog import CHANNELS, analog, convert, nominal
-from host.twin.sensors.delays import FILTERS, dlpf_for
 from host.twin.sensors.imu import imu
+from host.twin.sensors.local_flow import AirData, air_data
+from host.twin.sensors.sensor_delays import FILTERS, dlpf_for
 from host.twin.testcard.cards import AXES
 
 CONVERSIONS = 4  # the recorder sums four conversions of each channel

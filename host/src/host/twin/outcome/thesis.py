@@ -16,9 +16,9 @@ import pandas as pd
 
 from host.aircraft.airframe import GRAVITY_MPS2, Array
 from host.twin.flight.fly import FlightRecord
-from host.twin.sensors.airdata import AirData
 from host.twin.sensors.analog import analog, convert
 from host.twin.sensors.imu import imu
+from host.twin.sensors.local_flow import AirData
 
 IMU_RATE_HZ = 50.0
 GYRO_COUNTS_PER_DEGPS = 16.4

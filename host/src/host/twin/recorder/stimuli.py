@@ -15,10 +15,10 @@ from host.aircraft.airframe import Array
 from host.twin.faults import SUPPLY_V
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors import bmp085, ubx
-from host.twin.sensors.airdata import AirData
 from host.twin.sensors.analog import CHANNELS, analog
 from host.twin.sensors.imu import Imu
 from host.twin.sensors.imu_stream import ImuPacket, imu_packets
+from host.twin.sensors.local_flow import AirData
 from host.twin.sensors.mega_clock import TICKS_PER_S, clock_share, ticks
 from host.twin.sensors.receiver import EDGE, edges
 

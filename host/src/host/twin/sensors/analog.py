@@ -14,9 +14,9 @@ from host.aircraft.airframe import AILERON, ELEVATOR, RUDDER, Array
 from host.resources import resource
 from host.twin.faults import PITOTS, POTS, VANES, Fault
 from host.twin.flight.fly import STEP_S, FlightRecord
-from host.twin.sensors.airdata import AirData, local_velocity
-from host.twin.sensors.delays import dlpf_for, nominal_vane_s, sensor_delays
 from host.twin.sensors.filters import delayed, first_order, vane
+from host.twin.sensors.local_flow import AirData, local_velocity
+from host.twin.sensors.sensor_delays import dlpf_for, nominal_vane_s, sensor_delays
 
 CHANNELS = (*VANES, *PITOTS, *POTS)
 # Far enough beyond the converter's range that its noise cannot bring it back.

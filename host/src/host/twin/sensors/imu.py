@@ -11,9 +11,9 @@ from host.aircraft.airframe import DOWN, GRAVITY_MPS2, NORTH, Q0, Q3, Array, P, 
 from host.aircraft.attitude import euler, to_body
 from host.compiled import compiled_fast
 from host.twin.flight.fly import STEP_S, FlightRecord
-from host.twin.sensors.airdata import AirData
-from host.twin.sensors.delays import FILTERS, sensor_delays
 from host.twin.sensors.filters import delayed, first_order
+from host.twin.sensors.local_flow import AirData
+from host.twin.sensors.sensor_delays import FILTERS, sensor_delays
 
 GYRO_NOISE_RADPS_RTHZ = math.radians(0.005)  # PS-MPU-6000A: 0.005 deg/s/sqrt(Hz)
 ACCEL_NOISE_MPS2_RTHZ = 400e-6 * GRAVITY_MPS2  # 400 ug/sqrt(Hz)

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from host.aircraft.airframe import Array
 from host.twin.faults import Fault
 from host.twin.flight.fly import FlightRecord
-from host.twin.sensors.airdata import AirData
-from host.twin.sensors.delays import dlpf_for
 from host.twin.sensors.imu import Imu, imu
+from host.twin.sensors.local_flow import AirData
 from host.twin.sensors.mega_clock import TICKS_PER_S, ticks
+from host.twin.sensors.sensor_delays import dlpf_for
 from host.wire.packets import packet
 from host.wire.schema_text import packed_schema
 

@@ -14,7 +14,7 @@ import numpy as np
 from host.aircraft.airframe import DOWN, NORTH, Array
 from host.twin.faults import Fault
 from host.twin.flight.fly import STEP_S, FlightRecord
-from host.twin.sensors.delays import dlpf_for, sensor_delays
+from host.twin.sensors.sensor_delays import dlpf_for, sensor_delays
 
 RATE_HZ = 5.0
 EARTH_RADIUS_M = 6_371_000.0

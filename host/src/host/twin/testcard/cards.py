@@ -11,8 +11,8 @@ from host.aircraft.air import Air
 from host.errors import UsageError
 from host.files import toml_reader
 from host.twin.faults import FAULTS, Fault
-from host.twin.testcard.maneuvers import KINDS, STEPS, harmonics
-from host.twin.testcard.ranges import LONGEST_FLIGHT_S, RANGES
+from host.twin.testcard.card_ranges import LONGEST_FLIGHT_S, RANGES
+from host.twin.testcard.input_shapes import KINDS, STEPS, harmonics
 
 FOLDER = Path(__file__).parent / "cards"
 MOST_SEGMENTS = 2000  # repeated ones counted each

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from host.export.writer import Meta
+from host.original.row_table import NOTES, RowTable
 from host.original.rows import OriginalRows
-from host.original.table import NOTES, RowTable
 from host.physical.calibration import Calibration
 from host.physical.columns import COLUMNS, UNITS
 

@@ -12,11 +12,11 @@ import pandas as pd
 from host.aircraft.file import Aircraft
 from host.log import read_log
 from host.twin.flight.fly import FlightRecord, fly
-from host.twin.outcome import compare, ideal, picture, thesis, truth
+from host.twin.outcome import compare, ideal, picture, thesis, truth_files
 from host.twin.outcome.instrument import calibration
 from host.twin.recorder import avr, sitl, stimuli
-from host.twin.sensors.airdata import AirData, air_data
 from host.twin.sensors.imu import Imu
+from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.testcard.cards import Card, Segment
 
 FIRMWARES = ("sitl", "avr", "none", "thesis")
@@ -154,7 +154,7 @@ def simulate(
             chip = given.imu if firmware == "avr" else None
             outcome.table = _decoded(outcome, path, folder, chip)
     clock.mark("decode" if outcome.recording else firmware)
-    outcome.files += truth.write(record, data, stem, first_row_s=outcome.first_row_s)
+    outcome.files += truth_files.write(record, data, stem, first_row_s=outcome.first_row_s)
     clock.mark("truth")
     second = None
     if both and firmware != "thesis":
@@ -167,9 +167,9 @@ def simulate(
             outcome.table,
             image,
             title=f"{card.title} (simulated, seed {seed})",
-            windows=truth.maneuvers(record, data),
+            windows=truth_files.maneuvers(record, data),
             faults=card.faults,
-            truth=truth.series(record, data),
+            truth=truth_files.series(record, data),
             second=second,
             second_name="thesis logger",
         )

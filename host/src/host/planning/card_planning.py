@@ -32,7 +32,7 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.flight.pilot import Window
 from host.twin.outcome.ideal import true_table
-from host.twin.sensors.airdata import AirData, air_data
+from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.testcard.cards import Card, Pilot, Segment, Sensors
 
 # White noise of each output at 100 Hz: two vanes and two pitots averaged, four conversions each,

@@ -10,7 +10,7 @@ _WIDTH = 13
 
 
 def lines(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of a summary made by `host.decode.summary.summarise`."""
+    """Yield the lines of a summary made by `host.decode.log_summary.summarise`."""
     yield _row("log", f"{summary['file']}  file id {summary['file_id']}, {summary['complete']}")
     if summary["begins_at_byte"]:
         yield _row("", f"it begins at byte {summary['begins_at_byte']} of this file")

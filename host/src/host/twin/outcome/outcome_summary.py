@@ -6,7 +6,7 @@ from typing import Any
 
 from host.errors import CheckError
 from host.twin.faults import without_recorder
-from host.twin.outcome.report import Outcome
+from host.twin.outcome.flight_outcome import Outcome
 from host.twin.recorder import sitl
 from host.twin.testcard import cards
 

@@ -1,7 +1,7 @@
 """What each number of an aircraft file may be, from an indoor model of 5 g to the An-225.
 
 A range is where the number would have another unit or sign, or where no aircraft is. What follows
-from several numbers together is in `plausible`.
+from several numbers together is in `size_ratios`.
 """
 
 from __future__ import annotations

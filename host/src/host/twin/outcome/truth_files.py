@@ -19,8 +19,8 @@ from host.aircraft.trim import TrimError, solve
 from host.export.toml import dumps
 from host.twin.flight.fly import FlightRecord
 from host.twin.flight.pilot import Window
-from host.twin.sensors.airdata import AirData
-from host.twin.sensors.delays import dlpf_for, sensor_delays
+from host.twin.sensors.local_flow import AirData
+from host.twin.sensors.sensor_delays import dlpf_for, sensor_delays
 
 STRIDE = 5  # samples of 1 ms per row of the truth file: 200 Hz
 
