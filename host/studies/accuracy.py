@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.hopfield import network
-from host.sysid.estimators.regression import regression_rows, solve_rows
+from host.sysid.estimators.regression import regression_equations, solve_least_squares
 from host.sysid.estimators.start_values import start_values
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.diagnostics import references
+from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 from studies.aircraft import navion, navion_free, navion_structured
@@ -75,11 +75,11 @@ def run_case(shape: str, rate_hz: float, runs: int, *, seed: int = 20260201) -> 
     deviation = np.sqrt(np.mean(y**2, axis=0) / SNR)
     rate_deviation = np.sqrt(np.mean(rates**2, axis=0) / SNR)
     spotless = Maneuver(dt_s, u, y)
-    reference = references(structured, [spotless], truth)
-    reference_free = references(free, [spotless], truth_free)
+    reference = reference_values(structured, [spotless], truth)
+    reference_free = reference_values(free, [spotless], truth_free)
     exact = OutputProblem(structured, [spotless])
     at_truth = minimise(exact, truth, variance=deviation**2, max_iterations=0)
-    bound = np.sqrt(np.diag(covariance_of(at_truth.information, at_truth.free)))
+    bound = np.sqrt(np.diag(covariance_of_free(at_truth.information, at_truth.free)))
     hopfield, smoothed, output, ratios = [], [], [], []
     failed = 0
     physical = len(structured.parameters)
@@ -91,8 +91,8 @@ def run_case(shape: str, rate_hz: float, runs: int, *, seed: int = 20260201) -> 
         fixed_point = np.linalg.solve(-W, b)
         hopfield.append(np.abs(fixed_point - truth_free) / reference_free)
         plain = Maneuver(dt_s, u, noisy)
-        names, rows = regression_rows(free, [plain])
-        smoothed.append(np.abs(solve_rows(rows, len(names)) - truth_free) / reference_free)
+        names, rows = regression_equations(free, [plain])
+        smoothed.append(np.abs(solve_least_squares(rows, len(names)) - truth_free) / reference_free)
         problem = OutputProblem(structured, [plain])
         try:
             found = minimise(problem, start_values(problem))

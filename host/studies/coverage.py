@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.estimators.output_error_ar_noise import fit_with_memory
+from host.sysid.estimators.output_error_ar_noise import fit_with_ar_noise
 from host.sysid.estimators.start_values import start_values
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.numerics.ar_noise import OutputNoise, autocovariance
-from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.ar_noise import ArNoise, autocovariance
+from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import signal, stats
 
@@ -96,10 +96,10 @@ def run_case(noise: str, rate_hz: float, runs: int, *, seed: int = 20260101) -> 
     deviation = np.sqrt(np.mean(y**2, axis=0) / SNR)  # about the trim, which is zero
     coefficient = NOISES[noise]
     power = autocovariance(coefficient, 0)[0]
-    memory = [OutputNoise.from_coefficient(coefficient)] * 4
+    memory = [ArNoise.from_coefficient(coefficient)] * 4
     known_variance = deviation**2 / power
     bound = minimise(blank, truth, noise=memory, variance=known_variance, max_iterations=0)
-    crb = np.sqrt(np.diag(covariance_of(bound.information, bound.free)))
+    crb = np.sqrt(np.diag(covariance_of_free(bound.information, bound.free)))
     covered, widths, errors, white = [], [], [], []
     failed = 0
     physical = len(model.parameters)
@@ -109,7 +109,7 @@ def run_case(noise: str, rate_hz: float, runs: int, *, seed: int = 20260101) -> 
         maneuver = Maneuver(dt_s, u, measured)
         problem = OutputProblem(model, [maneuver])
         try:
-            fit = fit_with_memory(problem, start_values(problem))
+            fit = fit_with_ar_noise(problem, start_values(problem))
             reference = minimise(problem, fit.optimum.theta, noise=memory, variance=known_variance)
         except IdentificationError:
             failed += 1
@@ -117,7 +117,9 @@ def run_case(noise: str, rate_hz: float, runs: int, *, seed: int = 20260101) -> 
         error = fit.optimum.theta - truth
         dof = np.minimum(fit.degrees_of_freedom, 1e9)
         half = stats.t.ppf(0.975, dof) * np.sqrt(np.diag(fit.covariance))
-        ideal = QUANTILE * np.sqrt(np.diag(covariance_of(reference.information, reference.free)))
+        ideal = QUANTILE * np.sqrt(
+            np.diag(covariance_of_free(reference.information, reference.free))
+        )
         covered.append(np.abs(error) <= half)
         widths.append(half / ideal)
         errors.append(error / crb)

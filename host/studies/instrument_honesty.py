@@ -102,8 +102,10 @@ def analysed(flight: VirtualFlight, seed: int, factor: float) -> Row:
     row: Row = {"intervals": {}, "check": {}, "doubted": False}
     try:
         found = reconstruct(columns, airframe, data)
-        row["check"] = {c.name: [c.times, c.directions, c.probability] for c in found.claims}
-        row["doubted"] = found.claims[0].doubted
+        row["check"] = {
+            c.name: [c.times, c.directions, c.probability] for c in found.calibration_tests
+        }
+        row["doubted"] = found.calibration_tests[0].rejected
     except IdentificationError as error:
         row["failed"] = str(error)  # no check, so no doubt
     try:

@@ -12,7 +12,7 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.method_registry import fit, methods
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.diagnostics import references
+from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.maneuver import Maneuver
 
 from studies.aircraft import navion_structured
@@ -70,7 +70,7 @@ def score(method: str, data: str, runs: int) -> Score:
     failed = 0
     for seed in range(runs):
         maneuver = DATA[data](seed)
-        reference = references(navion_structured(), [maneuver], TRUTH)
+        reference = reference_values(navion_structured(), [maneuver], TRUTH)
         begin = time.process_time()
         try:
             result = fit(method, model, [maneuver])

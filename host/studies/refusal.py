@@ -14,19 +14,19 @@ from host.arrays import Array
 from host.sysid.estimators.method_registry import fit
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
-    CANNOT,
-    DOUBTFUL,
     EVEN_ODDS,
-    REFUSAL_LIMIT,
-    Judgement,
-    Refusal,
-    exceedance,
-    judge,
-    references,
+    NOT_IDENTIFIABLE,
+    RELATIVE_BOUND_LIMIT,
+    WEAKLY_IDENTIFIABLE,
+    Identifiability,
+    IdentifiabilityFlag,
+    assess_identifiability,
+    bound_exceedance_probability,
+    reference_values,
 )
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, free_model
-from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import special
 
@@ -64,7 +64,7 @@ class RefusalCheck:
     """
 
     names: tuple[str, ...]
-    judgement: Judgement
+    judgement: Identifiability
     shares: Array
     plain_shares: Array
     plain_probability: float
@@ -72,7 +72,9 @@ class RefusalCheck:
     @property
     def expected(self) -> tuple[str, ...]:
         """Parameters whose bound at the truth exceeds their reference value."""
-        return tuple(n for n, s in zip(self.names, self.shares, strict=True) if s > REFUSAL_LIMIT)
+        return tuple(
+            n for n, s in zip(self.names, self.shares, strict=True) if s > RELATIVE_BOUND_LIMIT
+        )
 
     @property
     def worst_share(self) -> float:
@@ -87,7 +89,9 @@ class RefusalCheck:
     @property
     def plain_agree(self) -> bool:
         """The same where every bound is compared with |parameter| alone."""
-        return (self.plain_probability > EVEN_ODDS) == bool(self.plain_shares.max() > REFUSAL_LIMIT)
+        return (self.plain_probability > EVEN_ODDS) == bool(
+            self.plain_shares.max() > RELATIVE_BOUND_LIMIT
+        )
 
     @property
     def firm(self) -> bool:
@@ -134,7 +138,7 @@ def analytic_bounds(
     at_truth = minimise(
         OutputProblem(model, [spotless]), start, variance=deviation**2, max_iterations=0
     )
-    bound = np.sqrt(np.diag(covariance_of(at_truth.information, at_truth.free)))
+    bound = np.sqrt(np.diag(covariance_of_free(at_truth.information, at_truth.free)))
     return spotless, bound[: len(truth)], deviation
 
 
@@ -159,16 +163,19 @@ def check_model(
     start = np.concatenate([truth, np.zeros(len(model.states))]) if from_truth else None
     try:
         result = fit("output-error", model, [maneuver], start=start)
-        judgement = judge(result, [maneuver])
-        plain = exceedance(result, [maneuver], small_share=0.0)[1]
+        judgement = assess_identifiability(result, [maneuver])
+        plain = bound_exceedance_probability(result, [maneuver], small_share=0.0)[1]
     except IdentificationError as error:
-        every = (Refusal(n, np.inf, 1.0, CANNOT, str(error)) for n in model.parameter_names)
-        judgement, plain = Judgement(1.0, tuple(every)), 1.0
+        every = (
+            IdentifiabilityFlag(n, np.inf, 1.0, NOT_IDENTIFIABLE, str(error))
+            for n in model.parameter_names
+        )
+        judgement, plain = Identifiability(1.0, tuple(every)), 1.0
     size = np.abs(truth)
     return RefusalCheck(
         names=model.parameter_names,
         judgement=judgement,
-        shares=bound / references(model, [spotless], truth),
+        shares=bound / reference_values(model, [spotless], truth),
         plain_shares=np.divide(bound, size, out=np.full(len(size), np.inf), where=size > 0.0),
         plain_probability=plain,
     )
@@ -199,14 +206,18 @@ class Repeated:
         lost = Counter(name for c in self.checks for name in c.missed)
         worst = ", ".join(f"{name} {count}" for name, count in lost.most_common(3)) or "none"
         told = runs * (len(first.names) - listed)
-        false = [sum(len(c.false(grade)) for c in self.checks) for grade in (CANNOT, DOUBTFUL)]
+        false = [
+            sum(len(c.false(grade)) for c in self.checks)
+            for grade in (NOT_IDENTIFIABLE, WEAKLY_IDENTIFIABLE)
+        ]
         return (
             f"{self.what}: refused on {sum(c.judgement.refused for c in self.checks)} of {runs}"
             f" noise seeds; analytic list {' '.join(first.expected) or 'empty'} (compared with"
-            f" |parameter| alone: {int(np.sum(first.plain_shares > REFUSAL_LIMIT))} names); whole"
-            f" list in one of the two grades on {sum(not c.missed for c in self.checks)}, names"
-            f" {runs * listed - lost.total()} of {runs * listed}, most often missed: {worst}; false"
-            f" names: {false[0]} '{CANNOT}', {false[1]} '{DOUBTFUL}' of {told}"
+            f" |parameter| alone: {int(np.sum(first.plain_shares > RELATIVE_BOUND_LIMIT))} names);"
+            f" whole list in one of the two grades on {sum(not c.missed for c in self.checks)},"
+            f" names {runs * listed - lost.total()} of {runs * listed}, most often missed: {worst};"
+            f" false names: {false[0]} '{NOT_IDENTIFIABLE}',"
+            f" {false[1]} '{WEAKLY_IDENTIFIABLE}' of {told}"
         )
 
 
@@ -348,6 +359,6 @@ def agreement_text(found: Agreement) -> str:
         f" worst bound is not between 50 and 200 %, in {share(found.firm_agree, len(found.firm))}"
         f" where the fit is {100.0 * SURE:.0f} % sure; {found.expected} refused by the bound; of"
         f" parameters above their bound {share(*found.named)} are in one of the two grades, of the"
-        f" others {share(*found.false(CANNOT))} '{CANNOT}', {share(*found.false(DOUBTFUL))}"
-        f" '{DOUBTFUL}'"
+        f" others {share(*found.false(NOT_IDENTIFIABLE))} '{NOT_IDENTIFIABLE}',"
+        f" {share(*found.false(WEAKLY_IDENTIFIABLE))} '{WEAKLY_IDENTIFIABLE}'"
     )

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from host.arrays import Array, BoolArray
 from host.sysid.estimators.filter_error import information_at
-from host.sysid.estimators.filter_error_gust import ROLLING, gust_model
+from host.sysid.estimators.filter_error_gust import ROLL_GUST, gust_model
 from host.sysid.estimators.method_registry import fit
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
@@ -25,7 +25,7 @@ from studies.gusts import AXES, NOISE, fly, gusty_aircraft, spectrum
 from studies.nonlinear_gusts import fly_nonlinear, varying
 
 SCALE_SHARE = 0.5  # how well the fit knows the length of the gusts beforehand
-PROCESS = {"longitudinal": ("gust_rad", "airspeed_mps"), "lateral": ("gust_rad", ROLLING)}
+PROCESS = {"longitudinal": ("gust_rad", "airspeed_mps"), "lateral": ("gust_rad", ROLL_GUST)}
 INTENSITIES_MPS = (0.5, 1.0)
 LIMIT_RATIO = 3.0
 LIMIT_BOUND = 1.3
@@ -121,7 +121,7 @@ def fitted_model(axis: str) -> LinearModel:
 def true_vector(axis: str, intensity_mps: float) -> Array:
     """Return everything filter error estimates, at the truth: zero biases, rest, gusts, noise."""
     plane, wide, air = gusty_aircraft(), fitted_model(axis), spectrum(axis, intensity_mps)
-    process = {"gust_rad": air.angle, "airspeed_mps": air.along_mps, ROLLING: air.roll_radps}
+    process = {"gust_rad": air.angle, "airspeed_mps": air.along_mps, ROLL_GUST: air.roll_radps}
     noise = [NOISE[name] for name in wide.outputs]
     return np.concatenate(
         [

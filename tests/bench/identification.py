@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 from host.sysid.estimators.start_values import start_values
 from host.sysid.numerics import recursion
-from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_free
 from studies.data import noisy
@@ -48,7 +48,7 @@ def fit_once(seed: int) -> tuple[float, float, OutputProblem, np.ndarray, np.nda
     start = start_values(problem)
     middle = time.process_time()
     found = minimise(problem, start)
-    covariance = covariance_of(found.information, found.free)
+    covariance = covariance_of_free(found.information, found.free)
     end = time.process_time()
     if not found.converged:
         raise SystemExit(f"seed {seed}: no convergence")

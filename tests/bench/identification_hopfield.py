@@ -17,7 +17,7 @@ import numba
 import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.hopfield import iterate_until, largest_stable_gain, network
-from host.sysid.estimators.regression import solve_normal
+from host.sysid.estimators.regression import solve_normal_equations
 from host.sysid.models.maneuver import Maneuver
 from studies.aircraft import FOOT_M, navion_free
 from studies.data import with_rates
@@ -74,7 +74,7 @@ def race(unit_m: float) -> Race:
     maneuver = Maneuver(metric.dt_s, metric.inputs, metric.outputs @ turn, rates=rates)
     rows = np.ascontiguousarray(np.hstack([maneuver.outputs, maneuver.inputs, rates]).T)
     _, W, b = network(navion_free(), [maneuver])
-    goal = solve_normal(-W, b)
+    goal = solve_normal_equations(-W, b)
     closed = closed_form(rows, 5)
     A, B, _, _ = navion_free().matrices(goal)
     np.testing.assert_allclose(closed.T, np.hstack([A, B]), rtol=1e-6)

@@ -8,7 +8,7 @@ import pytest
 from host.sysid.estimators.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
 from host.sysid.estimators.method_registry import METHODS
 from host.sysid.flight.finder import Found
-from host.sysid.models.diagnostics import CANNOT, GRADES
+from host.sysid.models.diagnostics import GRADES, NOT_IDENTIFIABLE
 from host.sysid.models.state_space_model import free_model
 from studies.__main__ import main
 from studies.accuracy import run_case as accuracy
@@ -51,7 +51,7 @@ def test_table_31_at_snr_10_is_refused_with_names() -> None:
     assert check.judgement.refused
     assert not check.missed
     assert len(check.expected) == 16
-    assert not {"a33", "b31"} & set(check.judgement.names(CANNOT))
+    assert not {"a33", "b31"} & set(check.judgement.names(NOT_IDENTIFIABLE))
     assert check.agree
     assert check.plain_agree
 

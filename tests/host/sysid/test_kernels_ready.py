@@ -79,17 +79,17 @@ def test_what_a_process_did_before_changes_no_answer() -> None:
     recursion.propagate(step, slopes, z, C, start, first)
     # Forty of these and a thousand of those once brought machine code, which rounds differently.
     for _ in range(500):
-        recursion.one_block.pays(2000 * 200, recursion.WORTH_COMPILING)
+        recursion.propagate_block.pays(2000 * 200, recursion.WORTH_COMPILING)
         propulsion.rotor_steps.pays(5000, propulsion.WORTH_COMPILING)
     recursion.propagate(step, slopes, z, C, start, again)
     np.testing.assert_array_equal(first, again)
-    assert not recursion.one_block.pays(1.0, recursion.WORTH_COMPILING)
+    assert not recursion.propagate_block.pays(1.0, recursion.WORTH_COMPILING)
     assert not propulsion.rotor_steps.pays(1.0, propulsion.WORTH_COMPILING)
 
 
 def test_every_kernel_is_built_in_the_types_that_methods_use() -> None:
     built, used = json.loads(printed(BUILT))
-    assert set(built) >= {"one_block", "rotor_steps", "iterate", "iterate_until"}
+    assert set(built) >= {"propagate_block", "rotor_steps", "iterate", "iterate_until"}
     assert used == built
 
 

@@ -27,7 +27,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim as Condition
 from host.sysid.models.templates import lateral, longitudinal
-from host.sysid.numerics.output_error import covariance_of, minimise
+from host.sysid.numerics.output_error import covariance_of_free, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.flight.pilot import Window
@@ -197,7 +197,7 @@ def _bounds(
         place = problem.columns(k)
         part = np.einsum("jta,j,jtb->ab", response.slopes, 1.0 / variance, response.slopes)
         information[np.ix_(place, place)] += times * part
-    covariance = covariance_of(information, np.ones(size, dtype=np.bool_))
+    covariance = covariance_of_free(information, np.ones(size, dtype=np.bool_))
     sigma = np.sqrt(np.diag(covariance))
     return [
         Bound(name, float(best.theta[k]), float(1.96 * sigma[k]))

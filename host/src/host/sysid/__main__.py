@@ -16,7 +16,7 @@ import host
 from host.aircraft.file import load_measured
 from host.aircraft.propulsion import rotor_steps
 from host.sysid.estimators.hopfield import iterate, iterate_until
-from host.sysid.numerics.recursion import one_block
+from host.sysid.numerics.recursion import propagate_block
 
 AIRCRAFT = "ultrastick25e"
 
@@ -27,7 +27,7 @@ def build_kernels() -> None:
     iterate(W, b, np.zeros(2), 0.1, 200.0, 3, 1e6)
     iterate_until(W, b, np.zeros(2), 0.1, 200.0, b, 0.5, 3)
     F, S, out = np.eye(2), np.zeros((2, 3)), np.zeros((2, 4, 3))
-    one_block(F, F, S, S.copy(), np.zeros((4, 6)), 0, 4, out)
+    propagate_block(F, F, S, S.copy(), np.zeros((4, 6)), 0, 4, out)
     half = np.full(2, 0.5)
     rotor_steps(load_measured(AIRCRAFT).airframe(), half, half, half, 600.0, 0.01, 3)
 

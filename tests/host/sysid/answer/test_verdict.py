@@ -8,7 +8,7 @@ from host.aircraft.mass_properties import Condition
 from host.sysid.answer.verdict import model_lines, unpredicted, words
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.linear import Answer
-from host.sysid.models.diagnostics import SignalFit, collinearity, references
+from host.sysid.models.diagnostics import SignalFit, collinearity, reference_values
 from host.sysid.models.modal_analysis import modes, modes_of
 from host.sysid.models.residual_delays import DELAYS
 from host.sysid.models.templates import TEMPLATES, Trim
@@ -79,7 +79,7 @@ def test_a_small_entry_is_not_called_trustworthy(answer: Answer) -> None:
     """Its interval is within 5 % of the row, not of its own size."""
     estimate = answer.result.estimate.copy()
     estimate[1] = 0.0
-    floor = references(answer.model, answer.maneuvers, estimate)[1]
+    floor = reference_values(answer.model, answer.maneuvers, estimate)[1]
     estimate[1] = 0.01 * floor
     half = np.full(len(estimate), 1e-9)
     half[1] = 0.1 * floor / 1.96

@@ -8,7 +8,7 @@ from host.arrays import Array
 from host.sysid.coefficients.coefficient_fit import CoefficientFit, Derivative, Flight, Pull, Trace
 from host.sysid.coefficients.deletion_diagnostics import Prediction
 from host.sysid.coefficients.pooled_flights import pooled
-from host.sysid.numerics.maneuver_agreement import scatter
+from host.sysid.numerics.maneuver_agreement import agreement_of
 
 NOISE = np.array([0.04, 0.02])
 SHARED = np.array([[0.0, 0.0], [0.06, 0.0]])  # derivatives by one deviation of each error
@@ -30,7 +30,7 @@ def fit(values: Array, noise: Array = NOISE, errors: Array = ERRORS) -> Coeffici
         flight=Flight(17.0, 180.0, 0.1, 0.3, 0.03, Pull(2.0, 0.1, 0.0), (0.0, 0.2), (1.0, 1.0)),
         traces={"CL": Trace(np.arange(9.0), np.arange(9.0))},
         prediction=Prediction((0, 1), {"CL": 0.03}, {"CL": 0.04}),
-        repeats=scatter(names, np.zeros((2, 2)), np.full((2, 2), 0.5), np.ones(2)),
+        repeats=agreement_of(names, np.zeros((2, 2)), np.full((2, 2), 0.5), np.ones(2)),
     )
 
 

@@ -9,8 +9,13 @@ from host.instrument.deviations import sensor_error_model
 from host.instrument.words import IN_WORDS
 from host.sysid import Maneuver
 from host.sysid.compatibility.reconstruction import Compatibility, Finding
-from host.sysid.compatibility.sensor_corrections import IN_COLUMNS
-from host.sysid.compatibility.sensor_dynamics import IMU_DELAY, at_cg, open_errors, without_open
+from host.sysid.compatibility.sensor_corrections import INSTANTANEOUS_ERRORS
+from host.sysid.compatibility.sensor_dynamics import (
+    IMU_DELAY,
+    columns_at_cg,
+    perturb_columns,
+    residual_errors,
+)
 from host.sysid.estimators.filter_error_gust import fit_with_gust, gust_model
 from host.sysid.flight.carried import systematic_error_shifts
 from host.sysid.models.fit_result import FitResult
@@ -24,8 +29,8 @@ SPEED_MPS = 20.0
 
 def told(delay_s: float) -> Compatibility:
     """Return a reconstruction that told the vanes' delay to half a millisecond."""
-    late = Finding("vane_delay_s", delay_s, 0.0005, 0.02, told=True, reason="")
-    pitot = Finding("pitot_scale", 0.0, 0.03, 0.031, told=False, reason="")
+    late = Finding("vane_delay_s", delay_s, 0.0005, 0.02, data_informed=True, reason="")
+    pitot = Finding("pitot_scale", 0.0, 0.03, 0.031, data_informed=False, reason="")
     return Compatibility((late, pitot), {}, (), gps=True, instrument=sensor_error_model(NAME))
 
 
@@ -55,7 +60,7 @@ def test_a_swinging_vane_says_again_what_the_air_said() -> None:
     columns["alpha_rad"] = angle
     # At its own place and without upwash only the spring is to be undone.
     plain = AirframeData("a", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
-    back = at_cg(columns, plain, replace(told(lag_s), instrument=i))["alpha_rad"]
+    back = columns_at_cg(columns, plain, replace(told(lag_s), instrument=i))["alpha_rad"]
     inside = slice(200, -200)
     late = np.interp(t + lag_s, t, angle)
     assert np.max(np.abs(back - true)[inside]) < 0.01 * 0.05
@@ -64,17 +69,17 @@ def test_a_swinging_vane_says_again_what_the_air_said() -> None:
 
 def test_what_stays_open_is_what_tolerances_leave() -> None:
     found = told(0.007)
-    left = open_errors(found, still(10))
+    left = residual_errors(found, still(10))
     assert left["vane_delay_s"] == pytest.approx(0.0005 / 1.96, rel=1e-3)
     assert left["imu_x_m"] == pytest.approx(0.010 / np.sqrt(3.0))
     assert left["elevator_scale"] == pytest.approx(0.01 / np.sqrt(3.0))
     assert left[IMU_DELAY] > 0.0005
-    assert not open_errors(replace(found, instrument=None), still(10))
+    assert not residual_errors(replace(found, instrument=None), still(10))
 
 
 def test_every_error_that_moves_an_answer_has_words() -> None:
     """A table says 'delay of the vanes', not the name of a variable."""
-    assert {*IN_COLUMNS, *open_errors(told(0.007), still(10))} <= IN_WORDS.keys()
+    assert {*INSTANTANEOUS_ERRORS, *residual_errors(told(0.007), still(10))} <= IN_WORDS.keys()
     assert not any("_" in words for words in IN_WORDS.values())
 
 
@@ -85,13 +90,13 @@ def test_a_place_is_felt_by_what_sits_there() -> None:
     t = columns["t_s"]
     columns["q_radps"] = 0.5 * np.sin(4.0 * t)
     turn = np.gradient(columns["q_radps"], 0.01)
-    imu = without_open(columns, "imu_x_m", 0.01, found)
+    imu = perturb_columns(columns, "imu_x_m", 0.01, found)
     np.testing.assert_allclose(imu["az_mps2"] - columns["az_mps2"], 0.01 * turn, atol=1e-12)
     np.testing.assert_array_equal(imu["alpha_rad"], columns["alpha_rad"])
-    vane = without_open(columns, "vane_x_m", 0.01, found)
+    vane = perturb_columns(columns, "vane_x_m", 0.01, found)
     np.testing.assert_allclose(vane["alpha_rad"], 0.01 * columns["q_radps"] / SPEED_MPS)
     np.testing.assert_array_equal(vane["az_mps2"], columns["az_mps2"])
-    cg = without_open(columns, "cg_x_m", 0.01, found)
+    cg = perturb_columns(columns, "cg_x_m", 0.01, found)
     np.testing.assert_allclose(cg["az_mps2"] - columns["az_mps2"], -0.01 * turn, atol=1e-12)
     np.testing.assert_allclose(cg["alpha_rad"], -0.01 * columns["q_radps"] / SPEED_MPS)
 
@@ -129,9 +134,9 @@ def test_one_step_of_filter_error_foretells_the_fit_of_disturbed_data() -> None:
     moved = {
         m.error: m for m in systematic_error_shifts(result, [maneuver], [columns], [found], trim)
     }
-    sizes = open_errors(found, columns)
+    sizes = residual_errors(found, columns)
     for error in (IMU_DELAY, "imu_x_m", "elevator_scale"):
-        other = without_open(columns, error, sizes[error], found)
+        other = perturb_columns(columns, error, sizes[error], found)
         data = Maneuver(
             0.01,
             np.column_stack([other[c] for c in model.inputs]),

@@ -7,18 +7,22 @@ from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.sysid.compatibility.calibration_consistency import (
     ALARM,
-    VISIBLE,
-    Claim,
-    claim_words,
-    claims,
+    OBSERVABLE_GROUPS,
+    ConsistencyTest,
+    calibration_lines,
+    consistency_tests,
 )
 from host.sysid.compatibility.path_preparation import prior
-from host.sysid.compatibility.reconstruction import document, reconstruct, words
+from host.sysid.compatibility.reconstruction import (
+    compatibility_document,
+    compatibility_lines,
+    reconstruct,
+)
 from host.sysid.flight.tables import even_columns
 from host.twin.virtual import virtual_flight
 
 NAME = "ultrastick25e"
-NAMES = tuple(name for own in VISIBLE.values() for name in own)
+NAMES = tuple(name for own in OBSERVABLE_GROUPS.values() for name in own)
 
 
 def drawn(rng: np.random.Generator, times: float, noise: Array) -> tuple[Array, Array]:
@@ -37,26 +41,26 @@ def drawn(rng: np.random.Generator, times: float, noise: Array) -> tuple[Array, 
 def test_alarms_come_as_often_as_stated(times: float, least: float, most: float) -> None:
     rng = np.random.default_rng(5)
     noise = np.geomspace(0.1, 2.0, len(NAMES))
-    found = [claims(NAMES, *drawn(rng, times, noise), prior(None)) for _ in range(500)]
-    assert least <= np.mean([f[0].doubted for f in found]) <= most
+    found = [consistency_tests(NAMES, *drawn(rng, times, noise), prior(None)) for _ in range(500)]
+    assert least <= np.mean([f[0].rejected for f in found]) <= most
     rms = np.sqrt(np.mean([f[0].times ** 2 for f in found]))
     assert pytest.approx(rms, abs=0.05) == 1.0 if times == 1.0 else 2.0 < rms < 3.0
 
 
 def test_what_the_flight_does_not_tell_is_not_judged() -> None:
     rng = np.random.default_rng(5)
-    found = claims(NAMES, *drawn(rng, 1.0, np.full(len(NAMES), 30.0)), prior(None))
-    assert all(c.directions == 0 and not c.doubted for c in found)
-    assert claim_words(found) == []
+    found = consistency_tests(NAMES, *drawn(rng, 1.0, np.full(len(NAMES), 30.0)), prior(None))
+    assert all(c.directions == 0 and not c.rejected for c in found)
+    assert calibration_lines(found) == []
 
 
 def test_a_doubted_file_is_named_with_the_errors_it_claims_too_small() -> None:
     found = (
-        Claim("all", 2.5, 9, ALARM / 10.0),
-        Claim("gyro_scale", 3.1, 3, ALARM / 10.0),
-        Claim("vane_scale", 1.1, 2, 0.4),
+        ConsistencyTest("all", 2.5, 9, ALARM / 10.0),
+        ConsistencyTest("gyro_scale", 3.1, 3, ALARM / 10.0),
+        ConsistencyTest("vane_scale", 1.1, 2, 0.4),
     )
-    (line,) = claim_words(found)
+    (line,) = calibration_lines(found)
     assert "gyro_scale 3.1 times" in line
     assert "vane_scale" not in line
 
@@ -65,11 +69,11 @@ def test_a_recorded_flight_doubts_a_file_that_claims_a_fifth_and_no_honest_one()
     columns, _ = even_columns(virtual_flight("demo", 901).table)
     airframe, data = airframe_data(NAME), sensor_error_model(NAME)
     honest = reconstruct(columns, airframe, data)
-    assert not honest.claims[0].doubted
-    assert honest.claims[0].directions > 8
+    assert not honest.calibration_tests[0].rejected
+    assert honest.calibration_tests[0].directions > 8
     bold = reconstruct(columns, airframe, data.scaled(0.2))
-    assert bold.claims[0].doubted
-    assert any("claims less than this flight shows" in line for line in words(bold))
-    told = document(bold)["calibration"]
+    assert bold.calibration_tests[0].rejected
+    assert any("claims less than this flight shows" in line for line in compatibility_lines(bold))
+    told = compatibility_document(bold)["calibration"]
     assert isinstance(told, dict)
     assert told["all"]["doubted"]

@@ -12,11 +12,15 @@ from host.sysid.compatibility.flight_path import (
     GPS,
     HEIGHT,
     PathProblem,
-    Stretch,
+    Segment,
 )
 from host.sysid.compatibility.path_fit import fit_path
-from host.sysid.compatibility.path_preparation import prepare
-from host.sysid.compatibility.reconstruction import document, reconstruct, words
+from host.sysid.compatibility.path_preparation import prepare_path_problem
+from host.sysid.compatibility.reconstruction import (
+    compatibility_document,
+    compatibility_lines,
+    reconstruct,
+)
 from host.sysid.compatibility.strapdown import rotation, strapdown
 from host.sysid.flight.tables import even_columns
 from host.sysid.identification_error import IdentificationError
@@ -84,7 +88,7 @@ def test_slopes_are_those_of_finite_differences() -> None:
     t = np.arange(n)[:, None] * 0.01
     wave = np.sin(2.0 * np.pi * rng.uniform(0.3, 1.0, 6) * t + rng.uniform(0.0, 6.0, 6))
     outputs = (*AIR, HEIGHT, *GPS)
-    stretch = Stretch(
+    stretch = Segment(
         dt_s=0.01,
         rates=0.5 * wave[:, :3],
         force=3.0 * wave[:, 3:] + [0.5, 0.0, -9.5],
@@ -97,7 +101,7 @@ def test_slopes_are_those_of_finite_differences() -> None:
         vane_s2=1e-4,
     )
     columns, _ = flown(1)
-    names = prepare(columns, AIRFRAME, INSTRUMENT)[0].common
+    names = prepare_path_problem(columns, AIRFRAME, INSTRUMENT)[0].common
     prior = dict.fromkeys(names, (0.0, 0.01))
     problem = PathProblem([stretch], outputs, prior, np.full(6, 0.1), block)
     theta = problem.prior_mean
@@ -132,7 +136,7 @@ def test_errors_of_recorded_flights_are_inside_their_intervals() -> None:
         for name, value in true.items():
             finding = found[name]
             inside.append(abs(finding.value - value) < finding.half_width)
-            if finding.told:
+            if finding.data_informed:
                 told.add(name)
         assert abs(found["vane_delay_s"].value - true["vane_delay_s"]) < 0.003
     assert np.mean(inside) > 0.88
@@ -172,7 +176,7 @@ def test_gusts_do_not_pass_for_vanes_that_under_read() -> None:
     errors, faults = [], []
     for seed in (1, 2):
         columns, true = flown(seed)
-        problem, follows, _ = prepare(columns, AIRFRAME, unsure)
+        problem, follows, _ = prepare_path_problem(columns, AIRFRAME, unsure)
         place = problem.common.index("alpha_scale")
         fit = fit_path(problem, follows)
         errors.append(fit.theta[place] - true["alpha_scale"])
@@ -199,7 +203,7 @@ def test_a_surface_that_stands_still_tells_nothing_and_spoils_nothing() -> None:
 def test_every_axis_has_stretches_of_its_own() -> None:
     """Rolling is quick: judged by rates alone the elevator's minute is left out."""
     columns, _ = flown(1)
-    problem, _, _ = prepare(columns, AIRFRAME, INSTRUMENT)
+    problem, _, _ = prepare_path_problem(columns, AIRFRAME, INSTRUMENT)
     swing = np.array([np.std(s.rates, axis=0) for s in problem.stretches])
     flight = np.column_stack([columns[f"{a}_radps"] for a in "pqr"])
     parts = [flight[k : k + 1200] for k in range(0, len(flight) - 1200, 1200)]
@@ -212,7 +216,7 @@ def test_vanes_ahead_of_the_cg_feel_rotation_as_late_as_the_flow() -> None:
     """Where the drawing has them or found by the fit: the same vane."""
     t = np.arange(200)[:, None] * 0.01
     rates = 0.05 * np.sin(2.0 * np.pi * np.array([0.7, 0.9, 0.5]) * t)
-    stretch = Stretch(
+    stretch = Segment(
         dt_s=0.01,
         rates=rates,
         force=np.tile([0.98, -0.98, -9.66], (200, 1)),
@@ -250,12 +254,14 @@ def test_without_gps_the_pitot_scale_is_called_unobservable() -> None:
     found = reconstruct(alone, AIRFRAME, INSTRUMENT)
     scale = found["pitot_scale"]
     assert not found.gps
-    assert not scale.told
+    assert not scale.data_informed
     assert "unobservable without GPS" in scale.reason
     assert scale.half_width == pytest.approx(scale.prior_half_width)
     assert abs(found["vane_delay_s"].value - true["vane_delay_s"]) < 0.006
-    assert any("pitot_scale" in line and "without GPS" in line for line in words(found))
-    findings = document(found)["findings"]
+    assert any(
+        "pitot_scale" in line and "without GPS" in line for line in compatibility_lines(found)
+    )
+    findings = compatibility_document(found)["findings"]
     assert isinstance(findings, dict)
     assert findings["pitot_scale"]["told"] is False
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from host.sysid import LinearModel, Maneuver, Parameter, Term, fit
 from host.sysid.identification_error import IdentificationError
-from host.sysid.numerics.coloured_residuals import coloured_middle
+from host.sysid.numerics.coloured_residuals import coloured_score_covariance
 from host.sysid.numerics.differentiation import (
     bandwidth_hz,
     local_polynomial,
@@ -143,7 +143,9 @@ def test_middle_of_the_sandwich_is_that_of_direct_sums(samples: int) -> None:
     correlation = signal.correlate(residual, residual, method="direct") / samples
     correlation[np.abs(np.arange(1 - samples, samples)) > lags] = 0.0
     R = linalg.toeplitz(correlation[samples - 1 :])
-    np.testing.assert_allclose(coloured_middle(residual, slopes), slopes.T @ R @ slopes, rtol=1e-9)
+    np.testing.assert_allclose(
+        coloured_score_covariance(residual, slopes), slopes.T @ R @ slopes, rtol=1e-9
+    )
 
 
 def test_units_of_a_state_do_not_matter() -> None:

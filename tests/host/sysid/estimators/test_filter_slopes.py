@@ -7,8 +7,12 @@ from host.sysid.estimators.filter_error_gust import gust_model
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim, template
-from host.sysid.numerics.filter_problem import FilterProblem, Likelihood
-from host.sysid.numerics.filter_scoring import scoring, summed, whitened_slopes
+from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
+from host.sysid.numerics.filter_scoring import (
+    fisher_scoring,
+    total_information,
+    whitened_innovation_sensitivities,
+)
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 KNOWN = {"Z_alpha": -8.0, "M_alpha": -60.0, "M_q": -8.0, "M_de": -70.0, "Z_de": -0.5}
@@ -50,7 +54,7 @@ def vector(problem: FilterProblem) -> np.ndarray:
     return np.concatenate([theta, np.log([0.03, 0.3]), np.log(0.1 * deviation)])
 
 
-def known(point: Likelihood | None) -> Likelihood:
+def known(point: InnovationLikelihood | None) -> InnovationLikelihood:
     """Return a point that must be there."""
     assert point is not None
     return point
@@ -61,7 +65,7 @@ def test_gradient_and_information_are_those_of_differences() -> None:
     problem = FilterProblem(model, flown(model, (1, 2)), ("gust_rad", "airspeed_mps"))
     theta = vector(problem)
     here = known(problem.evaluate(theta))
-    information, gradient = summed(problem, theta, *scoring(problem, theta, here))
+    information, gradient = total_information(problem, theta, *fisher_scoring(problem, theta, here))
     size = np.sqrt(np.diag(information))
     white, spread, slope = [], [], []
     for k in range(len(theta)):
@@ -74,7 +78,9 @@ def test_gradient_and_information_are_those_of_differences() -> None:
         white.append(np.concatenate(moved).ravel())
         spread.append((W @ (up.S[0] - down.S[0]) @ W.T / (2.0 * width[k])).ravel())
     J, L = np.array(white), np.array(spread)
-    exact = np.vstack([s.reshape(-1, len(theta)) for s in whitened_slopes(problem, theta, here)])
+    exact = np.vstack(
+        [s.reshape(-1, len(theta)) for s in whitened_innovation_sensitivities(problem, theta, here)]
+    )
     np.testing.assert_allclose(exact / size, J.T / size, atol=1e-6)
     expected = J @ J.T + 0.5 * problem.inner.samples * L @ L.T
     expected[: problem.n_model, : problem.n_model] += np.diag(problem.inner.prior_precision)

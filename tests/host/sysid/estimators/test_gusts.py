@@ -8,7 +8,7 @@ from host.aircraft.gains import dimensional_gains
 from host.aircraft.linearisation import linearise
 from host.aircraft.mass_properties import Condition
 from host.sysid.estimators.filter_error import information_at
-from host.sysid.estimators.filter_error_gust import ROLLING
+from host.sysid.estimators.filter_error_gust import ROLL_GUST
 from host.sysid.numerics.filter_problem import FilterProblem, discrete_noise
 from scipy import linalg
 from studies.gusts import AXES, DT_S, fly, gusty_aircraft, spectrum
@@ -111,5 +111,5 @@ def test_process_noise_of_the_twin_is_what_its_formulas_say() -> None:
     P = linalg.solve_continuous_lyapunov(A, -np.diag([air.angle**2, 0.0]))
     view = np.array([np.sqrt(3.0), 1.0 - np.sqrt(3.0)])
     assert view @ P @ view * V**2 == pytest.approx(1.0, rel=1e-6)
-    assert ROLLING in fitted_model("lateral").states
+    assert ROLL_GUST in fitted_model("lateral").states
     assert DT_S * rate < 0.1

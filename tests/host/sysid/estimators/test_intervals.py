@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.sysid import fit
-from host.sysid.numerics.ar_noise import choose_order, lagged_moments, regress, stabilised
+from host.sysid.numerics.ar_noise import choose_order, fit_ar, lagged_moments, stabilise
 from scipy import signal
 from studies.aircraft import navion_structured
 from studies.coverage import NOISES, coloured_noise, run_case
@@ -16,7 +16,7 @@ def test_regression_finds_the_coefficients_of_a_long_record() -> None:
         series = coloured_noise(rng, coefficient, 40000, np.ones(1))[:, 0]
         moments = lagged_moments([series], [np.zeros((len(series), 1))], 6)
         assert choose_order(moments, len(series)) == len(coefficient)
-        found, _ = regress(moments, len(coefficient))
+        found, _ = fit_ar(moments, len(coefficient))
         np.testing.assert_allclose(found, coefficient, atol=0.02)
 
 
@@ -36,7 +36,7 @@ def test_given_back_moments_remove_the_bias_of_residuals() -> None:
         noise = coloured_noise(rng, np.array([0.8]), 120, np.ones(1))[:, 0]
         residual = noise - Q @ (Q.T @ noise)
         none = np.zeros((120, 1))
-        raw.append(regress(lagged_moments([residual], [none], 1), 1)[0][0])
+        raw.append(fit_ar(lagged_moments([residual], [none], 1), 1)[0][0])
         a = raw[-1]
         for _ in range(8):
             white_Q = Q[1:] - a * Q[:-1]
@@ -45,14 +45,14 @@ def test_given_back_moments_remove_the_bias_of_residuals() -> None:
             shift = covariance @ white_Q.T @ white_r
             variance = np.mean((white_r - white_Q @ shift) ** 2)
             share = Q @ np.linalg.cholesky(variance * covariance)
-            a = regress(lagged_moments([residual - Q @ shift], [share], 1), 1)[0][0]
+            a = fit_ar(lagged_moments([residual - Q @ shift], [share], 1), 1)[0][0]
         corrected.append(a)
     assert np.mean(raw) < 0.70
     assert np.mean(corrected) > 0.74  # what remains is the bias of 120 samples: (1 + 3a)/N = 0.03
 
 
 def test_poles_are_kept_inside_the_circle() -> None:
-    inside = stabilised(np.array([2.5, -1.4]))
+    inside = stabilise(np.array([2.5, -1.4]))
     assert np.max(np.abs(np.roots(np.concatenate([[1.0], -inside])))) < 1.0
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.sysid import FitResult, Maneuver, fit, methods
 from host.sysid.estimators.frequency_domain import transform
-from host.sysid.estimators.kalman import inflation
+from host.sysid.estimators.kalman import innovation_inflation
 from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.output_error import minimise
@@ -220,11 +220,13 @@ def test_kalman_filters_say_when_their_noise_model_is_wrong() -> None:
 def test_inflation_is_power_times_the_time_a_correlation_lasts() -> None:
     rng = np.random.default_rng(4)
     white = rng.standard_normal((20000, 2))
-    assert inflation([white]) == pytest.approx(1.0, abs=0.05)
-    assert inflation([2.0 * white[:9000], 2.0 * white[9000:]]) == pytest.approx(4.0, rel=0.05)
+    assert innovation_inflation([white]) == pytest.approx(1.0, abs=0.05)
+    assert innovation_inflation([2.0 * white[:9000], 2.0 * white[9000:]]) == pytest.approx(
+        4.0, rel=0.05
+    )
     slow = signal.lfilter([1.0], [1.0, -0.8], white, axis=0)
     # Of an AR(1) process: its variance times (1 + a) / (1 - a), which is 1 / (1 - a)^2.
-    assert inflation([slow]) == pytest.approx(25.0, rel=0.15)
+    assert innovation_inflation([slow]) == pytest.approx(25.0, rel=0.15)
 
 
 def test_genetic_search_finds_the_valley_from_far_away() -> None:

@@ -1,7 +1,7 @@
 """Intervals widened by what neighbouring scores have in common."""
 
 import numpy as np
-from host.sysid.estimators.hac_inflation import misfit_factor, widened_names
+from host.sysid.estimators.hac_inflation import hac_inflation, inflation_lines
 from scipy import signal
 from studies.gusts import fly, gusty_aircraft
 from studies.turbulence import fit_both, linear_setup
@@ -16,7 +16,7 @@ def _factor(memory: float, rng: np.random.Generator) -> tuple[np.ndarray, np.nda
     inverse = np.linalg.inv(x.T @ x)
     miss = inverse @ x.T @ noise
     left = noise - x @ miss
-    factor = misfit_factor([x[:, None, :]], [left[:, None]], [DT_S], inverse)
+    factor = hac_inflation([x[:, None, :]], [left[:, None]], [DT_S], inverse)
     return factor, miss / np.sqrt(np.diag(inverse))
 
 
@@ -48,7 +48,7 @@ def test_what_was_widened_is_named() -> None:
     model = gusty_aircraft().models["longitudinal"]
     names = [p.name for p in model.parameters]
     factor = np.ones(len(names) + 5)
-    assert widened_names(model, factor) == []
+    assert inflation_lines(model, factor) == []
     factor[names.index("Cm_alpha")] = 1.44
-    (said,) = widened_names(model, factor)
+    (said,) = inflation_lines(model, factor)
     assert "widened Cm_alpha 1.4 times" in said

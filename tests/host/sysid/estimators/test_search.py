@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from host.arrays import Array
 from host.sysid.estimators import multistart as searching
-from host.sysid.estimators.homotopy import following_start, led_model
-from host.sysid.estimators.multistart import search, white_cost
+from host.sysid.estimators.homotopy import homotopy_start, stabilised_model
+from host.sysid.estimators.multistart import multistart, white_cost
 from host.sysid.estimators.start_values import start_values
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
@@ -73,7 +73,7 @@ def test_wrong_valleys_are_left(number: int) -> None:
     problem, truth = drawn(number)
     reference = minimise(problem, truth, max_iterations=200)
     first = minimise(problem, start_values(problem))
-    found = search(problem, start_values(problem))
+    found = multistart(problem, start_values(problem))
     assert first.cost > reference.cost + 100.0
     assert found.cost < reference.cost + 5.0
 
@@ -86,7 +86,7 @@ def test_a_converged_search_in_a_flat_valley_is_led_to_a_deeper_one(number: int)
     problem, truth = drawn(number, seed=7)
     first = minimise(problem, start_values(problem))
     reference = minimise(problem, truth, max_iterations=200)
-    found = search(problem, start_values(problem))
+    found = multistart(problem, start_values(problem))
     assert first.converged
     assert first.cost > reference.cost + 30.0
     assert found.converged
@@ -97,10 +97,10 @@ def test_a_led_model_forgets_its_start_and_ends_where_the_free_one_does() -> Non
     problem, truth = drawn(0)
     wild = truth.copy()
     wild[:16] = 50.0 * np.eye(4).ravel()
-    led = following_start(problem, wild, (100.0, 20.0, 5.0, 1.0))
+    led = homotopy_start(problem, wild, (100.0, 20.0, 5.0, 1.0))
     found = minimise(problem, led)
     assert found.cost < white_cost(problem, truth)
-    model = led_model(problem.model, 3.0)
+    model = stabilised_model(problem.model, 3.0)
     A, B, _, _ = model.matrices(truth[:20])
     np.testing.assert_allclose(A, truth[:16].reshape(4, 4) - 3.0 * np.eye(4))
     np.testing.assert_allclose(B[:, 1:], 3.0 * np.eye(4))
@@ -116,7 +116,7 @@ def test_a_good_search_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(searching, "minimise", counted)
     problem = OutputProblem(navion_free(), [noisy(2, 0.01)])
-    assert search(problem, start_values(problem)).converged
+    assert multistart(problem, start_values(problem)).converged
     assert len(calls) == 1
 
 
@@ -126,7 +126,7 @@ def test_a_start_that_diverges_is_replaced_where_the_states_are_seen() -> None:
     wild[:16] = 50.0 * np.eye(4).ravel()
     with pytest.raises(IdentificationError, match="diverges"):
         minimise(problem, wild)
-    found = search(problem, wild)
+    found = multistart(problem, wild)
     assert found.cost < white_cost(problem, truth)
     blind = LinearModel(
         name="unseen",
@@ -141,4 +141,4 @@ def test_a_start_that_diverges_is_replaced_where_the_states_are_seen() -> None:
     )
     data = Maneuver(DT_S, problem.maneuvers[0].inputs, problem.maneuvers[0].outputs[:, :1])
     with pytest.raises(IdentificationError, match="diverges"):
-        search(OutputProblem(blind, [data]), np.ones(2))
+        multistart(OutputProblem(blind, [data]), np.ones(2))

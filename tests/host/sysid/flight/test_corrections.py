@@ -17,12 +17,12 @@ from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.answer.verdict import model_lines, words
 from host.sysid.compatibility.reconstruction import Compatibility, Finding, reconstruct
 from host.sysid.compatibility.sensor_corrections import (
-    IN_COLUMNS,
+    INSTANTANEOUS_ERRORS,
+    advance_delayed,
+    correct_columns,
     corrections,
-    deviations,
-    pressure_part,
-    without_delays,
-    without_errors,
+    pressure_share,
+    residual_deviations,
 )
 from host.sysid.flight import linear, linear_model
 from host.sysid.flight.carried import carried, systematic_error_shifts
@@ -68,7 +68,7 @@ def test_an_instrument_that_errs_is_put_right_to_the_digit() -> None:
     """Sensors by their own formula: turned axes, then scale and bias; V squared for the pitot."""
     true = motion()
     rng = np.random.default_rng(3)
-    errors = {name: float(rng.uniform(-0.02, 0.02)) for name in IN_COLUMNS}
+    errors = {name: float(rng.uniform(-0.02, 0.02)) for name in INSTANTANEOUS_ERRORS}
     errors["pitot_zero_pa"] = 3.0
     measured = dict(true)
     x, y, z = (errors[f"imu_tilt_{a}_rad"] for a in "xyz")
@@ -86,7 +86,7 @@ def test_an_instrument_that_errs_is_put_right_to_the_digit() -> None:
     measured["qbar_pa"] = pitot * true["qbar_pa"] + errors["pitot_zero_pa"]
     measured["density_kgpm3"] = true["density_kgpm3"] / thin
     measured["airspeed_mps"] = np.sqrt(2.0 * measured["qbar_pa"] / measured["density_kgpm3"])
-    back = without_errors(measured, errors, part)
+    back = correct_columns(measured, errors, part)
     for name, values in true.items():
         tolerance = 2e-4 if name in ("airspeed_mps", "qbar_pa", "density_kgpm3") else 1e-12
         np.testing.assert_allclose(back[name], values, rtol=tolerance, atol=1e-12, err_msg=name)
@@ -105,18 +105,18 @@ def test_only_what_is_told_is_taken_out() -> None:
         gps=True,
     )
     assert [c.name for c in corrections(found)] == ["gyro_scale_x"]
-    left = deviations(found)
+    left = residual_deviations(found)
     assert left["gyro_scale_x"] == pytest.approx(0.003 / 1.96, rel=1e-3)
     assert left["alpha_scale"] == pytest.approx(0.0288 / 1.96, rel=1e-3)
     assert "wind_north_mps" not in left
     # 3 % of pitot, evenly, two of them, against 1 % of density.
-    assert pressure_part(found) == pytest.approx(0.6, abs=0.01)
+    assert pressure_share(found) == pytest.approx(0.6, abs=0.01)
 
 
 def test_a_late_vane_is_read_later() -> None:
     t = np.arange(0.0, 2.0, 0.01)
     columns = {"t_s": t, "alpha_rad": np.sin(3.0 * (t - 0.012)), "airspeed_mps": np.cos(t)}
-    back = without_delays(columns, {"vane_delay_s": 0.012})
+    back = advance_delayed(columns, {"vane_delay_s": 0.012})
     np.testing.assert_allclose(back["alpha_rad"][:-3], np.sin(3.0 * t)[:-3], atol=2e-4)
     np.testing.assert_array_equal(back["airspeed_mps"], columns["airspeed_mps"])
 
@@ -160,7 +160,7 @@ def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
     }
     assert set(moved) == set(size)
     for error, deviation in size.items():
-        other = without_errors(columns, {error: deviation}, pressure_part(found))
+        other = correct_columns(columns, {error: deviation}, pressure_share(found))
         bent = Trim(
             float(other["airspeed_mps"].mean()), float(other["alpha_rad"].mean()), trim.theta_rad
         )
@@ -173,7 +173,7 @@ def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
         np.testing.assert_allclose(
             step / result.estimate[:6], expected / result.estimate[:6], atol=0.1 * largest
         )
-    assert moved["pitot_scale"].qbar_gain == pytest.approx(1.0 - 0.02 * pressure_part(found), 1e-3)
+    assert moved["pitot_scale"].qbar_gain == pytest.approx(1.0 - 0.02 * pressure_share(found), 1e-3)
     wide = carried(result, tuple(moved.values()))
     k = result.index("M_alpha")
     expected_half = np.hypot(

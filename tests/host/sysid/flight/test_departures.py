@@ -11,7 +11,7 @@ from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.estimators.start_values import regressed, start_values
+from host.sysid.estimators.start_values import regression_estimates, start_values
 from host.sysid.flight import linear
 from host.sysid.flight.departures import spin_of
 from host.sysid.flight.finder import Found
@@ -102,7 +102,7 @@ def test_equation_error_gives_the_start_though_places_and_delays_are_free(
     found = windows(maneuvers)
     flown = flown_maneuvers([reconstructed(columns, found)], [found])
     cut = [m.cut(full) for m in flown]
-    told = regressed(full, cut)
+    told = regression_estimates(full, cut)
     assert "imu_x_m" not in told
     airframe, qbar = bare(), float(np.mean(columns["qbar_pa"]))
     about = qbar * airframe.wing_area_m2 * airframe.span_m / airframe.ixx_kgm2 * truth["Cl_da"]

@@ -10,14 +10,14 @@ from host.sysid.answer.json_document import answer_document
 from host.sysid.answer.verdict import model_lines, words
 from host.sysid.flight.linear import Answer
 from host.sysid.models.diagnostics import (
-    CANNOT,
-    DOUBTFUL,
+    NOT_IDENTIFIABLE,
+    WEAKLY_IDENTIFIABLE,
+    assess_identifiability,
+    bound_exceedance_probability,
     collinearity,
     constant_inputs,
-    exceedance,
-    judge,
-    references,
-    refusals,
+    identifiability_flags,
+    reference_values,
     signal_fits,
     thesis_program_error_percent,
     thesis_sum_of_mean_errors,
@@ -64,16 +64,17 @@ def test_thesis_figures_show_what_the_second_division_hides() -> None:
 
 def test_navion_is_answered_and_the_thesis_example_is_refused() -> None:
     result = fit("output-error", navion_structured(), [noisy(3, 0.01)])
-    assert refusals(result, [noisy(3, 0.01)]) == ()
+    assert identifiability_flags(result, [noisy(3, 0.01)]) == ()
     still = noisy(3, 0.01, duration_s=2.0)  # one second of motion: too little for the slow mode
     short = fit("output-error", navion_structured(), [still])
-    named = {r.name for r in refusals(short, [still])}
+    named = {r.name for r in identifiability_flags(short, [still])}
     assert "X_alpha" in named
     assert "M_de" not in named
 
 
 @pytest.mark.parametrize(
-    ("ratio", "grade"), [(0.7, CANNOT), (1.2, DOUBTFUL), (1.6, DOUBTFUL), (3.0, None)]
+    ("ratio", "grade"),
+    [(0.7, NOT_IDENTIFIABLE), (1.2, WEAKLY_IDENTIFIABLE), (1.6, WEAKLY_IDENTIFIABLE), (3.0, None)],
 )
 def test_probability_of_exceeding_is_that_of_a_normal_value_over_its_bound(
     ratio: float, grade: str | None
@@ -86,13 +87,13 @@ def test_probability_of_exceeding_is_that_of_a_normal_value_over_its_bound(
     covariance[k, :] = covariance[:, k] = 0.0
     covariance[k, k] = (result.estimate[k] / ratio) ** 2
     doubted = replace(result, covariance=covariance)
-    single, any_of_them = exceedance(doubted, [maneuver])
+    single, any_of_them = bound_exceedance_probability(doubted, [maneuver])
     # The prior pulls it a little: three times the whole state rate, here about its own size.
     expected = stats.norm.cdf(1.0 - ratio) - stats.norm.cdf(-1.0 - ratio)
     assert single[k] == pytest.approx(expected, abs=0.1)
     assert any_of_them == pytest.approx(float(single[k]), abs=0.03)
-    found = judge(doubted, [maneuver])
-    assert found.refused == (grade == CANNOT)
+    found = assess_identifiability(doubted, [maneuver])
+    assert found.refused == (grade == NOT_IDENTIFIABLE)
     assert {r.name: r.grade for r in found.named} == ({"Z_alpha": grade} if grade else {})
     for named in found.named:
         assert named.probability == pytest.approx(float(single[k]))
@@ -115,10 +116,10 @@ def test_collinear_parameters_are_named_with_their_partner_and_grade() -> None:
         parameters=(*one.parameters, Parameter("M_tab", 0.0)),
     )
     doubled = Maneuver(maneuver.dt_s, np.hstack([maneuver.inputs, twin]), maneuver.outputs)
-    found = judge(fit("output-error", two, [doubled]), [doubled])
+    found = assess_identifiability(fit("output-error", two, [doubled]), [doubled])
     named = {r.name: r for r in found.named}
     assert found.refused
-    assert {"M_de", "M_tab"} <= set(found.names(CANNOT))
+    assert {"M_de", "M_tab"} <= set(found.names(NOT_IDENTIFIABLE))
     assert "moves together with M_de" in named["M_tab"].reason
     assert "Z_alpha" not in named
 
@@ -126,8 +127,8 @@ def test_collinear_parameters_are_named_with_their_partner_and_grade() -> None:
 def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
     maneuver = noisy(3, 0.01, duration_s=2.0)
     result = fit("output-error", navion_structured(), [maneuver])
-    found = judge(result, [maneuver])
-    cannot, doubtful = found.names(CANNOT), found.names(DOUBTFUL)
+    found = assess_identifiability(result, [maneuver])
+    cannot, doubtful = found.names(NOT_IDENTIFIABLE), found.names(WEAKLY_IDENTIFIABLE)
     assert cannot
     assert doubtful
     answer = Answer(
@@ -153,14 +154,14 @@ def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
     table = model_lines(answer)
     document = answer_document(answer, text)
     for named in found.named:
-        warning = "do not use" if named.grade == CANNOT else "doubtful,"
+        warning = "do not use" if named.grade == NOT_IDENTIFIABLE else "doubtful,"
         assert f"  {warning} {named.name}: {named.reason}" in text
         assert any(line.split()[0] == named.name and named.grade in line for line in table)
     told = next(line for line in text if "trust (" in line)
     assert not set(cannot + doubtful) & {w.strip(",") for w in told.split()}
     assert {r["name"]: r["grade"] for r in document["refused"]} == {
-        **dict.fromkeys(cannot, CANNOT),
-        **dict.fromkeys(doubtful, DOUBTFUL),
+        **dict.fromkeys(cannot, NOT_IDENTIFIABLE),
+        **dict.fromkeys(doubtful, WEAKLY_IDENTIFIABLE),
     }
     assert all(0.05 < r["probability"] <= 1.0 for r in document["refused"])
 
@@ -170,14 +171,14 @@ def test_small_parameters_are_measured_by_what_would_matter() -> None:
     A, B = navion()
     theta = np.concatenate([A.ravel(), B.ravel()])
     maneuver = noisy(4, 0.01, snr=1e6)
-    reference = references(model, [maneuver], theta)
+    reference = reference_values(model, [maneuver], theta)
     spread = np.std(np.hstack([maneuver.outputs, maneuver.inputs]), axis=0)
     largest = np.max(np.abs(np.concatenate([A[0], B[0]])) * spread)
     assert reference[model.parameter_names.index("b11")] == pytest.approx(
         0.05 * largest / spread[4], rel=1e-3
     )
     assert reference[model.parameter_names.index("a33")] == pytest.approx(abs(A[2, 2]))
-    plain = references(model, [maneuver], theta, small_share=0.0)
+    plain = reference_values(model, [maneuver], theta, small_share=0.0)
     np.testing.assert_array_equal(plain, np.abs(theta))
 
 

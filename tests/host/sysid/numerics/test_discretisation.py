@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import DelayGroup, LinearModel, Parameter, Term
-from host.sysid.numerics.ar_noise import OutputNoise, ar_filter, autocovariance
-from host.sysid.numerics.fractional_delay import delayed
+from host.sysid.numerics.ar_noise import ArNoise, ar_filter, autocovariance
+from host.sysid.numerics.fractional_delay import delay_columns
 from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import signal
 
@@ -116,7 +116,7 @@ def test_delay_of_a_cubic_is_exact_and_its_slope_too() -> None:
     time = np.arange(40.0)
     cubic = (0.1 * time**3 - time**2 + 3.0)[:, None]
     for shift in (0.0, 0.3, 1.7, -2.4):
-        late, slope = delayed(cubic, shift)
+        late, slope = delay_columns(cubic, shift)
         t = time - shift
         np.testing.assert_allclose(late[:, 0], 0.1 * t**3 - t**2 + 3.0, rtol=1e-10, atol=1e-9)
         np.testing.assert_allclose(slope[:, 0], -(0.3 * t**2 - 2.0 * t), rtol=1e-9, atol=1e-8)
@@ -124,7 +124,7 @@ def test_delay_of_a_cubic_is_exact_and_its_slope_too() -> None:
 
 def test_whitening_turns_the_ar_covariance_into_the_identity() -> None:
     coefficient = np.array([1.2, -0.6, 0.1])
-    memory = OutputNoise.from_coefficient(coefficient)
+    memory = ArNoise.from_coefficient(coefficient)
     samples = 12
     covariance = np.array(
         [

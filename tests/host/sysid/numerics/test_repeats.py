@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.sysid import FitResult, Maneuver, fit
-from host.sysid.numerics.maneuver_agreement import repeats, widened
+from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
 from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_structured
 from studies.data import TRUTH, noisy
@@ -29,7 +29,7 @@ def flown(seed: int, spread: float, count: int = 5, method: str = "output-error"
 
 
 def test_maneuvers_of_one_aircraft_agree_as_often_as_chi_square_says() -> None:
-    found = [repeats(flown(seed, 0.0)) for seed in range(40)]
+    found = [maneuver_agreement(flown(seed, 0.0)) for seed in range(40)]
     p = np.array([f.p_value for f in found if f is not None])
     assert p.shape == (40, len(TRUTH))
     # 360 values, nine of a flight correlated: three deviations of a share of 0.1 and of 0.5.
@@ -41,9 +41,9 @@ def test_maneuvers_of_one_aircraft_agree_as_often_as_chi_square_says() -> None:
 @pytest.mark.parametrize("method", ["output-error", "output-error-white", "filter-error"])
 def test_an_aircraft_that_changes_is_named_and_its_interval_widened(method: str) -> None:
     result = flown(0, 0.1, method=method)
-    found = repeats(result)
+    found = maneuver_agreement(result)
     assert found is not None
-    wide = widened(result, found)
+    wide = inflate_covariance(result, found)
     assert found.p_value[PLACE] < 1e-3
     assert found.factor[PLACE] > 2.0
     assert wide.standard_error[PLACE] == pytest.approx(
@@ -61,12 +61,14 @@ def test_widened_intervals_hold_the_mean_where_plain_ones_do_not() -> None:
         result = flown(seed, 0.1, count=6)
         off = abs(result.value("M_alpha") - TRUTH[PLACE])
         plain.append(off < result.half_width()[PLACE])
-        wide.append(off < widened(result, repeats(result)).half_width()[PLACE])
+        wide.append(
+            off < inflate_covariance(result, maneuver_agreement(result)).half_width()[PLACE]
+        )
     assert np.mean(plain) < 0.75
     assert np.mean(wide) > 0.85
 
 
 def test_one_maneuver_says_nothing_of_scatter() -> None:
     result = fit("output-error", MODEL.with_start(TRUTH), [noisy(1, 0.05)])
-    assert repeats(result) is None
-    assert widened(result, None) is result
+    assert maneuver_agreement(result) is None
+    assert inflate_covariance(result, None) is result

@@ -9,11 +9,11 @@ from host.sysid import LinearModel, Maneuver, Parameter, Term, fit
 from host.sysid.models.modal_analysis import modes_of
 from host.sysid.models.state_space_model import DelayGroup
 from host.sysid.numerics.ar_noise import (
-    OutputNoise,
+    ArNoise,
     autocovariance,
     choose_order,
+    fit_ar,
     lagged_moments,
-    regress,
 )
 from host.sysid.numerics.filter_problem import FilterProblem, discrete_noise
 from host.sysid.numerics.output_error_problem import OutputProblem
@@ -42,7 +42,7 @@ def moments_of(e: np.ndarray, order: int) -> np.ndarray:
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_noise_model_is_the_autoregression_of_statsmodels(order: int) -> None:
     e = coloured(31, 800)
-    ours, innovation = regress(moments_of(e, order), order)
+    ours, innovation = fit_ar(moments_of(e, order), order)
     peer = AutoReg(e, order, trend="n").fit()
     np.testing.assert_allclose(ours, peer.params, rtol=1e-8)
     assert innovation == pytest.approx(float(peer.resid @ peer.resid), rel=1e-8)
@@ -71,7 +71,7 @@ def test_autocovariance_is_that_of_statsmodels() -> None:
 @pytest.mark.parametrize("coefficient", [[0.9], [1.6, -0.8], [0.3, 0.2, -0.4]])
 def test_whitened_likelihood_is_the_exact_one_of_statsmodels(coefficient: list[float]) -> None:
     e = coloured(33, 300, np.array(coefficient))
-    noise = OutputNoise.from_coefficient(np.array(coefficient))
+    noise = ArNoise.from_coefficient(np.array(coefficient))
     white, variance = noise.whiten(e[:, None])[:, 0], 1.7
     ours = -0.5 * (
         len(e) * np.log(2.0 * np.pi * variance)

@@ -5,7 +5,7 @@ import pytest
 import statsmodels.api as sm
 from host.sysid import FitResult, LinearModel, Maneuver, Parameter, Term, fit
 from host.sysid.estimators.recursive import START_VARIANCE, update
-from host.sysid.estimators.regression import regression_rows
+from host.sysid.estimators.regression import regression_equations
 from host.sysid.estimators.stepwise import F_IN, GAIN_LIMIT, choose_terms
 from host.sysid.models.diagnostics import signal_fits, whiteness
 from scipy import linalg, signal
@@ -232,9 +232,9 @@ def test_r_squared_is_that_of_statsmodels() -> None:
     assert figures.nrmse == pytest.approx(np.sqrt(1.0 - peer.rsquared), rel=1e-12)
 
 
-def test_regression_rows_are_the_rows_of_the_design() -> None:
+def test_regression_equations_are_the_rows_of_the_design() -> None:
     maneuver = with_rates(30, snr=10.0)
-    names, rows = regression_rows(navion_free(), [maneuver])
+    names, rows = regression_equations(navion_free(), [maneuver])
     X, y = design(maneuver)
     pitch = next(row for row in rows if row.label == "q_radps")
     np.testing.assert_allclose(pitch.regressors[:, [names.index(n) for n in PITCH]], X)

@@ -15,7 +15,7 @@ from host.aircraft.gains import dimensional_name, from_dimensional
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
 from host.instrument.words import IN_WORDS
-from host.sysid.models.consider_covariance import main_cause, systematic_covariance
+from host.sysid.models.consider_covariance import consider_covariance, dominant_error_source
 from host.sysid.models.fit_result import NORMAL_95, FitResult
 from host.sysid.models.templates import Trim
 
@@ -119,7 +119,7 @@ def coefficients(
             float(value[k]),
             float(fit_error[k]),
             float(half[k]),
-            main_cause(
+            dominant_error_source(
                 {cause: float(part[k]) for cause, part in parts.items()},
                 float(fit_error[k] ** 2 + extra[k]),
             ),
@@ -134,10 +134,10 @@ def _variances(assumed: dict[str, Array], sensed: dict[str, list[Array]]) -> dic
     Errors of pitot and vanes are what pressure and upwash allow for: the larger counts.
     """
     found = {
-        cause: np.diag(systematic_covariance(np.stack(shifts))) for cause, shifts in sensed.items()
+        cause: np.diag(consider_covariance(np.stack(shifts))) for cause, shifts in sensed.items()
     }
     for cause, shift in assumed.items():
-        allowed = np.diag(systematic_covariance(shift[None]))
+        allowed = np.diag(consider_covariance(shift[None]))
         found[cause] = np.maximum(allowed, found.get(cause, 0.0))
     return found
 

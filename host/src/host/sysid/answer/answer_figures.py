@@ -25,9 +25,9 @@ from host.sysid.answer.mat_file import labels
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.answer.verdict import not_relied_on
-from host.sysid.compatibility.inverse_sensor_model import THIN_HZ
+from host.sysid.compatibility.inverse_sensor_model import FIT_RATE_HZ
 from host.sysid.flight.linear import Answer
-from host.sysid.models.diagnostics import references
+from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def draw(answer: Answer, name: str) -> dict[str, Figure]:
     title = f"{answer.template}, {answer.method}: measured (grey), {kind} (red)"
     loose = not_relied_on(answer)
     half = result.half_width()
-    size = references(answer.model, answer.maneuvers, result.estimate)
+    size = reference_values(answer.model, answer.maneuvers, result.estimate)
     bars = [
         Bar(
             f"{label}, {unit}" if (unit := parameter_unit(answer.model, label)) != "1" else label,
@@ -142,7 +142,7 @@ def draw_coefficients(
         If matplotlib is missing.
     """
     signals = {
-        name: [Trace(np.arange(len(trace.model)) / THIN_HZ, trace.measured, trace.model)]
+        name: [Trace(np.arange(len(trace.model)) / FIT_RATE_HZ, trace.measured, trace.model)]
         for name, trace in answer.fit.traces.items()
     }
     true: dict[str, float] = {}

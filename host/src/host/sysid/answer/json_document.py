@@ -21,7 +21,7 @@ from host.sysid.models.modal_analysis import Mode
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
     from host.sysid.coefficients.deletion_diagnostics import Prediction
-    from host.sysid.numerics.maneuver_agreement import Repeats
+    from host.sysid.numerics.maneuver_agreement import ManeuverAgreement
 
 
 def json_text(document: Mapping[str, Any]) -> str:
@@ -162,7 +162,7 @@ def _prediction_document(found: Prediction | None) -> dict[str, Any] | None:
     }
 
 
-def _repeats_document(found: Repeats) -> dict[str, Any]:
+def _repeats_document(found: ManeuverAgreement) -> dict[str, Any]:
     """Return how the maneuvers scatter about the joint answer, where that can be judged."""
     return {
         name: {

@@ -13,7 +13,7 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.answer.atomic_files import whole
 from host.sysid.answer.parameter_units import parameter_unit
-from host.sysid.compatibility.inverse_sensor_model import THIN_HZ
+from host.sysid.compatibility.inverse_sensor_model import FIT_RATE_HZ
 from host.sysid.flight.linear import Answer
 from host.sysid.models.modal_analysis import Mode
 
@@ -136,7 +136,7 @@ def _coefficients(answer: CoefficientAnswer) -> dict[str, Any]:
         "modes": _modes(answer.modes),
         "histories": {
             name: {
-                "t_s": np.arange(len(trace.model)) / THIN_HZ,
+                "t_s": np.arange(len(trace.model)) / FIT_RATE_HZ,
                 "measured": trace.measured,
                 "fitted": trace.model,
             }

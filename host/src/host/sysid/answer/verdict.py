@@ -13,10 +13,10 @@ import numpy as np
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.coefficients.coefficient_model import standard_model
-from host.sysid.compatibility.sensor_corrections import correction_words
+from host.sysid.compatibility.sensor_corrections import correction_lines
 from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer, from_zero
-from host.sysid.models.diagnostics import CANNOT, references
+from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.residual_delays import DELAYS
 
@@ -94,7 +94,7 @@ def words(answers: Sequence[Answer | CoefficientAnswer], notes: Sequence[str]) -
 
 def taken_out(answers: Sequence[Answer]) -> list[str]:
     """Return which errors of sensors were taken out of the columns of linear fits."""
-    return correction_words(answers[0].corrections) if answers else []
+    return correction_lines(answers[0].corrections) if answers else []
 
 
 def _headed(marks: Mapping[str, str], mark: str) -> list[str]:
@@ -114,7 +114,7 @@ def _linear_verdict(answer: Answer) -> Verdict:
     result = answer.result
     half = result.half_width()
     refused = {r.name for r in answer.refused}
-    size = references(answer.model, answer.maneuvers, result.estimate)
+    size = reference_values(answer.model, answer.maneuvers, result.estimate)
     lost = unpredicted(answer)
     doubted = _entries_of(answer, lost)
     both = _of_both(answer)
@@ -132,7 +132,7 @@ def _linear_verdict(answer: Answer) -> Verdict:
             marks[name] = USELESS
         elif name in refused:
             grade = next(r.grade for r in answer.refused if r.name == name)
-            marks[name] = USELESS if grade == CANNOT else UNSURE
+            marks[name] = USELESS if grade == NOT_IDENTIFIABLE else UNSURE
         elif half[k] == 0.0 or name in doubted or name in both:  # on a bound: warned of
             marks[name] = UNSURE
         elif share <= FAIR and size[k] > abs(float(result.estimate[k])):
@@ -164,7 +164,7 @@ def _refusals(answer: Answer) -> list[str]:
     lines = []
     for refusal in answer.refused:
         if not refusal.name.startswith("imu_"):
-            warning = "do not use" if refusal.grade == CANNOT else "doubtful,"
+            warning = "do not use" if refusal.grade == NOT_IDENTIFIABLE else "doubtful,"
             lines.append(f"  {warning} {refusal.name}: {refusal.reason}")
     flights = {
         NEEDS[r.name.split("_")[-1]] for r in answer.refused if r.name.split("_")[-1] in NEEDS
@@ -272,9 +272,9 @@ def _why(answer: Answer, states: Sequence[str]) -> str:
 def not_relied_on(answer: Answer) -> set[str]:
     """Return the parameters that the verdict does not let a reader use."""
     half = answer.result.half_width()
-    size = references(answer.model, answer.maneuvers, answer.result.estimate)
+    size = reference_values(answer.model, answer.maneuvers, answer.result.estimate)
     wide = {p.name for k, p in enumerate(answer.model.parameters) if half[k] > FAIR * size[k]}
-    refused = {r.name for r in answer.refused if r.grade == CANNOT}
+    refused = {r.name for r in answer.refused if r.grade == NOT_IDENTIFIABLE}
     return wide | refused | _entries_of(answer, unpredicted(answer))
 
 

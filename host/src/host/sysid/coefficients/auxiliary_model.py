@@ -16,10 +16,10 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
 from host.sysid.coefficients.aero_equations import Flown
-from host.sysid.compatibility.inverse_sensor_model import BLEND_RADPS, Record
+from host.sysid.compatibility.inverse_sensor_model import ATTITUDE_CROSSOVER_RADPS, Record
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.templates import GRAVITY_MPS2
-from host.sysid.numerics.discretisation import transition
+from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.recursion import simulate
 
 LEVELLING_PERS = 0.3  # the pilot brings the wings back
@@ -33,7 +33,7 @@ def _simulate(A: Array, B: Array, inputs: Array, dt_s: float) -> Array:
     n, m = B.shape
     AB = np.hstack([A, B, np.zeros((n, 1))])
     none = np.zeros(0, dtype=np.int64)
-    step, _ = transition(AB, n, m, False, dt_s, none, none, none, np.zeros(0), 0)
+    step, _ = discretise(AB, n, m, False, dt_s, none, none, none, np.zeros(0), 0)
     drive = np.hstack([middle, np.ones((len(middle), 1))])
     finite, states = simulate(step, drive, np.zeros(n))
     if not finite:
@@ -73,7 +73,7 @@ def gust_free(
     S, b, c = a.wing_area_m2, a.span_m, a.chord_m
     lift = qbar * S / (a.mass_kg * V)
     pitch, hat_q, hat_p = qbar * S * c / a.iyy_kgm2, 0.5 * c / V, 0.5 * b / V
-    fast = jw / (jw + BLEND_RADPS)  # slow trim changes leave the linear model
+    fast = jw / (jw + ATTITUDE_CROSSOVER_RADPS)  # slow trim changes leave the linear model
     de, da, dr = (record.passed(s[k], fast) for k in ("de", "da", "dr"))
     short = _simulate(
         np.array(
@@ -114,7 +114,7 @@ def gust_free(
     x, y, z = data.imu_m
     omega = 2.0 * np.pi * data.vane_hz_per_mps * V
     vane = 1.0 / (1.0 + 2.0 * data.vane_damping * jw / omega + (jw / omega) ** 2)
-    theta = alpha_0 + record.passed(q, 1.0 / (jw + BLEND_RADPS))
+    theta = alpha_0 + record.passed(q, 1.0 / (jw + ATTITUDE_CROSSOVER_RADPS))
     columns = {
         "ax_mps2": ax + qd * z - rd * y,
         "ay_mps2": unit * CY + rd * x - pd * z,

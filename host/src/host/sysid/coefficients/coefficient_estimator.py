@@ -30,7 +30,7 @@ from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.finder import FLYING_SHARE, Found, find
 from host.sysid.flight.reconstructed import ReconstructedFlight, found_name, reconstructed
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.consider_covariance import main_cause
+from host.sysid.models.consider_covariance import dominant_error_source
 from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.models.modal_analysis import Mode
 
@@ -305,7 +305,7 @@ def _causes(fit: CoefficientFit) -> dict[str, tuple[str, float]]:
             with_them = fit.covariance[k, at]
             narrowed = with_them @ np.linalg.solve(fit.covariance[np.ix_(at, at)], with_them)
             shares[cause] = float(narrowed / max(fit.covariance[k, k], 1e-300))
-        if cause := main_cause(shares, 1.0):
+        if cause := dominant_error_source(shares, 1.0):
             result[d.name] = (cause, shares[cause])
     return result
 

@@ -10,7 +10,7 @@ import numpy as np
 from host.arrays import Array, IntArray
 from host.sysid.coefficients.deletion_diagnostics import Prediction
 from host.sysid.models.fit_result import NORMAL_95
-from host.sysid.numerics.maneuver_agreement import Repeats
+from host.sysid.numerics.maneuver_agreement import ManeuverAgreement
 
 METHOD = "equation error with instrument errors"
 FLAG_SHARE = 0.12  # up to it an error beyond 15 % is a case of one in seventy
@@ -97,7 +97,7 @@ class CoefficientFit:
     flight: Flight
     traces: dict[str, Trace]
     prediction: Prediction | None
-    repeats: Repeats
+    repeats: ManeuverAgreement
 
 
 def derivatives(

@@ -30,7 +30,7 @@ from host.sysid.coefficients.coefficient_problem import (
 from host.sysid.coefficients.deletion_diagnostics import LastStep, Prediction, prediction, pulls
 from host.sysid.coefficients.geometry_prior import apply_geometry_prior
 from host.sysid.coefficients.trim_derivatives import Local, Mean, local_derivatives, zero_lift_drag
-from host.sysid.numerics.maneuver_agreement import Repeats, scatter
+from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, agreement_of
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class CoefficientIntervals:
     derivatives: tuple[Derivative, ...]
     errors: dict[str, tuple[float, float]]
     covariance: Array
-    repeats: Repeats
+    repeats: ManeuverAgreement
 
 
 def intervals(ended: Searched) -> CoefficientIntervals:
@@ -93,7 +93,9 @@ def intervals(ended: Searched) -> CoefficientIntervals:
     errors = slice(last.unknowns.first_error, None)
     slopes = np.vstack([*(slope for _, slope in found.values()), np.eye(len(state))[errors]])
     own = slopes @ covariance @ slopes.T
-    agreement = scatter(tuple(values), *pulls(last, problem.blocks, slopes[: len(values)] @ kept))
+    agreement = agreement_of(
+        tuple(values), *pulls(last, problem.blocks, slopes[: len(values)] @ kept)
+    )
     own[np.diag_indices(len(values))] += agreement.extra_variance
     left = np.sqrt(np.maximum(np.diag(covariance)[errors], 0.0))
     pairs = zip(state[errors].tolist(), left.tolist(), strict=True)

@@ -43,7 +43,7 @@ from host.sysid.coefficients.normal_equations import Known, stepped
 from host.sysid.coefficients.slow_gusts import gust_information, gust_strength, turned
 from host.sysid.coefficients.trim_derivatives import Local
 from host.sysid.coefficients.window_spectra import Window, noise_spectra
-from host.sysid.compatibility.inverse_sensor_model import decimated, usable_length
+from host.sysid.compatibility.inverse_sensor_model import decimate, usable_length
 from host.sysid.identification_error import IdentificationError
 
 PLAIN_ROUNDS, FULL_ROUNDS = 3, 2  # without errors of the instrument and slow gusts, with them
@@ -103,7 +103,7 @@ def search_coefficients(
     shift = len(t) - kept if late else 0
     cut = {k: np.ascontiguousarray(columns[k][shift : shift + kept]) for k in COLUMNS}
     t = t[shift : shift + kept]
-    record = decimated(cut, float(t[-1] - t[0]) / (kept - 1))
+    record = decimate(cut, float(t[-1] - t[0]) / (kept - 1))
     t = t[0] + np.arange(record.samples) * record.dt_s
     prior = deviations(data, airframe)
     names = tuple(prior)

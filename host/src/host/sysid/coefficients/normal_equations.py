@@ -10,7 +10,7 @@ import numpy as np
 from host.arrays import Array, BoolArray, IntArray
 from host.sysid.coefficients.equation_blocks import Sums
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.consider_covariance import systematic_covariance
+from host.sysid.models.consider_covariance import consider_covariance
 
 LOST = 1e12  # by which a variance grows where a regressor never moves, or is the same as others
 STILL = 1e-30  # a sum of squares below it is rounding
@@ -64,7 +64,7 @@ def stepped(
     drawn = -inverse @ sums.normal[:, considered]
     drawn[considered] = np.eye(len(considered))
     covariance = inverse @ (sums.meat + known.information) @ inverse.T
-    covariance += systematic_covariance((drawn * sd).T)
+    covariance += consider_covariance((drawn * sd).T)
     return Step(inverse @ right, covariance, normal, right, inverse)
 
 

@@ -16,9 +16,9 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.coefficients.coefficient_fit import CoefficientFit, Derivative, Flight, Pull, Trace
 from host.sysid.coefficients.deletion_diagnostics import Prediction
-from host.sysid.models.consider_covariance import systematic_covariance
+from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import NORMAL_95
-from host.sysid.numerics.maneuver_agreement import scatter
+from host.sysid.numerics.maneuver_agreement import agreement_of
 
 LEAST = 1e-12  # of the largest: an eigenvalue below it is rounding
 
@@ -46,8 +46,8 @@ def pooled(fits: Sequence[CoefficientFit]) -> CoefficientFit:
     moved = weight[:, :count] * (found - state)[:, :count]
     whole = np.einsum("kii->ki", np.stack([fit.covariance for fit in fits]))
     expected = np.sum(weight**2 * whole, axis=0)[:count]
-    agreement = scatter(tuple(names), moved, weight[:, :count], expected)
-    covariance += systematic_covariance(np.einsum("ki,kij->ji", weight, common))
+    agreement = agreement_of(tuple(names), moved, weight[:, :count], expected)
+    covariance += consider_covariance(np.einsum("ki,kij->ji", weight, common))
     covariance[np.diag_indices(count)] += agreement.extra_variance
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     floors = np.mean([[_floor(d) for d in fit.derivatives] for fit in fits], axis=0)

@@ -19,7 +19,7 @@ from host.arrays import Array
 from host.sysid.compatibility.flight_path import FLOW, INERTIAL, PITOT, PLACES
 
 # Groups that kinematics can see, by the names of the instrument's file, and their unknowns.
-VISIBLE: dict[str, tuple[str, ...]] = {
+OBSERVABLE_GROUPS: dict[str, tuple[str, ...]] = {
     "gyro_bias_radps": INERTIAL[0:3],
     "gyro_scale": INERTIAL[3:6],
     "accel_bias_mps2": INERTIAL[6:9],
@@ -32,11 +32,11 @@ VISIBLE: dict[str, tuple[str, ...]] = {
     "place_m": PLACES,
 }
 ALARM = 0.01  # how often an honest file may be doubted
-LEAST_TOLD = 0.3  # of the prior's variance, that a direction counts
+LEAST_INFORMATION = 0.3  # of the prior's variance, that a direction counts
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
+class ConsistencyTest:
     """What the flight says of one group of errors, or of all: its own word against the file's.
 
     Attributes
@@ -57,14 +57,14 @@ class Claim:
     probability: float
 
     @property
-    def doubted(self) -> bool:
+    def rejected(self) -> bool:
         """Whether the file claims less than the flight shows."""
         return self.probability < ALARM
 
 
-def claims(
+def consistency_tests(
     names: Sequence[str], found: Array, covariance: Array, prior: Mapping[str, tuple[float, float]]
-) -> tuple[Claim, ...]:
+) -> tuple[ConsistencyTest, ...]:
     """Return the test of all visible errors together, then of each group.
 
     Parameters
@@ -76,29 +76,33 @@ def claims(
         Mean and standard deviation of each, as the file states them.
     """
     place = {name: k for k, name in enumerate(names)}
-    groups = {g: [place[n] for n in own if n in place] for g, own in VISIBLE.items()}
+    groups = {g: [place[n] for n in own if n in place] for g, own in OBSERVABLE_GROUPS.items()}
     every = sorted(k for own in groups.values() for k in own)
     mean, sd = (np.array([prior[n][i] for n in names]) for i in (0, 1))
     z = (found - mean) / sd
     P = covariance / np.outer(sd, sd)
-    return tuple(_claim(name, own, z, P) for name, own in (("all", every), *groups.items()) if own)
+    return tuple(
+        _consistency_test(name, own, z, P) for name, own in (("all", every), *groups.items()) if own
+    )
 
 
-def _claim(name: str, own: Sequence[int], z: Array, P: Array) -> Claim:
+def _consistency_test(name: str, own: Sequence[int], z: Array, P: Array) -> ConsistencyTest:
     told, directions = np.linalg.eigh(np.eye(len(own)) - P[np.ix_(own, own)])
-    kept = told > LEAST_TOLD
+    kept = told > LEAST_INFORMATION
     count = int(kept.sum())
     if not count:
-        return Claim(name, 0.0, 0, 1.0)
+        return ConsistencyTest(name, 0.0, 0, 1.0)
     square = float(np.sum((directions[:, kept].T @ z[own]) ** 2 / told[kept]))
-    return Claim(name, float(np.sqrt(square / count)), count, float(special.chdtrc(count, square)))
+    return ConsistencyTest(
+        name, float(np.sqrt(square / count)), count, float(special.chdtrc(count, square))
+    )
 
 
-def claim_words(found: Sequence[Claim]) -> list[str]:
+def calibration_lines(found: Sequence[ConsistencyTest]) -> list[str]:
     """Return what a verdict says of a file that claims too little; nothing of an honest one."""
-    if not found or not found[0].doubted:
+    if not found or not found[0].rejected:
         return []
-    named = [c for c in found[1:] if c.doubted]
+    named = [c for c in found[1:] if c.rejected]
     worst = named or sorted(found[1:], key=lambda c: c.probability)[:1]
     parts = ", ".join(f"{c.name} {c.times:.1f} times" for c in worst)
     return [

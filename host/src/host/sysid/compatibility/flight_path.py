@@ -14,7 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.compatibility.strapdown import cross, path_slopes, small_turn, strapdown
+from host.sysid.compatibility.strapdown import (
+    cross,
+    path_sensitivities,
+    rotation_from_vector,
+    strapdown,
+)
 from host.sysid.numerics.output_error_problem import Response
 
 # Errors of the inertial sensors, in the order of their slopes.
@@ -38,7 +43,7 @@ LEAST_SPEED_MPS = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class Segment:
     """A stretch of flight on an even grid, at the CG; `start` is a first guess of it.
 
     Attributes
@@ -102,7 +107,7 @@ class PathProblem:
 
     def __init__(
         self,
-        stretches: Sequence[Stretch],
+        stretches: Sequence[Segment],
         outputs: tuple[str, ...],
         prior: dict[str, tuple[float, float]],
         start_sd: Array,
@@ -162,20 +167,20 @@ class PathProblem:
     def _value(self, local: Array, names: Sequence[str]) -> Array:
         return np.array([local[self._place[n]] if n in self._place else 0.0 for n in names])
 
-    def _one(self, s: Stretch, local: Array) -> Response:
+    def _one(self, s: Segment, local: Array) -> Response:
         common = len(self.common)
         errors = self._value(local, INERTIAL)
         spread, stretch, tilt = 1.0 + errors[3:6], 1.0 + errors[9:12], errors[12:15]
         plain = (s.rates - errors[0:3]) / spread, (s.force - errors[6:9]) / stretch
         rates, force = (x + cross(tilt, x) for x in plain)
         own = local[common:]
-        attitude = small_turn(own[3:6]) @ s.attitude
+        attitude = rotation_from_vector(own[3:6]) @ s.attitude
         C, v = strapdown(rates, force, attitude, s.velocity_mps + own[0:3], s.dt_s)
         step_s = self.block * s.dt_s
         through = v - np.append(self._value(local, WITH_GPS[1:]), 0.0)
         mean_C = self._mean(C)
         width = common + len(own)
-        ground, fall, air = path_slopes(
+        ground, fall, air = path_sensitivities(
             mean_C,
             self._mean(plain[0]),
             self._mean(plain[1]),
@@ -217,7 +222,7 @@ class PathProblem:
         return Response(np.stack(y), np.ascontiguousarray(np.stack(slopes)))
 
     def _air(
-        self, s: Stretch, local: Array, flow: Array, x: Array, rates: Array
+        self, s: Segment, local: Array, flow: Array, x: Array, rates: Array
     ) -> list[tuple[Array, Array]]:
         """Return airspeed, alpha and beta as the sensors tell them, with slopes."""
         alpha_scale, alpha_zero, beta_scale, beta_zero = self._value(local, FLOW)

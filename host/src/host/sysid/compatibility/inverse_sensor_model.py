@@ -16,11 +16,11 @@ from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
 
 PASS_HZ, STOP_HZ = 9.0, 13.0
-THIN_HZ = 33.0  # rate of the fit: nothing is left above 13 Hz, a fit takes a third of the time
+FIT_RATE_HZ = 33.0  # rate of the fit: nothing is left above 13 Hz, a fit takes a third of the time
 # Over this rate a vane slides for certain; its noise after the low-pass is about 0.015 rad/s.
 SLIDING_RADPS = 0.02
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
-BLEND_RADPS = 2.0 * np.pi * 0.05  # attitude: filter below, integrated gyro above
+ATTITUDE_CROSSOVER_RADPS = 2.0 * np.pi * 0.05  # attitude: filter below, integrated gyro above
 Spectrum = NDArray[np.complex128]
 
 
@@ -89,7 +89,7 @@ def usable_length(samples: int) -> int:
     return best
 
 
-def decimated(columns: Mapping[str, Array], dt_s: float) -> Record:
+def decimate(columns: Mapping[str, Array], dt_s: float) -> Record:
     """Return a record at the rate of the fit; its first sample keeps its time.
 
     Parameters
@@ -99,7 +99,7 @@ def decimated(columns: Mapping[str, Array], dt_s: float) -> Record:
     dt_s : float
     """
     samples = len(next(iter(columns.values())))
-    fewer = min(usable_length(round(samples * dt_s * THIN_HZ)), samples)
+    fewer = min(usable_length(round(samples * dt_s * FIT_RATE_HZ)), samples)
     at = np.arange(fewer) * (samples / fewer)
     result = {}
     for name, values in columns.items():
@@ -117,9 +117,9 @@ def attitude(record: Record, s: Mapping[str, Array]) -> tuple[Array, Array]:
     rates = (s["p"] + np.tan(theta) * across, s["q"] * np.cos(phi) - s["r"] * np.sin(phi))
     blended = []
     for angle, rate in zip((phi, theta), rates, strict=True):
-        both = BLEND_RADPS * angle + rate
-        line = np.linspace(both[0], both[-1], len(both)) / BLEND_RADPS
-        blended.append(record.passed(both, 1.0 / (record.jw + BLEND_RADPS)) + line)
+        both = ATTITUDE_CROSSOVER_RADPS * angle + rate
+        line = np.linspace(both[0], both[-1], len(both)) / ATTITUDE_CROSSOVER_RADPS
+        blended.append(record.passed(both, 1.0 / (record.jw + ATTITUDE_CROSSOVER_RADPS)) + line)
     return blended[0], blended[1]
 
 
@@ -145,7 +145,7 @@ def apply_sensor_errors(
     """
     e = errors
     pitot = e["pitot_delay_s"], data.pitot_lag_s
-    pressure = record.made("qbar_pa", pitot, lambda: _unlagged(record, "qbar_pa", *pitot))
+    pressure = record.made("qbar_pa", pitot, lambda: _invert_lag(record, "qbar_pa", *pitot))
     qbar = (pressure - e["pitot_drift_pa"]) / (1.0 + e["pitot_scale"])
     density = record.columns["density_kgpm3"] * (1.0 + e["density_share"])
     V = np.sqrt(2.0 * np.maximum(qbar, 1.0) / density)
@@ -153,7 +153,9 @@ def apply_sensor_errors(
     turned = np.linalg.inv(
         [[1.0, tilt[2], -tilt[1]], [-tilt[2], 1.0, tilt[0]], [tilt[1], -tilt[0], 1.0]]
     )
-    inertial = _inertial(record, e["imu_delay_s"], 1.0 / (2.0 * np.pi * data.imu_bandwidth_hz))
+    inertial = _inertial_signals(
+        record, e["imu_delay_s"], 1.0 / (2.0 * np.pi * data.imu_bandwidth_hz)
+    )
     spread = np.array([[1.0 + e[f"gyro_{a}_scale"]] for a in "xyz"])
     stretch = np.array([[1.0 + e[f"accel_{a}_scale"]] for a in "xyz"])
     p, q, r = turned @ ((inertial[:3] - [[e[f"gyro_{a}_bias_radps"]] for a in "xyz"]) / spread)
@@ -165,10 +167,10 @@ def apply_sensor_errors(
     ax = ax - (qd * z - rd * y + q * (p * y - q * x) - r * (r * x - p * z))
     ay = ay - (rd * x - pd * z + r * (q * z - r * y) - p * (p * y - q * x))
     az = az - (pd * y - qd * x + p * (r * x - p * z) - q * (q * z - r * y))
-    alpha = (_vane(record, "alpha", e, data, airspeed_mps) - e["alpha_zero_rad"]) / (
+    alpha = (_vane_angle(record, "alpha", e, data, airspeed_mps) - e["alpha_zero_rad"]) / (
         1.0 + e["alpha_scale"]
     )
-    beta = _vane(record, "beta", e, data, airspeed_mps) / (1.0 + e["beta_scale"])
+    beta = _vane_angle(record, "beta", e, data, airspeed_mps) / (1.0 + e["beta_scale"])
     # A vane in upwash reads atan((1 + upwash) w/u); a beta vane the flank angle atan(v/u).
     up = np.tan(alpha) / (1.0 + data.upwash * (1.0 + e["upwash_share"]))
     side = np.tan(beta)
@@ -190,23 +192,23 @@ def apply_sensor_errors(
     }  # fmt: skip
 
 
-def _unlagged(record: Record, name: str, delay_s: float, lag_s: float) -> Array:
+def _invert_lag(record: Record, name: str, delay_s: float, lag_s: float) -> Array:
     """Return a column without its delay and the lag of the first order behind it."""
     return record.smooth(name, (1.0 + record.jw * lag_s) * np.exp(record.jw * delay_s))
 
 
-def _inertial(record: Record, delay_s: float, pole_s: float) -> Array:
+def _inertial_signals(record: Record, delay_s: float, pole_s: float) -> Array:
     """Return p, q, r, their derivatives and ax, ay, az without delay and low-pass, (9, n)."""
 
     def make() -> Array:
         columns = "p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2"
-        rows = [_unlagged(record, name, delay_s - pole_s, pole_s) for name in columns]
+        rows = [_invert_lag(record, name, delay_s - pole_s, pole_s) for name in columns]
         return np.stack([*rows[:3], *map(record.rate, rows[:3]), *rows[3:]])
 
     return record.made("inertial", (delay_s, pole_s), make)
 
 
-def _vane(
+def _vane_angle(
     record: Record, name: str, e: Mapping[str, float], data: SensorErrorModel, airspeed_mps: float
 ) -> Array:
     """Return the flow angle a vane was pushed by: inertia, damping and dry friction undone."""

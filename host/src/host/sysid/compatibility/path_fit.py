@@ -18,22 +18,23 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, GPS, PITOT, PLACES, PathProblem
 from host.sysid.identification_error import IdentificationError
-from host.sysid.numerics.ar_noise import OutputNoise, lagged_moments, regress
+from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
 
-ORDER = 2  # memory of the residuals: a gust and a sensor
+AR_ORDER = 2  # memory of the residuals: a gust and a sensor
 MOST_ITERATIONS = 25
-MEMORY_FROM = 2  # iteration at which residuals are worth modelling
-LEARNING = 4  # iterations; then memory and instruments stay, and the equations can settle
+ADAPT_FROM = 2  # iteration at which residuals are worth modelling
+# Iterations after which AR models and instruments stay, so that the equations can settle.
+ADAPTING_ITERATIONS = 4
 # A second search, where the first does not settle: errors twice those of a calibrated instrument
 # leave residuals at iteration 2 of which nothing is learned (3 of 12 flights). It first finds what
 # inertial sensors and GPS tell, air data all but held to their calibration: without instruments
 # gusts would draw them off.
-PATIENCE = 25  # plain iterations at most, each halved until the misfit falls
+PLAIN_ITERATIONS = 25  # plain iterations at most, each halved until the misfit falls
 HALVINGS = 5
-NEAR = 3.0  # of a standard error, the last plain step
-HOLDING = 1e4  # times the prior precision
+PLAIN_STEP_LIMIT = 3.0  # of a standard error, the last plain step
+AIR_PRIOR_WEIGHT = 1e4  # times the prior precision
 AIR_ERRORS = (*FLOW, *PITOT, *DELAYS, *PLACES)
-SETTLED = 0.05  # of a standard error: the last step
+STEP_LIMIT = 0.05  # of a standard error: the last step
 DRIFT_POWERS = 4  # constants to cubics follow no gust either
 RIDGE = 1e-10  # of a column's own product: a surface that stood still has none
 LARGEST_STEP = 4.0  # in prior deviations
@@ -65,20 +66,20 @@ def fit_path(problem: PathProblem, follows: Sequence[Array]) -> PathFit:
         If the path is not finite at some step or the equations are singular.
     """
     found = _search(problem, follows, patience=0)
-    return found if found.converged else _search(problem, follows, patience=PATIENCE)
+    return found if found.converged else _search(problem, follows, patience=PLAIN_ITERATIONS)
 
 
 def _search(problem: PathProblem, follows: Sequence[Array], patience: int) -> PathFit:
     """Iterate until the equations settle; after `patience` plain iterations at most."""
     theta = problem.prior_mean.copy()
     outputs = problem.model.outputs
-    noise = [OutputNoise.white() for _ in outputs]
+    noise = [ArNoise.white() for _ in outputs]
     held: dict[int, list[Array]] = {}
     held_back = [k for k, name in enumerate(problem.names) if name in AIR_ERRORS]
     converged, near = False, False
     iteration = 0
     origin, least, halvings = theta, np.inf, 0
-    plain, learnt_from = bool(patience), max(patience, MEMORY_FROM)
+    plain, learnt_from = bool(patience), max(patience, ADAPT_FROM)
     while True:
         responses = problem.respond(theta)
         if responses is None:
@@ -86,23 +87,23 @@ def _search(problem: PathProblem, follows: Sequence[Array], patience: int) -> Pa
         residuals = [problem.measured(k) - r.y for k, r in enumerate(responses)]
         precision = problem.prior_precision.copy()
         if plain:
-            precision[held_back] *= HOLDING
-            here = _misfit(problem, residuals, theta, precision)
+            precision[held_back] *= AIR_PRIOR_WEIGHT
+            here = _negative_log_likelihood(problem, residuals, theta, precision)
             if here > least and halvings < HALVINGS:
                 theta, halvings = 0.5 * (theta + origin), halvings + 1
                 continue
             origin, least, halvings = theta, here, 0
         if plain and (near or iteration == patience):
             precision = problem.prior_precision
-            plain, learnt_from = False, max(iteration, MEMORY_FROM)
-        learning = learnt_from <= iteration < learnt_from + LEARNING
+            plain, learnt_from = False, max(iteration, ADAPT_FROM)
+        learning = learnt_from <= iteration < learnt_from + ADAPTING_ITERATIONS
         # Of every stretch, one array per output.
         whites: list[list[Array]] = [[] for _ in responses]
         tools: list[list[Array]] = [[] for _ in responses]
         slopes: list[list[Array]] = [[] for _ in responses]
         for j, name in enumerate(outputs):
             if learning and name not in GPS:
-                noise[j] = _memory([r[j] for r in residuals])
+                noise[j] = _fit_ar_noise([r[j] for r in residuals])
             white = [noise[j].whiten(r[j][:, None])[:, 0] for r in residuals]
             slope = [noise[j].whiten(r.slopes[j]) for r in responses]
             variance = float(np.sum(np.concatenate(white) ** 2)) / problem.counted(name)
@@ -139,11 +140,11 @@ def _search(problem: PathProblem, follows: Sequence[Array], patience: int) -> Pa
         iteration += 1
         error_size = np.sqrt(np.maximum(np.abs(np.diag(inverse)), 1e-300))
         largest = float(np.max(np.abs(step) / error_size))
-        near = largest < NEAR
-        converged = largest < SETTLED and not plain and iteration > learnt_from + 1
+        near = largest < PLAIN_STEP_LIMIT
+        converged = largest < STEP_LIMIT and not plain and iteration > learnt_from + 1
 
 
-def _misfit(
+def _negative_log_likelihood(
     problem: PathProblem, residuals: Sequence[Array], theta: Array, precision: Array
 ) -> float:
     """Return twice the negative log likelihood of white residuals of unknown size and the prior."""
@@ -153,17 +154,17 @@ def _misfit(
     return float(counts @ np.log(np.maximum(squares, 1e-300)) + off**2 @ precision)
 
 
-def _memory(residuals: Sequence[Array]) -> OutputNoise:
+def _fit_ar_noise(residuals: Sequence[Array]) -> ArNoise:
     none = [np.zeros((len(r), 0)) for r in residuals]
-    coefficient, _ = regress(lagged_moments(residuals, none, ORDER), ORDER)
-    return OutputNoise.from_coefficient(coefficient)
+    coefficient, _ = fit_ar(lagged_moments(residuals, none, AR_ORDER), AR_ORDER)
+    return ArNoise.from_coefficient(coefficient)
 
 
 def _instruments(
     problem: PathProblem,
     slopes: Sequence[Array],
     follows: Sequence[Array],
-    memory: OutputNoise,
+    memory: ArNoise,
 ) -> list[Array]:
     """Return the part of whitened slopes that follows surfaces, slow drift and the wind's angle."""
     if not follows[0].shape[1]:

@@ -23,7 +23,7 @@ from host.sysid.compatibility.flight_path import (
     START,
     WITH_GPS,
     PathProblem,
-    Stretch,
+    Segment,
 )
 from host.sysid.compatibility.inverse_sensor_model import SLIDING_RADPS
 from host.sysid.compatibility.position_correction import transfer_to_cg
@@ -32,29 +32,29 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.differentiation import local_polynomial
 
 BLOCK_S = 0.05  # samples are averaged to this: a trainer's motion is far below 10 Hz
-STRETCH_S = 12.0
-SHORT_STRETCH_S = 6.0  # without GPS nothing holds the path for longer
+SEGMENT_S = 12.0
+SHORT_SEGMENT_S = 6.0  # without GPS nothing holds the path for longer
 # Without GPS a tilt of the IMU, a bias of an accelerometer and the attitude look alike.
 WITHOUT_GPS = (*INERTIAL[0:3], *FLOW, *DELAYS)
-MOST_STRETCHES = 8
-LEAST_LIFE = 0.1  # of the liveliest stretch: what an axis has before any is chosen
+MOST_SEGMENTS = 8
+LEAST_EXCITATION = 0.1  # of the liveliest stretch: what an axis has before any is chosen
 QUADRANTS = 4  # of heading: wind and pitot scale need them
-LAGS = (*range(0, 10), *range(10, 31, 2))  # in blocks: what an answer to a surface lasts
+INPUT_LAGS = (*range(0, 10), *range(10, 31, 2))  # in blocks: what an answer to a surface lasts
 START_SD = np.array([1.0, 1.0, 1.0, *np.radians([5.0, 5.0, 20.0])])
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
 SMOOTH_S = 0.03  # half a window for derivatives: 9 Hz at 100 Hz
 SPEED_SMOOTH_S = 0.25  # half a window: one count of the pitot is 1.4 % of trim speed
 SMOOTHED = "airspeed_mps smoothed"
-BEND_MPS = 1e-6
-NOTHING = AirframeData("nothing but places", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
-FLYING = 0.5  # of the median airspeed
+FIX_BEND_MPS = 1e-6
+NO_OFFSETS = AirframeData("nothing but places", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
+FLYING_SHARE = 0.5  # of the median airspeed
 # What no calibration says: deviation of the steady wind, delays of vanes and GPS.
 WIND_SD_MPS = 10.0
 VANE_DELAY_S = (0.010, 0.010)
 GPS_DELAY_S = (0.10, 0.08)
 
 
-def prepare(
+def prepare_path_problem(
     columns: Mapping[str, Array],
     airframe: AirframeData | None,
     instrument: SensorErrorModel | None,
@@ -84,14 +84,14 @@ def prepare(
     half = max(2, round(SPEED_SMOOTH_S / dt_s))
     data[SMOOTHED] = local_polynomial(data[AIR[0]][:, None], 2 * half + 1, 2)[:, 0]
     fixes = _fixes(data) if gps else np.zeros(len(data["t_s"]), dtype=bool)
-    cuts = _cuts(data, dt_s, block, STRETCH_S if gps else SHORT_STRETCH_S)
+    cuts = _select_segments(data, dt_s, block, SEGMENT_S if gps else SHORT_SEGMENT_S)
     vane = 0.0 if instrument is None else 1.0 / (2.0 * np.pi * instrument.vane_hz_per_mps)
     place = np.zeros(3)
     if airframe is not None and airframe.vanes_m:
         place = np.mean(airframe.vanes_m, axis=0)
     stretches = [
         replace(
-            _stretch(data, cut, outputs, dt_s, block, vane, fixes[cut]),
+            _segment(data, cut, outputs, dt_s, block, vane, fixes[cut]),
             vane_m=(float(place[0]), float(place[2])),
         )
         for cut in cuts
@@ -103,13 +103,13 @@ def prepare(
     problem = PathProblem(stretches, outputs, open_now, start_sd, block)
     t = data["t_s"]
     when = tuple((float(t[c.start]), float(t[c.stop - 1])) for c in cuts)
-    return problem, [_follows(columns, cut, block) for cut in cuts], when
+    return problem, [_lagged_inputs(columns, cut, block) for cut in cuts], when
 
 
 def prior(instrument: SensorErrorModel | None) -> dict[str, tuple[float, float]]:
     """Return mean and standard deviation of every unknown before the flight."""
     i = instrument or unknown_sensors()
-    e, sd = i.errors, deviations(i, NOTHING)
+    e, sd = i.errors, deviations(i, NO_OFFSETS)
     kinds = (
         *("gyro_{}_bias_radps", "gyro_{}_scale", "accel_{}_bias_mps2", "accel_{}_scale"),
         "tilt_{}_rad",
@@ -174,11 +174,13 @@ def _at_cg(data: dict[str, Array], airframe: AirframeData, dt_s: float) -> dict[
     return {**moved, **rates, "alpha_rad": straight}
 
 
-def _cuts(data: Mapping[str, Array], dt_s: float, block: int, length_s: float) -> list[slice]:
+def _select_segments(
+    data: Mapping[str, Array], dt_s: float, block: int, length_s: float
+) -> list[slice]:
     """Return the stretches that tell most: something of every heading, then of every axis."""
     samples = max(block, round(length_s / dt_s) // block * block)
     speed = np.nan_to_num(data["airspeed_mps"])
-    flying = speed > max(FLYING * float(np.median(speed)), LEAST_SPEED_MPS)
+    flying = speed > max(FLYING_SHARE * float(np.median(speed)), LEAST_SPEED_MPS)
     candidates = [
         slice(k, k + samples)
         for k in range(0, len(speed) - samples + 1, samples)
@@ -205,8 +207,8 @@ def _cuts(data: Mapping[str, Array], dt_s: float, block: int, length_s: float) -
             ]
             chosen += sorted(own, key=lambda c: -float(np.sum(life[c.start])))[:1]
     rest = [c for c in candidates if c not in chosen]
-    while rest and len(chosen) < MOST_STRETCHES:
-        known = LEAST_LIFE + sum((life[c.start] for c in chosen), np.zeros(len(rates)))
+    while rest and len(chosen) < MOST_SEGMENTS:
+        known = LEAST_EXCITATION + sum((life[c.start] for c in chosen), np.zeros(len(rates)))
         best = max(rest, key=lambda c: float(np.sum(np.log(known + life[c.start]))))
         chosen.append(best)
         rest.remove(best)
@@ -217,24 +219,24 @@ def _fixes(data: Mapping[str, Array]) -> BoolArray:
     """Return at which samples GPS spoke: between them a decoded table runs straight."""
     bend = sum(np.abs(np.diff(data[name], n=2)) for name in GPS)
     bend = np.concatenate([[0.0], bend, [0.0]])
-    known = bend > BEND_MPS
+    known = bend > FIX_BEND_MPS
     peak = (bend >= np.roll(bend, 1)) & (bend > np.roll(bend, -1))
     return np.asarray(known & peak)
 
 
-def _follows(columns: Mapping[str, Array], cut: slice, block: int) -> Array:
+def _lagged_inputs(columns: Mapping[str, Array], cut: slice, block: int) -> Array:
     """Return what the pilot did, at lags of whole blocks, (blocks, surfaces x lags)."""
     at = np.arange(cut.start, cut.stop)
     lagged = [
         columns[name][np.maximum(at - lag * block, 0)].reshape(-1, block).mean(axis=1)
         for name in SURFACES
         if name in columns
-        for lag in LAGS
+        for lag in INPUT_LAGS
     ]
     return np.column_stack(lagged) if lagged else np.zeros((len(at) // block, 0))
 
 
-def _stretch(
+def _segment(
     data: Mapping[str, Array],
     cut: slice,
     outputs: tuple[str, ...],
@@ -242,7 +244,7 @@ def _stretch(
     block: int,
     vane_s_mps: float,
     fixes: BoolArray,
-) -> Stretch:
+) -> Segment:
     gps = bool(fixes.any())
     zero = np.zeros(cut.stop - cut.start)
     measured = np.stack([data[name][cut].reshape(-1, block).mean(axis=1) for name in outputs])
@@ -268,7 +270,7 @@ def _stretch(
     if gps:
         velocity = np.array([float(np.median(data[name][cut][:block])) for name in GPS])
     density = data.get("density_kgpm3", np.full(cut.stop, 1.225))
-    return Stretch(
+    return Segment(
         dt_s=dt_s,
         rates=np.column_stack([data[f"{a}_radps"][cut] for a in "pqr"]),
         force=np.column_stack([data[f"a{a}_mps2"][cut] for a in "xyz"]),

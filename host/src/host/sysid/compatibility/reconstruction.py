@@ -17,18 +17,23 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
-from host.sysid.compatibility.calibration_consistency import Claim, claim_words, claims
+from host.sysid.compatibility.calibration_consistency import (
+    ConsistencyTest,
+    calibration_lines,
+    consistency_tests,
+)
 from host.sysid.compatibility.flight_path import FLOW, GPS, INERTIAL
 from host.sysid.compatibility.path_fit import fit_path
-from host.sysid.compatibility.path_preparation import prepare, prior
+from host.sysid.compatibility.path_preparation import prepare_path_problem, prior
 from host.sysid.identification_error import IdentificationError
 
-TOLD = 0.7  # of the prior's deviation: what stays above is the calibration's word, not the data's
-VANE_MODEL = 0.006  # of scale: dry friction known to 20 % of its 3 %
+# Posterior over prior deviation below which the data inform an error; above, the calibration does.
+POSTERIOR_PRIOR_RATIO = 0.7
+VANE_MODEL_SD = 0.006  # of scale: dry friction known to 20 % of its 3 %
 # Without GPS only vanes and pitot hold the path, gusts and all: on eight flights rms errors
 # were up to 2.5 times what the equations say, more for biases of the gyro.
-GUSTY = 2.5
-HIDDEN = INERTIAL[0:3]
+NO_GPS_INFLATION = 2.5
+UNOBSERVABLE_WITHOUT_GPS = INERTIAL[0:3]
 NORMAL = 1.959964  # 97.5 % of the normal distribution
 REASONS = {
     "pitot_scale": "wind and scale look alike on one heading, gusts hide it: fly full turns",
@@ -41,29 +46,29 @@ REASONS_NO_GPS = {
     "wind_east_mps": "unobservable without GPS",
     "gps_delay_s": "no GPS",
 }
-USUAL = "the motion flown does not show it; the calibration stands"
-USUAL_NO_GPS = "not told from attitude and gusts without GPS; the calibration stands"
+NOT_EXCITED = "the motion flown does not show it; the calibration stands"
+NOT_EXCITED_NO_GPS = "not told from attitude and gusts without GPS; the calibration stands"
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
     """One sensor error: estimate, 95 % half-width, and the half-width the calibration left open.
 
-    `told` is false where the data say no more than the calibration did; `reason` says why and what
-    to fly.
+    `data_informed` is false where the data say no more than the calibration did; `reason` says why
+    and what to fly.
     """
 
     name: str
     value: float
     half_width: float
     prior_half_width: float
-    told: bool
+    data_informed: bool
     reason: str
 
     @property
     def significant(self) -> bool:
         """Whether the data tell an error that is not zero."""
-        return self.told and abs(self.value) > self.half_width
+        return self.data_informed and abs(self.value) > self.half_width
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,7 @@ class Compatibility:
     gps : bool
     instrument : SensorErrorModel, optional
         What the calibration leaves open, as far as it was told.
-    claims : tuple of Claim
+    calibration_tests : tuple of ConsistencyTest
         What the flight says of the file's own deviations: all together, then group by group.
     """
 
@@ -90,7 +95,7 @@ class Compatibility:
     stretches: tuple[tuple[float, float], ...]
     gps: bool
     instrument: SensorErrorModel | None = None
-    claims: tuple[Claim, ...] = ()
+    calibration_tests: tuple[ConsistencyTest, ...] = ()
 
     def __getitem__(self, name: str) -> Finding:
         """Return a finding by name."""
@@ -119,7 +124,7 @@ def reconstruct(
         If inertial sensors or all air data are missing, nothing of the flight is long enough, or
         the equations do not settle.
     """
-    problem, follows, when = prepare(columns, airframe, instrument)
+    problem, follows, when = prepare_path_problem(columns, airframe, instrument)
     fit = fit_path(problem, follows)
     if not fit.converged:
         raise IdentificationError(
@@ -130,25 +135,25 @@ def reconstruct(
     count = len(problem.common)
     covariance = fit.covariance[:count, :count]
     scales = [problem.common.index(name) for name in FLOW[::2]]
-    covariance[scales, scales] += VANE_MODEL**2
+    covariance[scales, scales] += VANE_MODEL_SD**2
     before = prior(instrument)
-    wide = covariance if gps else GUSTY**2 * covariance
-    judged = claims(problem.common, fit.theta[:count], wide, before)
+    wide = covariance if gps else NO_GPS_INFLATION**2 * covariance
+    judged = consistency_tests(problem.common, fit.theta[:count], wide, before)
     findings = []
     for name, (mean, sd) in before.items():
-        known = name in problem.common and (gps or name not in HIDDEN)
+        known = name in problem.common and (gps or name not in UNOBSERVABLE_WITHOUT_GPS)
         k = problem.common.index(name) if known else None
         deviation = sd if k is None else float(np.sqrt(covariance[k, k]))
-        deviation = deviation if gps else min(GUSTY * deviation, sd)
-        told = deviation < TOLD * sd
+        deviation = deviation if gps else min(NO_GPS_INFLATION * deviation, sd)
+        informed = deviation < POSTERIOR_PRIOR_RATIO * sd
         findings.append(
             Finding(
                 name=name,
                 value=mean if k is None else float(fit.theta[k]),
                 half_width=NORMAL * deviation,
                 prior_half_width=NORMAL * sd,
-                told=told,
-                reason="" if told else _reason(name, gps=gps),
+                data_informed=informed,
+                reason="" if informed else _reason(name, gps=gps),
             )
         )
     squares = np.sum(np.hstack(fit.residuals) ** 2, axis=1)
@@ -161,11 +166,11 @@ def reconstruct(
 
 def _reason(name: str, *, gps: bool) -> str:
     if gps:
-        return REASONS.get(name, USUAL)
-    return REASONS_NO_GPS.get(name, USUAL_NO_GPS)
+        return REASONS.get(name, NOT_EXCITED)
+    return REASONS_NO_GPS.get(name, NOT_EXCITED_NO_GPS)
 
 
-def words(found: Compatibility) -> list[str]:
+def compatibility_lines(found: Compatibility) -> list[str]:
     """Return the paragraph of a verdict: errors found, then what the data cannot tell and why."""
     lines = [
         f"data compatibility over {len(found.stretches)} stretches,"
@@ -175,10 +180,10 @@ def words(found: Compatibility) -> list[str]:
     lines += [f"  {f.name:20s} {f.value:11.4g}  +- {f.half_width:8.2g}" for f in wrong]
     if not wrong:
         lines.append("  no sensor error stands out of its interval")
-    lines += [f"  {line}" for line in claim_words(found.claims)]
+    lines += [f"  {line}" for line in calibration_lines(found.calibration_tests)]
     reasons: dict[str, list[str]] = {}
     for f in found.findings:
-        if not f.told:
+        if not f.data_informed:
             reasons.setdefault(f.reason, []).append(f.name)
     for why, names in reasons.items():
         text = f"  not told: {', '.join(names)} ({why})"
@@ -186,7 +191,7 @@ def words(found: Compatibility) -> list[str]:
     return lines
 
 
-def document(found: Compatibility) -> dict[str, object]:
+def compatibility_document(found: Compatibility) -> dict[str, object]:
     """Return everything for JSON."""
     return {
         "gps": found.gps,
@@ -197,16 +202,16 @@ def document(found: Compatibility) -> dict[str, object]:
                 "times": c.times,
                 "directions": c.directions,
                 "probability": c.probability,
-                "doubted": c.doubted,
+                "doubted": c.rejected,
             }
-            for c in found.claims
+            for c in found.calibration_tests
         },
         "findings": {
             f.name: {
                 "value": f.value,
                 "half_width": f.half_width,
                 "calibration_half_width": f.prior_half_width,
-                "told": f.told,
+                "told": f.data_informed,
                 "reason": f.reason,
             }
             for f in found.findings

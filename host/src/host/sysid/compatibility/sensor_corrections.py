@@ -20,10 +20,10 @@ from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
 
 RATES = tuple(f"{a}_radps" for a in "pqr")
 FORCES = tuple(f"a{a}_mps2" for a in "xyz")
-IN_COLUMNS = (*INERTIAL, *FLOW, *PITOT)  # errors of single instants
+INSTANTANEOUS_ERRORS = (*INERTIAL, *FLOW, *PITOT)  # errors of single instants
 # The pitot's delay stays in: told on six of twelve survey flights, 8 ms too long in the mean.
-LATE = {DELAYS[0]: AIR[1:]}
-CORRECTED = (*IN_COLUMNS, *LATE)
+DELAYED_COLUMNS = {DELAYS[0]: AIR[1:]}
+CORRECTABLE = (*INSTANTANEOUS_ERRORS, *DELAYED_COLUMNS)
 LEAST_PRESSURE_SHARE = 0.1
 
 
@@ -42,27 +42,27 @@ def corrections(found: Compatibility) -> tuple[Correction, ...]:
     return tuple(
         Correction(f.name, f.value, f.half_width, f.prior_half_width)
         for f in found.findings
-        if f.told and f.name in CORRECTED
+        if f.data_informed and f.name in CORRECTABLE
     )
 
 
-def deviations(found: Compatibility) -> dict[str, float]:
+def residual_deviations(found: Compatibility) -> dict[str, float]:
     """Return what stays open of every error: told ones as found, others as calibrated."""
     return {
-        f.name: (f.half_width if f.told else f.prior_half_width) / NORMAL
+        f.name: (f.half_width if f.data_informed else f.prior_half_width) / NORMAL
         for f in found.findings
-        if f.name in CORRECTED
+        if f.name in CORRECTABLE
     }
 
 
-def pressure_part(found: Compatibility) -> float:
+def pressure_share(found: Compatibility) -> float:
     """Return the part of an error of V squared that is the pitot's, not the density's."""
     total = found["pitot_scale"].prior_half_width / NORMAL
     density = density_share(found.instrument)
     return max(1.0 - (density / max(total, density)) ** 2, LEAST_PRESSURE_SHARE)
 
 
-def without_errors(
+def correct_columns(
     columns: Mapping[str, Array], errors: Mapping[str, float], part: float = 1.0
 ) -> dict[str, Array]:
     """Return columns without errors of single instants.
@@ -72,7 +72,7 @@ def without_errors(
     columns : mapping of (n,) arrays
         SI, already at the CG.
     errors : mapping
-        Names of `IN_COLUMNS` to values; others are not looked at.
+        Names of `INSTANTANEOUS_ERRORS` to values; others are not looked at.
     part : float
         Of ``pitot_scale`` that is dynamic pressure; the rest is density.
     """
@@ -96,10 +96,10 @@ def without_errors(
         if f"{name}_rad" in columns:
             zero, scale = at(f"{name}_zero_rad", 0.0), at(f"{name}_scale", 0.0)
             result[f"{name}_rad"] = (columns[f"{name}_rad"] - zero) / (1.0 + scale)
-    return result | _pitot(columns, at("pitot_scale", 0.0), at("pitot_zero_pa", 0.0), part)
+    return result | _correct_pitot(columns, at("pitot_scale", 0.0), at("pitot_zero_pa", 0.0), part)
 
 
-def _pitot(
+def _correct_pitot(
     columns: Mapping[str, Array], scale: float, zero: float, part: float
 ) -> dict[str, Array]:
     density = columns.get("density_kgpm3", np.array(1.225))
@@ -114,10 +114,10 @@ def _pitot(
     return fixed
 
 
-def without_delays(columns: Mapping[str, Array], delays: Mapping[str, float]) -> dict[str, Array]:
+def advance_delayed(columns: Mapping[str, Array], delays: Mapping[str, float]) -> dict[str, Array]:
     """Return columns read later by their sensors' delays (s) behind the IMU."""
     result = dict(columns)
-    for delay, names in LATE.items():
+    for delay, names in DELAYED_COLUMNS.items():
         for name in names:
             if name in columns and delay in delays:
                 t = columns["t_s"]
@@ -125,7 +125,7 @@ def without_delays(columns: Mapping[str, Array], delays: Mapping[str, float]) ->
     return result
 
 
-def correction_words(taken: Sequence[Correction]) -> list[str]:
+def correction_lines(taken: Sequence[Correction]) -> list[str]:
     """Return what was taken out of the columns, for a verdict."""
     if not taken:
         return []

@@ -18,7 +18,7 @@ from host.instrument.deviations import SensorErrorModel, vane_delay_s
 from host.instrument.deviations import deviations as drawn
 from host.sysid.compatibility.flight_path import AIR, DELAYS
 from host.sysid.compatibility.path_preparation import (
-    NOTHING,
+    NO_OFFSETS,
     compensate_friction,
     compensate_lowpass,
 )
@@ -31,7 +31,7 @@ FRICTION = "friction_share"
 ANGLES = AIR[1:]
 PRESSURE = (AIR[0], "qbar_pa")
 INERTIAL = (*(f"{a}_radps" for a in "pqr"), *(f"a{a}_mps2" for a in "xyz"))
-LATE = {
+DELAYED_COLUMNS = {
     VANE_DELAY: ANGLES,
     PITOT_DELAY: PRESSURE,
     IMU_DELAY: (*INERTIAL, *ANGLES, *PRESSURE, "phi_rad", "theta_rad"),
@@ -40,7 +40,7 @@ POTS = {f"{name}_scale": f"{name}_rad" for name in ("elevator", "aileron", "rudd
 PLACES = tuple(f"{what}_{a}_m" for what in ("imu", "cg", "vane") for a in "xyz")
 
 
-def at_cg(
+def columns_at_cg(
     columns: Mapping[str, Array], airframe: AirframeData, found: Compatibility
 ) -> dict[str, Array]:
     """Return columns as perfect sensors at the CG would have written them, as far as is known.
@@ -58,14 +58,14 @@ def at_cg(
         return transfer_to_cg(dict(columns), airframe)
     result = dict(columns)
     dt_s = float(columns["t_s"][1] - columns["t_s"][0])
-    tau_s, _ = vane_delay(found, i, columns)
+    tau_s, _ = vane_delay_of(found, i, columns)
     for name in (a for a in ANGLES if a in columns and AIR[0] in columns):
         result[name] = invert_vane_dynamics(
             compensate_friction(columns, name, i, dt_s), tau_s, i, columns, dt_s
         )
     for name in (n for n in INERTIAL if n in columns):
         result[name] = compensate_lowpass(columns[name], i, dt_s)
-    result = later(result, PRESSURE, i.pitot_lag_s)
+    result = advance_in_time(result, PRESSURE, i.pitot_lag_s)
     return transfer_to_cg(result, airframe)
 
 
@@ -80,11 +80,11 @@ def invert_vane_dynamics(
     return np.asarray(prompt - swing * np.gradient(np.gradient(prompt, dt_s), dt_s))
 
 
-def vane_delay(
+def vane_delay_of(
     found: Compatibility, i: SensorErrorModel, columns: Mapping[str, Array]
 ) -> tuple[float, float]:
     """Return the vanes' delay and its deviation, s: as told, else of the spring by the file."""
-    told = next((f for f in found.findings if f.name == VANE_DELAY and f.told), None)
+    told = next((f for f in found.findings if f.name == VANE_DELAY and f.data_informed), None)
     if told is not None:
         return told.value, told.half_width / NORMAL
     omega = 2.0 * np.pi * i.vane_hz_per_mps * float(np.median(columns[AIR[0]]))
@@ -92,25 +92,25 @@ def vane_delay(
     return nominal, vane_delay_s(i, nominal)
 
 
-def open_errors(found: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
+def residual_errors(found: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
     """Return one deviation of every error beyond those of single instants, by name."""
     i = found.instrument
     if i is None:
         return {}
-    every = drawn(i, NOTHING)
+    every = drawn(i, NO_OFFSETS)
     wanted = (*PLACES, *POTS, FRICTION, IMU_DELAY, PITOT_DELAY)
     return {n: every[n] for n in wanted if n in every} | {
-        VANE_DELAY: vane_delay(found, i, columns)[1]
+        VANE_DELAY: vane_delay_of(found, i, columns)[1]
     }
 
 
-def without_open(
+def perturb_columns(
     columns: Mapping[str, Array], error: str, size: float, found: Compatibility
 ) -> dict[str, Array]:
-    """Return columns already at the CG without one more error of `open_errors`."""
+    """Return columns already at the CG without one more error of `residual_errors`."""
     result = dict(columns)
-    if error in LATE:
-        return later(result, LATE[error], size)
+    if error in DELAYED_COLUMNS:
+        return advance_in_time(result, DELAYED_COLUMNS[error], size)
     if error in POTS:
         name = POTS[error]
         return result | ({name: columns[name] / (1.0 + size)} if name in columns else {})
@@ -127,15 +127,17 @@ def without_open(
         move = tuple(size if a == axis else 0.0 for a in "xyz")
         here = (move[0], move[1], move[2])
         frame = replace(
-            NOTHING,
-            imu_m=here if what != "vane" else NOTHING.imu_m,
+            NO_OFFSETS,
+            imu_m=here if what != "vane" else NO_OFFSETS.imu_m,
             vanes_m=(here,) if what != "imu" else (),
         )
         return transfer_to_cg(result, frame)
     return result
 
 
-def later(columns: Mapping[str, Array], names: tuple[str, ...], delay_s: float) -> dict[str, Array]:
+def advance_in_time(
+    columns: Mapping[str, Array], names: tuple[str, ...], delay_s: float
+) -> dict[str, Array]:
     """Return columns with some of them read later by a delay (s)."""
     t = columns["t_s"]
     return {k: np.interp(t + delay_s, t, v) if k in names else v for k, v in columns.items()}

@@ -26,14 +26,14 @@ def strapdown(
         At the first sample, north-east-down, m/s.
     dt_s : float
     """
-    turn = _turned_on(attitude, _turns(0.5 * dt_s * (rates[:-1] + rates[1:])))
+    turn = _accumulated_rotations(attitude, _rotations(0.5 * dt_s * (rates[:-1] + rates[1:])))
     push = np.einsum("nij,nj->ni", turn, force)
     gained = 0.5 * dt_s * (push[:-1] + push[1:])
     gained[:, 2] += GRAVITY_MPS2 * dt_s
     return turn, np.cumsum(np.vstack([velocity, gained]), axis=0)
 
 
-def _turns(angle: Array) -> Array:
+def _rotations(angle: Array) -> Array:
     """Return the matrices (n, 3, 3) of turns by rotation vectors (n, 3), rad.
 
     Rodrigues' formula, I + sin(a)/a K + (1 - cos(a))/a^2 K^2.
@@ -57,7 +57,7 @@ def _turns(angle: Array) -> Array:
     return turn
 
 
-def _turned_on(attitude: Array, turns: Array) -> Array:
+def _accumulated_rotations(attitude: Array, turns: Array) -> Array:
     """Return an attitude and what it becomes by every turn in a row, (n + 1, 3, 3).
 
     The record is cut into about as many pieces as each has samples, all multiplied side by side.
@@ -80,7 +80,7 @@ def _turned_on(attitude: Array, turns: Array) -> Array:
     return result
 
 
-def path_slopes(
+def path_sensitivities(
     C: Array,
     rates: Array,
     force: Array,
@@ -127,19 +127,23 @@ def path_slopes(
         Of the velocity through the air, body axes.
     """
     axes = np.arange(3)
-    E = _to_middle(_shares(C, rates, size[0], place[0], width), step_s, early)
+    E = _integral_to_middle(_sensor_error_effect(C, rates, size[0], place[0], width), step_s, early)
     E[:, axes, own + 3 + axes] += 1.0
-    pushed = _shares(C, force, size[1], place[1], width) - np.cross(felt[:, :, None], E, axis=1)
-    ground = _to_middle(pushed, step_s, early)
+    pushed = _sensor_error_effect(C, force, size[1], place[1], width) - np.cross(
+        felt[:, :, None], E, axis=1
+    )
+    ground = _integral_to_middle(pushed, step_s, early)
     ground[:, axes, own + axes] += 1.0
-    fall = _to_middle(ground[:, 2], step_s, early)
+    fall = _integral_to_middle(ground[:, 2], step_s, early)
     moved = ground + np.cross(through[:, :, None], E, axis=1)
     for axis in np.flatnonzero(wind >= 0):
         moved[:, axis, wind[axis]] -= 1.0
     return ground, fall, C.transpose(0, 2, 1) @ moved
 
 
-def _shares(C: Array, signal: Array, size: Array, place: IntArray, width: int) -> Array:
+def _sensor_error_effect(
+    C: Array, signal: Array, size: Array, place: IntArray, width: int
+) -> Array:
     """Return what errors of a triple of sensors make of its signal, turned by C."""
     out = np.zeros((len(C), 3, width))
     for axis in range(3):
@@ -154,7 +158,7 @@ def _shares(C: Array, signal: Array, size: Array, place: IntArray, width: int) -
     return out
 
 
-def _to_middle(mean: Array, step_s: float, early: float) -> Array:
+def _integral_to_middle(mean: Array, step_s: float, early: float) -> Array:
     """Integrate means of blocks to the middle of each."""
     return np.asarray(step_s * (np.cumsum(mean, axis=0) - 0.5 * mean - early * mean[0]))
 
@@ -172,7 +176,7 @@ def rotation(phi: float, theta: float, psi: float) -> Array:
     )
 
 
-def small_turn(vector: Array) -> Array:
+def rotation_from_vector(vector: Array) -> Array:
     """Return the matrix (3, 3) of a turn about an axis, given as a vector (3,), rad."""
     angle = float(np.linalg.norm(vector))
     x, y, z = vector

@@ -14,18 +14,18 @@ import numpy as np
 
 from host.arrays import Array, IntArray
 from host.sysid.estimators.regression import (
-    NEVER_MOVED,
-    Row,
+    NO_EXCITATION,
+    RegressionEquation,
     normal_equations,
-    regression_rows,
-    solve_rows,
+    regression_equations,
+    solve_least_squares,
 )
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.coloured_residuals import coloured_middle
-from host.sysid.numerics.information_inverse import covariance_of
+from host.sysid.numerics.coloured_residuals import coloured_score_covariance
+from host.sysid.numerics.information_inverse import covariance_from_information
 
 HUBER_LIMIT = 1.345  # 95 % efficiency on normal residuals (Huber 1981)
 MAD_TO_SIGMA = 1.4826
@@ -45,7 +45,7 @@ def fit_equation_error(
     Parameters
     ----------
     model, maneuvers
-        See `regression_rows`.
+        See `regression_equations`.
     variant : str
         ``ordinary``, ``weighted`` (equations weighted by their residual variance; differs only
         with tied entries), ``robust`` (Huber) or ``total`` (errors in states as well as rates).
@@ -53,16 +53,16 @@ def fit_equation_error(
         For ``total``: noise standard deviations of the states and of the rates, each of shape
         (n,). Without, they come from third differences, which takes fast signals for noise.
     bandwidth, use_rates
-        See `regression_rows`.
+        See `regression_equations`.
     """
-    names, rows = regression_rows(model, maneuvers, bandwidth=bandwidth, use_rates=use_rates)
+    names, rows = regression_equations(model, maneuvers, bandwidth=bandwidth, use_rates=use_rates)
     warnings: list[str] = []
     sample_weights = [np.ones(len(row.target)) for row in rows]
     iterations = 1
     theta = (
         _total(model, rows, len(names), deviations)
         if variant == "total"
-        else solve_rows(rows, len(names))
+        else solve_least_squares(rows, len(names))
     )
     if variant in ("weighted", "robust"):
         while iterations < 50:
@@ -73,7 +73,7 @@ def fit_equation_error(
                 for k, row in enumerate(rows):
                     size = np.abs(row.residual(theta)) / scales[k]
                     sample_weights[k] = np.minimum(1.0, HUBER_LIMIT / np.maximum(size, 1e-12))
-            theta = solve_rows(_weighted(rows, sample_weights), len(names), scales**-2.0)
+            theta = solve_least_squares(_weighted(rows, sample_weights), len(names), scales**-2.0)
             if np.all(np.abs(theta - before) <= 1e-8 * np.abs(theta) + 1e-14):
                 break
     elif variant not in ("ordinary", "total"):
@@ -83,7 +83,7 @@ def fit_equation_error(
     used = _pseudo_rows(rows, theta, sample_weights) if variant == "robust" else rows
     scales = _equation_scales(used, theta, robust=False, dof=len(names))
     normal, _ = normal_equations(used, len(names), scales**-2.0)
-    white = covariance_of(normal)
+    white = covariance_from_information(normal)
     coloured = coloured_covariance(used, theta, white, scales)
     labels = sorted({row.equation for row in rows})
     residuals, fitted = [], []
@@ -112,12 +112,14 @@ def fit_equation_error(
     )
 
 
-def _weighted(rows: Sequence[Row], weights: Sequence[Array]) -> list[Row]:
+def _weighted(
+    rows: Sequence[RegressionEquation], weights: Sequence[Array]
+) -> list[RegressionEquation]:
     result = []
     for row, weight in zip(rows, weights, strict=True):
         root = np.sqrt(weight)
         result.append(
-            Row(
+            RegressionEquation(
                 row.equation,
                 row.label,
                 row.maneuver,
@@ -130,7 +132,9 @@ def _weighted(rows: Sequence[Row], weights: Sequence[Array]) -> list[Row]:
     return result
 
 
-def _pseudo_rows(rows: Sequence[Row], theta: Array, weights: Sequence[Array]) -> list[Row]:
+def _pseudo_rows(
+    rows: Sequence[RegressionEquation], theta: Array, weights: Sequence[Array]
+) -> list[RegressionEquation]:
     """Return rows whose residuals are what an M-estimate takes of the true ones.
 
     Ordinary least squares on them gives the same estimate and Huber's covariance: the residual,
@@ -154,7 +158,9 @@ def _pseudo_rows(rows: Sequence[Row], theta: Array, weights: Sequence[Array]) ->
     ]
 
 
-def _equation_scales(rows: Sequence[Row], theta: Array, *, robust: bool, dof: int = 0) -> Array:
+def _equation_scales(
+    rows: Sequence[RegressionEquation], theta: Array, *, robust: bool, dof: int = 0
+) -> Array:
     """Return the residual scale of each row, pooled over maneuvers of one equation."""
     scale: dict[int, float] = {}
     for equation in {row.equation for row in rows}:
@@ -170,12 +176,14 @@ def _equation_scales(rows: Sequence[Row], theta: Array, *, robust: bool, dof: in
     return np.array([scale[row.equation] for row in rows])
 
 
-def coloured_covariance(rows: Sequence[Row], theta: Array, white: Array, scales: Array) -> Array:
+def coloured_covariance(
+    rows: Sequence[RegressionEquation], theta: Array, white: Array, scales: Array
+) -> Array:
     """Correct a covariance for coloured residuals (Klein & Morelli, sec. 5.2)."""
     middle = np.zeros_like(white)
     for row, scale in zip(rows, scales, strict=True):
         residual = row.residual(theta)
-        part = coloured_middle(residual, row.block) / scale**4
+        part = coloured_score_covariance(residual, row.block) / scale**4
         middle[np.ix_(row.columns, row.columns)] += part
     result = white @ middle @ white
     result = 0.5 * (result + result.T)
@@ -188,7 +196,7 @@ def coloured_covariance(rows: Sequence[Row], theta: Array, white: Array, scales:
 
 def _total(
     model: LinearModel,
-    rows: Sequence[Row],
+    rows: Sequence[RegressionEquation],
     n_parameters: int,
     deviations: tuple[Array, Array] | None,
 ) -> Array:
@@ -235,7 +243,7 @@ def _total(
             solution[~noisy] = np.linalg.lstsq(exact_columns, rest, rcond=None)[0]
         theta[active] = solution
     if np.isnan(theta).any():
-        raise IdentificationError(NEVER_MOVED)
+        raise IdentificationError(NO_EXCITATION)
     return theta
 
 

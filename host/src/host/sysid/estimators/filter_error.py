@@ -12,33 +12,37 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array, BoolArray
-from host.sysid.estimators.hac_inflation import misfit_factor, widened_names
-from host.sysid.estimators.noise_model_comparison import against_coloured_noise
+from host.sysid.estimators.hac_inflation import hac_inflation, inflation_lines
+from host.sysid.estimators.noise_model_comparison import compare_noise_models
 from host.sysid.estimators.start_values import start_values
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.filter_problem import FilterProblem, Likelihood
-from host.sysid.numerics.filter_scoring import scoring, summed, whitened_slopes
+from host.sysid.numerics.filter_problem import FilterProblem, InnovationLikelihood
+from host.sysid.numerics.filter_scoring import (
+    fisher_scoring,
+    total_information,
+    whitened_innovation_sensitivities,
+)
 from host.sysid.numerics.gauss_newton import Objective, free_of_bounds, gauss_newton
-from host.sysid.numerics.information_inverse import covariance_of
-from host.sysid.numerics.maneuver_agreement import pulls
+from host.sysid.numerics.information_inverse import covariance_from_information
+from host.sysid.numerics.maneuver_agreement import maneuver_influence
 from host.sysid.numerics.output_error import minimise
 
 # Fisher's information overstates the curvature by the noise of a sensor that is smoother than any:
 # steps towards zero are all too short, by the same share. A longer one is tried for a fifth of what
 # new slopes cost: 12 to 20 iterations instead of 22 to 60.
-FAR_FROM = 0.5  # bounds
-FARTHEST = 32.0
-VARIANCE = (0.01, 100.0)  # times what it was: most of one step
+EXTEND_FROM_BOUNDS = 0.5  # bounds
+LONGEST_EXTENSION = 32.0
+VARIANCE_CHANGE = (0.01, 100.0)  # times what it was: most of one step
 MAX_ITERATIONS = 60
 NOISE_FLOOR = 1e-3  # of an output's deviation, or of the first guess of process noise
 # First guess of the deviations: sensors share the residuals of output error with process noise.
 # A guess of process noise that is too small starves the gain, and the search ends elsewhere.
 NOISE_SHARE, PROCESS_SHARE = 0.6, 2.7
-HIDDEN = 0.1  # rad, rad/s or m/s: what no output shows at once is not taken for larger
-SLOWEST = 0.1  # rad/s, of a state that forgets its process noise
+LARGEST_HIDDEN = 0.1  # rad, rad/s or m/s: what no output shows at once is not taken for larger
+SLOWEST_DECAY_RADPS = 0.1  # rad/s, of a state that forgets its process noise
 
 
 def fit_filter_error(
@@ -86,19 +90,21 @@ def fit_filter_error(
     if found is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
     theta, point = found.theta, found.trial
-    covariance = covariance_of(found.information)
+    covariance = covariance_from_information(found.information)
     factor: Array = np.ones(len(theta))
     if misfit:
         white = [
             e @ point.gains[m.dt_s].whitener.T for e, m in zip(point.e, maneuvers, strict=True)
         ]
         steps_s = [m.dt_s for m in maneuvers]
-        factor = misfit_factor(whitened_slopes(problem, theta, point), white, steps_s, covariance)
+        factor = hac_inflation(
+            whitened_innovation_sensitivities(problem, theta, point), white, steps_s, covariance
+        )
     kept = problem.n_model
     warnings = []
     if not found.converged:
         warnings.append(f"no convergence: last step {found.step:.3g} bounds long")
-    warnings += widened_names(model, factor)
+    warnings += inflation_lines(model, factor)
     result = FitResult(
         method="filter error",
         model=model,
@@ -119,10 +125,10 @@ def fit_filter_error(
             "misfit": factor,
             "process_deviation": np.exp(theta[kept : kept + len(process)]),
             "noise_deviation": np.exp(theta[kept + len(process) :]),
-            **pulls(objective.parts, objective.scores, covariance),
+            **maneuver_influence(objective.parts, objective.scores, covariance),
         },
     )
-    return against_coloured_noise(result, maneuvers, first) if rival else result
+    return compare_noise_models(result, maneuvers, first) if rival else result
 
 
 def information_at(
@@ -146,8 +152,8 @@ def information_at(
     point = problem.evaluate(theta)
     if point is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at these values")
-    parts, scores = scoring(problem, theta, point)
-    return summed(problem, theta, parts, scores)[0]
+    parts, scores = fisher_scoring(problem, theta, point)
+    return total_information(problem, theta, parts, scores)[0]
 
 
 def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> Array:
@@ -159,12 +165,12 @@ def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> Ar
     process = []
     for i in problem.process_index:
         # The smallest motion of this state that would explain the residual of an output.
-        size = float(np.min(deviation / np.maximum(np.abs(C[:, i]), 1e-9), initial=HIDDEN))
-        process.append(PROCESS_SHARE * size * np.sqrt(2.0 * max(-A[i, i], SLOWEST)))
+        size = float(np.min(deviation / np.maximum(np.abs(C[:, i]), 1e-9), initial=LARGEST_HIDDEN))
+        process.append(PROCESS_SHARE * size * np.sqrt(2.0 * max(-A[i, i], SLOWEST_DECAY_RADPS)))
     return np.concatenate([optimum.theta, np.log(process), np.log(NOISE_SHARE * deviation)])
 
 
-class _FilterError(Objective[Likelihood]):
+class _FilterError(Objective[InnovationLikelihood]):
     """Innovations of the steady filter; deviations of the noise never fall below `floor`."""
 
     def __init__(self, problem: FilterProblem, floor: Array) -> None:
@@ -175,12 +181,12 @@ class _FilterError(Objective[Likelihood]):
         self.parts: list[Array] = []  # Fisher's information by maneuver where last asked for
         self.scores: list[Array] = []
 
-    def evaluate(self, theta: Array) -> Likelihood | None:
+    def evaluate(self, theta: Array) -> InnovationLikelihood | None:
         return self._problem.evaluate(theta)
 
-    def normal(self, theta: Array, trial: Likelihood) -> tuple[Array, Array]:
-        self.parts, self.scores = scoring(self._problem, theta, trial)
-        return summed(self._problem, theta, self.parts, self.scores)
+    def normal(self, theta: Array, trial: InnovationLikelihood) -> tuple[Array, Array]:
+        self.parts, self.scores = fisher_scoring(self._problem, theta, trial)
+        return total_information(self._problem, theta, self.parts, self.scores)
 
     def free(self, theta: Array, gradient: Array) -> BoolArray:
         return free_of_bounds(theta, gradient, self._lower, self._upper)
@@ -188,15 +194,17 @@ class _FilterError(Objective[Likelihood]):
     def reached(self, theta: Array, step: Array, far: float = 1.0) -> Array:
         """Return where `far` steps lead: noise moves by its variance, which may come to nothing."""
         goal, noise = theta + far * step, self._noise
-        goal[noise] = theta[noise] + 0.5 * np.log(np.clip(1.0 + 2.0 * far * step[noise], *VARIANCE))
+        goal[noise] = theta[noise] + 0.5 * np.log(
+            np.clip(1.0 + 2.0 * far * step[noise], *VARIANCE_CHANGE)
+        )
         return np.clip(goal, self._lower, self._upper)
 
-    def farther(
-        self, theta: Array, step: Array, size: float, reached: tuple[Array, Likelihood]
-    ) -> tuple[Array, Likelihood]:
+    def extend_step(
+        self, theta: Array, step: Array, size: float, reached: tuple[Array, InnovationLikelihood]
+    ) -> tuple[Array, InnovationLikelihood]:
         """Return the best of a long step and its doubles, as long as they gain."""
         best, far = reached, 2.0
-        while size > FAR_FROM and far <= FARTHEST:
+        while size > EXTEND_FROM_BOUNDS and far <= LONGEST_EXTENSION:
             goal = self.reached(theta, step, far)
             trial = self._problem.evaluate(goal)
             if trial is None or trial.cost >= best[1].cost:

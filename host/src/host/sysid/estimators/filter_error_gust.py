@@ -25,8 +25,8 @@ from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, low altitude)
 VANES = ("alpha_rad", "beta_rad")
 # What else disturbs: thrust and longitudinal gusts; the drift of the attitude filter.
-ALSO = ("airspeed_mps", "phi_rad")
-ROLLING = "gust_roll_radps"
+OTHER_PROCESS_STATES = ("airspeed_mps", "phi_rad")
+ROLL_GUST = "gust_roll_radps"
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,8 @@ def gust_model(
             ("gust_tail_rad", "gust_tail_rad", -lag),
         ]
         if vane == "beta_rad" and "p_radps" in base.states:
-            hidden[ROLLING] = {"p_radps": 1.0}
-            fixed.append((ROLLING, ROLLING, -lag))
+            hidden[ROLL_GUST] = {"p_radps": 1.0}
+            fixed.append((ROLL_GUST, ROLL_GUST, -lag))
     states = (*base.states, *hidden)
     n, total = len(base.states), len(base.states) + len(hidden)
     A, C = np.zeros((total, total)), np.zeros((len(base.outputs), total))
@@ -155,7 +155,7 @@ def fit_with_gust(
     """
     if not model.delays:
         start = start_values_of(model, maneuvers)
-        result = _second(model, model, list(maneuvers), airspeed_mps, start)
+        result = _fit_gust_state(model, model, list(maneuvers), airspeed_mps, start)
         return GustFit(result, model, tuple(maneuvers), {})
     first = fit("output-error-white", model, maneuvers, doubting=False)
     half = first.half_width()
@@ -164,19 +164,19 @@ def fit_with_gust(
     for delay in model.delays:
         for output in delay.outputs:
             shifts[model.outputs.index(output)] = delays[delay.name][0]
-    shifted = [_advanced(m, shifts) for m in maneuvers]
+    shifted = [_advance_outputs(m, shifts) for m in maneuvers]
     count = len(model.parameters)
     start = np.concatenate([first.estimate[:count], first.estimate[len(model.parameter_names) :]])
     plain = replace(model, delays=())
-    result = _second(model, plain, shifted, airspeed_mps, start)
+    result = _fit_gust_state(model, plain, shifted, airspeed_mps, start)
     if result.residual_kind == "innovation":
         covariance = result.covariance.copy()
-        covariance[:count, :count] += _from_delays(first, model)
+        covariance[:count, :count] += _delay_covariance(first, model)
         result = replace(result, covariance=covariance)
     return GustFit(result=result, model=plain, maneuvers=tuple(shifted), delays=delays)
 
 
-def _second(
+def _fit_gust_state(
     model: LinearModel,
     plain: LinearModel,
     maneuvers: Sequence[Maneuver],
@@ -184,7 +184,7 @@ def _second(
     start: Array,
 ) -> FitResult:
     """Return filter error with the gust as a state; output error where that search does not end."""
-    process = ("gust_rad", *(s for s in ALSO if s in model.states))
+    process = ("gust_rad", *(s for s in OTHER_PROCESS_STATES if s in model.states))
     wide = gust_model(model, airspeed_mps)
     try:
         result = fit_filter_error(wide, maneuvers, process=process, start=start, rival=False)
@@ -207,7 +207,7 @@ def _second(
     )
 
 
-def _from_delays(first: FitResult, model: LinearModel) -> Array:
+def _delay_covariance(first: FitResult, model: LinearModel) -> Array:
     """Return what the uncertainty of the delays adds to the covariance of the parameters.
 
     The second stage takes the delays for known; the first one says how the parameters move with
@@ -223,7 +223,7 @@ def _from_delays(first: FitResult, model: LinearModel) -> Array:
     return np.asarray(0.5 * (part + part.T), dtype=np.float64)
 
 
-def _advanced(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
+def _advance_outputs(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
     """Read each output later by its delay, so that all belong to one instant."""
     t = maneuver.time_s
     columns = [

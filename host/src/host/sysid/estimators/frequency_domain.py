@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from host.arrays import Array
-from host.sysid.estimators.regression import solve_normal
+from host.sysid.estimators.regression import solve_normal_equations
 from host.sysid.estimators.start_values import start_values_of
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.differentiation import signal_bandwidth_hz
-from host.sysid.numerics.discretisation import transition
+from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.gauss_newton import Objective, gauss_newton
-from host.sysid.numerics.information_inverse import covariance_of
+from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.output_error_problem import check_shapes
 
 Spectrum = NDArray[np.complexfloating]
@@ -125,7 +125,7 @@ def fit_frequency_equation_error(
     for _ in range(3):
         normal = sum(w * X.T @ X for w, X in zip(weights, X_rows, strict=True))
         right = sum(w * X.T @ y for w, X, y in zip(weights, X_rows, y_rows, strict=True))
-        theta = solve_normal(np.asarray(normal), np.asarray(right))
+        theta = solve_normal_equations(np.asarray(normal), np.asarray(right))
         power = {key: [0.0, 0.0] for key in keys}
         for key, block, y in zip(keys, X_rows, y_rows, strict=True):
             miss = y - block @ theta
@@ -133,7 +133,7 @@ def fit_frequency_equation_error(
             power[key][0] += float(miss @ miss)
             power[key][1] += max(len(y) - free, 1)
         weights = np.array([power[key][1] / max(power[key][0], 1e-300) for key in keys])
-    covariance = covariance_of(
+    covariance = covariance_from_information(
         np.asarray(sum(w * X.T @ X for w, X in zip(weights, X_rows, strict=True)))
     )
     residuals = [y - X @ theta for X, y in zip(X_rows, y_rows, strict=True)]
@@ -226,7 +226,7 @@ def fit_frequency_output_error(
     if found is None:
         raise IdentificationError(f"model {model.name}: no finite response at the start")
     information, _ = objective.normal(found.theta, found.trial)
-    covariance = covariance_of(information)[:count, :count]
+    covariance = covariance_from_information(information)[:count, :count]
     left = found.trial.residuals
     residuals = tuple(np.vstack([r.real, r.imag]) for r in left)
     lines = 2 * sum(map(len, left)) - count - n
@@ -290,7 +290,7 @@ class _Spectra(Objective[_Trial]):
     ) -> tuple[Spectrum, Spectrum]:
         model, entries, outputs = self._model, self._entries, self._outputs
         n, m, count = len(model.states), len(model.inputs), len(model.parameters)
-        step, step_slopes = transition(
+        step, step_slopes = discretise(
             AB, n, m, model.hold == "foh", record.dt_s, entries.row, entries.column,
             entries.parameter, entries.gain, count,
         )  # fmt: skip

@@ -19,11 +19,11 @@ from host.arrays import Array
 from host.sysid.models.state_space_model import LinearModel
 
 WINDOW_S = 1.0  # longest memory looked for: more than a short period, most of a dutch roll
-WORTH_SAYING = 1.25  # times wider
+REPORTED_FACTOR = 1.25  # times wider
 QUANTILE = (1.96, 2.9694, 0.416, -0.5324)  # 97.5 %, lags weighted by a triangle
 
 
-def misfit_factor(
+def hac_inflation(
     slopes: Sequence[Array], white: Sequence[Array], steps_s: Sequence[float], inverse: Array
 ) -> Array:
     """Return by how much each standard error is too small, at least 1, (P,).
@@ -55,12 +55,12 @@ def misfit_factor(
     return np.asarray(np.maximum(wider * ratio, 1.0), dtype=np.float64)
 
 
-def widened_names(model: LinearModel, factor: Array) -> list[str]:
+def inflation_lines(model: LinearModel, factor: Array) -> list[str]:
     """Return a sentence that names the parameters widened by much, or nothing."""
     said = [
         f"{parameter.name} {times:.1f}"
         for parameter, times in zip(model.parameters, factor, strict=False)
-        if times >= WORTH_SAYING
+        if times >= REPORTED_FACTOR
     ]
     if not said:
         return []

@@ -20,11 +20,11 @@ from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.output_error import minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 
-STEPS = 15  # of each search but the last: its end is only the next one's start
-ROUGH = 0.3  # Cramer-Rao bounds: nearer than that the next rate moves it anyway
+MAX_ITERATIONS = 15  # of each search but the last: its end is only the next one's start
+STEP_LIMIT = 0.3  # Cramer-Rao bounds: nearer than that the next rate moves it anyway
 
 
-def following_start(problem: OutputProblem, theta: Array, rates_radps: Sequence[float]) -> Array:
+def homotopy_start(problem: OutputProblem, theta: Array, rates_radps: Sequence[float]) -> Array:
     """Return where searches at falling rates of following end, begun at `theta`.
 
     Parameters
@@ -43,14 +43,14 @@ def following_start(problem: OutputProblem, theta: Array, rates_radps: Sequence[
     """
     for rate_radps in rates_radps:
         led = OutputProblem(
-            led_model(problem.model, rate_radps),
-            [_led_maneuver(problem.model, m) for m in problem.maneuvers],
+            stabilised_model(problem.model, rate_radps),
+            [_stabilised_maneuver(problem.model, m) for m in problem.maneuvers],
         )
-        theta = minimise(led, theta, step_limit=ROUGH, max_iterations=STEPS).theta
+        theta = minimise(led, theta, step_limit=STEP_LIMIT, max_iterations=MAX_ITERATIONS).theta
     return theta
 
 
-def led_model(model: LinearModel, rate_radps: float) -> LinearModel:
+def stabilised_model(model: LinearModel, rate_radps: float) -> LinearModel:
     """Return the model drawn to its measured states, which become inputs; nothing new is free."""
     count = len(model.states)
     model.measured_states()
@@ -64,6 +64,6 @@ def led_model(model: LinearModel, rate_radps: float) -> LinearModel:
     )
 
 
-def _led_maneuver(model: LinearModel, maneuver: Maneuver) -> Maneuver:
+def _stabilised_maneuver(model: LinearModel, maneuver: Maneuver) -> Maneuver:
     seen = maneuver.outputs[:, list(model.measured_states())]
     return replace(maneuver, inputs=np.hstack([maneuver.inputs, seen]))

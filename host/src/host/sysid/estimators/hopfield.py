@@ -22,13 +22,13 @@ import numpy as np
 from host.arrays import Array
 from host.compiled import compiled
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.regression import normal_equations, regression_rows
+from host.sysid.estimators.regression import normal_equations, regression_equations
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import thesis_program_error_percent
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.discretisation import transition
+from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.recursion import simulate
 
 LAMBDA = 0.001  # thesis, section 3.2.3
@@ -106,9 +106,9 @@ def network(
     Parameters
     ----------
     model, maneuvers, bandwidth
-        See `rows.regression_rows`.
+        See `regression_equations`.
     """
-    names, rows = regression_rows(model, maneuvers, bandwidth=bandwidth)
+    names, rows = regression_equations(model, maneuvers, bandwidth=bandwidth)
     normal, right = normal_equations(rows, len(names))
     return names, -normal, right
 
@@ -283,7 +283,7 @@ def free_run(model: LinearModel, maneuver: Maneuver, beta: Array) -> Array | Non
     AB = np.zeros((n, n + m + 1))
     AB[:, :n], AB[:, n : n + m] = A, B
     none = np.zeros(0, dtype=np.int64)
-    step, _ = transition(AB, n, m, False, maneuver.dt_s, none, none, none, np.zeros(0), 0)
+    step, _ = discretise(AB, n, m, False, maneuver.dt_s, none, none, none, np.zeros(0), 0)
     drive = np.hstack([maneuver.inputs, np.ones((maneuver.samples, 1))])
     first = maneuver.outputs[0, model.measured_states()].copy()
     finite, z = simulate(step, drive, first)

@@ -15,10 +15,10 @@ from host.arrays import Array
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.coloured_residuals import coloured_middle
+from host.sysid.numerics.coloured_residuals import coloured_score_covariance
 from host.sysid.numerics.filter_problem import FilterProblem
-from host.sysid.numerics.filter_scoring import whitened_slopes
-from host.sysid.numerics.information_inverse import covariance_of
+from host.sysid.numerics.filter_scoring import whitened_innovation_sensitivities
+from host.sysid.numerics.information_inverse import covariance_from_information
 
 PROCESS = "log_process."
 
@@ -69,7 +69,7 @@ class Innovations:
         for e, white, slope in zip(self.e, self.white, self.slopes, strict=True):
             plain = e @ white.T
             for j in range(plain.shape[1]):
-                middle += coloured_middle(plain[:, j], slope[:, j])
+                middle += coloured_score_covariance(plain[:, j], slope[:, j])
         wide = self.covariance @ middle @ self.covariance
         factor = np.sqrt(
             np.maximum(np.diag(wide) / np.maximum(np.diag(self.covariance), 1e-300), 1.0)
@@ -88,11 +88,11 @@ def innovations_of(
     if point is None:
         return None
     white = [point.gains[m.dt_s].whitener for m in maneuvers]
-    slopes = whitened_slopes(problem, theta, point)
+    slopes = whitened_innovation_sensitivities(problem, theta, point)
     count = problem.n_model
     own = [slope.reshape(-1, len(theta))[:, :count] for slope in slopes]
     inverse = np.zeros_like(covariance)
-    inverse[:count, :count] = covariance_of(
+    inverse[:count, :count] = covariance_from_information(
         np.diag(problem.inner.prior_precision) + sum(J.T @ J for J in own)
     )
     return Innovations(theta, covariance, inverse, process, point.e, white, slopes)

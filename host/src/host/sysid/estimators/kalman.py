@@ -19,15 +19,15 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.discretisation import transition
+from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.output_error_problem import check_shapes
 
 PASSES = 2  # over the record: the second starts from the parameters of the first
-START_SHARE = 0.5  # first standard deviation of a parameter, relative to its size
+INITIAL_RELATIVE_SD = 0.5  # first standard deviation of a parameter, relative to its size
 PROCESS_SHARE = 1e-4  # default process noise per root second, of the rms of a state
-SPREAD = 1e-1  # alpha of the sigma points
-NOTHING = 0.05  # correlation taken for none: twice its deviation over 1600 samples
-LOUD = 2.0  # inflation worth a word
+SIGMA_POINT_SPREAD = 1e-1  # alpha of the sigma points
+NEGLIGIBLE_CORRELATION = 0.05  # correlation taken for none: twice its deviation over 1600 samples
+REPORTED_INFLATION = 2.0  # inflation worth a word
 
 
 @dataclass(slots=True)
@@ -89,7 +89,7 @@ def noise_deviation(maneuvers: Sequence[Maneuver]) -> Array:
     return np.asarray(np.maximum(np.sqrt(np.mean(stacked**2, axis=0) / 20.0), floor))
 
 
-def inflation(white: Sequence[Array]) -> float:
+def innovation_inflation(white: Sequence[Array]) -> float:
     """Return by how much innovations tell less than the filter believes, at least 1.
 
     Power of the whitened innovations times the time their correlation lasts, in samples: summed
@@ -108,7 +108,7 @@ def inflation(white: Sequence[Array]) -> float:
             [sum(float(x[k:] @ x[: len(x) - k]) for x in parts) for k in range(lags)]
         )
         moments /= sum(len(x) for x in parts)
-        low = np.flatnonzero(moments < NOTHING * moments[0])
+        low = np.flatnonzero(moments < NEGLIGIBLE_CORRELATION * moments[0])
         end = int(low[0]) if len(low) else lags
         total += max(float(2.0 * np.sum(moments[:end]) - moments[0]), 0.0)
     return float(max(total / white[0].shape[1], 1.0))
@@ -147,7 +147,7 @@ def _run(
     joint: Array = np.zeros(size)
     P: Array = np.zeros((size, size))
     joint[n : n + q] = first
-    spread_first = START_SHARE * np.abs(first) + 1e-3 * np.max(np.abs(first))
+    spread_first = INITIAL_RELATIVE_SD * np.abs(first) + 1e-3 * np.max(np.abs(first))
     residuals: list[Array] = []
     white: list[Array] = []
     for _ in range(PASSES):
@@ -174,10 +174,10 @@ def _run(
                 )
             residuals.append(e)
             white.append(whitened)
-    excess = inflation(white)
+    excess = innovation_inflation(white)
     covariance = excess * P[n:, n:]
     warnings: tuple[str, ...] = ()
-    if excess > LOUD:
+    if excess > REPORTED_INFLATION:
         warnings = (
             f"innovations tell {excess:.0f} times less than the noise model says (gusts, coloured"
             f" noise): intervals are {np.sqrt(excess):.1f} times wider for it, and the estimate is"
@@ -258,7 +258,7 @@ def _extended_pass(
         AB[:, :n], AB[:, n : n + m] = A, B
         for b, place in enumerate(bias_rows):
             AB[place, -1] = biases[b]
-        step, slopes = transition(
+        step, slopes = discretise(
             AB, n, m, foh, maneuver.dt_s, row, column, parameter, gain, q + rates
         )
         parts = [x, u, [1.0]]
@@ -280,11 +280,11 @@ def _unscented_pass(
     model, n, size = filter_.model, filter_.n_states, len(joint)
     Q = np.zeros_like(P)
     Q[:n, :n] = np.diag(filter_.process**2) * maneuver.dt_s
-    scale = SPREAD**2 * size
+    scale = SIGMA_POINT_SPREAD**2 * size
     mean_weight = np.full(2 * size + 1, 0.5 / scale)
     mean_weight[0] = 1.0 - size / scale
     weight = mean_weight.copy()
-    weight[0] += 3.0 - SPREAD**2
+    weight[0] += 3.0 - SIGMA_POINT_SPREAD**2
     e, white = np.zeros_like(maneuver.outputs), np.zeros_like(maneuver.outputs)
     following = np.vstack([maneuver.inputs[1:], maneuver.inputs[-1:]])
     if model.hold == "zoh":

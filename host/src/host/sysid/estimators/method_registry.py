@@ -18,7 +18,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.output_error_problem import check_shapes
 
-STILL = 1e-30  # in any unit: an output that moves less holds nothing, and its square underflows
+NO_MOTION = 1e-30  # in any unit: an output that moves less holds nothing, and its square underflows
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +162,7 @@ def _check(model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:
     for maneuver in maneuvers:
         check_shapes(model, maneuver)
     moved = np.max([np.ptp(m.outputs, axis=0) for m in maneuvers], axis=0)
-    still = [y for y, size in zip(model.outputs, moved, strict=True) if size < STILL]
+    still = [y for y, size in zip(model.outputs, moved, strict=True) if size < NO_MOTION]
     if still:
         raise IdentificationError(
             f"{maneuvers[0].name}: {', '.join(still)} never moved: a dead sensor, or not connected"

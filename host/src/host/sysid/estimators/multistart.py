@@ -16,9 +16,13 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.estimators.homotopy import following_start
+from host.sysid.estimators.homotopy import homotopy_start
 from host.sysid.estimators.kalman import noise_deviation
-from host.sysid.estimators.regression import Row, regression_rows, solve_rows
+from host.sysid.estimators.regression import (
+    RegressionEquation,
+    regression_equations,
+    solve_least_squares,
+)
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import CONDITION_LIMIT
 from host.sysid.models.maneuver import Maneuver
@@ -27,18 +31,18 @@ from host.sysid.numerics.output_error import Optimum, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.recursion import simulate
 
-LADDERS_RADPS = ((2.0, 0.5), (6.0, 1.5, 0.4))  # rates of following, one search each
+HOMOTOPY_GAINS_RADPS = ((2.0, 0.5), (6.0, 1.5, 0.4))  # rates of following, one search each
 CORNERS_RADPS = (0.5, 2.0, 6.0, 20.0)  # of the lag: slow and fast motions of small aircraft
 INSTRUMENT_CORNERS_RADPS = (2.0, 6.0)
 INSTRUMENT_ROUNDS = 3
-SETTLED = 3.0  # time constants until the lag has forgotten its start
-UNEXPLAINED = 2.0  # residual over white noise power: from here on the fit is looked at again
-TRIED = 4  # searches from other starts
-LONG_SEARCH = 200  # iterations where none of them has converged
+FILTER_TIME_CONSTANTS = 3.0  # time constants until the lag has forgotten its start
+EXCESS_POWER = 2.0  # residual over white noise power: from here on the fit is looked at again
+MOST_STARTS = 4  # searches from other starts
+LAST_SEARCH_ITERATIONS = 200  # iterations where none of them has converged
 LEAST_SAMPLES = 50
 
 
-def search(problem: OutputProblem, theta: Array, *, doubting: bool = True) -> Optimum:
+def multistart(problem: OutputProblem, theta: Array, *, doubting: bool = True) -> Optimum:
     """Return the best optimum of white-noise output error found from `theta` and other starts.
 
     Parameters
@@ -58,25 +62,25 @@ def search(problem: OutputProblem, theta: Array, *, doubting: bool = True) -> Op
     best, failure = _try(problem, None, theta)
     if best is not None and best.converged and not doubting:
         return best
-    settled = best is not None and best.converged and _explained(problem, best)
-    if best is not None and settled and not _flat(best):
+    settled = best is not None and best.converged and _residuals_are_noise(problem, best)
+    if best is not None and settled and not _nearly_singular(best):
         return best
-    for rates_radps in LADDERS_RADPS:
+    for rates_radps in HOMOTOPY_GAINS_RADPS:
         try:
-            led = following_start(problem, theta, rates_radps)
+            led = homotopy_start(problem, theta, rates_radps)
         except IdentificationError:
             continue
         best, _ = _try(problem, best, led)
-    settled = best is not None and best.converged and _explained(problem, best)
+    settled = best is not None and best.converged and _residuals_are_noise(problem, best)
     if not settled:
         known = best if best is not None and best.converged else None
-        for start in _starts(problem, theta, known)[:TRIED]:
+        for start in _starts(problem, theta, known)[:MOST_STARTS]:
             best, _ = _try(problem, best, start)
     if best is None:
         assert failure is not None
         raise failure
     if not best.converged:
-        best = minimise(problem, best.theta, max_iterations=LONG_SEARCH)
+        best = minimise(problem, best.theta, max_iterations=LAST_SEARCH_ITERATIONS)
     return best
 
 
@@ -91,7 +95,7 @@ def _try(
     return (found if best is None or found.cost < best.cost else best), None
 
 
-def _flat(optimum: Optimum) -> bool:
+def _nearly_singular(optimum: Optimum) -> bool:
     """Whether the information is close to singular: valleys are long there, and many."""
     information = optimum.information[np.ix_(optimum.free, optimum.free)]
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
@@ -115,10 +119,10 @@ def white_cost(problem: OutputProblem, theta: Array) -> float:
     return 0.5 * (problem.samples * float(np.sum(np.log(power))) + float(np.sum(prior)))
 
 
-def _explained(problem: OutputProblem, optimum: Optimum) -> bool:
+def _residuals_are_noise(problem: OutputProblem, optimum: Optimum) -> bool:
     noise = noise_deviation(problem.maneuvers) ** 2
     power = np.mean(np.hstack(optimum.residuals) ** 2, axis=1)
-    return bool(np.all(power <= UNEXPLAINED * noise))
+    return bool(np.all(power <= EXCESS_POWER * noise))
 
 
 def _starts(problem: OutputProblem, theta: Array, settled: Optimum | None) -> list[Array]:
@@ -132,7 +136,7 @@ def _starts(problem: OutputProblem, theta: Array, settled: Optimum | None) -> li
         return []
     found: list[tuple[float, Array]] = []
     for corner in CORNERS_RADPS:
-        _add(found, problem, _lagged_equations(problem, corner, None))
+        _add(found, problem, _filtered_equation_error(problem, corner, None))
     if settled is not None and all(cost >= settled.cost for cost, _ in found):
         return []
     first = white_cost(problem, theta)
@@ -143,7 +147,7 @@ def _starts(problem: OutputProblem, theta: Array, settled: Optimum | None) -> li
         if outputs is None:
             break
         for corner in INSTRUMENT_CORNERS_RADPS:
-            _add(found, problem, _lagged_equations(problem, corner, outputs))
+            _add(found, problem, _filtered_equation_error(problem, corner, outputs))
     return [start for cost, start in sorted(found, key=lambda pair: pair[0]) if np.isfinite(cost)]
 
 
@@ -153,23 +157,23 @@ def _add(found: list[tuple[float, Array]], problem: OutputProblem, start: Array 
         found.append((white_cost(problem, start), start))
 
 
-def _lagged_equations(
+def _filtered_equation_error(
     problem: OutputProblem, corner_radps: float, simulated: list[Array] | None
 ) -> Array | None:
     """Solve equation error on lagged signals, with a simulated response as instruments."""
     model = problem.model
     try:
-        lagged = [_lagged(model, m, corner_radps) for m in problem.maneuvers]
-        names, rows = regression_rows(model, lagged)
+        lagged = [_state_variable_filter(model, m, corner_radps) for m in problem.maneuvers]
+        names, rows = regression_equations(model, lagged)
         if simulated is None:
-            estimate = solve_rows(rows, len(names))
+            estimate = solve_least_squares(rows, len(names))
         else:
             calm = [
-                _lagged(model, replace(m, outputs=y.T), corner_radps)
+                _state_variable_filter(model, replace(m, outputs=y.T), corner_radps)
                 for m, y in zip(problem.maneuvers, simulated, strict=True)
             ]
-            _, instruments = regression_rows(model, calm)
-            estimate = _with_instruments(rows, instruments, len(names))
+            _, instruments = regression_equations(model, calm)
+            estimate = _instrumental_variables(rows, instruments, len(names))
     except (IdentificationError, np.linalg.LinAlgError):
         return None
     theta = problem.first_guess()
@@ -179,7 +183,9 @@ def _lagged_equations(
     return theta
 
 
-def _with_instruments(rows: list[Row], instruments: list[Row], count: int) -> Array:
+def _instrumental_variables(
+    rows: list[RegressionEquation], instruments: list[RegressionEquation], count: int
+) -> Array:
     normal, right = np.zeros((count, count)), np.zeros(count)
     for row, calm in zip(rows, instruments, strict=True):
         normal += calm.regressors.T @ row.regressors
@@ -188,14 +194,14 @@ def _with_instruments(rows: list[Row], instruments: list[Row], count: int) -> Ar
     return np.asarray(np.linalg.solve(normal / np.outer(scale, scale), right / scale) / scale)
 
 
-def _lagged(model: LinearModel, maneuver: Maneuver, corner_radps: float) -> Maneuver:
+def _state_variable_filter(model: LinearModel, maneuver: Maneuver, corner_radps: float) -> Maneuver:
     """Pass everything through corner / (s + corner); rates of the lagged states are exact."""
     keep = float(np.exp(-corner_radps * maneuver.dt_s))
-    skip = round(SETTLED / (corner_radps * maneuver.dt_s))
+    skip = round(FILTER_TIME_CONSTANTS / (corner_radps * maneuver.dt_s))
     if maneuver.samples - skip < LEAST_SAMPLES:
         raise IdentificationError(f"{maneuver.name}: too short for a lag of {corner_radps} rad/s")
-    outputs = _lag(maneuver.outputs, keep, held=False)
-    inputs = _lag(maneuver.inputs, keep, held=model.hold == "zoh")
+    outputs = _first_order_lag(maneuver.outputs, keep, held=False)
+    inputs = _first_order_lag(maneuver.inputs, keep, held=model.hold == "zoh")
     seen = model.measured_states()
     return Maneuver(
         maneuver.dt_s,
@@ -206,7 +212,7 @@ def _lagged(model: LinearModel, maneuver: Maneuver, corner_radps: float) -> Mane
     )
 
 
-def _lag(values: Array, keep: float, *, held: bool) -> Array:
+def _first_order_lag(values: Array, keep: float, *, held: bool) -> Array:
     """Pass columns through a lag from rest; they run linearly between samples unless held."""
     following = values if held else 0.5 * (values + np.vstack([values[1:], values[-1:]]))
     columns = values.shape[1]

@@ -16,7 +16,7 @@ from scipy import optimize
 
 from host.arrays import Array
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.regression import Row, regression_rows
+from host.sysid.estimators.regression import RegressionEquation, regression_equations
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -57,12 +57,12 @@ def fit_neural(
     """
     if repeats < 3:
         raise IdentificationError(f"{repeats} trainings tell no scatter, at least 3 are needed")
-    names, rows = regression_rows(model, maneuvers, bandwidth=bandwidth)
+    names, rows = regression_equations(model, maneuvers, bandwidth=bandwidth)
     theta = np.zeros(len(names))
     scatter = np.zeros((repeats, len(names)))
     rng = np.random.default_rng(seed)
     for equation in sorted({row.equation for row in rows}):
-        mine: list[Row] = [row for row in rows if row.equation == equation]
+        mine: list[RegressionEquation] = [row for row in rows if row.equation == equation]
         X = np.vstack([row.regressors for row in mine])
         y = np.concatenate([row.target for row in mine])
         active = np.flatnonzero(X.std(axis=0) > 0.0)

@@ -21,7 +21,7 @@ from host.sysid.models.maneuver import Maneuver
 DECISIVE = 10.0  # Kass & Raftery, JASA 90 (1995): "very strong" on the scale of 2 log odds
 
 
-def against_coloured_noise(
+def compare_noise_models(
     result: FitResult, maneuvers: Sequence[Maneuver], start: Array
 ) -> FitResult:
     """Compare a filter-error result with output error whose noise has a memory.

@@ -19,9 +19,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.estimators.multistart import search
-from host.sysid.numerics.ar_noise import OutputNoise, choose_order, lagged_moments, regress
-from host.sysid.numerics.output_error import Optimum, covariance_of, minimise, whitened_slopes
+from host.sysid.estimators.multistart import multistart
+from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
+from host.sysid.numerics.output_error import (
+    Optimum,
+    covariance_of_free,
+    minimise,
+    whitened_sensitivities,
+)
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 HIGHEST_ORDER = 6
@@ -32,26 +37,26 @@ SMALLEST_DOF = 3.0
 
 
 @dataclass(frozen=True)
-class Interval:
+class ArNoiseFit:
     """A fit whose covariance and degrees of freedom belong to its estimated noise model."""
 
     optimum: Optimum
     covariance: Array
     covariance_white: Array
     degrees_of_freedom: Array
-    noise: tuple[OutputNoise, ...]
+    noise: tuple[ArNoise, ...]
     innovation_variance: Array
     refits: int
 
 
-def fit_with_memory(
+def fit_with_ar_noise(
     problem: OutputProblem,
     theta: Array,
     *,
     highest_order: int = HIGHEST_ORDER,
     criterion: str = "bic",
     doubting: bool = True,
-) -> Interval:
+) -> ArNoiseFit:
     """Fit output error and the memory of its noise together.
 
     Parameters
@@ -65,12 +70,12 @@ def fit_with_memory(
     criterion : str
         ``bic`` or ``aicc``.
     doubting : bool
-        See `search`.
+        See `multistart`.
     """
-    optimum = search(problem, theta, doubting=doubting)
+    optimum = multistart(problem, theta, doubting=doubting)
     outputs = len(problem.model.outputs)
-    noise = [OutputNoise.white() for _ in range(outputs)]
-    variance = _innovations(problem, optimum, noise, optimum.variance)
+    noise = [ArNoise.white() for _ in range(outputs)]
+    variance = _innovation_variances(problem, optimum, noise, optimum.variance)
     covariance_white = _covariance(problem, optimum, noise, variance)
     orders: list[int] | None = None
     refits = 0
@@ -78,7 +83,7 @@ def fit_with_memory(
         while refits < REFITS:
             refits += 1
             before = [n.coefficient for n in noise]
-            noise, variance, orders = _memory(
+            noise, variance, orders = _fit_ar_models(
                 problem, optimum, noise, variance, highest_order, criterion, orders
             )
             if all(n.order == 0 for n in noise):
@@ -90,17 +95,17 @@ def fit_with_memory(
             )
             if change < COEFFICIENT_CHANGE:
                 break
-    variance = _innovations(problem, optimum, noise, variance)
+    variance = _innovation_variances(problem, optimum, noise, variance)
     covariance = _covariance(problem, optimum, noise, variance)
     dof = _satterthwaite(problem, optimum, noise, variance, covariance)
-    return Interval(optimum, covariance, covariance_white, dof, tuple(noise), variance, refits)
+    return ArNoiseFit(optimum, covariance, covariance_white, dof, tuple(noise), variance, refits)
 
 
 def _information(
-    problem: OutputProblem, optimum: Optimum, noise: Sequence[OutputNoise], variance: Array
+    problem: OutputProblem, optimum: Optimum, noise: Sequence[ArNoise], variance: Array
 ) -> tuple[Array, list[Array]]:
     """Return the information matrix and the whitened slopes."""
-    slopes = whitened_slopes(problem, optimum.responses, noise)
+    slopes = whitened_sensitivities(problem, optimum.responses, noise)
     information = np.diag(problem.prior_precision)
     for number, block in enumerate(slopes):
         columns = problem.columns(number)
@@ -112,19 +117,19 @@ def _information(
 
 
 def _covariance(
-    problem: OutputProblem, optimum: Optimum, noise: Sequence[OutputNoise], variance: Array
+    problem: OutputProblem, optimum: Optimum, noise: Sequence[ArNoise], variance: Array
 ) -> Array:
     information, _ = _information(problem, optimum, noise, variance)
-    return covariance_of(information, optimum.free)
+    return covariance_of_free(information, optimum.free)
 
 
-def _innovations(
-    problem: OutputProblem, optimum: Optimum, noise: Sequence[OutputNoise], variance: Array
+def _innovation_variances(
+    problem: OutputProblem, optimum: Optimum, noise: Sequence[ArNoise], variance: Array
 ) -> Array:
     """Return unbiased innovation variances: each output's share of the parameters is counted."""
     for _ in range(3):
         information, slopes = _information(problem, optimum, noise, variance)
-        covariance = covariance_of(information, optimum.free)
+        covariance = covariance_of_free(information, optimum.free)
         fresh = np.zeros(len(noise))
         for j, memory in enumerate(noise):
             squares, share = 0.0, 0.0
@@ -142,22 +147,22 @@ def _innovations(
     return variance
 
 
-def _memory(
+def _fit_ar_models(
     problem: OutputProblem,
     optimum: Optimum,
-    noise: Sequence[OutputNoise],
+    noise: Sequence[ArNoise],
     variance: Array,
     highest: int,
     criterion: str,
     orders: list[int] | None,
-) -> tuple[list[OutputNoise], Array, list[int]]:
+) -> tuple[list[ArNoise], Array, list[int]]:
     """Estimate the AR model of each output by expectation-maximisation at a fixed fit."""
     chosen = list(orders) if orders is not None else [-1] * len(noise)
     memory = list(noise)
     for round_number in range(MOMENT_ROUNDS):
         information, _ = _information(problem, optimum, memory, variance)
-        covariance = covariance_of(information, optimum.free)
-        lower = _root(covariance)
+        covariance = covariance_of_free(information, optimum.free)
+        lower = _matrix_root(covariance)
         fresh, change = [], 0.0
         variance = variance.copy()
         for j in range(len(memory)):
@@ -172,21 +177,21 @@ def _memory(
             if orders is None and round_number < 2:
                 chosen[j] = choose_order(moments, count, criterion=criterion)
             order = chosen[j]
-            coefficient, innovation = regress(moments[: order + 1, : order + 1], order)
+            coefficient, innovation = fit_ar(moments[: order + 1, : order + 1], order)
             variance[j] = max(innovation / count, 1e-300)
             old = memory[j].coefficient
             if len(old) == order:
                 change = max(change, float(np.max(np.abs(coefficient - old), initial=0.0)))
             else:
                 change = np.inf
-            fresh.append(OutputNoise.from_coefficient(coefficient))
+            fresh.append(ArNoise.from_coefficient(coefficient))
         memory = fresh
         if change < COEFFICIENT_CHANGE:
             break
     return memory, variance, chosen
 
 
-def _root(covariance: Array) -> Array:
+def _matrix_root(covariance: Array) -> Array:
     value, vector = np.linalg.eigh(covariance)
     return np.asarray(vector * np.sqrt(np.maximum(value, 0.0)), dtype=np.float64)
 
@@ -194,7 +199,7 @@ def _root(covariance: Array) -> Array:
 def _satterthwaite(
     problem: OutputProblem,
     optimum: Optimum,
-    noise: Sequence[OutputNoise],
+    noise: Sequence[ArNoise],
     variance: Array,
     covariance: Array,
 ) -> Array:
@@ -208,7 +213,7 @@ def _satterthwaite(
     free = np.flatnonzero(np.diag(covariance) > 0.0)
     base = np.diag(covariance)[free]
     spread = np.zeros(len(free))
-    blocks = _per_output(problem, optimum, noise)
+    blocks = _information_per_output(problem, optimum, noise)
     total = np.diag(problem.prior_precision) + sum(
         b / v for b, v in zip(blocks, variance, strict=True)
     )
@@ -229,7 +234,7 @@ def _satterthwaite(
                 moved = memory.coefficient.copy()
                 moved[k] += sign * width
                 # Interior of the record only: a moved coefficient need not be stationary.
-                change += sign * _block(problem, optimum, j, moved)
+                change += sign * _filtered_information(problem, optimum, j, moved)
             change /= 2.0 * width * variance[j]
             inner = -np.einsum("ij,jk,ki->i", covariance[free], change, covariance[:, free])
             slopes[k] = inner / base
@@ -239,12 +244,14 @@ def _satterthwaite(
     return dof
 
 
-def _toeplitz(memory: OutputNoise) -> Array:
+def _toeplitz(memory: ArNoise) -> Array:
     inverse = np.linalg.inv(memory.head)
     return np.asarray(inverse @ inverse.T, dtype=np.float64)
 
 
-def _block(problem: OutputProblem, optimum: Optimum, output: int, coefficient: Array) -> Array:
+def _filtered_information(
+    problem: OutputProblem, optimum: Optimum, output: int, coefficient: Array
+) -> Array:
     """Return J'J of one output filtered by AR coefficients, whole vector, unit variance."""
     order = len(coefficient)
     result = np.zeros((len(problem.names), len(problem.names)))
@@ -258,11 +265,11 @@ def _block(problem: OutputProblem, optimum: Optimum, output: int, coefficient: A
     return result
 
 
-def _per_output(
-    problem: OutputProblem, optimum: Optimum, noise: Sequence[OutputNoise]
+def _information_per_output(
+    problem: OutputProblem, optimum: Optimum, noise: Sequence[ArNoise]
 ) -> list[Array]:
     result: list[Array] = []
-    slopes = whitened_slopes(problem, optimum.responses, noise)
+    slopes = whitened_sensitivities(problem, optimum.responses, noise)
     for j in range(len(noise)):
         total = np.zeros((len(problem.names), len(problem.names)))
         for number, block in enumerate(slopes):

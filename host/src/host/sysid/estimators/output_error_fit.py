@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.estimators.output_error_ar_noise import HIGHEST_ORDER, Interval, fit_with_memory
+from host.sysid.estimators.output_error_ar_noise import HIGHEST_ORDER, ArNoiseFit, fit_with_ar_noise
 from host.sysid.estimators.start_values import start_values
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.coloured_residuals import coloured_middle
-from host.sysid.numerics.maneuver_agreement import pulls
-from host.sysid.numerics.output_error import unseen, whitened_slopes
+from host.sysid.numerics.coloured_residuals import coloured_score_covariance
+from host.sysid.numerics.maneuver_agreement import maneuver_influence
+from host.sysid.numerics.output_error import unidentifiable_covariance, whitened_sensitivities
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 
@@ -42,7 +42,7 @@ def fit_output_error(
     start : Array, optional
         Whole start vector; equation error gives it without.
     highest_order, criterion, doubting
-        See `fit_with_memory`.
+        See `fit_with_ar_noise`.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def fit_output_error(
         raise IdentificationError(
             f"{len(first)} start values, {len(problem.names)} needed: {', '.join(problem.names)}"
         )
-    fit = fit_with_memory(
+    fit = fit_with_ar_noise(
         problem,
         first,
         highest_order=highest_order if memory else 0,
@@ -83,15 +83,15 @@ def fit_output_error(
             "refits": float(fit.refits),
             "noise_orders": np.array([float(n.order) for n in fit.noise]),
             "innovation_variance": fit.innovation_variance,
-            **_pulls(problem, fit),
+            **_maneuver_influence(problem, fit),
         },
     )
 
 
-def _pulls(problem: OutputProblem, fit: Interval) -> dict[str, float | Array]:
+def _maneuver_influence(problem: OutputProblem, fit: ArNoiseFit) -> dict[str, float | Array]:
     size = len(problem.names)
     parts, scores = [], []
-    slopes = whitened_slopes(problem, fit.optimum.responses, fit.noise)
+    slopes = whitened_sensitivities(problem, fit.optimum.responses, fit.noise)
     for number, residual in enumerate(fit.optimum.residuals):
         part, score = np.zeros((size, size)), np.zeros(size)
         own = problem.columns(number)
@@ -102,10 +102,10 @@ def _pulls(problem: OutputProblem, fit: Interval) -> dict[str, float | Array]:
             score[own] += J.T @ white / fit.innovation_variance[j]
         parts.append(part)
         scores.append(score)
-    return pulls(parts, scores, fit.covariance)
+    return maneuver_influence(parts, scores, fit.covariance)
 
 
-def _warnings(problem: OutputProblem, fit: Interval) -> tuple[str, ...]:
+def _warnings(problem: OutputProblem, fit: ArNoiseFit) -> tuple[str, ...]:
     found = []
     if not fit.optimum.converged:
         found.append(
@@ -117,7 +117,7 @@ def _warnings(problem: OutputProblem, fit: Interval) -> tuple[str, ...]:
     return tuple(found)
 
 
-def coloured_output_covariance(problem: OutputProblem, fit: Interval) -> Array:
+def coloured_output_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array:
     """Return the white covariance corrected by residual autocorrelations (the usual sandwich)."""
     white = fit.covariance_white
     middle = np.zeros_like(white)
@@ -125,11 +125,11 @@ def coloured_output_covariance(problem: OutputProblem, fit: Interval) -> Array:
         columns = problem.columns(number)
         for j, variance in enumerate(fit.optimum.variance):
             residual = fit.optimum.residuals[number][j]
-            part = coloured_middle(residual, response.slopes[j]) / variance**2
+            part = coloured_score_covariance(residual, response.slopes[j]) / variance**2
             middle[np.ix_(columns, columns)] += part
     result = white @ middle @ white
     result = 0.5 * (result + result.T)
     low = np.diag(result) <= 0.0
     result[low], result[:, low] = white[low], white[:, low]
-    result += unseen(fit.optimum.information, fit.optimum.free)
+    result += unidentifiable_covariance(fit.optimum.information, fit.optimum.free)
     return np.asarray(result, dtype=np.float64)

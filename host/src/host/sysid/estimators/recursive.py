@@ -14,17 +14,21 @@ from numpy.typing import NDArray
 
 from host.arrays import Array
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.regression import Row, regression_rows, solve_normal
+from host.sysid.estimators.regression import (
+    RegressionEquation,
+    regression_equations,
+    solve_normal_equations,
+)
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.information_inverse import covariance_of
+from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.output_error_problem import check_shapes
 
 Spectrum = NDArray[np.complexfloating]
 START_VARIANCE = 1e8  # of scaled regressors: a start that weighs nothing
-SPREAD_HZ = 0.04  # spacing of the running transforms
+SPACING_HZ = 0.04  # spacing of the running transforms
 
 
 def update(theta: Array, P: Array, regressors: Array, targets: Array, forgetting: float) -> Array:
@@ -78,7 +82,7 @@ def fit_recursive_least_squares(
     """
     if not 0.0 < forgetting <= 1.0:
         raise IdentificationError(f"forgetting {forgetting}, expected above 0 and at most 1")
-    names, rows = regression_rows(model, maneuvers, bandwidth=bandwidth)
+    names, rows = regression_equations(model, maneuvers, bandwidth=bandwidth)
     theta = np.zeros(len(names))
     histories: list[Array] = []
     for equation in sorted({row.equation for row in rows}):
@@ -100,7 +104,9 @@ def fit_recursive_least_squares(
         histories.append(full)
         theta[active] = estimate / scale
     batch = fit_equation_error(model, maneuvers, bandwidth=bandwidth)
-    return _like(batch, "recursive least squares", names, theta, np.sum(histories, axis=0), rows)
+    return _with_batch_statistics(
+        batch, "recursive least squares", names, theta, np.sum(histories, axis=0), rows
+    )
 
 
 def fit_recursive_fourier(
@@ -128,7 +134,7 @@ def fit_recursive_fourier(
     entries = model.entries("AB")
     count = len(model.parameters)
     fixed = np.hstack([model.A, model.B])
-    f = np.arange(limits_hz[0], limits_hz[1] + 1e-9, SPREAD_HZ)
+    f = np.arange(limits_hz[0], limits_hz[1] + 1e-9, SPACING_HZ)
     if len(f) < 4:
         raise IdentificationError(f"band {limits_hz} Hz holds {len(f)} lines, at least 4 needed")
     s = 2j * np.pi * f
@@ -159,13 +165,13 @@ def fit_recursive_fourier(
                 normal += (X.conj().T @ X).real
                 right += (X.conj().T @ y).real
             try:
-                history.append(solve_normal(normal, right))
+                history.append(solve_normal_equations(normal, right))
             except IdentificationError:
                 continue  # before the first input there is nothing to estimate
         past = (normal, right)
         for row, lines in last.items():
             whole.setdefault(row, []).append(lines)
-    theta = solve_normal(normal, right)
+    theta = solve_normal_equations(normal, right)
     batch = fit_equation_error(model, maneuvers)
     # Equations have unlike residuals: the sandwich weighs each with its own power.
     middle = np.zeros_like(normal)
@@ -173,23 +179,25 @@ def fit_recursive_fourier(
         power = float(np.mean([np.mean(np.abs(y - X @ theta) ** 2) for X, y in parts]))
         for X, _ in parts:
             middle += (X.conj().T @ X).real * power
-    inverse = covariance_of(normal)
+    inverse = covariance_from_information(normal)
     covariance = batch.covariance.copy()
     covariance[:count, :count] = inverse @ middle @ inverse
-    names, rows = regression_rows(model, maneuvers)
+    names, rows = regression_equations(model, maneuvers)
     full = batch.estimate.copy()
     full[:count] = theta
-    result = _like(batch, "recursive Fourier regression", names, full, np.array(history), rows)
+    result = _with_batch_statistics(
+        batch, "recursive Fourier regression", names, full, np.array(history), rows
+    )
     return replace(result, covariance=covariance, covariance_white=covariance)
 
 
-def _like(
+def _with_batch_statistics(
     batch: FitResult,
     method: str,
     names: tuple[str, ...],
     theta: Array,
     history: Array,
-    rows: list[Row],
+    rows: list[RegressionEquation],
 ) -> FitResult:
     """Return a result with the residuals and covariance of the batch regression."""
     residuals = tuple(

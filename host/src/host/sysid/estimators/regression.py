@@ -23,11 +23,11 @@ from host.sysid.numerics.differentiation import (
 )
 from host.sysid.numerics.output_error_problem import check_shapes
 
-NEVER_MOVED = "a parameter has no regressor: its state or input never moved"
+NO_EXCITATION = "a parameter has no regressor: its state or input never moved"
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class RegressionEquation:
     """One regression: `target` = `regressors` @ theta + residual, in one maneuver.
 
     `equation` numbers the equation across maneuvers, `columns` are the parameters whose regressor
@@ -59,13 +59,13 @@ class Row:
         return self.target - self.fitted(theta)
 
 
-def regression_rows(
+def regression_equations(
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
     *,
     bandwidth: float | None = None,
     use_rates: bool = True,
-) -> tuple[tuple[str, ...], list[Row]]:
+) -> tuple[tuple[str, ...], list[RegressionEquation]]:
     """Write the model as regressions.
 
     Parameters
@@ -96,7 +96,7 @@ def regression_rows(
         names += [f"bias.{y}@{number}" for y in extra_biases]
     n_local = len(model.state_biases) + len(extra_biases)
     state_entries, output_entries = model.entries("AB"), model.entries("CD")
-    rows: list[Row] = []
+    rows: list[RegressionEquation] = []
     for number, maneuver in enumerate(maneuvers):
         check_shapes(model, maneuver)
         states, inputs, rates, outputs = _signals(model, maneuver, measured, bandwidth, use_rates)
@@ -124,7 +124,7 @@ def regression_rows(
                     continue
                 is_state = left is rates
                 rows.append(
-                    Row(
+                    RegressionEquation(
                         equation=i if is_state else len(model.states) + i,
                         label=model.states[i] if is_state else model.outputs[i],
                         maneuver=number,
@@ -160,7 +160,9 @@ def _signals(
     return states, smooth(inputs, maneuver.dt_s, edge), rates, outputs
 
 
-def solve_rows(rows: Sequence[Row], n_parameters: int, weights: Array | None = None) -> Array:
+def solve_least_squares(
+    rows: Sequence[RegressionEquation], n_parameters: int, weights: Array | None = None
+) -> Array:
     """Solve the stacked regressions by normal equations, columns scaled first.
 
     Parameters
@@ -178,11 +180,11 @@ def solve_rows(rows: Sequence[Row], n_parameters: int, weights: Array | None = N
         If the regressors are collinear to working precision.
     """
     normal, right = normal_equations(rows, n_parameters, weights)
-    return solve_normal(normal, right)
+    return solve_normal_equations(normal, right)
 
 
 def normal_equations(
-    rows: Sequence[Row], n_parameters: int, weights: Array | None = None
+    rows: Sequence[RegressionEquation], n_parameters: int, weights: Array | None = None
 ) -> tuple[Array, Array]:
     """Return X'WX and X'Wy over all rows."""
     normal = np.zeros((n_parameters, n_parameters))
@@ -194,11 +196,11 @@ def normal_equations(
     return normal, right
 
 
-def solve_normal(normal: Array, right: Array) -> Array:
+def solve_normal_equations(normal: Array, right: Array) -> Array:
     """Solve symmetric normal equations after scaling; refuse singular ones."""
     scale = np.sqrt(np.diag(normal))
     if np.any(scale == 0.0):
-        raise IdentificationError(NEVER_MOVED)
+        raise IdentificationError(NO_EXCITATION)
     scaled = normal / np.outer(scale, scale)
     try:
         factor = linalg.cho_factor(scaled)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.estimators.regression import regression_rows, solve_rows
+from host.sysid.estimators.regression import regression_equations, solve_least_squares
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -22,7 +22,7 @@ def start_values(problem: OutputProblem) -> Array:
     the result does not diverge over the maneuver; the model's start values stand in otherwise.
     """
     theta = problem.first_guess()
-    told = regressed(problem.model, problem.maneuvers)
+    told = regression_estimates(problem.model, problem.maneuvers)
     better = np.array([told.get(name, x) for name, x in zip(problem.names, theta, strict=True)])
     better = np.asarray(np.clip(better, problem.lower, problem.upper), dtype=np.float64)
     if problem.outputs(better) is None:
@@ -30,7 +30,7 @@ def start_values(problem: OutputProblem) -> Array:
     return better
 
 
-def regressed(model: LinearModel, maneuvers: Sequence[Maneuver]) -> dict[str, float]:
+def regression_estimates(model: LinearModel, maneuvers: Sequence[Maneuver]) -> dict[str, float]:
     """Return what equation error says of a model's parameters and biases, by name.
 
     Places of accelerometers and delays enter no regression; they are left out, and all the rest is
@@ -44,8 +44,8 @@ def regressed(model: LinearModel, maneuvers: Sequence[Maneuver]) -> dict[str, fl
         parameters=tuple(p for p in model.parameters if p.name not in places),
     )
     try:
-        names, rows = regression_rows(plain, maneuvers)
-        estimate = solve_rows(rows, len(names))
+        names, rows = regression_equations(plain, maneuvers)
+        estimate = solve_least_squares(rows, len(names))
     except IdentificationError:
         return {}
     return dict(zip(names, estimate.tolist(), strict=True))

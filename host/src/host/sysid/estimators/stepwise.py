@@ -13,7 +13,7 @@ import numpy as np
 
 from host.arrays import Array, BoolArray
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.regression import regression_rows
+from host.sysid.estimators.regression import regression_equations
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -86,7 +86,7 @@ def fit_stepwise(
     FitResult
         Dropped parameters are zero with zero variance and named in a warning.
     """
-    names, rows = regression_rows(model, maneuvers, bandwidth=bandwidth)
+    names, rows = regression_equations(model, maneuvers, bandwidth=bandwidth)
     kept: set[str] = set()
     for equation in {row.equation for row in rows}:
         mine = [row for row in rows if row.equation == equation]

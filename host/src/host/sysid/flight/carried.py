@@ -17,15 +17,15 @@ from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Moved, trim_of
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import (
-    IN_COLUMNS,
-    deviations,
-    pressure_part,
-    without_errors,
+    INSTANTANEOUS_ERRORS,
+    correct_columns,
+    pressure_share,
+    residual_deviations,
 )
-from host.sysid.compatibility.sensor_dynamics import open_errors, without_open
+from host.sysid.compatibility.sensor_dynamics import perturb_columns, residual_errors
 from host.sysid.estimators.filter_error_gust import gust_model
 from host.sysid.estimators.innovations import innovations_of
-from host.sysid.models.consider_covariance import systematic_covariance
+from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, without_outputs
@@ -100,17 +100,17 @@ def systematic_error_shifts(
 
 def _open_deviations(known: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
     """Return one deviation of every error that stays open in a flight, by name."""
-    told = {e: sd for e, sd in deviations(known).items() if e in IN_COLUMNS}
-    return {e: sd for e, sd in (told | open_errors(known, columns)).items() if sd > 0.0}
+    told = {e: sd for e, sd in residual_deviations(known).items() if e in INSTANTANEOUS_ERRORS}
+    return {e: sd for e, sd in (told | residual_errors(known, columns)).items() if sd > 0.0}
 
 
 def _without_one(
     columns: Mapping[str, Array], error: str, deviation: float, known: Compatibility
 ) -> dict[str, Array]:
     """Return columns with one error less."""
-    if error in IN_COLUMNS:
-        return without_errors(columns, {error: deviation}, pressure_part(known))
-    return without_open(columns, error, deviation, known)
+    if error in INSTANTANEOUS_ERRORS:
+        return correct_columns(columns, {error: deviation}, pressure_share(known))
+    return perturb_columns(columns, error, deviation, known)
 
 
 def carried(result: FitResult, moved: Sequence[Moved]) -> FitResult:
@@ -118,7 +118,7 @@ def carried(result: FitResult, moved: Sequence[Moved]) -> FitResult:
     if not moved:
         return result
     shifts = np.stack([m.estimate - result.estimate for m in moved])
-    covariance = result.covariance + systematic_covariance(shifts)
+    covariance = result.covariance + consider_covariance(shifts)
     # Welch-Satterthwaite: what is carried is no small sample of maneuvers.
     own = np.diag(result.covariance) / np.maximum(np.diag(covariance), 1e-300)
     freedom = result.degrees_of_freedom / np.maximum(own, 1e-6) ** 2

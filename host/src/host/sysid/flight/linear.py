@@ -49,11 +49,11 @@ from host.sysid.flight.reconstructed import (
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
     Collinearity,
-    Refusal,
+    IdentifiabilityFlag,
     SignalFit,
+    assess_identifiability,
     collinearity,
     constant_inputs,
-    judge,
 )
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -61,7 +61,7 @@ from host.sysid.models.modal_analysis import Mode, modes
 from host.sysid.models.residual_delays import DELAYS, without_usual_delays
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
-from host.sysid.numerics.maneuver_agreement import repeats, widened
+from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
 
 
 class NoManeuverError(IdentificationError):
@@ -87,7 +87,7 @@ class Answer:
     result: FitResult
     fits: tuple[SignalFit, ...]
     validation: tuple[SignalFit, ...]
-    refused: tuple[Refusal, ...]
+    refused: tuple[IdentifiabilityFlag, ...]
     together: Collinearity
     modes: tuple[Mode, ...]
     coefficients: tuple[Coefficient, ...]
@@ -246,7 +246,7 @@ class LinearEstimator:
     def intervals(self, estimate: LinearEstimate) -> LinearIntervals:
         """Return the covariance from noise and repeats, and from every systematic error."""
         e = estimate
-        scattered = widened(e.fit, repeats(e.fit))
+        scattered = inflate_covariance(e.fit, maneuver_agreement(e.fit))
         statistical = replace(scattered, estimate=e.estimate)
         shifts: tuple[Moved, ...] = () if e.departure is None else (e.departure.remainder,)
         carriers = [m.flight.compatibility for m in e.used]
@@ -293,7 +293,7 @@ class LinearEstimator:
             result=total,
             fits=validation.fits,
             validation=validation.held_out,
-            refused=judge(total, e.maneuvers).named,
+            refused=assess_identifiability(total, e.maneuvers).named,
             together=collinearity(intervals.statistical),
             modes=modes(total),
             coefficients=intervals.coefficients,

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
-from host.sysid.compatibility.path_preparation import NOTHING
-from host.sysid.estimators.start_values import regressed
+from host.sysid.compatibility.path_preparation import NO_OFFSETS
+from host.sysid.estimators.start_values import regression_estimates
 from host.sysid.flight.reconstructed import FlownManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.residual_delays import DELAYS
@@ -61,7 +61,7 @@ def frees_places(method: str) -> bool:
 
 def imu_place_m(i: SensorErrorModel) -> float:
     """Return one deviation of the IMU's height above the CG, m: tape measure and balance."""
-    sd = deviations(i, NOTHING)
+    sd = deviations(i, NO_OFFSETS)
     return float(np.hypot(sd["imu_z_m"], sd["cg_z_m"]))
 
 
@@ -90,7 +90,7 @@ def without_attitude(model: LinearModel, used: Sequence[FlownManeuver]) -> Linea
     It is made of the same gyro and of accelerometers that take side force for gravity: on the
     recorded demonstration flight 15 of 15 intervals hold the truth without it, 12 with it.
     """
-    told = regressed(model, [m.cut(model) for m in used])
+    told = regression_estimates(model, [m.cut(model) for m in used])
     model = model.with_start([told.get(p.name, p.start) for p in model.parameters])
     reduced = without_outputs(model, ("phi_rad",))
     return replace(reduced, state_biases=tuple(s for s in reduced.state_biases if s != "phi_rad"))

@@ -17,12 +17,12 @@ from host.arrays import Array
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import (
+    advance_delayed,
+    correct_columns,
     corrections,
-    pressure_part,
-    without_delays,
-    without_errors,
+    pressure_share,
 )
-from host.sysid.compatibility.sensor_dynamics import at_cg
+from host.sysid.compatibility.sensor_dynamics import columns_at_cg
 from host.sysid.flight.column_map import like
 from host.sysid.flight.finder import Found
 from host.sysid.identification_error import IdentificationError
@@ -119,14 +119,14 @@ def reconstructed(
     told = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
     delays_open = True
     if airframe is not None and compatibility is not None and compatibility.instrument is not None:
-        corrected = at_cg(columns, airframe, compatibility)
+        corrected = columns_at_cg(columns, airframe, compatibility)
         delays_open = False
     else:
-        corrected = without_delays(columns, told)
+        corrected = advance_delayed(columns, told)
         if airframe is not None:
             corrected = transfer_to_cg(corrected, airframe)
     if compatibility is not None:
-        corrected = without_errors(corrected, told, pressure_part(compatibility))
+        corrected = correct_columns(corrected, told, pressure_share(compatibility))
     return ReconstructedFlight(
         source, columns, corrected, tuple(maneuvers), compatibility, delays_open
     )

@@ -13,10 +13,10 @@ import numpy as np
 
 from host.arrays import Array
 
-NAMED_SHARE = 0.25  # of the variance: a cause with less is not worth naming
+DOMINANT_SHARE = 0.25  # of the variance: a cause with less is not worth naming
 
 
-def systematic_covariance(shifts: Array) -> Array:
+def consider_covariance(shifts: Array) -> Array:
     """Return what systematic errors add to a covariance, (P, P).
 
     Parameters
@@ -27,9 +27,9 @@ def systematic_covariance(shifts: Array) -> Array:
     return np.asarray(shifts.T @ shifts)
 
 
-def main_cause(parts: dict[str, float], variance: float) -> str:
+def dominant_error_source(parts: dict[str, float], variance: float) -> str:
     """Return the cause of most of a variance; nothing where none has a quarter of it."""
     if not parts:
         return ""
     cause = max(parts, key=parts.__getitem__)
-    return cause if parts[cause] >= NAMED_SHARE * max(variance, 1e-300) else ""
+    return cause if parts[cause] >= DOMINANT_SHARE * max(variance, 1e-300) else ""

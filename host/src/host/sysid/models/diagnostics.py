@@ -16,14 +16,15 @@ from host.sysid.models.fit_result import NORMAL_95, FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 
-CORRELATED = 0.9
+CORRELATION_LIMIT = 0.9
 CONDITION_LIMIT = 1e5  # of the scaled information: correlations beyond all digits of a sensor
-SMALL_SHARE = 0.05  # of the row's largest contribution: below it errors are relative to this share
-REFUSAL_LIMIT = 1.0  # standard error over the reference value: 100 %
+# Of the largest contribution to its equation: below it errors are relative to this share.
+LEAST_CONTRIBUTION = 0.05
+RELATIVE_BOUND_LIMIT = 1.0  # standard error over the reference value: 100 %
 EVEN_ODDS = 0.5  # of a bound above the limit: more likely than not
-DOUBT = 0.05  # the same: what a 95 % statement leaves over
-GRADES = CANNOT, DOUBTFUL = ("cannot be told", "doubtful")
-PRIOR_WIDTH = 3.0
+WEAK_PROBABILITY = 0.05  # the same: what a 95 % statement leaves over
+GRADES = NOT_IDENTIFIABLE, WEAKLY_IDENTIFIABLE = ("cannot be told", "doubtful")
+SHRINKAGE_PRIOR_WIDTH = 3.0
 DRAWS, DRAW_SEED = 2000, 1
 
 
@@ -95,12 +96,12 @@ def whiteness(residuals: Sequence[Array], lags: int = 25) -> tuple[float, float]
     return outside, float(special.chdtrc(lags, statistic))
 
 
-def references(
+def reference_values(
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
     theta: Array,
     *,
-    small_share: float = SMALL_SHARE,
+    small_share: float = LEAST_CONTRIBUTION,
 ) -> Array:
     """Return the value each parameter's error is compared with.
 
@@ -110,11 +111,11 @@ def references(
     `small_share` of zero it is |parameter| whatever it contributes.
     """
     spread = regressor_rms(model, maneuvers)
-    rows = _references(model, spread, np.asarray(theta)[None], small_share)
+    rows = _reference_values(model, spread, np.asarray(theta)[None], small_share)
     return np.asarray(rows[0])
 
 
-def _references(model: LinearModel, spread: Array, theta: Array, small_share: float) -> Array:
+def _reference_values(model: LinearModel, spread: Array, theta: Array, small_share: float) -> Array:
     """Return references of many parameter vectors, (vectors, parameters)."""
     n, count = len(model.states), len(model.parameters)
     place = {p.name: k for k, p in enumerate(model.parameters)}
@@ -156,7 +157,7 @@ def regressor_rms(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class IdentifiabilityFlag:
     """A parameter that these data cannot tell, or only doubtfully, and why.
 
     Attributes
@@ -167,7 +168,8 @@ class Refusal:
     probability : float
         That the bound exceeds 100 % of the value.
     grade : str
-        `CANNOT` where that is more likely than not, `DOUBTFUL` from `DOUBT` on.
+        `NOT_IDENTIFIABLE` where that is more likely than not, `WEAKLY_IDENTIFIABLE` from
+        `WEAK_PROBABILITY` on.
     reason : str
     """
 
@@ -179,7 +181,7 @@ class Refusal:
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class Identifiability:
     """Whether a fit is refused, and which of its common parameters are in doubt.
 
     Attributes
@@ -192,7 +194,7 @@ class Judgement:
     """
 
     probability: float
-    named: tuple[Refusal, ...]
+    named: tuple[IdentifiabilityFlag, ...]
 
     @property
     def refused(self) -> bool:
@@ -204,13 +206,13 @@ class Judgement:
         return tuple(r.name for r in self.named if not grades or r.grade in grades)
 
 
-def plausible(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, Array]:
+def shrunk_estimate(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, Array]:
     """Return mean and covariance of the parameters, drawn towards zero where nothing else holds.
 
     Where the data cannot tell entries of a row apart, estimates of either sign and any size cancel
     each other, and comparing a bound with such a value hides that it is worthless. Each entry gets
-    a prior about zero, `PRIOR_WIDTH` times what alone would make up the whole state rate; entries
-    that the data determine do not move.
+    a prior about zero, `SHRINKAGE_PRIOR_WIDTH` times what alone would make up the whole state rate;
+    entries that the data determine do not move.
     """
     model = result.model
     count = len(model.parameters)
@@ -228,7 +230,7 @@ def plausible(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, 
                 column = term.column + (n if term.matrix == "B" else 0)
                 scale = abs(term.gain) * spread[column]
                 if scale > 0.0:
-                    prior[k] = min(prior[k], PRIOR_WIDTH * rate_rms[term.row] / scale)
+                    prior[k] = min(prior[k], SHRINKAGE_PRIOR_WIDTH * rate_rms[term.row] / scale)
     covariance = result.covariance[:count, :count]
     known = np.isfinite(prior)
     total = covariance + np.diag(np.minimum(prior, 1e100) ** 2) + 1e-300 * np.eye(count)
@@ -243,17 +245,17 @@ def measured_columns(model: LinearModel) -> list[int]:
 
 
 def relative_bounds(
-    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = LEAST_CONTRIBUTION
 ) -> Array:
     """Return the standard error of every common parameter over its reference value."""
     count = len(result.model.parameters)
-    mean, _ = plausible(result, maneuvers)
-    reference = references(result.model, maneuvers, mean, small_share=small_share)
+    mean, _ = shrunk_estimate(result, maneuvers)
+    reference = reference_values(result.model, maneuvers, mean, small_share=small_share)
     return np.asarray(result.standard_error[:count] / np.maximum(reference, 1e-300))
 
 
-def exceedance(
-    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
+def bound_exceedance_probability(
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = LEAST_CONTRIBUTION
 ) -> tuple[Array, float]:
     """Return the probability that each bound exceeds 100 % of its value, and that any does.
 
@@ -261,18 +263,18 @@ def exceedance(
     100 %: values are drawn from what the fit knows of them, and each draw is compared.
     """
     model, count = result.model, len(result.model.parameters)
-    mean, covariance = plausible(result, maneuvers)
+    mean, covariance = shrunk_estimate(result, maneuvers)
     value, vector = np.linalg.eigh(covariance)
     root = vector * np.sqrt(np.maximum(value, 0.0))
     draws = mean + np.random.default_rng(DRAW_SEED).standard_normal((DRAWS, count)) @ root.T
-    values = _references(model, regressor_rms(model, maneuvers), draws, small_share)
-    over = result.standard_error[:count] > REFUSAL_LIMIT * values
+    values = _reference_values(model, regressor_rms(model, maneuvers), draws, small_share)
+    over = result.standard_error[:count] > RELATIVE_BOUND_LIMIT * values
     return np.asarray(np.mean(over, axis=0)), float(np.mean(np.any(over, axis=1)))
 
 
-def judge(
-    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = SMALL_SHARE
-) -> Judgement:
+def assess_identifiability(
+    result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = LEAST_CONTRIBUTION
+) -> Identifiability:
     """Say whether a fit is refused, and name every parameter in doubt with its grade.
 
     A single estimate cannot always show that its bound is too large: one with a bound of 500 % lies
@@ -280,36 +282,40 @@ def judge(
     fit (`probability` of any) and for each parameter.
     """
     relative = relative_bounds(result, maneuvers, small_share=small_share)
-    single, any_of_them = exceedance(result, maneuvers, small_share=small_share)
+    single, any_of_them = bound_exceedance_probability(result, maneuvers, small_share=small_share)
     named = tuple(
-        _refusal(result, int(k), float(relative[k]), float(single[k]))
-        for k in np.flatnonzero(single > DOUBT)
+        _identifiability_flag(result, int(k), float(relative[k]), float(single[k]))
+        for k in np.flatnonzero(single > WEAK_PROBABILITY)
     )
-    return Judgement(any_of_them, named)
+    return Identifiability(any_of_them, named)
 
 
-def refusals(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Refusal, ...]:
+def identifiability_flags(
+    result: FitResult, maneuvers: Sequence[Maneuver]
+) -> tuple[IdentifiabilityFlag, ...]:
     """Name the common parameters that these data cannot tell or tell doubtfully."""
-    return judge(result, maneuvers).named
+    return assess_identifiability(result, maneuvers).named
 
 
-def _refusal(result: FitResult, k: int, relative: float, probability: float) -> Refusal:
+def _identifiability_flag(
+    result: FitResult, k: int, relative: float, probability: float
+) -> IdentifiabilityFlag:
     count = len(result.model.parameters)
     correlation = np.abs(result.correlation[k, :count])
     correlation[k] = 0.0
     partner = int(np.argmax(correlation))
     reason = f"its bound is {100.0 * relative:.0f} % of its value"
-    if (relative > REFUSAL_LIMIT) != (probability > EVEN_ODDS):
+    if (relative > RELATIVE_BOUND_LIMIT) != (probability > EVEN_ODDS):
         reason += f", above 100 % with a probability of {100.0 * probability:.0f} %"
-    if correlation[partner] > CORRELATED:
+    if correlation[partner] > CORRELATION_LIMIT:
         reason += (
             f"; it moves together with {result.names[partner]}"
             f" (correlation {correlation[partner]:.3f})"
         )
     else:
         reason += "; the maneuver excites it too little for this noise"
-    grade = CANNOT if probability > EVEN_ODDS else DOUBTFUL
-    return Refusal(result.names[k], relative, probability, grade, reason)
+    grade = NOT_IDENTIFIABLE if probability > EVEN_ODDS else WEAKLY_IDENTIFIABLE
+    return IdentifiabilityFlag(result.names[k], relative, probability, grade, reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,7 +341,7 @@ def collinearity(result: FitResult) -> Collinearity:
     count = len(result.model.parameters)
     for i in range(len(live)):
         for j in range(i):
-            if live[i] < count and abs(correlation[i, j]) > CORRELATED:
+            if live[i] < count and abs(correlation[i, j]) > CORRELATION_LIMIT:
                 pairs.append(
                     (result.names[live[j]], result.names[live[i]], float(correlation[i, j]))
                 )

@@ -48,8 +48,8 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.residual_delays import delays_of
 from host.sysid.models.state_space_model import (
     MATRICES,
+    AccelerometerOffset,
     DelayGroup,
-    Lever,
     LinearModel,
     Parameter,
     Term,
@@ -312,7 +312,7 @@ def _delays(value: object, used: list[str], source: str) -> tuple[DelayGroup, ..
     return tuple(result)
 
 
-def _levers(value: object, source: str) -> tuple[Lever, ...]:
+def _levers(value: object, source: str) -> tuple[AccelerometerOffset, ...]:
     needed = ("output", "state", "parameter")
     if not isinstance(value, list):
         raise IdentificationError(f"{source}: [[levers]] must be a list of tables")
@@ -323,5 +323,5 @@ def _levers(value: object, source: str) -> tuple[Lever, ...]:
         if len(names) < len(needed):
             raise IdentificationError(f"{source}: a lever needs output, state and parameter")
         gain = _number(table.get("gain", 1.0), f"{source}: lever on {names[0]}: gain")
-        result.append(Lever(names[0], names[1], names[2], gain))
+        result.append(AccelerometerOffset(names[0], names[1], names[2], gain))
     return tuple(result)

@@ -77,7 +77,7 @@ class DelayGroup:
 
 
 @dataclass(frozen=True, slots=True)
-class Lever:
+class AccelerometerOffset:
     """An accelerometer off its assumed place: output += gain * parameter * rate of a state.
 
     A wrong position of 1 cm turns angular acceleration into false side force; the offset is then a
@@ -147,7 +147,7 @@ class LinearModel:
     initial_states: tuple[str, ...] = ()
     delays: tuple[DelayGroup, ...] = field(default=())
     hold: str = "zoh"
-    levers: tuple[Lever, ...] = ()
+    levers: tuple[AccelerometerOffset, ...] = ()
 
     def __post_init__(self) -> None:
         n, m, p = len(self.states), len(self.inputs), len(self.outputs)

@@ -20,7 +20,13 @@ import numpy as np
 
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.residual_delays import delays_of
-from host.sysid.models.state_space_model import DelayGroup, Lever, LinearModel, Parameter, Term
+from host.sysid.models.state_space_model import (
+    AccelerometerOffset,
+    DelayGroup,
+    LinearModel,
+    Parameter,
+    Term,
+)
 
 GRAVITY_MPS2 = 9.80665
 
@@ -51,7 +57,7 @@ class _Builder:
     parameters: dict[str, Parameter] = field(default_factory=dict)
     terms: list[Term] = field(default_factory=list)
     known: dict[tuple[str, str, str], float] = field(default_factory=dict)
-    levers: list[Lever] = field(default_factory=list)
+    levers: list[AccelerometerOffset] = field(default_factory=list)
 
     def add(self, name: str, start: float, places: Iterable[tuple[str, str, float]]) -> None:
         """Make a parameter act on rows by columns with gains; unknown signals are left out."""
@@ -88,7 +94,7 @@ class _Builder:
             self.parameters[name] = Parameter(
                 name, 0.0, lower=-3.0 * sd_m, upper=3.0 * sd_m, prior_sd=sd_m
             )
-            self.levers.append(Lever(output, state, name, gain))
+            self.levers.append(AccelerometerOffset(output, state, name, gain))
 
     def build(self, *, delays: tuple[DelayGroup, ...], hold: str) -> LinearModel:
         """Return the model; outputs that carry a state's name measure it."""

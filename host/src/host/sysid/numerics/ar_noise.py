@@ -19,19 +19,19 @@ POLE_LIMIT = 0.999  # radius: closer to one, a 2000-sample record cannot tell no
 
 
 @dataclass(frozen=True, slots=True)
-class OutputNoise:
+class ArNoise:
     """AR coefficients of one output and the filter that whitens its first samples."""
 
     coefficient: Array
     head: Array
 
     @classmethod
-    def from_coefficient(cls, coefficient: Array) -> OutputNoise:
+    def from_coefficient(cls, coefficient: Array) -> ArNoise:
         """Prepare the exact start of the whitening for stationary AR coefficients."""
         return cls(coefficient, _head(coefficient))
 
     @classmethod
-    def white(cls) -> OutputNoise:
+    def white(cls) -> ArNoise:
         """Return the model without memory."""
         return cls(np.zeros(0), np.zeros((0, 0)))
 
@@ -106,7 +106,7 @@ def _head(coefficient: Array) -> Array:
     return np.ascontiguousarray(linalg.solve_triangular(lower, np.eye(order), lower=True))
 
 
-def stabilised(coefficient: Array) -> Array:
+def stabilise(coefficient: Array) -> Array:
     """Pull the poles of an AR model inside `POLE_LIMIT`."""
     if len(coefficient) == 0:
         return coefficient
@@ -153,13 +153,13 @@ def lagged_moments(residuals: Sequence[Array], taken: Sequence[Array], order: in
     return total
 
 
-def regress(moments: Array, order: int) -> tuple[Array, float]:
+def fit_ar(moments: Array, order: int) -> tuple[Array, float]:
     """Return AR coefficients and innovation sum of squares from lagged moments."""
     if order == 0:
         return np.zeros(0), float(moments[0, 0])
     block = moments[1 : order + 1, 1 : order + 1]
     right = moments[1 : order + 1, 0]
-    coefficient = stabilised(np.linalg.solve(block, right))
+    coefficient = stabilise(np.linalg.solve(block, right))
     innovation = float(
         moments[0, 0] - 2.0 * coefficient @ right + coefficient @ block @ coefficient
     )
@@ -171,7 +171,7 @@ def choose_order(moments: Array, samples: int, *, criterion: str = "bic") -> int
     highest = len(moments) - 1
     scores = []
     for order in range(highest + 1):
-        _, innovation = regress(moments, order)
+        _, innovation = fit_ar(moments, order)
         free = order + 1
         fit = samples * np.log(max(innovation, 1e-300) / samples)
         if criterion == "bic":

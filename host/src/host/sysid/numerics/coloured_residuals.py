@@ -14,7 +14,7 @@ from host.arrays import Array
 LAG_SHARE = 5  # a fifth of the record
 
 
-def coloured_middle(residual: Array, slopes: Array) -> Array:
+def coloured_score_covariance(residual: Array, slopes: Array) -> Array:
     """Return slopes' R slopes with the residual's autocorrelation R, shape (columns, columns).
 
     Parameters

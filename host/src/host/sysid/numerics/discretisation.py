@@ -25,7 +25,7 @@ BOTH_SIDES = np.array(
 )
 
 
-def transition(
+def discretise(
     AB: Array,
     n_states: int,
     n_inputs: int,

@@ -16,15 +16,15 @@ from host.arrays import Array
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.discretisation import transition
+from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.sysid.numerics.riccati import innovations, predicted_covariance
+from host.sysid.numerics.riccati import filter_innovations, predicted_covariance
 
 SAME_PERIOD = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Gain:
+class SteadyStateFilter:
     """Steady filter of one sample period.
 
     Attributes
@@ -48,13 +48,13 @@ class Gain:
 
 
 @dataclass(slots=True)
-class Likelihood:
-    """Rows of `innovations` and innovations (samples, p) with covariance per maneuver, cost."""
+class InnovationLikelihood:
+    """Rows of `filter_innovations`, innovations (samples, p) and covariance per maneuver; cost."""
 
     z: list[Array]
     e: list[Array]
     S: list[Array]
-    gains: dict[float, Gain]  # per sample period
+    gains: dict[float, SteadyStateFilter]  # per sample period
     cost: float
 
 
@@ -113,7 +113,7 @@ class FilterProblem:
             found.append(values)
         return found[0], found[1], found[2]
 
-    def evaluate(self, theta: Array) -> Likelihood | None:
+    def evaluate(self, theta: Array) -> InnovationLikelihood | None:
         """Return innovations and cost; None where the filter or the model fails."""
         model = self.model
         n, m = len(model.states), len(model.inputs)
@@ -125,25 +125,25 @@ class FilterProblem:
         if not (np.isfinite(intensity).all() and np.isfinite(power).all()):
             return None
         none = np.zeros(0, dtype=np.int64)
-        gains: dict[float, Gain] = {}
-        found = Likelihood([], [], [], gains, 0.0)
+        gains: dict[float, SteadyStateFilter] = {}
+        found = InnovationLikelihood([], [], [], gains, 0.0)
         cost = 0.0
         for number, maneuver in enumerate(self.maneuvers):
             rate, bias, start = self.constants(theta, number)
             AB[:, -1] = rate
-            step, _ = transition(
+            step, _ = discretise(
                 AB, n, m, model.hold == "foh", maneuver.dt_s, none, none, none, np.zeros(0), 0
             )
             if maneuver.dt_s not in gains:
                 # Rounding of the clock gives one rate several names.
                 near = [t for t in gains if abs(t - maneuver.dt_s) < SAME_PERIOD * t]
                 gain = gains[near[0]] if near else None
-                gain = gain or _gain(A, C, intensity, np.diag(power), maneuver.dt_s)
+                gain = gain or _steady_state_filter(A, C, intensity, np.diag(power), maneuver.dt_s)
                 if gain is None:
                     return None
                 gains[maneuver.dt_s] = gain
             gain = gains[maneuver.dt_s]
-            finite, z = innovations(
+            finite, z = filter_innovations(
                 step, CD, gain.K, self._drives[number], maneuver.outputs, start, bias
             )
             if not finite:
@@ -161,7 +161,9 @@ class FilterProblem:
         return found if np.isfinite(cost) else None
 
 
-def _gain(A: Array, C: Array, intensity: Array, R: Array, dt_s: float) -> Gain | None:
+def _steady_state_filter(
+    A: Array, C: Array, intensity: Array, R: Array, dt_s: float
+) -> SteadyStateFilter | None:
     F, Qd = discrete_noise(A, intensity, dt_s)
     if not np.isfinite(Qd).all() or np.max(np.abs(F)) > 1e6:
         return None
@@ -172,7 +174,7 @@ def _gain(A: Array, C: Array, intensity: Array, R: Array, dt_s: float) -> Gain |
         if not solved:
             return None
         K = np.ascontiguousarray(np.linalg.solve(S, C @ P).T)
-        return Gain(F, P, S, np.linalg.inv(factor), K)
+        return SteadyStateFilter(F, P, S, np.linalg.inv(factor), K)
     except np.linalg.LinAlgError:
         return None
 
@@ -192,7 +194,7 @@ def discrete_noise(A: Array, intensity: Array, dt_s: float) -> tuple[Array, Arra
     """
     n = len(A)
     none = np.zeros(0, dtype=np.int64)
-    E, _ = transition(
+    E, _ = discretise(
         van_loan(A, intensity), 2 * n, 0, False, dt_s, none, none, none, np.zeros(0), 0
     )
     F = np.ascontiguousarray(E[n:, n : 2 * n].T)

@@ -7,14 +7,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.numerics.discretisation import transition
-from host.sysid.numerics.filter_problem import FilterProblem, Gain, Likelihood
-from host.sysid.numerics.filter_sensitivities import GainSlopes, gain_slopes, matrix_slopes
+from host.sysid.numerics.discretisation import discretise
+from host.sysid.numerics.filter_problem import (
+    FilterProblem,
+    InnovationLikelihood,
+    SteadyStateFilter,
+)
+from host.sysid.numerics.filter_sensitivities import (
+    GainSensitivities,
+    gain_sensitivities,
+    matrix_sensitivities,
+)
 from host.sysid.numerics.recursion import propagate
 
 
-def scoring(
-    problem: FilterProblem, theta: Array, point: Likelihood
+def fisher_scoring(
+    problem: FilterProblem, theta: Array, point: InnovationLikelihood
 ) -> tuple[list[Array], list[Array]]:
     """Return Fisher information and minus the cost's gradient of every maneuver.
 
@@ -27,14 +35,14 @@ def scoring(
         There.
     """
     size = len(theta)
-    matrices = matrix_slopes(problem.model, theta)
-    gains = _gain_slopes(problem, theta, point, matrices)
+    matrices = matrix_sensitivities(problem.model, theta)
+    gains = _gain_sensitivities(problem, theta, point, matrices)
     parts: list[Array] = []
     scores: list[Array] = []
     for number, maneuver in enumerate(problem.maneuvers):
         gain, by = point.gains[maneuver.dt_s], gains[maneuver.dt_s]
         active = _active(problem, number)
-        J = _innovation_slopes(problem, theta, point, number, by, matrices)
+        J = _innovation_sensitivities(problem, theta, point, number, by, matrices)
         white = point.e[number] @ gain.whitener.T
         information, gradient = np.zeros((size, size)), np.zeros(size)
         information[np.ix_(active, active)] = J.T @ J
@@ -52,28 +60,33 @@ def scoring(
     return parts, scores
 
 
-def whitened_slopes(problem: FilterProblem, theta: Array, point: Likelihood) -> list[Array]:
+def whitened_innovation_sensitivities(
+    problem: FilterProblem, theta: Array, point: InnovationLikelihood
+) -> list[Array]:
     """Return slopes of the whitened innovations of every maneuver, (samples, p, P)."""
-    matrices = matrix_slopes(problem.model, theta)
-    gains = _gain_slopes(problem, theta, point, matrices)
+    matrices = matrix_sensitivities(problem.model, theta)
+    gains = _gain_sensitivities(problem, theta, point, matrices)
     found: list[Array] = []
     for number, (e, maneuver) in enumerate(zip(point.e, problem.maneuvers, strict=True)):
         slopes = np.zeros((e.size, len(theta)))
-        slopes[:, _active(problem, number)] = _innovation_slopes(
+        slopes[:, _active(problem, number)] = _innovation_sensitivities(
             problem, theta, point, number, gains[maneuver.dt_s], matrices
         )
         found.append(slopes.reshape(*e.shape, -1))
     return found
 
 
-def _gain_slopes(
-    problem: FilterProblem, theta: Array, point: Likelihood, matrices: tuple[Array, Array, Array]
-) -> dict[float, GainSlopes]:
+def _gain_sensitivities(
+    problem: FilterProblem,
+    theta: Array,
+    point: InnovationLikelihood,
+    matrices: tuple[Array, Array, Array],
+) -> dict[float, GainSensitivities]:
     AB_slopes, _, CD_slopes = matrices
-    known: dict[int, GainSlopes] = {}
+    known: dict[int, GainSensitivities] = {}
     for dt_s, gain in point.gains.items():
         if id(gain) not in known:
-            known[id(gain)] = gain_slopes(problem, theta, gain, dt_s, AB_slopes, CD_slopes)
+            known[id(gain)] = gain_sensitivities(problem, theta, gain, dt_s, AB_slopes, CD_slopes)
     return {dt_s: known[id(gain)] for dt_s, gain in point.gains.items()}
 
 
@@ -89,19 +102,19 @@ def _shared(problem: FilterProblem) -> IntArray:
     )
 
 
-def _innovation_slopes(
+def _innovation_sensitivities(
     problem: FilterProblem,
     theta: Array,
-    point: Likelihood,
+    point: InnovationLikelihood,
     number: int,
-    by: GainSlopes,
+    by: GainSensitivities,
     matrices: tuple[Array, Array, Array],
 ) -> Array:
     """Return slopes of the whitened innovations, (samples x p, `_active`)."""
     _, CD, CD_slopes = matrices
     model, inner = problem.model, problem.inner
     n, m, p = len(model.states), len(model.inputs), len(model.outputs)
-    gain: Gain = point.gains[problem.maneuvers[number].dt_s]
+    gain: SteadyStateFilter = point.gains[problem.maneuvers[number].dt_s]
     common, local = inner.n_common, inner.n_local
     width = common + local + len(theta) - problem.n_model
     noise = slice(common + local, width)
@@ -109,7 +122,7 @@ def _innovation_slopes(
     rate, _, _ = problem.constants(theta, number)
     entries = model.entries("AB")
     rates = np.array([model.states.index(s) for s in model.state_biases], dtype=np.int64)
-    step, step_slopes = transition(
+    step, step_slopes = discretise(
         np.column_stack([A, B, rate]),
         n,
         m,
@@ -148,7 +161,7 @@ def _innovation_slopes(
     return np.asarray(slopes.reshape(-1, width))
 
 
-def summed(
+def total_information(
     problem: FilterProblem, theta: Array, parts: Sequence[Array], scores: Sequence[Array]
 ) -> tuple[Array, Array]:
     """Return information and minus the cost's gradient of all maneuvers and the prior."""

@@ -8,19 +8,19 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.discretisation import transition
-from host.sysid.numerics.filter_problem import FilterProblem, Gain, van_loan
+from host.sysid.numerics.discretisation import discretise
+from host.sysid.numerics.filter_problem import FilterProblem, SteadyStateFilter, van_loan
 
 
 @dataclass(frozen=True, slots=True)
-class GainSlopes:
+class GainSensitivities:
     """Slopes of S (shared, p, p) and K (shared, n, p) by common unknowns, process and noise."""
 
     S: Array
     K: Array
 
 
-def matrix_slopes(model: LinearModel, theta: Array) -> tuple[Array, Array, Array]:
+def matrix_sensitivities(model: LinearModel, theta: Array) -> tuple[Array, Array, Array]:
     """Return slopes of [A B], [C D] itself and its slopes, by every common unknown, last axis."""
     A, B, C, D = model.matrices(theta)
     names = [p.name for p in model.parameters]
@@ -37,14 +37,14 @@ def matrix_slopes(model: LinearModel, theta: Array) -> tuple[Array, Array, Array
     return AB, np.hstack([C, D]), CD
 
 
-def gain_slopes(
+def gain_sensitivities(
     problem: FilterProblem,
     theta: Array,
-    gain: Gain,
+    gain: SteadyStateFilter,
     dt_s: float,
     AB_slopes: Array,
     CD_slopes: Array,
-) -> GainSlopes:
+) -> GainSensitivities:
     """Return slopes of the filter at one sample period.
 
     The Riccati equation in Joseph's form does not feel the gain to first order, so that slopes of
@@ -55,7 +55,7 @@ def gain_slopes(
     common, process = problem.inner.n_common, len(problem.process)
     count = common + process + p
     intensity, power = problem.noise(theta)
-    F, Q = _noise_slopes(problem, A, intensity, dt_s, AB_slopes[:, :n])
+    F, Q = _noise_sensitivities(problem, A, intensity, dt_s, AB_slopes[:, :n])
     dC = np.zeros((count, p, n))
     dC[:common] = CD_slopes[:, :n].transpose(2, 0, 1)
     dR = np.zeros((count, p, p))
@@ -74,10 +74,10 @@ def gain_slopes(
     dS = across + across.transpose(0, 2, 1) + C @ dP @ C.T + dR
     inverse = gain.whitener.T @ gain.whitener
     dK = (dP @ C.T + gain.P @ dC.transpose(0, 2, 1) - gain.K @ dS) @ inverse
-    return GainSlopes(dS, dK)
+    return GainSensitivities(dS, dK)
 
 
-def _noise_slopes(
+def _noise_sensitivities(
     problem: FilterProblem, A: Array, intensity: Array, dt_s: float, A_slopes: Array
 ) -> tuple[Array, Array]:
     """Return slopes of transition and process noise of a sample, (common and process, n, n)."""
@@ -86,7 +86,7 @@ def _noise_slopes(
     gain = A_slopes[row, column, parameter]
     driven = np.array(problem.process_index, dtype=np.int64)
     common = A_slopes.shape[2]
-    E, slopes = transition(
+    E, slopes = discretise(
         van_loan(A, intensity),
         2 * n,
         0,

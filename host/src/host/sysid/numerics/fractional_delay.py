@@ -7,7 +7,7 @@ import numpy as np
 from host.arrays import Array
 
 
-def delayed(values: Array, shift: float) -> tuple[Array, Array]:
+def delay_columns(values: Array, shift: float) -> tuple[Array, Array]:
     """Delay each column by `shift` samples with cubic interpolation.
 
     Parameters

@@ -20,15 +20,15 @@ from host.sysid.identification_error import IdentificationError
 
 STEP_LIMIT = 0.01  # in Cramer-Rao bounds: below it an iteration is not worth another
 MAX_DAMPING = 1e8
-FIRST_DAMPING = 1e-4
-LEAST_DAMPING = 1e-8
-DAMPED = 1e-2  # from here on a short step may be short because it is damped
+INITIAL_DAMPING = 1e-4
+MIN_DAMPING = 1e-8
+HEAVY_DAMPING = 1e-2  # from here on a short step may be short because it is damped
 TOLERANCE = 1e-9  # of the cost: rounding of its sums
 RIDGE = 1e-14  # of a scaled information: what keeps flat directions solvable
 NOT_FINITE = "the information matrix is not finite; scale or bound the parameters"
 
 
-class Costly(Protocol):
+class Evaluated(Protocol):
     """A trial that has been evaluated."""
 
     @property
@@ -37,7 +37,7 @@ class Costly(Protocol):
         ...
 
 
-Trial = TypeVar("Trial", bound=Costly)
+Trial = TypeVar("Trial", bound=Evaluated)
 
 
 class Objective(ABC, Generic[Trial]):
@@ -59,7 +59,7 @@ class Objective(ABC, Generic[Trial]):
         """Return where a step leads."""
         return theta + step
 
-    def farther(
+    def extend_step(
         self, theta: Array, step: Array, size: float, reached: tuple[Array, Trial]
     ) -> tuple[Array, Trial]:
         """Return something better than the end of an undamped step, `size` bounds long."""
@@ -70,7 +70,7 @@ class Objective(ABC, Generic[Trial]):
 
 
 @dataclass(frozen=True, slots=True)
-class Found(Generic[Trial]):
+class GaussNewtonResult(Generic[Trial]):
     """Where a search ended.
 
     Attributes
@@ -104,7 +104,7 @@ def gauss_newton(
     *,
     max_iterations: int,
     step_limit: float = STEP_LIMIT,
-) -> Found[Trial] | None:
+) -> GaussNewtonResult[Trial] | None:
     """Search the least cost from `theta`; None if the model fails there.
 
     Parameters
@@ -139,30 +139,30 @@ def gauss_newton(
         if next_trial is None or not next_trial.cost <= trial.cost + tolerance:
             if next_trial is not None:
                 objective.release(next_trial)
-            if size < step_limit and damping < DAMPED:
+            if size < step_limit and damping < HEAVY_DAMPING:
                 converged, last = True, size
                 break
-            damping, growth = max(growth * damping, FIRST_DAMPING), 2.0 * growth
+            damping, growth = max(growth * damping, INITIAL_DAMPING), 2.0 * growth
             if damping > MAX_DAMPING:
                 break
             continue
         foreseen = float(gradient @ step - 0.5 * step @ information @ step)
         gain = (trial.cost - next_trial.cost) / foreseen if foreseen > 0.0 else 0.0
         if damping == 0.0:
-            goal, next_trial = objective.farther(theta, step, size, (goal, next_trial))
+            goal, next_trial = objective.extend_step(theta, step, size, (goal, next_trial))
         objective.release(trial)
         theta, trial, last = goal, next_trial, size
         iterations += 1
-        if size < step_limit and damping < DAMPED:
+        if size < step_limit and damping < HEAVY_DAMPING:
             converged = True
             break
         # Nielsen, report IMM-REP-1999-05 (DTU): steps that keep less than they promise run from
         # wall to wall of a bent valley, so the damping follows the gain and not mere success.
         damping *= max(0.2, 1.0 - (2.0 * gain - 1.0) ** 3)
-        damping, growth = (damping if damping > LEAST_DAMPING else 0.0), 2.0
+        damping, growth = (damping if damping > MIN_DAMPING else 0.0), 2.0
         information, gradient = objective.normal(theta, trial)
     free = objective.free(theta, gradient)
-    return Found(theta, trial, information, free, iterations, converged, float(last))
+    return GaussNewtonResult(theta, trial, information, free, iterations, converged, float(last))
 
 
 def free_of_bounds(theta: Array, gradient: Array, lower: Array, upper: Array) -> BoolArray:

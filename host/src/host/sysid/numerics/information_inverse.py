@@ -7,7 +7,7 @@ import numpy as np
 from host.arrays import Array
 
 
-def covariance_of(information: Array) -> Array:
+def covariance_from_information(information: Array) -> Array:
     """Return the covariance an information matrix stands for, shape (P, P).
 
     Parameters

@@ -19,11 +19,11 @@ from host.arrays import Array
 from host.sysid.models.fit_result import FitResult
 
 SIGNIFICANCE = 0.01
-LEAST_REPEATS = 1.5  # effective number of maneuvers that tell something of a parameter
+MIN_EFFECTIVE_MANEUVERS = 1.5  # effective number of maneuvers that tell something of a parameter
 
 
 @dataclass(frozen=True)
-class Repeats:
+class ManeuverAgreement:
     """Scatter of maneuvers about the joint answer, per common parameter.
 
     Attributes
@@ -32,7 +32,7 @@ class Repeats:
     maneuvers : Array, shape (P,)
         Effective number that tell of the parameter; chi-square has one degree of freedom less.
     chi_square, p_value : Array, shape (P,)
-        NaN where fewer than `LEAST_REPEATS` tell of it.
+        NaN where fewer than `MIN_EFFECTIVE_MANEUVERS` tell of it.
     factor : Array, shape (P,)
         By which the interval was widened, 1 where the maneuvers agree.
     variance : Array, shape (P,)
@@ -55,10 +55,10 @@ class Repeats:
         return np.where(wide, ((self.factor * stretch) ** 2 - 1.0) * self.variance, 0.0)
 
 
-def pulls(
+def maneuver_influence(
     information: Sequence[Array], scores: Sequence[Array], inverse: Array
 ) -> dict[str, float | Array]:
-    """Return what `repeats` needs of a fit, for `FitResult.details`.
+    """Return what `maneuver_agreement` needs of a fit, for `FitResult.details`.
 
     Parameters
     ----------
@@ -73,17 +73,19 @@ def pulls(
     }
 
 
-def repeats(result: FitResult) -> Repeats | None:
+def maneuver_agreement(result: FitResult) -> ManeuverAgreement | None:
     """Return the scatter of the maneuvers of a joint fit; None if the method does not tell it."""
     pull, share = result.details.get("pulls"), result.details.get("shares")
     count = len(result.model.parameter_names)
     if not isinstance(pull, np.ndarray) or not isinstance(share, np.ndarray) or len(pull) < 2:
         return None
     variance = np.diag(result.covariance)[:count]
-    return scatter(result.names[:count], pull[:, :count], share[:, :count], variance)
+    return agreement_of(result.names[:count], pull[:, :count], share[:, :count], variance)
 
 
-def scatter(names: tuple[str, ...], pull: Array, share: Array, variance: Array) -> Repeats:
+def agreement_of(
+    names: tuple[str, ...], pull: Array, share: Array, variance: Array
+) -> ManeuverAgreement:
     """Return how maneuvers scatter about their joint answer against its variance.
 
     Parameters
@@ -100,13 +102,13 @@ def scatter(names: tuple[str, ...], pull: Array, share: Array, variance: Array) 
     number = 1.0 / np.maximum(squares, 1e-12)
     own = pull - weight * np.sum(pull, axis=0)
     spread = np.sum(own**2, axis=0) / np.maximum(1.0 - squares, 1e-12)
-    testable = (number >= LEAST_REPEATS) & (variance > 0.0)
+    testable = (number >= MIN_EFFECTIVE_MANEUVERS) & (variance > 0.0)
     ratio = np.where(testable, spread / np.where(testable, variance, 1.0), np.nan)
     chi_square = (number - 1.0) * ratio
     p_value = np.full(len(names), np.nan)
     p_value[testable] = special.chdtrc(number[testable] - 1.0, chi_square[testable])
     wide = testable & (np.nan_to_num(p_value, nan=1.0) < SIGNIFICANCE)
-    return Repeats(
+    return ManeuverAgreement(
         names=names,
         maneuvers=number,
         chi_square=chi_square,
@@ -116,7 +118,7 @@ def scatter(names: tuple[str, ...], pull: Array, share: Array, variance: Array) 
     )
 
 
-def widened(result: FitResult, found: Repeats | None) -> FitResult:
+def inflate_covariance(result: FitResult, found: ManeuverAgreement | None) -> FitResult:
     """Return the result with intervals as wide as its maneuvers scatter, and a warning for each."""
     if found is None or not np.any(found.factor > 1.0):
         return result

@@ -14,7 +14,7 @@ import numpy as np
 
 from host.arrays import Array, BoolArray
 from host.sysid.identification_error import IdentificationError
-from host.sysid.numerics.ar_noise import OutputNoise
+from host.sysid.numerics.ar_noise import ArNoise
 from host.sysid.numerics.gauss_newton import (
     STEP_LIMIT,
     Objective,
@@ -25,7 +25,7 @@ from host.sysid.numerics.output_error_problem import OutputProblem, Response
 
 MAX_ITERATIONS = 60
 SINGULAR = 1e-15  # of the largest eigenvalue of the scaled information
-UNSEEN = 1e-12  # the same: below, a product of two inverses holds no digit
+UNIDENTIFIABLE = 1e-12  # the same: below, a product of two inverses holds no digit
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def minimise(
     problem: OutputProblem,
     theta: Array,
     *,
-    noise: Sequence[OutputNoise] | None = None,
+    noise: Sequence[ArNoise] | None = None,
     variance: Array | None = None,
     step_limit: float = STEP_LIMIT,
     max_iterations: int = MAX_ITERATIONS,
@@ -74,7 +74,7 @@ def minimise(
         Residuals and slopes.
     theta : Array, shape (P,)
         Start.
-    noise : sequence of OutputNoise, optional
+    noise : sequence of ArNoise, optional
         Memory of the noise of each output; white without.
     variance : Array, optional
         Known innovation variances, shape (p,); estimated without.
@@ -88,9 +88,7 @@ def minimise(
     IdentificationError
         If the response at the start leaves all bounds.
     """
-    memory = (
-        list(noise) if noise is not None else [OutputNoise.white()] * len(problem.model.outputs)
-    )
+    memory = list(noise) if noise is not None else [ArNoise.white()] * len(problem.model.outputs)
     found = gauss_newton(
         _OutputError(problem, memory, variance),
         np.clip(theta, problem.lower, problem.upper),
@@ -121,7 +119,7 @@ class _OutputError(Objective[_Point]):
     """Residuals of outputs whose noise variance is concentrated out, or known."""
 
     def __init__(
-        self, problem: OutputProblem, noise: Sequence[OutputNoise], variance: Array | None
+        self, problem: OutputProblem, noise: Sequence[ArNoise], variance: Array | None
     ) -> None:
         self._problem, self._noise, self._variance = problem, noise, variance
 
@@ -141,8 +139,8 @@ class _OutputError(Objective[_Point]):
         self._problem.release(trial.responses)
 
 
-def whitened_slopes(
-    problem: OutputProblem, responses: Sequence[Response], noise: Sequence[OutputNoise]
+def whitened_sensitivities(
+    problem: OutputProblem, responses: Sequence[Response], noise: Sequence[ArNoise]
 ) -> list[Array]:
     """Return slopes of each maneuver filtered by the noise memory, (p, samples, columns)."""
     result = []
@@ -156,7 +154,7 @@ def whitened_slopes(
     return result
 
 
-def covariance_of(information: Array, free: BoolArray) -> Array:
+def covariance_of_free(information: Array, free: BoolArray) -> Array:
     """Invert an information matrix over the free parameters; others get zero.
 
     Raises
@@ -179,7 +177,7 @@ def covariance_of(information: Array, free: BoolArray) -> Array:
     return covariance
 
 
-def unseen(information: Array, free: BoolArray) -> Array:
+def unidentifiable_covariance(information: Array, free: BoolArray) -> Array:
     """Return the covariance of directions that the data do not see, zero where they see all.
 
     Corrections for coloured residuals multiply by the inverse twice; along these directions only
@@ -191,7 +189,7 @@ def unseen(information: Array, free: BoolArray) -> Array:
     block = information[np.ix_(free, free)]
     scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
     value, vector = np.linalg.eigh(block / np.outer(scale, scale))
-    lost = value < UNSEEN * value[-1]
+    lost = value < UNIDENTIFIABLE * value[-1]
     if lost.any():
         value = np.maximum(value[lost], SINGULAR * value[-1])
         part = (vector[:, lost] / value) @ vector[:, lost].T
@@ -202,7 +200,7 @@ def unseen(information: Array, free: BoolArray) -> Array:
 def _evaluate(
     problem: OutputProblem,
     theta: Array,
-    noise: Sequence[OutputNoise],
+    noise: Sequence[ArNoise],
     variance: Array | None,
 ) -> _Point | None:
     responses = problem.respond(theta)
@@ -229,19 +227,19 @@ def _evaluate(
     return _Point(responses, residuals, whitened, estimated, cost + prior)
 
 
-def _whitened(residual: Array, noise: Sequence[OutputNoise]) -> Array:
+def _whitened(residual: Array, noise: Sequence[ArNoise]) -> Array:
     if all(n.order == 0 for n in noise):
         return residual
     return np.stack([n.whiten(residual[j][:, None])[:, 0] for j, n in enumerate(noise)])
 
 
 def _normal(
-    problem: OutputProblem, theta: Array, point: _Point, noise: Sequence[OutputNoise]
+    problem: OutputProblem, theta: Array, point: _Point, noise: Sequence[ArNoise]
 ) -> tuple[Array, Array]:
     size = len(problem.names)
     information = np.diag(problem.prior_precision)
     gradient = problem.prior_precision * (problem.prior_mean - theta)
-    for number, slopes in enumerate(whitened_slopes(problem, point.responses, noise)):
+    for number, slopes in enumerate(whitened_sensitivities(problem, point.responses, noise)):
         columns = problem.columns(number)
         block = np.zeros((len(columns), len(columns)))
         right = np.zeros(len(columns))

@@ -11,8 +11,8 @@ from host.arrays import Array, IntArray
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import EntryTable, LinearModel
-from host.sysid.numerics.discretisation import transition
-from host.sysid.numerics.fractional_delay import delayed
+from host.sysid.numerics.discretisation import discretise
+from host.sysid.numerics.fractional_delay import delay_columns
 from host.sysid.numerics.recursion import propagate, simulate
 
 
@@ -183,7 +183,7 @@ class OutputProblem:
             AB[:, -1] = 0.0
             for k, state in enumerate(model.state_biases):
                 AB[model.states.index(state), -1] = local[self.n_common + k]
-            step, slopes = transition(
+            step, slopes = discretise(
                 AB,
                 n,
                 m,
@@ -255,7 +255,7 @@ class OutputProblem:
             AB[:, -1] = 0.0
             for k, state in enumerate(model.state_biases):
                 AB[model.states.index(state), -1] = local[self.n_common + k]
-            step, _ = transition(
+            step, _ = discretise(
                 AB, n, m, model.hold == "foh", part.dt_s, none, none, none, np.zeros(0), 0
             )
             start = local[self._start_parameter]
@@ -273,12 +273,12 @@ class OutputProblem:
             shift = local[k] / dt_s
             for output in delay.outputs:
                 j = self.model.outputs.index(output)
-                late, by_shift = delayed(np.ascontiguousarray(y[j][:, None]), shift)
+                late, by_shift = delay_columns(np.ascontiguousarray(y[j][:, None]), shift)
                 y[j] = late[:, 0]
                 if slope.shape[1] == 0:
                     continue
                 if shift != 0.0:
-                    slope[j] = delayed(slope[j], shift)[0]
+                    slope[j] = delay_columns(slope[j], shift)[0]
                 slope[j][:, k] += by_shift[:, 0] / dt_s
 
 

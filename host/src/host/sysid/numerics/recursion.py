@@ -67,7 +67,7 @@ def propagate(
     """
     samples, wide = z.shape
     n, _, free = step_slopes.shape
-    if not one_block.pays(samples * (n * free + OVERHEAD), WORTH_COMPILING):
+    if not propagate_block.pays(samples * (n * free + OVERHEAD), WORTH_COMPILING):
         out[...] = _in_pieces(step[:, :n], step_slopes, z, C, start_slopes)
         return
     F = np.ascontiguousarray(step[:, :n])
@@ -79,11 +79,11 @@ def propagate(
     for begin in range(0, samples, BLOCK):
         count = min(BLOCK, samples - begin)
         np.dot(z[begin : begin + count], flat, out=push[:count])
-        one_block(F, C, S, T, push, begin, count, out)
+        propagate_block(F, C, S, T, push, begin, count, out)
 
 
 @compiled
-def one_block(
+def propagate_block(
     F: Array, C: Array, S: Array, T: Array, push: Array, begin: int, count: int, out: Array
 ) -> None:
     """Run `count` samples from `begin`; S holds the state sensitivities before and after.

@@ -38,7 +38,7 @@ def predicted_covariance(transition: Array, C: Array, Q: Array, R: Array) -> tup
     return False, H
 
 
-def innovations(
+def filter_innovations(
     step: Array, CD: Array, K: Array, drive: Array, y: Array, start: Array, bias: Array
 ) -> tuple[bool, Array]:
     """Run a constant-gain Kalman filter.

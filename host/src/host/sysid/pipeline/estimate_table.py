@@ -10,7 +10,7 @@ from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.linear import Answer
-from host.sysid.models.diagnostics import references
+from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def mode_table(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> pd
 def _linear_rows(answer: Answer) -> Iterator[tuple[str, tuple[Any, ...]]]:
     result, marks = answer.result, verdict_of(answer).marks
     half = result.half_width()
-    size = references(answer.model, answer.maneuvers, result.estimate)
+    size = reference_values(answer.model, answer.maneuvers, result.estimate)
     for k, p in enumerate(answer.model.parameters):
         share = float(half[k]) / max(float(size[k]), 1e-300)
         unit = parameter_unit(answer.model, p.name)

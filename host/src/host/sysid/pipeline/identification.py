@@ -17,8 +17,11 @@ from host.sysid.answer.prior_comparison import prior_document, prior_lines
 from host.sysid.answer.truth_comparison import against_truth, truth_document
 from host.sysid.answer.verdict import coefficient_lines, model_lines, taken_out, words
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.compatibility.reconstruction import Compatibility, document
-from host.sysid.compatibility.reconstruction import words as agreement_words
+from host.sysid.compatibility.reconstruction import (
+    Compatibility,
+    compatibility_document,
+    compatibility_lines,
+)
 from host.sysid.flight.linear import Answer
 from host.sysid.flight.reconstructed import ReconstructedFlight
 from host.sysid.pipeline.aircraft_data import AircraftKnown
@@ -149,7 +152,7 @@ class Identification:
         if direct:
             documents.append(coefficient_document(direct, words([direct], [])))
         sources = [flight.source for flight in self.flights]
-        agreements = [document(a) if a else None for a in self.agreements]
+        agreements = [compatibility_document(a) if a else None for a in self.agreements]
         one = len(sources) == 1
         return {
             "source": sources[0] if one else sources,
@@ -183,7 +186,7 @@ class Identification:
         for flight, agreement in zip(self.flights, self.agreements, strict=True):
             if agreement:
                 named = [flight.source] if len(self.flights) > 1 else []
-                lines += ["", *named, *agreement_words(agreement)]
+                lines += ["", *named, *compatibility_lines(agreement)]
         if self.prior is not None:
             lines += ["", *prior_lines(self.coefficient_tables, self.prior)]
         if self.truth is not None:
