@@ -84,7 +84,7 @@ class RefusalCheck:
     @property
     def agree(self) -> bool:
         """Whether the fit is refused exactly when the bound at the truth says so."""
-        return self.judgement.refused == bool(self.expected)
+        return self.judgement.not_identifiable == bool(self.expected)
 
     @property
     def plain_agree(self) -> bool:
@@ -211,9 +211,10 @@ class Repeated:
             for grade in (NOT_IDENTIFIABLE, WEAKLY_IDENTIFIABLE)
         ]
         return (
-            f"{self.what}: refused on {sum(c.judgement.refused for c in self.checks)} of {runs}"
-            f" noise seeds; analytic list {' '.join(first.expected) or 'empty'} (compared with"
-            f" |parameter| alone: {int(np.sum(first.plain_shares > RELATIVE_BOUND_LIMIT))} names);"
+            f"{self.what}: refused on {sum(c.judgement.not_identifiable for c in self.checks)}"
+            f" of {runs} noise seeds; analytic list {' '.join(first.expected) or 'empty'}"
+            " (compared with |parameter| alone:"
+            f" {int(np.sum(first.plain_shares > RELATIVE_BOUND_LIMIT))} names);"
             f" whole list in one of the two grades on {sum(not c.missed for c in self.checks)},"
             f" names {runs * listed - lost.total()} of {runs * listed}, most often missed: {worst};"
             f" false names: {false[0]} '{NOT_IDENTIFIABLE}',"

@@ -184,8 +184,8 @@ def fit_both(
     start = np.concatenate([first.estimate[:count], more, first.estimate[count:]])
     process = PROCESS[setup.axis]
     ours = fit(
-        "filter-error", setup.wide, [maneuver], process=process, start=start, rival=False,
-        misfit=True,
+        "filter-error", setup.wide, [maneuver], process=process, start=start, compare_noise=False,
+        hac=True,
     )  # fmt: skip
     if not ours.converged:
         raise IdentificationError(f"{maneuver.name}: {ours.warnings[0]}")

@@ -48,7 +48,7 @@ def test_printed_network_diverges_and_its_figure_hides_the_error() -> None:
 
 def test_table_31_at_snr_10_is_refused_with_names() -> None:
     check = check_refusal(TABLE_31_A, TABLE_31_B, standard_input(), DT_S)
-    assert check.judgement.refused
+    assert check.judgement.not_identifiable
     assert not check.missed
     assert len(check.expected) == 16
     assert not {"a33", "b31"} & set(check.judgement.names(NOT_IDENTIFIABLE))
@@ -59,14 +59,14 @@ def test_table_31_at_snr_10_is_refused_with_names() -> None:
 def test_navion_is_told_with_nine_free_and_refused_with_twenty() -> None:
     table, nine, twenty = (one.checks[0] for one in repeated(1))
     assert not nine.expected
-    assert not nine.judgement.named
+    assert not nine.judgement.flags
     assert nine.agree
     # Not for its zeros alone: a12 has a bound of 146 % of 5 % of its row, 170 % of itself.
     assert set(twenty.expected) == {"a12", "a13", "b11", "b41"}
     assert twenty.shares[1] == pytest.approx(1.464, abs=0.002)
     assert twenty.plain_shares[1] == pytest.approx(1.705, abs=0.002)
     assert np.isinf(twenty.plain_shares[[2, 7, 11, 12, 13, 15, 16, 19]]).all()
-    assert twenty.judgement.refused
+    assert twenty.judgement.not_identifiable
     assert not twenty.missed
     assert np.sum(table.plain_shares > 1.0) == 16
 

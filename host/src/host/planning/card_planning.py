@@ -195,7 +195,9 @@ def _bounds(
     information = np.diag(problem.prior_precision)
     for k, (response, (_, times)) in enumerate(zip(responses, windows, strict=True)):
         place = problem.columns(k)
-        part = np.einsum("jta,j,jtb->ab", response.slopes, 1.0 / variance, response.slopes)
+        part = np.einsum(
+            "jta,j,jtb->ab", response.sensitivities, 1.0 / variance, response.sensitivities
+        )
         information[np.ix_(place, place)] += times * part
     covariance = covariance_of_free(information, np.ones(size, dtype=np.bool_))
     sigma = np.sqrt(np.diag(covariance))

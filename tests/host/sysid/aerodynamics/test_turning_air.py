@@ -81,7 +81,7 @@ def test_flight_tells_that_the_gusts_turn() -> None:
     start = np.concatenate([setup.wide.start, np.zeros(len(setup.wide.local_names(1)))])
     result = fit(
         "filter-error", setup.wide, [flight.maneuver], process=PROCESS["lateral"], start=start,
-        rival=False,
+        compare_noise=False,
     )  # fmt: skip
     half = float(result.half_width()[result.index("gust_turns")])
     assert half < 0.3  # 0.98 beforehand

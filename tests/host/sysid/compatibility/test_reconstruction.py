@@ -118,7 +118,7 @@ def test_slopes_are_those_of_finite_differences() -> None:
         numeric = (moved[0] - moved[1]) / 2e-5
         # Slopes are integrated over blocks, outputs over samples: what cancels (a tilt of the whole
         # IMU) is 8 % off, all else up to 2 %. Ends lean on one side only.
-        miss = np.abs(response[0].slopes[:, 3:-3, k] - numeric[:, 3:-3])
+        miss = np.abs(response[0].sensitivities[:, 3:-3, k] - numeric[:, 3:-3])
         size = np.max(np.abs(numeric), axis=1, keepdims=True)
         worst = np.max(miss / (size + 1e-2 * np.max(size) + 1e-9), axis=1)
         assert np.max(worst) < (0.08 if "tilt" in problem.names[k] else 0.03), (
@@ -204,7 +204,7 @@ def test_every_axis_has_stretches_of_its_own() -> None:
     """Rolling is quick: judged by rates alone the elevator's minute is left out."""
     columns, _ = flown(1)
     problem, _, _ = prepare_path_problem(columns, AIRFRAME, INSTRUMENT)
-    swing = np.array([np.std(s.rates, axis=0) for s in problem.stretches])
+    swing = np.array([np.std(s.rates, axis=0) for s in problem.segments])
     flight = np.column_stack([columns[f"{a}_radps"] for a in "pqr"])
     parts = [flight[k : k + 1200] for k in range(0, len(flight) - 1200, 1200)]
     most = np.max([np.std(part, axis=0) for part in parts], axis=0)

@@ -48,7 +48,7 @@ def flown(model: LinearModel, seeds: tuple[int, ...]) -> list[Maneuver]:
 def vector(problem: FilterProblem) -> np.ndarray:
     """Return unknowns away from any optimum."""
     rng = np.random.default_rng(3)
-    theta = problem.inner.first_guess()
+    theta = problem.output_problem.first_guess()
     theta += 0.03 * (np.abs(theta) + 0.01) * rng.standard_normal(len(theta))
     deviation = np.std(np.vstack([m.outputs for m in problem.maneuvers]), axis=0)
     return np.concatenate([theta, np.log([0.03, 0.3]), np.log(0.1 * deviation)])
@@ -82,8 +82,10 @@ def test_gradient_and_information_are_those_of_differences() -> None:
         [s.reshape(-1, len(theta)) for s in whitened_innovation_sensitivities(problem, theta, here)]
     )
     np.testing.assert_allclose(exact / size, J.T / size, atol=1e-6)
-    expected = J @ J.T + 0.5 * problem.inner.samples * L @ L.T
-    expected[: problem.n_model, : problem.n_model] += np.diag(problem.inner.prior_precision)
+    expected = J @ J.T + 0.5 * problem.output_problem.samples * L @ L.T
+    expected[: problem.n_model, : problem.n_model] += np.diag(
+        problem.output_problem.prior_precision
+    )
     np.testing.assert_allclose(gradient / size, np.array(slope) / size, atol=1e-3)
     assert np.max(np.abs(gradient / size)) > 10.0
     np.testing.assert_allclose(
@@ -97,9 +99,11 @@ def test_the_answer_does_not_hang_on_the_start(share: float) -> None:
     maneuvers = flown(model, (4, 5))
     process = ("gust_rad", "airspeed_mps")
     start = OutputProblem(model, maneuvers).first_guess()
-    reference = fit_filter_error(model, maneuvers, process=process, start=start, rival=False)
+    reference = fit_filter_error(
+        model, maneuvers, process=process, start=start, compare_noise=False
+    )
     start[: len(model.parameters)] *= 1.0 + 0.1 * share
-    other = fit_filter_error(model, maneuvers, process=process, start=start, rival=False)
+    other = fit_filter_error(model, maneuvers, process=process, start=start, compare_noise=False)
     assert reference.converged
     assert other.converged
     common = slice(0, len(model.parameters))

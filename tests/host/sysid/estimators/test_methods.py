@@ -205,7 +205,7 @@ def test_kalman_filters_say_when_their_noise_model_is_wrong() -> None:
     """Gusts leave innovations that last: intervals must say so, and hold the truth."""
     calm = fit("extended-kalman", navion_structured(), [noisy(13, 0.02)])
     assert calm.warnings == ()
-    assert calm.details["inflation"] < 1.3
+    assert calm.details["innovation_inflation"] < 1.3
     held, before = [], []
     for seed in range(2):
         result = fit("extended-kalman", navion_structured(), [gusty(seed, 0.05)])

@@ -30,7 +30,7 @@ def test_sensor_noise_with_a_memory_is_named_and_its_intervals_hold() -> None:
 def test_gusts_and_white_noise_leave_filter_error_as_it_is() -> None:
     for maneuver, what in ((gusty(1, 0.02), "gusts"), (noisy(5, 0.02), "white")):
         asked = fit("filter-error", navion_structured(), [maneuver])
-        alone = fit("filter-error", navion_structured(), [maneuver], rival=False)
+        alone = fit("filter-error", navion_structured(), [maneuver], compare_noise=False)
         assert not any("use output-error" in w for w in asked.warnings), what
         np.testing.assert_array_equal(asked.covariance, alone.covariance)
         if what == "gusts":

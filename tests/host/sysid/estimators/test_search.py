@@ -46,7 +46,7 @@ def test_slopes_beyond_all_numbers_are_said(monkeypatch: pytest.MonkeyPatch) -> 
     def steep(theta: Array) -> list[Response] | None:
         responses = respond(theta)
         if responses is not None:
-            responses[0].slopes[0, -1, 0] = np.inf
+            responses[0].sensitivities[0, -1, 0] = np.inf
         return responses
 
     monkeypatch.setattr(problem, "respond", steep)

@@ -93,9 +93,9 @@ def test_probability_of_exceeding_is_that_of_a_normal_value_over_its_bound(
     assert single[k] == pytest.approx(expected, abs=0.1)
     assert any_of_them == pytest.approx(float(single[k]), abs=0.03)
     found = assess_identifiability(doubted, [maneuver])
-    assert found.refused == (grade == NOT_IDENTIFIABLE)
-    assert {r.name: r.grade for r in found.named} == ({"Z_alpha": grade} if grade else {})
-    for named in found.named:
+    assert found.not_identifiable == (grade == NOT_IDENTIFIABLE)
+    assert {r.name: r.grade for r in found.flags} == ({"Z_alpha": grade} if grade else {})
+    for named in found.flags:
         assert named.probability == pytest.approx(float(single[k]))
         if ratio > 1.0:
             assert f"probability of {100.0 * single[k]:.0f} %" not in named.reason
@@ -117,8 +117,8 @@ def test_collinear_parameters_are_named_with_their_partner_and_grade() -> None:
     )
     doubled = Maneuver(maneuver.dt_s, np.hstack([maneuver.inputs, twin]), maneuver.outputs)
     found = assess_identifiability(fit("output-error", two, [doubled]), [doubled])
-    named = {r.name: r for r in found.named}
-    assert found.refused
+    named = {r.name: r for r in found.flags}
+    assert found.not_identifiable
     assert {"M_de", "M_tab"} <= set(found.names(NOT_IDENTIFIABLE))
     assert "moves together with M_de" in named["M_tab"].reason
     assert "Z_alpha" not in named
@@ -143,7 +143,7 @@ def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
         result=result,
         fits=(),
         validation=(),
-        refused=found.named,
+        refused=found.flags,
         together=collinearity(result),
         modes=(),
         coefficients=(),
@@ -153,7 +153,7 @@ def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
     text = words([answer], [])
     table = model_lines(answer)
     document = answer_document(answer, text)
-    for named in found.named:
+    for named in found.flags:
         warning = "do not use" if named.grade == NOT_IDENTIFIABLE else "doubtful,"
         assert f"  {warning} {named.name}: {named.reason}" in text
         assert any(line.split()[0] == named.name and named.grade in line for line in table)

@@ -91,7 +91,7 @@ def test_templates_survive_a_file(name: str, tmp_path: Path) -> None:
         np.testing.assert_array_equal(ours, theirs)
     assert back.state_biases == model.state_biases
     assert back.output_biases == model.output_biases
-    assert back.levers == model.levers
+    assert back.accelerometer_offsets == model.accelerometer_offsets
     assert back.delays == model.delays == ()
 
 
@@ -246,7 +246,7 @@ def test_an_output_left_out_leaves_the_others_alone() -> None:
     for ours, theirs in zip(fewer.matrices(theta), (A, B, C[keep], D[keep]), strict=True):
         np.testing.assert_array_equal(ours, theirs)
     arm = without_outputs(longitudinal(TRIM, imu_sd_m=0.01), ("theta_rad",))
-    assert {x.output for x in arm.levers} == {"ax_mps2", "az_mps2"}
+    assert {x.output for x in arm.accelerometer_offsets} == {"ax_mps2", "az_mps2"}
 
 
 @pytest.mark.parametrize(
@@ -271,12 +271,14 @@ def test_numbers_of_numpy_are_written_as_numbers(tmp_path: Path) -> None:
     model = template("longitudinal", TRIM, imu_sd_m=two / 100.0)
     parameters = tuple(replace(p, lower=-two * 1e4, prior_sd=two) for p in model.parameters)
     delays = (DelayGroup("delay_s", ("q_radps",), prior_sd_s=two, limit_s=two),)
-    levers = tuple(replace(x, gain=two) for x in model.levers)
-    model = replace(model, parameters=parameters, delays=delays, levers=levers)
+    accelerometer_offsets = tuple(replace(x, gain=two) for x in model.accelerometer_offsets)
+    model = replace(
+        model, parameters=parameters, delays=delays, accelerometer_offsets=accelerometer_offsets
+    )
     path = tmp_path / "model.toml"
     path.write_text(model_text(model), encoding="utf-8")
     again = read_model(path)
     named = {p.name: p for p in parameters}
     assert {p.name: p for p in again.parameters} == named
-    assert len(again.levers) == len(levers) > 0
-    assert (again.delays, again.levers) == (delays, levers)
+    assert len(again.accelerometer_offsets) == len(accelerometer_offsets) > 0
+    assert (again.delays, again.accelerometer_offsets) == (delays, accelerometer_offsets)

@@ -101,7 +101,7 @@ def test_slopes_agree_with_finite_differences(hold: str) -> None:
     assert response is not None
     analytic = np.zeros((2 * 3 * len(u), len(theta)))
     for number in range(2):
-        block = response[number].slopes.reshape(3 * len(u), -1)
+        block = response[number].sensitivities.reshape(3 * len(u), -1)
         analytic[number * 3 * len(u) : (number + 1) * 3 * len(u), problem.columns(number)] = block
     for k in range(len(theta)):
         step = 1e-6 * max(1.0, abs(theta[k]))

@@ -94,7 +94,7 @@ class PathProblem:
 
     Parameters
     ----------
-    stretches : sequence of Stretch
+    segments : sequence of Segment
     outputs : tuple of str
         Of `AIR`, `HEIGHT` and `GPS`, in the order of `Stretch.measured`.
     prior : dict
@@ -107,13 +107,13 @@ class PathProblem:
 
     def __init__(
         self,
-        stretches: Sequence[Segment],
+        segments: Sequence[Segment],
         outputs: tuple[str, ...],
         prior: dict[str, tuple[float, float]],
         start_sd: Array,
         block: int,
     ) -> None:
-        self.stretches = tuple(stretches)
+        self.segments = tuple(segments)
         self.model = PathModel("flight path", outputs)
         self.block = block
         self._weights = np.full(block, 1.0 / block)
@@ -127,14 +127,14 @@ class PathProblem:
         local = START + (("height_m",) if HEIGHT in outputs else ())
         names = list(self.common)
         self._index: list[IntArray] = []
-        for number in range(1, len(self.stretches) + 1):
+        for number in range(1, len(self.segments) + 1):
             own = np.arange(len(names), len(names) + len(local))
             names += [f"{name}@{number}" for name in local]
             self._index.append(np.concatenate([np.arange(len(self.common)), own]))
         self.names = tuple(names)
         mean, sd = (np.array(column) for column in zip(*prior.values(), strict=True))
         own_sd = np.concatenate([start_sd, np.full(len(local) - len(START), np.inf)])
-        count = len(self.stretches)
+        count = len(self.segments)
         self.prior_mean = np.concatenate([mean, np.zeros(count * len(local))])
         self.prior_precision = np.concatenate([sd**-2.0, np.tile(own_sd**-2.0, count)])
         self.lower = np.full(len(names), -np.inf)
@@ -143,12 +143,12 @@ class PathProblem:
     @property
     def samples(self) -> int:
         """Blocks of all stretches together."""
-        return sum(s.measured.shape[1] for s in self.stretches)
+        return sum(s.measured.shape[1] for s in self.segments)
 
     def counted(self, output: str) -> int:
         """Return how many blocks of all stretches say something of an output."""
         if output in GPS:
-            return sum(int(np.sum(s.fixes >= 0)) for s in self.stretches)
+            return sum(int(np.sum(s.fixes >= 0)) for s in self.segments)
         return self.samples
 
     def columns(self, maneuver: int) -> IntArray:
@@ -157,11 +157,11 @@ class PathProblem:
 
     def measured(self, maneuver: int) -> Array:
         """Return the measured outputs of a stretch, (p, blocks)."""
-        return self.stretches[maneuver].measured
+        return self.segments[maneuver].measured
 
     def respond(self, theta: Array) -> list[Response] | None:
         """Return outputs and slopes of all stretches; None if one is not finite."""
-        found = [self._one(s, theta[i]) for s, i in zip(self.stretches, self._index, strict=True)]
+        found = [self._one(s, theta[i]) for s, i in zip(self.segments, self._index, strict=True)]
         return found if all(np.isfinite(r.y).all() for r in found) else None
 
     def _value(self, local: Array, names: Sequence[str]) -> Array:

@@ -105,7 +105,7 @@ def _search(problem: PathProblem, follows: Sequence[Array], patience: int) -> Pa
             if learning and name not in GPS:
                 noise[j] = _fit_ar_noise([r[j] for r in residuals])
             white = [noise[j].whiten(r[j][:, None])[:, 0] for r in residuals]
-            slope = [noise[j].whiten(r.slopes[j]) for r in responses]
+            slope = [noise[j].whiten(r.sensitivities[j]) for r in responses]
             variance = float(np.sum(np.concatenate(white) ** 2)) / problem.counted(name)
             deviation = np.sqrt(max(variance, 1e-300))
             if learning and name in AIR:

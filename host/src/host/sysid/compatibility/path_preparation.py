@@ -89,7 +89,7 @@ def prepare_path_problem(
     place = np.zeros(3)
     if airframe is not None and airframe.vanes_m:
         place = np.mean(airframe.vanes_m, axis=0)
-    stretches = [
+    segments = [
         replace(
             _segment(data, cut, outputs, dt_s, block, vane, fixes[cut]),
             vane_m=(float(place[0]), float(place[2])),
@@ -100,7 +100,7 @@ def prepare_path_problem(
     open_now = prior(instrument)
     if not gps:
         open_now = {k: v for k, v in open_now.items() if k in WITHOUT_GPS}
-    problem = PathProblem(stretches, outputs, open_now, start_sd, block)
+    problem = PathProblem(segments, outputs, open_now, start_sd, block)
     t = data["t_s"]
     when = tuple((float(t[c.start]), float(t[c.stop - 1])) for c in cuts)
     return problem, [_lagged_inputs(columns, cut, block) for cut in cuts], when

@@ -81,7 +81,7 @@ class Compatibility:
         Sensor errors, delays behind the IMU, steady wind.
     rms : dict
         Residual of each output, over all stretches.
-    stretches : tuple of (from, to), s
+    segments : tuple of (from, to), s
         What it rests on.
     gps : bool
     instrument : SensorErrorModel, optional
@@ -92,7 +92,7 @@ class Compatibility:
 
     findings: tuple[Finding, ...]
     rms: dict[str, float]
-    stretches: tuple[tuple[float, float], ...]
+    segments: tuple[tuple[float, float], ...]
     gps: bool
     instrument: SensorErrorModel | None = None
     calibration_tests: tuple[ConsistencyTest, ...] = ()
@@ -173,7 +173,7 @@ def _reason(name: str, *, gps: bool) -> str:
 def compatibility_lines(found: Compatibility) -> list[str]:
     """Return the paragraph of a verdict: errors found, then what the data cannot tell and why."""
     lines = [
-        f"data compatibility over {len(found.stretches)} stretches,"
+        f"data compatibility over {len(found.segments)} stretches,"
         f" {'with' if found.gps else 'without'} GPS:"
     ]
     wrong = [f for f in found.findings if f.significant]
@@ -195,7 +195,7 @@ def compatibility_document(found: Compatibility) -> dict[str, object]:
     """Return everything for JSON."""
     return {
         "gps": found.gps,
-        "stretches_s": [list(s) for s in found.stretches],
+        "stretches_s": [list(s) for s in found.segments],
         "residual_rms": found.rms,
         "calibration": {
             c.name: {

@@ -51,8 +51,8 @@ def fit_filter_error(
     *,
     process: tuple[str, ...] | None = None,
     start: Array | None = None,
-    rival: bool = True,
-    misfit: bool = False,
+    compare_noise: bool = True,
+    hac: bool = False,
 ) -> FitResult:
     """Fit by filter error.
 
@@ -64,10 +64,10 @@ def fit_filter_error(
         States driven by white process noise; without, all whose rate has a free entry.
     start : Array, optional
         Start of the model's own vector; output error gives it without.
-    rival : bool
-        Ask whether sensor noise with a memory explains the data better (`rival`).
-    misfit : bool
-        Widen intervals by what neighbouring scores have in common (`misfit`).
+    compare_noise : bool
+        Ask whether coloured measurement noise explains the data better (`compare_noise_models`).
+    hac : bool
+        Inflate standard errors by the autocorrelation of the scores (`hac_inflation`).
 
     Raises
     ------
@@ -78,7 +78,11 @@ def fit_filter_error(
         rows = {t.row for t in model.terms if t.matrix == "A"}
         process = tuple(model.states[i] for i in sorted(rows))
     problem = FilterProblem(model, maneuvers, process)
-    first = start_values(problem.inner) if start is None else np.asarray(start, dtype=np.float64)
+    first = (
+        start_values(problem.output_problem)
+        if start is None
+        else np.asarray(start, dtype=np.float64)
+    )
     theta = _first_guess(problem, first, fit_first=start is None)
     quiet = np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
     # Noise that the data do not show would walk to nothing for ever, and the search with it.
@@ -92,7 +96,7 @@ def fit_filter_error(
     theta, point = found.theta, found.trial
     covariance = covariance_from_information(found.information)
     factor: Array = np.ones(len(theta))
-    if misfit:
+    if hac:
         white = [
             e @ point.gains[m.dt_s].whitener.T for e, m in zip(point.e, maneuvers, strict=True)
         ]
@@ -112,7 +116,9 @@ def fit_filter_error(
         estimate=theta,
         covariance=covariance * np.outer(factor, factor),
         covariance_white=covariance,
-        degrees_of_freedom=np.full(len(theta), float(max(problem.inner.samples - kept, 1))),
+        degrees_of_freedom=np.full(
+            len(theta), float(max(problem.output_problem.samples - kept, 1))
+        ),
         residuals=tuple(point.e),
         fitted=tuple(m.outputs - e for m, e in zip(maneuvers, point.e, strict=True)),
         residual_kind="innovation",
@@ -122,13 +128,13 @@ def fit_filter_error(
         warnings=tuple(warnings),
         details={
             "cost": point.cost,
-            "misfit": factor,
+            "hac_inflation": factor,
             "process_deviation": np.exp(theta[kept : kept + len(process)]),
             "noise_deviation": np.exp(theta[kept + len(process) :]),
             **maneuver_influence(objective.parts, objective.scores, covariance),
         },
     )
-    return compare_noise_models(result, maneuvers, first) if rival else result
+    return compare_noise_models(result, maneuvers, first) if compare_noise else result
 
 
 def information_at(
@@ -158,8 +164,8 @@ def information_at(
 
 def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> Array:
     """Start from output error; split its residuals between both kinds of noise."""
-    inner, model = problem.inner, problem.model
-    optimum = minimise(inner, first, max_iterations=15 if fit_first else 0)
+    output_problem, model = problem.output_problem, problem.model
+    optimum = minimise(output_problem, first, max_iterations=15 if fit_first else 0)
     deviation = np.maximum(np.std(np.hstack(optimum.residuals), axis=1), 1e-12)
     A, _, C, _ = model.matrices(optimum.theta)
     process = []
@@ -175,9 +181,9 @@ class _FilterError(Objective[InnovationLikelihood]):
 
     def __init__(self, problem: FilterProblem, floor: Array) -> None:
         self._problem, self._noise = problem, slice(problem.n_model, None)
-        inner = problem.inner
-        self._lower = np.concatenate([inner.lower, floor])
-        self._upper = np.concatenate([inner.upper, np.full(len(floor), np.inf)])
+        output_problem = problem.output_problem
+        self._lower = np.concatenate([output_problem.lower, floor])
+        self._upper = np.concatenate([output_problem.upper, np.full(len(floor), np.inf)])
         self.parts: list[Array] = []  # Fisher's information by maneuver where last asked for
         self.scores: list[Array] = []
 

@@ -157,7 +157,7 @@ def fit_with_gust(
         start = start_values_of(model, maneuvers)
         result = _fit_gust_state(model, model, list(maneuvers), airspeed_mps, start)
         return GustFit(result, model, tuple(maneuvers), {})
-    first = fit("output-error-white", model, maneuvers, doubting=False)
+    first = fit("output-error-white", model, maneuvers, multiple_starts=False)
     half = first.half_width()
     delays = {d.name: (first.value(d.name), float(half[first.index(d.name)])) for d in model.delays}
     shifts = np.zeros(len(model.outputs))
@@ -187,7 +187,9 @@ def _fit_gust_state(
     process = ("gust_rad", *(s for s in OTHER_PROCESS_STATES if s in model.states))
     wide = gust_model(model, airspeed_mps)
     try:
-        result = fit_filter_error(wide, maneuvers, process=process, start=start, rival=False)
+        result = fit_filter_error(
+            wide, maneuvers, process=process, start=start, compare_noise=False
+        )
         failure = "" if result.converged else result.warnings[0]
     except IdentificationError as error:
         failure = str(error)
@@ -197,10 +199,10 @@ def _fit_gust_state(
             result,
             method="filter error with gust",
             model=plain,
-            covariance=result.covariance if around is None else around.coloured(),
+            covariance=result.covariance if around is None else around.coloured_covariance(),
         )
     # Better the plain answer with its wider intervals than a search that has not ended.
-    result = fit("output-error-white", plain, maneuvers, start=start, doubting=False)
+    result = fit("output-error-white", plain, maneuvers, start=start, multiple_starts=False)
     return replace(
         result,
         warnings=(*result.warnings, f"filter error: {failure}; output error stands instead"),

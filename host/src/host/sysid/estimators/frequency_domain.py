@@ -192,7 +192,7 @@ def fit_frequency_output_error(
     start : Array, optional
         Common parameters; equation error gives them without.
     """
-    if model.delays or model.levers:
+    if model.delays or model.accelerometer_offsets:
         raise IdentificationError(
             "frequency output error has no delays or levers: use output-error"
         )

@@ -74,7 +74,7 @@ def fit_genetic(
         raise IdentificationError("genetic search: every trial diverges; give tighter bounds")
     theta = base.copy()
     theta[:count] = found.x
-    result = fit_output_error(model, maneuvers, start=theta, memory=polish)
+    result = fit_output_error(model, maneuvers, start=theta, coloured_noise=polish)
     details = {**result.details, "search_score": float(found.fun), "search_best": found.x}
     return replace(result, method="genetic search, polished", details=details)
 

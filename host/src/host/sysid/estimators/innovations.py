@@ -38,7 +38,7 @@ class Innovations:
     e : list of Array, each (samples, p)
     white : list of Array, each (p, p)
         Turns an innovation into whitened ones.
-    slopes : list of Array, each (samples, p, P)
+    sensitivities : list of Array, each (samples, p, P)
         Of the whitened innovations.
     """
 
@@ -48,9 +48,9 @@ class Innovations:
     process: tuple[str, ...]
     e: list[Array]
     white: list[Array]
-    slopes: list[Array]
+    sensitivities: list[Array]
 
-    def step(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
+    def one_step_update(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
         """Return how far the answer moves with another model and other data, (P,).
 
         One Gauss-Newton step; nothing if the filter fails there.
@@ -59,14 +59,16 @@ class Innovations:
         pull = np.zeros(len(self.theta))
         if point is None:
             return pull
-        for e, still, white, slope in zip(point.e, self.e, self.white, self.slopes, strict=True):
+        for e, still, white, slope in zip(
+            point.e, self.e, self.white, self.sensitivities, strict=True
+        ):
             pull -= np.einsum("nj,njk->k", (e - still) @ white.T, slope)
         return np.asarray(self.inverse @ pull)
 
-    def coloured(self) -> Array:
+    def coloured_covariance(self) -> Array:
         """Return the covariance with the memory of the innovations in it; never a narrower one."""
         middle = np.zeros_like(self.covariance)
-        for e, white, slope in zip(self.e, self.white, self.slopes, strict=True):
+        for e, white, slope in zip(self.e, self.white, self.sensitivities, strict=True):
             plain = e @ white.T
             for j in range(plain.shape[1]):
                 middle += coloured_score_covariance(plain[:, j], slope[:, j])
@@ -93,6 +95,6 @@ def innovations_of(
     own = [slope.reshape(-1, len(theta))[:, :count] for slope in slopes]
     inverse = np.zeros_like(covariance)
     inverse[:count, :count] = covariance_from_information(
-        np.diag(problem.inner.prior_precision) + sum(J.T @ J for J in own)
+        np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in own)
     )
     return Innovations(theta, covariance, inverse, process, point.e, white, slopes)

@@ -123,7 +123,7 @@ def _run(
     *,
     unscented: bool,
 ) -> FitResult:
-    if model.delays or model.levers:
+    if model.delays or model.accelerometer_offsets:
         raise IdentificationError(
             "Kalman filters have no delays or levers: estimate those by output error"
         )
@@ -198,7 +198,11 @@ def _run(
         iterations=PASSES,
         converged=True,
         warnings=warnings,
-        details={"noise_deviation": deviation, "process": intensity, "inflation": excess},
+        details={
+            "noise_deviation": deviation,
+            "process": intensity,
+            "innovation_inflation": excess,
+        },
     )
 
 

@@ -57,7 +57,7 @@ METHODS: dict[str, Method] = {
         "output_error_fit",
         "fit_output_error",
         "maximum likelihood for white noise, covariance corrected for colour",
-        (("memory", False),),
+        (("coloured_noise", False),),
     ),
     "filter-error": Method(
         "filter_error", "fit_filter_error", "maximum likelihood with process noise"

@@ -42,7 +42,7 @@ LAST_SEARCH_ITERATIONS = 200  # iterations where none of them has converged
 LEAST_SAMPLES = 50
 
 
-def multistart(problem: OutputProblem, theta: Array, *, doubting: bool = True) -> Optimum:
+def multistart(problem: OutputProblem, theta: Array, *, multiple_starts: bool = True) -> Optimum:
     """Return the best optimum of white-noise output error found from `theta` and other starts.
 
     Parameters
@@ -50,7 +50,7 @@ def multistart(problem: OutputProblem, theta: Array, *, doubting: bool = True) -
     problem : OutputProblem
     theta : Array, shape (P,)
         Start.
-    doubting : bool
+    multiple_starts : bool
         Look further from an optimum that leaves more than white noise or lies in a flat valley
         (default). In a flight the gusts leave more than noise at every optimum.
 
@@ -60,7 +60,7 @@ def multistart(problem: OutputProblem, theta: Array, *, doubting: bool = True) -
         If no start is finite over the maneuvers.
     """
     best, failure = _try(problem, None, theta)
-    if best is not None and best.converged and not doubting:
+    if best is not None and best.converged and not multiple_starts:
         return best
     settled = best is not None and best.converged and _residuals_are_noise(problem, best)
     if best is not None and settled and not _nearly_singular(best):

@@ -43,25 +43,25 @@ def compare_noise_models(
         parameters becomes that of output error plus the square of the distance between both.
     """
     try:
-        rival = fit_output_error(result.model, maneuvers, start=start)
+        alternative = fit_output_error(result.model, maneuvers, start=start)
     except IdentificationError:
         return result
-    orders = np.asarray(rival.details["noise_orders"])
+    orders = np.asarray(alternative.details["noise_orders"])
     rows, outputs = sum(m.samples for m in maneuvers), len(result.model.outputs)
-    likelihood = float(rival.details["cost"]) + 0.5 * rows * outputs
-    unknown = len(rival.estimate) + outputs + float(np.sum(orders))
+    likelihood = float(alternative.details["cost"]) + 0.5 * rows * outputs
+    unknown = len(alternative.estimate) + outputs + float(np.sum(orders))
     excess = 2.0 * (float(result.details["cost"]) - likelihood)
     excess += float(np.log(rows)) * (len(result.estimate) - unknown)
     details = {**result.details, "bic_over_coloured_noise": excess}
-    if not rival.converged or excess < DECISIVE or not np.any(orders):
+    if not alternative.converged or excess < DECISIVE or not np.any(orders):
         return replace(result, details=details)
-    count = len(rival.estimate)
-    distance = result.estimate[:count] - rival.estimate
+    count = len(alternative.estimate)
+    distance = result.estimate[:count] - alternative.estimate
     covariance = result.covariance.copy()
     covariance[:count, count:] = covariance[count:, :count] = 0.0
-    covariance[:count, :count] = rival.covariance + np.outer(distance, distance)
+    covariance[:count, :count] = alternative.covariance + np.outer(distance, distance)
     freedom = result.degrees_of_freedom.copy()
-    freedom[:count] = np.minimum(freedom[:count], rival.degrees_of_freedom)
+    freedom[:count] = np.minimum(freedom[:count], alternative.degrees_of_freedom)
     said = (
         "noise of the sensors with a memory explains the data better than moving air (BIC"
         f" {excess:.0f} lower): use output-error; intervals widened to hold its answer"

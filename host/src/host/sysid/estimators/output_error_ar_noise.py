@@ -55,7 +55,7 @@ def fit_with_ar_noise(
     *,
     highest_order: int = HIGHEST_ORDER,
     criterion: str = "bic",
-    doubting: bool = True,
+    multiple_starts: bool = True,
 ) -> ArNoiseFit:
     """Fit output error and the memory of its noise together.
 
@@ -69,10 +69,10 @@ def fit_with_ar_noise(
         Highest AR order considered; 0 keeps the noise white.
     criterion : str
         ``bic`` or ``aicc``.
-    doubting : bool
+    multiple_starts : bool
         See `multistart`.
     """
-    optimum = multistart(problem, theta, doubting=doubting)
+    optimum = multistart(problem, theta, multiple_starts=multiple_starts)
     outputs = len(problem.model.outputs)
     noise = [ArNoise.white() for _ in range(outputs)]
     variance = _innovation_variances(problem, optimum, noise, optimum.variance)
@@ -168,7 +168,7 @@ def _fit_ar_models(
         for j in range(len(memory)):
             residuals = [r[j] for r in optimum.residuals]
             shares = [
-                response.slopes[j] @ lower[problem.columns(number)]
+                response.sensitivities[j] @ lower[problem.columns(number)]
                 for number, response in enumerate(optimum.responses)
             ]
             top = highest if chosen[j] < 0 or round_number < 2 else chosen[j]
@@ -257,7 +257,7 @@ def _filtered_information(
     result = np.zeros((len(problem.names), len(problem.names)))
     for number, response in enumerate(optimum.responses):
         columns = problem.columns(number)
-        slope = response.slopes[output]
+        slope = response.sensitivities[output]
         white = slope[order:].copy()
         for k in range(order):
             white -= coefficient[k] * slope[order - 1 - k : len(slope) - 1 - k]

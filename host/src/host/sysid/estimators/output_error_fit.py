@@ -23,11 +23,11 @@ def fit_output_error(
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
     *,
-    memory: bool = True,
+    coloured_noise: bool = True,
     start: Array | None = None,
     highest_order: int = HIGHEST_ORDER,
     criterion: str = "bic",
-    doubting: bool = True,
+    multiple_starts: bool = True,
 ) -> FitResult:
     """Fit by output error.
 
@@ -35,13 +35,13 @@ def fit_output_error(
     ----------
     model, maneuvers
         Model and data; the states need not be measured.
-    memory : bool
+    coloured_noise : bool
         Model the memory of the noise, refit with it and let the intervals stand on it (default).
         Without, noise is taken as white for the estimate and the covariance is corrected by the
         residual autocorrelation (Morelli & Klein 1997), the standard that covers 87-90 %.
     start : Array, optional
         Whole start vector; equation error gives it without.
-    highest_order, criterion, doubting
+    highest_order, criterion, multiple_starts
         See `fit_with_ar_noise`.
 
     Raises
@@ -58,13 +58,13 @@ def fit_output_error(
     fit = fit_with_ar_noise(
         problem,
         first,
-        highest_order=highest_order if memory else 0,
+        highest_order=highest_order if coloured_noise else 0,
         criterion=criterion,
-        doubting=doubting,
+        multiple_starts=multiple_starts,
     )
-    covariance = fit.covariance if memory else coloured_output_covariance(problem, fit)
+    covariance = fit.covariance if coloured_noise else coloured_output_covariance(problem, fit)
     return FitResult(
-        method="output error" if memory else "output error (white)",
+        method="output error" if coloured_noise else "output error (white)",
         model=model,
         names=problem.names,
         estimate=fit.optimum.theta,
@@ -125,7 +125,7 @@ def coloured_output_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array
         columns = problem.columns(number)
         for j, variance in enumerate(fit.optimum.variance):
             residual = fit.optimum.residuals[number][j]
-            part = coloured_score_covariance(residual, response.slopes[j]) / variance**2
+            part = coloured_score_covariance(residual, response.sensitivities[j]) / variance**2
             middle[np.ix_(columns, columns)] += part
     result = white @ middle @ white
     result = 0.5 * (result + result.T)

@@ -36,10 +36,10 @@ def regression_estimates(model: LinearModel, maneuvers: Sequence[Maneuver]) -> d
     Places of accelerometers and delays enter no regression; they are left out, and all the rest is
     told as if they were zero. Nothing is told where a state is not measured or two are collinear.
     """
-    places = {lever.parameter for lever in model.levers}
+    places = {lever.parameter for lever in model.accelerometer_offsets}
     plain = replace(
         model,
-        levers=(),
+        accelerometer_offsets=(),
         delays=(),
         parameters=tuple(p for p in model.parameters if p.name not in places),
     )

@@ -163,7 +163,9 @@ def follower(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> Fo
         found = innovations_of(result, wide, maneuvers)
         if found is None:
             return None
-        return lambda model, bent, data: found.step(gust_model(model, bent.airspeed_mps), data)
+        return lambda model, bent, data: found.one_step_update(
+            gust_model(model, bent.airspeed_mps), data
+        )
     outputs = _Outputs(result, maneuvers)
     return (lambda model, _, data: outputs.step(model, data)) if outputs.fine else None
 
@@ -190,7 +192,7 @@ class _Outputs:
         H = np.diag(problem.prior_precision)
         for k, r in enumerate(self.responses):
             own = problem.columns(k)
-            for w, J in zip(self.weight, r.slopes, strict=True):
+            for w, J in zip(self.weight, r.sensitivities, strict=True):
                 H[np.ix_(own, own)] += w * J.T @ J
         if not np.isfinite(H).all():
             self.fine = False
@@ -212,7 +214,7 @@ class _Outputs:
         pull = np.zeros(len(self.theta))
         for k, (r, y, m) in enumerate(zip(self.responses, other, changed, strict=True)):
             rest = m.outputs.T - self.problem.measured(k) - (y - r.y)
-            for w, J, d in zip(self.weight, r.slopes, rest, strict=True):
+            for w, J, d in zip(self.weight, r.sensitivities, rest, strict=True):
                 pull[self.problem.columns(k)] += w * J.T @ d
         step = self.inverse @ pull
         for k, target in self.known:

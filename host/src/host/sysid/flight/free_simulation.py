@@ -28,7 +28,11 @@ def free_simulation(frozen: LinearModel, maneuvers: Sequence[Maneuver]) -> list[
             problem = OutputProblem(frozen, [maneuver])
             # Nothing but constants is free here, which the door would refuse.
             best = fit_output_error(
-                frozen, [maneuver], memory=False, start=problem.first_guess(), doubting=False
+                frozen,
+                [maneuver],
+                coloured_noise=False,
+                start=problem.first_guess(),
+                multiple_starts=False,
             )
             simulated.append(best.fitted[0])
         except IdentificationError:
@@ -50,4 +54,6 @@ def frozen_model(model: LinearModel, result: FitResult) -> LinearModel:
     """Return the model frozen at the estimate, biases and start states left free."""
     count = len(model.parameters)
     A, B, C, D = model.matrices(result.estimate[:count])
-    return replace(model, A=A, B=B, C=C, D=D, terms=(), parameters=(), delays=(), levers=())
+    return replace(
+        model, A=A, B=B, C=C, D=D, terms=(), parameters=(), delays=(), accelerometer_offsets=()
+    )

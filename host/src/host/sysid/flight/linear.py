@@ -221,7 +221,7 @@ class LinearEstimator:
         else:
             single = "output-error-white" if method == GUST else method
             calm: dict[str, object] = (
-                {"doubting": False} if single.startswith("output-error") else {}
+                {"multiple_starts": False} if single.startswith("output-error") else {}
             )
             found = fit(single, model, data, **calm)
         cuts = [m.inside() for m in used]
@@ -293,7 +293,7 @@ class LinearEstimator:
             result=total,
             fits=validation.fits,
             validation=validation.held_out,
-            refused=assess_identifiability(total, e.maneuvers).named,
+            refused=assess_identifiability(total, e.maneuvers).flags,
             together=collinearity(intervals.statistical),
             modes=modes(total),
             coefficients=intervals.coefficients,

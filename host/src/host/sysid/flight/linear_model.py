@@ -75,11 +75,11 @@ def with_drag_arm(model: LinearModel, trim: Trim, i: SensorErrorModel) -> Linear
         return model
     sd_m = imu_place_m(i)
     free = template(model.name, trim, accelerometers=True, imu_sd_m=sd_m)
-    kept = [x for x in free.levers if x.output == "ax_mps2"]
-    names = {x.parameter for x in free.levers} - {x.parameter for x in kept}
+    kept = [x for x in free.accelerometer_offsets if x.output == "ax_mps2"]
+    names = {x.parameter for x in free.accelerometer_offsets} - {x.parameter for x in kept}
     return replace(
         model,
-        levers=tuple(kept),
+        accelerometer_offsets=tuple(kept),
         parameters=tuple(p for p in free.parameters if p.name not in names),
     )
 

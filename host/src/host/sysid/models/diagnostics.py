@@ -182,28 +182,28 @@ class IdentifiabilityFlag:
 
 @dataclass(frozen=True, slots=True)
 class Identifiability:
-    """Whether a fit is refused, and which of its common parameters are in doubt.
+    """Whether the data identify a fit's parameters in practice, and which of them are in doubt.
 
     Attributes
     ----------
     probability : float
         That some bound exceeds 100 % of its value.
-    named : tuple of Refusal
-        Both grades, in the order of the model. Of a fit that is not refused they can only be
-        doubtful; of one that is refused, the data cannot tell at least one of them.
+    flags : tuple of Refusal
+        Both grades, in the order of the model. Of an identifiable fit they can only be weakly
+        identifiable; of another one at least one of them is not identifiable.
     """
 
     probability: float
-    named: tuple[IdentifiabilityFlag, ...]
+    flags: tuple[IdentifiabilityFlag, ...]
 
     @property
-    def refused(self) -> bool:
-        """Whether more likely than not some bound exceeds its value."""
+    def not_identifiable(self) -> bool:
+        """Whether it is more likely than not that some bound exceeds its value."""
         return self.probability > EVEN_ODDS
 
     def names(self, *grades: str) -> tuple[str, ...]:
         """Return the names of these grades, of both without any."""
-        return tuple(r.name for r in self.named if not grades or r.grade in grades)
+        return tuple(r.name for r in self.flags if not grades or r.grade in grades)
 
 
 def shrunk_estimate(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, Array]:
@@ -294,7 +294,7 @@ def identifiability_flags(
     result: FitResult, maneuvers: Sequence[Maneuver]
 ) -> tuple[IdentifiabilityFlag, ...]:
     """Name the common parameters that these data cannot tell or tell doubtfully."""
-    return assess_identifiability(result, maneuvers).named
+    return assess_identifiability(result, maneuvers).flags
 
 
 def _identifiability_flag(

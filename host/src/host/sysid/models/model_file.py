@@ -133,9 +133,11 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
     for label, shape in shapes.items():
         fixed[label], found = _matrix(document.get(label), label, shape, signals, source)
         terms += found
-    levers = _levers(document.get("levers", []), source)
+    accelerometer_offsets = _levers(document.get("levers", []), source)
     _constants(document, signals, terms)
-    used = list(dict.fromkeys([t.parameter for t in terms] + [x.parameter for x in levers]))
+    used = list(
+        dict.fromkeys([t.parameter for t in terms] + [x.parameter for x in accelerometer_offsets])
+    )
     parameters = _parameters(document.get("parameters", {}), used, source)
     return LinearModel(
         name=in_a_line(str(document.get("name", Path(source).stem))),
@@ -157,7 +159,7 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
             else delays_of(signals["outputs"])
         ),
         hold=str(document.get("hold", "foh")),
-        levers=levers,
+        accelerometer_offsets=accelerometer_offsets,
     )
 
 

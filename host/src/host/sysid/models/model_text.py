@@ -67,7 +67,7 @@ def model_text(
             f"prior_sd_s = {_plain(delay.prior_sd_s)}",
             f"limit_s = {_plain(delay.limit_s)}",
         ]
-    for lever in model.levers:
+    for lever in model.accelerometer_offsets:
         lines += [
             "[[levers]]",
             f'output = "{lever.output}"',

@@ -123,7 +123,7 @@ class LinearModel:
         Residual delays, common to all maneuvers.
     hold : str
         ``zoh`` or ``foh``: how the input runs between its samples.
-    levers : tuple of Lever
+    accelerometer_offsets : tuple of AccelerometerOffset
         Sensor offsets that mix state rates into outputs.
 
     Raises
@@ -147,7 +147,7 @@ class LinearModel:
     initial_states: tuple[str, ...] = ()
     delays: tuple[DelayGroup, ...] = field(default=())
     hold: str = "zoh"
-    levers: tuple[AccelerometerOffset, ...] = ()
+    accelerometer_offsets: tuple[AccelerometerOffset, ...] = ()
 
     def __post_init__(self) -> None:
         n, m, p = len(self.states), len(self.inputs), len(self.outputs)
@@ -178,7 +178,7 @@ class LinearModel:
         unused = sorted(
             set(names)
             - {term.parameter for term in self.terms}
-            - {lever.parameter for lever in self.levers}
+            - {lever.parameter for lever in self.accelerometer_offsets}
         )
         if unused:
             raise IdentificationError(f"model {self.name}: {', '.join(unused)} enters no matrix")
@@ -186,9 +186,9 @@ class LinearModel:
             ("state bias", self.state_biases, self.states),
             ("initial state", self.initial_states, self.states),
             ("output bias", self.output_biases, self.outputs),
-            ("lever", tuple(x.output for x in self.levers), self.outputs),
-            ("lever", tuple(x.state for x in self.levers), self.states),
-            ("lever", tuple(x.parameter for x in self.levers), tuple(names)),
+            ("lever", tuple(x.output for x in self.accelerometer_offsets), self.outputs),
+            ("lever", tuple(x.state for x in self.accelerometer_offsets), self.states),
+            ("lever", tuple(x.parameter for x in self.accelerometer_offsets), tuple(names)),
             ("delay", tuple(y for d in self.delays for y in d.outputs), self.outputs),
         ):
             strangers = [x for x in chosen if x not in known]
@@ -247,7 +247,7 @@ class LinearModel:
         index = {p.name: i for i, p in enumerate(self.parameters)}
         for term in self.terms:
             result[term.matrix][term.row, term.column] += term.gain * theta[index[term.parameter]]
-        for lever in self.levers:
+        for lever in self.accelerometer_offsets:
             row, state = self.outputs.index(lever.output), self.states.index(lever.state)
             arm = lever.gain * float(theta[index[lever.parameter]])
             result["C"][row] += arm * result["A"][state]
@@ -349,7 +349,9 @@ def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
         ),
         output_biases=tuple(y for y in model.output_biases if y not in names),
         delays=tuple(d for d in delays if d.outputs),
-        levers=tuple(x for x in model.levers if x.output not in names),
+        accelerometer_offsets=tuple(
+            x for x in model.accelerometer_offsets if x.output not in names
+        ),
     )
 
 

@@ -57,7 +57,7 @@ class _Builder:
     parameters: dict[str, Parameter] = field(default_factory=dict)
     terms: list[Term] = field(default_factory=list)
     known: dict[tuple[str, str, str], float] = field(default_factory=dict)
-    levers: list[AccelerometerOffset] = field(default_factory=list)
+    accelerometer_offsets: list[AccelerometerOffset] = field(default_factory=list)
 
     def add(self, name: str, start: float, places: Iterable[tuple[str, str, float]]) -> None:
         """Make a parameter act on rows by columns with gains; unknown signals are left out."""
@@ -94,7 +94,7 @@ class _Builder:
             self.parameters[name] = Parameter(
                 name, 0.0, lower=-3.0 * sd_m, upper=3.0 * sd_m, prior_sd=sd_m
             )
-            self.levers.append(AccelerometerOffset(output, state, name, gain))
+            self.accelerometer_offsets.append(AccelerometerOffset(output, state, name, gain))
 
     def build(self, *, delays: tuple[DelayGroup, ...], hold: str) -> LinearModel:
         """Return the model; outputs that carry a state's name measure it."""
@@ -128,7 +128,7 @@ class _Builder:
             initial_states=self.states,
             delays=delays_of(self.outputs, delays),
             hold=hold,
-            levers=tuple(self.levers),
+            accelerometer_offsets=tuple(self.accelerometer_offsets),
         )
 
 

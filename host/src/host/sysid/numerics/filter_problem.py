@@ -73,14 +73,14 @@ class FilterProblem:
             raise IdentificationError(
                 f"process noise on {', '.join(strangers)}; states are {', '.join(model.states)}"
             )
-        self.inner = OutputProblem(model, maneuvers)
+        self.output_problem = OutputProblem(model, maneuvers)
         self.model = model
         self.maneuvers = tuple(maneuvers)
         self.process = process
         self.process_index = [model.states.index(s) for s in process]
-        self.n_model = len(self.inner.names)
+        self.n_model = len(self.output_problem.names)
         self.names = (
-            *self.inner.names,
+            *self.output_problem.names,
             *(f"log_process.{s}" for s in process),
             *(f"log_noise.{y}" for y in model.outputs),
         )
@@ -102,7 +102,7 @@ class FilterProblem:
     def constants(self, theta: Array, maneuver: int) -> tuple[Array, Array, Array]:
         """Return biases of states and outputs, and start states of a maneuver."""
         model = self.model
-        local = iter(theta[self.inner.columns(maneuver)[self.inner.n_common :]])
+        local = iter(theta[self.output_problem.columns(maneuver)[self.output_problem.n_common :]])
         names = model.states, model.outputs, model.states
         which = model.state_biases, model.output_biases, model.initial_states
         found = []
@@ -154,8 +154,8 @@ class FilterProblem:
             white = found.e[-1] @ gain.whitener.T
             cost += 0.5 * float(np.sum(white**2))
             cost -= len(z) * float(np.sum(np.log(np.diag(gain.whitener))))
-        prior = self.inner.prior_precision
-        miss = theta[: self.n_model] - self.inner.prior_mean
+        prior = self.output_problem.prior_precision
+        miss = theta[: self.n_model] - self.output_problem.prior_mean
         cost += 0.5 * float(np.sum(prior * miss**2))
         found.cost = cost
         return found if np.isfinite(cost) else None

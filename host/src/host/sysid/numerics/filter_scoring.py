@@ -93,12 +93,12 @@ def _gain_sensitivities(
 def _active(problem: FilterProblem, number: int) -> IntArray:
     """Return which unknowns the innovations of a maneuver depend on."""
     noise = np.arange(problem.n_model, len(problem.names))
-    return np.concatenate([problem.inner.columns(number), noise])
+    return np.concatenate([problem.output_problem.columns(number), noise])
 
 
 def _shared(problem: FilterProblem) -> IntArray:
     return np.concatenate(
-        [np.arange(problem.inner.n_common), np.arange(problem.n_model, len(problem.names))]
+        [np.arange(problem.output_problem.n_common), np.arange(problem.n_model, len(problem.names))]
     )
 
 
@@ -112,10 +112,10 @@ def _innovation_sensitivities(
 ) -> Array:
     """Return slopes of the whitened innovations, (samples x p, `_active`)."""
     _, CD, CD_slopes = matrices
-    model, inner = problem.model, problem.inner
+    model, output_problem = problem.model, problem.output_problem
     n, m, p = len(model.states), len(model.inputs), len(model.outputs)
     gain: SteadyStateFilter = point.gains[problem.maneuvers[number].dt_s]
-    common, local = inner.n_common, inner.n_local
+    common, local = output_problem.n_common, output_problem.n_local
     width = common + local + len(theta) - problem.n_model
     noise = slice(common + local, width)
     A, B, _, _ = model.matrices(theta)
@@ -167,6 +167,8 @@ def total_information(
     """Return information and minus the cost's gradient of all maneuvers and the prior."""
     information, gradient = np.sum(parts, axis=0), np.sum(scores, axis=0)
     n = problem.n_model
-    information[:n, :n] += np.diag(problem.inner.prior_precision)
-    gradient[:n] -= problem.inner.prior_precision * (theta[:n] - problem.inner.prior_mean)
+    information[:n, :n] += np.diag(problem.output_problem.prior_precision)
+    gradient[:n] -= problem.output_problem.prior_precision * (
+        theta[:n] - problem.output_problem.prior_mean
+    )
     return information, gradient

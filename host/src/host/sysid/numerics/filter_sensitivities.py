@@ -28,7 +28,7 @@ def matrix_sensitivities(model: LinearModel, theta: Array) -> tuple[Array, Array
         np.stack([np.hstack([model.gradient(x, name) for x in pair]) for name in names], axis=2)
         for pair in ("AB", "CD")
     )
-    for lever in model.levers:
+    for lever in model.accelerometer_offsets:
         # The arm carries a whole state row into an output.
         row, state = model.outputs.index(lever.output), model.states.index(lever.state)
         arm = names.index(lever.parameter)
@@ -52,7 +52,7 @@ def gain_sensitivities(
     """
     A, _, C, _ = problem.model.matrices(theta)
     n, p = len(A), len(C)
-    common, process = problem.inner.n_common, len(problem.process)
+    common, process = problem.output_problem.n_common, len(problem.process)
     count = common + process + p
     intensity, power = problem.noise(theta)
     F, Q = _noise_sensitivities(problem, A, intensity, dt_s, AB_slopes[:, :n])

@@ -68,14 +68,16 @@ def maneuver_influence(
         Of the whole information, prior included.
     """
     return {
-        "pulls": np.array([inverse @ g for g in scores]),
-        "shares": np.array([np.einsum("kj,jk->k", inverse, part) for part in information]),
+        "maneuver_influence": np.array([inverse @ g for g in scores]),
+        "information_share": np.array(
+            [np.einsum("kj,jk->k", inverse, part) for part in information]
+        ),
     }
 
 
 def maneuver_agreement(result: FitResult) -> ManeuverAgreement | None:
     """Return the scatter of the maneuvers of a joint fit; None if the method does not tell it."""
-    pull, share = result.details.get("pulls"), result.details.get("shares")
+    pull, share = result.details.get("maneuver_influence"), result.details.get("information_share")
     count = len(result.model.parameter_names)
     if not isinstance(pull, np.ndarray) or not isinstance(share, np.ndarray) or len(pull) < 2:
         return None

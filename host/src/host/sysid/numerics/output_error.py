@@ -146,10 +146,10 @@ def whitened_sensitivities(
     result = []
     for response in responses:
         if all(n.order == 0 for n in noise):
-            result.append(response.slopes)
+            result.append(response.sensitivities)
         else:
             result.append(
-                np.stack([n.whiten(response.slopes[j]) for j, n in enumerate(noise)], axis=0)
+                np.stack([n.whiten(response.sensitivities[j]) for j, n in enumerate(noise)], axis=0)
             )
     return result
 

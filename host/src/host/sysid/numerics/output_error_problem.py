@@ -18,10 +18,18 @@ from host.sysid.numerics.recursion import propagate, simulate
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """Output of one maneuver: y (p, samples) and slopes (p, samples, columns of this maneuver)."""
+    """Simulated outputs of one maneuver and their sensitivities.
+
+    Attributes
+    ----------
+    y : Array, shape (p, samples)
+        Outputs in the units of the model.
+    sensitivities : Array, shape (p, samples, columns of this maneuver)
+        Derivatives of `y` by the unknowns that this maneuver depends on.
+    """
 
     y: Array
-    slopes: Array
+    sensitivities: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +119,7 @@ class OutputProblem:
         for i in np.flatnonzero(self._start_parameter >= 0):
             self._start_slopes[i, self._start_parameter[i]] = 1.0
         output_entries = model.entries("CD")
-        free_output = len(output_entries.row) + len(model.levers) > 0
+        free_output = len(output_entries.row) + len(model.accelerometer_offsets) > 0
         self._arms = [
             (
                 model.outputs.index(lever.output),
@@ -119,7 +127,7 @@ class OutputProblem:
                 [p.name for p in model.parameters].index(lever.parameter),
                 lever.gain,
             )
-            for lever in model.levers
+            for lever in model.accelerometer_offsets
         ]
         self._CD_slopes = np.zeros((len(model.outputs) if free_output else 0, n + m, width))
         for k in range(len(output_entries.row)):
@@ -220,7 +228,7 @@ class OutputProblem:
         Fresh memory costs as much as the slopes themselves: 375 pages for 24 x 2000 x 4.
         """
         for spare, response in zip(self._spare, responses, strict=True):
-            spare.append(response.slopes)
+            spare.append(response.sensitivities)
 
     def _room(self, number: int, shape: tuple[int, int, int]) -> Array:
         spare = self._spare[number]
