@@ -4,6 +4,9 @@
 
 #ifndef __AVR__
 
+// An exception ends the case, not the check alone: a third less to compile.
+#define DOCTEST_CONFIG_SUPER_FAST_ASSERTS
+
 // The registry's library, else Debian's header.
 #if __has_include(<doctest.h>)
 #include <doctest.h>
