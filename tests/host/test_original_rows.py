@@ -159,3 +159,11 @@ def test_a_field_of_a_million_spaces_is_no_field() -> None:
     spaces = b"PCH" + b" " * 1_000_000 + b"x"
     rows = parse_rows(b"RLL:1.00,PCH:2.00,YAW:3.00,AN0:4.00\nRLL:1.00," + spaces + b",YAW:3.00\n")
     assert len(rows) == 1
+
+
+def test_a_file_of_fragments_is_no_log_of_the_original() -> None:
+    fragments = b"PCH:1,AN0:1,f\n" * 200
+    with pytest.raises(NotALogError, match=r"200 rows of 14 bytes .* prints 150 to 250"):
+        parse_rows(fragments)
+    whole = APPENDIX.format(1.0).encode()
+    assert len(parse_rows(whole * 100 + fragments)) == 300  # a damaged part costs no other row

@@ -2,7 +2,7 @@
 
     python -m tests.protocol.costs --blocks 2000 32768
 
-Each file is read in a process of its own: `read_log`, its table, its ledger, the summary. Exit code
+Files of the original logger's rows are held against a clean file of such rows. Each file is read in a process of its own: `read_log`, its table, its ledger, the summary. Exit code
 1 if one takes more than 20 times the clean log's time, or more than 300 MB plus eight times its
 size. Times are of the processor, so that a busy machine spoils them less; `make test` has none.
 """
@@ -13,7 +13,7 @@ import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -25,20 +25,27 @@ from tests.protocol.log_writer import BLOCK, HEADER, MAGIC, ROOM
 MOST_TIMES = 20.0
 MOST_BYTES, MOST_PER_BYTE = 300 << 20, 8
 READ = """
-import json, resource, sys, time, warnings
+import json, pathlib, resource, sys, time, warnings
 import pandas, scipy.io
 from host.decode.log_summary import summarise
 from host.errors import HostError
 from host.log import read_log
+from host.original.rows import read_rows
+from host.original.table import make_table
 from host.physical.calibration import load_calibration
 calibration = load_calibration()
 warnings.simplefilter("ignore")
 began = time.process_time()
 try:
-    log = read_log(sys.argv[1], calibration=calibration)
-    table = log.table()
-    said = summarise(log)
-    end = f"{log.complete}, {len(table)} rows, {len(log.loss.losses)} losses"
+    if sys.argv[1].endswith(".txt"):
+        rows = read_rows(pathlib.Path(sys.argv[1]))
+        table = pandas.DataFrame(make_table(rows, calibration).columns)
+        end = f"{rows.variant}, {len(table)} rows"
+    else:
+        log = read_log(sys.argv[1], calibration=calibration)
+        table = log.table()
+        said = summarise(log)
+        end = f"{log.complete}, {len(table)} rows, {len(log.loss.losses)} losses"
 except HostError as error:
     end = type(error).__name__
 took = time.process_time() - began
@@ -46,6 +53,14 @@ peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
 print(json.dumps({"s": took, "bytes": peak, "end": end}))
 """
 
+# As the original logger printed them, and the shortest that are read.
+PRINTED_ROW = (
+    b"RLL:0.07,PCH:0.08,YAW:0.33,altitude:-0.50,velocity:0.00,elev:-683,ail:-713,rdr:-713,"
+    b"alpha:-737,beta:-690,AN0:0.13,AN1:-0.62,AN2:0.22,AN3:17.78, AN4:-0.08,AN5:8190.33,"
+    b"lat:0.00,lon:0.00,gpsalt:17.00 , gpsgc0.00,gpsgs0.00, fix:0,numsat:0,elevs:0,ails:0, "
+    b"ruds:0,throts:0\n"
+)
+SHORT_ROW = b"RLL:0.07,PCH:0.08,YAW:0.33,AN0:0.13,AN1:0.22,AN2:1.00\n"
 FLIGHT = simple_log(8.0)
 BASE = FLIGHT.data()
 ROWS = {name: FLIGHT.truth(name)[0] for name in FLIGHT.layouts}
@@ -132,6 +147,12 @@ def hostile(count: int) -> dict[str, Callable[[], bytes]]:
     }
 
 
+def hostile_rows(size: int) -> dict[str, bytes]:
+    """Return files of original rows by what is wrong with them."""
+    rows = {"rows of two fields": b"PCH:1,AN0:1,f\n", "rows of six fields": SHORT_ROW}
+    return {what: PRINTED_ROW + row * (size // len(row)) for what, row in rows.items()}
+
+
 def measured(path: Path) -> tuple[float, int, str]:
     """Return processor time in s, most memory in bytes, and how it ended."""
     ran = subprocess.run(
@@ -143,34 +164,48 @@ def measured(path: Path) -> tuple[float, int, str]:
     return said["s"], said["bytes"], said["end"]
 
 
+def compare(count: int, clean: Path, files: Iterable[tuple[str, bytes]]) -> tuple[list[str], float]:
+    """Print what files cost beside a clean one; return those that cost too much, most times."""
+    clean_s, clean_bytes, end = measured(clean)
+    print(
+        f"{count:6d} blocks  {'clean':28s} {clean_s:7.3f} s {clean_bytes >> 20:5d} MiB"
+        f"             {end}"
+    )
+    limit = MOST_BYTES + MOST_PER_BYTE * count * BLOCK
+    bad_ones, most = [], 0.0
+    for what, data in files:
+        clean.write_bytes(data)
+        took_s, peak, end = measured(clean)
+        bad = took_s > MOST_TIMES * clean_s or peak > limit
+        bad_ones += [what] if bad else []
+        most = max(most, took_s / clean_s)
+        print(
+            f"{count:6d} blocks  {what:28s} {took_s:7.3f} s {peak >> 20:5d} MiB"
+            f" {took_s / clean_s:6.1f} times{'  TOO MUCH' if bad else ''}  {end}",
+            flush=True,
+        )
+    return bad_ones, most
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     parser = argparse.ArgumentParser(prog="costs", description=__doc__)
     parser.add_argument("--blocks", type=int, nargs="+", default=[2000])
-    bad_ones = []
+    bad_ones: list[str] = []
     most = 0.0
     with tempfile.TemporaryDirectory() as name:
-        path = Path(name) / "flight.bin"
         for count in parser.parse_args(arguments).blocks:
             size = count * BLOCK
+            path, rows = Path(name) / "flight.bin", Path(name) / "rows.txt"
             large_log(path, size)
-            clean_s, clean_bytes, end = measured(path)
-            print(
-                f"{count:6d} blocks  {'clean':28s} {clean_s:7.3f} s {clean_bytes >> 20:5d} MiB"
-                f"             {end}"
-            )
-            limit = MOST_BYTES + MOST_PER_BYTE * size
-            for what, make in hostile(count).items():
-                path.write_bytes(make())
-                took_s, peak, end = measured(path)
-                bad = took_s > MOST_TIMES * clean_s or peak > limit
-                bad_ones += [what] if bad else []
-                most = max(most, took_s / clean_s)
-                print(
-                    f"{count:6d} blocks  {what:28s} {took_s:7.3f} s {peak >> 20:5d} MiB"
-                    f" {took_s / clean_s:6.1f} times{'  TOO MUCH' if bad else ''}  {end}",
-                    flush=True,
-                )
+            rows.write_bytes((PRINTED_ROW * (size // len(PRINTED_ROW) + 1))[:size])
+            for clean, files in (
+                (path, ((what, make()) for what, make in hostile(count).items())),
+                (rows, hostile_rows(size).items()),
+            ):
+                bad, times = compare(count, clean, files)
+                bad_ones += bad
+                most = max(most, times)
     print(f"at most {most:.1f} times a clean log's time; too much: {', '.join(bad_ones) or 'none'}")
     return 1 if bad_ones else 0
 

@@ -40,6 +40,9 @@ VARIANTS: dict[str, tuple[str, ...]] = {
 _LABELS = sorted({label for labels in VARIANTS.values() for label in labels}, key=len, reverse=True)
 # "gpsgc0.00" and "gpsalt:17.00 " are both as printed
 _FIELD = re.compile(rf"({'|'.join(_LABELS)})\s*(?::\s*)?(-?\d{{1,7}}(?:\.(\d{{1,7}}))?)")
+# Rows are 150 to 250 bytes long. A number here costs 8 bytes and the table has 51 columns: shorter
+# rows than these would take more than eight times the file's size in memory.
+_LEAST_ROW_BYTES = 48
 _BARE_ROLL = re.compile(r"(-?\d{1,3}\.(\d\d))")  # variant 26: the station strips "RLL:"
 _SIGNATURE = re.compile(rb"PCH\s*:\s*-?\d+\.\d+\s*,\s*YAW\s*:")
 _RANGES = {
@@ -99,7 +102,7 @@ def read_rows(path: Path) -> OriginalRows:
     Raises
     ------
     NotALogError
-        If no row is found.
+        If no row is found, or the rows are hardly more than fragments.
     """
     return parse_rows(path.read_bytes(), str(path))
 
@@ -116,6 +119,12 @@ def parse_rows(data: bytes, name: str = "rows") -> OriginalRows:
             digits_of.setdefault(label, Counter[int]())[digits] += 1
     if not count:
         raise NotALogError(f"{name}: no row of the original logger (RLL:...,PCH:...,YAW:...)")
+    if len(data) < _LEAST_ROW_BYTES * count:
+        raise NotALogError(
+            f"{name}: {count} rows of {len(data) / count:.0f} bytes on average, where the original"
+            f" logger prints 150 to 250: at least {_LEAST_ROW_BYTES} are needed; keep the rows that"
+            " are whole and try again"
+        )
     variant = _variant(seen)
     # Fewer or more decimals than usual are a damaged number.
     decimals = {label: digits.most_common(1)[0][0] for label, digits in digits_of.items()}
