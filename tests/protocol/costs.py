@@ -2,9 +2,10 @@
 
     python -m tests.protocol.costs --blocks 2000 32768
 
-Files of the original logger's rows are held against a clean file of such rows. Each file is read in a process of its own: `read_log`, its table, its ledger, the summary. Exit code
-1 if one takes more than 20 times the clean log's time, or more than 300 MB plus eight times its
-size. Times are of the processor, so that a busy machine spoils them less; `make test` has none.
+Files of the original logger's rows are held against a clean file of such rows. Each file is read
+in a process of its own: `read_log`, its table, its ledger, the summary. Exit code 1 if one takes
+more than 20 times the clean file's time, or more than 300 MB plus eight times its size. Times are
+of the processor, so that a busy machine spoils them less; `make test` has none.
 """
 
 import argparse
