@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
+from host.constants import NORMAL_95
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, identify_coefficients
 from host.sysid.flight.finder import Found
@@ -67,11 +68,11 @@ class CoefficientTally:
                 self.frequency.setdefault(name, []).append(
                     (
                         mode.frequency_radps / frequency - 1.0,
-                        1.96 * mode.frequency_sd_radps / frequency,
+                        NORMAL_95 * mode.frequency_sd_radps / frequency,
                     )
                 )
                 self.damping.setdefault(name, []).append(
-                    (mode.damping - damping, 1.96 * mode.damping_sd)
+                    (mode.damping - damping, NORMAL_95 * mode.damping_sd)
                 )
         late = true_delays(flight)
         for name, (value, half) in answer.delays.items():

@@ -24,7 +24,7 @@ import numpy as np
 from host.aircraft.file import load as load_aircraft
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
-from host.instrument.errors import InstrumentErrors, instrument_errors
+from host.instrument.instrument_errors import InstrumentErrors, instrument_errors
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.tables import even_columns

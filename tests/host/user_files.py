@@ -170,7 +170,7 @@ def use_aircraft(path: Path, rng: random.Random) -> None:
 def use_calibration(path: Path, rng: random.Random) -> None:
     """As `decode` does."""
     import numpy as np
-    from host.instrument.errors import instrument_errors
+    from host.instrument.instrument_errors import instrument_errors
     from host.log import read_log
     from host.physical.calibration import load_calibration
 

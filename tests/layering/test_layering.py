@@ -7,6 +7,7 @@ each, so that a rule that never bites is found out.
 from __future__ import annotations
 
 import ast
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -72,6 +73,18 @@ HOST_NEVERS = (
     ("host.sysid", "host.twin"),
     ("host.twin.sensors", "host.twin.testcard"),
 )
+
+# Constants of physics and geometry with one owner, and how near to one a number is that means it.
+CONSTANTS = "host/src/host/constants.py"
+KNOWN_NUMBERS = {
+    "GRAVITY_MPS2": 9.80665,
+    "DEG_PER_RAD": 180.0 / math.pi,
+    "RAD_PER_DEG": math.pi / 180.0,
+    "NORMAL_95": 1.96,
+}
+NEAR = 1e-3
+# Files that every package may have.
+COMMON_NAMES = {"__init__.py", "__main__.py"}
 
 
 def include_breaches(root: Path) -> Iterator[str]:
@@ -190,7 +203,34 @@ def verb_breaches(root: Path) -> Iterator[str]:
                 yield f"{name}:{number}: a verb does no work: may not import {module}"
 
 
+def basename_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every file of the host package whose name another room has too."""
+    first: dict[str, Path] = {}
+    for path in _files(root / "host" / "src" / "host", {".py"}):
+        if path.name in COMMON_NAMES:
+            continue
+        if path.name in first:
+            other = first[path.name].relative_to(root)
+            yield f"{path.relative_to(root)}: {other} has the same name; say which each is"
+        else:
+            first[path.name] = path
+
+
+def constant_breaches(root: Path) -> Iterator[str]:
+    """Yield a line for every number that `host.constants` has, typed again."""
+    for path in _files(root / "host", {".py"}):
+        name = str(path.relative_to(root))
+        if name == CONSTANTS:
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.expr):
+                for constant in _constants_in(node):
+                    yield f"{name}:{node.lineno}: host.constants has {constant}"
+
+
 RULES = (
+    basename_breaches,
+    constant_breaches,
     verb_breaches,
     include_breaches,
     board_breaches,
@@ -202,6 +242,23 @@ RULES = (
     link_breaches,
     simulator_breaches,
 )
+
+
+def _constants_in(node: ast.expr) -> Iterator[str]:
+    """Yield the constant that a number (or its thousandth) or a quotient with pi repeats."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, float) and node.value != 0.0:
+        for name, value in KNOWN_NUMBERS.items():
+            decades = round(math.log10(abs(node.value) / value))
+            if decades in (-3, 0, 3) and abs(abs(node.value) / value / 10.0**decades - 1.0) < NEAR:
+                yield name
+    elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
+        for above, below in ((node.left, node.right), (node.right, node.left)):
+            if _is_pi(above) and isinstance(below, ast.Constant) and below.value == 180:
+                yield "DEG_PER_RAD" if above is node.right else "RAD_PER_DEG"
+
+
+def _is_pi(node: ast.expr) -> bool:
+    return isinstance(node, ast.Attribute) and node.attr == "pi"
 
 
 def _files(folder: Path, suffixes: set[str]) -> list[Path]:
@@ -255,6 +312,13 @@ def test_clone_keeps_the_table(rule: object) -> None:
 
 
 PLANTED = [
+    (constant_breaches, "host/src/host/twin/sensors/imu.py", "G = 9.81"),
+    (constant_breaches, "host/src/host/twin/sensors/imu.py", "MG = 9.80665e-3"),
+    (constant_breaches, "host/src/host/sysid/answer/verdict.py", "x = f'{1.0 * 57.29578:.1f}'"),
+    (constant_breaches, "host/src/host/sysid/answer/verdict.py", "half = -1.959964 * 0.1"),
+    (constant_breaches, "host/studies/coefficients.py", "half = 1.96 * 0.1"),
+    (constant_breaches, "host/src/host/aircraft/air.py", "turn = 180 / np.pi"),
+    (constant_breaches, "host/src/host/aircraft/air.py", "turn = math.pi / 180.0"),
     (include_breaches, "firmware/core/relay.h", '#include "hal/relay.h"'),
     (include_breaches, "firmware/core/relay.h", "#include <avr/io.h>"),
     (include_breaches, "firmware/core/relay.h", '#include "failsafe.h"'),
@@ -342,7 +406,18 @@ def test_planted_breach_is_found(tmp_path: Path, rule: object, name: str, text: 
     assert found[0].startswith(name)
 
 
+def test_a_name_that_two_rooms_have_is_found(tmp_path: Path) -> None:
+    for room in ("models", "coefficients"):
+        for name in ("__init__.py", "fit.py"):
+            (tmp_path / "host/src/host/sysid" / room).mkdir(parents=True, exist_ok=True)
+            (tmp_path / "host/src/host/sysid" / room / name).touch()
+    [found] = basename_breaches(tmp_path)
+    assert found.startswith("host/src/host/sysid/models/fit.py: host/src/host/sysid/coefficients/")
+
+
 ALLOWED = [
+    (CONSTANTS, "GRAVITY_MPS2 = 9.80665"),
+    ("host/src/host/physical/columns.py", 'NOTE = "level at rest -9.81"\nHALF = np.pi / 2.0'),
     ("firmware/core/relay.h", '#include <stdint.h>\n#include "core/time.h"  // no virtual, no new'),
     ("firmware/core/framing.h", '#include "generated/frames.h"\n/* float and\n double */'),
     ("firmware/storage/volume.cpp", '#include <string.h>\n#include "drivers/sd_card.h"'),

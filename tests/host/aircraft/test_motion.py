@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.aircraft import file as aircraft
-from host.aircraft.airframe import GRAVITY_MPS2, ROTOR, STATE_COUNT, Airframe, Array
+from host.aircraft.airframe import ROTOR, STATE_COUNT, Airframe, Array
 from host.aircraft.analytic_derivatives import hand_matrices
 from host.aircraft.attitude import euler, quaternion, to_body
 from host.aircraft.file import Aircraft
@@ -17,6 +17,7 @@ from host.aircraft.local_derivatives import local_derivatives
 from host.aircraft.propulsion import propeller
 from host.aircraft.rigid_body import aerodynamics, run
 from host.aircraft.trim import TrimError, solve
+from host.constants import GRAVITY_MPS2
 
 STILL = np.zeros(9)
 

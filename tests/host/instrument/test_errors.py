@@ -9,7 +9,7 @@ from host.aircraft.file import load
 from host.aircraft.mass_properties import airframe_data
 from host.errors import CalibrationError
 from host.instrument.deviations import deviations, sensor_error_model
-from host.instrument.errors import EVEN, instrument_errors, standard_errors
+from host.instrument.instrument_errors import EVEN, instrument_errors, standard_errors
 from host.physical.calibration import load_calibration
 from host.resources import resource
 from host.sysid.compatibility.path_preparation import prior

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from host.aircraft.airframe import GRAVITY_MPS2
+from host.constants import GRAVITY_MPS2
 from host.log import FlightLog, read_log
 from host.physical.channels import constant_delay_us
 from host.twin.flight.draws import delay_s

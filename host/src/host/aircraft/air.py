@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from host.aircraft.airframe import GRAVITY_MPS2, Array
+from host.aircraft.airframe import Array
 from host.compiled import compiled_fast
+from host.constants import GRAVITY_MPS2
 
 GAS_CONSTANT = 287.05287  # J/(kg K), ICAO Doc 7488
 LAPSE_KPM = 0.0065

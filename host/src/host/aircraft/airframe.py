@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-GRAVITY_MPS2 = 9.80665
 
 # Columns of Airframe.derivatives, in the order of COEFFICIENTS.
 COEFFICIENTS = (

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.aircraft.airframe import GRAVITY_MPS2, Array
+from host.aircraft.airframe import Array
 from host.aircraft.file import Aircraft
+from host.constants import GRAVITY_MPS2
 
 
 def hand_matrices(

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from host.aircraft.aircraft_ranges import RANGES
-from host.aircraft.airframe import COEFFICIENTS, GRAVITY_MPS2, Airframe, Array
+from host.aircraft.airframe import COEFFICIENTS, Airframe, Array
 from host.aircraft.linear_dynamics import Straight
 from host.aircraft.size_ratios import doubts, impossible
+from host.constants import GRAVITY_MPS2
 from host.errors import UsageError
 from host.files import toml_reader
 

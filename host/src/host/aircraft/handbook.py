@@ -21,8 +21,9 @@ from pathlib import Path
 
 import numpy as np
 
-from host.aircraft.airframe import COEFFICIENTS, GRAVITY_MPS2, Array
+from host.aircraft.airframe import COEFFICIENTS, Array
 from host.aircraft.file import FOLDER
+from host.constants import GRAVITY_MPS2
 from host.export.toml import dumps
 
 DIMENSIONS = Path(__file__).parent / "dimensions"

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from xml.etree import ElementTree
 
-from host.aircraft.airframe import GRAVITY_MPS2
 from host.aircraft.file import Aircraft
+from host.constants import GRAVITY_MPS2
 
 Element = ElementTree.Element
 

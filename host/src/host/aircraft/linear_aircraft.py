@@ -10,9 +10,10 @@ import numpy as np
 
 from host.aircraft import file as aircraft
 from host.aircraft.aircraft_ranges import RANGES
-from host.aircraft.airframe import GRAVITY_MPS2, Array
+from host.aircraft.airframe import Array
 from host.aircraft.file import Aircraft, AircraftError, read_document
 from host.aircraft.linear_dynamics import Straight
+from host.constants import GRAVITY_MPS2
 from host.files.quantities import Quantity
 
 # Of the gravity terms of a file, against g and its own angle of attack.

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.aircraft.airframe import GRAVITY_MPS2, Airframe, Array
+from host.aircraft.airframe import Airframe, Array
+from host.constants import GRAVITY_MPS2
 
 LONGITUDINAL, LATERAL = (0, 2, 4), (1, 3, 5)  # of u v w p q r
 

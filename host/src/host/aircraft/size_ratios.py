@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.aircraft.airframe import GRAVITY_MPS2, Array
+from host.aircraft.airframe import Array
+from host.constants import GRAVITY_MPS2
 
 SEA_LEVEL_KGPM3 = 1.225
 

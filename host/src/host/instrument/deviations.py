@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from host.aircraft.file import load_measured
 from host.aircraft.mass_properties import AirframeData, Place, place
-from host.instrument.errors import InstrumentErrors, instrument_errors, standard_errors
+from host.instrument.instrument_errors import InstrumentErrors, instrument_errors, standard_errors
 from host.physical.calibration import Calibration
 
 VANE_LATE_S = 8e-3  # about a vane's delay at trim: the filter model's error is a share of it

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from host.constants import NORMAL_95
 from host.wire.blocks import KIND_FRAMES, Blocks
 from host.wire.frames import FrameSet
 
@@ -18,7 +19,6 @@ _MIN_FIXES = 20
 _MIN_SPAN_S = 20.0
 _MAX_HALF_WIDTH = 500e-6  # wider than this a correction says less than the resonator's own 0.5 %
 _CONVERGED = 1e-9  # of the scale: a thousandth of a ppm
-_T_95 = 1.96
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +157,7 @@ def fit_gps(parts: list[tuple[NDArray[np.int64], NDArray[np.int64]]]) -> ClockFi
     lagged = 0.0
     if np.ptp(residual[1:]) > 0.0 and np.ptp(residual[:-1]) > 0.0:
         lagged = float(np.clip(np.corrcoef(residual[1:], residual[:-1])[0, 1], 0.0, 0.95))
-    half_width = _T_95 * sigma / np.sqrt(spread) * np.sqrt((1 + lagged) / (1 - lagged))
+    half_width = NORMAL_95 * sigma / np.sqrt(spread) * np.sqrt((1 + lagged) / (1 - lagged))
     span_s = float(max(t[-1] for t in t_s))
     good = half_width <= _MAX_HALF_WIDTH and span_s >= _MIN_SPAN_S and abs(slope) <= _SCALE_LIMIT
     return ClockFit(slope, float(half_width), count, span_s, sigma * 1e3, bool(good))

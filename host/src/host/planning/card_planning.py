@@ -21,6 +21,7 @@ from host.aircraft.linear_aircraft import load
 from host.aircraft.linearisation import linearise, modes
 from host.aircraft.mode_names import DUTCH_ROLL, SHORT_PERIOD
 from host.aircraft.trim import solve
+from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.sysid.estimators.start_values import start_values
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
@@ -202,7 +203,7 @@ def _bounds(
     covariance = covariance_of_free(information, np.ones(size, dtype=np.bool_))
     sigma = np.sqrt(np.diag(covariance))
     return [
-        Bound(name, float(best.theta[k]), float(1.96 * sigma[k]))
+        Bound(name, float(best.theta[k]), float(NORMAL_95 * sigma[k]))
         for k, name in enumerate(problem.names)
         if name in shown
     ]
@@ -225,7 +226,7 @@ def _point(record: FlightRecord, data: AirData, s: Segment, w: Window) -> Point:
         return float(np.abs(x[inside] - x[first]).max())
 
     phi, theta, _ = euler(record.states[:, 6:10])
-    load = -record.specific_force_mps2[inside, 2] / 9.80665
+    load = -record.specific_force_mps2[inside, 2] / GRAVITY_MPS2
     return Point(
         kind=s.kind,
         axes=s.axes,

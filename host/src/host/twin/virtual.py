@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from host.errors import UsageError
-from host.instrument.errors import InstrumentErrors
+from host.instrument.instrument_errors import InstrumentErrors
 from host.log import read_log
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome import compare, ideal, thesis, truth_files

@@ -6,6 +6,7 @@ from host.aircraft.air import Turbulence, gusts
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
+from host.constants import GRAVITY_MPS2
 from host.sysid.coefficients.aero_equations import Flown, equations
 from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.coefficients.slow_gusts import (
@@ -17,7 +18,6 @@ from host.sysid.coefficients.slow_gusts import (
 )
 from host.sysid.coefficients.window_spectra import Block, Window, window_block
 from host.sysid.compatibility.inverse_sensor_model import Record
-from host.sysid.models.templates import GRAVITY_MPS2
 from numpy.polynomial import legendre
 
 NAME = "ultrastick25e"

@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import airframe_data
+from host.constants import GRAVITY_MPS2
 from host.instrument.deviations import sensor_error_model
 from host.sysid.compatibility.flight_path import (
     AIR,
@@ -24,7 +25,6 @@ from host.sysid.compatibility.reconstruction import (
 from host.sysid.compatibility.strapdown import rotation, strapdown
 from host.sysid.flight.tables import even_columns
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.templates import GRAVITY_MPS2
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors.sensor_delays import FILTERS, sensor_delays
 from host.twin.virtual import virtual_flight

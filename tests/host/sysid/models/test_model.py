@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from host.constants import GRAVITY_MPS2
 from host.sysid import LinearModel, Maneuver, Parameter, Term
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.modal_analysis import longitudinal_names
@@ -13,13 +14,7 @@ from host.sysid.models.model_file import model_from, parse_entry, read_model
 from host.sysid.models.model_text import model_text
 from host.sysid.models.residual_delays import without_usual_delays
 from host.sysid.models.state_space_model import DelayGroup, without_outputs
-from host.sysid.models.templates import (
-    GRAVITY_MPS2,
-    TEMPLATES,
-    Trim,
-    longitudinal,
-    template,
-)
+from host.sysid.models.templates import TEMPLATES, Trim, longitudinal, template
 
 TRIM = Trim(airspeed_mps=17.0, alpha_rad=0.1, theta_rad=0.16)
 

@@ -16,6 +16,7 @@ import re
 import numpy as np
 
 from host.aircraft.prior.prior_table import Points, PriorError, PriorTable
+from host.constants import DEG_PER_RAD
 
 _NUMBER = r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)"
 _DERIVATIVE = re.compile(rf"\b(C[LDYXZlmn])([abpqruvw]|d\d+)\s*=\s*{_NUMBER}")
@@ -159,7 +160,7 @@ def _controls(entries: dict[str, dict[str, float]]) -> dict[str, float]:
         suffix, moment, sign = SURFACES.get(start, ("", "", 0.0))
         if moment not in values:
             continue
-        turn = np.sign(sign * values[moment]) * 180.0 / np.pi
+        turn = np.sign(sign * values[moment]) * DEG_PER_RAD
         for coefficient, value in values.items():
             found.setdefault(f"{coefficient}_{suffix}", float(turn * value))
     return found

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.aircraft.prior.prior_table import Points, PriorTable
+from host.constants import DEG_PER_RAD
 
 NAMES = {
     "CLA": "CL_alpha", "CMA": "Cm_alpha", "CYB": "CY_beta", "CNB": "Cn_beta", "CLB": "Cl_beta",
@@ -99,7 +100,7 @@ def _read(lines: list[str]) -> _Page | None:
             return None
         unit = _UNIT.search(line)
         if unit:
-            scale = 180.0 / np.pi if unit.group(1) == "DEGREE" else 1.0
+            scale = DEG_PER_RAD if unit.group(1) == "DEGREE" else 1.0
         if not configuration and (named := _CONFIGURATION.match(line)):
             configuration = named.group(1)
         if not unit_m2 and (lengths := _LENGTHS.search(line)):

@@ -14,9 +14,10 @@ import numpy as np
 from host.aircraft.gains import dimensional_name, from_dimensional
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
+from host.constants import NORMAL_95
 from host.instrument.words import IN_WORDS
 from host.sysid.models.consider_covariance import consider_covariance, dominant_error_source
-from host.sysid.models.fit_result import NORMAL_95, FitResult
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.templates import Trim
 
 

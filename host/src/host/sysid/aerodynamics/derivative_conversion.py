@@ -24,9 +24,9 @@ from host.aircraft.gains import (
 )
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
+from host.constants import GRAVITY_MPS2
 from host.instrument.deviations import SensorErrorModel, deviations
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.templates import GRAVITY_MPS2
 
 CARRIED = (
     "mass_share", "ixx_share", "iyy_share", "izz_share", "cg_x_m", "cg_z_m",

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.models.templates import GRAVITY_MPS2
+from host.constants import GRAVITY_MPS2
 
 AXES = ("x", "y", "z")
 

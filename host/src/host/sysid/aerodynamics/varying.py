@@ -19,11 +19,12 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
+from host.constants import GRAVITY_MPS2
 from host.sysid.aerodynamics.turning_air import AXES, gust_motion, turning
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
-from host.sysid.models.templates import GRAVITY_MPS2, Trim, template
+from host.sysid.models.templates import Trim, template
 
 RATES = ("p_radps", "q_radps", "r_radps")
 MEASURED = (

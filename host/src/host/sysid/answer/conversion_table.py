@@ -14,6 +14,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import Condition, airframe_data
 from host.aircraft.prior.prior_file import read_prior
+from host.constants import NORMAL_95
 from host.files.quantities import Quantity
 from host.files.user_text import shown
 from host.instrument.deviations import sensor_error_model
@@ -30,7 +31,6 @@ from host.sysid.aerodynamics.derivative_conversion import (
 )
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.models.model_file import read_model, read_trim
 from host.sysid.models.templates import Trim, template
 from host.sysid.models.toml_document import read_document

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array
+from host.constants import DEG_PER_RAD
 from host.extras import install_hint
 from host.sysid.answer.atomic_files import whole
 from host.sysid.identification_error import IdentificationError
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 
 MEASURED, MODEL, RESIDUAL, REFUSED, TRUTH = "0.7", "C3", "C0", "C3", "black"
 SHOWN_UNITS = {
-    "_radps": ("deg/s", 57.29578),
-    "_rad": ("deg", 57.29578),
+    "_radps": ("deg/s", DEG_PER_RAD),
+    "_rad": ("deg", DEG_PER_RAD),
     "_mps2": ("m/s2", 1.0),
     "_mps": ("m/s", 1.0),
 }

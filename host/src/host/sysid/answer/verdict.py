@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from host.constants import DEG_PER_RAD
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.coefficients.coefficient_model import standard_model
@@ -51,7 +52,7 @@ def maneuver_lines(graded: Sequence[tuple[Found, Grade]]) -> list[str]:
     lines = [f"{len(graded)} maneuvers found"]
     for number, (item, mark) in enumerate(graded, start=1):
         unit = "" if item.axis == "throttle" else " deg"
-        size = item.amplitude if item.axis == "throttle" else item.amplitude * 57.29578
+        size = item.amplitude if item.axis == "throttle" else item.amplitude * DEG_PER_RAD
         lines.append(
             f"  {number:2d}  {item.start_s:8.2f} to {item.end_s:8.2f} s"
             f"  {item.axis.split('_')[0]:8s} {item.kind:10s} {size:5.1f}{unit}"
@@ -304,7 +305,7 @@ def model_lines(answer: Answer) -> list[str]:
     half = result.half_width()
     lines = [
         f"{answer.template} at {answer.condition.airspeed_mps:.2f} m/s,"
-        f" alpha {answer.trim.alpha_rad * 57.29578:.1f} deg; value and 95 % half-width"
+        f" alpha {answer.trim.alpha_rad * DEG_PER_RAD:.1f} deg; value and 95 % half-width"
     ]
     marks = {r.name: r.grade for r in answer.refused if not r.name.startswith("imu_")}
     for k, name in enumerate(answer.model.parameter_names):
@@ -401,7 +402,7 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
     flight = answer.fit.flight
     lines = [
         f"coefficients at {flight.airspeed_mps:.2f} m/s, alpha"
-        f" {flight.alpha_rad * 57.29578:.1f} deg, CL {flight.lift:.3f}; value, 95 % half-width,"
+        f" {flight.alpha_rad * DEG_PER_RAD:.1f} deg, CL {flight.lift:.3f}; value, 95 % half-width,"
         " what widens it most"
     ]
     for d in answer.fit.derivatives:

@@ -14,9 +14,9 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array, IntArray
+from host.constants import GRAVITY_MPS2
 from host.sysid.coefficients.coefficient_model import CoefficientModel
 from host.sysid.compatibility.inverse_sensor_model import Record
-from host.sysid.models.templates import GRAVITY_MPS2
 
 # Roll under the elevator: lift beside a CG off the plane of symmetry, its only clear trace.
 LONGITUDINAL = ("Cm", "Cl", "w", "u")  # behind the model's two forces

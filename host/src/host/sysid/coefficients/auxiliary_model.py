@@ -14,11 +14,11 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
+from host.constants import GRAVITY_MPS2
 from host.instrument.deviations import SensorErrorModel
 from host.sysid.coefficients.aero_equations import Flown
 from host.sysid.compatibility.inverse_sensor_model import ATTITUDE_CROSSOVER_RADPS, Record
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.templates import GRAVITY_MPS2
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.recursion import simulate
 

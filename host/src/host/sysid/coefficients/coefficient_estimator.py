@@ -10,6 +10,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import NoPropulsionError, Powerplant, powerplant
 from host.arrays import Array
+from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.coefficients.coefficient_fit import METHOD, CoefficientFit
@@ -31,7 +32,6 @@ from host.sysid.flight.finder import FLYING_SHARE, Found, find
 from host.sysid.flight.reconstructed import ReconstructedFlight, found_name, reconstructed
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.consider_covariance import dominant_error_source
-from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.models.modal_analysis import Mode
 
 NAME = "coefficients"

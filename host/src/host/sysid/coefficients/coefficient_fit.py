@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, IntArray
+from host.constants import NORMAL_95
 from host.sysid.coefficients.deletion_diagnostics import Prediction
-from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement
 
 METHOD = "equation error with instrument errors"

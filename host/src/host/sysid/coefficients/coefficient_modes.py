@@ -13,11 +13,10 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
+from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.sysid.aerodynamics.derivative_conversion import Quantities
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
-from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.models.modal_analysis import Mode, eigenmodes, lateral_names, longitudinal_names
-from host.sysid.models.templates import GRAVITY_MPS2
 
 SIGNALS = {
     "longitudinal": (("airspeed_mps", "alpha_rad", "q_radps", "theta_rad"), ("elevator_rad",)),

@@ -14,6 +14,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array, IntArray
+from host.constants import GRAVITY_MPS2
 from host.instrument.deviations import SensorErrorModel
 from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, Flown, equations
 from host.sysid.coefficients.coefficient_model import CoefficientModel
@@ -25,7 +26,6 @@ from host.sysid.compatibility.inverse_sensor_model import (
     apply_sensor_errors,
     attitude,
 )
-from host.sysid.models.templates import GRAVITY_MPS2
 
 STEP = 0.3  # of a standard deviation: width of the numeric slopes
 OF_THE_BODY = ("mass_share", "ixx_share", "iyy_share", "izz_share", "thrust_share")  # no sensor's

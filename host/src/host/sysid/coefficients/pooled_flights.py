@@ -14,10 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array
+from host.constants import NORMAL_95
 from host.sysid.coefficients.coefficient_fit import CoefficientFit, Derivative, Flight, Pull, Trace
 from host.sysid.coefficients.deletion_diagnostics import Prediction
 from host.sysid.models.consider_covariance import consider_covariance
-from host.sysid.models.fit_result import NORMAL_95
 from host.sysid.numerics.maneuver_agreement import agreement_of
 
 LEAST = 1e-12  # of the largest: an eigenvalue below it is rounding

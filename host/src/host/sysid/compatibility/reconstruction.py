@@ -16,6 +16,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
+from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel
 from host.sysid.compatibility.calibration_consistency import (
     ConsistencyTest,
@@ -34,7 +35,6 @@ VANE_MODEL_SD = 0.006  # of scale: dry friction known to 20 % of its 3 %
 # were up to 2.5 times what the equations say, more for biases of the gyro.
 NO_GPS_INFLATION = 2.5
 UNOBSERVABLE_WITHOUT_GPS = INERTIAL[0:3]
-NORMAL = 1.959964  # 97.5 % of the normal distribution
 REASONS = {
     "pitot_scale": "wind and scale look alike on one heading, gusts hide it: fly full turns",
     "pitot_zero_pa": "fly slow and fast parts, or zero the pitot at rest",
@@ -150,8 +150,8 @@ def reconstruct(
             Finding(
                 name=name,
                 value=mean if k is None else float(fit.theta[k]),
-                half_width=NORMAL * deviation,
-                prior_half_width=NORMAL * sd,
+                half_width=NORMAL_95 * deviation,
+                prior_half_width=NORMAL_95 * sd,
                 data_informed=informed,
                 reason="" if informed else _reason(name, gps=gps),
             )

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
+from host.constants import NORMAL_95
 from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, INERTIAL, PITOT
 from host.sysid.compatibility.path_preparation import density_share
-from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
+from host.sysid.compatibility.reconstruction import Compatibility
 
 RATES = tuple(f"{a}_radps" for a in "pqr")
 FORCES = tuple(f"a{a}_mps2" for a in "xyz")
@@ -49,7 +50,7 @@ def corrections(found: Compatibility) -> tuple[Correction, ...]:
 def residual_deviations(found: Compatibility) -> dict[str, float]:
     """Return what stays open of every error: told ones as found, others as calibrated."""
     return {
-        f.name: (f.half_width if f.data_informed else f.prior_half_width) / NORMAL
+        f.name: (f.half_width if f.data_informed else f.prior_half_width) / NORMAL_95
         for f in found.findings
         if f.name in CORRECTABLE
     }
@@ -57,7 +58,7 @@ def residual_deviations(found: Compatibility) -> dict[str, float]:
 
 def pressure_share(found: Compatibility) -> float:
     """Return the part of an error of V squared that is the pitot's, not the density's."""
-    total = found["pitot_scale"].prior_half_width / NORMAL
+    total = found["pitot_scale"].prior_half_width / NORMAL_95
     density = density_share(found.instrument)
     return max(1.0 - (density / max(total, density)) ** 2, LEAST_PRESSURE_SHARE)
 

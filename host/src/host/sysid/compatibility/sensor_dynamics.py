@@ -14,6 +14,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
+from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, vane_delay_s
 from host.instrument.deviations import deviations as drawn
 from host.sysid.compatibility.flight_path import AIR, DELAYS
@@ -23,7 +24,7 @@ from host.sysid.compatibility.path_preparation import (
     compensate_lowpass,
 )
 from host.sysid.compatibility.position_correction import transfer_to_cg
-from host.sysid.compatibility.reconstruction import NORMAL, Compatibility
+from host.sysid.compatibility.reconstruction import Compatibility
 
 VANE_DELAY, PITOT_DELAY = DELAYS
 IMU_DELAY = "imu_delay_s"
@@ -86,7 +87,7 @@ def vane_delay_of(
     """Return the vanes' delay and its deviation, s: as told, else of the spring by the file."""
     told = next((f for f in found.findings if f.name == VANE_DELAY and f.data_informed), None)
     if told is not None:
-        return told.value, told.half_width / NORMAL
+        return told.value, told.half_width / NORMAL_95
     omega = 2.0 * np.pi * i.vane_hz_per_mps * float(np.median(columns[AIR[0]]))
     nominal = 2.0 * i.vane_damping / omega
     return nominal, vane_delay_s(i, nominal)

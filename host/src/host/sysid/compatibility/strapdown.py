@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.models.templates import GRAVITY_MPS2
+from host.constants import GRAVITY_MPS2
 
 
 def strapdown(

@@ -16,11 +16,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array
+from host.constants import NORMAL_95
 from host.sysid.models.state_space_model import LinearModel
 
 WINDOW_S = 1.0  # longest memory looked for: more than a short period, most of a dutch roll
 REPORTED_FACTOR = 1.25  # times wider
-QUANTILE = (1.96, 2.9694, 0.416, -0.5324)  # 97.5 %, lags weighted by a triangle
+QUANTILE = (NORMAL_95, 2.9694, 0.416, -0.5324)  # 97.5 %, lags weighted by a triangle
 
 
 def hac_inflation(

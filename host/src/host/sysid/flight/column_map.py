@@ -16,19 +16,18 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from host.arrays import Array
+from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.files.quantities import Quantity
 from host.files.user_text import read_toml
 from host.sysid.identification_error import IdentificationError
 
-DEG, FOOT, POUND_PA = np.pi / 180.0, 0.3048, 6894.757
+DEG, FOOT, POUND_PA = RAD_PER_DEG, 0.3048, 6894.757
 # What a column of ours may come in, by the end of its name.
 UNITS: dict[str, dict[str, float]] = {
     "rad": {"rad": 1.0, "deg": DEG, "mrad": 1e-3},
     "radps": {"rad/s": 1.0, "deg/s": DEG},
-    "mps2": {"m/s2": 1.0, "g": 9.80665, "ft/s2": FOOT, "mg": 9.80665e-3},
+    "mps2": {"m/s2": 1.0, "g": GRAVITY_MPS2, "ft/s2": FOOT, "mg": 1e-3 * GRAVITY_MPS2},
     "mps": {
         "m/s": 1.0, "kt": 1852.0 / 3600.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "ft/s": FOOT,
         "ft/min": FOOT / 60.0, "cm/s": 0.01,

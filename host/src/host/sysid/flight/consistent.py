@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
+from host.constants import GRAVITY_MPS2
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.templates import GRAVITY_MPS2
 
 SURE, SOME = 0.5, 0.25  # partial correlation: less tells nothing about a sign, about a factor
 FACTOR = 1.5

@@ -11,9 +11,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from host.arrays import Array
+from host.constants import GRAVITY_MPS2
 from host.sysid.flight.consistent import BLOCK_S, FEWEST, HINT, SURE, block_means, consistent
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.templates import GRAVITY_MPS2
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")
 DOUBTFUL_RAD = 1.0  # of such an angle in flight, and of a surface at any moment

@@ -12,7 +12,8 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
-from host.sysid.models.fit_result import NORMAL_95, FitResult
+from host.constants import NORMAL_95
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 

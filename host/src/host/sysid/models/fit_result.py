@@ -11,8 +11,6 @@ from host.arrays import Array
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import LinearModel
 
-NORMAL_95 = 1.96  # standard deviations to either side of a normal distribution that hold 95 %
-
 
 @dataclass(frozen=True)
 class FitResult:

@@ -9,7 +9,8 @@ import numpy as np
 
 from host.aircraft.mode_names import DUTCH_ROLL, LONGITUDINAL, ROLL, ROLL_SPIRAL, SPIRAL
 from host.arrays import Array
-from host.sysid.models.fit_result import NORMAL_95, FitResult
+from host.constants import NORMAL_95
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.state_space_model import LinearModel
 
 PAIR, ROOT = "oscillatory mode", "real mode"  # without a name of their own

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from host.constants import GRAVITY_MPS2
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.residual_delays import delays_of
 from host.sysid.models.state_space_model import (
@@ -27,8 +28,6 @@ from host.sysid.models.state_space_model import (
     Parameter,
     Term,
 )
-
-GRAVITY_MPS2 = 9.80665
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from host.aircraft.airframe import Airframe, Array
 from host.aircraft.file import Aircraft
-from host.instrument.errors import (
+from host.instrument.instrument_errors import (
     InstrumentErrors,
     NamedError,
     instrument_errors,

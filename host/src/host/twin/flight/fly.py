@@ -30,7 +30,7 @@ from host.aircraft.linear_aircraft import load
 from host.aircraft.rigid_body import rotate_to_body, rotate_to_ned, step
 from host.aircraft.trim import Trim, solve
 from host.compiled import compiled_fast
-from host.instrument.errors import InstrumentErrors
+from host.instrument.instrument_errors import InstrumentErrors
 from host.twin.flight.draws import GROUPS, Draws, draw, flown
 from host.twin.flight.pilot import Schedule, gains, schedule
 from host.twin.testcard.cards import Card

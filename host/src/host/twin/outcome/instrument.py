@@ -9,7 +9,7 @@ import tomllib
 
 from host.aircraft.file import Aircraft
 from host.export.toml import dumps
-from host.instrument.errors import (
+from host.instrument.instrument_errors import (
     IMU_LINES,
     LINES,
     InstrumentErrors,

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from host.aircraft.airframe import Array
+from host.constants import DEG_PER_RAD
 from host.twin.faults import Fault
 
 COLOURS = {"elevator": "#1f77b4", "aileron": "#ff7f0e", "rudder": "#2ca02c", "throttle": "#9467bd"}
@@ -17,19 +18,23 @@ SETTLED_S = 6.5  # what comes before is the ground and the launch
 # Rows: label, (column, legend, factor) ...
 ROWS: tuple[tuple[str, tuple[tuple[str, str, float], ...]], ...] = (
     ("airspeed\nm/s", (("airspeed_mps", "V", 1.0),)),
-    ("flow\ndeg", (("alpha_rad", "alpha", 57.29578), ("beta_rad", "beta", 57.29578))),
+    ("flow\ndeg", (("alpha_rad", "alpha", DEG_PER_RAD), ("beta_rad", "beta", DEG_PER_RAD))),
     (
         "rates\ndeg/s",
-        (("p_radps", "p", 57.29578), ("q_radps", "q", 57.29578), ("r_radps", "r", 57.29578)),
+        (
+            ("p_radps", "p", DEG_PER_RAD),
+            ("q_radps", "q", DEG_PER_RAD),
+            ("r_radps", "r", DEG_PER_RAD),
+        ),
     ),
     ("specific\nforce m/s2", (("ay_mps2", "ay", 1.0), ("az_mps2", "az", 1.0))),
-    ("attitude\ndeg", (("phi_rad", "phi", 57.29578), ("theta_rad", "theta", 57.29578))),
+    ("attitude\ndeg", (("phi_rad", "phi", DEG_PER_RAD), ("theta_rad", "theta", DEG_PER_RAD))),
     (
         "surfaces\ndeg",
         (
-            ("elevator_rad", "elevator", 57.29578),
-            ("aileron_rad", "aileron", 57.29578),
-            ("rudder_rad", "rudder", 57.29578),
+            ("elevator_rad", "elevator", DEG_PER_RAD),
+            ("aileron_rad", "aileron", DEG_PER_RAD),
+            ("rudder_rad", "rudder", DEG_PER_RAD),
         ),
     ),
     ("throttle", (("throttle", "throttle", 1.0),)),

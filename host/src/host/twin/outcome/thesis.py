@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from host.aircraft.airframe import GRAVITY_MPS2, Array
+from host.aircraft.airframe import Array
+from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors.analog import analog, convert
 from host.twin.sensors.imu import imu
@@ -178,7 +179,7 @@ def table(printed: pd.DataFrame) -> pd.DataFrame:
         undone only within the linear range around their start value; jumps of the overflow stay
         visible.
     """
-    radians = np.pi / 180.0
+    radians = RAD_PER_DEG
     # 90/27 printed for 27/90: one printed unit is 0.3 * 27/90 count; the encoder turns 360/1024
     # deg.
     per_unit = 27.0 / 90.0 * 360.0 / 1024.0 * radians

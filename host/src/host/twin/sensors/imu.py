@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.aircraft.airframe import DOWN, GRAVITY_MPS2, NORTH, Q0, Q3, Array, P, Q, R
+from host.aircraft.airframe import DOWN, NORTH, Q0, Q3, Array, P, Q, R
 from host.aircraft.attitude import euler, to_body
 from host.compiled import compiled_fast
+from host.constants import GRAVITY_MPS2
 from host.twin.flight.fly import STEP_S, FlightRecord
 from host.twin.sensors.filters import delayed, first_order
 from host.twin.sensors.local_flow import AirData
@@ -127,7 +128,7 @@ def complementary(
         gy = -(force[i, 1] - now[2] * speed[i])
         gz = -(force[i, 2] + now[1] * speed[i])
         size = math.sqrt(gx * gx + gy * gy + gz * gz)
-        weight = max(0.0, 1.0 - abs(size / 9.80665 - 1.0) * 2.0)
+        weight = max(0.0, 1.0 - abs(size / GRAVITY_MPS2 - 1.0) * 2.0)
         size = max(size, 1e-6)
         gx, gy, gz = gx / size, gy / size, gz / size
         # Error: measured x expected direction of gravity (third row of c), body axes.

@@ -1,0 +1,12 @@
+"""Numbers that physics, geometry and statistics give, each typed once in the package."""
+
+from __future__ import annotations
+
+import math
+
+# Standard acceleration of free fall: 3rd General Conference on Weights and Measures, 1901.
+GRAVITY_MPS2 = 9.80665
+DEG_PER_RAD = 180.0 / math.pi
+RAD_PER_DEG = math.pi / 180.0
+# Standard deviations to either side of a normal distribution's mean that hold 95 % of it.
+NORMAL_95 = 1.96
