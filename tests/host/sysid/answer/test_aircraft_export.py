@@ -23,7 +23,7 @@ from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTa
 from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
-from host.sysid.coefficients.coefficient_fit import Flight, Pull
+from host.sysid.coefficients.coefficient_fit import MeanCondition, ThrustEffect
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns, read_columns
 from host.twin.testcard.cards import load
@@ -136,7 +136,9 @@ def test_bends_have_their_place_in_the_tables() -> None:
         "CL_alpha": 4.0, "CD_alpha": 0.24, "CD_0": 0.03, "CL_de": 0.5, "CD_de": 0.05,
         "Cm_alpha": -1.6, "Cm_alpha2": -4.0, "Cm_q": -11.0, "Cm_alpha_q": -40.0, "Cm_V": 0.3,
     }  # fmt: skip
-    flight = Flight(17.0, 170.0, trim, lift, 0.04, Pull(2.0, -0.1, 0.0), (0.02, 0.14), (1.0, 1.0))
+    flight = MeanCondition(
+        17.0, 170.0, trim, lift, 0.04, ThrustEffect(2.0, -0.1, 0.0), (0.02, 0.14), (1.0, 1.0)
+    )
     table = CoefficientTable("longitudinal", "by hand", trim, tuple(starmap(known, values.items())))
     document, replaced = aircraft_document([table], "ultrastick25e", flight)
     assert set(replaced) == set(values) - {"Cm_V"}

@@ -7,7 +7,7 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
-from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, Flown, equations
+from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, FlightHistory, equations
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.coefficients.coefficient_search import fit_coefficients
@@ -36,21 +36,21 @@ def seen_with(phi_rad: Array, theta_rad: Array) -> dict[str, Equation]:
     thrust, spin, drive = (random.standard_normal(SAMPLES) for _ in range(3))
     return equations(
         standard_model(), Record(0.01, dict(signals)), signals, dict.fromkeys(ERRORS, 0.01),
-        Flown(
+        FlightHistory(
             thrust, spin, drive, phi_rad, theta_rad, signals["V"] - 1.0, signals["V"], (0.0, 0.0)
         ),
         airframe_data(NAME), powerplant(NAME), 0.05,
-    ).rows  # fmt: skip
+    ).by_name  # fmt: skip
 
 
 def test_force_and_moment_equations_hold_no_attitude() -> None:
     t = np.linspace(0.0, 1.0, SAMPLES)
     level, tumbling = seen_with(0.0 * t, 0.0 * t), seen_with(2.0 * t, -1.0 * t)
     for name, equation in level.items():
-        same = np.array_equal(equation.left, tumbling[name].left)
+        same = np.array_equal(equation.response, tumbling[name].response)
         assert same is (name not in KINEMATIC), name
-        for term, values in equation.terms.items():
-            np.testing.assert_array_equal(values, tumbling[name].terms[term])
+        for term, values in equation.regressors.items():
+            np.testing.assert_array_equal(values, tumbling[name].regressors[term])
 
 
 def test_an_attitude_wrong_by_degrees_moves_no_coefficient() -> None:

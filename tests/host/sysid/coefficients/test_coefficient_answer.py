@@ -14,7 +14,7 @@ from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.coefficients.coefficient_estimator import (
     CoefficientAnswer,
     identify_coefficients,
-    joined,
+    merged_windows,
 )
 from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
 from host.sysid.flight.finder import Found
@@ -89,7 +89,7 @@ def test_another_inertia_than_the_fit_used_moves_the_modes(answer: CoefficientAn
 def test_modes_need_no_zero_of_the_pitot(answer: CoefficientAnswer) -> None:
     fit, drift_pa = answer.fit, 6.0
     (was, sd), frame = fit.errors["pitot_drift_pa"], airframe_data(NAME)
-    more = (fit.flight.qbar_pa - was) / (fit.flight.qbar_pa - was - drift_pa)
+    more = (fit.condition.qbar_pa - was) / (fit.condition.qbar_pa - was - drift_pa)
     assert more > 1.02
     rates = tuple(f"_{k}" for k in "pqr")
     scaled = tuple(
@@ -105,8 +105,8 @@ def test_modes_need_no_zero_of_the_pitot(answer: CoefficientAnswer) -> None:
 
 def test_modes_are_at_the_airspeed_of_their_own_maneuvers(answer: CoefficientAnswer) -> None:
     fit, frame = answer.fit, airframe_data(NAME)
-    along, across = fit.flight.faster
-    quick = replace(fit, flight=replace(fit.flight, faster=(1.02 * along, across)))
+    along, across = fit.condition.airspeed_ratio
+    quick = replace(fit, condition=replace(fit.condition, airspeed_ratio=(1.02 * along, across)))
     before, after = (
         {m.name: m.frequency_radps for m in coefficient_modes(f, frame)} for f in (fit, quick)
     )
@@ -134,12 +134,12 @@ def test_the_linear_motion_is_that_of_the_true_aircraft(
 
 
 def test_public_conversion_gives_the_same_motion(answer: CoefficientAnswer) -> None:
-    flight, frame = answer.fit.flight, airframe_data(NAME)
+    flight, frame = answer.fit.condition, airframe_data(NAME)
     for name, row, entry in (
         ("M_alpha", "longitudinal", (2, 1)), ("M_q", "longitudinal", (2, 2)),
         ("L_p", "lateral", (1, 1)), ("N_beta", "lateral", (2, 0)),
     ):  # fmt: skip
-        system, faster = answer.systems[row], flight.faster[row == "lateral"]
+        system, faster = answer.systems[row], flight.airspeed_ratio[row == "lateral"]
         at = Condition(flight.airspeed_mps * faster, flight.qbar_pa * faster**2)
         found = to_derivatives(quantities(answer.fit), Place(frame, at, flight.alpha_rad), {})
         assert found.value(name) == pytest.approx(system.A[entry], rel=1e-4)
@@ -203,7 +203,7 @@ def test_aileron_and_rudder_flown_together_are_one_window() -> None:
     def item(axis: str, first: float, last: float) -> Found:
         return Found(axis, "multisine", first, last - 3.0, last, 0.1, 9)
 
-    windows = joined(
+    windows = merged_windows(
         [
             item("aileron_rad", 10.0, 33.0),
             item("rudder_rad", 10.4, 32.0),

@@ -22,7 +22,7 @@ from host.sysid.coefficients.coefficient_model import (
     standard_model,
 )
 from host.sysid.coefficients.coefficient_search import fit_coefficients
-from host.sysid.coefficients.trim_derivatives import Mean, local_derivatives
+from host.sysid.coefficients.trim_derivatives import TrimMeans, derivatives_at_trim
 from host.sysid.coefficients.window_spectra import Window
 from host.sysid.flight.tables import even_columns
 from host.sysid.identification_error import IdentificationError
@@ -109,15 +109,15 @@ def test_recovers_the_bend_of_a_moment_and_of_the_polar(
     # Nothing in this aircraft goes with airspeed beyond dynamic pressure.
     assert abs(found["Cm_V"].value) <= 1.5 * found["Cm_V"].half_width
     # Slopes stay those at the trim; drag's hold what lift brings.
-    steep = -1.65 + 2.0 * BEND * (fit.flight.alpha_rad - 0.07)
+    steep = -1.65 + 2.0 * BEND * (fit.condition.alpha_rad - 0.07)
     assert found["Cm_alpha"].value == pytest.approx(steep, rel=0.05)
     assert found["CD_alpha"].value == pytest.approx(
-        2.0 * found["CD_CL2"].value * fit.flight.lift * found["CL_alpha"].value, rel=1e-9
+        2.0 * found["CD_CL2"].value * fit.condition.lift * found["CL_alpha"].value, rel=1e-9
     )
     # Taken for straight, the moment fits visibly worse; zero lift is where it was.
     straight = fitted(bent, None)
     assert found["CD_0"].value == pytest.approx(by_name(straight)["CD_0"].value, abs=0.003)
-    assert fit.traces["Cm"].nrmse < 0.97 * straight.traces["Cm"].nrmse
+    assert fit.histories["Cm"].nrmse < 0.97 * straight.histories["Cm"].nrmse
 
 
 def test_body_axes_say_the_same_as_lift_and_drag_turned(
@@ -160,13 +160,13 @@ def test_turning_is_the_slope_of_turned_forces(tmp_path: Path) -> None:
 
     expected = (turned(trim + 1e-6) - turned(trim - 1e-6)) / 2e-6
     still = np.zeros(len(position))
-    found = local_derivatives(model, state, position, Mean(trim, lift, drag, still, still))
+    found = derivatives_at_trim(model, state, position, TrimMeans(trim, lift, drag, still, still))
     assert [found["CL_alpha"][0], found["CD_alpha"][0]] == pytest.approx(expected, rel=1e-7)
 
 
 def test_the_standard_equations_are_a_file(tmp_path: Path) -> None:
-    assert read_coefficient_model(written(tmp_path, ROWS)).rows == standard_model().rows
-    assert standard_model().beside == {"CD_alpha2", "CD_alpha_de", "CD_de2"}
+    assert read_coefficient_model(written(tmp_path, ROWS)).equations == standard_model().equations
+    assert standard_model().nuisance == {"CD_alpha2", "CD_alpha_de", "CD_de2"}
 
 
 def test_a_term_is_known_by_its_factors() -> None:

@@ -19,7 +19,7 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.atomic_files import whole
-from host.sysid.coefficients.coefficient_fit import Flight
+from host.sysid.coefficients.coefficient_fit import MeanCondition
 from host.sysid.identification_error import IdentificationError
 
 # Names of the aircraft file for the names of the answer.
@@ -35,7 +35,7 @@ ROTOR_RADPS = 500.0  # where JSBSim's rotor starts; it finds its own speed withi
 
 
 def aircraft_document(
-    tables: Sequence[CoefficientTable], source: str, flight: Flight | None = None
+    tables: Sequence[CoefficientTable], source: str, condition: MeanCondition | None = None
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the aircraft file with identified coefficients, and the names that were replaced.
 
@@ -48,7 +48,7 @@ def aircraft_document(
     tables : sequence of CoefficientTable
     source : str
         The aircraft they were made with: a name or a file.
-    flight : Flight, optional
+    condition : MeanCondition, optional
         Of a direct fit of coefficients: gives the drag polar and the range of angles of attack.
 
     Raises
@@ -66,8 +66,8 @@ def aircraft_document(
     for found in tables:
         known = {c.name: c for c in found.coefficients if c.half_width < abs(c.value)}
         bent = [n for n in known if n.split("_")[1:2] in (["alpha"], ["alpha2"])]
-        if flight is not None and any(not n.endswith("_alpha") for n in bent):
-            _add_nodes(table, flight.alpha_range_rad)
+        if condition is not None and any(not n.endswith("_alpha") for n in bent):
+            _add_nodes(table, condition.alpha_range_rad)
         nodes = np.asarray(table["alpha_rad"], dtype=np.float64)
         for c in known.values():
             axis, _, label = c.name.partition("_")
@@ -88,10 +88,10 @@ def aircraft_document(
             table[key] = (c.value + steeper * (nodes - from_rad)).tolist()
             origins[key] = _origin(found.method, c) + ("" if bend is None else f"; {_said(bend)}")
             replaced += [c.name] if bend is None else [c.name, bend.name]
-        if flight is not None:
-            replaced += _put_drag(table, origins, known, flight, found.method)
+        if condition is not None:
+            replaced += _put_drag(table, origins, known, condition, found.method)
         left = [c for n, c in known.items() if n not in replaced and n[:2] not in ("CX", "CZ")]
-        if flight is not None and left:
+        if condition is not None and left:
             before = [origins["not_carried"]] if "not_carried" in origins else []
             origins["not_carried"] = "; ".join([*before, *map(_said, left)])
     if not replaced:
@@ -125,24 +125,24 @@ def _put_drag(
     table: dict[str, Any],
     origins: dict[str, str],
     known: Mapping[str, Coefficient],
-    flight: Flight,
+    condition: MeanCondition,
     method: str,
 ) -> list[str]:
     """Put the parabola in lift that has the slope and the drag at zero lift that were identified.
 
     The file counts the elevator's drag at the same lift, an answer at the same angle of attack.
     """
-    if not {"CD_0", "CD_alpha", "CL_alpha"} <= known.keys() or flight.lift <= 0.0:
+    if not {"CD_0", "CD_alpha", "CL_alpha"} <= known.keys() or condition.lift <= 0.0:
         return []
-    induced = known["CD_alpha"].value / (2.0 * flight.lift * known["CL_alpha"].value)
+    induced = known["CD_alpha"].value / (2.0 * condition.lift * known["CL_alpha"].value)
     table["cd_0"], table["induced_factor"] = known["CD_0"].value, induced
     origins["cd_0"] = _origin(method, known["CD_0"])
     origins["induced_factor"] = (
-        f"{_origin(method, known['CD_alpha'])}, over 2 CL CL_alpha at CL {flight.lift:.3f}"
+        f"{_origin(method, known['CD_alpha'])}, over 2 CL CL_alpha at CL {condition.lift:.3f}"
     )
     used = [n for n in ("CD_0", "CD_alpha", "CD_CL2") if n in known]
     if {"CD_de", "CL_de"} <= known.keys():
-        own = known["CD_de"].value - 2.0 * induced * flight.lift * known["CL_de"].value
+        own = known["CD_de"].value - 2.0 * induced * condition.lift * known["CL_de"].value
         table["cd_elevator"] = [own] * len(table["alpha_rad"])
         origins["cd_elevator"] = f"{_origin(method, known['CD_de'])}, less what lift makes of it"
         used.append("CD_de")
@@ -150,14 +150,17 @@ def _put_drag(
 
 
 def save_aircraft(
-    path: Path, tables: Sequence[CoefficientTable], source: str, flight: Flight | None = None
+    path: Path,
+    tables: Sequence[CoefficientTable],
+    source: str,
+    condition: MeanCondition | None = None,
 ) -> list[str]:
     """Write ``.toml`` for `host simulate` or ``.xml`` for JSBSim; return what was replaced."""
     from host.aircraft import file as aircraft
     from host.aircraft.jsbsim_model import aircraft_xml
     from host.export import toml as tomlout
 
-    document, replaced = aircraft_document(tables, source, flight)
+    document, replaced = aircraft_document(tables, source, condition)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "identified.toml"
         file.write_text(tomlout.dumps(document), encoding="utf-8")

@@ -143,7 +143,7 @@ def draw_coefficients(
     """
     signals = {
         name: [Trace(np.arange(len(trace.model)) / FIT_RATE_HZ, trace.measured, trace.model)]
-        for name, trace in answer.fit.traces.items()
+        for name, trace in answer.fit.histories.items()
     }
     true: dict[str, float] = {}
     for table in answer.tables if truth is not None else ():

@@ -20,7 +20,7 @@ from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-    from host.sysid.coefficients.deletion_diagnostics import Prediction
+    from host.sysid.coefficients.deletion_diagnostics import CrossValidation
     from host.sysid.numerics.maneuver_agreement import ManeuverAgreement
 
 
@@ -148,7 +148,7 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _prediction_document(found: Prediction | None) -> dict[str, Any] | None:
+def _prediction_document(found: CrossValidation | None) -> dict[str, Any] | None:
     """Return how well each maneuver is predicted by the others, one-step, below 4.5 Hz."""
     if found is None:
         return None
@@ -157,7 +157,7 @@ def _prediction_document(found: Prediction | None) -> dict[str, Any] | None:
         "windows": list(found.windows),
         "nrmse": {
             name: {"fitted": found.fitted[name], "unseen": unseen}
-            for name, unseen in found.unseen.items()
+            for name, unseen in found.left_out.items()
         },
     }
 
@@ -178,7 +178,7 @@ def _repeats_document(found: ManeuverAgreement) -> dict[str, Any]:
 
 def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dict[str, Any]:
     """Return a direct fit of coefficients: verdict, values, modes, delays, instrument errors."""
-    flight = answer.fit.flight
+    flight = answer.fit.condition
     return {
         "template": "coefficients",
         "model": answer.model.name,
@@ -216,8 +216,8 @@ def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dic
         "instrument_errors": {
             n: {"value": v, "standard_deviation": d} for n, (v, d) in answer.fit.errors.items()
         },
-        "fit": {"one_step": {n: {"nrmse": x.nrmse} for n, x in answer.fit.traces.items()}},
+        "fit": {"one_step": {n: {"nrmse": x.nrmse} for n, x in answer.fit.histories.items()}},
         "unseen": _prediction_document(answer.fit.prediction),
-        "repeats": _repeats_document(answer.fit.repeats),
+        "repeats": _repeats_document(answer.fit.maneuver_agreement),
         "maneuvers": list(answer.maneuvers),
     }

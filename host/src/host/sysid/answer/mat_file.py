@@ -121,8 +121,8 @@ def _linear(answer: Answer) -> dict[str, Any]:
 
 
 def _coefficients(answer: CoefficientAnswer) -> dict[str, Any]:
-    found, flight = answer.fit.derivatives, answer.fit.flight
-    traces = answer.fit.traces
+    found, flight = answer.fit.derivatives, answer.fit.condition
+    traces = answer.fit.histories
     return {
         "names": _cells(d.name for d in found),
         "estimate": np.array([d.value for d in found]),

@@ -148,7 +148,7 @@ def _write_aircraft(
 
     if not source:
         raise IdentificationError(f"{path}: an aircraft needs mass and geometry; give --aircraft")
-    save_aircraft(path, tables, source, direct.fit.flight if direct else None)
+    save_aircraft(path, tables, source, direct.fit.condition if direct else None)
     return path
 
 

@@ -367,7 +367,7 @@ def _direct_verdict(answer: CoefficientAnswer) -> Verdict:
         )
     if needs:
         lines.append(f"  to learn them, {'; '.join(sorted(needs))}")
-    repeats = answer.fit.repeats
+    repeats = answer.fit.maneuver_agreement
     lines += [
         f"  maneuvers do not agree on {name}: they scatter {repeats.factor[k]:.1f} times what noise"
         f" allows (chi-square {repeats.chi_square[k]:.1f} on {repeats.maneuvers[k] - 1.0:.1f}),"
@@ -388,7 +388,7 @@ def _prediction_words(answer: CoefficientAnswer) -> str:
         )
     poor = [
         f"{name} (NRMSE {100.0 * unseen:.1f} %, fitted {100.0 * found.fitted[name]:.1f} %)"
-        for name, unseen in found.unseen.items()
+        for name, unseen in found.left_out.items()
         if unseen > WORSE * found.fitted[name]
     ]
     return (
@@ -399,7 +399,7 @@ def _prediction_words(answer: CoefficientAnswer) -> str:
 
 def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
     """Return coefficients, modes, delays and fit as a table for people."""
-    flight = answer.fit.flight
+    flight = answer.fit.condition
     lines = [
         f"coefficients at {flight.airspeed_mps:.2f} m/s, alpha"
         f" {flight.alpha_rad * DEG_PER_RAD:.1f} deg, CL {flight.lift:.3f}; value, 95 % half-width,"
@@ -418,10 +418,10 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
         for name, (value, half) in answer.delays.items()
     )
     lines.append(f"  residual delays: {delays}")
-    shares = ", ".join(f"{n} {100.0 * x.nrmse:.1f} %" for n, x in answer.fit.traces.items())
+    shares = ", ".join(f"{n} {100.0 * x.nrmse:.1f} %" for n, x in answer.fit.histories.items())
     lines.append(f"  NRMSE (one-step, fitted data, gusts in it): {shares}")
     if answer.fit.prediction is not None:
-        both = answer.fit.prediction.fitted, answer.fit.prediction.unseen
+        both = answer.fit.prediction.fitted, answer.fit.prediction.left_out
         shares = ", ".join(
             f"{name} {100.0 * fitted:.1f} / {100.0 * both[1][name]:.1f} %"
             for name, fitted in both[0].items()

@@ -1,7 +1,7 @@
-"""Equations that hold at every sample: coefficients of force and moment, and kinematics.
+"""Equations that hold at every sample: force and moment coefficients, and kinematics.
 
-Each is a left side and named regressors; the kinematic ones have none and tell instrument errors
-apart. Stevens & Lewis, ch. 1; signs and axes of the house.
+Each has a response and named regressors. The kinematic equations have no regressors: their response
+is zero but for noise, gusts and sensor errors. Signs and axes are those of the house.
 """
 
 from __future__ import annotations
@@ -18,47 +18,66 @@ from host.constants import GRAVITY_MPS2
 from host.sysid.coefficients.coefficient_model import CoefficientModel
 from host.sysid.compatibility.inverse_sensor_model import Record
 
-# Roll under the elevator: lift beside a CG off the plane of symmetry, its only clear trace.
+# Roll in elevator maneuvers: lift beside a CG off the plane of symmetry, its only clear trace.
 LONGITUDINAL = ("Cm", "Cl", "w", "u")  # behind the model's two forces
 LATERAL = ("CY", "Cl", "Cn", "v")
 KINEMATIC = ("u", "v", "w")
 
 
 @dataclass(frozen=True, slots=True)
-class Flown:
-    """What goes with the signals of one flight: thrust, spin, motor torque, attitude, airspeed over
-    that of the maneuvers less one, airspeed along x behind that thrust, each (n,); how much more
-    thrust it would be with airspeed (N per m/s) and with density (N per unit share)."""
+class FlightHistory:
+    """What belongs to one flight beside the corrected signals, each (n,) unless stated.
+
+    Attributes
+    ----------
+    thrust_n, spin_radps, drive_nm : Array
+        Thrust, rotor speed and motor torque.
+    phi_rad, theta_rad : Array
+    airspeed_deviation : Array
+        Airspeed over the mean of the maneuvers, less one.
+    axial_mps : Array
+        Airspeed along x that the thrust was computed with.
+    thrust_slopes : tuple of float
+        Derivative of the mean thrust by airspeed (N per m/s) and by density (N per unit share).
+    """
 
     thrust_n: Array
     spin_radps: Array
     drive_nm: Array
     phi_rad: Array
     theta_rad: Array
-    faster: Array
-    flying_mps: Array
-    pull: tuple[float, float]
+    airspeed_deviation: Array
+    axial_mps: Array
+    thrust_slopes: tuple[float, float]
 
-    def at(self, samples: IntArray) -> Flown:
-        """Return it at some samples."""
-        cut = {f.name: getattr(self, f.name)[samples] for f in fields(self) if f.name != "pull"}
-        return replace(self, **cut)
+    def at(self, samples: IntArray) -> FlightHistory:
+        """Return the history at some samples."""
+        columns = [f.name for f in fields(self) if f.name != "thrust_slopes"]
+        return replace(self, **{name: getattr(self, name)[samples] for name in columns})
 
 
 @dataclass(frozen=True, slots=True)
 class Equation:
-    """Left side (n,) and regressors (n,) by name."""
+    """Dependent variable (n,) and regressors (n,) by the label of their term."""
 
-    left: Array
-    terms: dict[str, Array]
+    response: Array
+    regressors: dict[str, Array]
 
 
 @dataclass(frozen=True, slots=True)
 class Equations:
-    """All equations by row; lift and drag coefficients (n,), rows or not, at the same samples; mean
-    specific force along the path of the whole flight (m/s2)."""
+    """All equations of a flight at the same samples.
 
-    rows: dict[str, Equation]
+    Attributes
+    ----------
+    by_name : dict
+    lift, drag : Array, shape (m,)
+        CL and CD, whether the model has them or not.
+    along_mps2 : float
+        Mean specific force along the path of the whole flight.
+    """
+
+    by_name: dict[str, Equation]
     lift: Array
     drag: Array
     along_mps2: float
@@ -69,94 +88,106 @@ def equations(
     record: Record,
     s: Mapping[str, Array],
     errors: Mapping[str, float],
-    flown: Flown,
+    history: FlightHistory,
     airframe: AirframeData,
-    plant: Powerplant,
+    powerplant: Powerplant,
     trim_alpha_rad: float,
     inside: IntArray | None = None,
 ) -> Equations:
-    """Return every equation of a flight for assumed instrument errors.
+    """Return every equation of a flight for assumed sensor errors.
 
     Parameters
     ----------
     model : CoefficientModel
-        Whose terms the force and moment coefficients are made of.
+        Terms of the force and moment coefficients.
     record : Record
     s : mapping
-        Of `coefficient_signals.corrected`.
+        From `apply_sensor_errors`: SI signals at the CG, (n,) each.
     errors : mapping
-        Of the mass properties and the thrust.
-    flown : Flown
+        Errors of mass properties, CG, thrust and density.
+    history : FlightHistory
     airframe : AirframeData
-    plant : Powerplant
+    powerplant : Powerplant
     trim_alpha_rad : float
-        Where products of the angle of attack count from.
-    inside : (m,) IntArray, optional
-        Samples at which the equations are wanted; all by default. Speeds are differentiated over
+        Reference of the angle of attack in products.
+    inside : IntArray, shape (m,), optional
+        Samples at which the equations are wanted; all without. Velocities are differentiated over
         the whole flight.
+
+    Returns
+    -------
+    Equations
     """
     e = errors
-    about = {"alpha": trim_alpha_rad, "de": float(np.mean(s["de"]))}
-    u, v, w = speeds(s)
+    reference = {"alpha": trim_alpha_rad, "de": float(np.mean(s["de"]))}
+    u, v, w = body_velocity(s)
     along = float(np.mean((u * s["ax"] + v * s["ay"] + w * s["az"]) / s["V"]))
-    rising = [record.rate(x) for x in (u, v, w)]
+    rates = [record.rate(x) for x in (u, v, w)]
     if inside is not None:
-        s, flown = {name: values[inside] for name, values in s.items()}, flown.at(inside)
-        u, v, w, *rising = (x[inside] for x in (u, v, w, *rising))
+        s, history = {name: values[inside] for name, values in s.items()}, history.at(inside)
+        u, v, w, *rates = (x[inside] for x in (u, v, w, *rates))
     mass = airframe.mass_kg * (1.0 + e["mass_share"])
     ixx = airframe.ixx_kgm2 * (1.0 + e["ixx_share"])
     iyy = airframe.iyy_kgm2 * (1.0 + e["iyy_share"])
     izz = airframe.izz_kgm2 * (1.0 + e["izz_share"])
     ixz = airframe.ixz_kgm2
     S, b, c = airframe.wing_area_m2, airframe.span_m, airframe.chord_m
-    by_speed, by_density = flown.pull
-    thrust = flown.thrust_n + by_speed * (s["V"] * np.cos(s["alpha"]) - flown.flying_mps)
+    by_speed, by_density = history.thrust_slopes
+    thrust = history.thrust_n + by_speed * (s["V"] * np.cos(s["alpha"]) - history.axial_mps)
     thrust = (thrust + by_density * e["density_share"]) * (1.0 + e["thrust_share"])
-    tx, tz = thrust * plant.axis[0], thrust * plant.axis[2]
-    spin = plant.rotor_kgm2 * flown.spin_radps
-    hx, hz = spin * plant.axis[0], spin * plant.axis[2]
+    axis, hub = powerplant.axis, powerplant.hub_m
+    tx, tz = thrust * axis[0], thrust * axis[2]
+    spin = powerplant.rotor_kgm2 * history.spin_radps
+    hx, hz = spin * axis[0], spin * axis[2]
     p, q, r, V = s["p"], s["q"], s["r"], s["V"]
+    # Aerodynamic force from specific force, thrust subtracted (Klein & Morelli, ch. 3 and 5).
     X, Y, Z = mass * s["ax"] - tx, mass * s["ay"], mass * s["az"] - tz
     force = s["qbar"] * S
     ca, sa = np.cos(s["alpha"]), np.sin(s["alpha"])
-    arm_x, arm_z = plant.hub_m[0] - e["cg_x_m"], plant.hub_m[2] - e["cg_z_m"]
+    arm_x, arm_z = hub[0] - e["cg_x_m"], hub[2] - e["cg_z_m"]
+    # Aerodynamic moments from Euler's equations with the rotor's angular momentum (Stevens & Lewis,
+    # Aircraft Control and Simulation, ch. 1; Etkin & Reid, Dynamics of Flight, ch. 4).
     roll = ixx * s["pd"] - ixz * (s["rd"] + p * q) + (izz - iyy) * q * r + q * hz
-    roll += flown.drive_nm * plant.axis[0]
+    roll += history.drive_nm * axis[0]
     pitch = iyy * s["qd"] + (ixx - izz) * p * r + ixz * (p * p - r * r) + r * hx - p * hz
     pitch -= arm_z * tx - arm_x * tz
     yaw = izz * s["rd"] - ixz * (s["pd"] - q * r) + (iyy - ixx) * p * q - q * hx
-    yaw += flown.drive_nm * plant.axis[2]
-    # About the plane of symmetry, where neither lift nor drag rolls or yaws: a CG 8 mm beside it
-    # makes Cl_alpha -0.024, which left out drew Cl_r by 4 %.
+    yaw += history.drive_nm * axis[2]
+    # Moments about the plane of symmetry, where neither lift nor drag rolls or yaws: a CG 8 mm
+    # beside it makes Cl_alpha -0.024, which left out biased Cl_r by 4 %.
     roll += e["cg_y_m"] * mass * s["az"]
     yaw -= e["cg_y_m"] * mass * s["ax"]
+    # From body to wind axes (Klein & Morelli, ch. 3).
     lift, drag = -(Z * ca - X * sa) / force, -(X * ca + Z * sa) / force
     signals = {
         "alpha": s["alpha"], "beta": s["beta"],
         "p": 0.5 * p * b / V, "q": 0.5 * q * c / V, "r": 0.5 * r * b / V,
-        "de": s["de"], "da": s["da"], "dr": s["dr"], "V": flown.faster, "CL": lift,
+        "de": s["de"], "da": s["da"], "dr": s["dr"], "V": history.airspeed_deviation, "CL": lift,
     }  # fmt: skip
-    phi, theta = flown.phi_rad, flown.theta_rad
+    phi, theta = history.phi_rad, history.theta_rad
     gx = -GRAVITY_MPS2 * np.sin(theta)
     gy = GRAVITY_MPS2 * np.sin(phi) * np.cos(theta)
     gz = GRAVITY_MPS2 * np.cos(phi) * np.cos(theta)
-    left = {
+    response = {
         "CL": lift, "CD": drag, "CZ": Z / force, "CX": X / force, "Cm": pitch / (force * c),
         "CY": Y / force, "Cl": roll / (force * b), "Cn": yaw / (force * b),
     }  # fmt: skip
     found = {
-        row: Equation(left[row], {term.label: term.values(signals, about) for term in terms})
-        for row, terms in model.rows.items()
+        name: Equation(
+            response[name], {term.label: term.values(signals, reference) for term in terms}
+        )
+        for name, terms in model.equations.items()
     }
+    # Kinematic equations of the velocity through the air (Klein & Morelli, ch. 3 and 10).
     found |= {
-        "u": Equation(rising[0] - (s["ax"] + gx - q * w + r * v), {}),
-        "v": Equation(rising[1] - (s["ay"] + gy - r * u + p * w), {}),
-        "w": Equation(rising[2] - (s["az"] + gz + q * u - p * v), {}),
+        "u": Equation(rates[0] - (s["ax"] + gx - q * w + r * v), {}),
+        "v": Equation(rates[1] - (s["ay"] + gy - r * u + p * w), {}),
+        "w": Equation(rates[2] - (s["az"] + gz + q * u - p * v), {}),
     }
     return Equations(found, lift, drag, along)
 
 
-def speeds(s: Mapping[str, Array]) -> tuple[Array, Array, Array]:
-    """Return speed through the air along x, y and z (m/s), each (n,)."""
+def body_velocity(s: Mapping[str, Array]) -> tuple[Array, Array, Array]:
+    """Return velocity through the air along x, y and z (m/s), each (n,)."""
     plane = s["V"] * np.cos(s["beta"])
     return plane * np.cos(s["alpha"]), s["V"] * np.sin(s["beta"]), plane * np.sin(s["alpha"])

@@ -1,9 +1,9 @@
-"""What the sensors would have said without gusts: instruments in the sense of regression.
+"""The auxiliary model: a gust-free simulation whose regressors are the instrumental variables.
 
-A linear model with the coefficients found so far is driven by the surfaces as measured. Its
-signals follow the inputs and know nothing of gusts and sensor noise: least squares weighted with
-them has no bias from either (instrumental variables; Soderstrom & Stoica 1983). They need not be
-exact.
+A linear model with the coefficients found so far is driven by the measured surfaces. Its signals
+are correlated with the inputs but not with gusts and sensor noise, so an estimate with regressors
+of this simulation as instrumental variables is not biased by either (Ljung, System Identification,
+sec. 7.6; Soderstrom & Stoica, Instrumental Variable Methods, 1983). They need not be exact.
 """
 
 from __future__ import annotations
@@ -16,17 +16,18 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.instrument.deviations import SensorErrorModel
-from host.sysid.coefficients.aero_equations import Flown
+from host.sysid.coefficients.aero_equations import FlightHistory
 from host.sysid.compatibility.inverse_sensor_model import ATTITUDE_CROSSOVER_RADPS, Record
 from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.recursion import simulate
 
 LEVELLING_PERS = 0.3  # the pilot brings the wings back
-DRAG = 0.04  # only sets the mean of a force whose mean is taken out again
+MEAN_DRAG = 0.04  # the mean of a force is removed again
 
 
 def _simulate(A: Array, B: Array, inputs: Array, dt_s: float) -> Array:
+    """Return states (samples, n) of x' = A x + B u from rest."""
     if np.max(np.linalg.eigvals(A).real) > -1e-3:
         raise IdentificationError("the coefficients found so far make an unstable aircraft")
     middle = 0.5 * (inputs + np.vstack([inputs[1:], inputs[-1:]]))
@@ -34,32 +35,32 @@ def _simulate(A: Array, B: Array, inputs: Array, dt_s: float) -> Array:
     AB = np.hstack([A, B, np.zeros((n, 1))])
     none = np.zeros(0, dtype=np.int64)
     step, _ = discretise(AB, n, m, False, dt_s, none, none, none, np.zeros(0), 0)
-    drive = np.hstack([middle, np.ones((len(middle), 1))])
-    finite, states = simulate(step, drive, np.zeros(n))
+    driving = np.hstack([middle, np.ones((len(middle), 1))])
+    finite, states = simulate(step, driving, np.zeros(n))
     if not finite:
         raise IdentificationError("the coefficients found so far make an unstable aircraft")
     return np.ascontiguousarray(states[:, :n])
 
 
-def gust_free(
+def simulate_noise_free(
     record: Record,
     s: Mapping[str, Array],
-    flown: Flown,
+    history: FlightHistory,
     value: Callable[[str], float],
     airframe: AirframeData,
-    data: SensorErrorModel,
+    sensors: SensorErrorModel,
     condition: tuple[float, float, float],
-) -> tuple[Record, Flown]:
-    """Return sensor columns and attitude of a gust-free flight with the same surfaces.
+) -> tuple[Record, FlightHistory]:
+    """Simulate the sensor columns and the history of a gust-free flight with the same surfaces.
 
     Parameters
     ----------
-    record, s, flown
+    record, s, history
         The flight as measured and corrected.
     value : callable
-        Slope at the trim found so far, by name.
-    airframe, data
-        Nominal.
+        Derivative at the trim found so far, by name.
+    airframe, sensors
+        Without errors.
     condition : tuple
         Airspeed (m/s), dynamic pressure (Pa), angle of attack (rad).
 
@@ -73,9 +74,12 @@ def gust_free(
     S, b, c = a.wing_area_m2, a.span_m, a.chord_m
     lift = qbar * S / (a.mass_kg * V)
     pitch, hat_q, hat_p = qbar * S * c / a.iyy_kgm2, 0.5 * c / V, 0.5 * b / V
-    fast = jw / (jw + ATTITUDE_CROSSOVER_RADPS)  # slow trim changes leave the linear model
-    de, da, dr = (record.passed(s[k], fast) for k in ("de", "da", "dr"))
-    short = _simulate(
+    high_pass = jw / (
+        jw + ATTITUDE_CROSSOVER_RADPS
+    )  # slow trim changes are outside the linear model
+    de, da, dr = (record.passed(s[k], high_pass) for k in ("de", "da", "dr"))
+    # Short period and lateral motion in wind and body axes (Etkin & Reid, ch. 4).
+    short_period = _simulate(
         np.array(
             [
                 [-lift * value("CL_alpha"), 1.0 - lift * value("CL_q") * hat_q],
@@ -100,41 +104,45 @@ def gust_free(
         moments = qbar * S * b * np.array([value(f"Cl_{k}"), value(f"Cn_{k}")])
         B[1:3, j] = np.linalg.solve(inertia, moments)
     beta, p, r, phi = _simulate(A, B, np.column_stack([da, dr]), record.dt_s).T
-    alpha, q = alpha_0 + short[:, 0], short[:, 1]
+    alpha, q = alpha_0 + short_period[:, 0], short_period[:, 1]
     CL = a.mass_kg * GRAVITY_MPS2 / (qbar * S) + value("CL_de") * de
-    CL = CL + value("CL_alpha") * short[:, 0] + value("CL_q") * q * hat_q
-    CD = DRAG + value("CD_alpha") * short[:, 0] + value("CD_de") * de
+    CL = CL + value("CL_alpha") * short_period[:, 0] + value("CL_q") * q * hat_q
+    CD = MEAN_DRAG + value("CD_alpha") * short_period[:, 0] + value("CD_de") * de
     CY = value("CY_beta") * beta + (value("CY_p") * p + value("CY_r") * r) * hat_p
     CY = CY + value("CY_da") * da + value("CY_dr") * dr
-    thrust = float(np.mean(flown.thrust_n))
+    thrust = float(np.mean(history.thrust_n))
     unit = qbar * S / a.mass_kg
     ax = unit * (CL * np.sin(alpha) - CD * np.cos(alpha)) + thrust / a.mass_kg
     az = -unit * (CL * np.cos(alpha) + CD * np.sin(alpha))
     pd, qd, rd = (record.rate(x) for x in (p, q, r))
-    x, y, z = data.imu_m
-    omega = 2.0 * np.pi * data.vane_hz_per_mps * V
-    vane = 1.0 / (1.0 + 2.0 * data.vane_damping * jw / omega + (jw / omega) ** 2)
+    # Accelerometers beside the CG feel the angular acceleration times their arm.
+    x, y, z = sensors.imu_m
+    omega = 2.0 * np.pi * sensors.vane_hz_per_mps * V
+    # Second-order vane; upwash and the vane's own motion added.
+    vane = 1.0 / (1.0 + 2.0 * sensors.vane_damping * jw / omega + (jw / omega) ** 2)
     theta = alpha_0 + record.passed(q, 1.0 / (jw + ATTITUDE_CROSSOVER_RADPS))
     columns = {
         "ax_mps2": ax + qd * z - rd * y,
         "ay_mps2": unit * CY + rd * x - pd * z,
         "az_mps2": az + pd * y - qd * x,
         "p_radps": p, "q_radps": q, "r_radps": r,
-        "alpha_rad": record.passed((1.0 + data.upwash) * (alpha - q * data.vanes_m[0] / V), vane),
-        "beta_rad": record.passed(beta + r * data.vanes_m[0] / V, vane),
+        "alpha_rad": record.passed(
+            (1.0 + sensors.upwash) * (alpha - q * sensors.vanes_m[0] / V), vane
+        ),
+        "beta_rad": record.passed(beta + r * sensors.vanes_m[0] / V, vane),
         "qbar_pa": np.full(n, qbar), "density_kgpm3": np.full(n, 2.0 * qbar / V**2),
         "elevator_rad": de + float(np.mean(s["de"])), "aileron_rad": da, "rudder_rad": dr,
         "phi_rad": phi, "theta_rad": theta,
     }  # fmt: skip
-    columns["alpha_rad"] += (1.0 + data.upwash) * alpha_0
-    calm = Flown(
+    columns["alpha_rad"] += (1.0 + sensors.upwash) * alpha_0
+    simulated = FlightHistory(
         np.full(n, thrust),
-        np.full(n, float(np.mean(flown.spin_radps))),
-        np.full(n, float(np.mean(flown.drive_nm))),
+        np.full(n, float(np.mean(history.spin_radps))),
+        np.full(n, float(np.mean(history.drive_nm))),
         phi,
         theta,
-        flown.faster,  # of the flight: slow, and nothing else tells how speed changed
+        history.airspeed_deviation,  # measured: it is slow, and the model has no speed
         np.full(n, V * np.cos(alpha_0)),
-        flown.pull,
+        history.thrust_slopes,
     )
-    return Record(record.dt_s, columns), calm
+    return Record(record.dt_s, columns), simulated

@@ -1,4 +1,4 @@
-"""From the columns of a flight to coefficients with a verdict: maneuvers found, fitted, judged."""
+"""The estimator of coefficients: from reconstructed flights to an answer, in four stages."""
 
 from __future__ import annotations
 
@@ -16,17 +16,21 @@ from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTa
 from host.sysid.coefficients.coefficient_fit import METHOD, CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import (
     CoefficientIntervals,
-    Searched,
+    SearchResult,
     coefficient_fit,
     intervals,
     validation,
 )
 from host.sysid.coefficients.coefficient_model import BODY, WIND, CoefficientModel, standard_model
-from host.sysid.coefficients.coefficient_modes import System, coefficient_modes, dimensional
+from host.sysid.coefficients.coefficient_modes import (
+    LinearSystem,
+    coefficient_modes,
+    linear_systems,
+)
 from host.sysid.coefficients.coefficient_search import search_coefficients
-from host.sysid.coefficients.deletion_diagnostics import Prediction
-from host.sysid.coefficients.pooled_flights import pooled
-from host.sysid.coefficients.window_spectra import LEAST_S, Window
+from host.sysid.coefficients.deletion_diagnostics import CrossValidation
+from host.sysid.coefficients.pooled_flights import pool_fits
+from host.sysid.coefficients.window_spectra import SHORTEST_S, Window
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.finder import FLYING_SHARE, Found, find
 from host.sysid.flight.reconstructed import ReconstructedFlight, found_name, reconstructed
@@ -38,7 +42,7 @@ NAME = "coefficients"
 LEAD_S = 0.5  # of trim before a maneuver
 SETTLED_S = 3.0  # after the launch
 LONGITUDINAL = (*WIND, *BODY, "Cm")
-CAUSES = {
+ERROR_GROUPS = {
     "mass": ("mass_share",),
     "Ixx": ("ixx_share",),
     "Iyy": ("iyy_share",),
@@ -62,11 +66,25 @@ CAUSES = {
 
 @dataclass(frozen=True)
 class CoefficientAnswer:
-    """What the equations of motion say straight from a flight.
+    """Coefficients estimated directly from flights, with modes and linear systems.
 
-    `used` are the inputs found, `flights` which flight each is of, from 0; `windows` what was
-    fitted; `causes` is what widens each coefficient most, with its share of the variance; `delays`
-    are residual (s) with 95 % half-width.
+    Attributes
+    ----------
+    model : CoefficientModel
+    fit : CoefficientFit
+    used : tuple of Found
+        Maneuvers.
+    flights : tuple of int
+        Flight of each maneuver, from 0.
+    windows : tuple of Window
+        Spans that were fitted.
+    causes : dict
+        Coefficient to the group of errors that widens it most, and its share of the variance.
+    modes : tuple of Mode
+    systems : dict
+        ``longitudinal`` and ``lateral`` linear systems.
+    delays : dict
+        Residual delay (s) and 95 % half-width.
     """
 
     model: CoefficientModel
@@ -76,17 +94,17 @@ class CoefficientAnswer:
     windows: tuple[Window, ...]
     causes: dict[str, tuple[str, float]]
     modes: tuple[Mode, ...]
-    systems: dict[str, System]
+    systems: dict[str, LinearSystem]
     delays: dict[str, tuple[float, float]]
 
     @property
     def template(self) -> str:
-        """What it is called beside linear models."""
+        """Name of this answer among those of linear models."""
         return NAME
 
     @property
     def maneuvers(self) -> tuple[str, ...]:
-        """What the inputs are called, of several flights with the number of theirs."""
+        """Names of the maneuvers, with the number of the flight if there are several."""
         several = max(self.flights, default=0) > 0
         return tuple(
             found_name(item) + (f" of flight {k + 1}" if several else "")
@@ -95,7 +113,7 @@ class CoefficientAnswer:
 
     @property
     def coefficients(self) -> tuple[Coefficient, ...]:
-        """The derivatives as the rest of the package takes them."""
+        """The derivatives with standard errors."""
         return tuple(
             Coefficient(d.name, d.value, d.half_width / NORMAL_95, d.half_width)
             for d in self.fit.derivatives
@@ -104,7 +122,7 @@ class CoefficientAnswer:
     @property
     def tables(self) -> tuple[CoefficientTable, ...]:
         """Coefficients of the longitudinal and of the lateral maneuvers."""
-        alpha = self.fit.flight.alpha_rad
+        alpha = self.fit.condition.alpha_rad
         along = tuple(c for c in self.coefficients if c.name[:2] in LONGITUDINAL)
         across = tuple(c for c in self.coefficients if c.name[:2] not in LONGITUDINAL)
         return (
@@ -115,23 +133,23 @@ class CoefficientAnswer:
 
 @dataclass(frozen=True)
 class CoefficientEstimate:
-    """What estimation made of one flight: where the search ended, and the maneuvers it rests on."""
+    """The estimate of one flight: end of the search, maneuvers and their windows."""
 
-    searched: Searched
+    search: SearchResult
     used: tuple[Found, ...]
     windows: tuple[Window, ...]
 
 
 @dataclass(frozen=True)
 class CoefficientEstimator:
-    """Force and moment equations with the errors of the instrument, in the stages of the pipeline.
+    """Force and moment equations with sensor errors, in the stages of the pipeline.
 
     Attributes
     ----------
     airframe : AirframeData
     powerplant : Powerplant
     instrument : SensorErrorModel
-        What the sensors may be wrong by.
+        Standard deviations of the sensor errors.
     model : CoefficientModel
         The terms of every coefficient.
     """
@@ -142,50 +160,50 @@ class CoefficientEstimator:
     model: CoefficientModel
 
     def estimate(self, flights: Sequence[ReconstructedFlight]) -> tuple[CoefficientEstimate, ...]:
-        """Search coefficients and errors of the instrument together, flight by flight.
+        """Estimate coefficients and sensor errors jointly, flight by flight.
 
         Raises
         ------
         IdentificationError
-            If a column or an axis is missing, or a term cannot be told at all.
+            If a column or an axis is missing, or a term cannot be determined at all.
         """
         return tuple(self._of_one(flight) for flight in flights)
 
     def intervals(
         self, estimate: tuple[CoefficientEstimate, ...]
     ) -> tuple[CoefficientIntervals, ...]:
-        """Return derivatives with their intervals: geometry, scatter and every error counted."""
-        return tuple(intervals(one.searched) for one in estimate)
+        """Return derivatives with intervals: geometric prior, scatter and every error included."""
+        return tuple(intervals(one.search) for one in estimate)
 
     def validation(
         self,
         estimate: tuple[CoefficientEstimate, ...],
         widths: tuple[CoefficientIntervals, ...],
-    ) -> tuple[Prediction | None, ...]:
+    ) -> tuple[CrossValidation | None, ...]:
         """Predict each maneuver by all others of its flight."""
-        return tuple(validation(one.searched) for one in estimate)
+        return tuple(validation(one.search) for one in estimate)
 
     def answer(
         self,
         estimate: tuple[CoefficientEstimate, ...],
         widths: tuple[CoefficientIntervals, ...],
-        predicted: tuple[Prediction | None, ...],
+        predicted: tuple[CrossValidation | None, ...],
     ) -> CoefficientAnswer:
-        """Return the parts of all stages as one answer, with modes and what widens it most."""
+        """Return the parts of all stages as one answer, with modes and main error sources."""
         fits = [
-            coefficient_fit(one.searched, width, unseen)
-            for one, width, unseen in zip(estimate, widths, predicted, strict=True)
+            coefficient_fit(one.search, width, prediction)
+            for one, width, prediction in zip(estimate, widths, predicted, strict=True)
         ]
-        fit = pooled(fits)
+        fit = pool_fits(fits)
         return CoefficientAnswer(
             model=self.model,
             fit=fit,
             used=tuple(f for one in estimate for f in one.used),
             flights=tuple(k for k, one in enumerate(estimate) for _ in one.used),
             windows=tuple(w for one in estimate for w in one.windows),
-            causes=_causes(fit),
+            causes=_main_causes(fit),
             modes=coefficient_modes(fit, self.airframe),
-            systems=dimensional(fit, self.airframe),
+            systems=linear_systems(fit, self.airframe),
             delays=_delays(fit, self.instrument),
         )
 
@@ -193,7 +211,7 @@ class CoefficientEstimator:
         columns = flight.recorded
         if "airspeed_mps" not in columns:
             raise IdentificationError("coefficients need the columns airspeed_mps and qbar_pa")
-        flying = _airborne(columns)
+        flying = _airborne_samples(columns)
         t = columns["t_s"][flying]
         if len(t) == 0:
             raise IdentificationError(
@@ -203,11 +221,11 @@ class CoefficientEstimator:
         found = [
             f
             for f in flight.maneuvers
-            if f.axis != "throttle" and f.end_s - f.start_s + LEAD_S >= LEAST_S
+            if f.axis != "throttle" and f.end_s - f.start_s + LEAD_S >= SHORTEST_S
             and t[0] <= f.start_s - LEAD_S and f.end_s <= t[-1]
         ]  # fmt: skip
-        spans = joined(found)
-        ended = search_coefficients(
+        spans = merged_windows(found)
+        search = search_coefficients(
             {k: v[flying] for k, v in columns.items()},
             spans,
             self.airframe,
@@ -215,7 +233,7 @@ class CoefficientEstimator:
             self.powerplant,
             self.model,
         )
-        return CoefficientEstimate(ended, tuple(found), tuple(spans))
+        return CoefficientEstimate(search, tuple(found), tuple(spans))
 
 
 def coefficient_estimator(
@@ -243,7 +261,7 @@ def identify_coefficients(
     airframe: AirframeData | None = None,
     instrument: SensorErrorModel | None = None,
 ) -> CoefficientAnswer:
-    """Find the maneuvers of a flight and fit coefficients to all of them at once.
+    """Find the maneuvers of a flight and fit coefficients to all of them jointly.
 
     Parameters
     ----------
@@ -256,10 +274,10 @@ def identify_coefficients(
     model : CoefficientModel, optional
         The terms of every coefficient; `standard_model` by default.
     airframe : AirframeData, optional
-        In place of what the aircraft file says.
+        Instead of that of the aircraft file.
     instrument : SensorErrorModel, optional
-        What the sensors may be wrong by, as `sensor_error_model` reads it of a calibration; the
-        standard errors without.
+        Standard deviations of the sensor errors, from `sensor_error_model`; the standard ones
+        without.
 
     Raises
     ------
@@ -271,36 +289,36 @@ def identify_coefficients(
     return answer_of(by, [reconstructed(columns, found)])
 
 
-def joined(found: Sequence[Found]) -> list[Window]:
-    """Return the windows of maneuvers; aileron and rudder flown together are one."""
+def merged_windows(found: Sequence[Found]) -> list[Window]:
+    """Return the windows of maneuvers; overlapping aileron and rudder maneuvers are one."""
     windows: list[Window] = []
     for item in sorted(found, key=lambda f: (f.axis != "elevator_rad", f.start_s)):
         along = item.axis == "elevator_rad"
         first, last = item.start_s - LEAD_S, item.end_s
         if windows and not along and not windows[-1].longitudinal:
             before = windows[-1]
-            if first < before.last_s - LEAST_S:
+            if first < before.last_s - SHORTEST_S:
                 windows[-1] = Window(before.first_s, max(last, before.last_s), longitudinal=False)
                 continue
         windows.append(Window(first, last, along))
     return windows
 
 
-def _airborne(columns: Mapping[str, Array]) -> slice:
-    """Return from some seconds after the launch to the last moment of flight."""
+def _airborne_samples(columns: Mapping[str, Array]) -> slice:
+    """Return the samples from some seconds after the launch to the end of the flight."""
     t, speed = columns["t_s"], columns["airspeed_mps"]
     up = np.flatnonzero(speed > FLYING_SHARE * float(np.median(speed)))
     first = int(np.searchsorted(t, t[up[0]] + SETTLED_S, side="right"))
     return slice(first, int(up[-1]) + 1)
 
 
-def _causes(fit: CoefficientFit) -> dict[str, tuple[str, float]]:
-    """Return for each coefficient the errors whose knowledge would narrow it most."""
+def _main_causes(fit: CoefficientFit) -> dict[str, tuple[str, float]]:
+    """Return for each coefficient the group of errors that contributes most to its variance."""
     count, names = len(fit.derivatives), list(fit.errors)
     result = {}
     for k, d in enumerate(fit.derivatives):
         shares = {}
-        for cause, members in CAUSES.items():
+        for cause, members in ERROR_GROUPS.items():
             at = [count + names.index(m) for m in members]
             with_them = fit.covariance[k, at]
             narrowed = with_them @ np.linalg.solve(fit.covariance[np.ix_(at, at)], with_them)
@@ -310,9 +328,10 @@ def _causes(fit: CoefficientFit) -> dict[str, tuple[str, float]]:
     return result
 
 
-def _delays(fit: CoefficientFit, data: SensorErrorModel) -> dict[str, tuple[float, float]]:
-    omega = 2.0 * np.pi * data.vane_hz_per_mps * data.friction_speed_mps
-    vane_s = 2.0 * data.vane_damping / omega
+def _delays(fit: CoefficientFit, sensors: SensorErrorModel) -> dict[str, tuple[float, float]]:
+    """Return residual delays (s) of IMU and vanes with 95 % half-widths."""
+    omega = 2.0 * np.pi * sensors.vane_hz_per_mps * sensors.friction_speed_mps
+    vane_s = 2.0 * sensors.vane_damping / omega  # delay of a second-order vane
     table = {"delay_imu_s": ("imu_delay_s", 1.0)}
     table |= {f"delay_{k}_s": (f"{k}_lag_share", -vane_s) for k in ("alpha", "beta")}
     return {

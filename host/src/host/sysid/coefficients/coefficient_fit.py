@@ -9,20 +9,25 @@ import numpy as np
 
 from host.arrays import Array, IntArray
 from host.constants import NORMAL_95
-from host.sysid.coefficients.deletion_diagnostics import Prediction
+from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement
 
 METHOD = "equation error with instrument errors"
 FLAG_SHARE = 0.12  # up to it an error beyond 15 % is a case of one in seventy
-SMALL_SHARE = 0.05  # of the row's largest contribution
+SMALL_SHARE = 0.05  # of the largest contribution in its equation
 
 
 @dataclass(frozen=True, slots=True)
 class Derivative:
-    """A coefficient with its 95 % half-width; `flagged` if it is too wide to be relied on.
+    """A coefficient with its 95 % half-width.
 
-    Widths are judged against `reference`: the value, or what would contribute 5 % of the row's
-    largest term, if that is more.
+    Attributes
+    ----------
+    name : str
+    value, half_width : float
+    reference : float
+        What the width is judged against: the value, or what would contribute 5 % of the largest
+        term of its equation, if that is more.
     """
 
     name: str
@@ -42,8 +47,17 @@ class Derivative:
 
 
 @dataclass(frozen=True, slots=True)
-class Pull:
-    """Mean thrust (N), its slope with airspeed at constant rotor speed, pitching moment per N."""
+class ThrustEffect:
+    """Thrust at the mean condition.
+
+    Attributes
+    ----------
+    thrust_n : float
+    slope_npmps : float
+        Its derivative by airspeed at constant rotor speed.
+    arm_m : float
+        Pitching moment per newton.
+    """
 
     thrust_n: float
     slope_npmps: float
@@ -51,11 +65,20 @@ class Pull:
 
 
 @dataclass(frozen=True, slots=True)
-class Flight:
-    """Mean condition of the maneuvers; angle of attack with its range, CL and CD of the
-    longitudinal ones.
+class MeanCondition:
+    """Mean condition of the maneuvers.
 
-    `faster` is the airspeed of the longitudinal and of the lateral ones over that of all.
+    Attributes
+    ----------
+    airspeed_mps, qbar_pa : float
+        Of all maneuvers.
+    alpha_rad, lift, drag : float
+        Angle of attack, CL and CD of the longitudinal maneuvers.
+    thrust_effect : ThrustEffect
+    alpha_range_rad : tuple of float
+        Least and largest angle of attack of the longitudinal maneuvers.
+    airspeed_ratio : tuple of float
+        Airspeed of the longitudinal and of the lateral maneuvers over that of all.
     """
 
     airspeed_mps: float
@@ -63,15 +86,20 @@ class Flight:
     alpha_rad: float
     lift: float
     drag: float
-    pull: Pull
+    thrust_effect: ThrustEffect
     alpha_range_rad: tuple[float, float]
-    faster: tuple[float, float]
+    airspeed_ratio: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Trace:
-    """One coefficient over all its maneuvers end to end, each (n,); the model's constant and slope
-    of each maneuver are fitted."""
+class CoefficientHistory:
+    """One coefficient over all its maneuvers, end to end.
+
+    Attributes
+    ----------
+    measured, model : Array, shape (n,)
+        A constant and a slope in time of each maneuver are fitted to the model.
+    """
 
     measured: Array
     model: Array
@@ -84,50 +112,68 @@ class Trace:
 
 @dataclass(frozen=True, slots=True)
 class CoefficientFit:
-    """Coefficients, and the instrument's errors as value and deviation left.
+    """The result of a fit of coefficients.
 
-    `covariance` is of all derivatives and behind them all errors, in their order; `traces` are the
-    six force and moment coefficients in time, measured and by the derivatives; `prediction` is that
-    of single maneuvers by all others, `repeats` how they scatter, both of the last step.
+    Attributes
+    ----------
+    derivatives : tuple of Derivative
+    covariance : Array, shape (derivatives + errors, derivatives + errors)
+        Of all derivatives, and behind them all sensor errors.
+    errors : dict
+        Sensor error to its estimate and standard deviation.
+    condition : MeanCondition
+    histories : dict
+        The force and moment coefficients in time.
+    prediction : CrossValidation or None
+        Of single maneuvers by all others, in the last step.
+    maneuver_agreement : ManeuverAgreement
+        Scatter of the maneuvers about the joint estimate, in the last step.
     """
 
     derivatives: tuple[Derivative, ...]
     covariance: Array
     errors: dict[str, tuple[float, float]]
-    flight: Flight
-    traces: dict[str, Trace]
-    prediction: Prediction | None
-    repeats: ManeuverAgreement
+    condition: MeanCondition
+    histories: dict[str, CoefficientHistory]
+    prediction: CrossValidation | None
+    maneuver_agreement: ManeuverAgreement
 
 
-def derivatives(
-    values: Mapping[str, float], covariance: Array, sizes: Mapping[str, float]
+def derivatives_with_intervals(
+    values: Mapping[str, float], covariance: Array, regressor_rms: Mapping[str, float]
 ) -> tuple[Derivative, ...]:
     """Return coefficients with intervals, in the order of the covariance.
 
-    `sizes` is the rms of each coefficient's regressor; one without is judged by its value alone.
+    Parameters
+    ----------
+    values : mapping
+    covariance : Array, shape (P, P)
+    regressor_rms : mapping
+        Rms of each coefficient's regressor; a coefficient without is judged by its value alone.
     """
     halves = NORMAL_95 * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     largest: dict[str, float] = {}
-    for name, size in sizes.items():
-        row = name.split("_")[0]
-        largest[row] = max(largest.get(row, 0.0), abs(values.get(name, 0.0)) * size)
+    for name, rms in regressor_rms.items():
+        equation = name.split("_")[0]
+        contribution = abs(values.get(name, 0.0)) * rms
+        largest[equation] = max(largest.get(equation, 0.0), contribution)
     found = []
     for (name, value), half in zip(values.items(), halves, strict=True):
         least = 0.0
-        if sizes.get(name, 0.0) > 0.0:
-            least = SMALL_SHARE * largest[name.split("_")[0]] / sizes[name]
+        if regressor_rms.get(name, 0.0) > 0.0:
+            least = SMALL_SHARE * largest[name.split("_")[0]] / regressor_rms[name]
         found.append(Derivative(name, value, float(half), float(max(abs(value), least))))
     return tuple(found)
 
 
-def trace(left: Array, model: Array, windows: Sequence[IntArray]) -> Trace:
-    """Return measured and modelled coefficient (n,) over the samples of some windows."""
+def coefficient_history(
+    response: Array, model: Array, windows: Sequence[IntArray]
+) -> CoefficientHistory:
+    """Return a measured and a modelled coefficient, (n,) each, over the samples of some windows."""
     measured, fitted = [], []
     for samples in windows:
-        gap = left[samples] - model[samples]
-        line = np.linspace(-1.0, 1.0, len(samples))[:, None] ** np.arange(2)
-        gone = line @ np.linalg.lstsq(line, gap, rcond=None)[0]
-        measured.append(left[samples])
-        fitted.append(model[samples] + gone)
-    return Trace(np.concatenate(measured), np.concatenate(fitted))
+        residual = response[samples] - model[samples]
+        trend = np.linspace(-1.0, 1.0, len(samples))[:, None] ** np.arange(2)
+        measured.append(response[samples])
+        fitted.append(model[samples] + trend @ np.linalg.lstsq(trend, residual, rcond=None)[0])
+    return CoefficientHistory(np.concatenate(measured), np.concatenate(fitted))

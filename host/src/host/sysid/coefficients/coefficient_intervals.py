@@ -1,4 +1,4 @@
-"""From where a search ended to a fit: intervals with geometry in them, validation, both in one."""
+"""From the end of the search to the result: geometric prior, intervals, maneuver agreement."""
 
 from __future__ import annotations
 
@@ -11,146 +11,201 @@ from host.arrays import Array
 from host.sysid.coefficients.aero_equations import KINEMATIC
 from host.sysid.coefficients.coefficient_fit import (
     CoefficientFit,
+    CoefficientHistory,
     Derivative,
-    Flight,
-    Pull,
-    Trace,
-    derivatives,
-    trace,
+    MeanCondition,
+    ThrustEffect,
+    coefficient_history,
+    derivatives_with_intervals,
 )
 from host.sysid.coefficients.coefficient_problem import (
+    EquationData,
     FlightProblem,
-    Rows,
+    alpha_range,
     density,
-    flown_range,
-    force_means,
+    mean_force_regressors,
     mean_levels,
-    regressor_sizes,
+    regressor_rms,
 )
-from host.sysid.coefficients.deletion_diagnostics import LastStep, Prediction, prediction, pulls
+from host.sysid.coefficients.deletion_diagnostics import (
+    CrossValidation,
+    FinalStep,
+    cross_validation,
+    maneuver_influence,
+)
 from host.sysid.coefficients.geometry_prior import apply_geometry_prior
-from host.sysid.coefficients.trim_derivatives import Local, Mean, local_derivatives, zero_lift_drag
+from host.sysid.coefficients.trim_derivatives import (
+    DerivativesAtTrim,
+    TrimMeans,
+    derivatives_at_trim,
+    zero_lift_drag,
+)
 from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, agreement_of
 
 
 @dataclass(frozen=True)
-class Searched:
-    """Coefficients and errors of the instrument found; how mean levels move with the errors."""
+class SearchResult:
+    """Where the search ended.
+
+    Attributes
+    ----------
+    problem : FlightProblem
+    theta : Array, shape (coefficients,)
+    errors : Array, shape (errors,)
+        Estimated sensor errors.
+    level_slopes : Array, shape (3, errors)
+        Derivatives of `mean_levels` by the sensor errors.
+    final : FinalStep
+    """
 
     problem: FlightProblem
     theta: Array
     errors: Array
-    levels: Array
-    last: LastStep
+    level_slopes: Array
+    final: FinalStep
 
     @cached_property
-    def rows(self) -> Rows:
-        """The equations at the errors found."""
-        return self.problem.rows(self.problem.record, self.problem.flown, self.errors)
+    def data(self) -> EquationData:
+        """The equations at the estimated sensor errors."""
+        return self.problem.evaluate(self.problem.record, self.problem.history, self.errors)
 
 
-def local(problem: FlightProblem, rows: Rows, state: Array, levels: Array | None = None) -> Local:
-    """Return told terms and what follows from them: value, slope with the state."""
-    _, drag, lift = mean_levels(problem, rows)
-    moved = np.zeros((3, len(state)))
-    if levels is not None:
-        moved[:, -levels.shape[1] :] = levels
-    mean = Mean(problem.condition[2], lift, drag, moved[2], moved[1])
-    return local_derivatives(problem.model, state, problem.position, mean)
+def derivatives_of(
+    problem: FlightProblem, data: EquationData, state: Array, level_slopes: Array | None = None
+) -> DerivativesAtTrim:
+    """Return the derivatives at the mean condition of a flight, with their slopes.
+
+    Parameters
+    ----------
+    problem : FlightProblem
+    data : EquationData
+    state : Array, shape (n,)
+        All unknowns, sensor errors last.
+    level_slopes : Array, shape (3, errors), optional
+        Of `mean_levels`; without them CL and CD count as exact.
+    """
+    _, drag, lift = mean_levels(problem, data)
+    slopes = np.zeros((3, len(state)))
+    if level_slopes is not None:
+        slopes[:, -level_slopes.shape[1] :] = level_slopes
+    means = TrimMeans(problem.condition[2], lift, drag, slopes[2], slopes[1])
+    return derivatives_at_trim(problem.model, state, problem.position, means)
 
 
 @dataclass(frozen=True, slots=True)
 class CoefficientIntervals:
-    """Derivatives with their intervals, the errors of the instrument, and their joint covariance.
+    """Derivatives with their intervals, sensor errors, and their joint covariance.
 
-    `state` is the estimate once the airframe's drawing is counted in; `repeats` is how single
-    maneuvers scatter about it.
+    Attributes
+    ----------
+    state : Array, shape (n,)
+        Estimate with the geometric prior.
+    derivatives : tuple of Derivative
+    errors : dict
+        Sensor error to its estimate and standard deviation.
+    covariance : Array, shape (derivatives + errors, derivatives + errors)
+    maneuver_agreement : ManeuverAgreement
+        Scatter of the maneuvers about the joint estimate.
     """
 
     state: Array
     derivatives: tuple[Derivative, ...]
     errors: dict[str, tuple[float, float]]
     covariance: Array
-    repeats: ManeuverAgreement
+    maneuver_agreement: ManeuverAgreement
 
 
-def intervals(ended: Searched) -> CoefficientIntervals:
-    """Add what geometry says, drag at zero lift, and what maneuvers scatter beyond chance."""
-    problem, last, levels = ended.problem, ended.last, ended.levels
-    rows, position = ended.rows, problem.position
-    state = np.concatenate([ended.theta, np.zeros(last.unknowns.gusts), ended.errors])
-    before = local(problem, rows, state)
-    state, covariance, kept = apply_geometry_prior(
-        state, last.solved.covariance, before, problem.airframe
+def intervals(search: SearchResult) -> CoefficientIntervals:
+    """Apply the geometric prior, add drag at zero lift, test the agreement of the maneuvers."""
+    problem, final, level_slopes = search.problem, search.final, search.level_slopes
+    data, position = search.data, problem.position
+    state = np.concatenate([search.theta, np.zeros(final.unknowns.gusts), search.errors])
+    state, covariance, gain_complement = apply_geometry_prior(
+        state,
+        final.solution.covariance,
+        derivatives_of(problem, data, state),
+        problem.airframe,
     )
-    found = local(problem, rows, state, levels)
-    _, drag, lift = mean_levels(problem, rows)
+    found = derivatives_of(problem, data, state, level_slopes)
+    _, drag, lift = mean_levels(problem, data)
     if "CL_alpha" in found and "CD_alpha" in found:
-        mean = Mean(problem.condition[2], lift, drag, levels[2], levels[1])
-        means = force_means(problem, rows)
-        found["CD_0"] = zero_lift_drag(problem.model, state, position, mean, means, found)
+        means = TrimMeans(problem.condition[2], lift, drag, level_slopes[2], level_slopes[1])
+        regressor_means = mean_force_regressors(problem, data)
+        found["CD_0"] = zero_lift_drag(
+            problem.model, state, position, means, regressor_means, found
+        )
     values = {name: value for name, (value, _) in found.items()}
-    errors = slice(last.unknowns.first_error, None)
-    slopes = np.vstack([*(slope for _, slope in found.values()), np.eye(len(state))[errors]])
-    own = slopes @ covariance @ slopes.T
+    errors = slice(final.unknowns.first_error, None)
+    jacobian = np.vstack([*(slope for _, slope in found.values()), np.eye(len(state))[errors]])
+    joint = jacobian @ covariance @ jacobian.T
     agreement = agreement_of(
-        tuple(values), *pulls(last, problem.blocks, slopes[: len(values)] @ kept)
+        tuple(values),
+        *maneuver_influence(final, problem.windows, jacobian[: len(values)] @ gain_complement),
     )
-    own[np.diag_indices(len(values))] += agreement.extra_variance
-    left = np.sqrt(np.maximum(np.diag(covariance)[errors], 0.0))
-    pairs = zip(state[errors].tolist(), left.tolist(), strict=True)
+    joint[np.diag_indices(len(values))] += agreement.extra_variance
+    deviations = np.sqrt(np.maximum(np.diag(covariance)[errors], 0.0))
+    pairs = zip(state[errors].tolist(), deviations.tolist(), strict=True)
     return CoefficientIntervals(
         state,
-        derivatives(values, own[: len(values), : len(values)], regressor_sizes(problem, rows)),
-        dict(zip(problem.names, pairs, strict=True)),
-        own,
+        derivatives_with_intervals(
+            values, joint[: len(values), : len(values)], regressor_rms(problem, data)
+        ),
+        dict(zip(problem.error_names, pairs, strict=True)),
+        joint,
         agreement,
     )
 
 
-def validation(ended: Searched) -> Prediction | None:
-    """Return how well each maneuver is predicted by all others; None where none can be."""
-    return prediction(ended.last, ended.problem.blocks)
+def validation(search: SearchResult) -> CrossValidation | None:
+    """Return how each maneuver is predicted by all others; None if none can be left out."""
+    return cross_validation(search.final, search.problem.windows)
 
 
 def coefficient_fit(
-    ended: Searched, widths: CoefficientIntervals, predicted: Prediction | None
+    search: SearchResult, widths: CoefficientIntervals, predicted: CrossValidation | None
 ) -> CoefficientFit:
-    """Return the parts of all stages as one fit."""
-    problem, rows = ended.problem, ended.rows
-    _, drag, lift = mean_levels(problem, rows)
-    flight = Flight(
-        *problem.condition, lift, drag, _pull(problem), flown_range(problem, rows), problem.faster
-    )
+    """Return the parts of all stages as one result."""
+    problem, data = search.problem, search.data
+    _, drag, lift = mean_levels(problem, data)
     return CoefficientFit(
-        widths.derivatives,
-        widths.covariance,
-        widths.errors,
-        flight,
-        _traces(problem, rows, widths.state),
-        predicted,
-        widths.repeats,
+        derivatives=widths.derivatives,
+        covariance=widths.covariance,
+        errors=widths.errors,
+        condition=MeanCondition(
+            *problem.condition,
+            lift,
+            drag,
+            _thrust_effect(problem),
+            alpha_range(problem, data),
+            problem.airspeed_ratio,
+        ),
+        histories=_histories(problem, data, widths.state),
+        prediction=predicted,
+        maneuver_agreement=widths.maneuver_agreement,
     )
 
 
-def _pull(problem: FlightProblem) -> Pull:
-    """Return what thrust does on the mean of the flight."""
-    plant, flown = problem.plant, problem.flown
-    spin, thrust = (float(np.mean(x)) for x in (flown.spin_radps, flown.thrust_n))
+def _thrust_effect(problem: FlightProblem) -> ThrustEffect:
+    """Return thrust, its slope and its arm at the mean condition of the flight."""
+    plant, history = problem.powerplant, problem.history
+    spin, thrust = (float(np.mean(x)) for x in (history.spin_radps, history.thrust_n))
     air = float(np.mean(density(problem.record)))
     arm_m = plant.hub_m[2] * plant.axis[0] - plant.hub_m[0] * plant.axis[2]
-    return Pull(thrust, plant.slope(spin, problem.condition[0], air), float(arm_m))
+    return ThrustEffect(thrust, plant.slope(spin, problem.condition[0], air), float(arm_m))
 
 
-def _traces(problem: FlightProblem, rows: Rows, state: Array) -> dict[str, Trace]:
+def _histories(
+    problem: FlightProblem, data: EquationData, state: Array
+) -> dict[str, CoefficientHistory]:
     """Return every force and moment coefficient in time, measured and modelled."""
     found = {}
-    for name, equation in rows.equations.items():
+    for name, equation in data.equations.items():
         if name in KINEMATIC:
             continue
-        model = np.zeros_like(equation.left)
-        for place, regressor in zip(problem.places[name], equation.terms.values(), strict=True):
-            model += state[place] * regressor
-        mine = [b.places for b in problem.blocks if name in b.names]
-        found[name] = trace(equation.left, model, mine)
+        model = np.zeros_like(equation.response)
+        terms = zip(problem.positions[name], equation.regressors.values(), strict=True)
+        for index, regressor in terms:
+            model += state[index] * regressor
+        windows = [w.positions for w in problem.windows if name in w.equations]
+        found[name] = coefficient_history(equation.response, model, windows)
     return found

@@ -1,6 +1,6 @@
-"""Which terms each force and moment coefficient is made of: data, read from TOML.
+"""Model structure: the terms of each force and moment coefficient, read from TOML.
 
-`standard.toml` holds the equations used when nothing is given, and the words a term is made of.
+`standard.toml` has the equations used when nothing is given, and the syntax of a term.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.toml_document import read_document
 
 SIGNALS = ("alpha", "beta", "p", "q", "r", "de", "da", "dr", "V")
-LIFT = "CL"  # as a signal: the polar's
+LIFT = "CL"  # as a regressor: of the drag polar
 WIND, BODY = ("CL", "CD"), ("CZ", "CX")
 MOMENTS_AND_SIDE = ("Cm", "CY", "Cl", "Cn")
 KIND = "coefficients"
@@ -38,7 +38,7 @@ class CoefficientTerm:
 
     @property
     def label(self) -> str:
-        """What follows the row in a coefficient's name: ``alpha``, ``alpha2``, ``abs_beta``."""
+        """The coefficient's name behind its equation: ``alpha``, ``alpha2``, ``abs_beta``."""
         return "_".join(
             f"{'abs_' if bars else ''}{signal}{power if power > 1 else ''}"
             for signal, power, bars in self.factors
@@ -49,13 +49,13 @@ class CoefficientTerm:
         """Whether it is one signal as it stands."""
         return len(self.factors) == 1 and self.factors[0][1:] == (1, False)
 
-    def values(self, signals: Mapping[str, Array], about: Mapping[str, float]) -> Array:
-        """Return the regressor (n,); in a product signals count from where `about` says."""
+    def values(self, signals: Mapping[str, Array], reference: Mapping[str, float]) -> Array:
+        """Return the regressor, (n,); signals in a product are relative to `reference`."""
         if self.linear:
             return signals[self.factors[0][0]]
         product: Array | None = None
         for name, power, bars in self.factors:
-            factor = signals[name] - about[name] if name in about else signals[name]
+            factor = signals[name] - reference[name] if name in reference else signals[name]
             factor = np.abs(factor) if bars else factor
             factor = factor**power if power > 1 else factor
             product = factor if product is None else product * factor
@@ -65,22 +65,31 @@ class CoefficientTerm:
 
 @dataclass(frozen=True, slots=True)
 class CoefficientModel:
-    """Terms of every row, in the order of the fit; those at `beside` are fitted and not told."""
+    """Terms of every equation, in the order of the fit.
+
+    Attributes
+    ----------
+    name : str
+    equations : mapping
+        Equation, such as ``Cm``, to its terms.
+    nuisance : frozenset of str
+        Coefficients that are fitted and not reported.
+    """
 
     name: str
-    rows: Mapping[str, tuple[CoefficientTerm, ...]]
-    beside: frozenset[str]
+    equations: Mapping[str, tuple[CoefficientTerm, ...]]
+    nuisance: frozenset[str]
 
     @property
     def forces(self) -> tuple[str, str]:
-        """Rows of normal and axial force: CL and CD, or CZ and CX."""
-        return WIND if WIND[0] in self.rows else BODY
+        """Equations of normal and axial force: CL and CD, or CZ and CX."""
+        return WIND if WIND[0] in self.equations else BODY
 
     def named(self) -> Iterator[tuple[str, str, CoefficientTerm]]:
-        """Return coefficient name, row and term of everything fitted."""
-        for row, terms in self.rows.items():
+        """Return coefficient name, equation and term of everything fitted."""
+        for equation, terms in self.equations.items():
             for term in terms:
-                yield f"{row}_{term.label}", row, term
+                yield f"{equation}_{term.label}", equation, term
 
 
 @cache
@@ -90,50 +99,60 @@ def standard_model() -> CoefficientModel:
 
 
 def is_coefficient_model(path: Path) -> bool:
-    """Return whether a TOML file says of itself that it is one of these."""
+    """Return whether a TOML file is of this kind, by its own key."""
     try:
         return bool(read_document(path).get("kind") == KIND)
     except IdentificationError:
-        return False  # whoever reads it says what is wrong
+        return False  # the reader of the file reports what is wrong
 
 
 def read_coefficient_model(path: Path) -> CoefficientModel:
     """Read the terms of every coefficient.
 
+    Parameters
+    ----------
+    path : Path
+        TOML; its tables ``[rows]`` and ``[beside]`` are terms reported and nuisance terms.
+
+    Parameters
+    ----------
+    path : Path
+        TOML; its tables ``[rows]`` and ``[beside]`` are terms reported and nuisance terms.
+
     Raises
     ------
     IdentificationError
-        Not TOML, a row absent or unknown, a term unknown or doubled; in one line.
+        If it is not TOML, an equation is absent or unknown, a term is unknown or doubled.
     """
     document = read_document(path)
-    strangers = sorted(set(document) - set(KEYS))
-    if strangers:
+    unknown = sorted(set(document) - set(KEYS))
+    if unknown:
         raise IdentificationError(
-            f"{path}: unknown key {', '.join(strangers)}; known are {', '.join(KEYS)}"
+            f"{path}: unknown key {', '.join(unknown)}; known are {', '.join(KEYS)}"
         )
-    told, beside = (_lists(document.get(key, {}), f"{path}: [{key}]") for key in KEYS[2:])
-    forces = BODY if set(BODY) & set(told) else WIND
-    wanted = (*forces, *MOMENTS_AND_SIDE)
-    for row in (*told, *beside):
-        if row not in wanted:
+    reported, nuisance = (_lists(document.get(key, {}), f"{path}: [{key}]") for key in KEYS[2:])
+    forces = BODY if set(BODY) & set(reported) else WIND
+    expected = (*forces, *MOMENTS_AND_SIDE)
+    for row in (*reported, *nuisance):
+        if row not in expected:
             raise IdentificationError(
                 f"{path}: unknown row {row}; a model has CL and CD or CZ and CX, and"
                 f" {', '.join(MOMENTS_AND_SIDE)}"
             )
-    absent = [row for row in wanted if not told.get(row)]
+    absent = [row for row in expected if not reported.get(row)]
     if absent:
         raise IdentificationError(f"{path}: no terms for {', '.join(absent)}; [rows] needs all six")
-    rows, hidden = {}, set()
-    for row in wanted:
-        texts = [*told[row], *beside.get(row, ())]
+    equations, not_reported = {}, set()
+    for row in expected:
+        texts = [*reported[row], *nuisance.get(row, ())]
         terms = tuple(parse_term(text, row, f"{path}: {row}") for text in texts)
         for term, count in Counter(terms).items():
             if count > 1:
                 raise IdentificationError(f"{path}: {row}: {term.label} stands there twice")
-        rows[row] = terms
-        hidden |= {f"{row}_{term.label}" for term in terms[len(told[row]) :]}
+        equations[row] = terms
+        not_reported |= {f"{row}_{term.label}" for term in terms[len(reported[row]) :]}
     name = str(document.get("name", path.stem))
-    return CoefficientModel(name, rows, frozenset(hidden))
+    return CoefficientModel(name, equations, frozenset(not_reported))
 
 
 def _lists(value: object, where: str) -> dict[str, list[str]]:
@@ -146,12 +165,20 @@ def _lists(value: object, where: str) -> dict[str, list[str]]:
 
 
 def parse_term(text: str, row: str, where: str) -> CoefficientTerm:
-    """Return the term a text stands for; `row` says where ``CL^2`` may stand.
+    """Return the term that a text means.
+
+    Parameters
+    ----------
+    text : str
+    row : str
+        Its equation: only CD may have ``CL^2``.
+    where : str
+        Begins the error message.
 
     Raises
     ------
     IdentificationError
-        If it is none.
+        If it is no term.
     """
     powers: Counter[tuple[str, bool]] = Counter()
     for part in text.split("*"):

@@ -1,7 +1,10 @@
-"""The linear motion and natural modes of the aircraft that a fit of coefficients found.
+"""Linear motion and natural modes of the aircraft from a fit of coefficients.
 
-Mass and inertia cancel: what is uncertain in a moment coefficient by the inertia assumed is exact
-in the motion it stands for, and the joint covariance of both says so.
+Errors of mass and inertia cancel: a moment coefficient is uncertain by the inertia assumed, but the
+motion computed from both is not, because their joint covariance is used.
+
+Linearised equations of motion in level flight: Etkin & Reid, Dynamics of Flight, ch. 4; Klein &
+Morelli, Aircraft System Identification, ch. 3.
 """
 
 from __future__ import annotations
@@ -22,13 +25,13 @@ SIGNALS = {
     "longitudinal": (("airspeed_mps", "alpha_rad", "q_radps", "theta_rad"), ("elevator_rad",)),
     "lateral": (("beta_rad", "p_radps", "r_radps", "phi_rad"), ("aileron_rad", "rudder_rad")),
 }
-# What the linear motion is made of; a model need not have all of it.
-MOTION = (
+# Coefficients in the linear motion; a model need not have all of them.
+LINEAR_MOTION = (
     *(f"{row}_{k}" for row in ("CL", "CD", "Cm") for k in ("alpha", "q", "de", "V")),
     *(f"{row}_{k}" for row in ("CY", "Cl", "Cn") for k in ("beta", "p", "r", "da", "dr")),
 )
 
-BETWEEN = (
+CONVERSION_ERRORS = (
     "mass_share", "ixx_share", "iyy_share", "izz_share",
     "pitot_scale", "pitot_drift_pa", "density_share",
 )  # fmt: skip
@@ -43,10 +46,10 @@ def coefficient_modes(fit: CoefficientFit, airframe: AirframeData) -> tuple[Mode
     airframe : AirframeData
         The one the fit was made with.
     """
-    base, moved, steps = _moved(fit, airframe)
+    base, perturbed, steps = _perturbed(fit, airframe)
     found: list[Mode] = []
     for k, named in enumerate((longitudinal_names, lateral_names)):
-        slopes = [(m[k][0] - base[k][0]) / step for m, step in zip(moved, steps, strict=True)]
+        slopes = [(m[k][0] - base[k][0]) / step for m, step in zip(perturbed, steps, strict=True)]
         own = eigenmodes(base[k][0], slopes, fit.covariance)
         names = named([m.oscillatory for m in own])
         called = [replace(m, name=name) for m, name in zip(own, names, strict=True)]
@@ -55,8 +58,16 @@ def coefficient_modes(fit: CoefficientFit, airframe: AirframeData) -> tuple[Mode
 
 
 @dataclass(frozen=True, slots=True)
-class System:
-    """States' rates by states (A) and inputs (B), each with its 95 % half-width."""
+class LinearSystem:
+    """x' = A x + B u; every entry with its 95 % half-width.
+
+    Attributes
+    ----------
+    states, inputs : tuple of str
+        Names that end in their SI unit.
+    A, A_half : Array, shape (n, n)
+    B, B_half : Array, shape (n, m)
+    """
 
     states: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -67,50 +78,50 @@ class System:
 
 
 def quantities(fit: CoefficientFit) -> Quantities:
-    """Return what a fit found as `to_derivatives` takes it, mass, inertia and pitot beside it.
+    """Return the estimates for `to_derivatives`, with errors of mass, inertia, pitot and density.
 
-    Moments of a fit are at the CG as it was and angles are true: neither the place of the CG nor a
-    sensor's scale stands between them and the motion.
+    Moments of a fit are at the actual CG and angles are true, so errors of the CG and of vane
+    scales do not enter the conversion.
     """
     table = {d.name: d.value for d in fit.derivatives} | {n: e for n, (e, _) in fit.errors.items()}
-    names = [n for n in table if n in MOTION or n in BETWEEN]
+    names = [n for n in table if n in LINEAR_MOTION or n in CONVERSION_ERRORS]
     at = [list(table).index(n) for n in names]
     values = np.array([table[n] for n in names])
     return Quantities(tuple(names), values, fit.covariance[np.ix_(at, at)])
 
 
-def dimensional(fit: CoefficientFit, airframe: AirframeData) -> dict[str, System]:
-    """Return the linear motion that coefficients stand for, ``longitudinal`` and ``lateral``.
+def linear_systems(fit: CoefficientFit, airframe: AirframeData) -> dict[str, LinearSystem]:
+    """Return the linear systems of the coefficients, ``longitudinal`` and ``lateral``.
 
     Parameters
     ----------
     fit : CoefficientFit
     airframe : AirframeData
-        The one the fit was made with; what mass and inertia may be wrong by cancels.
+        The one the fit was made with; errors of its mass and inertia cancel.
     """
-    base, moved, steps = _moved(fit, airframe)
+    base, perturbed, steps = _perturbed(fit, airframe)
     found = {}
     for k, (name, (states, inputs)) in enumerate(SIGNALS.items()):
         halves = []
         for part in (0, 1):
             slope = np.stack(
-                [(m[k][part] - base[k][part]) / s for m, s in zip(moved, steps, strict=True)]
+                [(m[k][part] - base[k][part]) / s for m, s in zip(perturbed, steps, strict=True)]
             )
             variance = np.einsum("iab,ij,jab->ab", slope, fit.covariance, slope)
             halves.append(NORMAL_95 * np.sqrt(np.maximum(variance, 0.0)))
-        found[name] = System(states, inputs, *base[k], *halves)
+        found[name] = LinearSystem(states, inputs, *base[k], *halves)
     return found
 
 
 Matrices = tuple[Array, Array]
 
 
-def _moved(
+def _perturbed(
     fit: CoefficientFit, airframe: AirframeData
 ) -> tuple[tuple[Matrices, Matrices], list[tuple[Matrices, Matrices]], Array]:
-    """Return both systems, and with each unknown moved by a step; the steps."""
+    """Return both systems, the systems with each unknown perturbed by a step, and the steps."""
     names = [d.name for d in fit.derivatives] + list(fit.errors)
-    absent = dict.fromkeys(MOTION, 0.0)
+    absent = dict.fromkeys(LINEAR_MOTION, 0.0)
     state = np.array([d.value for d in fit.derivatives] + [e for e, _ in fit.errors.values()])
 
     def systems(values: Array) -> tuple[Matrices, Matrices]:
@@ -118,26 +129,30 @@ def _moved(
         return longitudinal(table, fit, airframe), lateral(table, fit, airframe)
 
     steps = 1e-3 * np.maximum(np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)), 1e-9)
-    moved = [
+    perturbed = [
         systems(state + step * row) for step, row in zip(steps, np.eye(len(state)), strict=True)
     ]
-    return systems(state), moved, steps
+    return systems(state), perturbed, steps
 
 
 def longitudinal(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -> Matrices:
     """Return the system of airspeed, alpha, q, theta in level flight, and its inputs."""
-    f = fit.flight
-    V, force = _moving(v, fit, a, f.faster[0])
+    f = fit.condition
+    V, force = _speed_and_force(v, fit, a, f.airspeed_ratio[0])
     mass = a.mass_kg * (1.0 + v["mass_share"])
     iyy = a.iyy_kgm2 * (1.0 + v["iyy_share"])
     hat, g = 0.5 * a.chord_m / V, GRAVITY_MPS2
     pitch = force * a.chord_m / iyy
     # In trim the moments of air and thrust cancel; with airspeed one grows, the other falls.
-    by_speed = f.pull.arm_m * (f.pull.slope_npmps - 2.0 * f.pull.thrust_n / V) / iyy
+    by_speed = (
+        f.thrust_effect.arm_m
+        * (f.thrust_effect.slope_npmps - 2.0 * f.thrust_effect.thrust_n / V)
+        / iyy
+    )
     A = np.array(
         [
             [
-                (f.pull.slope_npmps - 2.0 * force * f.drag / V) / mass
+                (f.thrust_effect.slope_npmps - 2.0 * force * f.drag / V) / mass
                 - force * v["CD_V"] / (mass * V),
                 g - force * v["CD_alpha"] / mass, 0.0, -g,
             ],
@@ -156,8 +171,8 @@ def longitudinal(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -
 
 def lateral(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -> Matrices:
     """Return the system of beta, p, r, phi in level flight, and its inputs."""
-    f = fit.flight
-    V, force = _moving(v, fit, a, f.faster[1])
+    f = fit.condition
+    V, force = _speed_and_force(v, fit, a, f.airspeed_ratio[1])
     mass = a.mass_kg * (1.0 + v["mass_share"])
     ixx, izz = (n * (1.0 + v[k]) for n, k in ((a.ixx_kgm2, "ixx_share"), (a.izz_kgm2, "izz_share")))
     inertia = np.array([[ixx, -a.ixz_kgm2], [-a.ixz_kgm2, izz]])
@@ -176,10 +191,13 @@ def lateral(v: Mapping[str, float], fit: CoefficientFit, a: AirframeData) -> Mat
     return A, B
 
 
-def _moving(
-    v: Mapping[str, float], fit: CoefficientFit, a: AirframeData, faster: float
+def _speed_and_force(
+    v: Mapping[str, float], fit: CoefficientFit, a: AirframeData, airspeed_ratio: float
 ) -> tuple[float, float]:
-    """Return airspeed and dynamic pressure times wing area, the errors of pitot and density out."""
-    qbar_pa = (fit.flight.qbar_pa - v["pitot_drift_pa"]) / (1.0 + v["pitot_scale"])
-    share = qbar_pa / fit.flight.qbar_pa / (1.0 + v["density_share"])
-    return fit.flight.airspeed_mps * faster * share**0.5, qbar_pa * faster**2 * a.wing_area_m2
+    """Return airspeed and dynamic pressure times wing area, corrected for pitot and density."""
+    qbar_pa = (fit.condition.qbar_pa - v["pitot_drift_pa"]) / (1.0 + v["pitot_scale"])
+    share = qbar_pa / fit.condition.qbar_pa / (1.0 + v["density_share"])
+    return (
+        fit.condition.airspeed_mps * airspeed_ratio * share**0.5,
+        qbar_pa * airspeed_ratio**2 * a.wing_area_m2,
+    )

@@ -1,7 +1,7 @@
-"""The equations of one flight at assumed errors of the instrument, and the means of the flight.
+"""One flight as an estimation problem: its equations at assumed sensor errors, their slopes.
 
-What `fit` asks for at every round: the flight as recorded and the aircraft as known stay, errors of
-the instrument change.
+The record and what is known of the aircraft stay the same in all rounds of the search; only the
+sensor errors change.
 """
 
 from __future__ import annotations
@@ -16,10 +16,16 @@ from host.aircraft.powerplant import Powerplant
 from host.arrays import Array, IntArray
 from host.constants import GRAVITY_MPS2
 from host.instrument.deviations import SensorErrorModel
-from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, Flown, equations
+from host.sysid.coefficients.aero_equations import KINEMATIC, Equation, FlightHistory, equations
 from host.sysid.coefficients.coefficient_model import CoefficientModel
 from host.sysid.coefficients.slow_gusts import LENGTH_M
-from host.sysid.coefficients.window_spectra import Block, Key, Window, transformed, window_block
+from host.sysid.coefficients.window_spectra import (
+    EquationKey,
+    Window,
+    WindowTransform,
+    equation_spectra,
+    window_transform,
+)
 from host.sysid.compatibility.inverse_sensor_model import (
     Record,
     Spectrum,
@@ -28,22 +34,31 @@ from host.sysid.compatibility.inverse_sensor_model import (
 )
 
 STEP = 0.3  # of a standard deviation: width of the numeric slopes
-OF_THE_BODY = ("mass_share", "ixx_share", "iyy_share", "izz_share", "thrust_share")  # no sensor's
-Slopes = dict[Key, Spectrum]
+# Errors that change no corrected signal.
+MASS_AND_THRUST = ("mass_share", "ixx_share", "iyy_share", "izz_share", "thrust_share")
+SensorErrorSlopes = dict[EquationKey, Spectrum]
 
 
 @dataclass(slots=True)
-class Rows:
-    """Signals of a whole flight; its equations at the samples of all windows, and transformed per
-    window: left side, then regressors.
+class EquationData:
+    """The equations of a flight for one set of sensor errors.
 
-    `lift` and `drag` are the coefficients at these samples; `along_mps2` is the mean specific force
-    along the path of the whole flight.
+    Attributes
+    ----------
+    signals : dict
+        Corrected signals of the whole flight, (n,) each, SI.
+    equations : dict
+        By name, at the samples of all windows (m,).
+    spectra : dict
+        Response and regressors by equation and window, (F, 1 + terms).
+    lift, drag : Array, shape (m,)
+    along_mps2 : float
+        Mean specific force along the path of the whole flight.
     """
 
     signals: dict[str, Array]
     equations: dict[str, Equation]
-    spectra: dict[Key, Spectrum]
+    spectra: dict[EquationKey, Spectrum]
     lift: Array
     drag: Array
     along_mps2: float
@@ -55,167 +70,217 @@ class FlightProblem:
 
     Attributes
     ----------
+    model : CoefficientModel
     record : Record
-    flown : Flown
-        As far as the instrument is right.
+    history : FlightHistory
+        For sensor errors of zero.
+    airframe : AirframeData
+    sensors : SensorErrorModel
+    powerplant : Powerplant
     condition : tuple of float
         Mean airspeed (m/s) and dynamic pressure (Pa) of all maneuvers, mean angle of attack (rad)
-        of the elevator's.
-    faster : tuple of float
-        Mean airspeed of the elevator's maneuvers, and of the others, over that of all.
-    blocks : list of Block
-        One a window.
-    every : (m,) IntArray
+        of the elevator maneuvers.
+    airspeed_ratio : tuple of float
+        Mean airspeed of the elevator maneuvers, and of the others, over that of all.
+    windows : list of WindowTransform
+    window_samples : IntArray, shape (m,)
         Samples of all windows.
-    names : tuple of str
-        Errors of the instrument, in their order.
+    error_names : tuple of str
+        Sensor errors in the order of the unknowns.
     """
 
     model: CoefficientModel
     record: Record
-    flown: Flown
+    history: FlightHistory
     airframe: AirframeData
-    data: SensorErrorModel
-    plant: Powerplant
+    sensors: SensorErrorModel
+    powerplant: Powerplant
     condition: tuple[float, float, float]
-    faster: tuple[float, float]
-    blocks: list[Block]
-    every: IntArray
-    names: tuple[str, ...]
+    airspeed_ratio: tuple[float, float]
+    windows: list[WindowTransform]
+    window_samples: IntArray
+    error_names: tuple[str, ...]
 
     @property
     def position(self) -> dict[str, int]:
-        """Where coefficients stand among the unknowns, by name."""
+        """Index of each coefficient among the unknowns, by name."""
         return {name: k for k, (name, _, _) in enumerate(self.model.named())}
 
     @property
-    def places(self) -> dict[str, IntArray]:
-        """Where those of each equation stand, in the order of its terms."""
-        rows = [row for _, row, _ in self.model.named()]
-        every = (*self.model.rows, *KINEMATIC)
-        return {name: np.flatnonzero([row == name for row in rows]) for name in every}
+    def positions(self) -> dict[str, IntArray]:
+        """Indices of the coefficients of each equation, in the order of its terms."""
+        of_term = [equation for _, equation, _ in self.model.named()]
+        names = (*self.model.equations, *KINEMATIC)
+        return {name: np.flatnonzero([x == name for x in of_term]) for name in names}
 
-    def balance_mps2(self, gust_mps: float) -> float:
-        """Return the deviation of the mean tangential balance: vertical gusts left in the mean."""
+    def balance_deviation_mps2(self, gust_mps: float) -> float:
+        """Return the standard deviation of the mean tangential balance.
+
+        Parameters
+        ----------
+        gust_mps : float
+            Standard deviation of the vertical gust, whose mean over the flight is not zero.
+        """
         V = self.condition[0]
         lengths = V * self.record.samples * self.record.dt_s / LENGTH_M["w"]
         return float(GRAVITY_MPS2 * gust_mps / V / np.sqrt(lengths))
 
-    def rows(
+    def evaluate(
         self,
         record: Record,
-        flown: Flown,
+        history: FlightHistory,
         errors: Array,
-        own: Mapping[str, Array] | None = None,
+        coefficients: Mapping[str, Array] | None = None,
         signals: dict[str, Array] | None = None,
-    ) -> Rows:
-        """Return all equations for given instrument errors, transformed.
+    ) -> EquationData:
+        """Return all equations for given sensor errors, with their spectra.
 
-        With `own`, the coefficients of each equation, only what they leave of the left side.
-        `signals` are those for the same errors of the sensors, where they are known already.
+        Parameters
+        ----------
+        record, history
+            The flight, or its gust-free simulation.
+        errors : Array, shape (errors,)
+        coefficients : mapping, optional
+            By equation. With them the response is the residual and there are no regressors.
+        signals : dict, optional
+            Corrected signals for the same sensor errors, where they are known already.
         """
-        table = dict(zip(self.names, errors.tolist(), strict=True))
-        s = signals or apply_sensor_errors(record, table, self.data, self.condition[0])
+        table = dict(zip(self.error_names, errors.tolist(), strict=True))
+        s = signals or apply_sensor_errors(record, table, self.sensors, self.condition[0])
         found = equations(
-            self.model, record, s, table, flown, self.airframe, self.plant, self.condition[2],
-            self.every,
-        )  # fmt: skip
-        full = found.rows
-        if own is not None:
-            full = {name: _left_over(e, own[name]) for name, e in full.items()}
-        spectra = transformed(full, self.blocks)
-        return Rows(s, full, spectra, found.lift, found.drag, found.along_mps2)
+            self.model,
+            record,
+            s,
+            table,
+            history,
+            self.airframe,
+            self.powerplant,
+            self.condition[2],
+            self.window_samples,
+        )
+        by_name = found.by_name
+        if coefficients is not None:
+            by_name = {name: _residual(e, coefficients[name]) for name, e in by_name.items()}
+        spectra = equation_spectra(by_name, self.windows)
+        return EquationData(s, by_name, spectra, found.lift, found.drag, found.along_mps2)
 
 
-def _left_over(equation: Equation, own: Array) -> Equation:
-    """Return what coefficients leave of the left side."""
-    left = equation.left.copy()
-    for factor, regressor in zip(own, equation.terms.values(), strict=True):
-        left -= factor * regressor
-    return Equation(left, {})
+def _residual(equation: Equation, coefficients: Array) -> Equation:
+    """Return the equation with its residual as response and no regressors."""
+    residual = equation.response.copy()
+    for factor, regressor in zip(coefficients, equation.regressors.values(), strict=True):
+        residual -= factor * regressor
+    return Equation(residual, {})
 
 
-def moved_by_errors(
+def sensor_error_slopes(
     problem: FlightProblem,
     record: Record,
-    flown: Flown,
-    rows: Rows,
-    own: Mapping[str, Array],
+    history: FlightHistory,
+    base: EquationData,
+    coefficients: Mapping[str, Array],
     errors: Array,
     sd: Array,
-) -> tuple[Slopes, Array]:
-    """Return how residuals and mean levels (3, errors) move with every instrument error.
+) -> tuple[SensorErrorSlopes, Array]:
+    """Return the derivatives of residuals and mean levels by every sensor error.
 
     Parameters
     ----------
     problem : FlightProblem
-    record, flown
-        The flight, or a gust-free one.
-    rows : Rows
+    record, history
+        The flight, or its gust-free simulation.
+    base : EquationData
         Its equations at `errors`.
-    own : mapping
-        Coefficients of each equation.
-    errors, sd : (errors,) Array
-        Of the instrument, and their standard deviations before.
+    coefficients : mapping
+        By equation.
+    errors, sd : Array, shape (errors,)
+        Sensor errors and their prior standard deviations.
+
+    Returns
+    -------
+    slopes : dict
+        By equation and window, (F, errors).
+    level_slopes : Array, shape (3, errors)
+        Of `mean_levels`.
     """
-    start = {k: v[:, 0] - v[:, 1:] @ own[k[0]] for k, v in rows.spectra.items()}
+    start = {k: v[:, 0] - v[:, 1:] @ coefficients[k[0]] for k, v in base.spectra.items()}
     slopes = {k: np.zeros((len(v), len(sd)), np.complex128) for k, v in start.items()}
-    base = mean_levels(problem, rows)
-    levels = np.zeros((len(base), len(sd)))
-    for j, (name, width) in enumerate(zip(problem.names, STEP * sd, strict=True)):
-        moved = errors.copy()
-        moved[j] += width
-        same = rows.signals if name in OF_THE_BODY else None
-        other = problem.rows(record, flown, moved, own, same)
-        levels[:, j] = (mean_levels(problem, other) - base) / width
+    base_levels = mean_levels(problem, base)
+    level_slopes = np.zeros((len(base_levels), len(sd)))
+    for j, (name, width) in enumerate(zip(problem.error_names, STEP * sd, strict=True)):
+        perturbed = errors.copy()
+        perturbed[j] += width
+        same = base.signals if name in MASS_AND_THRUST else None
+        other = problem.evaluate(record, history, perturbed, coefficients, same)
+        level_slopes[:, j] = (mean_levels(problem, other) - base_levels) / width
         for key, spectrum in other.spectra.items():
             slopes[key][:, j] = (spectrum[:, 0] - start[key]) / width
-    return slopes, levels
+    return slopes, level_slopes
 
 
-def prepared(
+def flight_problem(
     model: CoefficientModel,
     record: Record,
     t: Array,
     windows: Sequence[Window],
     airframe: AirframeData,
-    data: SensorErrorModel,
-    plant: Powerplant,
-    names: tuple[str, ...],
+    sensors: SensorErrorModel,
+    powerplant: Powerplant,
+    error_names: tuple[str, ...],
 ) -> FlightProblem:
-    """Return the problem of a record, cut to an even grid `t` (n,), s.
+    """Return the problem of a record.
 
-    `names` are those of the instrument's errors.
+    Parameters
+    ----------
+    model : CoefficientModel
+    record : Record
+    t : Array, shape (n,)
+        Its even grid, s.
+    windows : sequence of Window
+    airframe, sensors, powerplant
+        Of the aircraft file.
+    error_names : tuple of str
+        Sensor errors to estimate.
     """
-    zero = dict.fromkeys(names, 0.0)
-    picked = [np.flatnonzero((t >= w.first_s) & (t <= w.last_s)) for w in windows]
-    every = np.unique(np.concatenate(picked))
+    zero = dict.fromkeys(error_names, 0.0)
+    samples = [np.flatnonzero((t >= w.first_s) & (t <= w.last_s)) for w in windows]
+    window_samples = np.unique(np.concatenate(samples))
     speed = np.sqrt(2.0 * np.maximum(record.columns["qbar_pa"], 1.0) / density(record))
-    s = apply_sensor_errors(record, zero, data, float(speed[every].mean()))
-    flying = s["V"] * np.cos(s["alpha"])
-    driving = (record.columns["throttle"], flying, density(record))
-    flown = Flown(
-        *plant.run(*driving, record.dt_s),
+    s = apply_sensor_errors(record, zero, sensors, float(speed[window_samples].mean()))
+    axial = s["V"] * np.cos(s["alpha"])
+    driving = (record.columns["throttle"], axial, density(record))
+    history = FlightHistory(
+        *powerplant.run(*driving, record.dt_s),
         *attitude(record, s),
-        s["V"] / float(s["V"][every].mean()) - 1.0,
-        flying,
-        plant.settled_slopes(*(float(x[every].mean()) for x in driving)),
+        s["V"] / float(s["V"][window_samples].mean()) - 1.0,
+        axial,
+        powerplant.settled_slopes(*(float(x[window_samples].mean()) for x in driving)),
     )
-    along = np.concatenate([k for k, w in zip(picked, windows, strict=True) if w.longitudinal])
+    along = np.concatenate([k for k, w in zip(samples, windows, strict=True) if w.longitudinal])
     condition = (
-        float(s["V"][every].mean()),
-        float(s["qbar"][every].mean()),
+        float(s["V"][window_samples].mean()),
+        float(s["qbar"][window_samples].mean()),
         float(s["alpha"][along].mean()),
     )
-    across = np.concatenate([k for k, w in zip(picked, windows, strict=True) if not w.longitudinal])
+    across = np.concatenate(
+        [k for k, w in zip(samples, windows, strict=True) if not w.longitudinal]
+    )
     own_mps = [float(s["V"][k].mean()) for k in (along, across)]
-    faster = (own_mps[0] / condition[0], own_mps[1] / condition[0])
-    blocks = [
-        window_block(samples, record.dt_s, window, model.forces, every)
-        for samples, window in zip(picked, windows, strict=True)
-    ]
     return FlightProblem(
-        model, record, flown, airframe, data, plant, condition, faster, blocks, every, names
+        model=model,
+        record=record,
+        history=history,
+        airframe=airframe,
+        sensors=sensors,
+        powerplant=powerplant,
+        condition=condition,
+        airspeed_ratio=(own_mps[0] / condition[0], own_mps[1] / condition[0]),
+        windows=[
+            window_transform(inside, record.dt_s, window, model.forces, window_samples)
+            for inside, window in zip(samples, windows, strict=True)
+        ],
+        window_samples=window_samples,
+        error_names=error_names,
     )
 
 
@@ -224,43 +289,51 @@ def density(record: Record) -> Array:
     return record.columns["density_kgpm3"]
 
 
-def mean_levels(problem: FlightProblem, rows: Rows) -> Array:
-    """Return the tangential balance of the flight (m/s2) and the means of CD and CL."""
-    s, record = rows.signals, problem.record
+def mean_levels(problem: FlightProblem, data: EquationData) -> Array:
+    """Return the tangential balance of the flight (m/s2) and the means of CD and CL, (3,).
+
+    The balance is what mean specific force along the path, gain of speed and climb leave of each
+    other: zero but for sensor errors and the mean gust.
+    """
+    s, record = data.signals, problem.record
     static = record.columns["static_pa"]
     span = record.samples * record.dt_s
     climb = -(static[-1] - static[0]) / (float(np.mean(density(record))) * GRAVITY_MPS2 * span)
     gain = (s["V"][-1] - s["V"][0]) / span
-    balance = rows.along_mps2 - gain - GRAVITY_MPS2 * climb / problem.condition[0]
-    inside = np.concatenate(
-        [b.places for b in problem.blocks if problem.model.forces[0] in b.names]
-    )
-    return np.array([balance, *(float(x[inside].mean()) for x in (rows.drag, rows.lift))])
+    balance = data.along_mps2 - gain - GRAVITY_MPS2 * climb / problem.condition[0]
+    inside = _force_samples(problem)
+    return np.array([balance, *(float(x[inside].mean()) for x in (data.drag, data.lift))])
 
 
-def flown_range(problem: FlightProblem, rows: Rows) -> tuple[float, float]:
-    """Return the least and the largest angle of attack (rad) of the elevator's maneuvers."""
-    own = [rows.signals["alpha"][b.samples] for b in problem.blocks if "u" in b.names]
+def alpha_range(problem: FlightProblem, data: EquationData) -> tuple[float, float]:
+    """Return the least and the largest angle of attack (rad) of the elevator maneuvers."""
+    own = [data.signals["alpha"][w.samples] for w in problem.windows if "u" in w.equations]
     return float(min(x.min() for x in own)), float(max(x.max() for x in own))
 
 
-def force_means(problem: FlightProblem, rows: Rows) -> dict[str, float]:
-    """Return the mean of every regressor of the forces over the elevator's maneuvers."""
+def mean_force_regressors(problem: FlightProblem, data: EquationData) -> dict[str, float]:
+    """Return the mean of every regressor of the forces over the elevator maneuvers."""
     model = problem.model
-    inside = np.concatenate([b.places for b in problem.blocks if model.forces[0] in b.names])
+    inside = _force_samples(problem)
     return {
-        name: float(np.mean(rows.equations[row].terms[term.label][inside]))
-        for name, row, term in model.named()
-        if row in model.forces
+        name: float(np.mean(data.equations[equation].regressors[term.label][inside]))
+        for name, equation, term in model.named()
+        if equation in model.forces
     }
 
 
-def regressor_sizes(problem: FlightProblem, rows: Rows) -> dict[str, float]:
+def regressor_rms(problem: FlightProblem, data: EquationData) -> dict[str, float]:
     """Return the rms of every regressor about its mean in each window, by name of the term."""
     result = {}
-    for name, equation in rows.equations.items():
-        windows = [b.places for b in problem.blocks if name in b.names]
-        for term, values in equation.terms.items():
+    for name, equation in data.equations.items():
+        windows = [w.positions for w in problem.windows if name in w.equations]
+        for term, values in equation.regressors.items():
             parts = np.concatenate([values[k] - values[k].mean() for k in windows])
             result[f"{name}_{term}"] = float(np.sqrt(np.mean(parts**2)))
     return result
+
+
+def _force_samples(problem: FlightProblem) -> IntArray:
+    """Return the positions of the samples of all elevator maneuvers."""
+    normal_force = problem.model.forces[0]
+    return np.concatenate([w.positions for w in problem.windows if normal_force in w.equations])

@@ -1,11 +1,11 @@
-"""Non-dimensional derivatives straight from flight, with every stated uncertainty in the interval.
+"""Search for non-dimensional derivatives and sensor errors of one flight.
 
-Force, moment and kinematic equations of all maneuvers are compared in the frequency domain, their
-coefficients and the errors of the instrument found together (Gauss-Newton; the errors have the
-aircraft file's and the calibration's uncertainty as prior). Left factors are gust-free
-(`gust_free`), so neither gusts nor sensor noise bias the answer; the weight of each equation comes
-from its own residuals. Klein & Morelli, Aircraft System Identification, ch. 5 and 7, for equation
-error in the frequency domain.
+Force, moment and kinematic equations of all maneuvers are compared in the frequency domain
+(equation error; Klein & Morelli, Aircraft System Identification, ch. 5 and 7). Their coefficients
+and the sensor errors are estimated together by Gauss-Newton steps; the prior of the sensor errors
+is the uncertainty in aircraft file and calibration. Instrumental variables from a gust-free
+simulation (`auxiliary_model`) keep gusts and sensor noise from biasing the estimate. The weight of
+each equation comes from the spectrum of its own residuals.
 """
 
 from __future__ import annotations
@@ -19,43 +19,49 @@ from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, deviations
-from host.sysid.coefficients.auxiliary_model import gust_free
+from host.sysid.coefficients.auxiliary_model import simulate_noise_free
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_intervals import (
-    Searched,
+    SearchResult,
     coefficient_fit,
+    derivatives_of,
     intervals,
-    local,
     validation,
 )
 from host.sysid.coefficients.coefficient_model import CoefficientModel, standard_model
 from host.sysid.coefficients.coefficient_problem import (
+    EquationData,
     FlightProblem,
-    Rows,
-    Slopes,
+    SensorErrorSlopes,
+    flight_problem,
     mean_levels,
-    moved_by_errors,
-    prepared,
+    sensor_error_slopes,
 )
-from host.sysid.coefficients.deletion_diagnostics import LastStep
-from host.sysid.coefficients.equation_blocks import Side, Unknowns, stretches, summed
-from host.sysid.coefficients.normal_equations import Known, stepped
-from host.sysid.coefficients.slow_gusts import gust_information, gust_strength, turned
-from host.sysid.coefficients.trim_derivatives import Local
-from host.sysid.coefficients.window_spectra import Window, noise_spectra
+from host.sysid.coefficients.deletion_diagnostics import FinalStep
+from host.sysid.coefficients.equation_blocks import (
+    EquationSpectra,
+    Unknowns,
+    accumulate,
+    equation_blocks,
+)
+from host.sysid.coefficients.normal_equations import Prior, solve_normal_equations
+from host.sysid.coefficients.slow_gusts import gust_information, gust_regressors, gust_strength
+from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
+from host.sysid.coefficients.window_spectra import Window, residual_spectra
 from host.sysid.compatibility.inverse_sensor_model import decimate, usable_length
 from host.sysid.identification_error import IdentificationError
 
-PLAIN_ROUNDS, FULL_ROUNDS = 3, 2  # without errors of the instrument and slow gusts, with them
-# Not estimated, only carried into the intervals: a vane's lag of 0.5 ms looks like an arm of 8 mm,
-# and estimating the arm drew CL_de 15 % and CY_beta 11 % off (simulated flights, seeds 300-303).
-# Pitot and density stay as calibrated too: the flight tells them no better than that, and what it
-# seems to tell drew CL_alpha 0.5 % and CD_0 off (seeds 900-939).
+# Rounds with the coefficients alone, then with sensor errors and slow gusts.
+COEFFICIENT_ROUNDS, JOINT_ROUNDS = 3, 2
+# Consider parameters: not estimated, only in the intervals. A vane's lag of 0.5 ms looks like an
+# arm of 8 mm, and estimating the arm biased CL_de by 15 % and CY_beta by 11 % (simulated flights,
+# seeds 300-303). Pitot and density stay as calibrated too: the flight determines them no better,
+# and estimating them biased CL_alpha by 0.5 % and CD_0 (seeds 900-939).
 CONSIDERED = (
     "cg_x_m", "imu_x_m", "ixx_share", "iyy_share", "izz_share",
     "pitot_scale", "pitot_drift_pa", "density_share",
 )  # fmt: skip
-HELD = 1e30  # inverse variance of what is not estimated, or not yet
+FIXED = 1e30  # inverse variance of what is not estimated, or not yet
 COLUMNS = (
     "alpha_rad", "beta_rad", "p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2",
     "phi_rad", "theta_rad", "elevator_rad", "aileron_rad", "rudder_rad", "throttle", "qbar_pa",
@@ -67,28 +73,32 @@ def search_coefficients(
     columns: Mapping[str, Array],
     windows: Sequence[Window],
     airframe: AirframeData,
-    data: SensorErrorModel,
-    plant: Powerplant,
+    sensors: SensorErrorModel,
+    powerplant: Powerplant,
     model: CoefficientModel | None = None,
-) -> Searched:
+) -> SearchResult:
     """Find the coefficients of lift, drag, side force and moments.
 
     Parameters
     ----------
     columns : mapping
-        SI columns on an even grid as decoded, not moved to the CG; airborne throughout.
+        SI columns (n,) on an even grid as decoded, not moved to the CG; airborne throughout.
     windows : sequence of Window
-        Maneuvers; at least one with the elevator and one with aileron and rudder.
-    airframe, data, plant
+        Maneuvers; at least one of the elevator and one of aileron and rudder.
+    airframe, sensors, powerplant
         Of the aircraft file.
     model : CoefficientModel, optional
         The terms of every coefficient; `standard_model` by default.
+
+    Returns
+    -------
+    SearchResult
 
     Raises
     ------
     IdentificationError
         If a column or an axis is missing, the search meets an unstable aircraft, or a term cannot
-        be told from others at all.
+        be separated from others at all.
     """
     missing = [c for c in ("t_s", *COLUMNS) if c not in columns]
     if missing:
@@ -105,119 +115,153 @@ def search_coefficients(
     t = t[shift : shift + kept]
     record = decimate(cut, float(t[-1] - t[0]) / (kept - 1))
     t = t[0] + np.arange(record.samples) * record.dt_s
-    prior = deviations(data, airframe)
-    names = tuple(prior)
-    problem = prepared(model or standard_model(), record, t, windows, airframe, data, plant, names)
-    return _search(problem, np.array(list(prior.values())))
+    sd = deviations(sensors, airframe)
+    problem = flight_problem(
+        model or standard_model(), record, t, windows, airframe, sensors, powerplant, tuple(sd)
+    )
+    return _search(problem, np.array(list(sd.values())))
 
 
 def fit_coefficients(
     columns: Mapping[str, Array],
     windows: Sequence[Window],
     airframe: AirframeData,
-    data: SensorErrorModel,
-    plant: Powerplant,
+    sensors: SensorErrorModel,
+    powerplant: Powerplant,
     model: CoefficientModel | None = None,
 ) -> CoefficientFit:
     """Return coefficients with intervals and prediction; arguments of `search_coefficients`."""
-    found = search_coefficients(columns, windows, airframe, data, plant, model)
+    found = search_coefficients(columns, windows, airframe, sensors, powerplant, model)
     return coefficient_fit(found, intervals(found), validation(found))
 
 
 @dataclass(slots=True)
-class _State:
-    """Where the search stands: coefficients, errors of the instrument, spectra of the residuals;
-    how residuals of the flight and of the gust-free one, and mean levels, move with the errors."""
+class _Iterate:
+    """The current iterate of the search.
+
+    Attributes
+    ----------
+    theta, errors : Array
+        Coefficients and sensor errors.
+    noise : dict
+        Frequency (Hz) and residual spectrum by equation.
+    slopes : tuple of dict
+        Derivatives of the residuals by the sensor errors, of the flight and of the gust-free one.
+    level_slopes : Array, shape (3, errors)
+    """
 
     theta: Array
     errors: Array
     noise: dict[str, tuple[Array, Array]]
-    slopes: tuple[Slopes, Slopes]
-    levels: Array
+    slopes: tuple[SensorErrorSlopes, SensorErrorSlopes]
+    level_slopes: Array
 
-    def own(self, problem: FlightProblem) -> dict[str, Array]:
-        """Return the coefficients of each equation."""
-        return {row: self.theta[at] for row, at in problem.places.items()}
+    def coefficients(self, problem: FlightProblem) -> dict[str, Array]:
+        """Return the coefficients by equation."""
+        return {name: self.theta[at] for name, at in problem.positions.items()}
 
 
-def _search(problem: FlightProblem, sd: Array) -> Searched:
-    """Return coefficients and errors of the instrument, known to `sd` before."""
+def _search(problem: FlightProblem, sd: Array) -> SearchResult:
+    """Run all rounds; `sd` are the prior standard deviations of the sensor errors."""
     position = problem.position
-    state = _State(np.zeros(len(position)), np.zeros(len(sd)), {}, ({}, {}), np.zeros((3, len(sd))))
-    considered = np.array([problem.names.index(n) for n in CONSIDERED])
-    for round_ in range(PLAIN_ROUNDS + FULL_ROUNDS):
-        rows, sides = _sides(problem, state, sd, round_)
-        gusts = sum(values.shape[1] for values in sides[0].gusts.values())
-        unknowns = Unknowns(problem.places, len(position), gusts, len(sd))
-        parts = stretches(problem.blocks, *sides, state.own(problem), unknowns, state.noise)
-        inverse_variance = np.full(len(sd), HELD)
-        if round_ >= PLAIN_ROUNDS:
+    iterate = _Iterate(
+        np.zeros(len(position)), np.zeros(len(sd)), {}, ({}, {}), np.zeros((3, len(sd)))
+    )
+    considered = np.array([problem.error_names.index(n) for n in CONSIDERED])
+    for round_ in range(COEFFICIENT_ROUNDS + JOINT_ROUNDS):
+        data, spectra = _linearise(problem, iterate, sd, round_)
+        gusts = sum(values.shape[1] for values in spectra[0].gusts.values())
+        unknowns = Unknowns(problem.positions, len(position), gusts, len(sd))
+        blocks = equation_blocks(
+            problem.windows, *spectra, iterate.coefficients(problem), unknowns, iterate.noise
+        )
+        inverse_variance = np.full(len(sd), FIXED)
+        if round_ >= COEFFICIENT_ROUNDS:
             inverse_variance = sd**-2.0
-            inverse_variance[considered] = HELD
-        solved = stepped(
-            summed(parts, unknowns.count),
-            _known(problem, rows, unknowns, state, inverse_variance),
+            inverse_variance[considered] = FIXED
+        solution = solve_normal_equations(
+            accumulate(blocks, unknowns.count),
+            _prior(problem, data, unknowns, iterate, inverse_variance),
             position,
             unknowns.first_error + considered,
             sd[considered],
         )
-        last = LastStep(parts, solved, unknowns, state.noise, rows.spectra)
-        state.theta = state.theta + solved.step[: unknowns.terms]
-        state.errors = state.errors + solved.step[unknowns.first_error :]
-        left_over = (((part.name, part.window), part.left(solved.step)) for part in parts)
-        state.noise = noise_spectra(problem.blocks, left_over, state.noise)
-    return Searched(problem, state.theta, state.errors, state.levels, last)
+        final = FinalStep(blocks, solution, unknowns, iterate.noise, data.spectra)
+        iterate.theta = iterate.theta + solution.step[: unknowns.coefficients]
+        iterate.errors = iterate.errors + solution.step[unknowns.first_error :]
+        residuals = (
+            ((block.equation, block.window), block.residual_after(solution.step))
+            for block in blocks
+        )
+        iterate.noise = residual_spectra(problem.windows, residuals, iterate.noise)
+    return SearchResult(problem, iterate.theta, iterate.errors, iterate.level_slopes, final)
 
 
-def _sides(
-    problem: FlightProblem, state: _State, sd: Array, round_: int
-) -> tuple[Rows, tuple[Side, Side]]:
-    """Return the equations where the search stands, then flight and gust-free flight."""
-    flown = problem.record, problem.flown
-    rows = left = problem.rows(*flown, state.errors)
+def _linearise(
+    problem: FlightProblem, iterate: _Iterate, sd: Array, round_: int
+) -> tuple[EquationData, tuple[EquationSpectra, EquationSpectra]]:
+    """Return the equations at the iterate, then spectra of the flight and of the gust-free one."""
+    flight = problem.record, problem.history
+    data = noise_free_data = problem.evaluate(*flight, iterate.errors)
     if round_ > 0:
-        found = local(problem, rows, state.theta)
-        calm = gust_free(
-            problem.record, rows.signals, problem.flown, _reader(found),
-            problem.airframe, problem.data, problem.condition,
-        )  # fmt: skip
-        left = problem.rows(*calm, state.errors)
-        if round_ == PLAIN_ROUNDS:
-            own = state.own(problem)
-            first, state.levels = moved_by_errors(problem, *flown, rows, own, state.errors, sd)
-            state.slopes = first, moved_by_errors(problem, *calm, left, own, state.errors, sd)[0]
-    return rows, (_side(problem, rows, state.slopes[0]), _side(problem, left, state.slopes[1]))
+        at_trim = derivatives_of(problem, data, iterate.theta)
+        noise_free = simulate_noise_free(
+            problem.record,
+            data.signals,
+            problem.history,
+            _value_of(at_trim),
+            problem.airframe,
+            problem.sensors,
+            problem.condition,
+        )
+        noise_free_data = problem.evaluate(*noise_free, iterate.errors)
+        if round_ == COEFFICIENT_ROUNDS:
+            own = iterate.coefficients(problem)
+            first, iterate.level_slopes = sensor_error_slopes(
+                problem, *flight, data, own, iterate.errors, sd
+            )
+            second, _ = sensor_error_slopes(
+                problem, *noise_free, noise_free_data, own, iterate.errors, sd
+            )
+            iterate.slopes = first, second
+    return data, (
+        _spectra(problem, data, iterate.slopes[0]),
+        _spectra(problem, noise_free_data, iterate.slopes[1]),
+    )
 
 
-def _side(problem: FlightProblem, rows: Rows, slopes: Slopes) -> Side:
-    """Return what rows are made of; slow gusts come with the errors of the instrument."""
-    return Side(rows.spectra, turned(rows.signals, problem.blocks) if slopes else {}, slopes)
+def _spectra(
+    problem: FlightProblem, data: EquationData, slopes: SensorErrorSlopes
+) -> EquationSpectra:
+    """Return the spectra of the equations; slow gusts are estimated with the sensor errors."""
+    gusts = gust_regressors(data.signals, problem.windows) if slopes else {}
+    return EquationSpectra(data.spectra, gusts, slopes)
 
 
-def _reader(found: Local) -> Callable[[str], float]:
-    """Return slopes by name, 0 where no term makes one."""
-    return lambda name: found[name][0] if name in found else 0.0
+def _value_of(at_trim: DerivativesAtTrim) -> Callable[[str], float]:
+    """Return derivatives by name, 0 of those that no term contributes to."""
+    return lambda name: at_trim[name][0] if name in at_trim else 0.0
 
 
-def _known(
+def _prior(
     problem: FlightProblem,
-    rows: Rows,
+    data: EquationData,
     unknowns: Unknowns,
-    state: _State,
+    iterate: _Iterate,
     inverse_variance: Array,
-) -> Known:
-    """Return what is known of errors, slow gusts and the balance of the flight before the step."""
-    information, pull = np.zeros((unknowns.count,) * 2), np.zeros(unknowns.count)
+) -> Prior:
+    """Return the prior of sensor errors, slow gusts and the tangential balance of the flight."""
+    information, gradient = np.zeros((unknowns.count,) * 2), np.zeros(unknowns.count)
     first = unknowns.first_error
     information[first:, first:] = np.diag(inverse_variance)
-    pull[first:] = -inverse_variance * state.errors
+    gradient[first:] = -inverse_variance * iterate.errors
     if unknowns.gusts:
         V, dt_s = problem.condition[0], problem.record.dt_s
-        strength = gust_strength(state.noise, V, dt_s)
-        gusts = slice(unknowns.terms, first)
-        information[gusts, gusts] = gust_information(problem.blocks, strength, V, dt_s)
-        within_mps2 = problem.balance_mps2(strength["w"])
-        balance = state.levels[0] / within_mps2
+        strength = gust_strength(iterate.noise, V, dt_s)
+        gusts = slice(unknowns.coefficients, first)
+        information[gusts, gusts] = gust_information(problem.windows, strength, V, dt_s)
+        deviation_mps2 = problem.balance_deviation_mps2(strength["w"])
+        balance = iterate.level_slopes[0] / deviation_mps2
         information[first:, first:] += np.outer(balance, balance)
-        pull[first:] -= balance * (mean_levels(problem, rows)[0] / within_mps2)
-    return Known(information, pull)
+        gradient[first:] -= balance * (mean_levels(problem, data)[0] / deviation_mps2)
+    return Prior(information, gradient)

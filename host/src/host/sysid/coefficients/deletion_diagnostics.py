@@ -1,4 +1,8 @@
-"""What the last step of the joint fit says of single terms and single maneuvers."""
+"""Single maneuvers against the joint fit: prediction by all others, and influence.
+
+Both follow from the linear problem of the last Gauss-Newton step with some blocks deleted (Belsley,
+Kuh & Welsch, Regression Diagnostics, 1980).
+"""
 
 from __future__ import annotations
 
@@ -9,123 +13,160 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.coefficients.aero_equations import KINEMATIC
-from host.sysid.coefficients.equation_blocks import Stretch, Unknowns, summed
-from host.sysid.coefficients.normal_equations import STILL, Step
-from host.sysid.coefficients.window_spectra import FLAT, Block, Key, row_weight, used
+from host.sysid.coefficients.equation_blocks import EquationBlock, Unknowns, accumulate
+from host.sysid.coefficients.normal_equations import ROUNDING, GaussNewtonStep
+from host.sysid.coefficients.window_spectra import (
+    AERO_TREND,
+    ROUNDING_SHARE,
+    EquationKey,
+    WindowTransform,
+    equation_weight,
+    in_band,
+)
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
 
-LEAST_ELSEWHERE = 0.1  # of what is known of each term: a maneuver that alone tells it must stay
+# Share of the information on each term that the other maneuvers must have.
+LEAST_REMAINING_SHARE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class LastStep:
-    """The linear problem of the last step: its stretches of rows, and what they were solved to.
+class FinalStep:
+    """The linear problem of the last step of the search.
 
-    `noise` are the spectra they are weighted by; `spectra` left sides and regressors.
+    Attributes
+    ----------
+    blocks : sequence of EquationBlock
+    solution : GaussNewtonStep
+    unknowns : Unknowns
+    noise : mapping
+        Frequency (Hz) and spectrum that the blocks are weighted by, by equation.
+    spectra : mapping
+        Response and regressors by equation and window, (F, 1 + terms).
     """
 
-    parts: Sequence[Stretch]
-    solved: Step
+    blocks: Sequence[EquationBlock]
+    solution: GaussNewtonStep
     unknowns: Unknowns
     noise: Mapping[str, tuple[Array, Array]]
-    spectra: Mapping[Key, Spectrum]
+    spectra: Mapping[EquationKey, Spectrum]
 
 
 @dataclass(frozen=True, slots=True)
-class Prediction:
-    """How well maneuvers are predicted: NRMSE of each coefficient between 0.1 and 4.5 Hz.
+class CrossValidation:
+    """Leave-one-out prediction of the maneuvers: NRMSE of each coefficient from 0.1 to 4.5 Hz.
 
-    Measured angles, rates and surfaces go in, gusts with them; each maneuver keeps a constant and
-    slope of its own. `fitted` by the joint answer; `unseen` by answers to all other maneuvers, for
-    those of `windows`: leave-one-out in the last step of the search, spectra of noise and gust-free
-    simulation as in the joint answer.
+    The prediction is one-step: measured angles, rates and surfaces enter it, gusts with them. Each
+    maneuver keeps a constant and a slope in time of its own.
+
+    Attributes
+    ----------
+    windows : tuple of int
+        Maneuvers that could be left out.
+    fitted : dict
+        NRMSE of these maneuvers by the joint fit.
+    left_out : dict
+        NRMSE of each of them by the fit to all others, in the last step of the search; residual
+        spectra and instrumental variables are those of the joint fit.
     """
 
     windows: tuple[int, ...]
     fitted: dict[str, float]
-    unseen: dict[str, float]
+    left_out: dict[str, float]
 
 
-def prediction(last: LastStep, blocks: Sequence[Block]) -> Prediction | None:
-    """Return how well single maneuvers are predicted by all others; None where none can be."""
-    windows: list[int] = []
+def cross_validation(
+    final: FinalStep, windows: Sequence[WindowTransform]
+) -> CrossValidation | None:
+    """Return how single maneuvers are predicted by all others; None if none can be left out."""
+    left_out: list[int] = []
     sums: dict[str, Array] = {}
-    known = _sizes(last, last.parts)
-    for window, block in enumerate(blocks):
-        mine = [part for part in last.parts if part.window == window]
-        # A maneuver that alone tells a term cannot be left out.
-        if np.any(known - _sizes(last, mine) < LEAST_ELSEWHERE * known):
+    information = _coefficient_information(final, final.blocks)
+    for number, window in enumerate(windows):
+        own = [block for block in final.blocks if block.window == number]
+        # A maneuver that alone determines a term cannot be left out.
+        remaining = information - _coefficient_information(final, own)
+        if np.any(remaining < LEAST_REMAINING_SHARE * information):
             continue
-        windows.append(window)
-        steps = last.solved.step, _without(last, mine)
-        for part in mine:
-            if part.name not in KINEMATIC:
-                squares = _misses(last, part, block, steps)
-                sums[part.name] = sums.get(part.name, np.zeros(3)) + squares
-    if not windows:
+        left_out.append(number)
+        steps = final.solution.step, _step_without(final, own)
+        for block in own:
+            if block.equation not in KINEMATIC:
+                squares = _sums_of_squares(final, block, window, steps)
+                sums[block.equation] = sums.get(block.equation, np.zeros(3)) + squares
+    if not left_out:
         return None
-    fitted, unseen = (
+    fitted, predicted = (
         {name: float(np.sqrt(s[k] / s[2])) for name, s in sums.items()} for k in (0, 1)
     )
-    return Prediction(tuple(windows), fitted, unseen)
+    return CrossValidation(tuple(left_out), fitted, predicted)
 
 
-def _sizes(last: LastStep, parts: Sequence[Stretch]) -> Array:
-    """Return sums of squares of the left factors of every coefficient."""
-    found = np.zeros(last.unknowns.count)
-    for part in parts:
-        found[part.columns] += np.einsum("ij,ij->j", part.Z, part.Z)
-    return found[: last.unknowns.terms]
+def _coefficient_information(final: FinalStep, blocks: Sequence[EquationBlock]) -> Array:
+    """Return the sum of squares of the instrumental variables of every coefficient."""
+    found = np.zeros(final.unknowns.count)
+    for block in blocks:
+        found[block.unknown_indices] += np.einsum("ij,ij->j", block.Z, block.Z)
+    return found[: final.unknowns.coefficients]
 
 
-def _without(last: LastStep, mine: Sequence[Stretch]) -> Array:
-    """Return the step without some stretches."""
-    less = summed(mine, last.unknowns.count)
-    normal, right = last.solved.normal - less.normal, last.solved.right - less.right
-    scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(normal)), STILL))
-    found: Array = scale * np.linalg.solve(normal * np.outer(scale, scale), scale * right)
+def _step_without(final: FinalStep, deleted: Sequence[EquationBlock]) -> Array:
+    """Return the step, (n,), with some blocks deleted from the normal equations."""
+    less = accumulate(deleted, final.unknowns.count)
+    matrix = final.solution.normal_matrix - less.matrix
+    right_side = final.solution.right_side - less.right_side
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(matrix)), ROUNDING))
+    found: Array = scale * np.linalg.solve(matrix * np.outer(scale, scale), scale * right_side)
     return found
 
 
-def _misses(last: LastStep, part: Stretch, block: Block, steps: tuple[Array, Array]) -> Array:
-    """Return squares of what two steps leave of an equation in a window, and of its left side."""
-    kept = used(block, part.name)
-    weight = np.tile(row_weight(block.hertz[kept], last.noise.get(part.name)), 2)
-    trends, measured = block.trends[kept, :2], last.spectra[part.name, part.window][kept, 0]
-    line = np.concatenate([trends.real, trends.imag])
-    gusts = last.unknowns.terms + np.arange(last.unknowns.gusts)
-    told = ~np.isin(part.columns, gusts)  # a slow gust is the maneuver's own
-    A, columns = part.A[:, told], part.columns[told]
+def _sums_of_squares(
+    final: FinalStep, block: EquationBlock, window: WindowTransform, steps: tuple[Array, Array]
+) -> Array:
+    """Return sums of squares, (3,): residual after each of two steps, and response."""
+    kept = in_band(window, block.equation)
+    noise = final.noise.get(block.equation)
+    weight = np.tile(equation_weight(window.frequency_hz[kept], noise), 2)
+    trends = window.trends[kept, :AERO_TREND]
+    response = final.spectra[block.equation, block.window][kept, 0]
+    trend = np.concatenate([trends.real, trends.imag])
+    gusts = final.unknowns.coefficients + np.arange(final.unknowns.gusts)
+    shared_columns = ~np.isin(block.unknown_indices, gusts)  # a slow gust is the maneuver's own
+    A, indices = block.A[:, shared_columns], block.unknown_indices[shared_columns]
     found = []
     for values in (
-        *((part.y - A @ step[columns]) / weight for step in steps),
-        np.concatenate([measured.real, measured.imag]),
+        *((block.y - A @ step[indices]) / weight for step in steps),
+        np.concatenate([response.real, response.imag]),
     ):
-        gone = line @ np.linalg.lstsq(line, values, rcond=FLAT)[0]
-        found.append(float(np.sum((values - gone) ** 2)))
+        fitted_trend = trend @ np.linalg.lstsq(trend, values, rcond=ROUNDING_SHARE)[0]
+        found.append(float(np.sum((values - fitted_trend) ** 2)))
     return np.array(found)
 
 
-def pulls(last: LastStep, blocks: Sequence[Block], told: Array) -> tuple[Array, Array, Array]:
-    """Return how far each maneuver pulls an answer, its share of its variance, the variance.
+def maneuver_influence(
+    final: FinalStep, windows: Sequence[WindowTransform], output_jacobian: Array
+) -> tuple[Array, Array, Array]:
+    """Return the influence of each maneuver on reported quantities.
 
     Parameters
     ----------
-    last : LastStep
-    blocks : sequence of Block
-    told : Array, shape (P, unknowns)
-        How the answer moves with what was estimated.
+    final : FinalStep
+    windows : sequence of WindowTransform
+    output_jacobian : Array, shape (P, n)
+        Derivative of the reported quantities by the unknowns.
 
     Returns
     -------
-    pull, share : Array, shape (maneuvers, P)
+    influence : Array, shape (maneuvers, P)
+        Part of each maneuver in the last step.
+    information_share : Array, shape (maneuvers, P)
+        Its part of the variance.
     variance : Array, shape (P,)
-        From noise and gusts alone: what the maneuvers have in common (mass, places) is not in it.
+        From noise and gusts alone: errors common to all maneuvers (mass, places) are not in it.
     """
-    moved = told @ last.solved.inverse
-    pull, share = (np.zeros((len(blocks), len(told))) for _ in range(2))
-    for part in last.parts:
-        through = part.level(part.Z) @ moved[:, part.columns].T
-        pull[part.window] += part.left(last.solved.step) @ through
-        share[part.window] += np.einsum("ij,ij->j", through, through)
-    return pull, share, np.sum(share, axis=0)
+    gain = output_jacobian @ final.solution.inverse
+    influence, share = (np.zeros((len(windows), len(output_jacobian))) for _ in range(2))
+    for block in final.blocks:
+        through = block.without_trend(block.Z) @ gain[:, block.unknown_indices].T
+        influence[block.window] += block.residual_after(final.solution.step) @ through
+        share[block.window] += np.einsum("ij,ij->j", through, through)
+    return influence, share, np.sum(share, axis=0)

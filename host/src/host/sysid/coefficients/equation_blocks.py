@@ -1,9 +1,9 @@
-"""One equation in one window: its rows over the few unknowns that move it, and sums over all.
+"""One equation in one window: its regressors over the unknowns that enter it; normal equations.
 
-Forty maneuvers have two hundred stretches of rows and three hundred unknowns; one stretch moves
-sixty of them: its terms, its slow gusts, errors of the instrument. Normal equations are sums over
-stretches, so that the matrix with a row for every frequency of a flight is never there. Constant
-and slope are each stretch's own: projected out, which is what solving for them leaves.
+Forty maneuvers have two hundred blocks and three hundred unknowns; one block contains sixty of
+them: its terms, its slow gusts, the sensor errors. The normal equations are sums over blocks, so
+the matrix with a line for every frequency of a flight is never formed. Each block has a constant
+and a slope in time of its own, which are projected out: the same result as estimating them.
 """
 
 from __future__ import annotations
@@ -14,127 +14,185 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, IntArray
-from host.sysid.coefficients.window_spectra import FLAT, Block, Key, degree, row_weight, used
+from host.sysid.coefficients.window_spectra import (
+    ROUNDING_SHARE,
+    EquationKey,
+    WindowTransform,
+    equation_weight,
+    in_band,
+    trend_count,
+)
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
 
 
 @dataclass(frozen=True, slots=True)
 class Unknowns:
-    """What is solved for: coefficients of every row, slow gusts, errors of the instrument."""
+    """The vector of unknowns: coefficients of every equation, slow gusts, sensor errors.
 
-    places: Mapping[str, IntArray]
-    terms: int
+    Attributes
+    ----------
+    positions : mapping
+        Equation to the indices of its coefficients.
+    coefficients, gusts, errors : int
+        Number of each kind, in this order in the vector.
+    """
+
+    positions: Mapping[str, IntArray]
+    coefficients: int
     gusts: int
     errors: int
 
     @property
     def count(self) -> int:
-        """How many they are."""
+        """Number of all unknowns."""
         return self.first_error + self.errors
 
     @property
     def first_error(self) -> int:
-        """Where errors of the instrument begin."""
-        return self.terms + self.gusts
+        """Index of the first sensor error."""
+        return self.coefficients + self.gusts
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
-    """What rows are made of, by equation and window, (F, k) each.
+class EquationSpectra:
+    """Spectra of the equations by equation and window, each (F, k).
 
-    `spectra` are left side and regressors; `gusts` what slow gusts add, `slopes` how the residual
-    moves with the instrument's errors: both empty as long as they are not estimated.
+    Attributes
+    ----------
+    spectra : mapping
+        Response in column 0, regressors behind it.
+    gusts : mapping
+        Regressors of the slow gusts; empty as long as they are not estimated.
+    slopes : mapping
+        Derivative of the residual by each sensor error; empty as long as they are not estimated.
     """
 
-    spectra: Mapping[Key, Spectrum]
-    gusts: Mapping[Key, Spectrum]
-    slopes: Mapping[Key, Spectrum]
+    spectra: Mapping[EquationKey, Spectrum]
+    gusts: Mapping[EquationKey, Spectrum]
+    slopes: Mapping[EquationKey, Spectrum]
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
-    """Slopes `A`, left factors `Z` and residual `y` of one equation in one window.
+class EquationBlock:
+    """One equation in one window; real parts of all frequencies, then imaginary parts, weighted.
 
-    Rows are real, then imaginary parts, weighted; `columns` are the unknowns that stand in `A` and
-    `Z`, `lines` an orthonormal basis of constant and slope.
+    Attributes
+    ----------
+    equation : str
+    window : int
+    unknown_indices : IntArray, shape (k,)
+        The unknowns that belong to the columns of `A` and `Z`.
+    A : Array, shape (2 F, k)
+        Regressors.
+    Z : Array, shape (2 F, k)
+        Instrumental variables: the regressors of the gust-free simulation.
+    y : Array, shape (2 F,)
+        Residual before the step.
+    trend_basis : Array, shape (2 F, lines)
+        Orthonormal basis of constant and slope in time.
     """
 
-    name: str
+    equation: str
     window: int
-    columns: IntArray
+    unknown_indices: IntArray
     A: Array
     Z: Array
     y: Array
-    lines: Array
+    trend_basis: Array
 
-    def level(self, values: Array) -> Array:
-        """Return rows, (rows,) or (rows, k), without constant and slope."""
-        return values - self.lines @ (self.lines.T @ values)
+    def without_trend(self, values: Array) -> Array:
+        """Return values, (2 F,) or (2 F, k), with constant and slope in time projected out."""
+        return values - self.trend_basis @ (self.trend_basis.T @ values)
 
-    def left(self, step: Array) -> Array:
-        """Return what a step of all unknowns leaves of the residual."""
-        return self.level(self.y - self.A @ step[self.columns])
+    def residual_after(self, step: Array) -> Array:
+        """Return the residual after a step of all unknowns, trend removed."""
+        return self.without_trend(self.y - self.A @ step[self.unknown_indices])
 
 
 @dataclass(frozen=True, slots=True)
-class Sums:
-    """Normal equations: left factors times slopes, times themselves, times residuals.
+class NormalEquations:
+    """Normal equations of instrumental variables (Ljung, System Identification, sec. 7.6).
 
-    `sizes` is the diagonal of the first with constants and slopes in it: what a regressor that
-    never moves is told by.
+    Attributes
+    ----------
+    matrix : Array, shape (n, n)
+        Z' A.
+    score_covariance : Array, shape (n, n)
+        Z' Z: covariance of the score for residuals of unit variance (White 1982).
+    right_side : Array, shape (n,)
+        Z' y.
+    diagonal : Array, shape (n,)
+        Diagonal of Z' A before the trends are projected out. A regressor that is constant in
+        every window is recognised by it.
     """
 
-    normal: Array
-    meat: Array
-    right: Array
-    sizes: Array
+    matrix: Array
+    score_covariance: Array
+    right_side: Array
+    diagonal: Array
 
 
-def stretches(
-    blocks: Sequence[Block],
-    measured: Side,
-    calm: Side,
-    own: Mapping[str, Array],
+def equation_blocks(
+    windows: Sequence[WindowTransform],
+    measured: EquationSpectra,
+    noise_free: EquationSpectra,
+    coefficients: Mapping[str, Array],
     unknowns: Unknowns,
     noise: Mapping[str, tuple[Array, Array]],
-) -> list[Stretch]:
-    """Return every equation of every window, weighted.
+) -> list[EquationBlock]:
+    """Return the weighted block of every equation of every window.
 
     Parameters
     ----------
-    blocks : sequence of Block
-    measured, calm : Side
-        Of the flight for slopes and residuals, of the gust-free one for left factors.
-    own : mapping
-        Coefficients of each equation so far.
+    windows : sequence of WindowTransform
+    measured : EquationSpectra
+        Of the flight; it gives regressors and residuals.
+    noise_free : EquationSpectra
+        Of the gust-free simulation; it gives the instrumental variables.
+    coefficients : mapping
+        Estimate so far, by equation.
     unknowns : Unknowns
     noise : mapping
-        Spectra of residuals; weight is one where none is known yet.
+        Frequency (Hz) and spectrum of the residuals by equation; an equation without has weight
+        one at every frequency.
     """
     found = []
-    after = unknowns.terms
+    after = unknowns.coefficients
     errors = np.arange(unknowns.first_error, unknowns.count)
-    for window, block in enumerate(blocks):
-        for name in block.names:
-            key = name, window
-            kept = used(block, name)
-            weight = row_weight(block.hertz[kept], noise.get(name))
-            columns = [unknowns.places[name]]
+    for number, window in enumerate(windows):
+        for name in window.equations:
+            key = name, number
+            kept = in_band(window, name)
+            weight = equation_weight(window.frequency_hz[kept], noise.get(name))
+            indices = [unknowns.positions[name]]
             if key in measured.gusts:
                 before, after = after, after + measured.gusts[key].shape[1]
-                columns.append(np.arange(before, after))
+                indices.append(np.arange(before, after))
             if measured.slopes:
-                columns.append(errors)
-            A, Z = (_real(_beside(side, key)[kept] * weight[:, None]) for side in (measured, calm))
+                indices.append(errors)
+            A, Z = (
+                _real(_columns(side, key)[kept] * weight[:, None])
+                for side in (measured, noise_free)
+            )
             spectrum = measured.spectra[key]
-            y = _real((spectrum[:, 0] - spectrum[:, 1:] @ own[name])[kept] * weight)
-            lines = _real(block.trends[kept, : degree(name)] * weight[:, None])
-            found.append(Stretch(name, window, np.concatenate(columns), A, Z, y, _basis(lines)))
+            residual = spectrum[:, 0] - spectrum[:, 1:] @ coefficients[name]
+            trend = _real(window.trends[kept, : trend_count(name)] * weight[:, None])
+            found.append(
+                EquationBlock(
+                    name,
+                    number,
+                    np.concatenate(indices),
+                    A,
+                    Z,
+                    _real(residual[kept] * weight),
+                    _orthonormal(trend),
+                )
+            )
     return found
 
 
-def _beside(side: Side, key: Key) -> Spectrum:
-    """Return columns of one stretch, (F, k)."""
+def _columns(side: EquationSpectra, key: EquationKey) -> Spectrum:
+    """Return the regressors of one block, (F, k): terms, slow gusts, sensor errors."""
     parts = [side.spectra[key][:, 1:]]
     if key in side.gusts:
         parts.append(side.gusts[key])
@@ -147,22 +205,22 @@ def _real(values: Spectrum) -> Array:
     return np.concatenate([values.real, values.imag])
 
 
-def _basis(lines: Array) -> Array:
-    """Return orthonormal columns, (rows, k); what is only rounding spans nothing."""
-    sizes = np.sqrt(np.einsum("ij,ij->j", lines, lines))
-    there = sizes > FLAT * np.max(sizes)
-    return np.linalg.qr(lines[:, there] / sizes[there])[0]
+def _orthonormal(columns: Array) -> Array:
+    """Return orthonormal columns of the same span, (2 F, k); columns of rounding are dropped."""
+    sizes = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    kept = sizes > ROUNDING_SHARE * np.max(sizes)
+    return np.linalg.qr(columns[:, kept] / sizes[kept])[0]
 
 
-def summed(parts: Sequence[Stretch], count: int) -> Sums:
-    """Return the normal equations of some stretches over all unknowns."""
-    normal, meat = np.zeros((count, count)), np.zeros((count, count))
-    right, sizes = np.zeros(count), np.zeros(count)
-    for part in parts:
-        at = np.ix_(part.columns, part.columns)
-        free = part.level(part.Z)
-        normal[at] += free.T @ part.A
-        meat[at] += free.T @ free
-        right[part.columns] += free.T @ part.y
-        sizes[part.columns] += np.einsum("ij,ij->j", part.Z, part.A)
-    return Sums(normal, meat, right, sizes)
+def accumulate(blocks: Sequence[EquationBlock], count: int) -> NormalEquations:
+    """Return the sum of the normal equations of some blocks over all `count` unknowns."""
+    matrix, score_covariance = np.zeros((count, count)), np.zeros((count, count))
+    right_side, diagonal = np.zeros(count), np.zeros(count)
+    for block in blocks:
+        at = np.ix_(block.unknown_indices, block.unknown_indices)
+        Z = block.without_trend(block.Z)
+        matrix[at] += Z.T @ block.A
+        score_covariance[at] += Z.T @ Z
+        right_side[block.unknown_indices] += Z.T @ block.y
+        diagonal[block.unknown_indices] += np.einsum("ij,ij->j", block.Z, block.A)
+    return NormalEquations(matrix, score_covariance, right_side, diagonal)

@@ -16,13 +16,13 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
-from host.sysid.coefficients.trim_derivatives import Local
+from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
 
 SIDEWASH_SHARE = 0.1  # standard deviation of CY_da over CY_beta
 
 
 def apply_geometry_prior(
-    state: Array, covariance: Array, at_trim: Local, airframe: AirframeData
+    state: Array, covariance: Array, at_trim: DerivativesAtTrim, airframe: AirframeData
 ) -> tuple[Array, Array, Array]:
     """Update estimate and covariance with the geometry of the control surfaces.
 

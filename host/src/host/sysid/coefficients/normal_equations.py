@@ -1,4 +1,9 @@
-"""One step of the search: normal equations and what is known before, to unknowns and covariance."""
+"""The Gauss-Newton step of the search: normal equations with prior, consider covariance.
+
+Coefficients and sensor errors are estimated; some sensor errors are only considered: they are not
+estimated, and their covariance is added to that of the estimate (Schmidt; Tapley, Schutz & Born,
+Statistical Orbit Determination, ch. 6).
+"""
 
 from __future__ import annotations
 
@@ -8,76 +13,120 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
-from host.sysid.coefficients.equation_blocks import Sums
+from host.sysid.coefficients.equation_blocks import NormalEquations
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.consider_covariance import consider_covariance
 
-LOST = 1e12  # by which a variance grows where a regressor never moves, or is the same as others
-STILL = 1e-30  # a sum of squares below it is rounding
+# Growth of the variance of a regressor that is constant or equal to others.
+UNDETERMINED = 1e12
+ROUNDING = 1e-30  # a sum of squares below it is rounding
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
-    """What is known before the flight: inverse covariance (n, n), its pull on the step (n,)."""
+class Prior:
+    """What is known of the unknowns before the flight.
+
+    Attributes
+    ----------
+    information : Array, shape (n, n)
+        Inverse covariance.
+    gradient : Array, shape (n,)
+        Right-hand side that it adds to the normal equations.
+    """
 
     information: Array
-    pull: Array
+    gradient: Array
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
-    """The step (n,) with its covariance; `normal` step = `right`, what is known before included."""
+class GaussNewtonStep:
+    """The solution of the normal equations.
+
+    Attributes
+    ----------
+    step : Array, shape (n,)
+    covariance : Array, shape (n, n)
+        Of the estimate after the step, consider parameters included.
+    normal_matrix, right_side : Array, shapes (n, n) and (n,)
+        ``normal_matrix @ step = right_side``, prior included.
+    inverse : Array, shape (n, n)
+        Of the normal matrix.
+    """
 
     step: Array
     covariance: Array
-    normal: Array
-    right: Array
+    normal_matrix: Array
+    right_side: Array
     inverse: Array
 
 
-def stepped(
-    sums: Sums, known: Known, position: Mapping[str, int], considered: IntArray, sd: Array
-) -> Step:
-    """Solve the normal equations.
+def solve_normal_equations(
+    equations: NormalEquations,
+    prior: Prior,
+    position: Mapping[str, int],
+    considered: IntArray,
+    sd: Array,
+) -> GaussNewtonStep:
+    """Solve the normal equations for one step.
 
     Parameters
     ----------
-    sums : Sums
-    known : Known
+    equations : NormalEquations
+        Z' A, Z' Z and Z' y of all blocks.
+    prior : Prior
     position : mapping
-        Where coefficients stand, by name.
-    considered : (k,) IntArray
-        Unknowns that are not estimated but carried into the covariance (Schmidt).
-    sd : (k,) Array
+        Index of each coefficient among the unknowns, by name.
+    considered : IntArray, shape (k,)
+        Unknowns that are not estimated but considered in the covariance.
+    sd : Array, shape (k,)
         Their standard deviations.
+
+    Returns
+    -------
+    GaussNewtonStep
 
     Raises
     ------
     IdentificationError
-        If a coefficient cannot be told at all.
+        If a coefficient cannot be determined at all.
     """
-    normal, right = sums.normal + known.information, sums.right + known.pull
-    sizes = sums.sizes + np.diag(known.information)
-    scale = 1.0 / np.sqrt(np.maximum(np.abs(sizes), STILL))
+    normal_matrix = equations.matrix + prior.information
+    right_side = equations.right_side + prior.gradient
+    diagonal = equations.diagonal + np.diag(prior.information)
+    scale = 1.0 / np.sqrt(np.maximum(np.abs(diagonal), ROUNDING))
     both = np.outer(scale, scale)
-    inverse = told_inverse(normal * both, sizes * scale**2 < 0.5, position) * both
-    drawn = -inverse @ sums.normal[:, considered]
-    drawn[considered] = np.eye(len(considered))
-    covariance = inverse @ (sums.meat + known.information) @ inverse.T
-    covariance += consider_covariance((drawn * sd).T)
-    return Step(inverse @ right, covariance, normal, right, inverse)
+    constant = diagonal * scale**2 < 0.5
+    inverse = invert_normal_matrix(normal_matrix * both, constant, position) * both
+    # Tapley, Schutz & Born, ch. 6: sensitivity of the estimate to the consider parameters.
+    consider_sensitivity = -inverse @ equations.matrix[:, considered]
+    consider_sensitivity[considered] = np.eye(len(considered))
+    # Sandwich with the instrumental variables Z; Ljung, System Identification, sec. 7.6.
+    covariance = inverse @ (equations.score_covariance + prior.information) @ inverse.T
+    covariance += consider_covariance((consider_sensitivity * sd).T)
+    return GaussNewtonStep(inverse @ right_side, covariance, normal_matrix, right_side, inverse)
 
 
-def told_inverse(normal: Array, still: BoolArray, position: Mapping[str, int]) -> Array:
-    """Return the inverse of a scaled matrix; name the terms if it has none.
+def invert_normal_matrix(scaled: Array, constant: BoolArray, position: Mapping[str, int]) -> Array:
+    """Invert the scaled normal matrix.
 
-    `still` says of each column whether it never moves, (n,).
+    Parameters
+    ----------
+    scaled : Array, shape (n, n)
+    constant : BoolArray, shape (n,)
+        Columns whose regressor is constant in every window.
+    position : mapping
+        Index of each coefficient, by name.
+
+    Raises
+    ------
+    IdentificationError
+        If it is singular for a coefficient; the message names the undeterminable terms.
     """
     try:
-        found = np.linalg.inv(normal)
+        found = np.linalg.inv(scaled)
     except np.linalg.LinAlgError:
-        found = np.linalg.pinv(normal, rcond=1e-13) + np.diag(still) * 2.0 * LOST
-    lost = [n for n, k in position.items() if not abs(found[k, k]) < LOST]
+        found = np.linalg.pinv(scaled, rcond=1e-13) + np.diag(constant) * 2.0 * UNDETERMINED
+    lost = [n for n, k in position.items() if not abs(found[k, k]) < UNDETERMINED]
     if lost:
         raise IdentificationError(
             f"the flight cannot tell {', '.join(lost)}: what they go with never moves, or is the"

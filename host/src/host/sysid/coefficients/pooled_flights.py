@@ -1,10 +1,10 @@
-"""Fits of several flights as one: noise averages out, errors of the instrument do not.
+"""Fits of several flights as one: noise averages out, sensor errors do not.
 
-Each flight is fitted alone. Of its covariance P the part that goes with the errors of the
-instrument, L L' with L = P_xe P_ee^(-1/2), is the same error in every flight and is not averaged;
-the rest is the flight's own noise, and the flights are weighted by it. An error that is new at
-every power-on counts as if it were the same: intervals are rather too wide. Where flights scatter
-more than noise and errors allow, the interval is widened to it (`numerics/repeats`).
+Each flight is fitted alone. The part of its covariance P that is correlated with the sensor errors,
+L L' with L = P_xe P_ee^(-1/2), is the same error in every flight and is not averaged. The rest is
+the flight's own noise, and its inverse is the weight of the flight. An error that is new at every
+power-on is treated as common too, so intervals are rather too wide. Where flights scatter more than
+noise and errors allow, the interval is widened (`numerics/maneuver_agreement`).
 """
 
 from __future__ import annotations
@@ -15,15 +15,21 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import NORMAL_95
-from host.sysid.coefficients.coefficient_fit import CoefficientFit, Derivative, Flight, Pull, Trace
-from host.sysid.coefficients.deletion_diagnostics import Prediction
+from host.sysid.coefficients.coefficient_fit import (
+    CoefficientFit,
+    CoefficientHistory,
+    Derivative,
+    MeanCondition,
+    ThrustEffect,
+)
+from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.numerics.maneuver_agreement import agreement_of
 
-LEAST = 1e-12  # of the largest: an eigenvalue below it is rounding
+LEAST_EIGENVALUE = 1e-12  # of the largest; below it is rounding
 
 
-def pooled(fits: Sequence[CoefficientFit]) -> CoefficientFit:
+def pool_fits(fits: Sequence[CoefficientFit]) -> CoefficientFit:
     """Return one fit of several flights by the same terms and instrument.
 
     Parameters
@@ -36,17 +42,17 @@ def pooled(fits: Sequence[CoefficientFit]) -> CoefficientFit:
     count = len(fits[0].derivatives)
     names = [d.name for d in fits[0].derivatives]
     found = np.stack([_state(fit) for fit in fits])
-    common = np.stack([_common(fit.covariance, count) for fit in fits])
+    common = np.stack([_common_error_root(fit.covariance, count) for fit in fits])
     own = np.stack([f.covariance - c @ c.T for f, c in zip(fits, common, strict=True)])
     noise = np.maximum(np.einsum("kii->ki", own), 1e-300)
     weight = np.full_like(found, 1.0 / len(fits))
     weight[:, :count] = (1.0 / noise / np.sum(1.0 / noise, axis=0))[:, :count]
     state = np.sum(weight * found, axis=0)
     covariance = np.einsum("ki,kij,kj->ij", weight, own, weight)
-    moved = weight[:, :count] * (found - state)[:, :count]
-    whole = np.einsum("kii->ki", np.stack([fit.covariance for fit in fits]))
-    expected = np.sum(weight**2 * whole, axis=0)[:count]
-    agreement = agreement_of(tuple(names), moved, weight[:, :count], expected)
+    influence = weight[:, :count] * (found - state)[:, :count]
+    total_variance = np.einsum("kii->ki", np.stack([fit.covariance for fit in fits]))
+    expected = np.sum(weight**2 * total_variance, axis=0)[:count]
+    agreement = agreement_of(tuple(names), influence, weight[:, :count], expected)
     covariance += consider_covariance(np.einsum("ki,kij->ji", weight, common))
     covariance[np.diag_indices(count)] += agreement.extra_variance
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -60,62 +66,65 @@ def pooled(fits: Sequence[CoefficientFit]) -> CoefficientFit:
         ),
         covariance=covariance,
         errors={name: (value, deviation) for name, value, deviation in errors},
-        flight=_mean_flight([fit.flight for fit in fits]),
-        traces={
-            name: Trace(
-                np.concatenate([fit.traces[name].measured for fit in fits]),
-                np.concatenate([fit.traces[name].model for fit in fits]),
+        condition=_mean_condition([fit.condition for fit in fits]),
+        histories={
+            name: CoefficientHistory(
+                np.concatenate([fit.histories[name].measured for fit in fits]),
+                np.concatenate([fit.histories[name].model for fit in fits]),
             )
-            for name in fits[0].traces
+            for name in fits[0].histories
         },
         prediction=_predictions([fit.prediction for fit in fits]),
-        repeats=agreement,
+        maneuver_agreement=agreement,
     )
 
 
 def _state(fit: CoefficientFit) -> Array:
-    """Return derivatives, then errors of the instrument."""
+    """Return derivatives, then sensor errors, (n,)."""
     errors = [value for value, _ in fit.errors.values()]
     return np.array([*(d.value for d in fit.derivatives), *errors])
 
 
 def _floor(d: Derivative) -> float:
-    """Return what would contribute 5 % of the row, where a derivative contributes less."""
+    """Return what would contribute 5 % of its equation, where a derivative contributes less."""
     return d.reference if d.reference > abs(d.value) else 0.0
 
 
-def _common(covariance: Array, count: int) -> Array:
-    """Return L, (n, errors): what one deviation of each combination of errors does."""
+def _common_error_root(covariance: Array, count: int) -> Array:
+    """Return L, (n, errors): shifts by one standard deviation of each principal sensor error."""
     errors = covariance[count:, count:]
     size, vectors = np.linalg.eigh(errors)
-    kept = size > LEAST * size[-1]
-    root = (vectors[:, kept] / np.sqrt(size[kept])) @ vectors[:, kept].T
+    regular = size > LEAST_EIGENVALUE * size[-1]
+    root = (vectors[:, regular] / np.sqrt(size[regular])) @ vectors[:, regular].T
     return np.asarray(covariance[:, count:] @ root)
 
 
-def _mean_flight(flights: Sequence[Flight]) -> Flight:
+def _mean_condition(flights: Sequence[MeanCondition]) -> MeanCondition:
     def mean(*values: float) -> float:
         return float(np.mean(values))
 
-    pulls = [f.pull for f in flights]
-    return Flight(
+    thrust = [f.thrust_effect for f in flights]
+    return MeanCondition(
         mean(*(f.airspeed_mps for f in flights)),
         mean(*(f.qbar_pa for f in flights)),
         mean(*(f.alpha_rad for f in flights)),
         mean(*(f.lift for f in flights)),
         mean(*(f.drag for f in flights)),
-        Pull(
-            mean(*(p.thrust_n for p in pulls)),
-            mean(*(p.slope_npmps for p in pulls)),
-            mean(*(p.arm_m for p in pulls)),
+        ThrustEffect(
+            mean(*(p.thrust_n for p in thrust)),
+            mean(*(p.slope_npmps for p in thrust)),
+            mean(*(p.arm_m for p in thrust)),
         ),
         (min(f.alpha_range_rad[0] for f in flights), max(f.alpha_range_rad[1] for f in flights)),
-        (mean(*(f.faster[0] for f in flights)), mean(*(f.faster[1] for f in flights))),
+        (
+            mean(*(f.airspeed_ratio[0] for f in flights)),
+            mean(*(f.airspeed_ratio[1] for f in flights)),
+        ),
     )
 
 
-def _predictions(found: Sequence[Prediction | None]) -> Prediction | None:
-    """Return how maneuvers are predicted by the others of their flight, all flights together."""
+def _predictions(found: Sequence[CrossValidation | None]) -> CrossValidation | None:
+    """Return the cross-validation of all flights together; each maneuver within its flight."""
     known = [p for p in found if p is not None]
     if not known:
         return None
@@ -129,4 +138,6 @@ def _predictions(found: Sequence[Prediction | None]) -> Prediction | None:
         }
 
     windows = tuple(range(sum(counts)))
-    return Prediction(windows, rms([p.fitted for p in known]), rms([p.unseen for p in known]))
+    return CrossValidation(
+        windows, rms([p.fitted for p in known]), rms([p.left_out for p in known])
+    )

@@ -1,8 +1,9 @@
-"""Slopes at the trim, from whatever terms were fitted: what the linear motion is made of.
+"""Stability and control derivatives at the trim, from whatever terms were fitted.
 
-Names mean local derivatives, whatever the rows: with ``CL^2`` in the row of drag, CD_alpha and
-CD_de hold what lift brings (2 CD_CL2 CL CL_alpha); from forces in body axes CL and CD follow by
-turning them through the angle of attack.
+A name such as CD_alpha means the local derivative, whatever the equations are: with ``CL^2`` in the
+drag equation CD_alpha and CD_de contain what lift contributes (2 CD_CL2 CL CL_alpha). From forces
+in body axes those of lift and drag follow by rotation through the angle of attack (Klein & Morelli,
+Aircraft System Identification, ch. 3).
 """
 
 from __future__ import annotations
@@ -19,8 +20,16 @@ POLAR = "CD_CL2"
 
 
 @dataclass(frozen=True, slots=True)
-class Mean:
-    """Angle of attack, CL and CD of the elevator's maneuvers; how both move with the state (n,)."""
+class TrimMeans:
+    """Means over the elevator maneuvers.
+
+    Attributes
+    ----------
+    alpha_rad, lift, drag : float
+        Angle of attack, CL and CD.
+    lift_slope, drag_slope : Array, shape (n,)
+        Derivatives of CL and CD by the unknowns.
+    """
 
     alpha_rad: float
     lift: float
@@ -29,34 +38,36 @@ class Mean:
     drag_slope: Array
 
 
-Local = dict[str, tuple[float, Array]]
+# Name to value and its derivative by the unknowns, (n,).
+DerivativesAtTrim = dict[str, tuple[float, Array]]
 
 
-def local_derivatives(
-    model: CoefficientModel, state: Array, position: Mapping[str, int], mean: Mean
-) -> Local:
-    """Return value and slope with the state of everything an answer tells.
+def derivatives_at_trim(
+    model: CoefficientModel, state: Array, position: Mapping[str, int], means: TrimMeans
+) -> DerivativesAtTrim:
+    """Return every derivative that an answer reports.
 
     Parameters
     ----------
     model : CoefficientModel
-    state : (n,) Array
-        Coefficients of all terms at `position`, what else was estimated elsewhere.
+    state : Array, shape (n,)
+        All unknowns; the coefficients of the terms at `position`.
     position : mapping
-    mean : Mean
+    means : TrimMeans
 
     Returns
     -------
     dict
-        Told terms in the order of the model, then what follows from them.
+        Fitted terms in the order of the model without the nuisance terms, then what follows from
+        them.
     """
     unit = np.eye(len(state))
-    terms: Local = {name: (float(state[k]), unit[k]) for name, k in position.items()}
-    found = {name: terms[name] for name, _, _ in model.named() if name not in model.beside}
+    terms: DerivativesAtTrim = {name: (float(state[k]), unit[k]) for name, k in position.items()}
+    found = {name: terms[name] for name, _, _ in model.named() if name not in model.nuisance}
     if model.forces == BODY:
-        found |= _turned(terms, mean)
+        found |= _from_body_axes(terms, means)
     if POLAR in terms:
-        found |= _through_lift(terms, mean)
+        found |= _with_drag_polar(terms, means)
     return found
 
 
@@ -64,66 +75,75 @@ def zero_lift_drag(
     model: CoefficientModel,
     state: Array,
     position: Mapping[str, int],
-    mean: Mean,
-    means: Mapping[str, float],
-    found: Local,
+    means: TrimMeans,
+    regressor_means: Mapping[str, float],
+    found: DerivativesAtTrim,
 ) -> tuple[float, Array]:
-    """Return the drag at zero lift, surfaces as flown, and its slope with the state.
+    """Return the drag at zero lift, surfaces as flown, and its derivative by the unknowns, (n,).
 
     Parameters
     ----------
     model, state, position
-        As in `local_derivatives`.
-    mean : Mean
-        Its slopes with the last entries of the state suffice.
-    means : mapping
-        Of every regressor of the forces over the elevator's maneuvers.
+        As in `derivatives_at_trim`.
+    means : TrimMeans
+        Its slopes may be those of the last unknowns only.
+    regressor_means : mapping
+        Mean of every regressor of the forces over the elevator maneuvers.
     found : dict
-        Of `local_derivatives`.
+        From `derivatives_at_trim`.
     """
-    # What the bends of the polar add to the mean beyond the value at the trim.
-    gains = {"CD": 1.0, "CZ": -np.sin(mean.alpha_rad), "CX": -np.cos(mean.alpha_rad)}
-    bent = np.zeros(len(state))
-    for name, row, term in model.named():
-        if row in gains and not term.linear:
-            square = mean.lift**2 if name == POLAR else 0.0
-            bent[position[name]] = gains[row] * (means[name] - square)
-    (by_alpha, by_alpha_slope), (steep, steep_slope) = found["CD_alpha"], found["CL_alpha"]
-    share = by_alpha / (2.0 * steep)
-    lift = mean.lift
-    slope = -bent - lift / (2.0 * steep) * by_alpha_slope + share * lift / steep * steep_slope
-    slope[-len(mean.lift_slope) :] += mean.drag_slope - share * mean.lift_slope
-    return mean.drag - float(bent @ state) - share * lift, slope
+    # What the curvature of the polar adds to the mean beyond the value at the trim.
+    gains = {"CD": 1.0, "CZ": -np.sin(means.alpha_rad), "CX": -np.cos(means.alpha_rad)}
+    curvature = np.zeros(len(state))
+    for name, equation, term in model.named():
+        if equation in gains and not term.linear:
+            square = means.lift**2 if name == POLAR else 0.0
+            curvature[position[name]] = gains[equation] * (regressor_means[name] - square)
+    # The parabola in lift with this value and slope: CD_0 = CD - CL CD_alpha / (2 CL_alpha).
+    (drag_alpha, drag_alpha_slope), (lift_alpha, lift_alpha_slope) = (
+        found["CD_alpha"],
+        found["CL_alpha"],
+    )
+    share = drag_alpha / (2.0 * lift_alpha)
+    lift = means.lift
+    slope = (
+        -curvature
+        - lift / (2.0 * lift_alpha) * drag_alpha_slope
+        + share * lift / lift_alpha * lift_alpha_slope
+    )
+    slope[-len(means.lift_slope) :] += means.drag_slope - share * means.lift_slope
+    return means.drag - float(curvature @ state) - share * lift, slope
 
 
-def _turned(terms: Local, mean: Mean) -> Local:
-    """Return slopes of lift and drag from those of body-axis forces."""
-    ca, sa = float(np.cos(mean.alpha_rad)), float(np.sin(mean.alpha_rad))
-    nothing = (0.0, np.zeros_like(mean.lift_slope))
-    result: Local = {}
+def _from_body_axes(terms: DerivativesAtTrim, means: TrimMeans) -> DerivativesAtTrim:
+    """Return derivatives of lift and drag from those of body-axis forces."""
+    ca, sa = float(np.cos(means.alpha_rad)), float(np.sin(means.alpha_rad))
+    absent = (0.0, np.zeros_like(means.lift_slope))
+    result: DerivativesAtTrim = {}
     for label in ("alpha", "q", "de", "V"):
-        if label != "alpha" and not {f"{row}_{label}" for row in BODY} & terms.keys():
+        if label != "alpha" and not {f"{force}_{label}" for force in BODY} & terms.keys():
             continue
-        (z, dz), (x, dx) = (terms.get(f"{row}_{label}", nothing) for row in BODY)
+        (z, dz), (x, dx) = (terms.get(f"{force}_{label}", absent) for force in BODY)
+        # CL = CX sin(alpha) - CZ cos(alpha), CD = -CX cos(alpha) - CZ sin(alpha).
         lift, lift_slope = sa * x - ca * z, sa * dx - ca * dz
         drag, drag_slope = -ca * x - sa * z, -ca * dx - sa * dz
-        if label == "alpha":  # the axes turn too
-            lift, lift_slope = lift - mean.drag, lift_slope - mean.drag_slope
-            drag, drag_slope = drag + mean.lift, drag_slope + mean.lift_slope
+        if label == "alpha":  # the wind axes rotate with alpha
+            lift, lift_slope = lift - means.drag, lift_slope - means.drag_slope
+            drag, drag_slope = drag + means.lift, drag_slope + means.lift_slope
         result[f"CL_{label}"] = lift, lift_slope
         if label != "q":
             result[f"CD_{label}"] = drag, drag_slope
     return result
 
 
-def _through_lift(terms: Local, mean: Mean) -> Local:
-    """Return slopes of drag where a part of it goes with the square of lift."""
+def _with_drag_polar(terms: DerivativesAtTrim, means: TrimMeans) -> DerivativesAtTrim:
+    """Return derivatives of drag where a part of it is proportional to the square of lift."""
     k, dk = terms[POLAR]
-    nothing = (0.0, np.zeros_like(mean.lift_slope))
-    result: Local = {}
+    absent = (0.0, np.zeros_like(means.lift_slope))
+    result: DerivativesAtTrim = {}
     for label in ("alpha", "de"):
-        own, own_slope = terms.get(f"CD_{label}", nothing)
-        lift, lift_slope = terms.get(f"CL_{label}", nothing)
-        slope = mean.lift * (lift * dk + k * lift_slope) + k * lift * mean.lift_slope
-        result[f"CD_{label}"] = own + 2.0 * k * mean.lift * lift, own_slope + 2.0 * slope
+        own, own_slope = terms.get(f"CD_{label}", absent)
+        lift, lift_slope = terms.get(f"CL_{label}", absent)
+        slope = means.lift * (lift * dk + k * lift_slope) + k * lift * means.lift_slope
+        result[f"CD_{label}"] = own + 2.0 * k * means.lift * lift, own_slope + 2.0 * slope
     return result

@@ -1,4 +1,7 @@
-"""Windows of a flight in the frequency domain: transforms, trends, weights from residuals."""
+"""Spectra of the equations over the windows of a flight, and weights from residual spectra.
+
+Equation error in the frequency domain: Klein & Morelli, Aircraft System Identification, ch. 7.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +16,13 @@ from host.sysid.compatibility.inverse_sensor_model import Spectrum
 from host.sysid.identification_error import IdentificationError
 
 LOW_HZ, HIGH_HZ = 0.1, 4.5
-KINEMATIC_LOW_HZ = 0.4  # below, the attitude filter's own errors rule
-FLAT = 1e-9  # a constant has no transform at whole periods but rounding
-TRENDS = 4  # constant to cubic, taken out of the kinematic equations; constant and slope elsewhere
+KINEMATIC_LOW_HZ = 0.4  # below, the attitude filter's own errors dominate
+ROUNDING_SHARE = 1e-9  # a constant has no transform at whole periods but rounding
+# Powers of time removed: constant to cubic of kinematic equations, constant and slope of others.
+KINEMATIC_TREND, AERO_TREND = 4, 2
 SMOOTHING_HZ, GRID = 0.5, 12  # of residual spectra
-LEAST_S = 2.0  # shortest window
-Key = tuple[str, int]
+SHORTEST_S = 2.0  # shortest window
+EquationKey = tuple[str, int]  # equation, number of the window
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,109 +35,151 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
-    """One window: its samples, their places among those of all windows, frequencies, transform,
-    transformed trends."""
+class WindowTransform:
+    """The discrete Fourier transform of one window.
+
+    Attributes
+    ----------
+    samples : IntArray, shape (n,)
+        Indices into the flight.
+    positions : IntArray, shape (n,)
+        The same samples as indices into those of all windows.
+    frequency_hz : Array, shape (F,)
+    cosines, sines : Array, shape (F, n)
+    trends : complex Array, shape (F, 4)
+        Transforms of the powers of time.
+    equations : tuple of str
+        Equations that hold in it.
+    """
 
     samples: IntArray
-    places: IntArray
-    hertz: Array
+    positions: IntArray
+    frequency_hz: Array
     cosines: Array
     sines: Array
     trends: Spectrum
-    names: tuple[str, ...]
+    equations: tuple[str, ...]
 
 
-def window_block(
+def window_transform(
     samples: IntArray,
     dt_s: float,
     window: Window,
     forces: tuple[str, str],
-    every: IntArray | None = None,
-) -> Block:
-    """Return the transform of one window; `forces` are compared under the elevator.
+    all_samples: IntArray | None = None,
+) -> WindowTransform:
+    """Return the transform of one window.
 
-    `every` are the samples of all windows, sorted; its own by default.
+    Parameters
+    ----------
+    samples : IntArray, shape (n,)
+        Indices into the flight.
+    dt_s : float
+    window : Window
+    forces : tuple of str
+        Names of the two force equations of an elevator maneuver.
+    all_samples : IntArray, optional
+        Samples of all windows, sorted; those of this window without.
 
     Raises
     ------
     IdentificationError
-        If it is too short.
+        If the window is too short.
     """
     n = len(samples)
     length = n * dt_s
-    if length < LEAST_S:
+    if length < SHORTEST_S:
         raise IdentificationError(
-            f"window of {length:.1f} s at {window.first_s:.1f} s: {LEAST_S:.0f} s needed"
+            f"window of {length:.1f} s at {window.first_s:.1f} s: {SHORTEST_S:.0f} s needed"
         )
-    hertz = np.arange(1, int(HIGH_HZ * length) + 1) / length
-    hertz = hertz[hertz >= LOW_HZ]
-    phase = np.outer(hertz, np.arange(n) * dt_s)
+    frequency_hz = np.arange(1, int(HIGH_HZ * length) + 1) / length
+    frequency_hz = frequency_hz[frequency_hz >= LOW_HZ]
+    phase = np.outer(frequency_hz, np.arange(n) * dt_s)
     cosines, sines = (f(2.0 * np.pi * phase) / np.sqrt(n) for f in (np.cos, np.sin))
-    trend = np.linspace(-1.0, 1.0, n)[:, None] ** np.arange(TRENDS)
+    trend = np.linspace(-1.0, 1.0, n)[:, None] ** np.arange(KINEMATIC_TREND)
     trends = cosines @ trend - 1j * (sines @ trend)
-    names = (*forces, *LONGITUDINAL) if window.longitudinal else LATERAL
-    places = np.searchsorted(samples if every is None else every, samples)
-    return Block(samples, places, hertz, cosines, sines, trends, names)
+    equations = (*forces, *LONGITUDINAL) if window.longitudinal else LATERAL
+    positions = np.searchsorted(samples if all_samples is None else all_samples, samples)
+    return WindowTransform(samples, positions, frequency_hz, cosines, sines, trends, equations)
 
 
-def transformed(full: Mapping[str, Equation], blocks: Sequence[Block]) -> dict[Key, Spectrum]:
-    """Return left side and regressors of every equation in every window, (F, 1 + terms) each.
+def equation_spectra(
+    equations: Mapping[str, Equation], windows: Sequence[WindowTransform]
+) -> dict[EquationKey, Spectrum]:
+    """Return response and regressors of every equation in every window, (F, 1 + terms) each.
 
-    Equations are given at the samples of all windows.
+    Parameters
+    ----------
+    equations : mapping
+        By name, at the samples of all windows.
+    windows : sequence of WindowTransform
     """
-    result: dict[Key, Spectrum] = {}
-    for number, block in enumerate(blocks):
+    result: dict[EquationKey, Spectrum] = {}
+    for number, window in enumerate(windows):
         columns, ends = [], [0]
-        for name in block.names:
-            columns += [full[name].left, *full[name].terms.values()]
+        for name in window.equations:
+            columns += [equations[name].response, *equations[name].regressors.values()]
             ends.append(len(columns))
-        table = np.stack([c[block.places] for c in columns], axis=1)
+        table = np.stack([c[window.positions] for c in columns], axis=1)
         table -= table.mean(axis=0)
-        spectra = block.cosines @ table - 1j * (block.sines @ table)
-        for k, name in enumerate(block.names):
+        spectra = window.cosines @ table - 1j * (window.sines @ table)
+        for k, name in enumerate(window.equations):
             result[name, number] = spectra[:, ends[k] : ends[k + 1]]
     return result
 
 
-def used(block: Block, name: str) -> BoolArray:
-    """Return which frequencies of a window an equation is compared at."""
-    return block.hertz >= (KINEMATIC_LOW_HZ if name in KINEMATIC else LOW_HZ)
+def in_band(window: WindowTransform, equation: str) -> BoolArray:
+    """Return which frequencies of a window an equation is compared at, (F,)."""
+    return window.frequency_hz >= (KINEMATIC_LOW_HZ if equation in KINEMATIC else LOW_HZ)
 
 
-def degree(name: str) -> int:
-    """Return how many powers of time are taken out of an equation."""
-    return TRENDS if name in KINEMATIC else 2
+def trend_count(equation: str) -> int:
+    """Return how many powers of time are removed from an equation."""
+    return KINEMATIC_TREND if equation in KINEMATIC else AERO_TREND
 
 
-def row_weight(hertz: Array, noise: tuple[Array, Array] | None) -> Array:
-    """Return the weight of real and imaginary parts from the spectrum of residuals, (F,)."""
+def equation_weight(frequency_hz: Array, noise: tuple[Array, Array] | None) -> Array:
+    """Return the weight of real and imaginary parts from the spectrum of residuals, (F,).
+
+    Each part has half of the power, so the weight is the square root of 2 / S.
+    """
     if noise is None:
-        return np.full(len(hertz), np.sqrt(2.0))
-    return np.asarray(np.sqrt(2.0 / np.interp(hertz, *noise)), dtype=np.float64)
+        return np.full(len(frequency_hz), np.sqrt(2.0))
+    return np.asarray(np.sqrt(2.0 / np.interp(frequency_hz, *noise)), dtype=np.float64)
 
 
-def noise_spectra(
-    blocks: Sequence[Block],
-    residuals: Iterable[tuple[Key, Array]],
+def residual_spectra(
+    windows: Sequence[WindowTransform],
+    residuals: Iterable[tuple[EquationKey, Array]],
     before: Mapping[str, tuple[Array, Array]],
 ) -> dict[str, tuple[Array, Array]]:
     """Return the smoothed residual spectrum of every equation, pooled over maneuvers.
 
-    `residuals` are weighted by the spectra `before`, real parts then imaginary ones.
+    Parameters
+    ----------
+    windows : sequence of WindowTransform
+    residuals : iterable
+        Of each block, (2 F,): real parts then imaginary ones, weighted by the spectra `before`.
+    before : mapping
+        Frequency (Hz) and spectrum by equation.
+
+    Returns
+    -------
+    dict
+        Frequency (Hz) and spectrum, (12,) each, by equation.
     """
     found: dict[str, list[tuple[Array, Array]]] = {}
-    for (name, window), residual in residuals:
-        hertz = blocks[window].hertz[used(blocks[window], name)]
+    for (name, number), residual in residuals:
+        frequency_hz = windows[number].frequency_hz[in_band(windows[number], name)]
         power = 0.5 * np.sum(residual.reshape(2, -1) ** 2, axis=0)
         if name in before:
-            power = power * np.interp(hertz, *before[name])
-        found.setdefault(name, []).append((hertz, power))
+            power = power * np.interp(frequency_hz, *before[name])
+        found.setdefault(name, []).append((frequency_hz, power))
     grid = np.linspace(LOW_HZ, HIGH_HZ, GRID)
     result: dict[str, tuple[Array, Array]] = {}
     for name, parts in found.items():
-        hertz = np.concatenate([h for h, _ in parts])
+        frequency_hz = np.concatenate([h for h, _ in parts])
         power = np.concatenate([p for _, p in parts])
-        near = np.exp(-0.5 * ((hertz[None, :] - grid[:, None]) / SMOOTHING_HZ) ** 2)
-        result[name] = (grid, np.maximum(near @ power / near.sum(axis=1), 1e-30))
+        kernel = np.exp(-0.5 * ((frequency_hz[None, :] - grid[:, None]) / SMOOTHING_HZ) ** 2)
+        result[name] = (grid, np.maximum(kernel @ power / kernel.sum(axis=1), 1e-30))
     return result

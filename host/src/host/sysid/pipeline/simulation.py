@@ -12,7 +12,7 @@ from host.arrays import Array
 from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.coefficients.coefficient_modes import System
+from host.sysid.coefficients.coefficient_modes import LinearSystem
 from host.sysid.flight.chosen import moving, once
 from host.sysid.flight.free_simulation import fits_of, free_simulation, frozen_model
 from host.sysid.flight.linear import Answer
@@ -160,7 +160,7 @@ def _models(
             yield f"{direct.template}_{name}", _motion(name, system)
 
 
-def _motion(name: str, system: System) -> LinearModel:
+def _motion(name: str, system: LinearSystem) -> LinearModel:
     """Return the linear motion that coefficients stand for; every state is an output."""
     n, m = len(system.states), len(system.inputs)
     return LinearModel(

@@ -5,9 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.arrays import Array
-from host.sysid.coefficients.coefficient_fit import CoefficientFit, Derivative, Flight, Pull, Trace
-from host.sysid.coefficients.deletion_diagnostics import Prediction
-from host.sysid.coefficients.pooled_flights import pooled
+from host.sysid.coefficients.coefficient_fit import (
+    CoefficientFit,
+    CoefficientHistory,
+    Derivative,
+    MeanCondition,
+    ThrustEffect,
+)
+from host.sysid.coefficients.deletion_diagnostics import CrossValidation
+from host.sysid.coefficients.pooled_flights import pool_fits
 from host.sysid.numerics.maneuver_agreement import agreement_of
 
 NOISE = np.array([0.04, 0.02])
@@ -27,20 +33,22 @@ def fit(values: Array, noise: Array = NOISE, errors: Array = ERRORS) -> Coeffici
         ),
         covariance=covariance,
         errors={"cg_x_m": (0.1, float(errors[0])), "tilt_y_rad": (0.0, float(errors[1]))},
-        flight=Flight(17.0, 180.0, 0.1, 0.3, 0.03, Pull(2.0, 0.1, 0.0), (0.0, 0.2), (1.0, 1.0)),
-        traces={"CL": Trace(np.arange(9.0), np.arange(9.0))},
-        prediction=Prediction((0, 1), {"CL": 0.03}, {"CL": 0.04}),
-        repeats=agreement_of(names, np.zeros((2, 2)), np.full((2, 2), 0.5), np.ones(2)),
+        condition=MeanCondition(
+            17.0, 180.0, 0.1, 0.3, 0.03, ThrustEffect(2.0, 0.1, 0.0), (0.0, 0.2), (1.0, 1.0)
+        ),
+        histories={"CL": CoefficientHistory(np.arange(9.0), np.arange(9.0))},
+        prediction=CrossValidation((0, 1), {"CL": 0.03}, {"CL": 0.04}),
+        maneuver_agreement=agreement_of(names, np.zeros((2, 2)), np.full((2, 2), 0.5), np.ones(2)),
     )
 
 
 def test_one_flight_stays_as_it_is() -> None:
     alone = fit(np.array([4.0, -11.0]))
-    assert pooled([alone]) is alone
+    assert pool_fits([alone]) is alone
 
 
 def test_noise_averages_out_and_a_shared_error_does_not() -> None:
-    found = pooled([fit(np.array([4.0, -11.0])) for _ in range(4)])
+    found = pool_fits([fit(np.array([4.0, -11.0])) for _ in range(4)])
     lift, pitch = found.derivatives
     assert (lift.value, pitch.value) == (4.0, -11.0)
     assert lift.half_width == pytest.approx(1.96 * 0.04 / 2.0)
@@ -49,20 +57,20 @@ def test_noise_averages_out_and_a_shared_error_does_not() -> None:
     assert found.covariance[1, 2] == pytest.approx(0.06 * 0.5)
     assert found.prediction is not None
     assert len(found.prediction.windows) == 8
-    assert len(found.traces["CL"].model) == 36
+    assert len(found.histories["CL"].model) == 36
 
 
 def test_the_sharper_flight_counts_more() -> None:
     sharp, blunt = fit(np.array([4.0, -11.0]), 0.5 * NOISE), fit(np.array([4.05, -11.0]))
-    found = pooled([sharp, blunt]).derivatives[0]
+    found = pool_fits([sharp, blunt]).derivatives[0]
     assert found.value == pytest.approx(4.0 * 0.8 + 4.05 * 0.2)
 
 
 def test_flights_that_do_not_agree_widen_the_interval() -> None:
     values = [np.array([4.0 + shift, -11.0]) for shift in (-0.3, -0.1, 0.1, 0.3)]
-    wide, fair = (pooled([fit(v) for v in own]) for own in (values, values[:1] * 4))
-    assert wide.repeats.factor[0] > 3.0
-    assert wide.repeats.factor[1] == 1.0
+    wide, fair = (pool_fits([fit(v) for v in own]) for own in (values, values[:1] * 4))
+    assert wide.maneuver_agreement.factor[0] > 3.0
+    assert wide.maneuver_agreement.factor[1] == 1.0
     assert wide.derivatives[0].half_width > 3.0 * fair.derivatives[0].half_width
     assert wide.derivatives[1].half_width == pytest.approx(fair.derivatives[1].half_width)
 
@@ -74,7 +82,7 @@ def test_intervals_of_pooled_flights_cover() -> None:
     for _ in range(400):
         z = rng.standard_normal(2)
         fits = [fit(truth + SHARED @ z + NOISE * rng.standard_normal(2)) for _ in range(3)]
-        found = pooled(fits)
+        found = pool_fits(fits)
         told = found.derivatives
         inside += [abs(told[k].value - truth[k]) <= told[k].half_width for k in range(2)]
     assert (inside / 400.0 > 0.92).all()
@@ -84,7 +92,7 @@ def test_intervals_of_pooled_flights_cover() -> None:
 def test_a_flight_without_prediction_does_not_hide_the_others() -> None:
     blind = replace(fit(np.array([4.0, -11.0])), prediction=None)
     seen = fit(np.array([4.0, -11.0]))
-    found = pooled([blind, seen]).prediction
+    found = pool_fits([blind, seen]).prediction
     assert found is not None
-    assert found.unseen == {"CL": pytest.approx(0.04)}
-    assert pooled([blind, blind]).prediction is None
+    assert found.left_out == {"CL": pytest.approx(0.04)}
+    assert pool_fits([blind, blind]).prediction is None

@@ -10,10 +10,24 @@ from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_search import fit_coefficients
-from host.sysid.coefficients.deletion_diagnostics import LastStep, prediction, pulls
-from host.sysid.coefficients.equation_blocks import Side, Unknowns, stretches, summed
-from host.sysid.coefficients.normal_equations import Known, stepped
-from host.sysid.coefficients.window_spectra import Block, Key, Window, window_block
+from host.sysid.coefficients.deletion_diagnostics import (
+    FinalStep,
+    cross_validation,
+    maneuver_influence,
+)
+from host.sysid.coefficients.equation_blocks import (
+    EquationSpectra,
+    Unknowns,
+    accumulate,
+    equation_blocks,
+)
+from host.sysid.coefficients.normal_equations import Prior, solve_normal_equations
+from host.sysid.coefficients.window_spectra import (
+    EquationKey,
+    Window,
+    WindowTransform,
+    window_transform,
+)
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
 from host.sysid.flight.tables import even_columns
 from host.sysid.numerics.maneuver_agreement import agreement_of
@@ -27,35 +41,41 @@ NOISE = {"Cm": (np.array([0.1, 4.5]), np.array([0.5, 2.0]))}
 SD = 0.3
 
 
-def problem(seed: int, sizes: tuple[float, ...], bias: float = 0.4) -> tuple[list[Block], LastStep]:
+def problem(
+    seed: int, sizes: tuple[float, ...], bias: float = 0.4
+) -> tuple[list[WindowTransform], FinalStep]:
     """One equation with two terms, one instrument error, a line of its own in every window."""
     rng = np.random.default_rng(seed)
     blocks, spectra, slopes = [], {}, {}
     for k, size in enumerate(sizes):
         at = np.arange(300)
-        block = window_block(at, 0.03, Window(0.0, 9.0, longitudinal=True), ("CL", "CD"))
-        F = len(block.hertz)
+        block = window_transform(at, 0.03, Window(0.0, 9.0, longitudinal=True), ("CL", "CD"))
+        F = len(block.frequency_hz)
         terms = size * (rng.standard_normal((F, 2)) + 1j * rng.standard_normal((F, 2)))
         noise = 0.3 * (rng.standard_normal(F) + 1j * rng.standard_normal(F))
         error = rng.standard_normal(F) + 1j * rng.standard_normal(F)
         left = terms @ TRUE + block.trends[:, :2] @ np.array([3.0, -2.0]) + noise + bias * error
         spectra["Cm", k] = np.column_stack([left, terms])
         slopes["Cm", k] = -error[:, None]
-        blocks.append(replace(block, names=("Cm",)))
+        blocks.append(replace(block, equations=("Cm",)))
     return blocks, solved(blocks, spectra, slopes)
 
 
 def solved(
-    blocks: list[Block], spectra: dict[Key, Spectrum], slopes: dict[Key, Spectrum]
-) -> LastStep:
+    blocks: list[WindowTransform],
+    spectra: dict[EquationKey, Spectrum],
+    slopes: dict[EquationKey, Spectrum],
+) -> FinalStep:
     unknowns = Unknowns({"Cm": np.arange(2)}, 2, 0, 1)
-    side = Side(spectra, {}, slopes)
-    parts = stretches(blocks, side, side, {"Cm": np.zeros(2)}, unknowns, NOISE)
-    known = Known(np.diag([0.0, 0.0, SD**-2]), np.zeros(3))
+    side = EquationSpectra(spectra, {}, slopes)
+    parts = equation_blocks(blocks, side, side, {"Cm": np.zeros(2)}, unknowns, NOISE)
+    known = Prior(np.diag([0.0, 0.0, SD**-2]), np.zeros(3))
     position = {"Cm_alpha": 0, "Cm_q": 1}
     none = np.zeros(0, dtype=np.int64)
-    step = stepped(summed(parts, unknowns.count), known, position, none, np.zeros(0))
-    return LastStep(parts, step, unknowns, NOISE, spectra)
+    step = solve_normal_equations(
+        accumulate(parts, unknowns.count), known, position, none, np.zeros(0)
+    )
+    return FinalStep(parts, step, unknowns, NOISE, spectra)
 
 
 def without_line(values: Array, trends: Spectrum) -> Array:
@@ -66,7 +86,7 @@ def without_line(values: Array, trends: Spectrum) -> Array:
 
 def test_leaving_one_out_is_fitting_the_others() -> None:
     blocks, last = problem(3, (1.0, 0.7, 1.3))
-    found = prediction(last, blocks)
+    found = cross_validation(last, blocks)
     assert found is not None
     assert found.windows == (0, 1, 2)
     top = bottom = 0.0
@@ -77,7 +97,7 @@ def test_leaving_one_out_is_fitting_the_others() -> None:
             {("Cm", n): last.spectra["Cm", j] for n, j in enumerate(rest)},
             {("Cm", n): -error_of(last, blocks, j) for n, j in enumerate(rest)},
         )
-        step = again.solved.step
+        step = again.solution.step
         spectrum = last.spectra["Cm", k]
         missed = (
             spectrum[:, 0] - spectrum[:, 1:] @ step[:2] - error_of(last, blocks, k)[:, 0] * step[-1]
@@ -87,33 +107,33 @@ def test_leaving_one_out_is_fitting_the_others() -> None:
             for values in (missed, spectrum[:, 0])
         ]
         top, bottom = top + float(rest_of[0] @ rest_of[0]), bottom + float(rest_of[1] @ rest_of[1])
-    assert found.unseen["Cm"] == pytest.approx(np.sqrt(top / bottom), rel=1e-6)
-    assert found.unseen["Cm"] > found.fitted["Cm"]
+    assert found.left_out["Cm"] == pytest.approx(np.sqrt(top / bottom), rel=1e-6)
+    assert found.left_out["Cm"] > found.fitted["Cm"]
 
 
-def error_of(last: LastStep, blocks: list[Block], k: int) -> Spectrum:
+def error_of(last: FinalStep, blocks: list[WindowTransform], k: int) -> Spectrum:
     """Return what one unit of the instrument's error adds to the left side of a window."""
-    weight = np.sqrt(2.0 / np.interp(blocks[k].hertz, *NOISE["Cm"]))
-    real, imaginary = last.parts[k].A[:, -1].reshape(2, -1) / weight
+    weight = np.sqrt(2.0 / np.interp(blocks[k].frequency_hz, *NOISE["Cm"]))
+    real, imaginary = last.blocks[k].A[:, -1].reshape(2, -1) / weight
     return np.asarray(real + 1j * imaginary)[:, None]
 
 
 def test_a_maneuver_that_alone_tells_a_term_stays() -> None:
     blocks, last = problem(3, (1.0, 0.1, 0.1))
-    found = prediction(last, blocks)
+    found = cross_validation(last, blocks)
     assert found is not None
     assert found.windows == (1, 2)
     blocks, last = problem(3, (1.0,))
-    assert prediction(last, blocks) is None
+    assert cross_validation(last, blocks) is None
 
 
 def test_maneuvers_of_one_aircraft_agree_as_often_as_chance_says() -> None:
     p = []
     for seed in range(200):
         blocks, last = problem(seed, (1.0, 1.0, 0.8, 1.2), bias=0.0)
-        pull, share, variance = pulls(last, blocks, np.eye(2, last.unknowns.count))
+        pull, share, variance = maneuver_influence(last, blocks, np.eye(2, last.unknowns.count))
         # Spectra of this problem are five times its noise: 0.18 of 1 by variance.
-        level = 2.0 * 0.3**2 / 2.0 * np.mean(2.0 / np.interp(blocks[0].hertz, *NOISE["Cm"]))
+        level = 2.0 * 0.3**2 / 2.0 * np.mean(2.0 / np.interp(blocks[0].frequency_hz, *NOISE["Cm"]))
         p += agreement_of(("Cm_alpha", "Cm_q"), pull, share, level * variance).p_value.tolist()
         np.testing.assert_allclose(pull.sum(axis=0), 0.0, atol=0.02)
     assert 0.40 < np.mean(np.array(p) < 0.5) < 0.60
@@ -144,13 +164,13 @@ def slipped(share: float) -> CoefficientFit:
 
 def test_a_pot_that_slips_between_maneuvers_is_named_and_predicted_worse() -> None:
     fair, wrong = slipped(0.0), slipped(0.4)
-    k = fair.repeats.names.index("Cm_de")
-    assert fair.repeats.factor[k] == 1.0
-    assert wrong.repeats.factor[k] > 2.0
+    k = fair.maneuver_agreement.names.index("Cm_de")
+    assert fair.maneuver_agreement.factor[k] == 1.0
+    assert wrong.maneuver_agreement.factor[k] > 2.0
     half = [f.derivatives[k].half_width for f in (fair, wrong)]
     assert half[1] > 2.0 * half[0]
     assert fair.prediction is not None
     assert wrong.prediction is not None
     assert len(fair.prediction.windows) == 6
-    assert fair.prediction.unseen["Cm"] < 1.1 * fair.prediction.fitted["Cm"]
-    assert wrong.prediction.unseen["Cm"] > 1.25 * wrong.prediction.fitted["Cm"]
+    assert fair.prediction.left_out["Cm"] < 1.1 * fair.prediction.fitted["Cm"]
+    assert wrong.prediction.left_out["Cm"] > 1.25 * wrong.prediction.fitted["Cm"]

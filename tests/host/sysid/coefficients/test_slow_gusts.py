@@ -7,16 +7,16 @@ from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
-from host.sysid.coefficients.aero_equations import Flown, equations
+from host.sysid.coefficients.aero_equations import FlightHistory, equations
 from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.coefficients.slow_gusts import (
-    SHAPES,
-    TURNED,
+    GUST_TERMS,
+    LEGENDRE_TERMS,
     gust_information,
+    gust_regressors,
     gust_strength,
-    turned,
 )
-from host.sysid.coefficients.window_spectra import Block, Window, window_block
+from host.sysid.coefficients.window_spectra import Window, WindowTransform, window_transform
 from host.sysid.compatibility.inverse_sensor_model import Record
 from numpy.polynomial import legendre
 
@@ -28,10 +28,10 @@ WINDOW_S = 23.0
 FORCES = ("CL", "CD")
 
 
-def windows(count: int, longitudinal: bool, gap_s: float = 1.0) -> list[Block]:
+def windows(count: int, longitudinal: bool, gap_s: float = 1.0) -> list[WindowTransform]:
     length, stride = round(WINDOW_S / STEP_S), round((WINDOW_S + gap_s) / STEP_S)
     return [
-        window_block(
+        window_transform(
             np.arange(k * stride, k * stride + length),
             STEP_S,
             Window(0.0, 1.0, longitudinal),
@@ -56,7 +56,7 @@ def smooth(random: np.random.Generator, size: float, n: int) -> Array:
     return np.asarray(size * np.mean(waves, axis=0))
 
 
-@pytest.mark.parametrize("name", sorted(TURNED))
+@pytest.mark.parametrize("name", sorted(GUST_TERMS))
 def test_columns_are_what_a_gust_in_body_axes_leaves_of_the_kinematics(name: str) -> None:
     random, n = np.random.default_rng(3), 800
     record = Record(STEP_S, {"alpha_rad": np.zeros(n)})
@@ -84,13 +84,13 @@ def test_columns_are_what_a_gust_in_body_axes_leaves_of_the_kinematics(name: str
     )  # fmt: skip
     rows = equations(
         standard_model(), record, signals, dict.fromkeys(names, 0.0),
-        Flown(none, none, none, none, none, none, none, (0.0, 0.0)),
+        FlightHistory(none, none, none, none, none, none, none, (0.0, 0.0)),
         airframe_data(NAME), powerplant(NAME), 0.1,
-    ).rows  # fmt: skip
-    block = window_block(np.arange(n), STEP_S, Window(0.0, 1.0, name != "v"), FORCES)
-    columns = turned(rates, [block])[name, 0][:, ::SHAPES]
-    left = rows[name].left - rows[name].left.mean()
-    expected = columns @ np.array([gust[g] for _, _, g in TURNED[name]])
+    ).by_name  # fmt: skip
+    block = window_transform(np.arange(n), STEP_S, Window(0.0, 1.0, name != "v"), FORCES)
+    columns = gust_regressors(rates, [block])[name, 0][:, ::LEGENDRE_TERMS]
+    left = rows[name].response - rows[name].response.mean()
+    expected = columns @ np.array([gust[g] for _, _, g in GUST_TERMS[name]])
     np.testing.assert_allclose(
         block.cosines @ left - 1j * (block.sines @ left), expected, atol=1e-9
     )
@@ -116,12 +116,12 @@ def test_statistics_of_the_shapes_are_those_of_the_twins_gusts(air: Array) -> No
     known = np.linalg.inv(gust_information(blocks, SIGMA, AIRSPEED_MPS, STEP_S))
     last = int(blocks[1].samples[-1]) + 1
     at = np.linspace(-1.0, 1.0, len(blocks[0].samples))
-    fitted = np.linalg.pinv(legendre.legvander(at, SHAPES - 1))
+    fitted = np.linalg.pinv(legendre.legvander(at, LEGENDRE_TERMS - 1))
     flights = [air[k : k + last] for k in range(0, len(air) - last, last)]
     factors = np.array(
         [
             np.concatenate(
-                [fitted @ f[b.samples, PLACE[g]] for b in blocks for _, _, g in TURNED["v"]]
+                [fitted @ f[b.samples, PLACE[g]] for b in blocks for _, _, g in GUST_TERMS["v"]]
             )
             for f in flights
         ]
