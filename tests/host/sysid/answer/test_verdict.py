@@ -10,7 +10,7 @@ from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.linear import Answer
 from host.sysid.models.diagnostics import SignalFit, collinearity, reference_values
 from host.sysid.models.modal_analysis import modes, modes_of
-from host.sysid.models.residual_delays import DELAYS
+from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import TEMPLATES, Trim
 from studies.aircraft import navion_structured
 from studies.data import noisy
@@ -92,7 +92,7 @@ def test_a_small_entry_is_not_called_trustworthy(answer: Answer) -> None:
 def test_a_delay_at_its_bound_is_no_failed_prediction(answer: Answer) -> None:
     """Nothing was predicted: the words are those of the delay."""
     speed = answer.model.states[0]
-    bound = replace(DELAYS[3], outputs=(speed,))
+    bound = replace(STANDARD_DELAYS[3], outputs=(speed,))
     model = replace(answer.model, delays=(bound,))
     lost = replace(answer, model=model, delays={bound.name: (bound.limit_s, 0.0)})
     (line,) = [x for x in words([lost], []) if "whatever the interval" in x]

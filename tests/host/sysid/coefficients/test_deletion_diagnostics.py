@@ -30,7 +30,7 @@ from host.sysid.coefficients.window_spectra import (
 )
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
 from host.sysid.flight.tables import even_columns
-from host.sysid.numerics.maneuver_agreement import agreement_of
+from host.sysid.numerics.maneuver_agreement import scatter_test
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 
@@ -134,7 +134,7 @@ def test_maneuvers_of_one_aircraft_agree_as_often_as_chance_says() -> None:
         pull, share, variance = maneuver_influence(last, blocks, np.eye(2, last.unknowns.count))
         # Spectra of this problem are five times its noise: 0.18 of 1 by variance.
         level = 2.0 * 0.3**2 / 2.0 * np.mean(2.0 / np.interp(blocks[0].frequency_hz, *NOISE["Cm"]))
-        p += agreement_of(("Cm_alpha", "Cm_q"), pull, share, level * variance).p_value.tolist()
+        p += scatter_test(("Cm_alpha", "Cm_q"), pull, share, level * variance).p_value.tolist()
         np.testing.assert_allclose(pull.sum(axis=0), 0.0, atol=0.02)
     assert 0.40 < np.mean(np.array(p) < 0.5) < 0.60
     assert 0.05 < np.mean(np.array(p) < 0.1) < 0.17

@@ -14,7 +14,7 @@ from host.sysid.coefficients.coefficient_fit import (
 )
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.coefficients.pooled_flights import pool_fits
-from host.sysid.numerics.maneuver_agreement import agreement_of
+from host.sysid.numerics.maneuver_agreement import scatter_test
 
 NOISE = np.array([0.04, 0.02])
 SHARED = np.array([[0.0, 0.0], [0.06, 0.0]])  # derivatives by one deviation of each error
@@ -38,7 +38,7 @@ def fit(values: Array, noise: Array = NOISE, errors: Array = ERRORS) -> Coeffici
         ),
         histories={"CL": CoefficientHistory(np.arange(9.0), np.arange(9.0))},
         prediction=CrossValidation((0, 1), {"CL": 0.03}, {"CL": 0.04}),
-        maneuver_agreement=agreement_of(names, np.zeros((2, 2)), np.full((2, 2), 0.5), np.ones(2)),
+        maneuver_agreement=scatter_test(names, np.zeros((2, 2)), np.full((2, 2), 0.5), np.ones(2)),
     )
 
 

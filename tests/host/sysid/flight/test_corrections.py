@@ -28,7 +28,7 @@ from host.sysid.flight import linear, linear_model
 from host.sysid.flight.carried import carried, systematic_error_shifts
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import even_columns
-from host.sysid.models.residual_delays import DELAYS
+from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.twin.virtual import virtual_flight
@@ -273,7 +273,9 @@ def test_a_delay_at_its_bound_is_called_so(
     flown: tuple[Columns, list[dict[str, Any]], Compatibility], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     columns, _, _ = flown
-    tight = tuple(replace(d, limit_s=0.001) if d.name == "delay_vanes_s" else d for d in DELAYS)
+    tight = tuple(
+        replace(d, limit_s=0.001) if d.name == "delay_vanes_s" else d for d in STANDARD_DELAYS
+    )
     for module in (linear, linear_model):
         monkeypatch.setattr(module, "DELAYS", tight)
     answers = identify(columns, airframe=airframe_data(NAME))

@@ -20,7 +20,7 @@ from host.sysid.flight.linear_model import imu_place_m, without_attitude
 from host.sysid.flight.reconstructed import flown_maneuvers, reconstructed
 from host.sysid.flight.tables import even_columns
 from host.sysid.models.fit_result import FitResult
-from host.sysid.models.residual_delays import DELAYS
+from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.twin.testcard.cards import load
@@ -97,7 +97,10 @@ def test_equation_error_gives_the_start_though_places_and_delays_are_free(
     columns, maneuvers = calm
     truth = true_coefficients({"maneuver": maneuvers}, "lateral")
     full = template(
-        "lateral", Trim(20.0, 0.07, 0.07), imu_sd_m=imu_place_m(unknown_sensors()), delays=DELAYS
+        "lateral",
+        Trim(20.0, 0.07, 0.07),
+        imu_sd_m=imu_place_m(unknown_sensors()),
+        delays=STANDARD_DELAYS,
     )
     found = windows(maneuvers)
     flown = flown_maneuvers([reconstructed(columns, found)], [found])

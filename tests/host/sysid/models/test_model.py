@@ -12,7 +12,7 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.modal_analysis import longitudinal_names
 from host.sysid.models.model_file import model_from, parse_entry, read_model
 from host.sysid.models.model_text import model_text
-from host.sysid.models.residual_delays import without_usual_delays
+from host.sysid.models.residual_delays import without_standard_delays
 from host.sysid.models.state_space_model import DelayGroup, without_outputs
 from host.sysid.models.templates import TEMPLATES, Trim, longitudinal, template
 
@@ -174,11 +174,11 @@ def test_delays_left_out_are_those_of_the_sensors() -> None:
         ("delay_vanes_s", ("alpha_rad",)),
         ("delay_imu_s", ("q_radps",)),
     ]
-    assert without_usual_delays(model).delays == ()
+    assert without_standard_delays(model).delays == ()
     assert model_from({**document, "delays": []}).delays == ()
     own = {"name": "delay_vanes_s", "outputs": ["alpha_rad"], "prior_sd_s": 0.002}
     kept = model_from({**document, "delays": [own]})
-    assert without_usual_delays(kept).delays == kept.delays
+    assert without_standard_delays(kept).delays == kept.delays
 
 
 def test_names_of_any_letters_survive_a_file(tmp_path: Path) -> None:

@@ -132,7 +132,7 @@ def test_whitening_turns_the_ar_covariance_into_the_identity() -> None:
             for i in range(samples)
         ]
     )
-    whitener = ar_filter(np.eye(samples), coefficient, memory.head)
+    whitener = ar_filter(np.eye(samples), coefficient, memory.start_whitener)
     np.testing.assert_allclose(whitener @ covariance @ whitener.T, np.eye(samples), atol=1e-10)
     sign, log_determinant = np.linalg.slogdet(covariance)
     assert sign > 0

@@ -38,7 +38,7 @@ class Valley(Objective[Residuals]):
     def free(self, theta: Array, gradient: Array) -> BoolArray:
         return free_of_bounds(theta, gradient, self.lower, np.full(2, np.inf))
 
-    def reached(self, theta: Array, step: Array) -> Array:
+    def apply_step(self, theta: Array, step: Array) -> Array:
         return np.asarray(np.maximum(theta + step, self.lower))
 
     def release(self, trial: Residuals) -> None:

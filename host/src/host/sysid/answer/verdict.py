@@ -19,7 +19,7 @@ from host.sysid.flight.finder import Found, Grade
 from host.sysid.flight.linear import Answer, from_zero
 from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
 from host.sysid.models.modal_analysis import Mode
-from host.sysid.models.residual_delays import DELAYS
+from host.sysid.models.residual_delays import STANDARD_DELAYS
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
@@ -252,7 +252,7 @@ def unpredicted(answer: Answer) -> list[str]:
     not what is lacking: on a demonstration flight D_V was -0.33 +- 0.02 where -0.61 was true.
     """
     failing = _failing(answer)
-    for group in (*DELAYS, *answer.model.delays):
+    for group in (*STANDARD_DELAYS, *answer.model.delays):
         if group.name in answer.at_bound:
             failing |= set(group.outputs)
     return [state for state in answer.model.states if state in failing]

@@ -40,7 +40,7 @@ from host.sysid.coefficients.trim_derivatives import (
     derivatives_at_trim,
     zero_lift_drag,
 )
-from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, agreement_of
+from host.sysid.numerics.maneuver_agreement import ManeuverAgreement, scatter_test
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def intervals(search: SearchResult) -> CoefficientIntervals:
     errors = slice(final.unknowns.first_error, None)
     jacobian = np.vstack([*(slope for _, slope in found.values()), np.eye(len(state))[errors]])
     joint = jacobian @ covariance @ jacobian.T
-    agreement = agreement_of(
+    agreement = scatter_test(
         tuple(values),
         *maneuver_influence(final, problem.windows, jacobian[: len(values)] @ gain_complement),
     )

@@ -24,7 +24,7 @@ from host.sysid.coefficients.coefficient_fit import (
 )
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.models.consider_covariance import consider_covariance
-from host.sysid.numerics.maneuver_agreement import agreement_of
+from host.sysid.numerics.maneuver_agreement import scatter_test
 
 LEAST_EIGENVALUE = 1e-12  # of the largest; below it is rounding
 
@@ -52,7 +52,7 @@ def pool_fits(fits: Sequence[CoefficientFit]) -> CoefficientFit:
     influence = weight[:, :count] * (found - state)[:, :count]
     total_variance = np.einsum("kii->ki", np.stack([fit.covariance for fit in fits]))
     expected = np.sum(weight**2 * total_variance, axis=0)[:count]
-    agreement = agreement_of(tuple(names), influence, weight[:, :count], expected)
+    agreement = scatter_test(tuple(names), influence, weight[:, :count], expected)
     covariance += consider_covariance(np.einsum("ki,kij->ji", weight, common))
     covariance[np.diag_indices(count)] += agreement.extra_variance
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -197,7 +197,7 @@ class _FilterError(Objective[InnovationLikelihood]):
     def free(self, theta: Array, gradient: Array) -> BoolArray:
         return free_of_bounds(theta, gradient, self._lower, self._upper)
 
-    def reached(self, theta: Array, step: Array, far: float = 1.0) -> Array:
+    def apply_step(self, theta: Array, step: Array, far: float = 1.0) -> Array:
         """Return where `far` steps lead: noise moves by its variance, which may come to nothing."""
         goal, noise = theta + far * step, self._noise
         goal[noise] = theta[noise] + 0.5 * np.log(
@@ -211,7 +211,7 @@ class _FilterError(Objective[InnovationLikelihood]):
         """Return the best of a long step and its doubles, as long as they gain."""
         best, far = reached, 2.0
         while size > EXTEND_FROM_BOUNDS and far <= LONGEST_EXTENSION:
-            goal = self.reached(theta, step, far)
+            goal = self.apply_step(theta, step, far)
             trial = self._problem.evaluate(goal)
             if trial is None or trial.cost >= best[1].cost:
                 break

@@ -245,7 +245,7 @@ def _satterthwaite(
 
 
 def _toeplitz(memory: ArNoise) -> Array:
-    inverse = np.linalg.inv(memory.head)
+    inverse = np.linalg.inv(memory.start_whitener)
     return np.asarray(inverse @ inverse.T, dtype=np.float64)
 
 

@@ -58,7 +58,7 @@ from host.sysid.models.diagnostics import (
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.modal_analysis import Mode, modes
-from host.sysid.models.residual_delays import DELAYS, without_usual_delays
+from host.sysid.models.residual_delays import STANDARD_DELAYS, without_standard_delays
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
@@ -99,7 +99,7 @@ class Answer:
     @property
     def at_bound(self) -> tuple[str, ...]:
         """Delays that the search wanted larger than a sensor can be late."""
-        limits = {d.name: d.limit_s for d in (*DELAYS, *self.model.delays)}
+        limits = {d.name: d.limit_s for d in (*STANDARD_DELAYS, *self.model.delays)}
         values = {name: value for name, (value, _) in self.delays.items()}
         values |= {
             d.name: self.result.value(d.name)
@@ -339,7 +339,7 @@ class LinearEstimator:
         if self.own is None:
             model = template_at(flight.corrected, self.template, trim, self.method, able=able)
         else:
-            model = self.own if able else without_usual_delays(self.own)
+            model = self.own if able else without_standard_delays(self.own)
         instrument = None if flight.compatibility is None else flight.compatibility.instrument
         if self.own is None and instrument is not None and free:
             model = with_drag_arm(model, trim, instrument)

@@ -12,7 +12,7 @@ from host.sysid.compatibility.path_preparation import NO_OFFSETS
 from host.sysid.estimators.start_values import regression_estimates
 from host.sysid.flight.reconstructed import FlownManeuver
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.residual_delays import DELAYS
+from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.state_space_model import LinearModel, without_outputs
 from host.sysid.models.templates import TEMPLATES, Trim, template
 
@@ -49,7 +49,7 @@ def template_at(
         name,
         trim,
         accelerometers=method not in UNTIED and all(c in columns for c in forces),
-        delays=DELAYS if able else (),
+        delays=STANDARD_DELAYS if able else (),
         imu_sd_m=imu_place_m(unknown_sensors()) if able else 0.0,
     )
 

@@ -1,10 +1,8 @@
-"""The one way of a systematic error into an interval: by what one deviation of it does.
+"""Consider covariance: the one way of a systematic error into an interval.
 
-An error of mass, of a sensor's place, of a calibration or of a delay is the same in every sample:
-more data do not average it away. What is not estimated of it is considered: the answer moves by s_k
-for one standard deviation of error k, and its covariance grows by the sum of s_k s_k' (Tapley,
-Schutz & Born, Statistical Orbit Determination, ch. 6, consider covariance). The deviations come
-from `host.instrument` and the aircraft file.
+An error of mass, of a sensor's place, of a calibration or of a delay is the same in every sample,
+and more data do not average it away. Such an error is a consider parameter: it is not estimated,
+but its standard deviation, from `host.instrument` or the aircraft file, counts in the covariance.
 """
 
 from __future__ import annotations
@@ -13,22 +11,32 @@ import numpy as np
 
 from host.arrays import Array
 
-DOMINANT_SHARE = 0.25  # of the variance: a cause with less is not worth naming
+DOMINANT_SHARE = 0.25  # of the variance: an error with less is not named
 
 
 def consider_covariance(shifts: Array) -> Array:
-    """Return what systematic errors add to a covariance, (P, P).
+    """Return the covariance that systematic errors add, sum over errors k of s_k s_k', (P, P).
+
+    Tapley, Schutz & Born, Statistical Orbit Determination, ch. 6.
 
     Parameters
     ----------
-    shifts : (errors, P) Array
-        Of the answer, by one standard deviation of each error.
+    shifts : Array, shape (errors, P)
+        Shift s_k of the estimate for one standard deviation of each error.
     """
     return np.asarray(shifts.T @ shifts)
 
 
 def dominant_error_source(parts: dict[str, float], variance: float) -> str:
-    """Return the cause of most of a variance; nothing where none has a quarter of it."""
+    """Return the error that causes most of a variance; empty if none causes a quarter of it.
+
+    Parameters
+    ----------
+    parts : dict
+        Variance that each error causes.
+    variance : float
+        Total, in the same unit.
+    """
     if not parts:
         return ""
     cause = max(parts, key=parts.__getitem__)

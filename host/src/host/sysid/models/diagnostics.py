@@ -1,6 +1,6 @@
-"""What a fit is worth: figures of fit, whiteness, collinearity, refusals.
+"""Diagnostics of a fit: figures of fit, whiteness, identifiability, collinearity.
 
-The thesis's two error figures are kept under their own names beside honest ones.
+The thesis's two error figures are kept under names of their own.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 
 CORRELATION_LIMIT = 0.9
-CONDITION_LIMIT = 1e5  # of the scaled information: correlations beyond all digits of a sensor
+CONDITION_LIMIT = 1e5  # of the scaled information: more digits than any sensor has
 # Of the largest contribution to its equation: below it errors are relative to this share.
 LEAST_CONTRIBUTION = 0.05
 RELATIVE_BOUND_LIMIT = 1.0  # standard error over the reference value: 100 %
-EVEN_ODDS = 0.5  # of a bound above the limit: more likely than not
-WEAK_PROBABILITY = 0.05  # the same: what a 95 % statement leaves over
+EVEN_ODDS = 0.5  # probability of a bound above the limit: more likely than not
+WEAK_PROBABILITY = 0.05  # the same: what a 95 % statement leaves
 GRADES = NOT_IDENTIFIABLE, WEAKLY_IDENTIFIABLE = ("cannot be told", "doubtful")
 SHRINKAGE_PRIOR_WIDTH = 3.0
 DRAWS, DRAW_SEED = 2000, 1
@@ -31,7 +31,21 @@ DRAWS, DRAW_SEED = 2000, 1
 
 @dataclass(frozen=True, slots=True)
 class SignalFit:
-    """Figures of one output: all of free simulation or one step, as the result says."""
+    """Figures of fit of one output, of free simulation or one-step prediction as the result says.
+
+    Attributes
+    ----------
+    name : str
+    r_squared : float
+        Coefficient of determination, 1 - e'e / sum (y - mean y)^2.
+    nrmse : float
+        Root mean square of the residual over the standard deviation of the output.
+    theil : float
+        Theil's inequality coefficient, rms(y - y_model) / (rms(y) + rms(y_model)); 0 is perfect.
+    autocorrelation_outside : float
+        Share of residual autocorrelations outside the 95 % limits of white noise.
+    ljung_box_p : float
+    """
 
     name: str
     r_squared: float
@@ -79,8 +93,9 @@ def signal_fits(
 def whiteness(residuals: Sequence[Array], lags: int = 25) -> tuple[float, float]:
     """Return the share of autocorrelations outside 95 % limits and the Ljung-Box p value.
 
-    Ljung & Box, Biometrika 65 (1978). White residuals leave 5 % outside and p above 0.05 in 95 of
-    100 cases.
+    The statistic is Q = N (N + 2) sum r_k^2 / (N - k), chi-square with one degree of freedom per
+    lag (Ljung & Box, Biometrika 65, 1978). White residuals leave 5 % outside, and p is above 0.05
+    in 95 of 100 cases.
     """
     total = sum(len(e) for e in residuals)
     lags = min(lags, min(len(e) for e in residuals) // 4)
@@ -104,12 +119,26 @@ def reference_values(
     *,
     small_share: float = LEAST_CONTRIBUTION,
 ) -> Array:
-    """Return the value each parameter's error is compared with.
+    """Return the value that each parameter's error is compared with.
 
-    |parameter|, or, where its contribution (|parameter| times rms of its regressor) is below 5 % of
-    its row's largest, the value that would contribute 5 %. Of a tied parameter the row where it
-    counts most decides. Regressors are taken about their mean: the trim tells nothing. With a
-    `small_share` of zero it is |parameter| whatever it contributes.
+    It is |parameter|, or, where its contribution (|parameter| times rms of its regressor) is below
+    5 % of the largest of its equation, the value that would contribute 5 %. Of a tied parameter the
+    equation with its largest contribution decides. Regressors are taken about their mean, because
+    the trim carries no information. With a `small_share` of zero the value is always |parameter|.
+
+    Parameters
+    ----------
+    model : LinearModel
+    maneuvers : sequence of Maneuver
+    theta : Array, shape (P,)
+        Estimate, the common parameters first.
+    small_share : float
+        The 5 % above.
+
+    Returns
+    -------
+    Array, shape (common parameters,)
+        In the units of each parameter.
     """
     spread = regressor_rms(model, maneuvers)
     rows = _reference_values(model, spread, np.asarray(theta)[None], small_share)
@@ -117,7 +146,7 @@ def reference_values(
 
 
 def _reference_values(model: LinearModel, spread: Array, theta: Array, small_share: float) -> Array:
-    """Return references of many parameter vectors, (vectors, parameters)."""
+    """Return reference values of many parameter vectors, (vectors, parameters)."""
     n, count = len(model.states), len(model.parameters)
     place = {p.name: k for k, p in enumerate(model.parameters)}
     entries = [
@@ -159,15 +188,15 @@ def regressor_rms(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class IdentifiabilityFlag:
-    """A parameter that these data cannot tell, or only doubtfully, and why.
+    """A parameter that these data do not identify, or only weakly, and why.
 
     Attributes
     ----------
     name : str
     relative_bound : float
-        Standard error over the reference value of the (plausible) estimate.
+        Standard error over the reference value of the (shrunk) estimate.
     probability : float
-        That the bound exceeds 100 % of the value.
+        Probability that the bound exceeds 100 % of the value.
     grade : str
         `NOT_IDENTIFIABLE` where that is more likely than not, `WEAKLY_IDENTIFIABLE` from
         `WEAK_PROBABILITY` on.
@@ -188,7 +217,7 @@ class Identifiability:
     Attributes
     ----------
     probability : float
-        That some bound exceeds 100 % of its value.
+        Probability that some bound exceeds 100 % of its value.
     flags : tuple of Refusal
         Both grades, in the order of the model. Of an identifiable fit they can only be weakly
         identifiable; of another one at least one of them is not identifiable.
@@ -203,17 +232,18 @@ class Identifiability:
         return self.probability > EVEN_ODDS
 
     def names(self, *grades: str) -> tuple[str, ...]:
-        """Return the names of these grades, of both without any."""
+        """Return the names of parameters with these grades, by default with either."""
         return tuple(r.name for r in self.flags if not grades or r.grade in grades)
 
 
 def shrunk_estimate(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[Array, Array]:
-    """Return mean and covariance of the parameters, drawn towards zero where nothing else holds.
+    """Return mean and covariance of the parameters, shrunk towards zero where data inform little.
 
-    Where the data cannot tell entries of a row apart, estimates of either sign and any size cancel
-    each other, and comparing a bound with such a value hides that it is worthless. Each entry gets
-    a prior about zero, `SHRINKAGE_PRIOR_WIDTH` times what alone would make up the whole state rate;
-    entries that the data determine do not move.
+    Where the data cannot separate parameters of one equation, their estimates may have any size and
+    cancel each other. Comparing a bound with such a value would hide that it is worthless. This is
+    ridge regression (Hoerl & Kennard, Technometrics 12, 1970): each parameter gets a Gaussian prior
+    about zero, `SHRINKAGE_PRIOR_WIDTH` times the value that alone would explain the whole state
+    rate. Parameters that the data determine do not change.
     """
     model = result.model
     count = len(model.parameters)
@@ -233,11 +263,11 @@ def shrunk_estimate(result: FitResult, maneuvers: Sequence[Maneuver]) -> tuple[A
                 if scale > 0.0:
                     prior[k] = min(prior[k], SHRINKAGE_PRIOR_WIDTH * rate_rms[term.row] / scale)
     covariance = result.covariance[:count, :count]
-    known = np.isfinite(prior)
+    has_prior = np.isfinite(prior)
     total = covariance + np.diag(np.minimum(prior, 1e100) ** 2) + 1e-300 * np.eye(count)
     mean = result.estimate[:count] - covariance @ np.linalg.solve(total, result.estimate[:count])
-    left = covariance - covariance @ np.linalg.solve(total, covariance)
-    return np.where(known, mean, result.estimate[:count]), 0.5 * (left + left.T)
+    posterior = covariance - covariance @ np.linalg.solve(total, covariance)
+    return np.where(has_prior, mean, result.estimate[:count]), 0.5 * (posterior + posterior.T)
 
 
 def measured_columns(model: LinearModel) -> list[int]:
@@ -248,7 +278,10 @@ def measured_columns(model: LinearModel) -> list[int]:
 def relative_bounds(
     result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = LEAST_CONTRIBUTION
 ) -> Array:
-    """Return the standard error of every common parameter over its reference value."""
+    """Return the relative Cramer-Rao bound: standard error over reference value, per parameter.
+
+    Klein & Morelli, Aircraft System Identification, ch. 6.
+    """
     count = len(result.model.parameters)
     mean, _ = shrunk_estimate(result, maneuvers)
     reference = reference_values(result.model, maneuvers, mean, small_share=small_share)
@@ -260,8 +293,14 @@ def bound_exceedance_probability(
 ) -> tuple[Array, float]:
     """Return the probability that each bound exceeds 100 % of its value, and that any does.
 
-    The value is as uncertain as its bound says, so one estimate over its bound decides badly near
-    100 %: values are drawn from what the fit knows of them, and each draw is compared.
+    The true value is as uncertain as its bound says, so that a single estimate decides badly near
+    100 %. Values are therefore drawn at random from mean and covariance of `shrunk_estimate`, and
+    each draw is compared with the bounds.
+
+    Returns
+    -------
+    Array, shape (common parameters,)
+    float
     """
     model, count = result.model, len(result.model.parameters)
     mean, covariance = shrunk_estimate(result, maneuvers)
@@ -276,11 +315,11 @@ def bound_exceedance_probability(
 def assess_identifiability(
     result: FitResult, maneuvers: Sequence[Maneuver], *, small_share: float = LEAST_CONTRIBUTION
 ) -> Identifiability:
-    """Say whether a fit is refused, and name every parameter in doubt with its grade.
+    """Assess practical identifiability: grade every parameter whose bound may exceed its value.
 
     A single estimate cannot always show that its bound is too large: one with a bound of 500 % lies
-    beyond twice its own bound in one of twenty fits. So there are two grades and two odds, for the
-    fit (`probability` of any) and for each parameter.
+    beyond twice its own bound in one of twenty fits. There are therefore two grades, by the
+    probability for each parameter, and one `probability` for the whole fit.
     """
     relative = relative_bounds(result, maneuvers, small_share=small_share)
     single, any_of_them = bound_exceedance_probability(result, maneuvers, small_share=small_share)
@@ -294,7 +333,7 @@ def assess_identifiability(
 def identifiability_flags(
     result: FitResult, maneuvers: Sequence[Maneuver]
 ) -> tuple[IdentifiabilityFlag, ...]:
-    """Name the common parameters that these data cannot tell or tell doubtfully."""
+    """Return flags of the common parameters that these data identify weakly or not at all."""
     return assess_identifiability(result, maneuvers).flags
 
 
@@ -321,7 +360,7 @@ def _identifiability_flag(
 
 @dataclass(frozen=True, slots=True)
 class Collinearity:
-    """Condition number of the scaled information and strongly correlated pairs."""
+    """Condition number of the correlation matrix and strongly correlated pairs of parameters."""
 
     condition: float
     pairs: tuple[tuple[str, str, float], ...]
@@ -333,30 +372,37 @@ class Collinearity:
 
 
 def collinearity(result: FitResult) -> Collinearity:
-    """Return what the parameters have in common."""
-    live = np.flatnonzero(result.standard_error > 0.0)
-    correlation = result.correlation[np.ix_(live, live)]
+    """Return the collinearity of the estimates.
+
+    Klein & Morelli, Aircraft System Identification, ch. 5.
+    """
+    estimated = np.flatnonzero(result.standard_error > 0.0)
+    correlation = result.correlation[np.ix_(estimated, estimated)]
     values = np.linalg.eigvalsh(correlation)
     condition = float(values[-1] / max(values[0], 1e-300))
     pairs = []
     count = len(result.model.parameters)
-    for i in range(len(live)):
+    for i in range(len(estimated)):
         for j in range(i):
-            if live[i] < count and abs(correlation[i, j]) > CORRELATION_LIMIT:
+            if estimated[i] < count and abs(correlation[i, j]) > CORRELATION_LIMIT:
                 pairs.append(
-                    (result.names[live[j]], result.names[live[i]], float(correlation[i, j]))
+                    (
+                        result.names[estimated[j]],
+                        result.names[estimated[i]],
+                        float(correlation[i, j]),
+                    )
                 )
     pairs.sort(key=lambda pair: -abs(pair[2]))
     return Collinearity(condition, tuple(pairs))
 
 
 def constant_inputs(model: LinearModel, maneuvers: Sequence[Maneuver]) -> tuple[str, ...]:
-    """Name inputs that never move: they are the bias under another name."""
-    still = []
+    """Return inputs that never change: each is collinear with a bias."""
+    constant = []
     for k, name in enumerate(model.inputs):
         if all(float(np.ptp(m.inputs[:, k])) == 0.0 for m in maneuvers):
-            still.append(name)
-    return tuple(still)
+            constant.append(name)
+    return tuple(constant)
 
 
 def thesis_sum_of_mean_errors(measured: Array, simulated: Array) -> float:
@@ -365,9 +411,10 @@ def thesis_sum_of_mean_errors(measured: Array, simulated: Array) -> float:
 
 
 def thesis_program_error_percent(measured: Array, simulated: Array) -> float:
-    """Return the figure its program prints: relative L1 error divided once more by the samples.
+    """Return the figure that the thesis's program prints, in percent.
 
-    Multiply by the number of samples for the sum over states of honest relative errors in percent.
+    It is the relative L1 error divided once more by the number of samples. Times that number it is
+    the sum over states of the relative errors.
     """
     shares = np.sum(np.abs(measured - simulated), axis=0) / np.sum(np.abs(measured), axis=0)
     return float(np.sum(shares) * 100.0 / len(measured))

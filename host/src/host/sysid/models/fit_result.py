@@ -1,4 +1,4 @@
-"""One answer type for every method."""
+"""Result of a fit, the same type for every method."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class FitResult:
         Parameter names in the order of `estimate`: common ones first, then per maneuver.
     estimate : Array, shape (P,)
     covariance : Array, shape (P, P)
-        Covariance the intervals stand on (coloured or prewhitened where the method says so).
+        Covariance of the intervals (corrected for colour or prewhitened where the method says so).
     covariance_white : Array, shape (P, P)
         Covariance if the residuals were white.
     degrees_of_freedom : Array, shape (P,)
@@ -34,7 +34,7 @@ class FitResult:
     residuals : tuple of Array
         Per maneuver (samples, columns): measured minus model, of the outputs or of the rates.
     fitted : tuple of Array
-        Per maneuver the model's side of those residuals.
+        Per maneuver the modelled values of those columns.
     residual_kind : str
         ``output`` (free simulation), ``rate`` (equation error), ``innovation`` (one step) or
         ``spectrum`` (lines of output error in frequency, real and imaginary parts).
@@ -43,7 +43,7 @@ class FitResult:
     iterations : int
     converged : bool
     warnings : tuple of str
-        Clear statements about anything that should make a reader careful.
+        One sentence for each reason to trust the estimate less.
     details : dict
         Method-specific numbers for reports: name to value or array.
     """
@@ -89,7 +89,7 @@ class FitResult:
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def half_width(self, confidence: float = 0.95) -> Array:
-        """Return half-widths of the two-sided intervals, shape (P,)."""
+        """Return half-widths of two-sided intervals, units of the estimate, shape (P,)."""
         dof = np.minimum(self.degrees_of_freedom, 1e9)
         quantile = np.asarray(special.stdtrit(dof, 0.5 + confidence / 2.0), dtype=np.float64)
         return quantile * self.standard_error

@@ -1,4 +1,4 @@
-"""The samples of one maneuver, as every estimator sees them."""
+"""The samples of one maneuver, the data of every estimator."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from host.sysid.models.state_space_model import LinearModel
 
-LARGEST = 1e30  # in any unit: beyond it lies no quantity of flight, and its powers overflow
-JITTER_LIMIT = 0.02  # of one sample: beyond it the record is not on a uniform grid
+LARGEST = 1e30  # in any unit: no quantity of flight is larger, and its powers overflow
+JITTER_LIMIT = 0.02  # of one sample: a record with more is not on a uniform grid
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Natural modes of a model with the uncertainty of its parameters carried through."""
+"""Natural modes of a linear model and their uncertainty."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from host.constants import NORMAL_95
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.state_space_model import LinearModel
 
-PAIR, ROOT = "oscillatory mode", "real mode"  # without a name of their own
-REAL = 1e-9  # relative imaginary part below which an eigenvalue is called real
+PAIR, ROOT = "oscillatory mode", "real mode"  # where a mode has no name of its own
+REAL_LIMIT = 1e-9  # relative imaginary part below which an eigenvalue is called real
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +47,11 @@ class Mode:
     @property
     def oscillatory(self) -> bool:
         """Whether the mode is a conjugate pair."""
-        return abs(self.eigenvalue.imag) > REAL * abs(self.eigenvalue)
+        return abs(self.eigenvalue.imag) > REAL_LIMIT * abs(self.eigenvalue)
 
 
 def modes(result: FitResult) -> tuple[Mode, ...]:
-    """Return the modes of a fitted model, fastest first.
-
-    Uncertainty is first order: d lambda = w' dA v / (w' v) with the left and right eigenvectors.
-    """
+    """Return the modes of a fitted model, fastest first, with first-order uncertainty."""
     model = result.model
     A = result.matrices()[0]
     count = len(model.parameters)
@@ -69,54 +66,66 @@ def modes_of(model: LinearModel, A: Array, covariance: Array) -> tuple[Mode, ...
     return tuple(replace(m, name=name) for name, m in zip(names, found, strict=True))
 
 
-def eigenmodes(A: Array, slopes: Sequence[Array], covariance: Array) -> list[Mode]:
+def eigenmodes(A: Array, derivatives: Sequence[Array], covariance: Array) -> list[Mode]:
     """Return the modes of a matrix without names, fastest first.
 
     Parameters
     ----------
-    A : (n, n) Array
-    slopes : sequence of (n, n) Array
-        Of the matrix with each unknown: d lambda = w' dA v / (w' v) with left and right
-        eigenvectors (Stevens & Lewis, Aircraft Control and Simulation, sec. 1.3).
-    covariance : (unknowns, unknowns) Array
+    A : Array, shape (n, n)
+        System matrix, 1/s.
+    derivatives : sequence of Array, shape (n, n)
+        Derivative of A by each unknown.
+    covariance : Array, shape (unknowns, unknowns)
+
+    Notes
+    -----
+    An eigenvalue moves by d lambda = w' dA v / (w' v), with the left and right eigenvectors w and v
+    (Stevens & Lewis, Aircraft Control and Simulation, sec. 1.3).
     """
     values, right = np.linalg.eig(A)
     left = np.linalg.inv(right)
     found = []
     for k in range(len(values)):
         value = complex(values[k])
-        if value.imag < -REAL * abs(value):
+        if value.imag < -REAL_LIMIT * abs(value):
             continue
-        gradient = np.array([left[k] @ slope @ right[:, k] for slope in slopes])
+        gradient = np.array([left[k] @ derivative @ right[:, k] for derivative in derivatives])
         J = np.vstack([gradient.real, gradient.imag])
         found.append(mode_of("", value, J @ covariance @ J.T))
     return sorted(found, key=lambda mode: -mode.frequency_radps)
 
 
-def mode_of(name: str, value: complex, spread: Array) -> Mode:
-    """Return the mode of an eigenvalue; `spread` (2, 2) is of its real and imaginary part."""
+def mode_of(name: str, value: complex, covariance_re_im: Array) -> Mode:
+    """Return the mode of an eigenvalue lambda.
+
+    Frequency is |lambda| and damping ratio -Re lambda / |lambda| (Stevens & Lewis, Aircraft Control
+    and Simulation, ch. 4); their deviations follow to first order from `covariance_re_im` (2, 2),
+    that of real and imaginary part.
+    """
     frequency = float(np.hypot(value.real, value.imag))
     if frequency == 0.0:
-        return Mode(name, value, spread, 0.0, float(np.sqrt(spread[0, 0])), 0.0, 0.0)
+        return Mode(
+            name, value, covariance_re_im, 0.0, float(np.sqrt(covariance_re_im[0, 0])), 0.0, 0.0
+        )
     by_frequency = np.array([value.real, value.imag]) / frequency
     # zeta = -Re / |lambda|
     by_damping = np.array([-(value.imag**2), value.real * value.imag]) / frequency**3
     return Mode(
         name,
         value,
-        spread,
+        covariance_re_im,
         float(frequency),
-        float(np.sqrt(np.maximum(by_frequency @ spread @ by_frequency, 0.0))),
+        float(np.sqrt(np.maximum(by_frequency @ covariance_re_im @ by_frequency, 0.0))),
         float(-value.real / frequency),
-        float(np.sqrt(np.maximum(by_damping @ spread @ by_damping, 0.0))),
+        float(np.sqrt(np.maximum(by_damping @ covariance_re_im @ by_damping, 0.0))),
     )
 
 
 def longitudinal_names(oscillatory: Sequence[bool]) -> list[str]:
     """Return the names of longitudinal modes, fastest first, by whether each is a pair.
 
-    The two fastest roots are the short period, the next two the phugoid; one that is damped beyond
-    swinging is two real roots. A pair of one of each has no name of its own.
+    The two fastest roots are the short period, the next two the phugoid; an overdamped mode is two
+    real roots. A pair that has one root of each has no name of its own.
     """
     names, roots = [], 0
     for pair in oscillatory:
@@ -148,7 +157,7 @@ def lateral_names(oscillatory: Sequence[bool], *, yaw: bool = True) -> list[str]
 
 
 def _names(model: LinearModel, found: Sequence[Mode]) -> list[str]:
-    """Return what modes are called by the states of their model."""
+    """Return the names of modes, which depend on the states of their model."""
     pairs = [m.oscillatory for m in found]
     names = [PAIR if pair else ROOT for pair in pairs]
     if "q_radps" in model.states:

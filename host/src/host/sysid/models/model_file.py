@@ -1,4 +1,4 @@
-"""Models as TOML: what a user wrote, or `model_text.py` of what a fit found.
+"""Read models from TOML, written by a user or by `model_text.py` after a fit.
 
 ```toml
 name = "short-period"
@@ -106,10 +106,10 @@ def read_trim(path: Path) -> Trim:
 
 def model_from(document: Mapping[str, object], source: str = "model") -> LinearModel:
     """Build a model from a parsed document."""
-    strangers = sorted(set(document) - KEYS)
-    if strangers:
+    unknown_keys = sorted(set(document) - KEYS)
+    if unknown_keys:
         raise IdentificationError(
-            f"{source}: unknown key {', '.join(strangers)}; known are {', '.join(sorted(KEYS))}"
+            f"{source}: unknown key {', '.join(unknown_keys)}; known are {', '.join(sorted(KEYS))}"
         )
     signals = {
         key: _names(document, key, source, needed=key in ("states", "inputs", "outputs"))
@@ -231,7 +231,7 @@ def parse_entry(entry: object, where: str) -> tuple[float, list[tuple[str, float
 def _constants(
     document: Mapping[str, object], signals: dict[str, tuple[str, ...]], terms: list[Term]
 ) -> None:
-    """Free the constants of keys that are left out."""
+    """Fill in the free constants of keys that are left out."""
     free = {term.row for term in terms if term.matrix in "AB"}
     usual = {
         "initial_states": signals["states"],
@@ -246,10 +246,10 @@ def _table(value: object, allowed: Collection[str], where: str) -> dict[str, obj
         raise IdentificationError(
             f"{where}: {shown(value)}, expected a table of {', '.join(allowed)}"
         )
-    strangers = sorted(set(value) - set(allowed))
-    if strangers:
+    unknown_keys = sorted(set(value) - set(allowed))
+    if unknown_keys:
         raise IdentificationError(
-            f"{where}: unknown key {', '.join(strangers)}; known are {', '.join(allowed)}"
+            f"{where}: unknown key {', '.join(unknown_keys)}; known are {', '.join(allowed)}"
         )
     return value
 

@@ -1,4 +1,4 @@
-"""A model as the TOML that `model_file.py` reads again."""
+"""Write a model as TOML that `model_file.py` reads."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def model_text(
     result : FitResult, optional
         Gives start values, and a [fit] table with standard errors.
     trim : Trim, optional
-        Gives a [trim] table: what the model is about, for flying it again.
+        Gives a [trim] table: the condition the model is linearised about, to fly it again.
     """
     lines = [f"name = {_text(model.name)}"]
     for key in ("states", "inputs", "outputs"):

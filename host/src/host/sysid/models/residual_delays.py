@@ -1,4 +1,4 @@
-"""Residual delays of each group of sensors: what a model has where it names none of its own."""
+"""Standard residual delays of each group of sensors, for models that name none of their own."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from host.sysid.models.state_space_model import DelayGroup, LinearModel
 
-# Deviation of what is left of each sensor's delay once the nominal one is taken out, s.
-DELAYS = (
+# Prior deviation of the delay that remains of each sensor once the nominal one is removed, s.
+STANDARD_DELAYS = (
     DelayGroup("delay_vanes_s", ("alpha_rad", "beta_rad"), prior_sd_s=0.010, limit_s=0.03),
     DelayGroup(
         "delay_imu_s",
@@ -22,18 +22,18 @@ DELAYS = (
 
 
 def delays_of(
-    outputs: Iterable[str], groups: Iterable[DelayGroup] = DELAYS
+    outputs: Iterable[str], groups: Iterable[DelayGroup] = STANDARD_DELAYS
 ) -> tuple[DelayGroup, ...]:
-    """Return the delays that concern these outputs."""
-    there = set(outputs)
+    """Return the delay groups with only these outputs; groups without any are left out."""
+    present = set(outputs)
     return tuple(
-        DelayGroup(d.name, held, d.prior_sd_s, d.limit_s)
+        DelayGroup(d.name, concerned, d.prior_sd_s, d.limit_s)
         for d in groups
-        if (held := tuple(y for y in d.outputs if y in there))
+        if (concerned := tuple(y for y in d.outputs if y in present))
     )
 
 
-def without_usual_delays(model: LinearModel) -> LinearModel:
-    """Return a model without the delays it was given for want of its own."""
-    usual = delays_of(model.outputs)
-    return replace(model, delays=tuple(d for d in model.delays if d not in usual))
+def without_standard_delays(model: LinearModel) -> LinearModel:
+    """Return a model without the standard delays, with those of its own."""
+    standard = delays_of(model.outputs)
+    return replace(model, delays=tuple(d for d in model.delays if d not in standard))

@@ -1,10 +1,10 @@
-"""A linear model in words: what it is made of, what is known, what is free.
+"""A linear state-space model with named signals, fixed entries and free parameters.
 
     x' = A x + B u + b,   y = C x + D u + c,   x(0) = x0
 
-Every entry of A, B, C, D is a known number plus a sum of parameters times known gains, so that an
-entry can be fixed, free or tied (an accelerometer row repeats the force row times the speed).
-Biases b and c and the start x0 belong to each maneuver alone; everything else is common.
+Every entry of A, B, C and D is a known number plus a sum of parameters times known gains. An entry
+can thus be fixed, free or tied (an accelerometer equation repeats the force equation times the
+speed). Biases b and c and the initial state x0 belong to one maneuver; everything else is common.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ MATRICES = ("A", "B", "C", "D")
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A free number of the model.
+    """A free parameter of the model.
 
     Parameters
     ----------
     name : str
         Unique name, e.g. ``M_alpha``.
     start : float
-        Where iteration starts unless a cheaper method says better; centre of the prior.
+        Start of the iteration unless a cheaper method gives one; mean of the prior.
     lower, upper : float
         Bounds of the search.
     prior_sd : float
@@ -78,11 +78,13 @@ class DelayGroup:
 
 @dataclass(frozen=True, slots=True)
 class AccelerometerOffset:
-    """An accelerometer off its assumed place: output += gain * parameter * rate of a state.
+    """An accelerometer away from its assumed place: output += gain * parameter * rate of a state.
 
-    A wrong position of 1 cm turns angular acceleration into false side force; the offset is then a
-    parameter with a prior, and every derivative of the state's row enters the output through it.
-    The output should have a bias of its own, which takes the constant part.
+    It is the tangential term omega' x r of the acceleration at r (Klein & Morelli, Aircraft System
+    Identification, ch. 10). A wrong position of 1 cm turns angular acceleration into false side
+    force. The offset is then a parameter with a prior, and every derivative of the state's equation
+    enters the output through it. The output should have a bias of its own, which takes the constant
+    part.
     """
 
     output: str
@@ -93,7 +95,7 @@ class AccelerometerOffset:
 
 @dataclass(frozen=True, slots=True)
 class EntryTable:
-    """Terms as index arrays for the compiled kernels: rows, columns, parameters, gains."""
+    """Terms as index arrays, all of shape (terms,): rows, columns, parameters, gains."""
 
     row: IntArray
     column: IntArray
@@ -114,15 +116,15 @@ class LinearModel:
     A, B, C, D : Array
         Known parts; shapes (n, n), (n, m), (p, n), (p, m).
     terms : tuple of Term
-        Where parameters enter.
+        Entries in which parameters appear.
     parameters : tuple of Parameter
         Free numbers, in the order of every estimate.
     state_biases, output_biases, initial_states : tuple of str
-        Which state equations, outputs and start values get a free constant in each maneuver.
+        State equations, outputs and initial states with a free constant in each maneuver.
     delays : tuple of DelayGroup
         Residual delays, common to all maneuvers.
     hold : str
-        ``zoh`` or ``foh``: how the input runs between its samples.
+        Input between its samples: ``zoh`` (zero-order hold) or ``foh`` (first-order hold).
     accelerometer_offsets : tuple of AccelerometerOffset
         Sensor offsets that mix state rates into outputs.
 
@@ -191,10 +193,10 @@ class LinearModel:
             ("lever", tuple(x.parameter for x in self.accelerometer_offsets), tuple(names)),
             ("delay", tuple(y for d in self.delays for y in d.outputs), self.outputs),
         ):
-            strangers = [x for x in chosen if x not in known]
-            if strangers:
+            unknown = [x for x in chosen if x not in known]
+            if unknown:
                 raise IdentificationError(
-                    f"model {self.name}: {what} on {', '.join(strangers)}, known are"
+                    f"model {self.name}: {what} on {', '.join(unknown)}, known are"
                     f" {', '.join(known)}"
                 )
         if self.hold not in ("zoh", "foh"):
@@ -256,11 +258,11 @@ class LinearModel:
 
     def gradient(self, matrix: str, parameter: str) -> Array:
         """Return the derivative of one matrix by one parameter."""
-        slope: Array = np.zeros(np.shape(getattr(self, matrix)))
+        derivative: Array = np.zeros(np.shape(getattr(self, matrix)))
         for term in self.terms:
             if term.matrix == matrix and term.parameter == parameter:
-                slope[term.row, term.column] += term.gain
-        return slope
+                derivative[term.row, term.column] += term.gain
+        return derivative
 
     def measured_states(self) -> IntArray:
         """Return, for each state, the output that measures it.
@@ -331,7 +333,7 @@ def free_model(
 
 
 def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
-    """Return a model that does not look at some outputs; delays that are left empty go too."""
+    """Return a model without some of its outputs; delays without outputs are removed too."""
     keep = [k for k, y in enumerate(model.outputs) if y not in names]
     place = {old: new for new, old in enumerate(keep)}
     delays = [

@@ -1,14 +1,11 @@
-"""Ready models of the aircraft's motion about a trim point.
+"""Template models of the aircraft's motion about a trim point.
 
-Longitudinal states are airspeed, alpha, q, theta; lateral ones beta, p, r, phi. Forces are written
-as specific force along the velocity (D_) and normal to it (Z_, divided by the speed), so that
-accelerometer rows repeat the same parameters with known gains and help to find them. Kinematics and
-gravity are known numbers. Each state equation and each accelerometer has a bias per maneuver: the
-signals are total quantities, the trim lives in the biases. `imu_sd_m` makes the position of the
+Longitudinal states are airspeed, alpha, q, theta; lateral ones beta, p, r, phi. Forces are
+parameters of specific force along the velocity (D_) and normal to it (Z_, divided by the speed).
+Accelerometer equations repeat the same parameters with known gains, which helps to estimate them.
+Kinematics and gravity are known numbers. Signals are total quantities: each state equation and each
+accelerometer has a bias per maneuver, which holds the trim. `imu_sd_m` makes the position of the
 accelerometers a parameter with that prior deviation.
-
-Etkin & Reid, Dynamics of Flight, ch. 4-5, linearised in wind axes; a_x = f cos(alpha) -
-n sin(alpha), a_z = f sin(alpha) + n cos(alpha) with f along and n normal to the velocity.
 """
 
 from __future__ import annotations
@@ -32,7 +29,7 @@ from host.sysid.models.state_space_model import (
 
 @dataclass(frozen=True, slots=True)
 class Trim:
-    """The condition a template is linearised about, and which optional signals exist."""
+    """The condition a template is linearised about: airspeed (m/s), alpha and theta (rad)."""
 
     airspeed_mps: float
     alpha_rad: float = 0.0
@@ -47,7 +44,7 @@ class Trim:
 
 @dataclass(slots=True)
 class _Builder:
-    """Collect entries by signal names."""
+    """Collects the entries of a model by signal names."""
 
     name: str
     states: tuple[str, ...]
@@ -59,7 +56,7 @@ class _Builder:
     accelerometer_offsets: list[AccelerometerOffset] = field(default_factory=list)
 
     def add(self, name: str, start: float, places: Iterable[tuple[str, str, float]]) -> None:
-        """Make a parameter act on rows by columns with gains; unknown signals are left out."""
+        """Add a parameter to entries (row, column) with gains; unknown signals are left out."""
         found = []
         for row, column, gain in places:
             place = self._place(row, column)
@@ -87,8 +84,10 @@ class _Builder:
             return "B" if rate else "D", rows.index(label), self.inputs.index(column)
         return None
 
-    def lever(self, output: str, state: str, name: str, gain: float, sd_m: float) -> None:
-        """Let an accelerometer sit away from its assumed place, with a prior."""
+    def accelerometer_offset(
+        self, output: str, state: str, name: str, gain: float, sd_m: float
+    ) -> None:
+        """Add an accelerometer's offset from its assumed place, with a prior."""
         if sd_m > 0.0 and output in self.outputs and state in self.states:
             self.parameters[name] = Parameter(
                 name, 0.0, lower=-3.0 * sd_m, upper=3.0 * sd_m, prior_sd=sd_m
@@ -96,7 +95,7 @@ class _Builder:
             self.accelerometer_offsets.append(AccelerometerOffset(output, state, name, gain))
 
     def build(self, *, delays: tuple[DelayGroup, ...], hold: str) -> LinearModel:
-        """Return the model; outputs that carry a state's name measure it."""
+        """Return the model; an output with the name of a state measures it."""
         n, m, p = len(self.states), len(self.inputs), len(self.outputs)
         matrices = {
             "A": np.zeros((n, n)),
@@ -140,7 +139,12 @@ def longitudinal(
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
-    """Return the four-state longitudinal model."""
+    """Return the four-state longitudinal model.
+
+    Etkin & Reid, Dynamics of Flight, ch. 4-5, linearised in wind axes; the accelerometers measure
+    a_x = f cos(alpha) - n sin(alpha) and a_z = f sin(alpha) + n cos(alpha), with the specific force
+    f along and n normal to the velocity.
+    """
     V, g = trim.airspeed_mps, GRAVITY_MPS2
     gamma = trim.theta_rad - trim.alpha_rad
     outputs = ("airspeed_mps", "alpha_rad", "q_radps", "theta_rad")
@@ -152,7 +156,7 @@ def longitudinal(
         (*outputs, "ax_mps2", "az_mps2") if accelerometers else outputs,
     )
     sine, cosine = float(np.sin(trim.alpha_rad)), float(np.cos(trim.alpha_rad))
-    if accelerometers:  # without a_z it drowns in the known q
+    if accelerometers:  # without a_z it is negligible beside the known q
         model.add(
             "Z_q",
             -0.1,
@@ -201,8 +205,8 @@ def longitudinal(
     model.fix("alpha_rad'", "theta_rad", -g / V * float(np.sin(gamma)))
     model.fix("alpha_rad'", "alpha_rad", g / V * float(np.sin(gamma)))
     model.fix("theta_rad'", "q_radps", 1.0)
-    model.lever("ax_mps2", "q_radps", "imu_z_m", 1.0, imu_sd_m)
-    model.lever("az_mps2", "q_radps", "imu_x_m", -1.0, imu_sd_m)
+    model.accelerometer_offset("ax_mps2", "q_radps", "imu_z_m", 1.0, imu_sd_m)
+    model.accelerometer_offset("az_mps2", "q_radps", "imu_x_m", -1.0, imu_sd_m)
     along, normal = g * float(np.sin(gamma)), -g * float(np.cos(gamma))  # of the trim
     model.fix("ax_mps2", "alpha_rad", -(along * sine + normal * cosine))
     model.fix("az_mps2", "alpha_rad", along * cosine - normal * sine)
@@ -217,7 +221,7 @@ def short_period(
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
-    """Return the two-state short-period model (constant speed)."""
+    """Return the two-state short-period model at constant speed (Etkin & Reid, ch. 6)."""
     V = trim.airspeed_mps
     cosine = float(np.cos(trim.alpha_rad))
     states = ("alpha_rad", "q_radps")
@@ -242,7 +246,7 @@ def short_period(
         model.add(f"M_{label}", start, [("q_radps'", column, 1.0)])
     model.fix("alpha_rad'", "q_radps", 1.0)
     model.fix("az_mps2", "alpha_rad", GRAVITY_MPS2 * float(np.sin(trim.alpha_rad)))
-    model.lever("az_mps2", "q_radps", "imu_x_m", -1.0, imu_sd_m)
+    model.accelerometer_offset("az_mps2", "q_radps", "imu_x_m", -1.0, imu_sd_m)
     return model.build(delays=delays, hold=hold)
 
 
@@ -254,8 +258,8 @@ def phugoid(
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
-    """Return the two-state phugoid model (alpha follows at once)."""
-    del accelerometers, imu_sd_m  # slow motion: they see only gravity
+    """Return the two-state phugoid model, alpha quasi-steady (Etkin & Reid, ch. 6)."""
+    del accelerometers, imu_sd_m  # in slow motion they measure only gravity
     model = _Builder(
         "phugoid",
         ("airspeed_mps", "theta_rad"),
@@ -280,7 +284,7 @@ def lateral(
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
-    """Return the four-state lateral model."""
+    """Return the four-state lateral model (Etkin & Reid, Dynamics of Flight, ch. 4-5)."""
     states = ("beta_rad", "p_radps", "r_radps", "phi_rad")
     model = _Builder(
         "lateral",
@@ -305,8 +309,8 @@ def lateral(
             model.add(f"{axis}_{label}", start, [(row, column, 1.0)])
     model.fix("phi_rad'", "p_radps", 1.0)
     model.fix("phi_rad'", "r_radps", float(np.tan(trim.theta_rad)))
-    model.lever("ay_mps2", "p_radps", "imu_z_m", -1.0, imu_sd_m)
-    model.lever("ay_mps2", "r_radps", "imu_x_m", 1.0, imu_sd_m)
+    model.accelerometer_offset("ay_mps2", "p_radps", "imu_z_m", -1.0, imu_sd_m)
+    model.accelerometer_offset("ay_mps2", "r_radps", "imu_x_m", 1.0, imu_sd_m)
     return model.build(delays=delays, hold=hold)
 
 
@@ -333,7 +337,7 @@ def dutch_roll(
         ("dr", "rudder_rad", -20.0),
     ):
         model.add(f"N_{label}", start, [("r_radps'", column, 1.0)])
-    model.lever("ay_mps2", "r_radps", "imu_x_m", 1.0, imu_sd_m)
+    model.accelerometer_offset("ay_mps2", "r_radps", "imu_x_m", 1.0, imu_sd_m)
     return model.build(delays=delays, hold=hold)
 
 
@@ -358,7 +362,7 @@ def roll(
 def _side_force(model: _Builder, trim: Trim, *, with_rates: bool) -> None:
     V = trim.airspeed_mps
     terms = [("beta", "beta_rad", -0.5), ("da", "aileron_rad", 0.0), ("dr", "rudder_rad", 0.3)]
-    if with_rates:  # without a lateral accelerometer they drown in the known -cos(alpha) r
+    if with_rates:  # without a_y they are negligible beside the known -cos(alpha) r
         terms[1:1] = [("p", "p_radps", 0.0), ("r", "r_radps", 0.0)]
     for label, column, start in terms:
         model.add(f"Y_{label}", start, [("beta_rad'", column, 1.0), ("ay_mps2", column, V)])

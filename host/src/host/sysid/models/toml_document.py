@@ -1,4 +1,4 @@
-"""What a user wrote as TOML, parsed, every mistake one line."""
+"""Read a TOML file of the user; every mistake is one line."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What estimators share: kernels, residuals and slopes, memory of noise, Riccati equation."""
+"""What estimators share: responses and sensitivities, likelihoods, AR noise, Riccati equation."""

@@ -1,8 +1,7 @@
-"""Autoregressive models of output noise: whitening, estimation with correction, order choice.
+"""Autoregressive models of output noise: whitening, estimation, choice of the order.
 
-e[k] = a1 e[k-1] + ... + ap e[k-p] + w[k]. Residuals of a fit are smaller and whiter than the noise,
-because the parameters have eaten their share; the moments below give it back (J Cov J' is what the
-fit took), which makes the estimate restricted maximum likelihood by expectation-maximisation.
+The noise of an output is e[k] = a1 e[k-1] + ... + ap e[k-p] + w[k] with white innovations w (Ljung,
+System Identification, 2nd ed., ch. 4).
 """
 
 from __future__ import annotations
@@ -15,24 +14,33 @@ from scipy import linalg
 
 from host.arrays import Array
 
-POLE_LIMIT = 0.999  # radius: closer to one, a 2000-sample record cannot tell noise from drift
+POLE_LIMIT = 0.999  # radius: nearer to one, 2000 samples cannot separate noise from drift
 
 
 @dataclass(frozen=True, slots=True)
 class ArNoise:
-    """AR coefficients of one output and the filter that whitens its first samples."""
+    """AR model of the noise of one output.
+
+    Attributes
+    ----------
+    coefficient : Array, shape (order,)
+        a1 to ap.
+    start_whitener : Array, shape (order, order)
+        Inverse Cholesky factor of the covariance of `order` successive samples in units of the
+        innovation variance; it whitens the first samples exactly.
+    """
 
     coefficient: Array
-    head: Array
+    start_whitener: Array
 
     @classmethod
     def from_coefficient(cls, coefficient: Array) -> ArNoise:
-        """Prepare the exact start of the whitening for stationary AR coefficients."""
-        return cls(coefficient, _head(coefficient))
+        """Return the model of stationary AR coefficients."""
+        return cls(coefficient, _start_whitener(coefficient))
 
     @classmethod
     def white(cls) -> ArNoise:
-        """Return the model without memory."""
+        """Return the model of white noise."""
         return cls(np.zeros(0), np.zeros((0, 0)))
 
     @property
@@ -41,20 +49,23 @@ class ArNoise:
         return len(self.coefficient)
 
     def whiten(self, values: Array) -> Array:
-        """Filter columns (samples, columns) to unit-memory innovations."""
+        """Return the innovations of columns, both of shape (samples, columns)."""
         if self.order == 0:
             return values
-        return ar_filter(np.ascontiguousarray(values), self.coefficient, self.head)
+        return ar_filter(np.ascontiguousarray(values), self.coefficient, self.start_whitener)
 
     def log_determinant(self) -> float:
-        """Log determinant of the noise covariance of a record, innovation variance one."""
+        """Return the log determinant of a record's noise covariance, innovation variance one."""
         if self.order == 0:
             return 0.0
-        return float(-2.0 * np.sum(np.log(np.diag(self.head))))
+        return float(-2.0 * np.sum(np.log(np.diag(self.start_whitener))))
 
 
 def autocovariance(coefficient: Array, lags: int) -> Array:
-    """Return the autocovariance of an AR process of unit innovation, lags 0 to `lags`."""
+    """Return the autocovariance of an AR process of unit innovation variance, lags 0 to `lags`.
+
+    It solves the Yule-Walker equations, then continues by the recursion of the process.
+    """
     order = len(coefficient)
     if order == 0:
         return np.concatenate([[1.0], np.zeros(lags)])
@@ -73,16 +84,15 @@ def autocovariance(coefficient: Array, lags: int) -> Array:
     return result[: lags + 1]
 
 
-def ar_filter(values: Array, coefficient: Array, head: Array) -> Array:
-    """Whiten columns by an AR filter: e[k] = v[k] - sum a_l v[k-l], first samples by `head`.
+def ar_filter(values: Array, coefficient: Array, start_whitener: Array) -> Array:
+    """Whiten columns by an AR filter, w[k] = v[k] - sum a_l v[k-l].
 
     Parameters
     ----------
     values : Array, shape (samples, columns)
     coefficient : Array, shape (order,)
     head : Array, shape (order, order)
-        Inverse Cholesky factor of the covariance of `order` successive samples in units of the
-        innovation, which makes the whitening exact from the first sample.
+        See `ArNoise`: it makes the whitening exact from the first sample.
 
     Notes
     -----
@@ -91,13 +101,13 @@ def ar_filter(values: Array, coefficient: Array, head: Array) -> Array:
     order = len(coefficient)
     first = min(order, len(values))
     out = values.astype(np.float64)
-    out[:first] = head[:first, :first] @ values[:first]
-    for lag, share in enumerate(coefficient, start=1):
-        out[order:] -= share * values[order - lag : len(values) - lag]
+    out[:first] = start_whitener[:first, :first] @ values[:first]
+    for lag, part in enumerate(coefficient, start=1):
+        out[order:] -= part * values[order - lag : len(values) - lag]
     return out
 
 
-def _head(coefficient: Array) -> Array:
+def _start_whitener(coefficient: Array) -> Array:
     order = len(coefficient)
     if order == 0:
         return np.zeros((0, 0))
@@ -107,7 +117,7 @@ def _head(coefficient: Array) -> Array:
 
 
 def stabilise(coefficient: Array) -> Array:
-    """Pull the poles of an AR model inside `POLE_LIMIT`."""
+    """Return AR coefficients whose poles are shrunk into a circle of radius `POLE_LIMIT`."""
     if len(coefficient) == 0:
         return coefficient
     radius = float(np.max(np.abs(np.roots(np.concatenate([[1.0], -coefficient])))))
@@ -125,7 +135,7 @@ def _moments(columns: Array, order: int) -> Array:
         return result
     for b in range(order + 1):
         result[0, b] = np.vdot(columns[order:], columns[order - b : samples - b])
-    # One lag further on both sides the same sum has one sample more in front, one less behind.
+    # With both lags one larger the sum gains one sample at its start and loses one at its end.
     edges = np.vstack([columns[:order][::-1], columns[samples - order :][::-1]])
     products = edges @ edges.T
     for a in range(order):
@@ -135,26 +145,35 @@ def _moments(columns: Array, order: int) -> Array:
     return np.triu(result) + np.triu(result, 1).T
 
 
-def lagged_moments(residuals: Sequence[Array], taken: Sequence[Array], order: int) -> Array:
-    """Return sums of e[k-a] e[k-b], expected given the fit, for a, b = 0..order.
+def lagged_moments(
+    residuals: Sequence[Array], parameter_parts: Sequence[Array], order: int
+) -> Array:
+    """Return expected sums of e[k-a] e[k-b] of the noise, for a, b = 0..order.
+
+    Residuals of a fit are smaller and whiter than the noise, because the parameters fit part of it.
+    Their expected part J Cov J' is added here, so that `fit_ar` gives the restricted
+    maximum-likelihood estimate by expectation-maximisation.
 
     Parameters
     ----------
     residuals : sequence of Array, shape (samples,)
         One output in each maneuver.
     taken : sequence of Array, shape (samples, P)
-        J L with L L' the covariance of the parameters: what the fit took out of the noise.
+        J L with sensitivities J and L L' the covariance of the parameters.
     order : int
         Highest lag.
     """
     total = np.zeros((order + 1, order + 1))
-    for residual, share in zip(residuals, taken, strict=True):
-        total += _moments(np.ascontiguousarray(np.hstack([residual[:, None], share])), order)
+    for residual, part in zip(residuals, parameter_parts, strict=True):
+        total += _moments(np.ascontiguousarray(np.hstack([residual[:, None], part])), order)
     return total
 
 
 def fit_ar(moments: Array, order: int) -> tuple[Array, float]:
-    """Return AR coefficients and innovation sum of squares from lagged moments."""
+    """Return AR coefficients and the sum of squared innovations from lagged moments.
+
+    The coefficients solve the normal equations (Yule-Walker equations of the moments).
+    """
     if order == 0:
         return np.zeros(0), float(moments[0, 0])
     block = moments[1 : order + 1, 1 : order + 1]
@@ -167,7 +186,19 @@ def fit_ar(moments: Array, order: int) -> tuple[Array, float]:
 
 
 def choose_order(moments: Array, samples: int, *, criterion: str = "bic") -> int:
-    """Choose the AR order by BIC or AICc from moments up to the highest order considered."""
+    """Return the AR order of least BIC or AICc, from moments up to the highest order considered.
+
+    Ljung, System Identification, 2nd ed., ch. 16.
+
+    Parameters
+    ----------
+    moments : Array, shape (highest + 1, highest + 1)
+        See `lagged_moments`.
+    samples : int
+        Samples in each sum.
+    criterion : str
+        ``bic`` or ``aicc``.
+    """
     highest = len(moments) - 1
     scores = []
     for order in range(highest + 1):

@@ -1,8 +1,8 @@
-"""What coloured residuals do to a covariance: the middle of the usual sandwich.
+"""Covariance of a score whose residuals are coloured.
 
-Morelli & Klein, Accuracy of aerodynamic model parameters estimated from flight test data, Journal
-of Guidance, Control and Dynamics 20 (1997): the residual's autocorrelation up to a fifth of the
-record stands between the slopes.
+It is the middle factor of the covariance that corrects a white-noise fit: Morelli & Klein,
+Accuracy of aerodynamic model parameters estimated from flight test data, Journal of Guidance,
+Control and Dynamics 20 (1997).
 """
 
 from __future__ import annotations
@@ -14,13 +14,21 @@ from host.arrays import Array
 LAG_SHARE = 5  # a fifth of the record
 
 
-def coloured_score_covariance(residual: Array, slopes: Array) -> Array:
-    """Return slopes' R slopes with the residual's autocorrelation R, shape (columns, columns).
+def coloured_score_covariance(residual: Array, sensitivities: Array) -> Array:
+    """Return S' R S with sensitivities S and the residual's autocorrelation R.
+
+    R is a Toeplitz matrix of the sample autocorrelation up to `LAG_SHARE` of the record (Morelli &
+    Klein 1997).
 
     Parameters
     ----------
     residual : Array, shape (samples,)
-    slopes : Array, shape (samples, columns)
+    sensitivities : Array, shape (samples, columns)
+        Of the modelled output, by each parameter.
+
+    Returns
+    -------
+    Array, shape (columns, columns)
 
     Notes
     -----
@@ -37,5 +45,7 @@ def coloured_score_covariance(residual: Array, slopes: Array) -> Array:
     window[size - lags :] = correlation[size - lags :]
     # A symmetric window has a real spectrum.
     weight = np.fft.rfft(window).real[:, None]
-    spread = np.fft.irfft(np.fft.rfft(slopes, size, axis=0) * weight, size, axis=0)[:samples]
-    return np.asarray(slopes.T @ spread, dtype=np.float64)
+    correlated = np.fft.irfft(np.fft.rfft(sensitivities, size, axis=0) * weight, size, axis=0)[
+        :samples
+    ]
+    return np.asarray(sensitivities.T @ correlated, dtype=np.float64)

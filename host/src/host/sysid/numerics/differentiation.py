@@ -1,9 +1,9 @@
-"""Smooth and differentiate with a bandwidth that is known, not guessed (Savitzky-Golay).
+"""Smooth and differentiate signals with a known bandwidth (Savitzky-Golay).
 
-A local polynomial is a linear-phase filter: it delays nothing. Its window is chosen from the
-frequency at which the smoothed signal has fallen to half power, computed from the filter itself.
-Written out in numpy: `scipy.signal.savgol_filter` is the same, and its import takes a third of an
-answer's processor time (1.0 of 3.0 s for the card `demo`, measured together).
+A local polynomial is a linear-phase filter: it delays nothing. The window follows from the
+half-power frequency, which is computed from the filter's own frequency response. It is written out
+in numpy: `scipy.signal.savgol_filter` is the same, and its import takes a third of an answer's
+processor time (1.0 of 3.0 s for the card `demo`, measured together).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from host.sysid.identification_error import IdentificationError
 
 POLYNOMIAL = 3
 SMALLEST_WINDOW = 5
-HEADROOM = 1.5  # bandwidth over the highest frequency at which a signal stands out of its noise
-STANDS_OUT = 6.0  # times the noise floor
+HEADROOM = 1.5  # bandwidth over the highest frequency at which a signal exceeds its noise
+SIGNAL_TO_FLOOR = 6.0  # power of a signal over the noise floor
 RESPONSE_LINES = 8192  # of a window's frequency response, to pi per sample
 
 
@@ -40,8 +40,8 @@ def local_polynomial(
 ) -> Array:
     """Fit a polynomial around every sample and return its value or derivative there.
 
-    Savitzky & Golay, Analytical Chemistry 36 (1964). Within half a window of an end the polynomial
-    of the last whole window is evaluated.
+    The values are c * y with the convolution weights c of Savitzky & Golay, Analytical Chemistry 36
+    (1964). Within half a window of an end the polynomial of the last whole window is evaluated.
 
     Parameters
     ----------
@@ -51,6 +51,11 @@ def local_polynomial(
     order, derivative : int
     dt_s : float
         Sample period, s.
+
+    Returns
+    -------
+    Array, shape (samples, columns)
+        In the units of `values` per second to the power of `derivative`.
     """
     matrix = _projection(window, order, derivative) / dt_s**derivative
     half = (window - 1) // 2
@@ -128,12 +133,18 @@ def smooth(values: Array, dt_s: float, bandwidth: float) -> Array:
 
 
 def signal_bandwidth_hz(values: Array, dt_s: float) -> float:
-    """Return a bandwidth that keeps what stands out of the noise of any column, Hz.
+    """Return a bandwidth that keeps the signal content of every column, Hz.
 
     The noise floor is the median of the upper half of each periodogram.
+
+    Parameters
+    ----------
+    values : Array, shape (samples, columns)
+    dt_s : float
+        Sample period, s.
     """
     samples = len(values)
-    ramp = np.linspace(-1.0, 1.0, samples)  # has no mean: the two parts of a trend are apart
+    ramp = np.linspace(-1.0, 1.0, samples)  # has no mean, so mean and slope are independent
     slope = (ramp @ values) / max(float(ramp @ ramp), 1e-300)
     detrended = values.T - np.mean(values, axis=0)[:, None] - slope[:, None] * ramp
     power = np.abs(np.fft.rfft(detrended * _taper(samples))) ** 2
@@ -145,7 +156,7 @@ def signal_bandwidth_hz(values: Array, dt_s: float) -> float:
         level = np.convolve(column, kernel, mode="same")
         upper = level[len(level) // 2 :]
         floor = float(np.partition(upper, len(upper) // 2)[len(upper) // 2])
-        above = np.flatnonzero(level > STANDS_OUT * floor)
+        above = np.flatnonzero(level > SIGNAL_TO_FLOOR * floor)
         if floor > 0.0 and len(above):
             edge = max(edge, float(frequency[above[-1]]))
         elif floor <= 0.0:

@@ -1,8 +1,4 @@
-"""From continuous matrices to a sample's transition, with exact derivatives.
-
-One block exponential gives [Phi Gamma] for inputs that are held or run linearly (Van Loan, IEEE
-Transactions on Automatic Control 23 (1978)), by scaling, a Taylor series and squaring.
-"""
+"""Discretise a continuous linear system, with exact derivatives by its parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +12,8 @@ TAYLOR_ORDER = 14  # 0.5^15 / 15! = 2e-17: below double precision for a scaled n
 SCALED_NORM = 0.5
 MOST_SQUARINGS = 40
 TAYLOR = np.array([1.0 / factorial(k) for k in range(TAYLOR_ORDER + 1)])
-# The slope of M^k/k! is the sum of M^a dM M^b / k! over a + b = k - 1: 1/(a + b + 1)! for a and b.
+# The derivative of M^k / k! is the sum of M^a dM M^b / k! over a + b = k - 1; hence the weight
+# 1 / (a + b + 1)! of a and b.
 BOTH_SIDES = np.array(
     [
         [TAYLOR[a + b + 1] if a + b < TAYLOR_ORDER else 0.0 for b in range(TAYLOR_ORDER)]
@@ -39,28 +36,32 @@ def discretise(
 ) -> tuple[Array, Array]:
     """Discretise [A B b] and its derivatives.
 
+    The block exponential exp([[A, B], [0, 0]] dt) = [[Phi, Gamma], [0, I]] (Van Loan, IEEE
+    Transactions on Automatic Control 23, 1978) is computed by scaling, a Taylor series and
+    squaring; a first-order hold adds integrators for the increments of the inputs.
+
     Parameters
     ----------
     AB : Array, shape (n, n + inputs + 1)
         Per second; the last column is a constant rate.
     n_states, n_inputs : int
     foh : bool
-        Inputs run linearly between samples (first-order hold); held otherwise.
+        Whether inputs run linearly between samples (first-order hold); zero-order hold otherwise.
     dt_s : float
         Sample period, s.
     row, column, parameter : IntArray, shape (entries,)
-        Which entry of `AB` moves with which parameter.
+        Which entry of `AB` depends on which parameter.
     gain : Array, shape (entries,)
-        By how much.
+        Derivative of the entry by the parameter.
     n_parameters : int
 
     Returns
     -------
     Array, shape (n, n + w)
-        [Phi Gamma]; w = inputs + 1, or 2 inputs + 1 with inputs running linearly (the last `inputs`
-        columns act on the increments).
+        [Phi Gamma]; w = inputs + 1, or 2 inputs + 1 with a first-order hold, whose last `inputs`
+        columns act on the increments.
     Array, shape (n, n + w, parameters)
-        Derivatives.
+        Its derivatives by the parameters.
     """
     wide = n_states + n_inputs + 1
     size = wide + n_inputs if foh else wide
@@ -83,10 +84,10 @@ def discretise(
         left = powers[:-1, :n_states, :n_states].reshape(TAYLOR_ORDER, -1)
         right = powers[:-1].reshape(TAYLOR_ORDER, -1)
         by_entry = (left.T @ (BOTH_SIDES @ right)).reshape(n_states, n_states, size, size)
-        share = np.zeros((len(row), n_parameters))
-        share[np.arange(len(row)), parameter] = gain * (dt_s * scale)
-        slopes = by_entry[:, row, column].transpose(0, 2, 1) @ share
-    # A step of a search may be far out; it refuses what is no longer finite.
+        entry_to_parameter = np.zeros((len(row), n_parameters))
+        entry_to_parameter[np.arange(len(row)), parameter] = gain * (dt_s * scale)
+        slopes = by_entry[:, row, column].transpose(0, 2, 1) @ entry_to_parameter
+    # A search may try parameters far away; the caller refuses what is no longer finite.
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(squarings):
             if n_parameters:

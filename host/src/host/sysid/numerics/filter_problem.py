@@ -1,8 +1,7 @@
-"""Innovations of a steady-state Kalman filter as a function of every unknown of filter error.
+"""Likelihood of a steady-state Kalman filter's innovations: the problem of filter error.
 
-Unknown are the model, biases, start states, the intensity of the process noise of chosen states and
-the deviation of the noise of every output.
-Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5; Klein & Morelli, ch. 6.
+The unknowns are the parameters of the model, biases, initial states, the process noise of chosen
+states and the measurement noise of every output.
 """
 
 from __future__ import annotations
@@ -25,19 +24,20 @@ SAME_PERIOD = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class SteadyStateFilter:
-    """Steady filter of one sample period.
+    """Steady-state Kalman filter of one sample period.
 
     Attributes
     ----------
     F : Array, shape (n, n)
-        Transition over a sample.
+        State transition over a sample.
     P : Array, shape (n, n)
         Covariance of the predicted state.
     S : Array, shape (p, p)
-        Covariance of innovations.
+        Covariance of the innovations.
     whitener : Array, shape (p, p)
-        Lower triangular; makes innovations white, of unit variance.
+        Inverse Cholesky factor of S: it makes innovations white, of unit variance.
     K : Array, shape (n, p)
+        Gain of the measurement update.
     """
 
     F: Array
@@ -49,7 +49,21 @@ class SteadyStateFilter:
 
 @dataclass(slots=True)
 class InnovationLikelihood:
-    """Rows of `filter_innovations`, innovations (samples, p) and covariance per maneuver; cost."""
+    """Result of the filter at one set of parameters.
+
+    Attributes
+    ----------
+    z : list of Array
+        Per maneuver what `filter_innovations` returns.
+    e : list of Array, shape (samples, p)
+        Innovations per maneuver.
+    S : list of Array, shape (p, p)
+        Their covariance per maneuver.
+    gains : dict
+        Filter of each sample period.
+    cost : float
+        Negative log likelihood and prior, up to a constant.
+    """
 
     z: list[Array]
     e: list[Array]
@@ -59,7 +73,21 @@ class InnovationLikelihood:
 
 
 class FilterProblem:
-    """Innovations as a function of parameters, log process and log measurement deviations."""
+    """Innovations as a function of parameters, log process and log measurement deviations.
+
+    Parameters
+    ----------
+    model : LinearModel
+        Without delays.
+    maneuvers : sequence of Maneuver
+    process : tuple of str
+        States that white process noise drives.
+
+    Raises
+    ------
+    IdentificationError
+        If the model has delays or a state of `process` is not its own.
+    """
 
     def __init__(
         self, model: LinearModel, maneuvers: Sequence[Maneuver], process: tuple[str, ...]
@@ -68,10 +96,11 @@ class FilterProblem:
             raise IdentificationError(
                 "filter error has no delays: estimate them by output error and shift the data"
             )
-        strangers = [s for s in process if s not in model.states]
-        if strangers:
+        unknown_states = [s for s in process if s not in model.states]
+        if unknown_states:
             raise IdentificationError(
-                f"process noise on {', '.join(strangers)}; states are {', '.join(model.states)}"
+                f"process noise on {', '.join(unknown_states)};"
+                f" states are {', '.join(model.states)}"
             )
         self.output_problem = OutputProblem(model, maneuvers)
         self.model = model
@@ -92,7 +121,7 @@ class FilterProblem:
             self._drives.append(np.ascontiguousarray(np.hstack(columns)))
 
     def noise(self, theta: Array) -> tuple[Array, Array]:
-        """Return power of every state's process noise per second, and of every output's noise."""
+        """Return spectral density of every state's process noise and variance of every output."""
         split = self.n_model + len(self.process)
         intensity = np.zeros(len(self.model.states))
         with np.errstate(over="ignore"):
@@ -100,21 +129,26 @@ class FilterProblem:
             return intensity, np.exp(2.0 * theta[split:])
 
     def constants(self, theta: Array, maneuver: int) -> tuple[Array, Array, Array]:
-        """Return biases of states and outputs, and start states of a maneuver."""
+        """Return biases of states and outputs, and initial states of a maneuver."""
         model = self.model
         local = iter(theta[self.output_problem.columns(maneuver)[self.output_problem.n_common :]])
         names = model.states, model.outputs, model.states
         which = model.state_biases, model.output_biases, model.initial_states
-        found = []
+        likelihood = []
         for every, own in zip(names, which, strict=True):
             values = np.zeros(len(every))
             for name in own:
                 values[every.index(name)] = next(local)
-            found.append(values)
-        return found[0], found[1], found[2]
+            likelihood.append(values)
+        return likelihood[0], likelihood[1], likelihood[2]
 
     def evaluate(self, theta: Array) -> InnovationLikelihood | None:
-        """Return innovations and cost; None where the filter or the model fails."""
+        """Return innovations and cost; None where the filter or the model fails.
+
+        The cost is J = 1/2 sum nu' S^-1 nu + N/2 ln det S over the innovations nu of N samples
+        (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5; Klein & Morelli,
+        Aircraft System Identification, ch. 6), plus the prior.
+        """
         model = self.model
         n, m = len(model.states), len(model.inputs)
         A, B, C, D = model.matrices(theta)
@@ -126,7 +160,7 @@ class FilterProblem:
             return None
         none = np.zeros(0, dtype=np.int64)
         gains: dict[float, SteadyStateFilter] = {}
-        found = InnovationLikelihood([], [], [], gains, 0.0)
+        likelihood = InnovationLikelihood([], [], [], gains, 0.0)
         cost = 0.0
         for number, maneuver in enumerate(self.maneuvers):
             rate, bias, start = self.constants(theta, number)
@@ -135,7 +169,7 @@ class FilterProblem:
                 AB, n, m, model.hold == "foh", maneuver.dt_s, none, none, none, np.zeros(0), 0
             )
             if maneuver.dt_s not in gains:
-                # Rounding of the clock gives one rate several names.
+                # Rounding of the clock gives one sample period several values.
                 near = [t for t in gains if abs(t - maneuver.dt_s) < SAME_PERIOD * t]
                 gain = gains[near[0]] if near else None
                 gain = gain or _steady_state_filter(A, C, intensity, np.diag(power), maneuver.dt_s)
@@ -148,22 +182,26 @@ class FilterProblem:
             )
             if not finite:
                 return None
-            found.z.append(z)
-            found.e.append(z[:, -len(C) :])
-            found.S.append(gain.S)
-            white = found.e[-1] @ gain.whitener.T
+            likelihood.z.append(z)
+            likelihood.e.append(z[:, -len(C) :])
+            likelihood.S.append(gain.S)
+            white = likelihood.e[-1] @ gain.whitener.T
             cost += 0.5 * float(np.sum(white**2))
             cost -= len(z) * float(np.sum(np.log(np.diag(gain.whitener))))
         prior = self.output_problem.prior_precision
-        miss = theta[: self.n_model] - self.output_problem.prior_mean
-        cost += 0.5 * float(np.sum(prior * miss**2))
-        found.cost = cost
-        return found if np.isfinite(cost) else None
+        deviation = theta[: self.n_model] - self.output_problem.prior_mean
+        cost += 0.5 * float(np.sum(prior * deviation**2))
+        likelihood.cost = cost
+        return likelihood if np.isfinite(cost) else None
 
 
 def _steady_state_filter(
     A: Array, C: Array, intensity: Array, R: Array, dt_s: float
 ) -> SteadyStateFilter | None:
+    """Return the filter with P of the Riccati equation, S = C P C' + R and K = P C' S^-1.
+
+    Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5. None where none exists.
+    """
     F, Qd = discrete_noise(A, intensity, dt_s)
     if not np.isfinite(Qd).all() or np.max(np.abs(F)) > 1e6:
         return None
@@ -180,17 +218,19 @@ def _steady_state_filter(
 
 
 def discrete_noise(A: Array, intensity: Array, dt_s: float) -> tuple[Array, Array]:
-    """Return the transition over a sample and the covariance white process noise adds in it.
+    """Return F over a sample and Q, the covariance that white process noise adds in it.
 
-    Exact: Van Loan, IEEE Transactions on Automatic Control 23 (1978), by the kernel that
-    discretises. A trapezoid instead draws Cl_p 5 % off in rolling gusts at 50 Hz.
+    Q is the integral of exp(A t) W exp(A' t) over the sample, computed exactly from the exponential
+    of [[-A, W], [0, A']] (Van Loan, IEEE Transactions on Automatic Control 23, 1978). A trapezoid
+    instead biases Cl_p by 5 % in rolling gusts at 50 Hz.
 
     Parameters
     ----------
     A : Array, shape (n, n)
     intensity : Array, shape (n,)
-        Power of each state's noise per second.
+        Spectral density of each state's noise, unit of the state squared per second.
     dt_s : float
+        Sample period, s.
     """
     n = len(A)
     none = np.zeros(0, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Fisher information and gradient of the likelihood of innovations, maneuver by maneuver."""
+"""Fisher information and gradient of the likelihood of innovations, per maneuver."""
 
 from __future__ import annotations
 
@@ -24,15 +24,26 @@ from host.sysid.numerics.recursion import propagate
 def fisher_scoring(
     problem: FilterProblem, theta: Array, point: InnovationLikelihood
 ) -> tuple[list[Array], list[Array]]:
-    """Return Fisher information and minus the cost's gradient of every maneuver.
+    """Return Fisher information and negative gradient of the cost, per maneuver.
+
+    With innovations nu of covariance S over N samples, M_ij = sum (d nu/d i)' S^-1 (d nu/d j) + N/2
+    tr(S^-1 dS/di S^-1 dS/dj); the gradient has the same two parts (Klein & Morelli, Aircraft System
+    Identification, ch. 6; Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5).
 
     Parameters
     ----------
     problem : FilterProblem
     theta : Array
         All unknowns.
-    point : Likelihood
-        There.
+    point : InnovationLikelihood
+        At `theta`.
+
+    Returns
+    -------
+    list of Array, shape (P, P)
+        Information of every maneuver, without the prior.
+    list of Array, shape (P,)
+        Negative gradients.
     """
     size = len(theta)
     matrices = matrix_sensitivities(problem.model, theta)
@@ -47,14 +58,14 @@ def fisher_scoring(
         information, gradient = np.zeros((size, size)), np.zeros(size)
         information[np.ix_(active, active)] = J.T @ J
         gradient[active] = -(J.T @ white.ravel())
-        # Only what all maneuvers share moves the gain.
-        moving = _shared(problem)
+        # The gain depends only on the unknowns that all maneuvers share.
+        shared = _shared(problem)
         spread = gain.whitener @ by.S @ gain.whitener.T
         trace = np.trace(spread, axis1=1, axis2=2)
         outer = white.T @ white
-        gradient[moving] -= 0.5 * (len(white) * trace - np.sum(spread * outer, axis=(1, 2)))
-        flat = spread.reshape(len(moving), -1)
-        information[np.ix_(moving, moving)] += 0.5 * len(white) * (flat @ flat.T)
+        gradient[shared] -= 0.5 * (len(white) * trace - np.sum(spread * outer, axis=(1, 2)))
+        flat = spread.reshape(len(shared), -1)
+        information[np.ix_(shared, shared)] += 0.5 * len(white) * (flat @ flat.T)
         parts.append(information)
         scores.append(gradient)
     return parts, scores
@@ -63,7 +74,7 @@ def fisher_scoring(
 def whitened_innovation_sensitivities(
     problem: FilterProblem, theta: Array, point: InnovationLikelihood
 ) -> list[Array]:
-    """Return slopes of the whitened innovations of every maneuver, (samples, p, P)."""
+    """Return sensitivities of the whitened innovations of every maneuver, (samples, p, P)."""
     matrices = matrix_sensitivities(problem.model, theta)
     gains = _gain_sensitivities(problem, theta, point, matrices)
     found: list[Array] = []
@@ -83,11 +94,13 @@ def _gain_sensitivities(
     matrices: tuple[Array, Array, Array],
 ) -> dict[float, GainSensitivities]:
     AB_slopes, _, CD_slopes = matrices
-    known: dict[int, GainSensitivities] = {}
+    rows_known: dict[int, GainSensitivities] = {}
     for dt_s, gain in point.gains.items():
-        if id(gain) not in known:
-            known[id(gain)] = gain_sensitivities(problem, theta, gain, dt_s, AB_slopes, CD_slopes)
-    return {dt_s: known[id(gain)] for dt_s, gain in point.gains.items()}
+        if id(gain) not in rows_known:
+            rows_known[id(gain)] = gain_sensitivities(
+                problem, theta, gain, dt_s, AB_slopes, CD_slopes
+            )
+    return {dt_s: rows_known[id(gain)] for dt_s, gain in point.gains.items()}
 
 
 def _active(problem: FilterProblem, number: int) -> IntArray:
@@ -110,7 +123,7 @@ def _innovation_sensitivities(
     by: GainSensitivities,
     matrices: tuple[Array, Array, Array],
 ) -> Array:
-    """Return slopes of the whitened innovations, (samples x p, `_active`)."""
+    """Return sensitivities of the whitened innovations, (samples x p, `_active`)."""
     _, CD, CD_slopes = matrices
     model, output_problem = problem.model, problem.output_problem
     n, m, p = len(model.states), len(model.inputs), len(model.outputs)
@@ -135,27 +148,27 @@ def _innovation_sensitivities(
         common + len(rates),
     )
     w = step.shape[1] - n
-    known = common + len(rates)
-    tap = np.zeros((n + w, p, width))
-    tap[: n + m, :, :common] = CD_slopes.transpose(1, 0, 2)
+    rows_known = common + len(rates)
+    direct = np.zeros((n + w, p, width))
+    direct[: n + m, :, :common] = CD_slopes.transpose(1, 0, 2)
     for k, output in enumerate(model.output_biases):
-        tap[n + m, model.outputs.index(output), known + k] = 1.0
+        direct[n + m, model.outputs.index(output), rows_known + k] = 1.0
     start = np.zeros((n, width))
     for k, state in enumerate(model.initial_states):
-        start[model.states.index(state), known + len(model.output_biases) + k] = 1.0
-    push = np.zeros((n + w + p, n, width))
-    push[: n + w, :, :known] = step_slopes.transpose(1, 0, 2)
+        start[model.states.index(state), rows_known + len(model.output_biases) + k] = 1.0
+    drive = np.zeros((n + w + p, n, width))
+    drive[: n + w, :, :rows_known] = step_slopes.transpose(1, 0, 2)
     FK = gain.F @ gain.K
-    push[: n + w] -= FK @ tap
-    push[n + w :, :, :common] = np.einsum("iaq,aj->jiq", step_slopes[:, :n, :common], gain.K)
+    drive[: n + w] -= FK @ direct
+    drive[n + w :, :, :common] = np.einsum("iaq,aj->jiq", step_slopes[:, :n, :common], gain.K)
     for part, own in ((slice(0, common), slice(0, common)), (noise, slice(common, None))):
-        push[n + w :, :, part] += np.einsum("ia,qaj->jiq", gain.F, by.K[own])
+        drive[n + w :, :, part] += np.einsum("ia,qaj->jiq", gain.F, by.K[own])
     z = point.z[number]
     out = np.empty((p, len(z), width))
     whitened_C = gain.whitener @ CD[:, :n]
-    propagate(gain.F - FK @ CD[:, :n], push.transpose(1, 0, 2), z, whitened_C, start, out)
-    # What an innovation feels at a known state; the rest it feels by the state.
-    known_state = -(gain.whitener @ tap).reshape(n + w, -1)
+    propagate(gain.F - FK @ CD[:, :n], drive.transpose(1, 0, 2), z, whitened_C, start, out)
+    # Direct part at a fixed state; the rest comes through the state.
+    known_state = -(gain.whitener @ direct).reshape(n + w, -1)
     slopes = (z[:, : n + w] @ known_state).reshape(len(z), p, width)
     slopes -= out.transpose(1, 0, 2)
     return np.asarray(slopes.reshape(-1, width))
@@ -164,7 +177,7 @@ def _innovation_sensitivities(
 def total_information(
     problem: FilterProblem, theta: Array, parts: Sequence[Array], scores: Sequence[Array]
 ) -> tuple[Array, Array]:
-    """Return information and minus the cost's gradient of all maneuvers and the prior."""
+    """Return information and negative gradient of the cost, all maneuvers and the prior summed."""
     information, gradient = np.sum(parts, axis=0), np.sum(scores, axis=0)
     n = problem.n_model
     information[:n, :n] += np.diag(problem.output_problem.prior_precision)

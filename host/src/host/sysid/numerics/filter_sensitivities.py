@@ -1,4 +1,4 @@
-"""How a steady-state Kalman filter moves with the model and both kinds of noise: exact slopes."""
+"""Exact sensitivities of a steady-state Kalman filter to the model and to both kinds of noise."""
 
 from __future__ import annotations
 
@@ -14,14 +14,17 @@ from host.sysid.numerics.filter_problem import FilterProblem, SteadyStateFilter,
 
 @dataclass(frozen=True, slots=True)
 class GainSensitivities:
-    """Slopes of S (shared, p, p) and K (shared, n, p) by common unknowns, process and noise."""
+    """Derivatives of S (shared, p, p) and K (shared, n, p) by the unknowns all maneuvers share."""
 
     S: Array
     K: Array
 
 
 def matrix_sensitivities(model: LinearModel, theta: Array) -> tuple[Array, Array, Array]:
-    """Return slopes of [A B], [C D] itself and its slopes, by every common unknown, last axis."""
+    """Return derivatives of [A B], then [C D] itself and its derivatives.
+
+    The last axis of a derivative counts the common parameters.
+    """
     A, B, C, D = model.matrices(theta)
     names = [p.name for p in model.parameters]
     AB, CD = (
@@ -29,7 +32,7 @@ def matrix_sensitivities(model: LinearModel, theta: Array) -> tuple[Array, Array
         for pair in ("AB", "CD")
     )
     for lever in model.accelerometer_offsets:
-        # The arm carries a whole state row into an output.
+        # The offset adds a whole state equation to an output.
         row, state = model.outputs.index(lever.output), model.states.index(lever.state)
         arm = names.index(lever.parameter)
         CD[row] += lever.gain * theta[arm] * AB[state]
@@ -45,10 +48,12 @@ def gain_sensitivities(
     AB_slopes: Array,
     CD_slopes: Array,
 ) -> GainSensitivities:
-    """Return slopes of the filter at one sample period.
+    """Return derivatives of the filter at one sample period.
 
-    The Riccati equation in Joseph's form does not feel the gain to first order, so that slopes of
-    the covariance obey a Lyapunov equation, one for all unknowns.
+    The Riccati equation in Joseph's form, P = F (I - K C) P (I - K C)' F' + F K R K' F' + Q, does
+    not depend on the gain to first order. The derivative of P therefore obeys the Lyapunov equation
+    dP = A_c dP A_c' + X with A_c = F (I - K C), one for all unknowns (Jategaonkar, Flight Vehicle
+    System Identification, 2nd ed., ch. 5).
     """
     A, _, C, _ = problem.model.matrices(theta)
     n, p = len(A), len(C)
@@ -62,10 +67,10 @@ def gain_sensitivities(
     dR[common + process + np.arange(p), np.arange(p), np.arange(p)] = 2.0 * power
     dF, dQ = np.zeros((2, count, n, n))
     dF[: common + process], dQ[: common + process] = F, Q
-    keep = np.eye(n) - gain.K @ C
-    seen = keep @ gain.P  # covariance after the measurement
-    closed = gain.F @ keep
-    change = dF @ seen @ gain.F.T - closed @ gain.P @ dC.transpose(0, 2, 1) @ gain.K.T @ gain.F.T
+    reduction = np.eye(n) - gain.K @ C
+    updated = reduction @ gain.P  # covariance after the measurement update
+    closed = gain.F @ reduction
+    change = dF @ updated @ gain.F.T - closed @ gain.P @ dC.transpose(0, 2, 1) @ gain.K.T @ gain.F.T
     change = change + change.transpose(0, 2, 1)
     change += dQ + gain.F @ gain.K @ dR @ gain.K.T @ gain.F.T
     system = np.eye(n * n) - np.kron(closed, closed)
@@ -80,11 +85,11 @@ def gain_sensitivities(
 def _noise_sensitivities(
     problem: FilterProblem, A: Array, intensity: Array, dt_s: float, A_slopes: Array
 ) -> tuple[Array, Array]:
-    """Return slopes of transition and process noise of a sample, (common and process, n, n)."""
+    """Return derivatives of F and Q of a sample, each (common and process, n, n)."""
     n = len(A)
     row, column, parameter = np.nonzero(A_slopes)
     gain = A_slopes[row, column, parameter]
-    driven = np.array(problem.process_index, dtype=np.int64)
+    driven_states = np.array(problem.process_index, dtype=np.int64)
     common = A_slopes.shape[2]
     E, slopes = discretise(
         van_loan(A, intensity),
@@ -92,11 +97,11 @@ def _noise_sensitivities(
         0,
         False,
         dt_s,
-        np.concatenate([row, n + column, driven]),
-        np.concatenate([column, n + row, n + driven]),
-        np.concatenate([parameter, parameter, common + np.arange(len(driven))]),
-        np.concatenate([-gain, gain, 2.0 * intensity[driven]]),
-        common + len(driven),
+        np.concatenate([row, n + column, driven_states]),
+        np.concatenate([column, n + row, n + driven_states]),
+        np.concatenate([parameter, parameter, common + np.arange(len(driven_states))]),
+        np.concatenate([-gain, gain, 2.0 * intensity[driven_states]]),
+        common + len(driven_states),
     )
     slopes = slopes.transpose(2, 0, 1)
     F, dF = E[n:, n : 2 * n].T, slopes[:, n:, n : 2 * n].transpose(0, 2, 1)

@@ -1,4 +1,4 @@
-"""Signals read a fraction of a sample earlier or later."""
+"""Delay of sampled signals by a fraction of a sample (Lagrange interpolation)."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ def delay_columns(values: Array, shift: float) -> tuple[Array, Array]:
     Parameters
     ----------
     values : Array, shape (samples, columns)
-        Four samples or more; the first and last lean on the nearest four.
+        At least four samples; the first and last use the nearest four.
     shift : float
         Samples.
 
     Returns
     -------
     Array, Array
-        The delayed columns and their slope by the shift, of the shape of `values`.
+        The delayed columns and their derivative by the shift, of the shape of `values`.
     """
     samples = len(values)
     position = np.arange(samples) - shift
     base = np.clip(np.floor(position).astype(np.int64), 1, samples - 3)
     s = position - base
-    # Lagrange's polynomials of the samples at -1, 0, 1, 2, and their derivatives.
+    # Lagrange's cubic polynomials for samples at -1, 0, 1 and 2, and their derivatives.
     weights = (
         -s * (s - 1.0) * (s - 2.0) / 6.0,
         (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0,
@@ -39,9 +39,9 @@ def delay_columns(values: Array, shift: float) -> tuple[Array, Array]:
         -(3.0 * s * s - 2.0 * s - 2.0) / 2.0,
         (3.0 * s * s - 1.0) / 6.0,
     )
-    late, slope = np.zeros_like(values), np.zeros_like(values)
+    delayed, slope = np.zeros_like(values), np.zeros_like(values)
     for k, (weight, rate) in enumerate(zip(weights, rates, strict=True), start=-1):
-        near = values[base + k]
-        late += weight[:, None] * near
-        slope -= rate[:, None] * near
-    return late, slope
+        sample = values[base + k]
+        delayed += weight[:, None] * sample
+        slope -= rate[:, None] * sample
+    return delayed, slope

@@ -1,9 +1,7 @@
-"""One damped Gauss-Newton search for every likelihood with exact slopes.
+"""Damped Gauss-Newton search, shared by all likelihoods with exact sensitivities.
 
-Output error, filter error and output error in the frequency domain differ in what a trial costs
-and in its slopes; how a step is solved, damped, accepted and called small is the same for all.
-Klein & Morelli, Aircraft System Identification, ch. 6 (modified Newton-Raphson); Jategaonkar,
-Flight Vehicle System Identification, 2nd ed., ch. 4; damping after Levenberg, Marquardt, Nielsen.
+Output error, filter error and output error in the frequency domain have costs and sensitivities of
+their own. Solving, damping and accepting a step and the test of convergence are the same for all.
 """
 
 from __future__ import annotations
@@ -18,22 +16,22 @@ from scipy.linalg import lapack
 from host.arrays import Array, BoolArray
 from host.sysid.identification_error import IdentificationError
 
-STEP_LIMIT = 0.01  # in Cramer-Rao bounds: below it an iteration is not worth another
+STEP_LIMIT = 0.01  # in Cramer-Rao bounds: convergence
 MAX_DAMPING = 1e8
 INITIAL_DAMPING = 1e-4
 MIN_DAMPING = 1e-8
-HEAVY_DAMPING = 1e-2  # from here on a short step may be short because it is damped
+HEAVY_DAMPING = 1e-2  # from here on a step may be short only because it is damped
 TOLERANCE = 1e-9  # of the cost: rounding of its sums
-RIDGE = 1e-14  # of a scaled information: what keeps flat directions solvable
+RIDGE = 1e-14  # of a scaled information: keeps flat directions solvable
 NOT_FINITE = "the information matrix is not finite; scale or bound the parameters"
 
 
 class Evaluated(Protocol):
-    """A trial that has been evaluated."""
+    """Result of evaluating the cost at one set of parameters."""
 
     @property
     def cost(self) -> float:
-        """Minus the log likelihood and the prior, up to a constant."""
+        """Negative log likelihood and prior, up to a constant."""
         ...
 
 
@@ -41,47 +39,48 @@ Trial = TypeVar("Trial", bound=Evaluated)
 
 
 class Objective(ABC, Generic[Trial]):
-    """What a search wants to know of a likelihood."""
+    """Cost function of a search: its value, information and gradient."""
 
     @abstractmethod
     def evaluate(self, theta: Array) -> Trial | None:
-        """Return the trial at these parameters; None where the model fails."""
+        """Evaluate the cost at these parameters; None where the model fails."""
 
     @abstractmethod
     def normal(self, theta: Array, trial: Trial) -> tuple[Array, Array]:
-        """Return information (P, P) and minus the cost's gradient (P,)."""
+        """Return information (P, P) and negative gradient of the cost (P,)."""
 
     def free(self, theta: Array, gradient: Array) -> BoolArray:
-        """Return which parameters no bound holds."""
+        """Return which parameters may move: those not held by a bound."""
         return np.ones(len(theta), dtype=bool)
 
-    def reached(self, theta: Array, step: Array) -> Array:
-        """Return where a step leads."""
+    def apply_step(self, theta: Array, step: Array) -> Array:
+        """Return the parameters after a step."""
         return theta + step
 
     def extend_step(
         self, theta: Array, step: Array, size: float, reached: tuple[Array, Trial]
     ) -> tuple[Array, Trial]:
-        """Return something better than the end of an undamped step, `size` bounds long."""
+        """Return a better point along an undamped step of `size` Cramer-Rao bounds, if any."""
         return reached
 
     def release(self, trial: Trial) -> None:
-        """Take back the memory of a trial that nobody reads any more."""
+        """Free the memory of a trial that is no longer needed."""
 
 
 @dataclass(frozen=True, slots=True)
 class GaussNewtonResult(Generic[Trial]):
-    """Where a search ended.
+    """End of a search.
 
     Attributes
     ----------
     theta : Array, shape (P,)
+        Estimate.
     trial
-        There.
+        Evaluation at `theta`.
     information : Array, shape (P, P)
         At the last linearisation.
     free : BoolArray, shape (P,)
-        Parameters that do not sit on a bound.
+        Parameters that are not on a bound.
     iterations : int
         Accepted steps.
     converged : bool
@@ -105,7 +104,10 @@ def gauss_newton(
     max_iterations: int,
     step_limit: float = STEP_LIMIT,
 ) -> GaussNewtonResult[Trial] | None:
-    """Search the least cost from `theta`; None if the model fails there.
+    """Minimise the cost from `theta`; None if the model fails there.
+
+    Klein & Morelli, Aircraft System Identification, ch. 6 (modified Newton-Raphson); Jategaonkar,
+    Flight Vehicle System Identification, 2nd ed., ch. 4.
 
     Parameters
     ----------
@@ -115,7 +117,7 @@ def gauss_newton(
     max_iterations : int
         Most accepted steps.
     step_limit : float
-        Ends when no parameter moves further than this times its Cramer-Rao bound.
+        The search ends when no parameter moves by more than this times its Cramer-Rao bound.
 
     Raises
     ------
@@ -133,8 +135,8 @@ def gauss_newton(
     while iterations < max_iterations:
         free = objective.free(theta, gradient)
         step, size = damped_step(information, gradient, free, damping)
-        goal = objective.reached(theta, step)
-        next_trial = objective.evaluate(goal)
+        proposal = objective.apply_step(theta, step)
+        next_trial = objective.evaluate(proposal)
         tolerance = TOLERANCE * (1.0 + abs(trial.cost))
         if next_trial is None or not next_trial.cost <= trial.cost + tolerance:
             if next_trial is not None:
@@ -146,19 +148,22 @@ def gauss_newton(
             if damping > MAX_DAMPING:
                 break
             continue
-        foreseen = float(gradient @ step - 0.5 * step @ information @ step)
-        gain = (trial.cost - next_trial.cost) / foreseen if foreseen > 0.0 else 0.0
+        predicted_decrease = float(gradient @ step - 0.5 * step @ information @ step)
+        gain_ratio = (
+            (trial.cost - next_trial.cost) / predicted_decrease if predicted_decrease > 0.0 else 0.0
+        )
         if damping == 0.0:
-            goal, next_trial = objective.extend_step(theta, step, size, (goal, next_trial))
+            proposal, next_trial = objective.extend_step(theta, step, size, (proposal, next_trial))
         objective.release(trial)
-        theta, trial, last = goal, next_trial, size
+        theta, trial, last = proposal, next_trial, size
         iterations += 1
         if size < step_limit and damping < HEAVY_DAMPING:
             converged = True
             break
-        # Nielsen, report IMM-REP-1999-05 (DTU): steps that keep less than they promise run from
-        # wall to wall of a bent valley, so the damping follows the gain and not mere success.
-        damping *= max(0.2, 1.0 - (2.0 * gain - 1.0) ** 3)
+        # Nielsen, report IMM-REP-1999-05 (DTU): the damping follows the ratio of actual to
+        # predicted decrease, because steps in a curved valley that merely succeed zigzag between
+        # its walls.
+        damping *= max(0.2, 1.0 - (2.0 * gain_ratio - 1.0) ** 3)
         damping, growth = (damping if damping > MIN_DAMPING else 0.0), 2.0
         information, gradient = objective.normal(theta, trial)
     free = objective.free(theta, gradient)
@@ -166,7 +171,7 @@ def gauss_newton(
 
 
 def free_of_bounds(theta: Array, gradient: Array, lower: Array, upper: Array) -> BoolArray:
-    """Return which parameters lie between their bounds or are drawn back from them."""
+    """Return which parameters lie between their bounds or would move away from one."""
     return ~(((theta <= lower) & (gradient < 0.0)) | ((theta >= upper) & (gradient > 0.0)))
 
 
@@ -175,10 +180,12 @@ def damped_step(
 ) -> tuple[Array, float]:
     """Solve (M + damping diag M) step = gradient over the free parameters.
 
+    Levenberg, Quarterly of Applied Mathematics 2 (1944); Marquardt, SIAM Journal 11 (1963).
+
     Returns
     -------
     Array, shape (P,)
-        Zero where a bound holds.
+        Zero for parameters on a bound.
     float
         Its largest component in Cramer-Rao bounds.
 
@@ -191,7 +198,7 @@ def damped_step(
     if not free.any():
         return step, 0.0
     block = information[np.ix_(free, free)]
-    if not np.isfinite(block).all():  # dpotrf factors NaN without a word
+    if not np.isfinite(block).all():  # dpotrf factors NaN without an error
         raise IdentificationError(NOT_FINITE)
     scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
     scaled = block / np.outer(scale, scale)

@@ -8,19 +8,19 @@ from host.arrays import Array
 
 
 def covariance_from_information(information: Array) -> Array:
-    """Return the covariance an information matrix stands for, shape (P, P).
+    """Return the inverse of an information matrix, the Cramer-Rao covariance, shape (P, P).
 
     Parameters
     ----------
     information : Array, shape (P, P)
-        Symmetric; a row and column of zeros (nothing is known) gives zeros.
+        Symmetric; a row and column of zeros (no information) gives zeros.
 
     Notes
     -----
-    Rows and columns are scaled to a diagonal of ones first: a cut at the smallest digits would else
-    take a parameter that is only known worse than another, or has other units, for one that is
-    not known at all. A direction below those digits is not known at all: it gets the largest
-    variance that they can tell, not none, so that two inputs mixed exactly are refused.
+    Rows and columns are first scaled to a unit diagonal. Otherwise a cut at the smallest digits
+    would take a parameter in other units for one without information. A direction below those
+    digits has no information: it gets the largest variance that the digits can express, so that
+    parameters of two exactly collinear inputs are flagged.
     """
     live = np.flatnonzero(np.diag(information) > 0.0)
     if len(live) == 0:

@@ -1,10 +1,11 @@
-"""Do repeated maneuvers agree? Their scatter against the intervals, widened where it does not fit.
+"""Test whether repeated maneuvers agree; inflate the covariance of their joint estimate if not.
 
-Each maneuver pulls the joint answer by d_i = P g_i (P the inverse information, g_i its own score);
-the pulls sum to zero. If the intervals are right, sum d_i^2 estimates variance times 1 - sum w_i^2,
-with w_i the maneuver's share of the information. Where chi-square says with 99 % that the scatter
-is larger, the interval is widened to it (Birge, Phys. Rev. 40 (1932)), with a t quantile for as
-many maneuvers. Nothing is ever narrowed.
+The influence of maneuver i on the joint estimate is d_i = P g_i, with P the inverse information and
+g_i the score of the maneuver alone (Belsley, Kuh & Welsch, Regression Diagnostics, 1980). All d_i
+sum to zero. If the covariance is right, the sum of d_i^2 estimates variance times 1 - sum w_i^2,
+with w_i the maneuver's share of the information. Where a chi-square test rejects that at 1 %, the
+covariance is multiplied by the square of the Birge ratio (Birge, Physical Review 40, 1932) and the
+interval gets a t quantile for as many maneuvers. A covariance never becomes smaller.
 """
 
 from __future__ import annotations
@@ -19,24 +20,24 @@ from host.arrays import Array
 from host.sysid.models.fit_result import FitResult
 
 SIGNIFICANCE = 0.01
-MIN_EFFECTIVE_MANEUVERS = 1.5  # effective number of maneuvers that tell something of a parameter
+MIN_EFFECTIVE_MANEUVERS = 1.5  # effective number that inform a parameter, for a test
 
 
 @dataclass(frozen=True)
 class ManeuverAgreement:
-    """Scatter of maneuvers about the joint answer, per common parameter.
+    """Scatter of maneuvers about the joint estimate, per common parameter.
 
     Attributes
     ----------
     names : tuple of str
     maneuvers : Array, shape (P,)
-        Effective number that tell of the parameter; chi-square has one degree of freedom less.
+        Effective number that inform the parameter; chi-square has one degree of freedom less.
     chi_square, p_value : Array, shape (P,)
-        NaN where fewer than `MIN_EFFECTIVE_MANEUVERS` tell of it.
+        NaN where fewer than `MIN_EFFECTIVE_MANEUVERS` inform it.
     factor : Array, shape (P,)
-        By which the interval was widened, 1 where the maneuvers agree.
+        Birge ratio by which the standard error grows, 1 where the maneuvers agree.
     variance : Array, shape (P,)
-        Against which they were judged.
+        Variance that the scatter was tested against.
     """
 
     names: tuple[str, ...]
@@ -48,22 +49,22 @@ class ManeuverAgreement:
 
     @property
     def extra_variance(self) -> Array:
-        """What the scatter adds to a variance of normal quantiles, (P,): 0 where it is fair."""
-        wide = self.factor > 1.0
-        freedom = np.where(wide, np.maximum(self.maneuvers - 1.0, 1.0), np.inf)
+        """Variance that the scatter adds, for normal quantiles, (P,): 0 where maneuvers agree."""
+        inflated = self.factor > 1.0
+        freedom = np.where(inflated, np.maximum(self.maneuvers - 1.0, 1.0), np.inf)
         stretch = special.stdtrit(freedom, 0.975) / special.ndtri(0.975)
-        return np.where(wide, ((self.factor * stretch) ** 2 - 1.0) * self.variance, 0.0)
+        return np.where(inflated, ((self.factor * stretch) ** 2 - 1.0) * self.variance, 0.0)
 
 
 def maneuver_influence(
     information: Sequence[Array], scores: Sequence[Array], inverse: Array
 ) -> dict[str, float | Array]:
-    """Return what `maneuver_agreement` needs of a fit, for `FitResult.details`.
+    """Return influence and information share of every maneuver, for `FitResult.details`.
 
     Parameters
     ----------
     information, scores : sequence of Array
-        Per maneuver, (P, P) and (P,), prior left out.
+        Per maneuver, (P, P) and (P,), without the prior.
     inverse : Array, shape (P, P)
         Of the whole information, prior included.
     """
@@ -76,68 +77,79 @@ def maneuver_influence(
 
 
 def maneuver_agreement(result: FitResult) -> ManeuverAgreement | None:
-    """Return the scatter of the maneuvers of a joint fit; None if the method does not tell it."""
-    pull, share = result.details.get("maneuver_influence"), result.details.get("information_share")
+    """Return the scatter of the maneuvers of a joint fit; None if the method gives no influence."""
+    influence, information_share = (
+        result.details.get("maneuver_influence"),
+        result.details.get("information_share"),
+    )
     count = len(result.model.parameter_names)
-    if not isinstance(pull, np.ndarray) or not isinstance(share, np.ndarray) or len(pull) < 2:
+    if (
+        not isinstance(influence, np.ndarray)
+        or not isinstance(information_share, np.ndarray)
+        or len(influence) < 2
+    ):
         return None
     variance = np.diag(result.covariance)[:count]
-    return agreement_of(result.names[:count], pull[:, :count], share[:, :count], variance)
+    return scatter_test(
+        result.names[:count], influence[:, :count], information_share[:, :count], variance
+    )
 
 
-def agreement_of(
-    names: tuple[str, ...], pull: Array, share: Array, variance: Array
+def scatter_test(
+    names: tuple[str, ...], influence: Array, information_share: Array, variance: Array
 ) -> ManeuverAgreement:
-    """Return how maneuvers scatter about their joint answer against its variance.
+    """Test the scatter of maneuvers about their joint estimate against its variance.
 
     Parameters
     ----------
     names : tuple of str
-    pull, share : Array, shape (maneuvers, P)
-        How far each maneuver pulls the answer, and its share of what is known of it.
+    influence, information_share : Array, shape (maneuvers, P)
+        Influence of each maneuver on the estimate, and its share of the information.
     variance : Array, shape (P,)
-        Of the answer, as far as it comes from what differs between maneuvers.
+        Of the estimate, as far as its causes differ between maneuvers.
     """
-    total = np.maximum(np.sum(share, axis=0), 1e-12)
-    weight = np.clip(share / total, 0.0, 1.0)
+    total = np.maximum(np.sum(information_share, axis=0), 1e-12)
+    weight = np.clip(information_share / total, 0.0, 1.0)
     squares = np.sum(weight**2, axis=0)
     number = 1.0 / np.maximum(squares, 1e-12)
-    own = pull - weight * np.sum(pull, axis=0)
-    spread = np.sum(own**2, axis=0) / np.maximum(1.0 - squares, 1e-12)
+    deviation = influence - weight * np.sum(influence, axis=0)
+    scatter = np.sum(deviation**2, axis=0) / np.maximum(1.0 - squares, 1e-12)
     testable = (number >= MIN_EFFECTIVE_MANEUVERS) & (variance > 0.0)
-    ratio = np.where(testable, spread / np.where(testable, variance, 1.0), np.nan)
+    ratio = np.where(testable, scatter / np.where(testable, variance, 1.0), np.nan)
     chi_square = (number - 1.0) * ratio
     p_value = np.full(len(names), np.nan)
     p_value[testable] = special.chdtrc(number[testable] - 1.0, chi_square[testable])
-    wide = testable & (np.nan_to_num(p_value, nan=1.0) < SIGNIFICANCE)
+    inflated = testable & (np.nan_to_num(p_value, nan=1.0) < SIGNIFICANCE)
     return ManeuverAgreement(
         names=names,
         maneuvers=number,
         chi_square=chi_square,
         p_value=p_value,
-        factor=np.where(wide, np.sqrt(np.where(wide, ratio, 1.0)), 1.0),
+        factor=np.where(inflated, np.sqrt(np.where(inflated, ratio, 1.0)), 1.0),
         variance=variance,
     )
 
 
 def inflate_covariance(result: FitResult, found: ManeuverAgreement | None) -> FitResult:
-    """Return the result with intervals as wide as its maneuvers scatter, and a warning for each."""
+    """Return the result, its covariance inflated by Birge ratios, with a warning for each."""
     if found is None or not np.any(found.factor > 1.0):
         return result
     factor = np.ones(len(result.names))
     factor[: len(found.factor)] = found.factor
-    said = tuple(
+    warnings = tuple(
         f"maneuvers do not agree on {name}: they scatter {found.factor[k]:.1f} times its interval"
         f" (chi-square {found.chi_square[k]:.1f} on {found.maneuvers[k] - 1.0:.1f}), widened to it"
         for k, name in enumerate(found.names)
         if found.factor[k] > 1.0
     )
     freedom = result.degrees_of_freedom.copy()
-    wide = np.flatnonzero(found.factor > 1.0)
-    freedom[wide] = np.minimum(freedom[wide], np.maximum(found.maneuvers[wide] - 1.0, 1.0))
+    inflated = np.flatnonzero(found.factor > 1.0)
+    freedom[inflated] = np.minimum(
+        freedom[inflated], np.maximum(found.maneuvers[inflated] - 1.0, 1.0)
+    )
     return replace(
         result,
         covariance=result.covariance * np.outer(factor, factor),
         degrees_of_freedom=freedom,
-        warnings=(*result.warnings, *said),
+        warnings=(*result.warnings, *warnings),
     )

@@ -1,9 +1,4 @@
-"""Output error by maximum likelihood, with exact sensitivities.
-
-Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 4; Klein & Morelli, Aircraft System
-Identification, ch. 6. The noise covariance is re-estimated in every iteration (relaxation of the
-concentrated likelihood).
-"""
+"""Output error by maximum likelihood, with exact sensitivities."""
 
 from __future__ import annotations
 
@@ -25,15 +20,15 @@ from host.sysid.numerics.output_error_problem import OutputProblem, Response
 
 MAX_ITERATIONS = 60
 SINGULAR = 1e-15  # of the largest eigenvalue of the scaled information
-UNIDENTIFIABLE = 1e-12  # the same: below, a product of two inverses holds no digit
+UNIDENTIFIABLE = 1e-12  # the same: below it a product of two inverses has no correct digit
 
 
 @dataclass(frozen=True, slots=True)
 class Optimum:
-    """Where the search ended.
+    """Maximum of the likelihood.
 
-    `information` is of the whole vector at the last linearisation, `free` marks the parameters that
-    do not sit on a bound, `variance` is the innovation variance of each output.
+    `information` is that of the whole vector at the last linearisation, `free` marks parameters
+    that are not on a bound, `variance` is the innovation variance of each output.
     """
 
     theta: Array
@@ -66,31 +61,36 @@ def minimise(
     step_limit: float = STEP_LIMIT,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Optimum:
-    """Search the maximum of the (concentrated) likelihood from `theta`.
+    """Maximise the (concentrated) likelihood from `theta`.
+
+    The cost is J = 1/2 sum_j N ln s_j with s_j the variance of output j's innovations, concentrated
+    out of the Gaussian likelihood and re-estimated at every step, or 1/2 sum v_j'v_j / s_j with s_j
+    given (Klein & Morelli, Aircraft System Identification, ch. 6; Jategaonkar, Flight Vehicle
+    System Identification, 2nd ed., ch. 4); plus the prior.
 
     Parameters
     ----------
     problem : OutputProblem
-        Residuals and slopes.
+        Residuals and sensitivities.
     theta : Array, shape (P,)
         Start.
     noise : sequence of ArNoise, optional
-        Memory of the noise of each output; white without.
+        AR model of the noise of each output; white by default.
     variance : Array, optional
-        Known innovation variances, shape (p,); estimated without.
+        Known innovation variances, shape (p,); estimated by default.
     step_limit : float
-        Ends when no parameter moves further than this times its Cramer-Rao bound.
+        The search ends when no parameter moves by more than this times its Cramer-Rao bound.
     max_iterations : int
         Most accepted steps.
 
     Raises
     ------
     IdentificationError
-        If the response at the start leaves all bounds.
+        If the response at the start diverges.
     """
-    memory = list(noise) if noise is not None else [ArNoise.white()] * len(problem.model.outputs)
+    ar_models = list(noise) if noise is not None else [ArNoise.white()] * len(problem.model.outputs)
     found = gauss_newton(
-        _OutputError(problem, memory, variance),
+        _OutputError(problem, ar_models, variance),
         np.clip(theta, problem.lower, problem.upper),
         max_iterations=max_iterations,
         step_limit=step_limit,
@@ -132,7 +132,7 @@ class _OutputError(Objective[_Point]):
     def free(self, theta: Array, gradient: Array) -> BoolArray:
         return free_of_bounds(theta, gradient, self._problem.lower, self._problem.upper)
 
-    def reached(self, theta: Array, step: Array) -> Array:
+    def apply_step(self, theta: Array, step: Array) -> Array:
         return np.clip(theta + step, self._problem.lower, self._problem.upper)
 
     def release(self, trial: _Point) -> None:
@@ -142,7 +142,7 @@ class _OutputError(Objective[_Point]):
 def whitened_sensitivities(
     problem: OutputProblem, responses: Sequence[Response], noise: Sequence[ArNoise]
 ) -> list[Array]:
-    """Return slopes of each maneuver filtered by the noise memory, (p, samples, columns)."""
+    """Return sensitivities of each maneuver, whitened by the AR models, (p, samples, columns)."""
     result = []
     for response in responses:
         if all(n.order == 0 for n in noise):
@@ -155,7 +155,7 @@ def whitened_sensitivities(
 
 
 def covariance_of_free(information: Array, free: BoolArray) -> Array:
-    """Invert an information matrix over the free parameters; others get zero.
+    """Return the Cramer-Rao covariance over the free parameters; that of others is zero.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def covariance_of_free(information: Array, free: BoolArray) -> Array:
     if np.any(scale == 0.0):
         raise IdentificationError("singular information: a parameter does not act on any output")
     value, vector = np.linalg.eigh(block / np.outer(scale, scale))
-    # Directions the data do not see get a huge variance, not an exception: they will be named.
+    # Directions without information get a huge variance, not an exception: they are flagged later.
     value = np.maximum(value, SINGULAR * value[-1])
     inverse = (vector / value) @ vector.T / np.outer(scale, scale)
     covariance[np.ix_(free, free)] = 0.5 * (inverse + inverse.T)
@@ -178,10 +178,10 @@ def covariance_of_free(information: Array, free: BoolArray) -> Array:
 
 
 def unidentifiable_covariance(information: Array, free: BoolArray) -> Array:
-    """Return the covariance of directions that the data do not see, zero where they see all.
+    """Return the covariance of directions without information, zero where there is none.
 
-    Corrections for coloured residuals multiply by the inverse twice; along these directions only
-    rounding is left of them, which looks like a narrow interval.
+    Corrections for coloured residuals multiply by the inverse twice. Along these directions only
+    rounding remains of the product, which would look like a narrow interval.
     """
     result = np.zeros_like(information)
     if not free.any():
@@ -189,10 +189,10 @@ def unidentifiable_covariance(information: Array, free: BoolArray) -> Array:
     block = information[np.ix_(free, free)]
     scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
     value, vector = np.linalg.eigh(block / np.outer(scale, scale))
-    lost = value < UNIDENTIFIABLE * value[-1]
-    if lost.any():
-        value = np.maximum(value[lost], SINGULAR * value[-1])
-        part = (vector[:, lost] / value) @ vector[:, lost].T
+    unidentified = value < UNIDENTIFIABLE * value[-1]
+    if unidentified.any():
+        value = np.maximum(value[unidentified], SINGULAR * value[-1])
+        part = (vector[:, unidentified] / value) @ vector[:, unidentified].T
         result[np.ix_(free, free)] = part / np.outer(scale, scale)
     return result
 

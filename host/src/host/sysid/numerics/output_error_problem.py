@@ -1,4 +1,4 @@
-"""A model and its maneuvers made ready for the kernels: one vector in, residuals and slopes out."""
+"""Outputs and sensitivities of a model over several maneuvers: the problem of output error."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ class OutputProblem:
     Parameters
     ----------
     model : LinearModel
-        What is free.
+        Its parameters, biases, initial states and delays are the unknowns.
     maneuvers : sequence of Maneuver
         The data.
 
     Attributes
     ----------
     least_variance : Array, shape (p,)
-        Below it an estimated noise variance is rounding.
+        Below it an estimated noise variance is rounding error.
 
     Raises
     ------
@@ -120,7 +120,7 @@ class OutputProblem:
             self._start_slopes[i, self._start_parameter[i]] = 1.0
         output_entries = model.entries("CD")
         free_output = len(output_entries.row) + len(model.accelerometer_offsets) > 0
-        self._arms = [
+        self._offsets = [
             (
                 model.outputs.index(lever.output),
                 model.states.index(lever.state),
@@ -135,7 +135,7 @@ class OutputProblem:
                 output_entries.row[k], output_entries.column[k], output_entries.parameter[k]
             ] += output_entries.gain[k]
         self._width = width
-        self._spare: list[list[Array]] = [[] for _ in self._parts]
+        self._free_memory: list[list[Array]] = [[] for _ in self._parts]
         power = np.mean(np.square(self._parts[0].measured), axis=1)
         self.least_variance = 1e-20 * np.maximum(power, 1e-30)  # of an output that fits perfectly
         self.lower, self.upper, self.prior_mean, self.prior_precision = self._limits()
@@ -158,7 +158,7 @@ class OutputProblem:
         return sum(m.samples for m in self.maneuvers)
 
     def columns(self, maneuver: int) -> IntArray:
-        """Return which entries of the whole vector the slopes of a maneuver belong to."""
+        """Return which entries of the whole vector the sensitivities of a maneuver belong to."""
         return self._parts[maneuver].index
 
     def measured(self, maneuver: int) -> Array:
@@ -177,17 +177,21 @@ class OutputProblem:
         return theta
 
     def respond(self, theta: Array) -> list[Response] | None:
-        """Simulate every maneuver with sensitivities; None if a response left all bounds."""
+        """Simulate every maneuver with sensitivities; None if a response diverges.
+
+        The sensitivities obey dx/dtheta[k+1] = Phi dx/dtheta[k] + d[Phi Gamma]/dtheta z[k] (Klein &
+        Morelli, Aircraft System Identification, ch. 6, output sensitivities).
+        """
         model = self.model
         n, m = len(model.states), len(model.inputs)
         A, B, C, D = model.matrices(theta)
         AB = np.zeros((n, n + m + 1))
         AB[:, :n], AB[:, n : n + m] = A, B
         CD = np.hstack([C, D])
-        CD_slopes = self._with_levers(AB[:, :-1], theta)
+        CD_slopes = self._with_offsets(AB[:, :-1], theta)
         result = []
         for number, part in enumerate(self._parts):
-            local = np.append(theta[part.index], 0.0)  # the last is what a place of -1 reads
+            local = np.append(theta[part.index], 0.0)  # an index of -1 reads the last
             AB[:, -1] = 0.0
             for k, state in enumerate(model.state_biases):
                 AB[model.states.index(state), -1] = local[self.n_common + k]
@@ -212,7 +216,7 @@ class OutputProblem:
                 return None
             y = CD @ z[:, : n + m].T
             y += local[self._bias_parameter][:, None]
-            slope = self._room(number, (len(C), len(z), self._width))
+            slope = self._memory_for(number, (len(C), len(z), self._width))
             propagate(step, slopes, z, C, self._start_slopes, slope)
             for j in np.flatnonzero(self._bias_parameter >= 0):
                 slope[j, :, self._bias_parameter[j]] += 1.0
@@ -223,24 +227,24 @@ class OutputProblem:
         return result
 
     def release(self, responses: Sequence[Response]) -> None:
-        """Take back the slopes of responses of this problem that nobody reads any more.
+        """Take back the sensitivities of responses that are no longer needed.
 
-        Fresh memory costs as much as the slopes themselves: 375 pages for 24 x 2000 x 4.
+        New memory costs as much time as the sensitivities: 375 pages for 24 x 2000 x 4.
         """
-        for spare, response in zip(self._spare, responses, strict=True):
+        for spare, response in zip(self._free_memory, responses, strict=True):
             spare.append(response.sensitivities)
 
-    def _room(self, number: int, shape: tuple[int, int, int]) -> Array:
-        spare = self._spare[number]
+    def _memory_for(self, number: int, shape: tuple[int, int, int]) -> Array:
+        spare = self._free_memory[number]
         return spare.pop() if spare else np.empty(shape)
 
-    def _with_levers(self, AB: Array, theta: Array) -> Array:
-        """Return the slopes of [C D]; an arm carries a whole state row into an output."""
-        if not self._arms:
+    def _with_offsets(self, AB: Array, theta: Array) -> Array:
+        """Return derivatives of [C D]; an offset adds a state equation to an output."""
+        if not self._offsets:
             return self._CD_slopes
         slopes = self._CD_slopes.copy()
         entries = self._entries
-        for output, state, parameter, gain in self._arms:
+        for output, state, parameter, gain in self._offsets:
             slopes[output, :, parameter] += gain * AB[state]
             for t in np.flatnonzero(entries.row == state):
                 if entries.column[t] < AB.shape[1]:
@@ -259,7 +263,7 @@ class OutputProblem:
         none = np.zeros(0, dtype=np.int64)
         result: list[Array] = []
         for part in self._parts:
-            local = np.append(theta[part.index], 0.0)  # the last is what a place of -1 reads
+            local = np.append(theta[part.index], 0.0)  # an index of -1 reads the last
             AB[:, -1] = 0.0
             for k, state in enumerate(model.state_biases):
                 AB[model.states.index(state), -1] = local[self.n_common + k]

@@ -1,10 +1,10 @@
-"""x[k+1] = F x[k] + G z[k]: response of the states, and of their slopes by every parameter.
+"""Recursion x[k+1] = F x[k] + G z[k] of the states and of their sensitivities.
 
-A loop over samples is what an interpreter is slow at, so the record is cut into about as many
-pieces as each has samples: all pieces run side by side from rest, then each is given the state it
-began with. The same loop as machine code takes a fifth of the time (1.1 against 0.23 ms for 24
-parameters, 4 states and 2000 samples), but a process pays 0.4 s to load it and a fresh install
-1.2 s to compile it: one flight's maneuvers never earn that back, a study does within seconds and
+A loop over samples is slow in an interpreter. The record is therefore cut into about as many pieces
+as each has samples; all pieces run side by side from rest, then the response to the initial state
+of each is added. The same loop as machine code takes a fifth of the time (1.1 against 0.23 ms for
+24 parameters, 4 states and 2000 samples), but a process pays 0.4 s to load it and a fresh install
+1.2 s to compile it. One flight's maneuvers do not save that time; a study does within seconds and
 asks for it (`prefer_machine_code`).
 """
 
@@ -16,14 +16,14 @@ from host.arrays import Array
 from host.compiled import compiled
 from host.sysid.numerics.discretisation import powers_of
 
-STATE_LIMIT = 1e8  # a trial response beyond it is called divergent
+STATE_LIMIT = 1e8  # a response beyond it has diverged
 WORTH_COMPILING = 1.5e7  # 0.1 s of numpy ten times a search, in values of states and slopes
 OVERHEAD = 100  # the same, what a sample costs beside them
-BLOCK = 256  # samples: what drives 96 slopes of one block is 200 kB
+BLOCK = 256  # samples: the input of 96 sensitivities over one block is 200 kB
 
 
 def simulate(step: Array, drive: Array, start: Array) -> tuple[bool, Array]:
-    """Run the states.
+    """Simulate the states.
 
     Parameters
     ----------
@@ -47,44 +47,47 @@ def simulate(step: Array, drive: Array, start: Array) -> tuple[bool, Array]:
 
 
 def propagate(
-    step: Array, step_slopes: Array, z: Array, C: Array, start_slopes: Array, out: Array
+    step: Array, step_derivatives: Array, z: Array, C: Array, start_sensitivities: Array, out: Array
 ) -> None:
-    """Run the state sensitivities and map them to the outputs.
+    """Run the sensitivity equations of the states and map them to the outputs.
+
+    S[k+1] = F S[k] + sum over c of z_c[k] dstep_c, out[k] = C S[k] (Klein & Morelli, Aircraft
+    System Identification, ch. 6).
 
     Parameters
     ----------
     step : Array, shape (n, n + w)
-        Transition; its first n columns act on sensitivities.
-    step_slopes : Array, shape (n, wide, parameters)
-        What a sample's row of `z` adds to the sensitivities of the next.
+        [Phi Gamma]; the first n columns act on sensitivities.
+    step_derivatives : Array, shape (n, wide, parameters)
+        Derivatives of `step`: they drive the sensitivities with each sample's row of `z`.
     z : Array, shape (samples, wide)
         State and drive of each sample.
     C : Array, shape (p, n)
-    start_slopes : Array, shape (n, parameters)
-        Sensitivities of the start state.
+    start_sensitivities : Array, shape (n, parameters)
+        Sensitivities of the initial state.
     out : Array, shape (p, samples, parameters)
         Overwritten with the sensitivities of the outputs.
     """
     samples, wide = z.shape
-    n, _, free = step_slopes.shape
+    n, _, free = step_derivatives.shape
     if not propagate_block.pays(samples * (n * free + OVERHEAD), WORTH_COMPILING):
-        out[...] = _in_pieces(step[:, :n], step_slopes, z, C, start_slopes)
+        out[...] = _in_pieces(step[:, :n], step_derivatives, z, C, start_sensitivities)
         return
     F = np.ascontiguousarray(step[:, :n])
     C = np.ascontiguousarray(C)
-    flat = np.ascontiguousarray(step_slopes.transpose(1, 0, 2)).reshape(wide, n * free)
-    # What drives the sensitivities is made block by block and stays in the cache.
-    push = np.empty((min(BLOCK, samples), n * free))
-    S, T = start_slopes.copy(), np.empty_like(start_slopes)
+    flat = np.ascontiguousarray(step_derivatives.transpose(1, 0, 2)).reshape(wide, n * free)
+    # The input of the recursion is computed block by block and stays in the cache.
+    forcing = np.empty((min(BLOCK, samples), n * free))
+    S, T = start_sensitivities.copy(), np.empty_like(start_sensitivities)
     for begin in range(0, samples, BLOCK):
         count = min(BLOCK, samples - begin)
-        np.dot(z[begin : begin + count], flat, out=push[:count])
-        propagate_block(F, C, S, T, push, begin, count, out)
+        np.dot(z[begin : begin + count], flat, out=forcing[:count])
+        propagate_block(F, C, S, T, forcing, begin, count, out)
 
 
 @compiled
 def propagate_block(
-    F: Array, C: Array, S: Array, T: Array, push: Array, begin: int, count: int, out: Array
+    F: Array, C: Array, S: Array, T: Array, forcing: Array, begin: int, count: int, out: Array
 ) -> None:
     """Run `count` samples from `begin`; S holds the state sensitivities before and after.
 
@@ -102,7 +105,7 @@ def propagate_block(
                         out[j, begin + k, q] += f * S[i, q]
         for i in range(n):
             for q in range(free):
-                T[i, q] = push[k, i * free + q]
+                T[i, q] = forcing[k, i * free + q]
             for j in range(n):
                 f = F[i, j]
                 for q in range(free):
@@ -115,7 +118,7 @@ def propagate_block(
 def _in_pieces(F: Array, G: Array, z: Array, C: Array, start: Array) -> Array:
     """Return C S, shape (p, samples, P), with S[k+1] = F S[k] + sum over c of z[k, c] G[:, c].
 
-    A state that overflows ends in infinity or NaN, which the caller looks for.
+    A state that overflows ends in infinity or NaN, which the caller checks for.
     """
     samples, wide = z.shape
     n, _, free = G.shape
@@ -123,7 +126,7 @@ def _in_pieces(F: Array, G: Array, z: Array, C: Array, start: Array) -> Array:
     pieces = -(-samples // length)
     rows = np.zeros((pieces * length, wide))
     rows[:samples] = z
-    # Sample by sample, the pieces side by side: one product moves them all.
+    # Sample by sample, all pieces side by side in one product.
     rows = rows.reshape(pieces, length, wide).transpose(1, 0, 2).reshape(-1, wide)
     with np.errstate(over="ignore", invalid="ignore"):
         X = (rows @ G).reshape(n, length, pieces * free)

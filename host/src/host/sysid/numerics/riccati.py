@@ -1,4 +1,4 @@
-"""Steady-state Kalman filter: Riccati equation by doubling, and innovations."""
+"""Steady-state Kalman filter: discrete algebraic Riccati equation and innovations."""
 
 from __future__ import annotations
 
@@ -10,18 +10,35 @@ from host.sysid.numerics.recursion import simulate
 DOUBLINGS = 40
 
 
-def predicted_covariance(transition: Array, C: Array, Q: Array, R: Array) -> tuple[bool, Array]:
+def predicted_covariance(F: Array, C: Array, Q: Array, R: Array) -> tuple[bool, Array]:
     """Solve P = F P F' - F P C' (C P C' + R)^-1 C P F' + Q by the structured doubling algorithm.
 
     Chu, Fan, Lin & Wang, Structure-preserving algorithms for periodic discrete-time algebraic
     Riccati equations, International Journal of Control 77 (2004). For 5 states and 6 outputs it
     takes 0.29 ms where `scipy.linalg.solve_discrete_are` takes 1.36 (same to rounding), and a
     flight's answer solves it 63 times.
+
+    Parameters
+    ----------
+    F : Array, shape (n, n)
+        State transition over a sample.
+    C : Array, shape (p, n)
+    Q : Array, shape (n, n)
+        Covariance of the process noise of a sample.
+    R : Array, shape (p, p)
+        Covariance of the measurement noise.
+
+    Returns
+    -------
+    bool
+        Whether the iteration converged.
+    Array, shape (n, n)
+        Covariance of the predicted state.
     """
-    A = transition.T
+    A = F.T
     G = C.T @ np.linalg.solve(R, C)
     H = Q
-    eye = np.eye(len(transition))
+    eye = np.eye(len(F))
     for _ in range(DOUBLINGS):
         W = np.linalg.inv(eye + G @ H)
         AW = A @ W
@@ -42,6 +59,9 @@ def filter_innovations(
     step: Array, CD: Array, K: Array, drive: Array, y: Array, start: Array, bias: Array
 ) -> tuple[bool, Array]:
     """Run a constant-gain Kalman filter.
+
+    x[k+1] = Phi (x[k] + K nu[k]) + Gamma u[k] with the innovation nu[k] = y[k] - C x[k] - D u[k] -
+    b (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5).
 
     Parameters
     ----------
@@ -68,11 +88,11 @@ def filter_innovations(
     """
     n = len(start)
     inputs = CD.shape[1] - n
-    C, seen = CD[:, :n], y - bias - drive[:, :inputs] @ CD[:, n:].T
-    # x[k+1] = Phi (x + K (seen - C x)) + Gamma u
+    C, measured_part = CD[:, :n], y - bias - drive[:, :inputs] @ CD[:, n:].T
+    # The filter as one recursion: nu = measured_part - C x.
     FK = step[:, :n] @ K
-    closed = np.hstack([step[:, :n] - FK @ C, step[:, n:], FK])
-    finite, z = simulate(closed, np.hstack([drive, seen]), start)
+    closed_loop = np.hstack([step[:, :n] - FK @ C, step[:, n:], FK])
+    finite, z = simulate(closed_loop, np.hstack([drive, measured_part]), start)
     if finite:
         z[:, -len(C) :] -= z[:, :n] @ C.T
     return finite, z
