@@ -143,7 +143,7 @@ def use_aircraft(path: Path, rng: random.Random) -> None:
     from host.aircraft.powerplant import powerplant
     from host.aircraft.trim import solve
     from host.instrument.deviations import sensor_error_model
-    from host.sysid.answer.conversion_table import At, conversion_document, convert
+    from host.sysid.answer.conversion_table import FlightCondition, conversion_document, convert
 
     plane = None
     with contextlib.suppress(HostError):
@@ -157,7 +157,7 @@ def use_aircraft(path: Path, rng: random.Random) -> None:
     airframe_data(str(path))
     sensor_error_model(str(path))
     Path("prior.toml").write_text("[coefficients]\nCm_q = -10.0\nCL_alpha = 5.0\n")
-    done = convert(Path("prior.toml"), str(path), At())
+    done = convert(Path("prior.toml"), str(path), FlightCondition())
     finite(done.found.values, *(done.half_width(n) for n in done.found.names[:2]))
     json.dumps(conversion_document(done))
     import numpy as np
@@ -193,7 +193,7 @@ def use_map(path: Path, rng: random.Random) -> None:
 def use_model(path: Path, rng: random.Random) -> None:
     """As `identify --model` and `simulate --aircraft` do."""
     from host.planning.identified_aircraft import is_model
-    from host.sysid.answer.conversion_table import At, convert
+    from host.sysid.answer.conversion_table import FlightCondition, convert
     from host.sysid.coefficients.coefficient_model import (
         is_coefficient_model,
         read_coefficient_model,
@@ -209,7 +209,7 @@ def use_model(path: Path, rng: random.Random) -> None:
     for matrix in model.matrices(model.start):
         finite(matrix)
     with contextlib.suppress(HostError):
-        finite(convert(path, "ultrastick25e", At()).found.values)
+        finite(convert(path, "ultrastick25e", FlightCondition()).found.values)
     trim = read_trim(path)
     finite(trim.airspeed_mps, trim.alpha_rad, trim.theta_rad)
 
@@ -217,12 +217,12 @@ def use_model(path: Path, rng: random.Random) -> None:
 def use_prior(path: Path, rng: random.Random) -> None:
     """As `identify --prior` and `convert` do."""
     from host.aircraft.prior.prior_file import read_prior
-    from host.sysid.answer.conversion_table import At, conversion_document, convert
+    from host.sysid.answer.conversion_table import FlightCondition, conversion_document, convert
 
     del rng
     with contextlib.suppress(HostError):
         finite(*read_prior(path, 17.0).at(0.05).values())
-    done = convert(path, "ultrastick25e", At())
+    done = convert(path, "ultrastick25e", FlightCondition())
     finite(done.found.values)
     json.dumps(conversion_document(done))
 

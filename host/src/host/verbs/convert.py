@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from host.aircraft.file import load_measured
     from host.errors import ExitCode, UsageError
     from host.sysid.answer.conversion_table import (
-        At,
+        FlightCondition,
         conversion_document,
         conversion_lines,
         convert,
@@ -60,7 +60,9 @@ def run(args: argparse.Namespace) -> int:
         if value is not None:
             quantity.check(f"--{option}", value, UsageError)
     alpha_rad = None if args.alpha is None else radians(args.alpha)
-    done = convert(args.source, args.aircraft, At(args.airspeed, alpha_rad, args.density))
+    done = convert(
+        args.source, args.aircraft, FlightCondition(args.airspeed, alpha_rad, args.density)
+    )
     for doubt in load_measured(args.aircraft).doubts:
         print(f"host: {doubt}", file=sys.stderr)
     if args.json:

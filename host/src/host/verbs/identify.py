@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from host.sysid.answer.output_files import Places
+    from host.sysid.answer.output_files import OutputPaths
 
 
 def add_parser(subparsers: Any) -> None:
@@ -71,12 +71,24 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Identify and print the answer: words first, then numbers."""
+    """Identify and print the answer; messages name options where the library names arguments."""
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from host.errors import ExitCode
-    from host.sysid.answer.output_files import check
     from host.sysid.identification_error import IdentificationError
+    from host.sysid.pipeline.arguments import option_words
+
+    try:
+        return _run(args)
+    except IdentificationError as error:
+        raise IdentificationError(option_words(str(error))) from error
+
+
+def _run(args: argparse.Namespace) -> int:
+    """Identify and print the answer: words first, then numbers."""
+    from host.errors import ExitCode
+    from host.sysid.answer.output_files import check_outputs
+    from host.sysid.identification_error import IdentificationError
+    from host.sysid.pipeline.arguments import option_words
     from host.sysid.pipeline.requested_models import known_methods
     from host.sysid.pipeline.stages import identify
 
@@ -86,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.source:
         raise IdentificationError("name the flight: a log, CSV, Parquet or MAT file")
     places = _places(args)
-    check(places)
+    check_outputs(places)
     found = identify(
         args.source,
         aircraft=args.aircraft,
@@ -102,12 +114,12 @@ def run(args: argparse.Namespace) -> int:
         prior=args.prior,
     )
     if args.json:
-        text = found.to_json()
+        text = option_words(found.to_json())
         # What was written is said before the answer, so that no answer follows an error.
         _say(found.save(places))
         print(text)
         return int(ExitCode.OK)
-    text = found.to_text(shutil.get_terminal_size().columns)
+    text = option_words(found.to_text(shutil.get_terminal_size().columns))
     try:
         written = found.save(places)
     finally:
@@ -116,13 +128,13 @@ def run(args: argparse.Namespace) -> int:
     return int(ExitCode.OK)
 
 
-def _places(args: argparse.Namespace) -> Places:
+def _places(args: argparse.Namespace) -> OutputPaths:
     """Return where files go, and every file that the answer is made from."""
-    from host.sysid.answer.output_files import Places
+    from host.sysid.answer.output_files import OutputPaths
 
     given = [*args.source, args.map, args.calibration, *(args.truth or ()), args.prior]
     given += [Path(name) for name in (args.aircraft, *(args.model or ())) if name]
-    return Places(
+    return OutputPaths(
         plots=args.plots,
         mat=args.mat,
         model=args.save_model,

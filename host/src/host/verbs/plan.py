@@ -92,12 +92,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _save(path: Path, text: str) -> None:
-    from host.sysid.answer.atomic_files import refuse_place, whole
+    from host.sysid.answer.atomic_files import atomic_write, check_destination
 
     if path.suffix != ".toml":
         raise UsageError(f"--save {path}: ends in '{path.suffix}', expected .toml")
-    refuse_place("--save", path, folder=False)
-    with whole(path) as part:
+    check_destination("--save", path, folder=False)
+    with atomic_write(path) as part:
         part.write_text(text, encoding="utf-8")
 
 

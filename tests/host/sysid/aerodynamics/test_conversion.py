@@ -12,10 +12,10 @@ from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.aerodynamics.derivative_conversion import (
-    CARRIED,
-    Place,
+    CONSIDERED_ERRORS,
+    ConversionPoint,
     Quantities,
-    carried_errors,
+    consider_deviations,
     to_coefficients,
     to_derivatives,
 )
@@ -26,8 +26,8 @@ from host.sysid.models.state_space_model import free_model
 NAME = "ultrastick25e"
 AIRFRAME = airframe_data(NAME)
 ALPHA = 0.08
-PLACE = Place(AIRFRAME, Condition(17.0, 177.0), ALPHA)
-ERRORS = carried_errors(AIRFRAME, sensor_error_model(NAME))
+PLACE = ConversionPoint(AIRFRAME, Condition(17.0, 177.0), ALPHA)
+ERRORS = consider_deviations(AIRFRAME, sensor_error_model(NAME))
 TRUE = {
     "CL_alpha": 3.94, "CL_q": 8.0, "CL_de": 0.53, "CD_alpha": 0.30, "CD_de": 0.05,
     "Cm_alpha": -1.65, "Cm_q": -10.9, "Cm_de": -1.27,
@@ -48,7 +48,7 @@ def test_there_and_back_is_the_same_with_its_covariance() -> None:
     start = given()
     out = to_derivatives(start, PLACE, ERRORS)
     back = to_coefficients(out, PLACE, {})
-    assert back.names == (*TRUE, *CARRIED)
+    assert back.names == (*TRUE, *CONSIDERED_ERRORS)
     np.testing.assert_allclose(back.values[: len(TRUE)], start.values, rtol=1e-12)
     scale = np.sqrt(np.diag(start.covariance))
     gap = back.covariance[: len(TRUE), : len(TRUE)] - start.covariance
@@ -163,7 +163,7 @@ def test_moments_go_to_the_nominal_cg_as_the_twin_takes_them_from_it() -> None:
     lift, drag = about_cg(frame, at)[:2]
     weight = AIRFRAME.mass_kg * 9.80665
     qbar = float(weight / (lift * AIRFRAME.wing_area_m2))
-    place = Place(AIRFRAME, Condition(17.0, qbar), ALPHA, float(drag))
+    place = ConversionPoint(AIRFRAME, Condition(17.0, qbar), ALPHA, float(drag))
     here, there = slopes(frame), slopes(moved)
     none = np.zeros((len(here), len(here)))
     measured = to_derivatives(

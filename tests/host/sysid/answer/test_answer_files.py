@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.cli import main
-from host.sysid.answer.atomic_files import whole
+from host.sysid.answer.atomic_files import atomic_write
 from host.sysid.answer.mat_file import labels, mat_name, write_mat
-from host.sysid.answer.output_files import Places, check
+from host.sysid.answer.output_files import OutputPaths, check_outputs
 from host.sysid.flight.linear import Answer, identify
 from host.sysid.flight.tables import read_columns
 from host.sysid.identification_error import IdentificationError
@@ -87,8 +87,8 @@ def test_an_output_does_not_replace_what_it_is_made_from(
     model = tmp_path / "mine.toml"
     model.write_text("# mine\n")
     with pytest.raises(IdentificationError, match="made from"):
-        check(Places(None, None, tmp_path / "../" / tmp_path.name / "mine.toml", None, None,
-                     (flight, model)))  # fmt: skip
+        same = tmp_path / "../" / tmp_path.name / "mine.toml"
+        check_outputs(OutputPaths(None, None, same, None, None, (flight, model)))
 
 
 def test_models_named_after_the_first_replace_no_source(
@@ -112,7 +112,7 @@ def test_a_file_in_a_folder_that_takes_none_is_refused_before_the_work(
     path.write_text("before")
     monkeypatch.setattr(os, "access", lambda place, _: Path(place) != tmp_path)
     with pytest.raises(IdentificationError, match=f"no permission to write to {tmp_path}$"):
-        check(Places(None, None, path, None, None, ()))
+        check_outputs(OutputPaths(None, None, path, None, None, ()))
 
 
 def test_without_room_the_answer_is_said_and_nothing_is_left(
@@ -191,7 +191,7 @@ def test_names_are_those_of_variables(answers: list[Answer]) -> None:
 def test_interrupted_writing_leaves_the_file_that_was_there(tmp_path: Path) -> None:
     path = tmp_path / "a.svg"
     path.write_text("before")
-    with pytest.raises(KeyboardInterrupt), whole(path) as part:
+    with pytest.raises(KeyboardInterrupt), atomic_write(path) as part:
         part.write_text("half")
         raise KeyboardInterrupt
     assert path.read_text() == "before"
@@ -201,17 +201,17 @@ def test_interrupted_writing_leaves_the_file_that_was_there(tmp_path: Path) -> N
 def test_a_file_called_part_is_left_alone(tmp_path: Path) -> None:
     own = tmp_path / "model.part.toml"
     own.write_text("mine")
-    with whole(tmp_path / "model.toml") as part:
+    with atomic_write(tmp_path / "model.toml") as part:
         part.write_text("x")
     assert own.read_text() == "mine"
 
 
 def test_a_device_is_written_to_as_it_is(answers: list[Answer]) -> None:
-    with whole(Path(os.devnull)) as part:
+    with atomic_write(Path(os.devnull)) as part:
         assert part == Path(os.devnull)
     with (
         pytest.raises(IdentificationError, match="No space left"),
-        whole(Path("/dev/full")) as part,
+        atomic_write(Path("/dev/full")) as part,
     ):
         part.write_text("x")
     assert Path("/dev/full").exists()

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 from host.cli import main
-from host.sysid.answer.method_comparison import side_by_side
-from host.sysid.answer.verdict import words
+from host.sysid.answer.method_comparison import method_table
+from host.sysid.answer.verdict import verdict_lines
 from host.sysid.estimators.method_registry import methods
 from host.sysid.flight.chosen import chosen
 from host.sysid.flight.linear import Answer, identify
@@ -40,7 +40,7 @@ def test_every_method_of_the_list_answers(answers: dict[str, Answer]) -> None:
 
 @pytest.mark.parametrize(("width", "room"), [(80, 3), (120, 4), (30, 1)])
 def test_the_table_fits(width: int, room: int, answers: dict[str, Answer]) -> None:
-    lines = side_by_side(list(answers.values()), width)
+    lines = method_table(list(answers.values()), width)
     assert max(len(line) for line in lines[:-1]) <= max(width, 36)
     heads = [line for line in lines if line.startswith("short-period")]
     assert len(heads) == -(-len(answers) // room)
@@ -52,10 +52,10 @@ def test_the_table_fits(width: int, room: int, answers: dict[str, Answer]) -> No
 def test_what_did_not_converge_is_not_trusted(answers: dict[str, Answer]) -> None:
     stopped = answers["hopfield"]
     assert not stopped.result.converged
-    lines = words([stopped], [])
+    lines = verdict_lines([stopped], [])
     assert "  trust (within 10 %):  nothing" in lines
     assert "  no convergence: estimates and intervals mean nothing, use another method" in lines
-    table = side_by_side([stopped], 80)
+    table = method_table([stopped], 80)
     assert all(line.endswith("*") for line in table[1:-1])
     settled = replace(stopped, result=replace(stopped.result, converged=True))
-    assert not any("no convergence" in line for line in words([settled], []))
+    assert not any("no convergence" in line for line in verdict_lines([settled], []))

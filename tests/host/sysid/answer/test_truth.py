@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.truth_comparison import (
-    compared,
-    compared_modes,
+    compared_coefficients,
+    mode_comparisons,
     mode_truth_lines,
     truth_lines,
     truth_summary,
@@ -32,16 +32,16 @@ def table(**values: tuple[float, float]) -> CoefficientTable:
 
 
 def test_truth_is_the_mean_of_the_maneuvers_of_the_axis() -> None:
-    (lift,) = compared(table(CL_alpha=(4.41, 0.2)), DOCUMENT, {})
+    (lift,) = compared_coefficients(table(CL_alpha=(4.41, 0.2)), DOCUMENT, {})
     assert lift.truth == pytest.approx(4.2)
     assert lift.error == pytest.approx(0.05)
     assert not lift.covered
 
 
 def test_a_coefficient_next_to_nothing_is_not_judged_by_its_size() -> None:
-    (drag,) = compared(table(CD_de=(0.01, 0.02)), DOCUMENT, {})
+    (drag,) = compared_coefficients(table(CD_de=(0.01, 0.02)), DOCUMENT, {})
     assert math.isnan(drag.error)
-    (drag,) = compared(table(CD_de=(0.01, 0.02)), DOCUMENT, {"CD_de": 0.04})
+    (drag,) = compared_coefficients(table(CD_de=(0.01, 0.02)), DOCUMENT, {"CD_de": 0.04})
     assert drag.error == pytest.approx(0.25)
     lines = truth_lines([table(CD_de=(0.01, 0.02))], DOCUMENT, {"CD_de": 0.04})
     assert "+25.0 % of 5 % of the row  inside" in lines[1]
@@ -56,7 +56,7 @@ def test_modes_are_compared_with_those_of_their_axis() -> None:
         mode_of("roll", complex(-21.0, 0.0), spread),
         mode_of("spiral", complex(0.12, 0.0), spread),
     )
-    found = compared_modes(modes, DOCUMENT, ("longitudinal", "lateral"))
+    found = mode_comparisons(modes, DOCUMENT, ("longitudinal", "lateral"))
     names = {c.name: c for c in found}
     assert list(names) == ["short period", "short period, damping", "roll", "spiral"]
     assert names["short period"].truth == pytest.approx(11.0)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
-from host.sysid.answer.verdict import model_lines, unpredicted, words
+from host.sysid.answer.verdict import model_lines, unpredicted, verdict_lines
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.linear import Answer
 from host.sysid.models.diagnostics import SignalFit, collinearity, reference_values
@@ -38,7 +38,7 @@ def test_a_wide_interval_is_named_and_a_bound_is_not_trusted(answer: Answer) -> 
         covariance=np.diag(wide**2),
         degrees_of_freedom=np.full(len(wide), np.inf),
     )
-    lines = words([replace(answer, result=result)], [])
+    lines = verdict_lines([replace(answer, result=result)], [])
     headed = {line.split(":  ")[0].strip(): line.split(":  ")[-1] for line in lines}
     assert names[0] in headed["trust (within 10 %)"].split(", ")
     assert headed["use with care (10 to 30 %)"] == names[1]
@@ -48,7 +48,9 @@ def test_a_wide_interval_is_named_and_a_bound_is_not_trusted(answer: Answer) -> 
 
 def test_collinear_data_without_a_pair_are_no_empty_brackets(answer: Answer) -> None:
     severe = replace(answer.together, condition=1e9, pairs=())
-    assert "  the data are close to collinear" in words([replace(answer, together=severe)], [])
+    assert "  the data are close to collinear" in verdict_lines(
+        [replace(answer, together=severe)], []
+    )
 
 
 def test_what_is_not_predicted_is_not_trusted(answer: Answer) -> None:
@@ -59,7 +61,7 @@ def test_what_is_not_predicted_is_not_trusted(answer: Answer) -> None:
     failing = SignalFit(speed, 0.0, 0.8, 0.5, 0.0, 0.5)
     lost = replace(answer, result=sure, validation=(failing,), modes=modes(sure))
     assert unpredicted(lost) == [speed]
-    lines = words([lost], [])
+    lines = verdict_lines([lost], [])
     trusted = next(line for line in lines if "trust" in line).split(":  ")[1].split(", ")
     told = next(line for line in lines if "whatever the interval" in line)
     row = {t.parameter for t in answer.model.terms if t.row == 0 and t.matrix in "AB"}
@@ -71,7 +73,7 @@ def test_what_is_not_predicted_is_not_trusted(answer: Answer) -> None:
     marked = [line for line in model_lines(lost) if "not to be relied on" in line]
     assert [line.split(":")[0].strip() for line in marked] == ["phugoid"]
     assert not any("nothing was left" in line for line in lines)
-    alone = words([replace(lost, validation=())], [])
+    alone = verdict_lines([replace(lost, validation=())], [])
     assert any("nothing was left to be predicted" in line for line in alone)
 
 
@@ -84,7 +86,7 @@ def test_a_small_entry_is_not_called_trustworthy(answer: Answer) -> None:
     half = np.full(len(estimate), 1e-9)
     half[1] = 0.1 * floor / 1.96
     result = replace(answer.result, estimate=estimate, covariance=np.diag(half**2))
-    lines = words([replace(answer, result=result)], [])
+    lines = verdict_lines([replace(answer, result=result)], [])
     little = next(line for line in lines if "less than 5 % of their row" in line)
     assert answer.model.parameter_names[1] in little.split(":  ")[1].split(", ")
 
@@ -95,7 +97,7 @@ def test_a_delay_at_its_bound_is_no_failed_prediction(answer: Answer) -> None:
     bound = replace(STANDARD_DELAYS[3], outputs=(speed,))
     model = replace(answer.model, delays=(bound,))
     lost = replace(answer, model=model, delays={bound.name: (bound.limit_s, 0.0)})
-    (line,) = [x for x in words([lost], []) if "whatever the interval" in x]
+    (line,) = [x for x in verdict_lines([lost], []) if "whatever the interval" in x]
     assert line.endswith(f"whatever the interval: the delay of {speed} is at its bound")
 
 

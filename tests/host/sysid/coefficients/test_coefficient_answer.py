@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
-from host.sysid.aerodynamics.derivative_conversion import Place, to_derivatives
+from host.sysid.aerodynamics.derivative_conversion import ConversionPoint, to_derivatives
 from host.sysid.answer.figure_kinds import Bar, interval_bars, save
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.coefficients.coefficient_estimator import (
@@ -141,7 +141,9 @@ def test_public_conversion_gives_the_same_motion(answer: CoefficientAnswer) -> N
     ):  # fmt: skip
         system, faster = answer.systems[row], flight.airspeed_ratio[row == "lateral"]
         at = Condition(flight.airspeed_mps * faster, flight.qbar_pa * faster**2)
-        found = to_derivatives(quantities(answer.fit), Place(frame, at, flight.alpha_rad), {})
+        found = to_derivatives(
+            quantities(answer.fit), ConversionPoint(frame, at, flight.alpha_rad), {}
+        )
         assert found.value(name) == pytest.approx(system.A[entry], rel=1e-4)
         assert 1.96 * found.deviation(name) == pytest.approx(system.A_half[entry], rel=1e-2)
 

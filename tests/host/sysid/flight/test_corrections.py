@@ -14,7 +14,7 @@ from host.instrument.deviations import sensor_error_model
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.answer.verdict import model_lines, words
+from host.sysid.answer.verdict import model_lines, verdict_lines
 from host.sysid.compatibility.reconstruction import Compatibility, Finding, reconstruct
 from host.sysid.compatibility.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
@@ -281,7 +281,7 @@ def test_a_delay_at_its_bound_is_called_so(
     answers = identify(columns, airframe=airframe_data(NAME))
     for answer in answers:
         assert "delay_vanes_s" in answer.at_bound
-        assert any("delay_vanes_s is at its bound" in line for line in words([answer], []))
+        assert any("delay_vanes_s is at its bound" in line for line in verdict_lines([answer], []))
         assert any(
             "delay_vanes_s" in line and "at its bound" in line for line in model_lines(answer)
         )

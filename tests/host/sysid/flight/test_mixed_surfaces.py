@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.answer.verdict import words
+from host.sysid.answer.verdict import verdict_lines
 from host.sysid.flight.linear import identify
 from host.sysid.flight.tables import read_columns
 from scipy.signal import lsim
@@ -34,8 +34,8 @@ def test_surfaces_that_the_transmitter_mixes_are_not_told_apart(
     assert len(left_out) == (2 if method == "stepwise" else 0)
     assert left_out or {"L_da", "L_dr", "N_da", "N_dr"} <= refused
     mixed = "  aileron_rad and rudder_rad move together: fly them one at a time"
-    assert any(line.startswith(mixed) for line in words([answer], []))
-    [trusted] = [line for line in words([answer], []) if "trust (" in line]
+    assert any(line.startswith(mixed) for line in verdict_lines([answer], []))
+    [trusted] = [line for line in verdict_lines([answer], []) if "trust (" in line]
     assert "L_p" in trusted
     assert "_da" not in trusted
     assert "_dr" not in trusted

@@ -7,7 +7,7 @@ import pytest
 from host.aircraft.mass_properties import Condition
 from host.sysid import Maneuver, fit
 from host.sysid.answer.json_document import answer_document
-from host.sysid.answer.verdict import model_lines, words
+from host.sysid.answer.verdict import model_lines, verdict_lines
 from host.sysid.flight.linear import Answer
 from host.sysid.models.diagnostics import (
     NOT_IDENTIFIABLE,
@@ -150,7 +150,7 @@ def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
         still=(),
         delays={},
     )
-    text = words([answer], [])
+    text = verdict_lines([answer], [])
     table = model_lines(answer)
     document = answer_document(answer, text)
     for named in found.flags:

@@ -15,14 +15,14 @@ import pytest
 from host.cli import main
 from host.errors import HostError
 from host.sysid.answer.answer_figures import draw_coefficients
-from host.sysid.answer.output_files import Places
+from host.sysid.answer.output_files import OutputPaths
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.answer.verdict import MARKS
 from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.flight import chosen, finder
 from host.sysid.flight.linear import LinearEstimator
 from host.sysid.models.templates import Trim, template
-from host.sysid.pipeline.flight_preparation import Reading, prepare
+from host.sysid.pipeline.flight_preparation import ReadingOptions, prepare
 from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.notebook_pictures import Pictures
 
@@ -204,10 +204,10 @@ def test_maneuvers_are_found_once_a_flight(
 
 
 def test_a_stage_adds_and_changes_nothing_before_it(flights: tuple[Path, Path]) -> None:
-    from host.sysid.pipeline.aircraft_data import aircraft_known
+    from host.sysid.pipeline.aircraft_data import aircraft_data
 
-    known = aircraft_known(NAME)
-    flight = prepare(flights[0] / "flight.csv", Reading(), known).flight
+    known = aircraft_data(NAME)
+    flight = prepare(flights[0] / "flight.csv", ReadingOptions(), known).flight
     estimator = LinearEstimator("lateral", airframe=known.airframe, powerplant=known.powerplant)
     estimate = estimator.estimate([flight])
     fit = estimate.fit
@@ -295,7 +295,7 @@ def test_a_hostile_model_writes_into_its_folder_only(
     assert found.table.index.get_level_values("model").nunique() == len(names)
     assert {p.resolve().parent for p in written} == {folder}
     assert len({p.name.lower() for p in written}) == len(written) == 4 * len(names)
-    written = found.save(Places(None, None, saved, None, None, ()))
+    written = found.save(OutputPaths(None, None, saved, None, None, ()))
     assert {p.resolve().parent for p in written} == {saved.parent}
     assert len({p.name.lower() for p in written}) == len(names)
 
@@ -342,7 +342,7 @@ def test_an_error_is_one_line_of_our_own(
 def test_a_wrong_part_of_a_flight_is_said(one: Identification, flights: tuple[Path, Path]) -> None:
     with pytest.raises(host.IdentificationError, match="no maneuver 99"):
         host.identify(flights[0] / "flight.csv", maneuvers=[99])
-    with pytest.raises(host.IdentificationError, match="give --aircraft"):
+    with pytest.raises(host.IdentificationError, match="give argument aircraft"):
         host.identify(flights[0] / "flight.csv", models="coefficients")
     with pytest.raises(host.IdentificationError, match="no maneuver of elevator_rad"):
         replace(one, linear=one.linear[:1], coefficients=None).simulate(

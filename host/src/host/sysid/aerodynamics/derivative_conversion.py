@@ -1,12 +1,12 @@
-"""Dimensional derivatives to coefficients and back, with the covariance of everything known.
+"""Dimensional derivatives to coefficients and back, with consider covariance.
 
-What is known of an aircraft is uncertain: mass, inertias, the place of the CG, scales of pitot,
-vanes and surface pots. Each stands beside the numbers as one more of them (value 0, its deviation),
-so that nothing is lost on the way: what a wrong mass does to a coefficient it undoes in the motion.
+Mass, inertias, place of the CG and the scales of pitot, vanes and surface pots are uncertain. Each
+is a consider parameter: one more quantity of value 0 with its deviation in the joint covariance. A
+wrong mass therefore changes a coefficient, and the conversion back undoes the change.
 
-Dimensional derivatives are those of the templates, at the CG, per unit of what the sensors read;
-coefficients are per unit of what is true, moments about the nominal CG. Etkin & Reid, Dynamics of
-Flight, ch. 4; Klein & Morelli, ch. 3.
+Dimensional derivatives are those of the templates, at the CG, per unit of the sensor readings.
+Coefficients are per unit of the true quantities, with moments about the nominal CG. Etkin & Reid,
+Dynamics of Flight, ch. 4; Klein & Morelli, Aircraft System Identification, ch. 3.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from host.constants import GRAVITY_MPS2
 from host.instrument.deviations import SensorErrorModel, deviations
 from host.sysid.identification_error import IdentificationError
 
-CARRIED = (
+CONSIDERED_ERRORS = (
     "mass_share", "ixx_share", "iyy_share", "izz_share", "cg_x_m", "cg_z_m",
     "pitot_scale", "pitot_drift_pa", "density_share", "alpha_scale", "beta_scale", "upwash_share",
     "elevator_scale", "aileron_scale", "rudder_scale",
 )  # fmt: skip
-READ_WITH = {
+SENSOR_SCALES = {
     "alpha": "alpha_scale", "beta": "beta_scale", "de": "elevator_scale", "da": "aileron_scale",
     "dr": "rudder_scale",
 }  # fmt: skip
-LABELS = {
+TEMPLATE_TERMS = {
     "Z": ("alpha", "q", "de"), "D": ("alpha", "de"), "M": ("alpha", "q", "de"),
     **dict.fromkeys(("Y", "L", "N"), ("beta", "p", "r", "da", "dr")),
 }  # fmt: skip
-# What can be converted, and what it becomes.
-DERIVATIVES = tuple(f"{row}_{label}" for row, labels in LABELS.items() for label in labels)
+# The derivatives that can be converted, and their coefficients in the same order.
+DERIVATIVES = tuple(f"{row}_{label}" for row, labels in TEMPLATE_TERMS.items() for label in labels)
 COEFFICIENTS = tuple(map(coefficient_name, DERIVATIVES))
 STEP = 1e-4  # of a deviation, at least of 1e-6 of the value
 Table = dict[str, float]
@@ -57,18 +57,18 @@ class Quantities:
     covariance: Array
 
     def value(self, name: str) -> float:
-        """Return one of them."""
+        """Return a value by name."""
         return float(self.values[self.names.index(name)])
 
     def deviation(self, name: str) -> float:
-        """Return the standard deviation of one of them."""
+        """Return a standard deviation by name."""
         k = self.names.index(name)
         return float(np.sqrt(max(self.covariance[k, k], 0.0)))
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """What a conversion is made at: airframe, condition of the maneuvers, angle of attack, CD."""
+class ConversionPoint:
+    """The aircraft and flight condition of a conversion; `drag` is CD."""
 
     airframe: AirframeData
     condition: Condition
@@ -76,26 +76,27 @@ class Place:
     drag: float = 0.0
 
 
-def carried_errors(airframe: AirframeData, instrument: SensorErrorModel) -> dict[str, float]:
-    """Return one standard deviation of everything a conversion leans on, by name."""
+def consider_deviations(airframe: AirframeData, instrument: SensorErrorModel) -> dict[str, float]:
+    """Return one standard deviation of every consider parameter of a conversion, by name."""
     every = deviations(instrument, airframe)
-    return {name: every[name] for name in CARRIED}
+    return {name: every[name] for name in CONSIDERED_ERRORS}
 
 
 def to_coefficients(
-    derivatives: Quantities, place: Place, errors: Mapping[str, float]
+    derivatives: Quantities, point: ConversionPoint, errors: Mapping[str, float]
 ) -> Quantities:
     """Convert dimensional derivatives (A, B) to non-dimensional coefficients.
 
     Parameters
     ----------
     derivatives : Quantities
-        Under the names of the templates (Z_alpha, M_q, L_p ...), SI; names in `CARRIED` among them
-        are known errors, with whatever they share with the others. The rest is left out.
-    place : Place
+        Under the names of the templates (Z_alpha, M_q, L_p ...), SI; names of `CONSIDERED_ERRORS`
+        among them are consider parameters, correlated with the others by the covariance. Other
+        names are left out.
+    point : ConversionPoint
     errors : mapping
-        Standard deviations of what else is uncertain, names of `CARRIED` (`carried_errors`); what
-        is absent is taken as exact.
+        Standard deviations of further consider parameters (`consider_deviations`); what is absent
+        is exact.
 
     Returns
     -------
@@ -109,26 +110,26 @@ def to_coefficients(
     """
 
     def convert(values: Table) -> Table:
-        own, scale = _really(place, values), _reading(place.airframe, values)
-        found = {n: v * scale(n) for n, v in values.items() if n not in CARRIED}
+        own, scale = _true_point(point, values), _sensor_scale(point.airframe, values)
+        found = {n: v * scale(n) for n, v in values.items() if n not in CONSIDERED_ERRORS}
         table = from_dimensional(found, own.airframe, own.condition)
         result = {coefficient_name(n): table[coefficient_name(n)] for n in found}
-        return _moved(result, own, values, sign=1.0)
+        return _transfer_moments(result, own, values, sign=1.0)
 
     return _converted(derivatives, DERIVATIVES, errors, convert)
 
 
 def to_derivatives(
-    coefficients: Quantities, place: Place, errors: Mapping[str, float]
+    coefficients: Quantities, point: ConversionPoint, errors: Mapping[str, float]
 ) -> Quantities:
     """Convert non-dimensional coefficients to the dimensional derivatives of (A, B).
 
     Parameters
     ----------
     coefficients : Quantities
-        CL_alpha, Cm_q, Cl_p ...; names in `CARRIED` among them are known errors, with whatever they
-        share with the others. The rest is left out.
-    place : Place
+        CL_alpha, Cm_q, Cl_p ...; names of `CONSIDERED_ERRORS` among them are consider
+        parameters, correlated with the others by the covariance. Other names are left out.
+    point : ConversionPoint
     errors : mapping
         As in `to_coefficients`.
 
@@ -144,9 +145,9 @@ def to_derivatives(
     """
 
     def convert(values: Table) -> Table:
-        own, scale = _really(place, values), _reading(place.airframe, values)
-        found = {n: v for n, v in values.items() if n not in CARRIED}
-        found = _moved(found, own, values, sign=-1.0)
+        own, scale = _true_point(point, values), _sensor_scale(point.airframe, values)
+        found = {n: v for n, v in values.items() if n not in CONSIDERED_ERRORS}
+        found = _transfer_moments(found, own, values, sign=-1.0)
         gains = dimensional_gains(own.airframe, own.condition)
         result = {}
         for name in found:
@@ -158,9 +159,9 @@ def to_derivatives(
     return _converted(coefficients, COEFFICIENTS, errors, convert)
 
 
-def _really(place: Place, values: Table) -> Place:
-    """Return airframe and condition for assumed errors of mass, inertia and pitot."""
-    a, at = place.airframe, place.condition
+def _true_point(point: ConversionPoint, values: Table) -> ConversionPoint:
+    """Return airframe and condition for given errors of mass, inertia, pitot and density."""
+    a, at = point.airframe, point.condition
     frame = replace(
         a,
         mass_kg=a.mass_kg * (1.0 + values.get("mass_share", 0.0)),
@@ -174,34 +175,37 @@ def _really(place: Place, values: Table) -> Place:
     )
     qbar_pa = (at.qbar_pa - drift_pa) / (1.0 + scale)
     share = float(np.sqrt(qbar_pa / at.qbar_pa / (1.0 + density)))
-    return replace(place, airframe=frame, condition=Condition(at.airspeed_mps * share, qbar_pa))
+    return replace(point, airframe=frame, condition=Condition(at.airspeed_mps * share, qbar_pa))
 
 
-def _reading(airframe: AirframeData, values: Table) -> Callable[[str], float]:
-    """Return what sensors read over what is true, by the name of a derivative."""
+def _sensor_scale(airframe: AirframeData, values: Table) -> Callable[[str], float]:
+    """Return the ratio of sensor reading to true quantity, by the name of a derivative."""
     upwash = airframe.upwash
     over = (1.0 + upwash * (1.0 + values.get("upwash_share", 0.0))) / (1.0 + upwash)
 
     def scale(name: str) -> float:
         label = name.partition("_")[2]
-        share = 1.0 + values.get(READ_WITH.get(label, ""), 0.0)
+        share = 1.0 + values.get(SENSOR_SCALES.get(label, ""), 0.0)
         return share * over if label == "alpha" else share
 
     return scale
 
 
-def _moved(found: Table, place: Place, values: Table, *, sign: float) -> Table:
-    """Return coefficients with moments from the CG to its nominal place (sign 1) or back (-1)."""
+def _transfer_moments(found: Table, point: ConversionPoint, values: Table, *, sign: float) -> Table:
+    """Return coefficients with moments moved from the CG to the nominal CG (sign 1) or back (-1).
+
+    M_nominal = M_cg + r x F, divided by chord or span.
+    """
     x, z = (sign * values.get(f"cg_{k}_m", 0.0) for k in "xz")
-    a, ca, sa = place.airframe, np.cos(place.alpha_rad), np.sin(place.alpha_rad)
-    lift = a.mass_kg * GRAVITY_MPS2 / (place.condition.qbar_pa * a.wing_area_m2)
+    a, ca, sa = point.airframe, np.cos(point.alpha_rad), np.sin(point.alpha_rad)
+    lift = a.mass_kg * GRAVITY_MPS2 / (point.condition.qbar_pa * a.wing_area_m2)
     result = dict(found)
     for name in found:
         row, _, label = name.partition("_")
         up, back, side = (found.get(f"{c}_{label}", 0.0) for c in ("CL", "CD", "CY"))
         if row == "Cm":
-            if label == "alpha":  # forces turn with the wind
-                up, back = up + place.drag, back - lift
+            if label == "alpha":  # the wind axes rotate with alpha
+                up, back = up + point.drag, back - lift
             axial, normal = up * sa - back * ca, -up * ca - back * sa
             result[name] += (z * axial - x * normal) / a.chord_m
         elif row == "Cl":
@@ -217,14 +221,14 @@ def _converted(
     errors: Mapping[str, float],
     convert: Callable[[Table], Table],
 ) -> Quantities:
-    """Return converted numbers and carried errors with their joint covariance."""
-    strangers = sorted(set(errors) - set(CARRIED))
-    if strangers:
+    """Return converted quantities and consider parameters with their joint covariance."""
+    unknown = sorted(set(errors) - set(CONSIDERED_ERRORS))
+    if unknown:
         raise IdentificationError(
-            f"unknown error {', '.join(strangers)}; known are {', '.join(CARRIED)}"
+            f"unknown error {', '.join(unknown)}; known are {', '.join(CONSIDERED_ERRORS)}"
         )
-    kept = [k for k, n in enumerate(given.names) if n in known or n in CARRIED]
-    added = [n for n in CARRIED if n in errors and n not in given.names]
+    kept = [k for k, n in enumerate(given.names) if n in known or n in CONSIDERED_ERRORS]
+    added = [n for n in CONSIDERED_ERRORS if n in errors and n not in given.names]
     names = [given.names[k] for k in kept] + added
     if not set(known) & set(names):
         raise IdentificationError(
@@ -239,7 +243,7 @@ def _converted(
 
     def mapped(values: Array) -> Array:
         table = dict(zip(names, values.tolist(), strict=True))
-        own = {n: table[n] for n in names if n in CARRIED}
+        own = {n: table[n] for n in names if n in CONSIDERED_ERRORS}
         return np.array([*convert(table).values(), *own.values()])
 
     steps = STEP * np.sqrt(np.maximum(np.diag(covariance), (1e-2 * state) ** 2 + 1e-16))
@@ -251,5 +255,5 @@ def _converted(
         axis=1,
     )
     table = dict(zip(names, state.tolist(), strict=True))
-    told = (*convert(table), *(n for n in names if n in CARRIED))
-    return Quantities(told, mapped(state), slopes @ covariance @ slopes.T)
+    converted = (*convert(table), *(n for n in names if n in CONSIDERED_ERRORS))
+    return Quantities(converted, mapped(state), slopes @ covariance @ slopes.T)

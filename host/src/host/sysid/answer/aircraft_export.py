@@ -18,7 +18,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
-from host.sysid.answer.atomic_files import whole
+from host.sysid.answer.atomic_files import atomic_write
 from host.sysid.coefficients.coefficient_fit import MeanCondition
 from host.sysid.identification_error import IdentificationError
 
@@ -168,7 +168,7 @@ def save_aircraft(
         text = file.read_text(encoding="utf-8")
     if path.suffix.lower() == ".xml":
         text = _with_header(aircraft_xml(loaded, ROTOR_RADPS), document)
-    with whole(path) as part:
+    with atomic_write(path) as part:
         part.write_text(text, encoding="utf-8")
     return replaced
 

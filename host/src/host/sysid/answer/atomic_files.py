@@ -15,7 +15,7 @@ LONGEST_NAME = 100  # characters; file systems take 255 bytes
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """Give a name beside `path`; what is written there gets its own name once it is whole.
 
     Folders that are missing are made. A device or a pipe has nothing beside it and is written to
@@ -51,7 +51,7 @@ def whole(path: Path) -> Iterator[Path]:
                 part.unlink(missing_ok=True)
 
 
-def refuse_place(option: str, path: Path, *, folder: bool) -> None:
+def check_destination(option: str, path: Path, *, folder: bool) -> None:
     """Raise IdentificationError where a file, or a folder for files, cannot be at a place."""
     if folder and path.exists() and not path.is_dir():
         raise IdentificationError(f"{option} {path}: a file; name a folder")

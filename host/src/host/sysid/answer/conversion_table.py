@@ -20,12 +20,12 @@ from host.files.user_text import shown
 from host.instrument.deviations import sensor_error_model
 from host.instrument.words import IN_WORDS
 from host.sysid.aerodynamics.derivative_conversion import (
-    CARRIED,
     COEFFICIENTS,
+    CONSIDERED_ERRORS,
     DERIVATIVES,
-    Place,
+    ConversionPoint,
     Quantities,
-    carried_errors,
+    consider_deviations,
     to_coefficients,
     to_derivatives,
 )
@@ -50,7 +50,7 @@ EXPECTED = (
 
 
 @dataclass(frozen=True, slots=True)
-class At:
+class FlightCondition:
     """Where the aircraft flies; None is what the file or the aircraft says."""
 
     airspeed_mps: float | None = None
@@ -59,7 +59,7 @@ class At:
 
 
 @dataclass(frozen=True, slots=True)
-class Converted:
+class Conversion:
     """Numbers as they were given and what they became, errors of what is known behind both.
 
     `left_out` are names of the file that stand for no derivative of the templates.
@@ -84,7 +84,7 @@ class Converted:
         own = self.found.deviation(name) ** 2
         k = self.found.names.index(name)
         shares = {}
-        for error in CARRIED:
+        for error in CONSIDERED_ERRORS:
             j = self.found.names.index(error)
             part = self.found.covariance[k, j] ** 2 / max(self.found.covariance[j, j], 1e-300)
             shares[error] = part / max(own, 1e-300)
@@ -92,7 +92,7 @@ class Converted:
         return IN_WORDS[cause] if shares[cause] >= NAMED_SHARE else ""
 
 
-def convert(path: Path, aircraft: str, at: At) -> Converted:
+def convert(path: Path, aircraft: str, at: FlightCondition) -> Conversion:
     """Convert what a file says at one flight condition.
 
     Parameters
@@ -125,9 +125,9 @@ def convert(path: Path, aircraft: str, at: At) -> Converted:
         np.array([value for value, _ in given.values()]),
         np.diag([(half / NORMAL_95) ** 2 for _, half in given.values()]),
     )
-    place = Place(airframe, Condition(speed, 0.5 * at.density_kgpm3 * speed**2), alpha)
+    place = ConversionPoint(airframe, Condition(speed, 0.5 * at.density_kgpm3 * speed**2), alpha)
     turn = to_coefficients if dimensional else to_derivatives
-    return Converted(
+    return Conversion(
         source=str(path),
         aircraft=airframe.name,
         airspeed_mps=speed,
@@ -135,7 +135,7 @@ def convert(path: Path, aircraft: str, at: At) -> Converted:
         density_kgpm3=at.density_kgpm3,
         dimensional=bool(dimensional),
         given=quantities,
-        found=turn(quantities, place, carried_errors(airframe, instrument)),
+        found=turn(quantities, place, consider_deviations(airframe, instrument)),
         left_out=tuple(n for n in values if n not in given),
     )
 
@@ -180,7 +180,7 @@ def _unit(name: str) -> str:
     return next(filter(None, units), "")
 
 
-def conversion_lines(done: Converted) -> list[str]:
+def conversion_lines(done: Conversion) -> list[str]:
     """Return the conversion as a table for people."""
     kinds = ("derivatives", "coefficients")
     before, after = kinds if done.dimensional else kinds[::-1]
@@ -206,7 +206,7 @@ def conversion_lines(done: Converted) -> list[str]:
     return lines
 
 
-def conversion_document(done: Converted) -> dict[str, Any]:
+def conversion_document(done: Conversion) -> dict[str, Any]:
     """Return the conversion for programs."""
     return {
         "source": done.source,
@@ -227,6 +227,6 @@ def conversion_document(done: Converted) -> dict[str, Any]:
             }
             for n in (OTHER[name] for name in done.given.names)
         },
-        "standard_deviations": {n: done.found.deviation(n) for n in CARRIED},
+        "standard_deviations": {n: done.found.deviation(n) for n in CONSIDERED_ERRORS},
         "left_out": list(done.left_out),
     }

@@ -12,7 +12,7 @@ import numpy as np
 from host.arrays import Array
 from host.constants import DEG_PER_RAD
 from host.extras import install_hint
-from host.sysid.answer.atomic_files import whole
+from host.sysid.answer.atomic_files import atomic_write
 from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:
@@ -130,18 +130,18 @@ def pole_map(clouds: Sequence[Cloud], title: str) -> Figure:
     rows = (len(clouds) + 1) // 2
     figure = _figure((8.0, 3.4 + 2.4 * rows))
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[3] + [2] * rows)
-    whole = figure.add_subplot(grid[0, :])
+    overview = figure.add_subplot(grid[0, :])
     for cloud in clouds:
-        _cloud(whole, cloud)
-    whole.axvline(0.0, color="0.7", lw=0.8)
-    whole.axhline(0.0, color="0.9", lw=0.8, zorder=0)
-    whole.margins(x=0.08, y=0.12)
+        _cloud(overview, cloud)
+    overview.axvline(0.0, color="0.7", lw=0.8)
+    overview.axhline(0.0, color="0.9", lw=0.8, zorder=0)
+    overview.margins(x=0.08, y=0.12)
     if not any(abs(cloud.pole.imag) > 0.0 for cloud in clouds):
-        whole.set_ylim(-1.0, 1.0)  # else the scale is that of rounding
-    _name_poles(whole, [(c.name, c.pole) for c in clouds])
-    whole.set_xlabel("real, 1/s")
-    whole.set_ylabel("imaginary, rad/s")
-    whole.set_title(title, fontsize=10)
+        overview.set_ylim(-1.0, 1.0)  # else the scale is that of rounding
+    _name_poles(overview, [(c.name, c.pole) for c in clouds])
+    overview.set_xlabel("real, 1/s")
+    overview.set_ylabel("imaginary, rad/s")
+    overview.set_title(title, fontsize=10)
     for k, cloud in enumerate(clouds):
         near = figure.add_subplot(grid[1 + k // 2, k % 2])
         if cloud.pole.imag:
@@ -300,6 +300,6 @@ def save(figure: Figure, path: Path) -> Path:
     IdentificationError
         If it cannot be written.
     """
-    with whole(path) as part:
+    with atomic_write(path) as part:
         figure.savefig(part)
     return path

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.answer.atomic_files import whole
+from host.sysid.answer.atomic_files import atomic_write
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.compatibility.inverse_sensor_model import FIT_RATE_HZ
 from host.sysid.flight.linear import Answer
@@ -50,7 +50,7 @@ def write_mat(path: Path, answers: Sequence[Answer], direct: CoefficientAnswer |
                 "states": _cells(system.states),
                 "inputs": _cells(system.inputs),
             }
-    with whole(path) as part:
+    with atomic_write(path) as part:
         io.savemat(str(part), content, appendmat=False)
 
 

@@ -10,7 +10,7 @@ from host.sysid.flight.linear import Answer
 NAME, CELL = 14, 22  # characters: three methods in 80, four in 120
 
 
-def side_by_side(answers: Sequence[Answer], width: int) -> list[str]:
+def method_table(answers: Sequence[Answer], width: int) -> list[str]:
     """Return estimates and 95 % half-widths, a column for each method.
 
     Parameters

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from host.arrays import Array
 from host.extras import install_hint
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
-from host.sysid.answer.atomic_files import file_names, refuse_place, whole
+from host.sysid.answer.atomic_files import atomic_write, check_destination, file_names
 from host.sysid.answer.mat_file import labels, write_mat
 from host.sysid.flight.linear import Answer
 from host.sysid.identification_error import IdentificationError
@@ -27,7 +27,7 @@ ENDINGS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class OutputPaths:
     """Where the user wants files, and the aircraft that the answer is made with.
 
     `given` are the files the answer is made from, which no output may replace.
@@ -47,7 +47,7 @@ class Places:
         return {option: path for option, path in asked.items() if path is not None}
 
 
-def check(places: Places) -> None:
+def check_outputs(places: OutputPaths) -> None:
     """Refuse what cannot be written while it costs nothing: before the flight is read.
 
     Raises
@@ -63,7 +63,7 @@ def check(places: Places) -> None:
             raise IdentificationError(
                 f"{option} {path}: ends in '{path.suffix}', expected {' or '.join(known)}"
             )
-        refuse_place(option, path, folder=False)
+        check_destination(option, path, folder=False)
         if any(path.exists() and given.exists() and path.samefile(given) for given in places.given):
             raise IdentificationError(
                 f"{option} {path} is what the answer is made from; name another file"
@@ -82,13 +82,13 @@ def check(places: Places) -> None:
 
         aircraft.load(places.source)  # one that was only measured has no tables to put answers in
     if places.plots is not None:
-        refuse_place("--plots", places.plots, folder=True)
+        check_destination("--plots", places.plots, folder=True)
         if importlib.util.find_spec("matplotlib") is None:
             raise IdentificationError(f"pictures need matplotlib: {install_hint('matplotlib')}")
 
 
-def write(
-    places: Places,
+def write_outputs(
+    places: OutputPaths,
     answers: Sequence[Answer],
     direct: CoefficientAnswer | None,
     flights: Sequence[Mapping[str, Array]],
@@ -99,7 +99,7 @@ def write(
     Parameters
     ----------
     places : Places
-        Looked at by `check` before.
+        Looked at by `check_outputs` before.
     answers : sequence of Answer
         Linear models.
     direct : CoefficientAnswer or None
@@ -170,6 +170,6 @@ def _write_models(path: Path, answers: Sequence[Answer], kept: Sequence[Path]) -
             )
         named[own] = answer
     for own, answer in named.items():
-        with whole(own) as part:
+        with atomic_write(own) as part:
             part.write_text(model_text(answer.model, answer.result, answer.trim), encoding="utf-8")
     return list(named)

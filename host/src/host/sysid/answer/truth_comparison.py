@@ -66,7 +66,7 @@ def true_modes(document: dict[str, Any], template: str) -> dict[str, tuple[float
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
+class TruthComparison:
     """One figure beside the truth; the error is relative to `reference`.
 
     That is |truth|, or what would contribute 5 % of its row's largest where that is known and more
@@ -91,9 +91,9 @@ class Compared:
         return (self.value - self.truth) / self.reference if self.reference else float("nan")
 
 
-def compared(
+def compared_coefficients(
     table: CoefficientTable, document: dict[str, Any], floors: Mapping[str, float]
-) -> list[Compared]:
+) -> list[TruthComparison]:
     """Return the coefficients of a table that the truth has.
 
     Parameters
@@ -112,13 +112,15 @@ def compared(
         floor = floors.get(c.name, 0.0)
         size = abs(truth[c.name])
         reference, small = max(size, floor), floor > size
-        found.append(Compared(c.name, c.value, c.half_width, truth[c.name], reference, small))
+        found.append(
+            TruthComparison(c.name, c.value, c.half_width, truth[c.name], reference, small)
+        )
     return found
 
 
-def compared_modes(
+def mode_comparisons(
     modes: Sequence[Mode], document: dict[str, Any], templates: Sequence[str]
-) -> list[Compared]:
+) -> list[TruthComparison]:
     """Return frequencies, and dampings of those that swing, that the truth has.
 
     A real mode is its root, 1/s: minus its rate constant where it dies away.
@@ -134,13 +136,15 @@ def compared_modes(
         frequency, damping = true[mode.name]
         half = mode.frequency_half_width_radps
         if mode.oscillatory and abs(damping) < 1.0:
-            found.append(Compared(mode.name, mode.frequency_radps, half, frequency, frequency))
+            found.append(
+                TruthComparison(mode.name, mode.frequency_radps, half, frequency, frequency)
+            )
             half = mode.damping_half_width
             label = f"{mode.name}, damping"
-            found.append(Compared(label, mode.damping, half, damping, abs(damping)))
+            found.append(TruthComparison(label, mode.damping, half, damping, abs(damping)))
         elif not mode.oscillatory and abs(damping) == 1.0:
             root = -damping * frequency
-            found.append(Compared(mode.name, mode.eigenvalue.real, half, root, abs(root)))
+            found.append(TruthComparison(mode.name, mode.eigenvalue.real, half, root, abs(root)))
     return found
 
 
@@ -150,9 +154,9 @@ def truth_lines(
     floors: Mapping[str, float] | None = None,
 ) -> list[str]:
     """Return a table of coefficients against the truth."""
-    found = [c for table in tables for c in compared(table, document, floors or {})]
+    found = [c for table in tables for c in compared_coefficients(table, document, floors or {})]
     if not found:
-        return ["no coefficient to compare: name the aircraft (--aircraft)"]
+        return ["no coefficient to compare: name the aircraft (argument aircraft)"]
     return [
         "against the truth of the simulated flight (local derivatives, mean of maneuvers)",
         *map(_line, found),
@@ -160,7 +164,7 @@ def truth_lines(
     ]
 
 
-def against_truth(
+def truth_report_lines(
     answers: Sequence[Answer], direct: CoefficientAnswer | None, document: dict[str, Any]
 ) -> list[str]:
     """Return all answers against the truth: coefficients fitted directly line by line.
@@ -171,15 +175,17 @@ def against_truth(
     if direct:
         lines = truth_lines(direct.tables, document, small_references(direct))
         lines += mode_truth_lines(
-            compared_modes(direct.modes, document, ("longitudinal", "lateral"))
+            mode_comparisons(direct.modes, document, ("longitudinal", "lateral"))
         )
     else:
         lines = truth_lines([a.table for a in answers], document)
     for answer in answers:
-        own = compared_modes(answer.modes, document, (answer.template,))
+        own = mode_comparisons(answer.modes, document, (answer.template,))
         if direct:
             label = f"{answer.template}, {answer.result.method}"
-            lines += truth_summary(label, [*compared(answer.table, document, {}), *own])
+            lines += truth_summary(
+                label, [*compared_coefficients(answer.table, document, {}), *own]
+            )
         else:
             lines += mode_truth_lines(own)
     return lines
@@ -190,7 +196,7 @@ def small_references(direct: CoefficientAnswer) -> dict[str, float]:
     return {d.name: d.reference for d in direct.fit.derivatives if d.reference > abs(d.value)}
 
 
-def mode_truth_lines(found: Sequence[Compared]) -> list[str]:
+def mode_truth_lines(found: Sequence[TruthComparison]) -> list[str]:
     """Return the modes against the truth; nothing where there are none."""
     if not found:
         return []
@@ -198,7 +204,7 @@ def mode_truth_lines(found: Sequence[Compared]) -> list[str]:
     return [*map(_line, found), f"  {held} of {len(found)} intervals of the modes hold the truth"]
 
 
-def truth_summary(label: str, found: Sequence[Compared]) -> list[str]:
+def truth_summary(label: str, found: Sequence[TruthComparison]) -> list[str]:
     """Return in a line or two how a model fared, and by how much what is outside."""
     if not found:
         return []
@@ -223,16 +229,16 @@ def truth_document(
     """Return the comparison of every answer for JSON, by template."""
     found = {
         label: [
-            *compared(a.table, document, {}),
-            *compared_modes(a.modes, document, (a.template,)),
+            *compared_coefficients(a.table, document, {}),
+            *mode_comparisons(a.modes, document, (a.template,)),
         ]
         for a, label in zip(answers, labels(answers), strict=True)
     }
     if direct:
         floors = small_references(direct)
         found["coefficients"] = [
-            *(c for table in direct.tables for c in compared(table, document, floors)),
-            *compared_modes(direct.modes, document, ("longitudinal", "lateral")),
+            *(c for table in direct.tables for c in compared_coefficients(table, document, floors)),
+            *mode_comparisons(direct.modes, document, ("longitudinal", "lateral")),
         ]
     return {
         label: {
@@ -249,7 +255,7 @@ def truth_document(
     }
 
 
-def _line(c: Compared) -> str:
+def _line(c: TruthComparison) -> str:
     share = f"{100.0 * c.error:+7.1f} %" if isfinite(c.error) else "        -"
     small = " of 5 % of the row" if c.small else ""
     return (

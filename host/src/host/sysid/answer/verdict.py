@@ -85,7 +85,7 @@ def verdict_of(answer: Answer | CoefficientAnswer) -> Verdict:
     return _linear_verdict(answer) if isinstance(answer, Answer) else _direct_verdict(answer)
 
 
-def words(answers: Sequence[Answer | CoefficientAnswer], notes: Sequence[str]) -> list[str]:
+def verdict_lines(answers: Sequence[Answer | CoefficientAnswer], notes: Sequence[str]) -> list[str]:
     """Return the verdict: notes first, then per model what to trust and what to re-fly."""
     lines = [f"note: {note}" for note in notes]
     for answer in answers:
@@ -93,7 +93,7 @@ def words(answers: Sequence[Answer | CoefficientAnswer], notes: Sequence[str]) -
     return lines
 
 
-def taken_out(answers: Sequence[Answer]) -> list[str]:
+def removed_error_lines(answers: Sequence[Answer]) -> list[str]:
     """Return which errors of sensors were taken out of the columns of linear fits."""
     return correction_lines(answers[0].corrections) if answers else []
 
@@ -180,7 +180,7 @@ def _inputs(answer: Answer, both: set[str]) -> list[str]:
     lines = [
         f"  {one} and {other} move together: fly them one at a time, without a mixer, or leave"
         " one out of a model of your own"
-        for one, other in together(answer)
+        for one, other in correlated_inputs(answer)
     ]
     if both:
         lines.append(
@@ -217,7 +217,7 @@ def _data(answer: Answer) -> list[str]:
     return lines
 
 
-def together(answer: Answer) -> list[tuple[str, str]]:
+def correlated_inputs(answer: Answer) -> list[tuple[str, str]]:
     """Return inputs that were moved as one, by a mixer or a habit."""
     moved = np.concatenate([m.inputs - m.inputs.mean(axis=0) for m in answer.maneuvers])
     power = moved.T @ moved
@@ -237,7 +237,7 @@ def _of_both(answer: Answer) -> set[str]:
         if result.estimate[k] == 0.0 and result.half_width()[k] == 0.0
     }  # fmt: skip
     both: set[str] = set()
-    for pair in together(answer):
+    for pair in correlated_inputs(answer):
         own = {
             t.parameter for t in model.terms if t.matrix in "BD" and model.inputs[t.column] in pair
         }

@@ -1,4 +1,4 @@
-"""What the aircraft file and the calibration say, read once for every stage."""
+"""Aircraft file and calibration, read once for every stage."""
 
 from __future__ import annotations
 
@@ -13,8 +13,20 @@ from host.physical.calibration import load_calibration
 
 
 @dataclass(frozen=True, slots=True)
-class AircraftKnown:
-    """Mass and sizes, sensors with their errors, and the propeller where the file describes it."""
+class AircraftData:
+    """What is known of an aircraft and its sensors before the flight.
+
+    Attributes
+    ----------
+    source : str
+        Name or file of the aircraft.
+    airframe : AirframeData
+    instrument : SensorErrorModel
+    powerplant : Powerplant or None
+        None if the file does not describe a propeller.
+    doubts : tuple of str
+        Numbers of the file that no known aircraft has, one line each.
+    """
 
     source: str
     airframe: AirframeData
@@ -23,21 +35,21 @@ class AircraftKnown:
     doubts: tuple[str, ...]
 
 
-def aircraft_known(source: str | Path, calibration: str | Path | None = None) -> AircraftKnown:
+def aircraft_data(source: str | Path, calibration: str | Path | None = None) -> AircraftData:
     """Read an aircraft by name or file, and its instrument's calibration.
 
     Raises
     ------
     host.errors.UsageError
-        If there is no such file, or something in one cannot be.
+        If there is no such file, or a value in one is impossible.
     """
     name = str(source)
     airframe = airframe_data(name)
-    said = load_calibration(Path(calibration)) if calibration is not None else None
+    measured = load_calibration(Path(calibration)) if calibration is not None else None
     try:
         rotor = powerplant(name)
     except NoPropulsionError:
         rotor = None
-    return AircraftKnown(
-        name, airframe, sensor_error_model(name, said), rotor, tuple(load_measured(name).doubts)
+    return AircraftData(
+        name, airframe, sensor_error_model(name, measured), rotor, tuple(load_measured(name).doubts)
     )

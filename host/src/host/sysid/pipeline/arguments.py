@@ -1,8 +1,13 @@
-"""What a notebook gives as an argument: taken if it can be meant, else named in a line."""
+"""Types of the arguments of `host.identify`: converted, or refused in one line by name.
+
+Messages name an argument as ``argument NAME``; the verbs replace that by the option of the command
+line (`option_words`).
+"""
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from numbers import Integral, Real
 from pathlib import Path
@@ -27,7 +32,7 @@ def path_of(name: str, given: Any) -> Path | None:
 
 
 def paths_of(name: str, given: Any) -> list[Path]:
-    """Return paths one by one; one alone is one, None is none.
+    """Return a list of paths, of one path or several; empty for None.
 
     Raises
     ------
@@ -54,12 +59,12 @@ def seconds_of(name: str, given: Any) -> float | None:
 
 
 def numbers_of(name: str, given: Any) -> tuple[int, ...]:
-    """Return whole numbers; one alone is one.
+    """Return integers, of one or several.
 
     Raises
     ------
     IdentificationError
-        If one is none.
+        If one is no integer.
     """
     found = listed(given)
     for one in found:
@@ -69,12 +74,25 @@ def numbers_of(name: str, given: Any) -> tuple[int, ...]:
 
 
 def listed(given: Any) -> list[Any]:
-    """Return what was given one by one; a name or a thing alone is one, None is none."""
+    """Return a list of what was given; a single object makes a list of one, None an empty one."""
     if given is None:
         return []
     if isinstance(given, Iterable) and not isinstance(given, str | bytes):
         return list(given)
     return [given]
+
+
+OPTIONS = {
+    "aircraft": "--aircraft", "calibration": "--calibration", "from_s": "--from",
+    "maneuvers": "--maneuver", "mapping": "--map", "methods": "--method", "models": "--model",
+    "prior": "--prior", "to_s": "--to", "truth": "--truth",
+}  # fmt: skip
+_ARGUMENT = re.compile(rf"\bargument ({'|'.join(OPTIONS)})\b")
+
+
+def option_words(text: str) -> str:
+    """Return a message with the options of the command line in place of the arguments."""
+    return _ARGUMENT.sub(lambda found: OPTIONS[found[1]], text)
 
 
 def _other(name: str, given: Any, expected: str) -> IdentificationError:

@@ -1,4 +1,4 @@
-"""The first stages, one flight at a time: read it, find its maneuvers, reconstruct it."""
+"""The first stages, one flight at a time: reading, maneuvers, reconstruction."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from host.sysid.flight.chosen import chosen
 from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
 from host.sysid.flight.tables import read_columns, source_name
 from host.sysid.identification_error import IdentificationError
-from host.sysid.pipeline.aircraft_data import AircraftKnown
+from host.sysid.pipeline.aircraft_data import AircraftData
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ReadingOptions:
     """How flights are read.
 
     Attributes
@@ -37,11 +37,11 @@ class Reading:
     maneuvers : tuple of int
         Only these of each flight, counted from 1; all without.
     from_s, to_s : float, optional
-        One stretch of time in place of maneuvers.
+        One span of time instead of the maneuvers.
     corrections : bool
-        Take sensor errors that a flight tells out of its columns.
+        Remove sensor errors that the data determine from the columns.
     also : tuple of str
-        Signals beside those that are always looked for.
+        Signals to read beside those that are always read.
     """
 
     calibration: Path | None = None
@@ -55,14 +55,14 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class PreparedFlight:
-    """A flight ready for estimation, what its sensors say of each other, and notes."""
+    """A flight ready for estimation, its data-compatibility check, and notes."""
 
     flight: ReconstructedFlight
     agreement: Compatibility | None
     notes: tuple[str, ...]
 
 
-def prepare(source: Source, how: Reading, known: AircraftKnown | None) -> PreparedFlight:
+def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> PreparedFlight:
     """Read a flight, find its maneuvers once, and reconstruct it.
 
     Raises
@@ -85,14 +85,14 @@ def prepare(source: Source, how: Reading, known: AircraftKnown | None) -> Prepar
         found,
         source=source_name(source),
         airframe=known.airframe if known else None,
-        # Without the places of the sensors a vane ahead of the CG passes for a late one.
+        # Without sensor positions a vane ahead of the CG looks like a delayed one.
         compatibility=agreement if known is not None and how.corrections else None,
     )
     return PreparedFlight(flight, agreement, tuple(notes))
 
 
-def several(flights: Source | Sequence[Source]) -> list[Source]:
-    """Return flights one by one; a path, a log or a table is one.
+def listed_flights(flights: Source | Sequence[Source]) -> list[Source]:
+    """Return the flights as a list; a path, a log or a table is one flight.
 
     Raises
     ------
@@ -115,8 +115,8 @@ def several(flights: Source | Sequence[Source]) -> list[Source]:
     return listed
 
 
-def apart(flights: Sequence[ReconstructedFlight]) -> list[ReconstructedFlight]:
-    """Return the flights, none twice: the same samples counted twice would halve a variance.
+def distinct_flights(flights: Sequence[ReconstructedFlight]) -> list[ReconstructedFlight]:
+    """Return the flights if all differ: the same samples counted twice would halve a variance.
 
     Raises
     ------
@@ -136,8 +136,8 @@ def apart(flights: Sequence[ReconstructedFlight]) -> list[ReconstructedFlight]:
     return list(flights)
 
 
-def told(flights: Sequence[PreparedFlight], doubts: Collection[str]) -> list[str]:
-    """Return all notes; of several flights each begins with what it was read from."""
+def collected_notes(flights: Sequence[PreparedFlight], doubts: Collection[str]) -> list[str]:
+    """Return all notes; with several flights each begins with the source of its flight."""
     if len(flights) == 1:
         return [*flights[0].notes, *doubts]
     own = [f"{f.flight.source}: {note}" for f in flights for note in f.notes]

@@ -1,4 +1,4 @@
-"""The answer: what was estimated, what it rests on, and every form it is given in."""
+"""The answer of `host.identify`: estimates, the data they rest on, and all forms of output."""
 
 from __future__ import annotations
 
@@ -11,11 +11,16 @@ from host.aircraft.prior.prior_table import PriorTable
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.answer_figures import draw_all
 from host.sysid.answer.json_document import answer_document, coefficient_document, json_text
-from host.sysid.answer.method_comparison import side_by_side
-from host.sysid.answer.output_files import Places, check, write
+from host.sysid.answer.method_comparison import method_table
+from host.sysid.answer.output_files import OutputPaths, check_outputs, write_outputs
 from host.sysid.answer.prior_comparison import prior_document, prior_lines
-from host.sysid.answer.truth_comparison import against_truth, truth_document
-from host.sysid.answer.verdict import coefficient_lines, model_lines, taken_out, words
+from host.sysid.answer.truth_comparison import truth_document, truth_report_lines
+from host.sysid.answer.verdict import (
+    coefficient_lines,
+    model_lines,
+    removed_error_lines,
+    verdict_lines,
+)
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.compatibility.reconstruction import (
     Compatibility,
@@ -24,10 +29,10 @@ from host.sysid.compatibility.reconstruction import (
 )
 from host.sysid.flight.linear import Answer
 from host.sysid.flight.reconstructed import ReconstructedFlight
-from host.sysid.pipeline.aircraft_data import AircraftKnown
+from host.sysid.pipeline.aircraft_data import AircraftData
 from host.sysid.pipeline.arguments import numbers_of, path_of, seconds_of
 from host.sysid.pipeline.estimate_table import estimate_table, mode_table
-from host.sysid.pipeline.flight_preparation import Reading, prepare, several
+from host.sysid.pipeline.flight_preparation import ReadingOptions, listed_flights, prepare
 from host.sysid.pipeline.notebook_html import answer_html
 from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.simulation import Simulation, simulate
@@ -40,14 +45,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """What one identification found.
+    """The result of one identification.
 
     Attributes
     ----------
     flights : tuple of ReconstructedFlight
         As recorded and corrected, with the maneuvers found.
     agreements : tuple of Compatibility or None
-        What the sensors of each flight say of each other.
+        Data-compatibility check of each flight.
     linear : tuple of Answer
         Of linear models, one of each model and method.
     coefficients : CoefficientAnswer or None
@@ -62,8 +67,8 @@ class Identification:
     coefficients: CoefficientAnswer | None
     notes: tuple[str, ...]
     methods: tuple[str, ...]
-    reading: Reading
-    aircraft: AircraftKnown | None = None
+    reading: ReadingOptions
+    aircraft: AircraftData | None = None
     truth: dict[str, Any] | None = None
     prior: PriorTable | None = None
 
@@ -82,8 +87,8 @@ class Identification:
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """What to trust, what not and why, and what to fly again, in lines."""
-        return (*words(self.answers, self.notes), *taken_out(self.linear))
+        """Lines on what to trust, what not and why, and what to fly again."""
+        return (*verdict_lines(self.answers, self.notes), *removed_error_lines(self.linear))
 
     @property
     def answers(self) -> tuple[Answer | CoefficientAnswer, ...]:
@@ -141,16 +146,19 @@ class Identification:
             from_s=seconds_of("from_s", from_s),
             to_s=seconds_of("to_s", to_s),
         )
-        [source] = several([flight])
+        [source] = listed_flights([flight])
         found = prepare(source, how, self.aircraft)
         return simulate(self.linear, self.coefficients, found.flight, found.notes)
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain lists, numbers and strings; several flights are lists."""
         direct = self.coefficients
-        documents = [answer_document(a, words([a], []) + taken_out([a])) for a in self.linear]
+        documents = [
+            answer_document(a, verdict_lines([a], []) + removed_error_lines([a]))
+            for a in self.linear
+        ]
         if direct:
-            documents.append(coefficient_document(direct, words([direct], [])))
+            documents.append(coefficient_document(direct, verdict_lines([direct], [])))
         sources = [flight.source for flight in self.flights]
         agreements = [compatibility_document(a) if a else None for a in self.agreements]
         one = len(sources) == 1
@@ -177,7 +185,7 @@ class Identification:
         """
         lines = list(self.verdict)
         if len(self.methods) > 1:
-            lines += ["", *side_by_side(self.linear, width)]
+            lines += ["", *method_table(self.linear, width)]
         else:
             for answer in self.linear:
                 lines += ["", *model_lines(answer)]
@@ -190,20 +198,20 @@ class Identification:
         if self.prior is not None:
             lines += ["", *prior_lines(self.coefficient_tables, self.prior)]
         if self.truth is not None:
-            lines += ["", *against_truth(self.linear, self.coefficients, self.truth)]
+            lines += ["", *truth_report_lines(self.linear, self.coefficients, self.truth)]
         return "\n".join(lines)
 
-    def save(self, places: Places) -> list[Path]:
-        """Write every file asked for and return them.
+    def save(self, places: OutputPaths) -> list[Path]:
+        """Write every requested file and return them.
 
         Raises
         ------
         IdentificationError
             If a place cannot be written to, or holds what the answer is made from.
         """
-        check(places)
+        check_outputs(places)
         recorded = [flight.recorded for flight in self.flights]
-        return write(places, self.linear, self.coefficients, recorded, self.truth)
+        return write_outputs(places, self.linear, self.coefficients, recorded, self.truth)
 
     def __str__(self) -> str:
         """Return the answer as people read it."""

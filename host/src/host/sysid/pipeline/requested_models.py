@@ -1,4 +1,4 @@
-"""What a user wants identified: models by name or file, methods by name."""
+"""The models and methods that a user names, checked and read."""
 
 from __future__ import annotations
 
@@ -27,7 +27,14 @@ ModelName = str | Path | LinearModel | CoefficientModel
 
 @dataclass(frozen=True, slots=True)
 class Models:
-    """Linear models, a template by its name or one of the user's own; terms of the coefficients."""
+    """The requested models.
+
+    Attributes
+    ----------
+    linear : tuple
+        Name of a template and None, or the name and the model of a user.
+    coefficients : CoefficientModel or None
+    """
 
     linear: tuple[tuple[str, LinearModel | None], ...]
     coefficients: CoefficientModel | None
@@ -39,8 +46,8 @@ class Models:
         return tuple(sorted(own))
 
 
-def wanted_models(given: ModelName | Iterable[ModelName] | None) -> Models:
-    """Return the models asked for; the two four-state ones where nothing is.
+def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
+    """Return the requested models; the two four-state ones by default.
 
     Parameters
     ----------
@@ -77,7 +84,9 @@ def wanted_models(given: ModelName | Iterable[ModelName] | None) -> Models:
                 f" {', '.join(AXIS_OF)}, coefficients, or a TOML file"
             )
     if len([t for t in terms if t != COEFFICIENTS]) + (COEFFICIENTS in terms) > 1:
-        raise IdentificationError("one model of the coefficients at a time; --model names several")
+        raise IdentificationError(
+            "argument models names several models of the coefficients; give one at a time"
+        )
     return Models(tuple(linear), _terms(terms[0]) if terms else None)
 
 
@@ -92,17 +101,17 @@ def known_methods() -> dict[str, str]:
     return {**STAGED, **single_methods()}
 
 
-def wanted_methods(given: str | Iterable[str] | None) -> tuple[str, ...]:
-    """Return the methods asked for, each once; the default one where none is.
+def requested_methods(given: str | Iterable[str] | None) -> tuple[str, ...]:
+    """Return the requested methods, each once; the default one if there is none.
 
     Raises
     ------
     IdentificationError
         If there is no such method.
     """
-    wanted = tuple(dict.fromkeys(map(str, listed(given) or [DEFAULT_METHOD])))
+    requested = tuple(dict.fromkeys(map(str, listed(given) or [DEFAULT_METHOD])))
     known = known_methods()
-    unknown = [m for m in wanted if m not in known]
+    unknown = [m for m in requested if m not in known]
     if unknown:
         raise IdentificationError(f"unknown method {', '.join(unknown)}; known: {', '.join(known)}")
-    return wanted
+    return requested

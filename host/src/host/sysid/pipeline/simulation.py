@@ -1,4 +1,4 @@
-"""The identified models flown over a flight they have not seen, by its measured surfaces."""
+"""Free simulation of the identified models over another flight, by its measured surfaces."""
 
 from __future__ import annotations
 
@@ -34,7 +34,15 @@ GAP_S = 0.5  # between the maneuvers of a picture
 
 @dataclass(frozen=True, eq=False)
 class SimulatedModel:
-    """One model over the maneuvers of its axes: measured, simulated, and how well."""
+    """One model over the maneuvers of its axes: measured and simulated outputs.
+
+    Attributes
+    ----------
+    label : str
+    model : LinearModel
+    maneuvers : tuple of Maneuver
+    simulated : tuple of Array, shape (n, outputs) each
+    """
 
     label: str
     model: LinearModel
@@ -57,7 +65,7 @@ class Simulation:
         The flight.
     models : tuple of SimulatedModel
     notes : tuple of str
-        What was said of the flight, and which models could not be flown over it.
+        Notes on the flight, and the models that could not be simulated over it.
     """
 
     source: str
@@ -130,38 +138,38 @@ def simulate(
         If no model can be run over the flight.
     """
     found: list[SimulatedModel] = []
-    unfit: list[str] = []
+    not_simulated: list[str] = []
     for label, model in _models(linear, direct):
         axes = moving(model.inputs)
         own = [once([f for f in flight.maneuvers if f.axis in axes])]
         try:
             data = [m.cut(model) for m in flown_maneuvers([flight], own)]
         except IdentificationError as error:
-            unfit.append(f"{label}: {error}")
+            not_simulated.append(f"{label}: {error}")
             continue
         if data:
             simulated = free_simulation(model, data)
             found.append(SimulatedModel(label, model, tuple(data), tuple(simulated)))
         else:
-            unfit.append(f"{label}: no maneuver of {', '.join(axes)}")
+            not_simulated.append(f"{label}: no maneuver of {', '.join(axes)}")
     if not found:
-        raise IdentificationError("; ".join([*unfit, *notes]))
-    return Simulation(flight.source, tuple(found), (*notes, *unfit))
+        raise IdentificationError("; ".join([*not_simulated, *notes]))
+    return Simulation(flight.source, tuple(found), (*notes, *not_simulated))
 
 
 def _models(
     linear: Sequence[Answer], direct: CoefficientAnswer | None
 ) -> Iterator[tuple[str, LinearModel]]:
-    """Return every identified model by its label, its numbers fixed."""
+    """Return every identified model with fixed parameters, by its label."""
     for answer, label in zip(linear, labels(linear), strict=True):
         yield label, frozen_model(answer.model, answer.result)
     if direct:
         for name, system in direct.systems.items():
-            yield f"{direct.template}_{name}", _motion(name, system)
+            yield f"{direct.template}_{name}", _linear_model(name, system)
 
 
-def _motion(name: str, system: LinearSystem) -> LinearModel:
-    """Return the linear motion that coefficients stand for; every state is an output."""
+def _linear_model(name: str, system: LinearSystem) -> LinearModel:
+    """Return the linear system of the coefficients as a model; every state is an output."""
     n, m = len(system.states), len(system.inputs)
     return LinearModel(
         name=name,

@@ -15,11 +15,22 @@ from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear import Answer, LinearEstimator
 from host.sysid.flight.reconstructed import ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
-from host.sysid.pipeline.aircraft_data import AircraftKnown, aircraft_known
+from host.sysid.pipeline.aircraft_data import AircraftData, aircraft_data
 from host.sysid.pipeline.arguments import numbers_of, path_of, paths_of, seconds_of
-from host.sysid.pipeline.flight_preparation import Reading, apart, prepare, several, told
+from host.sysid.pipeline.flight_preparation import (
+    ReadingOptions,
+    collected_notes,
+    distinct_flights,
+    listed_flights,
+    prepare,
+)
 from host.sysid.pipeline.identification import Identification
-from host.sysid.pipeline.requested_models import ModelName, Models, wanted_methods, wanted_models
+from host.sysid.pipeline.requested_models import (
+    ModelName,
+    Models,
+    requested_methods,
+    requested_models,
+)
 
 if TYPE_CHECKING:
     from host.sysid.pipeline.flight_preparation import Source
@@ -53,17 +64,17 @@ def identify(
     models : str, Path or several, optional
         Templates by name, ``coefficients``, TOML files; ``longitudinal`` and ``lateral`` without.
     methods : str or several, optional
-        Methods of linear models (`known_methods`); several are held against each other.
+        Methods of linear models (`known_methods`); several are compared in one table.
     calibration : path, optional
-        Counts to SI of a log, and what the instrument may be wrong by.
+        Counts to SI of a log, and standard deviations of the sensor errors.
     mapping : path, optional
         Foreign names, units and signs of a table.
     maneuvers : int or several
         Only these of each flight, as `host maneuvers` counts them.
     from_s, to_s : float, optional
-        One stretch of time in place of the maneuvers found.
+        One span of time instead of the maneuvers found.
     corrections : bool
-        Take sensor errors that the flight tells out of the data.
+        Remove sensor errors that the data determine from the columns.
     truth : path or several, optional
         Of simulated flights, one of each: compared with.
     prior : path, optional
@@ -76,8 +87,8 @@ def identify(
     host.errors.HostError
         If a file cannot be read.
     """
-    asked, by = wanted_models(models), wanted_methods(methods)
-    how = Reading(
+    asked, by = requested_models(models), requested_methods(methods)
+    how = ReadingOptions(
         path_of("calibration", calibration),
         path_of("mapping", mapping),
         numbers_of("maneuvers", maneuvers),
@@ -86,12 +97,12 @@ def identify(
         corrections,
         asked.signals,
     )
-    known = aircraft_known(aircraft, calibration) if aircraft is not None else None
-    ready = [prepare(source, how, known) for source in several(flights)]
+    known = aircraft_data(aircraft, calibration) if aircraft is not None else None
+    ready = [prepare(source, how, known) for source in listed_flights(flights)]
     if known is None and how.calibration is not None:
-        load_calibration(how.calibration)  # no table needs it, a misspelt one is said all the same
-    notes = told(ready, known.doubts if known else ())
-    recorded = apart([one.flight for one in ready])
+        load_calibration(how.calibration)  # unused with a table, but a misspelt name is an error
+    notes = collected_notes(ready, known.doubts if known else ())
+    recorded = distinct_flights([one.flight for one in ready])
     true = _truth(truth, len(recorded))
     expected = _prior(prior, recorded, known)
     direct, doubts = _coefficients(asked, known, recorded)
@@ -113,13 +124,15 @@ def identify(
 
 
 def _coefficients(
-    asked: Models, known: AircraftKnown | None, flights: Sequence[ReconstructedFlight]
+    asked: Models, known: AircraftData | None, flights: Sequence[ReconstructedFlight]
 ) -> tuple[CoefficientAnswer | None, list[str]]:
-    """Fit coefficients directly; None with a note if that cannot be done."""
+    """Fit coefficients directly; return None and a note if that fails."""
     if asked.coefficients is None:
         return None, []
     if known is None:
-        raise IdentificationError("--model coefficients needs mass and sensors; give --aircraft")
+        raise IdentificationError(
+            "argument models: coefficients need mass and sensors; give argument aircraft"
+        )
     try:
         by = coefficient_estimator(
             known.source, model=asked.coefficients, instrument=known.instrument
@@ -132,10 +145,10 @@ def _coefficients(
 def _linear(
     asked: Models,
     by: Sequence[str],
-    known: AircraftKnown | None,
+    known: AircraftData | None,
     flights: Sequence[ReconstructedFlight],
 ) -> tuple[list[Answer], list[str]]:
-    """Fit every linear model by every method; a note for each reason why one was not."""
+    """Fit every linear model by every method; return answers, and a note for each failure."""
     answers: list[Answer] = []
     failed: dict[str, list[str]] = {}  # why, and of which models
     for method in by:
@@ -156,7 +169,7 @@ def _linear(
 
 
 def _truth(given: str | Path | Sequence[str | Path] | None, flights: int) -> dict[str, Any] | None:
-    """Return the truth of all flights as one: their maneuvers one behind the other."""
+    """Return the truth of all flights as one, with the maneuvers of all."""
     paths = paths_of("truth", given)
     if not paths:
         return None
@@ -171,14 +184,16 @@ def _truth(given: str | Path | Sequence[str | Path] | None, flights: int) -> dic
 
 
 def _prior(
-    prior: str | Path | None, flights: Sequence[ReconstructedFlight], known: AircraftKnown | None
+    prior: str | Path | None, flights: Sequence[ReconstructedFlight], known: AircraftData | None
 ) -> PriorTable | None:
-    """Return coefficients to compare with, read at the median airspeed of the first flight."""
+    """Return coefficients to compare with, read at the median airspeed of all flights."""
     source = path_of("prior", prior)
     if source is None:
         return None
-    speed = flights[0].recorded.get("airspeed_mps", ())
-    found = read_prior(source, sorted(speed)[len(speed) // 2] if len(speed) else 0.0)
+    speeds = sorted(x for f in flights for x in f.recorded.get("airspeed_mps", ()))
+    found = read_prior(source, speeds[len(speeds) // 2] if speeds else 0.0)
     if known is None:
-        raise IdentificationError("--prior compares coefficients; they need --aircraft")
+        raise IdentificationError(
+            "argument prior compares coefficients; they need argument aircraft"
+        )
     return found
