@@ -238,4 +238,4 @@ def test_regression_equations_are_the_rows_of_the_design() -> None:
     X, y = design(maneuver)
     pitch = next(row for row in rows if row.label == "q_radps")
     np.testing.assert_allclose(pitch.regressors[:, [names.index(n) for n in PITCH]], X)
-    np.testing.assert_allclose(pitch.target, y)
+    np.testing.assert_allclose(pitch.dependent, y)

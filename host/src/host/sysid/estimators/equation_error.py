@@ -1,8 +1,6 @@
 """Equation error: regress measured rates and accelerations on measured states and inputs.
 
-Ordinary, weighted, robust (Huber, iteratively reweighted) and total least squares on one set of
-regression rows. Klein & Morelli, Aircraft System Identification, ch. 5; Van Huffel & Vandewalle,
-The Total Least Squares Problem, sec. 3.5 (exact columns); Huber, Robust Statistics, sec. 7.8.
+Ordinary, weighted, robust and total least squares solve the same regression equations.
 """
 
 from __future__ import annotations
@@ -40,7 +38,7 @@ def fit_equation_error(
     bandwidth: float | None = None,
     use_rates: bool = True,
 ) -> FitResult:
-    """Fit by equation error.
+    """Fit by equation error (Klein & Morelli, Aircraft System Identification, ch. 5).
 
     Parameters
     ----------
@@ -51,46 +49,50 @@ def fit_equation_error(
         with tied entries), ``robust`` (Huber) or ``total`` (errors in states as well as rates).
     deviations : tuple of Array, optional
         For ``total``: noise standard deviations of the states and of the rates, each of shape
-        (n,). Without, they come from third differences, which takes fast signals for noise.
+        (n,). By default from third differences, which take fast signals for noise.
     bandwidth, use_rates
         See `regression_equations`.
     """
-    names, rows = regression_equations(model, maneuvers, bandwidth=bandwidth, use_rates=use_rates)
+    names, equations = regression_equations(
+        model, maneuvers, bandwidth=bandwidth, use_rates=use_rates
+    )
     warnings: list[str] = []
-    sample_weights = [np.ones(len(row.target)) for row in rows]
+    sample_weights = [np.ones(len(block.dependent)) for block in equations]
     iterations = 1
     theta = (
-        _total(model, rows, len(names), deviations)
+        _total(model, equations, len(names), deviations)
         if variant == "total"
-        else solve_least_squares(rows, len(names))
+        else solve_least_squares(equations, len(names))
     )
     if variant in ("weighted", "robust"):
         while iterations < 50:
             iterations += 1
-            scales = _equation_scales(rows, theta, robust=variant == "robust")
+            scales = _equation_scales(equations, theta, robust=variant == "robust")
             before = theta
             if variant == "robust":
-                for k, row in enumerate(rows):
-                    size = np.abs(row.residual(theta)) / scales[k]
+                for k, block in enumerate(equations):
+                    size = np.abs(block.residual(theta)) / scales[k]
                     sample_weights[k] = np.minimum(1.0, HUBER_LIMIT / np.maximum(size, 1e-12))
-            theta = solve_least_squares(_weighted(rows, sample_weights), len(names), scales**-2.0)
+            theta = solve_least_squares(
+                _weighted(equations, sample_weights), len(names), scales**-2.0
+            )
             if np.all(np.abs(theta - before) <= 1e-8 * np.abs(theta) + 1e-14):
                 break
     elif variant not in ("ordinary", "total"):
         raise IdentificationError(
             f"equation error '{variant}' unknown; use ordinary, weighted, robust or total"
         )
-    used = _pseudo_rows(rows, theta, sample_weights) if variant == "robust" else rows
+    used = _pseudo_equations(equations, theta, sample_weights) if variant == "robust" else equations
     scales = _equation_scales(used, theta, robust=False, dof=len(names))
     normal, _ = normal_equations(used, len(names), scales**-2.0)
     white = covariance_from_information(normal)
     coloured = coloured_covariance(used, theta, white, scales)
-    labels = sorted({row.equation for row in rows})
+    labels = sorted({block.equation for block in equations})
     residuals, fitted = [], []
     for number in range(len(maneuvers)):
-        mine = [row for row in rows if row.maneuver == number]
-        fitted.append(np.column_stack([row.fitted(theta) for row in mine]))
-        residuals.append(np.column_stack([row.target for row in mine]) - fitted[-1])
+        own = [block for block in equations if block.maneuver == number]
+        fitted.append(np.column_stack([block.fitted(theta) for block in own]))
+        residuals.append(np.column_stack([block.dependent for block in own]) - fitted[-1])
     stacked = np.vstack(residuals)
     if len(labels) != stacked.shape[1]:
         warnings.append("some equations are missing in some maneuvers")
@@ -113,79 +115,83 @@ def fit_equation_error(
 
 
 def _weighted(
-    rows: Sequence[RegressionEquation], weights: Sequence[Array]
+    equations: Sequence[RegressionEquation], weights: Sequence[Array]
 ) -> list[RegressionEquation]:
     result = []
-    for row, weight in zip(rows, weights, strict=True):
+    for block, weight in zip(equations, weights, strict=True):
         root = np.sqrt(weight)
         result.append(
             RegressionEquation(
-                row.equation,
-                row.label,
-                row.maneuver,
-                row.target * root,
-                row.columns,
-                row.block * root[:, None],
-                row.noisy,
+                block.equation,
+                block.label,
+                block.maneuver,
+                block.dependent * root,
+                block.columns,
+                block.active_regressors * root[:, None],
+                block.noisy_regressors,
             )
         )
     return result
 
 
-def _pseudo_rows(
-    rows: Sequence[RegressionEquation], theta: Array, weights: Sequence[Array]
+def _pseudo_equations(
+    equations: Sequence[RegressionEquation], theta: Array, weights: Sequence[Array]
 ) -> list[RegressionEquation]:
-    """Return rows whose residuals are what an M-estimate takes of the true ones.
+    """Return equations whose residuals are the pseudo-residuals of Huber's M-estimate.
 
-    Ordinary least squares on them gives the same estimate and Huber's covariance: the residual,
-    clipped, over the mean slope of the clipping, with the first-order correction for the number of
-    unknowns (Annals of Statistics 1, 1973). One outlier then counts as much as its clipped value.
+    The pseudo-residual is psi(r) / mean psi'(r) with the clipped residual psi, and has the
+    first-order correction for the number of unknowns (Huber, Annals of Statistics 1, 1973; Robust
+    Statistics, sec. 7.8). Ordinary least squares on these equations gives the same estimate and
+    Huber's covariance.
     """
     slope: dict[int, float] = {}
-    for equation in {row.equation for row in rows}:
-        mine = [k for k, row in enumerate(rows) if row.equation == equation]
-        share = float(np.mean(np.concatenate([weights[k] for k in mine]) >= 1.0))
-        unknowns = len(rows[mine[0]].columns)
-        samples = sum(len(weights[k]) for k in mine)
+    for equation in {block.equation for block in equations}:
+        own = [k for k, block in enumerate(equations) if block.equation == equation]
+        share = float(np.mean(np.concatenate([weights[k] for k in own]) >= 1.0))
+        unknowns = len(equations[own[0]].columns)
+        samples = sum(len(weights[k]) for k in own)
         correction = 1.0 + unknowns / samples * (1.0 - share) / max(share, 1e-12)
         slope[equation] = max(share, 1e-12) / correction
     return [
         replace(
-            row,
-            target=row.fitted(theta) + weight * row.residual(theta) / slope[row.equation],
+            block,
+            dependent=block.fitted(theta) + weight * block.residual(theta) / slope[block.equation],
         )
-        for row, weight in zip(rows, weights, strict=True)
+        for block, weight in zip(equations, weights, strict=True)
     ]
 
 
 def _equation_scales(
-    rows: Sequence[RegressionEquation], theta: Array, *, robust: bool, dof: int = 0
+    equations: Sequence[RegressionEquation], theta: Array, *, robust: bool, dof: int = 0
 ) -> Array:
-    """Return the residual scale of each row, pooled over maneuvers of one equation."""
+    """Return the residual scale of each equation, pooled over its maneuvers."""
     scale: dict[int, float] = {}
-    for equation in {row.equation for row in rows}:
-        mine = [row for row in rows if row.equation == equation]
-        residual = np.concatenate([row.residual(theta) for row in mine])
+    for equation in {block.equation for block in equations}:
+        own = [block for block in equations if block.equation == equation]
+        residual = np.concatenate([block.residual(theta) for block in own])
         if robust:
             value = MAD_TO_SIGMA * float(np.median(np.abs(residual)))
         else:
-            active = len(mine[0].columns) if dof else 0
+            active = len(own[0].columns) if dof else 0
             value = float(np.sqrt(residual @ residual / max(len(residual) - active, 1)))
-        size = max(float(np.max(np.abs(row.target), initial=0.0)) for row in mine)
+        size = max(float(np.max(np.abs(block.dependent), initial=0.0)) for block in own)
         scale[equation] = max(value, 1e-12 * size, 1e-150)
-    return np.array([scale[row.equation] for row in rows])
+    return np.array([scale[block.equation] for block in equations])
 
 
 def coloured_covariance(
-    rows: Sequence[RegressionEquation], theta: Array, white: Array, scales: Array
+    equations: Sequence[RegressionEquation], theta: Array, white: Array, scales: Array
 ) -> Array:
-    """Correct a covariance for coloured residuals (Klein & Morelli, sec. 5.2)."""
-    middle = np.zeros_like(white)
-    for row, scale in zip(rows, scales, strict=True):
-        residual = row.residual(theta)
-        part = coloured_score_covariance(residual, row.block) / scale**4
-        middle[np.ix_(row.columns, row.columns)] += part
-    result = white @ middle @ white
+    """Return (X'X)^-1 (sum X' R X) (X'X)^-1, the covariance corrected for coloured residuals.
+
+    Klein & Morelli, Aircraft System Identification, sec. 5.2.
+    """
+    score_covariance = np.zeros_like(white)
+    for block, scale in zip(equations, scales, strict=True):
+        residual = block.residual(theta)
+        part = coloured_score_covariance(residual, block.active_regressors) / scale**4
+        score_covariance[np.ix_(block.columns, block.columns)] += part
+    result = white @ score_covariance @ white
     result = 0.5 * (result + result.T)
     low = np.diag(result) <= 0.0
     if low.any():
@@ -196,30 +202,32 @@ def coloured_covariance(
 
 def _total(
     model: LinearModel,
-    rows: Sequence[RegressionEquation],
+    equations: Sequence[RegressionEquation],
     n_parameters: int,
     deviations: tuple[Array, Array] | None,
 ) -> Array:
-    """Mixed total least squares, equation by equation: exact columns are eliminated by QR.
+    """Solve by mixed total least squares, one equation at a time.
 
-    Noisy columns and the target are first scaled to equal noise: given, or estimated from the
-    third differences of each signal (which hold 20 times the variance of white noise).
+    Exact columns are eliminated by QR; the solution is the right singular vector of the smallest
+    singular value of [X z] (Van Huffel & Vandewalle, The Total Least Squares Problem, sec. 3.5).
+    Noisy columns and the dependent variable are first scaled to equal noise, which is given or
+    estimated from third differences (20 times the variance of white noise).
     """
     theta = np.full(n_parameters, np.nan)
-    for equation in sorted({row.equation for row in rows}):
-        mine = [row for row in rows if row.equation == equation]
-        X = np.vstack([row.regressors for row in mine])
-        y = np.concatenate([row.target for row in mine])
+    for equation in sorted({block.equation for block in equations}):
+        own = [block for block in equations if block.equation == equation]
+        X = np.vstack([block.regressors for block in own])
+        y = np.concatenate([block.dependent for block in own])
         active = np.flatnonzero(X.any(axis=0))
         if not np.all(np.isnan(theta[active])):
             raise IdentificationError(
                 "total least squares takes one equation at a time, and this"
                 " model ties entries of several: use equation-error-weighted"
             )
-        noisy = mine[0].noisy[active] > 0.0
+        noisy = own[0].noisy_regressors[active] > 0.0
         exact_columns, noisy_columns = X[:, active[~noisy]], X[:, active[noisy]]
         block = np.column_stack([noisy_columns, y])
-        ends = np.cumsum([len(row.target) for row in mine])[:-1]
+        ends = np.cumsum([len(block.dependent) for block in own])[:-1]
         thirds = np.vstack([np.diff(part, n=3, axis=0) for part in np.split(block, ends)])
         noise = np.sqrt(np.mean(thirds**2, axis=0) / 20.0)
         if deviations is not None and equation < len(model.states):

@@ -1,9 +1,4 @@
-"""Filter error: maximum likelihood with process noise (turbulence) and measurement noise.
-
-Innovations of a steady-state Kalman filter are the residuals; the search is Fisher scoring on their
-exact Gaussian likelihood (`numerics/filter_problem.py`, `numerics/filter_scoring.py`).
-Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5; Klein & Morelli, ch. 6.
-"""
+"""Filter error: maximum likelihood with process noise (turbulence) and measurement noise."""
 
 from __future__ import annotations
 
@@ -30,19 +25,19 @@ from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
 from host.sysid.numerics.output_error import minimise
 
-# Fisher's information overstates the curvature by the noise of a sensor that is smoother than any:
-# steps towards zero are all too short, by the same share. A longer one is tried for a fifth of what
-# new slopes cost: 12 to 20 iterations instead of 22 to 60.
+# Where the noise of a sensor tends to zero, Fisher's information overstates the curvature and all
+# steps are too short by the same share. A longer one is tried at a fifth of the cost of new
+# sensitivities: 12 to 20 iterations instead of 22 to 60.
 EXTEND_FROM_BOUNDS = 0.5  # bounds
 LONGEST_EXTENSION = 32.0
 VARIANCE_CHANGE = (0.01, 100.0)  # times what it was: most of one step
 MAX_ITERATIONS = 60
 NOISE_FLOOR = 1e-3  # of an output's deviation, or of the first guess of process noise
 # First guess of the deviations: sensors share the residuals of output error with process noise.
-# A guess of process noise that is too small starves the gain, and the search ends elsewhere.
+# With too small a guess of process noise the gain is too small, and the search ends elsewhere.
 NOISE_SHARE, PROCESS_SHARE = 0.6, 2.7
-LARGEST_HIDDEN = 0.1  # rad, rad/s or m/s: what no output shows at once is not taken for larger
-SLOWEST_DECAY_RADPS = 0.1  # rad/s, of a state that forgets its process noise
+LARGEST_HIDDEN = 0.1  # rad, rad/s or m/s: largest first guess for states without an output
+SLOWEST_DECAY_RADPS = 0.1  # rad/s, of a state that process noise drives
 
 
 def fit_filter_error(
@@ -56,14 +51,18 @@ def fit_filter_error(
 ) -> FitResult:
     """Fit by filter error.
 
+    The residuals are the innovations of a steady-state Kalman filter; the search is Fisher scoring
+    on their exact Gaussian likelihood (Jategaonkar, Flight Vehicle System Identification, 2nd ed.,
+    ch. 5; Klein & Morelli, Aircraft System Identification, ch. 6).
+
     Parameters
     ----------
     model, maneuvers
         Model and data. A gust can be a state of its own, its entries tied to those of alpha.
     process : tuple of str, optional
-        States driven by white process noise; without, all whose rate has a free entry.
+        States driven by white process noise; by default all whose equation has a free parameter.
     start : Array, optional
-        Start of the model's own vector; output error gives it without.
+        Start of the vector without noise parameters; by default from output error.
     compare_noise : bool
         Ask whether coloured measurement noise explains the data better (`compare_noise_models`).
     hac : bool
@@ -84,10 +83,10 @@ def fit_filter_error(
         else np.asarray(start, dtype=np.float64)
     )
     theta = _first_guess(problem, first, fit_first=start is None)
-    quiet = np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
-    # Noise that the data do not show would walk to nothing for ever, and the search with it.
+    output_sd = np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
+    # Noise that the data do not show would decrease for ever, and the search would not end.
     floor = np.log(NOISE_FLOOR) + np.concatenate(
-        [theta[problem.n_model : problem.n_model + len(process)], np.log(quiet)]
+        [theta[problem.n_model : problem.n_model + len(process)], np.log(output_sd)]
     )
     objective = _FilterError(problem, floor)
     found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS)
@@ -104,7 +103,7 @@ def fit_filter_error(
         factor = hac_inflation(
             whitened_innovation_sensitivities(problem, theta, point), white, steps_s, covariance
         )
-    kept = problem.n_model
+    n_model = problem.n_model
     warnings = []
     if not found.converged:
         warnings.append(f"no convergence: last step {found.step:.3g} bounds long")
@@ -117,7 +116,7 @@ def fit_filter_error(
         covariance=covariance * np.outer(factor, factor),
         covariance_white=covariance,
         degrees_of_freedom=np.full(
-            len(theta), float(max(problem.output_problem.samples - kept, 1))
+            len(theta), float(max(problem.output_problem.samples - n_model, 1))
         ),
         residuals=tuple(point.e),
         fitted=tuple(m.outputs - e for m, e in zip(maneuvers, point.e, strict=True)),
@@ -129,8 +128,8 @@ def fit_filter_error(
         details={
             "cost": point.cost,
             "hac_inflation": factor,
-            "process_deviation": np.exp(theta[kept : kept + len(process)]),
-            "noise_deviation": np.exp(theta[kept + len(process) :]),
+            "process_deviation": np.exp(theta[n_model : n_model + len(process)]),
+            "noise_deviation": np.exp(theta[n_model + len(process) :]),
             **maneuver_influence(objective.parts, objective.scores, covariance),
         },
     )
@@ -163,7 +162,7 @@ def information_at(
 
 
 def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> Array:
-    """Start from output error; split its residuals between both kinds of noise."""
+    """Return the estimate of output error, its residuals split between both kinds of noise."""
     output_problem, model = problem.output_problem, problem.model
     optimum = minimise(output_problem, first, max_iterations=15 if fit_first else 0)
     deviation = np.maximum(np.std(np.hstack(optimum.residuals), axis=1), 1e-12)
@@ -177,7 +176,7 @@ def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> Ar
 
 
 class _FilterError(Objective[InnovationLikelihood]):
-    """Innovations of the steady filter; deviations of the noise never fall below `floor`."""
+    """Cost of the steady-state filter; deviations of the noise do not fall below `floor`."""
 
     def __init__(self, problem: FilterProblem, floor: Array) -> None:
         self._problem, self._noise = problem, slice(problem.n_model, None)
@@ -197,24 +196,24 @@ class _FilterError(Objective[InnovationLikelihood]):
     def free(self, theta: Array, gradient: Array) -> BoolArray:
         return free_of_bounds(theta, gradient, self._lower, self._upper)
 
-    def apply_step(self, theta: Array, step: Array, far: float = 1.0) -> Array:
-        """Return where `far` steps lead: noise moves by its variance, which may come to nothing."""
-        goal, noise = theta + far * step, self._noise
-        goal[noise] = theta[noise] + 0.5 * np.log(
-            np.clip(1.0 + 2.0 * far * step[noise], *VARIANCE_CHANGE)
+    def apply_step(self, theta: Array, step: Array, length: float = 1.0) -> Array:
+        """Return the parameters after `length` steps; noise parameters move by their variance."""
+        proposal, noise = theta + length * step, self._noise
+        proposal[noise] = theta[noise] + 0.5 * np.log(
+            np.clip(1.0 + 2.0 * length * step[noise], *VARIANCE_CHANGE)
         )
-        return np.clip(goal, self._lower, self._upper)
+        return np.clip(proposal, self._lower, self._upper)
 
     def extend_step(
         self, theta: Array, step: Array, size: float, reached: tuple[Array, InnovationLikelihood]
     ) -> tuple[Array, InnovationLikelihood]:
-        """Return the best of a long step and its doubles, as long as they gain."""
-        best, far = reached, 2.0
-        while size > EXTEND_FROM_BOUNDS and far <= LONGEST_EXTENSION:
-            goal = self.apply_step(theta, step, far)
-            trial = self._problem.evaluate(goal)
+        """Return the best of a step doubled in length as long as the cost falls."""
+        best, length = reached, 2.0
+        while size > EXTEND_FROM_BOUNDS and length <= LONGEST_EXTENSION:
+            proposal = self.apply_step(theta, step, length)
+            trial = self._problem.evaluate(proposal)
             if trial is None or trial.cost >= best[1].cost:
                 break
-            best = goal, trial
-            far *= 2.0
+            best = proposal, trial
+            length *= 2.0
         return best

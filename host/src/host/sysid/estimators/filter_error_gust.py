@@ -1,9 +1,4 @@
-"""Fit a flight in turbulence: delays by output error first, then filter error with a gust state.
-
-A vertical (or side) gust is an angle of attack (sideslip) to vanes, forces and moments alike, so it
-is a state of its own whose entries are those of the angle; only its intensity is new. Dryden
-spectra: MIL-F-8785C, sec. 3.7.
-"""
+"""Filter error with the gust as a state, after output error has estimated the delays."""
 
 from __future__ import annotations
 
@@ -22,7 +17,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 
-SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, low altitude)
+SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, sec. 3.7, low altitude)
 VANES = ("alpha_rad", "beta_rad")
 # What else disturbs: thrust and longitudinal gusts; the drift of the attitude filter.
 OTHER_PROCESS_STATES = ("airspeed_mps", "phi_rad")
@@ -31,7 +26,10 @@ ROLL_GUST = "gust_roll_radps"
 
 @dataclass(frozen=True)
 class GustFit:
-    """Result on the model without the gust, its maneuvers with delays taken out, the delays."""
+    """Result on the model without the gust, its maneuvers with delays removed, and the delays.
+
+    `delays` has value and 95 % half-width of each, s.
+    """
 
     result: FitResult
     model: LinearModel
@@ -49,21 +47,26 @@ def gust_model(
 ) -> LinearModel:
     """Return a model with the gust angle as an extra state.
 
+    A vertical (or side) gust is an angle of attack (sideslip) to vanes, forces and moments alike,
+    so its entries are those of the angle and only its intensity is new. Its Dryden spectrum
+    (MIL-F-8785C, sec. 3.7) is that of white noise behind 1 / (1 + T s) with T = L / V, or with
+    `span_m` behind (1 + sqrt(3) T s) / (1 + T s)^2.
+
     Parameters
     ----------
     base : LinearModel
         A template; alpha or beta must be a measured state of it.
     airspeed_mps : float
-        Of the trim, for the gust's time scale.
+        Of the trim, for the gust's time scale, m/s.
     scale_m : float
-        Length of the gusts.
+        Scale length L of the gusts, m.
     span_m : float, optional
-        With it the second-order spectrum of gusts across the flight path, the turning of the air
-        that comes with it (a gust reaches the tail later) and, for the lateral motion, rolling
-        gusts; without it the first-order spectrum of the angle alone.
+        Wing span, m. With it the gust has the second-order spectrum across the flight path, acts as
+        a pitch (yaw) rate because it reaches the tail later, and has a rolling component in the
+        lateral motion; without it the first-order spectrum of the angle alone.
     scale_share : float
-        Relative deviation of `scale_m`; above zero the time scale is a parameter, ``gust_rate``,
-        behind the others.
+        Relative deviation of `scale_m`; above zero the rate V / L is a parameter, ``gust_rate``,
+        after the others.
 
     Raises
     ------
@@ -75,18 +78,18 @@ def gust_model(
         raise IdentificationError(f"model {base.name}: no vane angle a gust could act on")
     vane, rate = vanes[0], airspeed_mps / scale_m
     lag = 0.0 if span_m is None else np.pi * airspeed_mps / (4.0 * span_m)
-    turn = {"alpha_rad": ("q_radps", -1.0), "beta_rad": ("r_radps", 1.0)}[vane]
-    # Columns of the base a hidden state acts as, with gains.
-    hidden: dict[str, dict[str, float]] = {"gust_rad": {vane: 1.0}}
+    rate_effect = {"alpha_rad": ("q_radps", -1.0), "beta_rad": ("r_radps", 1.0)}[vane]
+    # Columns of the base that each gust state acts like, with gains.
+    gust_states: dict[str, dict[str, float]] = {"gust_rad": {vane: 1.0}}
     entries = [("gust_rad", "gust_rad", -1.0)]
     fixed: list[tuple[str, str, float]] = []
     if span_m is not None:
         lead, trail = np.sqrt(3.0), 1.0 - np.sqrt(3.0)
         entries += [("gust_lag_rad", "gust_rad", 1.0), ("gust_lag_rad", "gust_lag_rad", -1.0)]
-        hidden = {
-            "gust_rad": {vane: lead, turn[0]: turn[1] * lag * lead},
-            "gust_lag_rad": {vane: trail, turn[0]: turn[1] * lag * trail},
-            "gust_tail_rad": {turn[0]: -turn[1] * lag},
+        gust_states = {
+            "gust_rad": {vane: lead, rate_effect[0]: rate_effect[1] * lag * lead},
+            "gust_lag_rad": {vane: trail, rate_effect[0]: rate_effect[1] * lag * trail},
+            "gust_tail_rad": {rate_effect[0]: -rate_effect[1] * lag},
         }
         fixed = [
             ("gust_tail_rad", "gust_rad", lag * lead),
@@ -94,14 +97,14 @@ def gust_model(
             ("gust_tail_rad", "gust_tail_rad", -lag),
         ]
         if vane == "beta_rad" and "p_radps" in base.states:
-            hidden[ROLL_GUST] = {"p_radps": 1.0}
+            gust_states[ROLL_GUST] = {"p_radps": 1.0}
             fixed.append((ROLL_GUST, ROLL_GUST, -lag))
-    states = (*base.states, *hidden)
-    n, total = len(base.states), len(base.states) + len(hidden)
+    states = (*base.states, *gust_states)
+    n, total = len(base.states), len(base.states) + len(gust_states)
     A, C = np.zeros((total, total)), np.zeros((len(base.outputs), total))
     A[:n, :n], C[:, :n] = base.A, base.C
     terms = list(base.terms)
-    for column, (_, acts) in enumerate(hidden.items(), start=n):
+    for column, (_, acts) in enumerate(gust_states.items(), start=n):
         for state, gain in acts.items():
             source = base.states.index(state)
             terms += [
@@ -109,7 +112,7 @@ def gust_model(
                 for t in base.terms
                 if t.matrix in "AC" and t.column == source
             ]
-            if state == vane:  # forces turn with the air, and the vane measures it
+            if state == vane:  # the vane measures the gust as well
                 C[:, column] += gain * base.C[:, source]
     for row, source_name, value in fixed:
         A[states.index(row), states.index(source_name)] = value
@@ -131,7 +134,7 @@ def gust_model(
         name=f"{base.name} with gust",
         states=states,
         A=A,
-        B=np.vstack([base.B, np.zeros((len(hidden), len(base.inputs)))]),
+        B=np.vstack([base.B, np.zeros((len(gust_states), len(base.inputs)))]),
         C=C,
         terms=tuple(terms),
         parameters=parameters,
@@ -142,16 +145,16 @@ def gust_model(
 def fit_with_gust(
     model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float
 ) -> GustFit:
-    """Fit a template in two stages.
+    """Fit a template in two stages: delays by output error, then filter error with the gust.
 
     Parameters
     ----------
     model : LinearModel
-        With delays and levers as wanted.
+        With the delays and accelerometer offsets to be estimated.
     maneuvers : sequence of Maneuver
         Data as measured.
     airspeed_mps : float
-        Of the trim, for the gust's time scale.
+        Of the trim, for the gust's time scale, m/s.
     """
     if not model.delays:
         start = start_values_of(model, maneuvers)
@@ -183,25 +186,27 @@ def _fit_gust_state(
     airspeed_mps: float,
     start: Array,
 ) -> FitResult:
-    """Return filter error with the gust as a state; output error where that search does not end."""
+    """Return filter error with the gust as a state; output error if that does not converge."""
     process = ("gust_rad", *(s for s in OTHER_PROCESS_STATES if s in model.states))
-    wide = gust_model(model, airspeed_mps)
+    augmented = gust_model(model, airspeed_mps)
     try:
         result = fit_filter_error(
-            wide, maneuvers, process=process, start=start, compare_noise=False
+            augmented, maneuvers, process=process, start=start, compare_noise=False
         )
         failure = "" if result.converged else result.warnings[0]
     except IdentificationError as error:
         failure = str(error)
     if not failure:
-        around = innovations_of(result, wide, maneuvers)
+        innovations = innovations_of(result, augmented, maneuvers)
         return replace(
             result,
             method="filter error with gust",
             model=plain,
-            covariance=result.covariance if around is None else around.coloured_covariance(),
+            covariance=result.covariance
+            if innovations is None
+            else innovations.coloured_covariance(),
         )
-    # Better the plain answer with its wider intervals than a search that has not ended.
+    # Output error has wider intervals, but a search that has not converged has none.
     result = fit("output-error-white", plain, maneuvers, start=start, multiple_starts=False)
     return replace(
         result,
@@ -210,23 +215,27 @@ def _fit_gust_state(
 
 
 def _delay_covariance(first: FitResult, model: LinearModel) -> Array:
-    """Return what the uncertainty of the delays adds to the covariance of the parameters.
+    """Return the covariance that the uncertain delays add to that of the parameters.
 
-    The second stage takes the delays for known; the first one says how the parameters move with
-    them: d theta / d tau = C_theta_tau C_tau_tau^-1.
+    The second stage takes the delays for known. By the first one the parameters depend on them as d
+    theta / d tau = C_theta_tau C_tau_tau^-1, so that C_theta_tau C_tau_tau^-1 C_tau_theta is added.
     """
     count, names = len(model.parameters), len(model.parameter_names)
     own = first.covariance[count:names, count:names]
     cross = first.covariance[:count, count:names]
-    live = np.flatnonzero(np.diag(own) > 0.0)
-    if len(live) == 0:
+    estimated = np.flatnonzero(np.diag(own) > 0.0)
+    if len(estimated) == 0:
         return np.zeros((count, count))
-    part = cross[:, live] @ np.linalg.pinv(own[np.ix_(live, live)]) @ cross[:, live].T
+    part = (
+        cross[:, estimated]
+        @ np.linalg.pinv(own[np.ix_(estimated, estimated)])
+        @ cross[:, estimated].T
+    )
     return np.asarray(0.5 * (part + part.T), dtype=np.float64)
 
 
 def _advance_outputs(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
-    """Read each output later by its delay, so that all belong to one instant."""
+    """Return the maneuver with each output advanced by its delay (s)."""
     t = maneuver.time_s
     columns = [
         np.interp(t + shift, t, column)

@@ -1,10 +1,4 @@
-"""Frequency-domain equation error and output error, chirp-z transforms of one band.
-
-Equation error carries the ends of the record as unknowns: at harmonics of the record the transform
-of a rate is j w X plus x(T) - x(0), and a bias adds nothing. Output error works on the sampled
-system, (z - Phi) X = Gamma U + z (x0 - xN z^-N), which is exact for held inputs, ends included.
-Klein & Morelli, Aircraft System Identification, ch. 7; Morelli, NASA TM-1999-209120.
-"""
+"""Equation error and output error in the frequency domain, on chirp-z transforms of one band."""
 
 from __future__ import annotations
 
@@ -33,7 +27,10 @@ MAX_ITERATIONS = 40
 
 
 def transform(values: Array, dt_s: float, frequency_hz: Array) -> Spectrum:
-    """Return sums of values exp(-j w t) at evenly spaced frequencies, (frequencies, columns)."""
+    """Return the sums of values exp(-j w t) at evenly spaced frequencies, (frequencies, columns).
+
+    Chirp-z transform: Morelli, NASA TM-1999-209120.
+    """
     spacing = frequency_hz[1] - frequency_hz[0]
     return np.asarray(
         signal.czt(
@@ -53,7 +50,7 @@ def band(
     *,
     intervals: int | None = None,
 ) -> Array:
-    """Return harmonics of the record inside a band, the one that stands out of noise without.
+    """Return harmonics of the record inside a band (Hz); by default that of the signals.
 
     Raises
     ------
@@ -79,14 +76,18 @@ def fit_frequency_equation_error(
     *,
     limits_hz: tuple[float, float] | None = None,
 ) -> FitResult:
-    """Fit by equation error in the frequency domain; no rate is ever differentiated.
+    """Fit by equation error in the frequency domain; no signal is differentiated.
+
+    At harmonics of the record the transform of a rate is j w X + x(T) - x(0), and that of a bias is
+    zero; the differences x(T) - x(0) are unknowns (Klein & Morelli, Aircraft System Identification,
+    ch. 7).
 
     Parameters
     ----------
     model, maneuvers
         Model and data; every state must be measured.
     limits_hz : tuple of float, optional
-        Band; found from the data without.
+        Band, Hz; by default from the data.
     """
     measured = model.measured_states()
     count = len(model.parameters)
@@ -106,7 +107,7 @@ def fit_frequency_equation_error(
         if model.hold == "zoh":
             inputs = 0.5 * (inputs + np.vstack([inputs[:1], inputs[:-1]]))
         signals = np.hstack([states, inputs])
-        signals[[0, -1]] *= 0.5  # trapezoids: the sum is then the integral over the record
+        signals[[0, -1]] *= 0.5  # trapezoidal rule: the sum is then the integral over the record
         z = maneuver.dt_s * transform(signals, maneuver.dt_s, f)
         s = 2j * np.pi * f
         for position, row in enumerate(active):
@@ -183,14 +184,17 @@ def fit_frequency_output_error(
 ) -> FitResult:
     """Fit by output error in the frequency domain.
 
+    The sampled system is (z - Phi) X = Gamma U + z (x0 - xN z^-N), which is exact for held inputs,
+    ends of the record included (Klein & Morelli, Aircraft System Identification, ch. 7).
+
     Parameters
     ----------
     model, maneuvers
         Model and data; no residual delays.
     limits_hz : tuple of float, optional
-        Band; found from the data without.
+        Band, Hz; by default from the data.
     start : Array, optional
-        Common parameters; equation error gives them without.
+        Common parameters; by default from equation error.
     """
     if model.delays or model.accelerometer_offsets:
         raise IdentificationError(
@@ -227,9 +231,9 @@ def fit_frequency_output_error(
         raise IdentificationError(f"model {model.name}: no finite response at the start")
     information, _ = objective.normal(found.theta, found.trial)
     covariance = covariance_from_information(information)[:count, :count]
-    left = found.trial.residuals
-    residuals = tuple(np.vstack([r.real, r.imag]) for r in left)
-    lines = 2 * sum(map(len, left)) - count - n
+    residual_spectra = found.trial.residuals
+    residuals = tuple(np.vstack([r.real, r.imag]) for r in residual_spectra)
+    lines = 2 * sum(map(len, residual_spectra)) - count - n
     return FitResult(
         method="frequency output error",
         model=model,
@@ -251,19 +255,19 @@ def fit_frequency_output_error(
 
 @dataclass(slots=True)
 class _Trial:
-    """Residuals (frequencies, p) and slopes (frequencies, p, P) of the record of each maneuver."""
+    """Residuals (frequencies, p) and sensitivities (frequencies, p, P) of each maneuver."""
 
     residuals: list[Spectrum]
-    slopes: list[Spectrum]
+    sensitivities: list[Spectrum]
     variance: Array
     cost: float
 
 
 class _Spectra(Objective[_Trial]):
-    """Spectra of the outputs.
+    """Cost of the output spectra.
 
-    Unknown are the model's parameters and, per maneuver, x0 - xN: harmonics of the record see only
-    their difference.
+    The unknowns are the model's parameters and, per maneuver, x0 - xN: at harmonics of the record
+    only their difference appears.
     """
 
     def __init__(self, model: LinearModel, records: list[_Record]) -> None:
@@ -295,8 +299,8 @@ class _Spectra(Objective[_Trial]):
             entries.parameter, entries.gain, count,
         )  # fmt: skip
         inverse = np.linalg.inv(record.z[:, None, None] * np.eye(n) - step[:, :n])
-        push = record.drive @ step[:, n:].T + record.z[:, None] * end
-        X = np.einsum("fij,fj->fi", inverse, push)
+        forcing = record.drive @ step[:, n:].T + record.z[:, None] * end
+        X = np.einsum("fij,fj->fi", inverse, forcing)
         wide = np.hstack([X, record.drive])
         dX = np.zeros((len(record.z), n, count + n), dtype=np.complex128)
         dX[:, :, :count] = inverse @ np.einsum("ijq,fj->fiq", step_slopes, wide)
@@ -312,7 +316,7 @@ class _Spectra(Objective[_Trial]):
 
     def normal(self, theta: Array, trial: _Trial) -> tuple[Array, Array]:
         n, count = len(self._model.states), len(self._model.parameters)
-        return _normal(trial.slopes, trial.residuals, trial.variance, count, n)
+        return _normal(trial.sensitivities, trial.residuals, trial.variance, count, n)
 
 
 def _normal(

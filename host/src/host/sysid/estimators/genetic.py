@@ -1,9 +1,4 @@
-"""Genetic search of the output-error likelihood, polished by Gauss-Newton.
-
-Differential evolution (Storn & Price, Journal of Global Optimization 11, 1997) over a
-box of the dynamics; biases and start states keep their first guess during the search, an offset per
-output stands in for them.
-"""
+"""Global search of the output-error likelihood by differential evolution, refined after."""
 
 from __future__ import annotations
 
@@ -37,16 +32,20 @@ def fit_genetic(
 ) -> FitResult:
     """Search globally, then fit by output error from the best individual.
 
+    Differential evolution (Storn & Price, Journal of Global Optimization 11, 1997) over a box of
+    the common parameters. Biases and initial states keep their first guess during the search; a
+    constant per output replaces them.
+
     Parameters
     ----------
     model, maneuvers
-        Model and data; the box is the model's bounds, or about the start values where it has none.
+        Model and data; the box is given by the model's bounds, else by its start values.
     population, generations : int
         Size of the search.
     seed : int
         Of the random numbers: the answer is repeatable.
     polish : bool
-        Model the memory of the noise in the final fit.
+        Estimate AR models of the noise in the final fit.
     """
     problem = OutputProblem(model, maneuvers)
     count = len(model.parameters)
@@ -54,12 +53,14 @@ def fit_genetic(
     size = BOX * np.maximum(np.abs(start), 0.05 * max(float(np.max(np.abs(start))), 1e-3))
     lower = np.where(np.isfinite(problem.lower[:count]), problem.lower[:count], start - size)
     upper = np.where(np.isfinite(problem.upper[:count]), problem.upper[:count], start + size)
-    people = lower + (upper - lower) * np.random.default_rng(seed).random((population, count))
-    people[0] = np.clip(start, lower, upper)
+    population_start = lower + (upper - lower) * np.random.default_rng(seed).random(
+        (population, count)
+    )
+    population_start[0] = np.clip(start, lower, upper)
     base = problem.first_guess()
 
-    def score(person: Array) -> float:
-        return _score(problem, base, person)
+    def score(individual: Array) -> float:
+        return _score(problem, base, individual)
 
     found = optimize.differential_evolution(
         score,
@@ -68,7 +69,7 @@ def fit_genetic(
         tol=0.0,
         rng=seed,
         polish=False,
-        init=people,
+        init=population_start,
     )
     if not np.isfinite(found.fun):
         raise IdentificationError("genetic search: every trial diverges; give tighter bounds")
@@ -79,18 +80,18 @@ def fit_genetic(
     return replace(result, method="genetic search, polished", details=details)
 
 
-def _score(problem: OutputProblem, base: Array, person: Array) -> float:
+def _score(problem: OutputProblem, base: Array, individual: Array) -> float:
     """Return the concentrated cost, constants left at their first guess."""
     theta = base.copy()
-    theta[: len(person)] = person
+    theta[: len(individual)] = individual
     outputs = problem.outputs(theta)
     if outputs is None:
         return float("inf")
     total = np.zeros(len(problem.model.outputs))
     for number, y in enumerate(outputs):
-        miss = problem.measured(number) - y
-        # Constants are the cheap part: an offset per output stands for biases and start.
-        miss = miss - miss.mean(axis=1, keepdims=True)
-        total += np.sum(miss**2, axis=1)
+        residual = problem.measured(number) - y
+        # A constant per output replaces biases and initial states.
+        residual = residual - residual.mean(axis=1, keepdims=True)
+        total += np.sum(residual**2, axis=1)
     value = float(np.sum(np.log(np.maximum(total, 1e-300))))
     return value if np.isfinite(value) else float("inf")

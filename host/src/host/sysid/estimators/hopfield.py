@@ -1,4 +1,4 @@
-"""The Hopfield network of the thesis, kept faithfully, and one change that makes it honest.
+"""The Hopfield network of the thesis as printed and as programmed, and a preconditioned form.
 
 Three forms of gradient descent on the normal equations W beta + b = 0, W = -sum z z',
 b = +sum xdot z' (the thesis's equation 3.11; its program has both signs negative, so that its fixed
@@ -50,7 +50,9 @@ RHO_LIST = np.concatenate(
 def iterate(
     W: Array, b: Array, start: Array, gain: float, rho: float, iterations: int, limit: float
 ) -> tuple[Array, int]:
-    """Run the printed iteration; `gain` is dt times lambda.
+    """Run the printed iteration (thesis, equations 3.11 and 3.17); `gain` is dt times lambda.
+
+    v = W beta + b, then beta += gain (rho^2 - beta^2) / (2 rho) v, all neurons at once.
 
     Returns the state and the number of iterations done; fewer than asked for when it diverged.
     """
@@ -101,7 +103,9 @@ def iterate_until(
 def network(
     model: LinearModel, maneuvers: Sequence[Maneuver], *, bandwidth: float | None = None
 ) -> tuple[tuple[str, ...], Array, Array]:
-    """Return parameter names, W and b of the network for a model.
+    """Return parameter names, W and b of the network for a model (thesis, equation 3.11).
+
+    W = -sum z z' and b = +sum xdot z': their fixed point solves the normal equations.
 
     Parameters
     ----------
@@ -114,7 +118,7 @@ def network(
 
 
 def largest_stable_gain(W: Array, rho: float = RHO) -> float:
-    """Return the dt times lambda at which the fastest direction stops converging.
+    """Return the dt times lambda above which the iteration diverges.
 
     About a solution small against rho the step matrix is I + gain rho/2 W.
     """
@@ -276,7 +280,7 @@ def line_search(
 def free_run(model: LinearModel, maneuver: Maneuver, beta: Array) -> Array | None:
     """Return the states (samples, n) from the first measured ones on, as the program simulates.
 
-    None if they run away.
+    None if they diverge.
     """
     n, m = len(model.states), len(model.inputs)
     A, B, _, _ = model.matrices(beta)

@@ -1,8 +1,4 @@
-"""What the innovations of a filter-error answer say beside it: their slopes, their colour.
-
-Filter error takes its innovations for white. Where the model lacks something they are not, and
-their memory stands between the slopes as for output error (`numerics/coloured_residuals.py`).
-"""
+"""Innovations of a filter-error estimate and their sensitivities: one-step update, colour."""
 
 from __future__ import annotations
 
@@ -33,11 +29,11 @@ class Innovations:
     covariance : Array, shape (P, P)
         Inverse of the information at the answer.
     inverse : Array, shape (P, P)
-        The same of the model alone, both noises held: what a step may use.
+        The same of the model alone, both noises fixed; used by the one-step update.
     process : tuple of str
     e : list of Array, each (samples, p)
     white : list of Array, each (p, p)
-        Turns an innovation into whitened ones.
+        Whitener of the innovations.
     sensitivities : list of Array, each (samples, p, P)
         Of the whitened innovations.
     """
@@ -51,30 +47,35 @@ class Innovations:
     sensitivities: list[Array]
 
     def one_step_update(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
-        """Return how far the answer moves with another model and other data, (P,).
+        """Return the change of the estimate for another model and other data, (P,).
 
-        One Gauss-Newton step; nothing if the filter fails there.
+        It is one Gauss-Newton step, -M^-1 sum (d nu/d theta)' S^-1 (nu_changed - nu), and zero if
+        the filter fails.
         """
         point = FilterProblem(model, changed, self.process).evaluate(self.theta)
-        pull = np.zeros(len(self.theta))
+        score = np.zeros(len(self.theta))
         if point is None:
-            return pull
-        for e, still, white, slope in zip(
+            return score
+        for e, reference, white, sensitivity in zip(
             point.e, self.e, self.white, self.sensitivities, strict=True
         ):
-            pull -= np.einsum("nj,njk->k", (e - still) @ white.T, slope)
-        return np.asarray(self.inverse @ pull)
+            score -= np.einsum("nj,njk->k", (e - reference) @ white.T, sensitivity)
+        return np.asarray(self.inverse @ score)
 
     def coloured_covariance(self) -> Array:
-        """Return the covariance with the memory of the innovations in it; never a narrower one."""
-        middle = np.zeros_like(self.covariance)
-        for e, white, slope in zip(self.e, self.white, self.sensitivities, strict=True):
-            plain = e @ white.T
-            for j in range(plain.shape[1]):
-                middle += coloured_score_covariance(plain[:, j], slope[:, j])
-        wide = self.covariance @ middle @ self.covariance
+        """Return the covariance corrected for coloured innovations; no variance becomes smaller.
+
+        Filter error takes innovations for white; where the model lacks something they are not. The
+        correction is that of output error (Morelli & Klein 1997).
+        """
+        score_covariance = np.zeros_like(self.covariance)
+        for e, white, sensitivity in zip(self.e, self.white, self.sensitivities, strict=True):
+            whitened = e @ white.T
+            for j in range(whitened.shape[1]):
+                score_covariance += coloured_score_covariance(whitened[:, j], sensitivity[:, j])
+        corrected = self.covariance @ score_covariance @ self.covariance
         factor = np.sqrt(
-            np.maximum(np.diag(wide) / np.maximum(np.diag(self.covariance), 1e-300), 1.0)
+            np.maximum(np.diag(corrected) / np.maximum(np.diag(self.covariance), 1e-300), 1.0)
         )
         return np.asarray(self.covariance * np.outer(factor, factor))
 
@@ -82,7 +83,7 @@ class Innovations:
 def innovations_of(
     result: FitResult, model: LinearModel, maneuvers: Sequence[Maneuver]
 ) -> Innovations | None:
-    """Return them for a result of filter error on this model; None where the filter fails."""
+    """Return the innovations of a filter-error result on this model; None if the filter fails."""
     theta, covariance = result.estimate, result.covariance_white
     process = tuple(n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS))
     problem = FilterProblem(model, maneuvers, process)
@@ -90,11 +91,13 @@ def innovations_of(
     if point is None:
         return None
     white = [point.gains[m.dt_s].whitener for m in maneuvers]
-    slopes = whitened_innovation_sensitivities(problem, theta, point)
+    sensitivities = whitened_innovation_sensitivities(problem, theta, point)
     count = problem.n_model
-    own = [slope.reshape(-1, len(theta))[:, :count] for slope in slopes]
+    model_sensitivities = [
+        sensitivity.reshape(-1, len(theta))[:, :count] for sensitivity in sensitivities
+    ]
     inverse = np.zeros_like(covariance)
     inverse[:count, :count] = covariance_from_information(
-        np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in own)
+        np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in model_sensitivities)
     )
-    return Innovations(theta, covariance, inverse, process, point.e, white, slopes)
+    return Innovations(theta, covariance, inverse, process, point.e, white, sensitivities)

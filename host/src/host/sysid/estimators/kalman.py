@@ -1,10 +1,4 @@
-"""Joint estimation of states and parameters by Kalman filters, extended and unscented.
-
-The state carries the parameters as constants. The extended filter uses the exact slopes of the
-discretised model; the unscented one propagates sigma points by one Runge-Kutta step per sample.
-Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 7; Julier & Uhlmann, Proceedings of
-the IEEE 92 (2004).
-"""
+"""Joint estimation of states and parameters by Kalman filters, extended and unscented."""
 
 from __future__ import annotations
 
@@ -26,13 +20,13 @@ PASSES = 2  # over the record: the second starts from the parameters of the firs
 INITIAL_RELATIVE_SD = 0.5  # first standard deviation of a parameter, relative to its size
 PROCESS_SHARE = 1e-4  # default process noise per root second, of the rms of a state
 SIGMA_POINT_SPREAD = 1e-1  # alpha of the sigma points
-NEGLIGIBLE_CORRELATION = 0.05  # correlation taken for none: twice its deviation over 1600 samples
-REPORTED_INFLATION = 2.0  # inflation worth a word
+NEGLIGIBLE_CORRELATION = 0.05  # twice the deviation of a correlation over 1600 samples
+REPORTED_INFLATION = 2.0  # from here on there is a warning
 
 
 @dataclass(slots=True)
 class _Filter:
-    """What both filters share: model, noise, layout of the joint state."""
+    """What both filters share: model, noise, layout of the augmented state."""
 
     model: LinearModel
     R: Array
@@ -54,7 +48,12 @@ def fit_extended(
     noise: Array | None = None,
     start: Array | None = None,
 ) -> FitResult:
-    """Fit by an extended Kalman filter; see `fit_unscented` for the parameters."""
+    """Fit by an extended Kalman filter; see `fit_unscented` for the parameters.
+
+    The state is augmented by the parameters as constants; the filter is linearised with the exact
+    derivatives of the discretised model (Jategaonkar, Flight Vehicle System Identification, 2nd
+    ed., ch. 7).
+    """
     return _run(model, maneuvers, process, noise, start, unscented=False)
 
 
@@ -68,6 +67,9 @@ def fit_unscented(
 ) -> FitResult:
     """Fit by an unscented Kalman filter.
 
+    The state is augmented by the parameters as constants; sigma points are propagated by one
+    Runge-Kutta step per sample (Julier & Uhlmann, Proceedings of the IEEE 92, 2004).
+
     Parameters
     ----------
     model, maneuvers
@@ -75,9 +77,9 @@ def fit_unscented(
     process : Array, optional
         Process noise of each state, per root second, shape (n,).
     noise : Array, optional
-        Standard deviation of each output, shape (p,); from third differences without.
+        Standard deviation of each output, shape (p,); by default from third differences.
     start : Array, optional
-        Common parameters; equation error gives them without.
+        Common parameters; by default from equation error.
     """
     return _run(model, maneuvers, process, noise, start, unscented=True)
 
@@ -90,10 +92,11 @@ def noise_deviation(maneuvers: Sequence[Maneuver]) -> Array:
 
 
 def innovation_inflation(white: Sequence[Array]) -> float:
-    """Return by how much innovations tell less than the filter believes, at least 1.
+    """Return the factor by which coloured innovations inflate a variance, at least 1.
 
-    Power of the whitened innovations times the time their correlation lasts, in samples: summed
-    until it first turns negative (Geyer, Statistical Science 7, 1992), mean over outputs.
+    It is the power of the whitened innovations times their correlation time in samples, which is
+    summed until the correlation is negligible (initial sequence estimator: Geyer, Statistical
+    Science 7, 1992); mean over outputs.
 
     Parameters
     ----------
@@ -108,8 +111,8 @@ def innovation_inflation(white: Sequence[Array]) -> float:
             [sum(float(x[k:] @ x[: len(x) - k]) for x in parts) for k in range(lags)]
         )
         moments /= sum(len(x) for x in parts)
-        low = np.flatnonzero(moments < NEGLIGIBLE_CORRELATION * moments[0])
-        end = int(low[0]) if len(low) else lags
+        negligible = np.flatnonzero(moments < NEGLIGIBLE_CORRELATION * moments[0])
+        end = int(negligible[0]) if len(negligible) else lags
         total += max(float(2.0 * np.sum(moments[:end]) - moments[0]), 0.0)
     return float(max(total / white[0].shape[1], 1.0))
 
@@ -151,16 +154,16 @@ def _run(
     residuals: list[Array] = []
     white: list[Array] = []
     for _ in range(PASSES):
-        # Each pass starts as unsure as the first: data must not be counted twice.
+        # Each pass starts with the first covariance: data must not be counted twice.
         P[:] = 0.0
         P[n : n + q, n : n + q] = np.diag(spread_first**2)
         residuals, white = [], []
         for maneuver in maneuvers:
             for k, state in enumerate(model.states):
-                seen = state in model.outputs
-                joint[k] = maneuver.outputs[0, model.outputs.index(state)] if seen else 0.0
+                is_measured = state in model.outputs
+                joint[k] = maneuver.outputs[0, model.outputs.index(state)] if is_measured else 0.0
                 P[k, :] = P[:, k] = 0.0
-                known = deviation[model.outputs.index(state)] if seen else spread[k]
+                known = deviation[model.outputs.index(state)] if is_measured else spread[k]
                 P[k, k] = (3.0 * known) ** 2
             for k in range(n + q, size):
                 joint[k] = 0.0
@@ -290,9 +293,9 @@ def _unscented_pass(
     weight = mean_weight.copy()
     weight[0] += 3.0 - SIGMA_POINT_SPREAD**2
     e, white = np.zeros_like(maneuver.outputs), np.zeros_like(maneuver.outputs)
-    following = np.vstack([maneuver.inputs[1:], maneuver.inputs[-1:]])
+    next_inputs = np.vstack([maneuver.inputs[1:], maneuver.inputs[-1:]])
     if model.hold == "zoh":
-        following = maneuver.inputs
+        next_inputs = maneuver.inputs
     for k in range(maneuver.samples):
         points = _sigma_points(joint, P, scale)
         y = _outputs(filter_, points, maneuver.inputs[k])
@@ -306,9 +309,9 @@ def _unscented_pass(
         P = P - K @ S @ K.T
         P = 0.5 * (P + P.T)
         points = _sigma_points(joint, P, scale)
-        moved = _advance(filter_, points, maneuver.inputs[k], following[k], maneuver.dt_s)
-        joint = mean_weight @ moved
-        d = moved - joint
+        propagated = _advance(filter_, points, maneuver.inputs[k], next_inputs[k], maneuver.dt_s)
+        joint = mean_weight @ propagated
+        d = propagated - joint
         P = (weight[:, None] * d).T @ d + Q
         P = 0.5 * (P + P.T)
     return joint, P, e, white
@@ -373,6 +376,6 @@ def _advance(filter_: _Filter, points: Array, u0: Array, u1: Array, dt_s: float)
     k2 = rate(x + 0.5 * dt_s * k1, middle)
     k3 = rate(x + 0.5 * dt_s * k2, middle)
     k4 = rate(x + dt_s * k3, u1)
-    moved = points.copy()
-    moved[:, : x.shape[1]] = x + dt_s / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-    return moved
+    propagated = points.copy()
+    propagated[:, : x.shape[1]] = x + dt_s / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    return propagated

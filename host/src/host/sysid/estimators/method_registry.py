@@ -1,6 +1,6 @@
-"""One door to every method: `fit(method, model, maneuvers)`.
+"""Registry of the estimation methods: `fit(method, model, maneuvers)`.
 
-Methods register here by name and are imported when first used.
+A method is imported when it is first used.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ NO_MOTION = 1e-30  # in any unit: an output that moves less holds nothing, and i
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """Where a method lives and how it is called.
+    """Module and function of a method.
 
-    `options` are the settings that make this name out of a more general function.
+    `options` are the settings with which the function is this method.
     """
 
     module: str
@@ -138,7 +138,7 @@ def fit(
     )
     _check(model, maneuvers)
     try:
-        # Every number that comes back is looked at below; on the way there trials may overflow.
+        # Every number of the result is checked below; during the search trials may overflow.
         with np.errstate(all="ignore"):
             result: FitResult = function(model, maneuvers, **{**dict(entry.options), **options})
     except (np.linalg.LinAlgError, ZeroDivisionError) as error:
@@ -156,14 +156,15 @@ def fit(
 
 
 def _check(model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:
-    """Refuse what no method can fit: columns that do not fit the model, outputs that never move."""
+    """Raise if no method can fit: columns that do not fit the model, outputs that never move."""
     if not model.parameter_names:
         raise IdentificationError(f"model {model.name} has no free parameter: nothing to fit")
     for maneuver in maneuvers:
         check_shapes(model, maneuver)
-    moved = np.max([np.ptp(m.outputs, axis=0) for m in maneuvers], axis=0)
-    still = [y for y, size in zip(model.outputs, moved, strict=True) if size < NO_MOTION]
-    if still:
+    span = np.max([np.ptp(m.outputs, axis=0) for m in maneuvers], axis=0)
+    constant = [y for y, size in zip(model.outputs, span, strict=True) if size < NO_MOTION]
+    if constant:
         raise IdentificationError(
-            f"{maneuvers[0].name}: {', '.join(still)} never moved: a dead sensor, or not connected"
+            f"{maneuvers[0].name}: {', '.join(constant)} never moved:"
+            " a dead sensor, or not connected"
         )

@@ -1,12 +1,9 @@
-"""Search from several starts where the first one may have led into a wrong valley.
+"""Multistart: search from several starts where the first may have led to a local minimum.
 
-Differentiated noise draws equation error far off where the noise is large and the motion fast.
-Where the first search ends without convergence, leaves more than the sensors' own noise or ends in
-a nearly flat valley, others start where a model that follows the measured states leads
-(`following`). Where those do not settle it, more start from equation error on filtered signals:
-states, inputs and rates pass one lag, whose derivative needs no differentiation (state variable
-filter; Garnier & Wang (eds.), Identification of Continuous-time Models from Sampled Data, 2008),
-then with the simulated response as instruments.
+Differentiated noise biases equation error where noise is large and motion fast. If the first search
+does not converge, leaves more than the sensors' own noise or ends where the information is nearly
+singular, further searches start from `homotopy_start`. If those do not help, more start from
+equation error on signals behind a state variable filter, then with simulated instruments.
 """
 
 from __future__ import annotations
@@ -31,14 +28,14 @@ from host.sysid.numerics.output_error import Optimum, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.recursion import simulate
 
-HOMOTOPY_GAINS_RADPS = ((2.0, 0.5), (6.0, 1.5, 0.4))  # rates of following, one search each
-CORNERS_RADPS = (0.5, 2.0, 6.0, 20.0)  # of the lag: slow and fast motions of small aircraft
+HOMOTOPY_GAINS_RADPS = ((2.0, 0.5), (6.0, 1.5, 0.4))  # falling feedback gains, one search each
+CORNERS_RADPS = (0.5, 2.0, 6.0, 20.0)  # of the filter: slow to fast motion of small aircraft
 INSTRUMENT_CORNERS_RADPS = (2.0, 6.0)
 INSTRUMENT_ROUNDS = 3
-FILTER_TIME_CONSTANTS = 3.0  # time constants until the lag has forgotten its start
-EXCESS_POWER = 2.0  # residual over white noise power: from here on the fit is looked at again
-MOST_STARTS = 4  # searches from other starts
-LAST_SEARCH_ITERATIONS = 200  # iterations where none of them has converged
+FILTER_TIME_CONSTANTS = 3.0  # length of the transient that is cut off
+EXCESS_POWER = 2.0  # residual over white-noise power: above it other starts are tried
+MOST_STARTS = 4  # further searches
+LAST_SEARCH_ITERATIONS = 200  # where none of them has converged
 LEAST_SAMPLES = 50
 
 
@@ -51,8 +48,8 @@ def multistart(problem: OutputProblem, theta: Array, *, multiple_starts: bool = 
     theta : Array, shape (P,)
         Start.
     multiple_starts : bool
-        Look further from an optimum that leaves more than white noise or lies in a flat valley
-        (default). In a flight the gusts leave more than noise at every optimum.
+        Try other starts if the optimum leaves more than white noise or its information is nearly
+        singular (default). In a flight gusts leave more than noise at every optimum.
 
     Raises
     ------
@@ -62,17 +59,17 @@ def multistart(problem: OutputProblem, theta: Array, *, multiple_starts: bool = 
     best, failure = _try(problem, None, theta)
     if best is not None and best.converged and not multiple_starts:
         return best
-    settled = best is not None and best.converged and _residuals_are_noise(problem, best)
-    if best is not None and settled and not _nearly_singular(best):
+    accepted = best is not None and best.converged and _residuals_are_noise(problem, best)
+    if best is not None and accepted and not _nearly_singular(best):
         return best
     for rates_radps in HOMOTOPY_GAINS_RADPS:
         try:
-            led = homotopy_start(problem, theta, rates_radps)
+            homotopy_theta = homotopy_start(problem, theta, rates_radps)
         except IdentificationError:
             continue
-        best, _ = _try(problem, best, led)
-    settled = best is not None and best.converged and _residuals_are_noise(problem, best)
-    if not settled:
+        best, _ = _try(problem, best, homotopy_theta)
+    accepted = best is not None and best.converged and _residuals_are_noise(problem, best)
+    if not accepted:
         known = best if best is not None and best.converged else None
         for start in _starts(problem, theta, known)[:MOST_STARTS]:
             best, _ = _try(problem, best, start)
@@ -96,7 +93,7 @@ def _try(
 
 
 def _nearly_singular(optimum: Optimum) -> bool:
-    """Whether the information is close to singular: valleys are long there, and many."""
+    """Return whether the information is close to singular; minima are then shallow and several."""
     information = optimum.information[np.ix_(optimum.free, optimum.free)]
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values = np.linalg.eigvalsh(information / np.outer(scale, scale))
@@ -104,7 +101,7 @@ def _nearly_singular(optimum: Optimum) -> bool:
 
 
 def white_cost(problem: OutputProblem, theta: Array) -> float:
-    """Return the concentrated likelihood of white noise as `minimise` counts it."""
+    """Return the concentrated cost of white noise as `minimise` defines it."""
     outputs = problem.outputs(theta)
     if outputs is None:
         return np.inf
@@ -125,10 +122,10 @@ def _residuals_are_noise(problem: OutputProblem, optimum: Optimum) -> bool:
     return bool(np.all(power <= EXCESS_POWER * noise))
 
 
-def _starts(problem: OutputProblem, theta: Array, settled: Optimum | None) -> list[Array]:
-    """Return other starts, the deepest first; none where a state is not seen.
+def _starts(problem: OutputProblem, theta: Array, accepted: Optimum | None) -> list[Array]:
+    """Return other starts, that of the least cost first.
 
-    Nor where a search has settled and none of them begins deeper than that.
+    There are none if a state is not measured, or if an accepted optimum has a lower cost than each.
     """
     try:
         problem.model.measured_states()
@@ -137,7 +134,7 @@ def _starts(problem: OutputProblem, theta: Array, settled: Optimum | None) -> li
     found: list[tuple[float, Array]] = []
     for corner in CORNERS_RADPS:
         _add(found, problem, _filtered_equation_error(problem, corner, None))
-    if settled is not None and all(cost >= settled.cost for cost, _ in found):
+    if accepted is not None and all(cost >= accepted.cost for cost, _ in found):
         return []
     first = white_cost(problem, theta)
     for _ in range(INSTRUMENT_ROUNDS):
@@ -160,20 +157,24 @@ def _add(found: list[tuple[float, Array]], problem: OutputProblem, start: Array 
 def _filtered_equation_error(
     problem: OutputProblem, corner_radps: float, simulated: list[Array] | None
 ) -> Array | None:
-    """Solve equation error on lagged signals, with a simulated response as instruments."""
+    """Solve equation error on filtered signals, with a simulated response as instruments if given.
+
+    State variable filter: Garnier & Wang (eds.), Identification of Continuous-time Models from
+    Sampled Data, 2008.
+    """
     model = problem.model
     try:
         lagged = [_state_variable_filter(model, m, corner_radps) for m in problem.maneuvers]
-        names, rows = regression_equations(model, lagged)
+        names, equations = regression_equations(model, lagged)
         if simulated is None:
-            estimate = solve_least_squares(rows, len(names))
+            estimate = solve_least_squares(equations, len(names))
         else:
-            calm = [
+            instrument = [
                 _state_variable_filter(model, replace(m, outputs=y.T), corner_radps)
                 for m, y in zip(problem.maneuvers, simulated, strict=True)
             ]
-            _, instruments = regression_equations(model, calm)
-            estimate = _instrumental_variables(rows, instruments, len(names))
+            _, instruments = regression_equations(model, instrument)
+            estimate = _instrumental_variables(equations, instruments, len(names))
     except (IdentificationError, np.linalg.LinAlgError):
         return None
     theta = problem.first_guess()
@@ -184,38 +185,39 @@ def _filtered_equation_error(
 
 
 def _instrumental_variables(
-    rows: list[RegressionEquation], instruments: list[RegressionEquation], count: int
+    equations: list[RegressionEquation], instruments: list[RegressionEquation], count: int
 ) -> Array:
+    """Solve (Z'X) theta = Z'z with instruments Z (Ljung, 2nd ed., sec. 7.6)."""
     normal, right = np.zeros((count, count)), np.zeros(count)
-    for row, calm in zip(rows, instruments, strict=True):
-        normal += calm.regressors.T @ row.regressors
-        right += calm.regressors.T @ row.target
+    for row, instrument in zip(equations, instruments, strict=True):
+        normal += instrument.regressors.T @ row.regressors
+        right += instrument.regressors.T @ row.dependent
     scale = np.sqrt(np.maximum(np.abs(np.diag(normal)), 1e-300))
     return np.asarray(np.linalg.solve(normal / np.outer(scale, scale), right / scale) / scale)
 
 
 def _state_variable_filter(model: LinearModel, maneuver: Maneuver, corner_radps: float) -> Maneuver:
-    """Pass everything through corner / (s + corner); rates of the lagged states are exact."""
-    keep = float(np.exp(-corner_radps * maneuver.dt_s))
-    skip = round(FILTER_TIME_CONSTANTS / (corner_radps * maneuver.dt_s))
-    if maneuver.samples - skip < LEAST_SAMPLES:
+    """Filter all signals by corner / (s + corner); rates of the filtered states are then exact."""
+    pole = float(np.exp(-corner_radps * maneuver.dt_s))
+    transient = round(FILTER_TIME_CONSTANTS / (corner_radps * maneuver.dt_s))
+    if maneuver.samples - transient < LEAST_SAMPLES:
         raise IdentificationError(f"{maneuver.name}: too short for a lag of {corner_radps} rad/s")
-    outputs = _first_order_lag(maneuver.outputs, keep, held=False)
-    inputs = _first_order_lag(maneuver.inputs, keep, held=model.hold == "zoh")
-    seen = model.measured_states()
+    outputs = _first_order_lag(maneuver.outputs, pole, held=False)
+    inputs = _first_order_lag(maneuver.inputs, pole, held=model.hold == "zoh")
+    measured = model.measured_states()
     return Maneuver(
         maneuver.dt_s,
-        inputs[skip:],
-        outputs[skip:],
-        rates=corner_radps * (maneuver.outputs - outputs)[skip:, seen],
+        inputs[transient:],
+        outputs[transient:],
+        rates=corner_radps * (maneuver.outputs - outputs)[transient:, measured],
         name=maneuver.name,
     )
 
 
-def _first_order_lag(values: Array, keep: float, *, held: bool) -> Array:
-    """Pass columns through a lag from rest; they run linearly between samples unless held."""
-    following = values if held else 0.5 * (values + np.vstack([values[1:], values[-1:]]))
+def _first_order_lag(values: Array, pole: float, *, held: bool) -> Array:
+    """Filter columns by a first-order lag from rest, linear between samples unless held."""
+    held_input = values if held else 0.5 * (values + np.vstack([values[1:], values[-1:]]))
     columns = values.shape[1]
-    step = np.hstack([keep * np.eye(columns), np.eye(columns)])
-    _, z = simulate(step, np.ascontiguousarray((1.0 - keep) * following), np.zeros(columns))
+    step = np.hstack([pole * np.eye(columns), np.eye(columns)])
+    _, z = simulate(step, np.ascontiguousarray((1.0 - pole) * held_input), np.zeros(columns))
     return z[:, :columns]

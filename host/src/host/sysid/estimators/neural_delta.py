@@ -1,11 +1,4 @@
-"""Neural delta method: derivatives from a trained network by finite perturbation.
-
-A small network learns state rates (and accelerations) from states and inputs; each input is then
-moved up and down by a finite step at every sample and the mean response is the derivative.
-Raisinghani, Ghosh & Kalra, Two new techniques for aircraft parameter estimation using neural
-networks, Aeronautical Journal 102 (1998). Its spread over samples says how linear the network is,
-not how sure the derivative: the covariance comes from repeated training on resampled blocks.
-"""
+"""Neural delta method: derivatives from a trained network by finite perturbation."""
 
 from __future__ import annotations
 
@@ -24,9 +17,8 @@ from host.sysid.models.state_space_model import LinearModel
 
 NEURONS = 6
 DECAY_LEAST = 1e-3
-DECAY_PER_NOISE = (
-    0.5  # of the share of the target that a plane leaves: 67 % error without, 10 % with
-)
+# Of the share of the dependent variable that a plane does not explain: 10 % error instead of 67 %.
+DECAY_PER_NOISE = 0.5
 STEP = 0.5  # perturbation in standard deviations of the input
 BLOCKS = 20
 
@@ -41,6 +33,12 @@ def fit_neural(
     bandwidth: float | None = None,
 ) -> FitResult:
     """Fit by the neural delta method.
+
+    A small network learns state rates (and accelerations) from states and inputs. Each input is
+    then perturbed up and down at every sample; the mean central difference is the derivative
+    (Raisinghani, Ghosh & Kalra, Aeronautical Journal 102, 1998). Its scatter over samples measures
+    how linear the network is, not how certain the derivative is. The covariance comes from repeated
+    training on resampled blocks.
 
     Parameters
     ----------
@@ -57,14 +55,14 @@ def fit_neural(
     """
     if repeats < 3:
         raise IdentificationError(f"{repeats} trainings tell no scatter, at least 3 are needed")
-    names, rows = regression_equations(model, maneuvers, bandwidth=bandwidth)
+    names, equations = regression_equations(model, maneuvers, bandwidth=bandwidth)
     theta = np.zeros(len(names))
     scatter = np.zeros((repeats, len(names)))
     rng = np.random.default_rng(seed)
-    for equation in sorted({row.equation for row in rows}):
-        mine: list[RegressionEquation] = [row for row in rows if row.equation == equation]
-        X = np.vstack([row.regressors for row in mine])
-        y = np.concatenate([row.target for row in mine])
+    for equation in sorted({block.equation for block in equations}):
+        own: list[RegressionEquation] = [block for block in equations if block.equation == equation]
+        X = np.vstack([block.regressors for block in own])
+        y = np.concatenate([block.dependent for block in own])
         active = np.flatnonzero(X.std(axis=0) > 0.0)
         if theta[active].any():
             raise IdentificationError(
@@ -79,7 +77,7 @@ def fit_neural(
     covariance = np.cov(scatter.T) + 1e-300 * np.eye(len(names))
     batch = fit_equation_error(model, maneuvers, bandwidth=bandwidth)
     residuals = tuple(
-        np.column_stack([r.residual(theta) for r in rows if r.maneuver == number])
+        np.column_stack([r.residual(theta) for r in equations if r.maneuver == number])
         for number in range(len(maneuvers))
     )
     return FitResult(
@@ -106,8 +104,8 @@ def _derivatives(X: Array, y: Array, neurons: int, rng: np.random.Generator) -> 
     centre, size = float(y.mean()), float(y.std()) or 1.0
     z, t = (X - mean) / spread, (y - centre) / size
     n = z.shape[1]
-    plane = np.linalg.lstsq(z, t, rcond=None)[0]
-    decay = DECAY_LEAST + DECAY_PER_NOISE * float(np.mean((t - z @ plane) ** 2))
+    linear_fit = np.linalg.lstsq(z, t, rcond=None)[0]
+    decay = DECAY_LEAST + DECAY_PER_NOISE * float(np.mean((t - z @ linear_fit) ** 2))
     start = 0.3 * rng.standard_normal(neurons * (n + 2) + 1)
 
     def unpack(w: Array) -> tuple[Array, Array, Array, float]:
@@ -119,12 +117,12 @@ def _derivatives(X: Array, y: Array, neurons: int, rng: np.random.Generator) -> 
     def loss(w: Array) -> tuple[float, Array]:
         inner, offset, outer, last = unpack(w)
         h = np.tanh(z @ inner + offset)
-        miss = h @ outer + last - t
-        back = (miss[:, None] * outer) * (1.0 - h**2) / len(t)
+        residual = h @ outer + last - t
+        back = (residual[:, None] * outer) * (1.0 - h**2) / len(t)
         gradient = np.concatenate(
-            [(z.T @ back).ravel(), back.sum(axis=0), h.T @ miss / len(t), [miss.mean()]]
+            [(z.T @ back).ravel(), back.sum(axis=0), h.T @ residual / len(t), [residual.mean()]]
         )
-        return 0.5 * float(np.mean(miss**2)) + 0.5 * decay * float(w @ w) / len(w), (
+        return 0.5 * float(np.mean(residual**2)) + 0.5 * decay * float(w @ w) / len(w), (
             gradient + decay * w / len(w)
         )
 

@@ -1,8 +1,7 @@
-"""Is it the air or the sensors? Filter error held against output error with coloured noise.
+"""Compare process noise (filter error) with coloured measurement noise (output error) by BIC.
 
-Sensor noise with memory looks like process noise to filter error: the filter then follows what is
-no motion. Both explanations have an exact likelihood on the same outputs, so the Bayesian
-information criterion tells them apart (Schwarz, Annals of Statistics 6, 1978).
+Filter error takes coloured sensor noise for process noise; the filter then follows a motion that
+did not happen. Both models have an exact likelihood on the same outputs.
 """
 
 from __future__ import annotations
@@ -24,7 +23,10 @@ DECISIVE = 10.0  # Kass & Raftery, JASA 90 (1995): "very strong" on the scale of
 def compare_noise_models(
     result: FitResult, maneuvers: Sequence[Maneuver], start: Array
 ) -> FitResult:
-    """Compare a filter-error result with output error whose noise has a memory.
+    """Compare a filter-error result with output error whose noise is autoregressive.
+
+    The Bayesian information criterion is -2 ln L + k ln N with k unknowns and N samples (Schwarz,
+    Annals of Statistics 6, 1978; Ljung, System Identification, 2nd ed., ch. 16).
 
     Parameters
     ----------
@@ -33,14 +35,14 @@ def compare_noise_models(
     maneuvers : sequence of Maneuver
         What it was fitted to.
     start : Array
-        Start of output error, the model's own vector.
+        Start of output error: the vector of the model without noise parameters.
 
     Returns
     -------
     FitResult
-        With ``bic_over_coloured_noise`` in `details`, positive where the sensors explain the data
-        better. Where they do so decisively a warning says it, and the covariance of the model's
-        parameters becomes that of output error plus the square of the distance between both.
+        With ``bic_over_coloured_noise`` in `details`, positive where coloured measurement noise
+        explains the data better. Where it does so decisively there is a warning, and the covariance
+        of the model's parameters is that of output error plus the squared difference of both.
     """
     try:
         alternative = fit_output_error(result.model, maneuvers, start=start)
@@ -49,9 +51,9 @@ def compare_noise_models(
     orders = np.asarray(alternative.details["noise_orders"])
     rows, outputs = sum(m.samples for m in maneuvers), len(result.model.outputs)
     likelihood = float(alternative.details["cost"]) + 0.5 * rows * outputs
-    unknown = len(alternative.estimate) + outputs + float(np.sum(orders))
+    parameters = len(alternative.estimate) + outputs + float(np.sum(orders))
     excess = 2.0 * (float(result.details["cost"]) - likelihood)
-    excess += float(np.log(rows)) * (len(result.estimate) - unknown)
+    excess += float(np.log(rows)) * (len(result.estimate) - parameters)
     details = {**result.details, "bic_over_coloured_noise": excess}
     if not alternative.converged or excess < DECISIVE or not np.any(orders):
         return replace(result, details=details)
@@ -62,7 +64,7 @@ def compare_noise_models(
     covariance[:count, :count] = alternative.covariance + np.outer(distance, distance)
     freedom = result.degrees_of_freedom.copy()
     freedom[:count] = np.minimum(freedom[:count], alternative.degrees_of_freedom)
-    said = (
+    warning = (
         "noise of the sensors with a memory explains the data better than moving air (BIC"
         f" {excess:.0f} lower): use output-error; intervals widened to hold its answer"
     )
@@ -70,6 +72,6 @@ def compare_noise_models(
         result,
         covariance=covariance,
         degrees_of_freedom=freedom,
-        warnings=(*result.warnings, said),
+        warnings=(*result.warnings, warning),
         details=details,
     )

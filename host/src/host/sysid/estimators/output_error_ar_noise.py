@@ -1,14 +1,15 @@
-"""Output error with intervals that cover: residual memory is estimated, whitened and refitted.
+"""Output error with autoregressive residuals, whose intervals cover.
 
-The standard correction (Morelli & Klein 1997) keeps the white fit and repairs its covariance from
-raw residual autocorrelations; those are biased low, so it covers 87-90 %. Here instead
+The standard correction (Morelli & Klein 1997) keeps the fit for white noise and corrects its
+covariance by sample autocorrelations of the residuals. Those are biased low: it covers 87-90 %.
+Here
 
-1. residuals of each output get an autoregressive model, order by BIC, from moments to which the
-   share eaten by the fit is given back (`noise`): restricted maximum likelihood;
-2. output error is refitted with the whitened likelihood, which is also the efficient estimate, so
-   that the interval is near the bound for known noise and not only honest;
-3. the uncertainty of the noise model itself goes into the interval: a t quantile whose degrees of
-   freedom follow Satterthwaite from the information of the noise parameters.
+1. the noise of each output gets an AR model, its order by BIC, estimated by restricted maximum
+   likelihood (`ar_noise.lagged_moments`);
+2. output error is fitted again with the whitened likelihood, which gives the efficient estimate and
+   an interval near the Cramer-Rao bound of known noise;
+3. the uncertainty of the noise model widens the interval by a t quantile, its degrees of freedom
+   after Satterthwaite.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ SMALLEST_DOF = 3.0
 
 @dataclass(frozen=True)
 class ArNoiseFit:
-    """A fit whose covariance and degrees of freedom belong to its estimated noise model."""
+    """A fit whose covariance and degrees of freedom belong to its estimated AR noise models."""
 
     optimum: Optimum
     covariance: Array
@@ -57,7 +58,7 @@ def fit_with_ar_noise(
     criterion: str = "bic",
     multiple_starts: bool = True,
 ) -> ArNoiseFit:
-    """Fit output error and the memory of its noise together.
+    """Fit output error and the AR models of its noise together.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def fit_with_ar_noise(
 def _information(
     problem: OutputProblem, optimum: Optimum, noise: Sequence[ArNoise], variance: Array
 ) -> tuple[Array, list[Array]]:
-    """Return the information matrix and the whitened slopes."""
+    """Return the information matrix and the whitened sensitivities."""
     slopes = whitened_sensitivities(problem, optimum.responses, noise)
     information = np.diag(problem.prior_precision)
     for number, block in enumerate(slopes):
@@ -126,11 +127,11 @@ def _covariance(
 def _innovation_variances(
     problem: OutputProblem, optimum: Optimum, noise: Sequence[ArNoise], variance: Array
 ) -> Array:
-    """Return unbiased innovation variances: each output's share of the parameters is counted."""
+    """Return unbiased innovation variances; each output loses its share of the parameters."""
     for _ in range(3):
         information, slopes = _information(problem, optimum, noise, variance)
         covariance = covariance_of_free(information, optimum.free)
-        fresh = np.zeros(len(noise))
+        updated = np.zeros(len(noise))
         for j, memory in enumerate(noise):
             squares, share = 0.0, 0.0
             for number, block in enumerate(slopes):
@@ -139,10 +140,10 @@ def _innovation_variances(
                 share += float(np.sum((block[j].T @ block[j]) * local)) / variance[j]
                 white = memory.whiten(optimum.residuals[number][j][:, None])
                 squares += float(np.sum(white**2))
-            fresh[j] = squares / max(problem.samples - share, 1.0)
-        settled = bool(np.all(np.abs(fresh - variance) < 1e-6 * fresh))
-        variance = np.maximum(fresh, 1e-300)
-        if settled:
+            updated[j] = squares / max(problem.samples - share, 1.0)
+        converged = bool(np.all(np.abs(updated - variance) < 1e-6 * updated))
+        variance = np.maximum(updated, 1e-300)
+        if converged:
             break
     return variance
 
@@ -157,13 +158,13 @@ def _fit_ar_models(
     orders: list[int] | None,
 ) -> tuple[list[ArNoise], Array, list[int]]:
     """Estimate the AR model of each output by expectation-maximisation at a fixed fit."""
-    chosen = list(orders) if orders is not None else [-1] * len(noise)
+    selected = list(orders) if orders is not None else [-1] * len(noise)
     memory = list(noise)
     for round_number in range(MOMENT_ROUNDS):
         information, _ = _information(problem, optimum, memory, variance)
         covariance = covariance_of_free(information, optimum.free)
         lower = _matrix_root(covariance)
-        fresh, change = [], 0.0
+        updated, change = [], 0.0
         variance = variance.copy()
         for j in range(len(memory)):
             residuals = [r[j] for r in optimum.residuals]
@@ -171,12 +172,12 @@ def _fit_ar_models(
                 response.sensitivities[j] @ lower[problem.columns(number)]
                 for number, response in enumerate(optimum.responses)
             ]
-            top = highest if chosen[j] < 0 or round_number < 2 else chosen[j]
+            top = highest if selected[j] < 0 or round_number < 2 else selected[j]
             moments = lagged_moments(residuals, shares, top)
             count = problem.samples - top * len(residuals)
             if orders is None and round_number < 2:
-                chosen[j] = choose_order(moments, count, criterion=criterion)
-            order = chosen[j]
+                selected[j] = choose_order(moments, count, criterion=criterion)
+            order = selected[j]
             coefficient, innovation = fit_ar(moments[: order + 1, : order + 1], order)
             variance[j] = max(innovation / count, 1e-300)
             old = memory[j].coefficient
@@ -184,11 +185,11 @@ def _fit_ar_models(
                 change = max(change, float(np.max(np.abs(coefficient - old), initial=0.0)))
             else:
                 change = np.inf
-            fresh.append(ArNoise.from_coefficient(coefficient))
-        memory = fresh
+            updated.append(ArNoise.from_coefficient(coefficient))
+        memory = updated
         if change < COEFFICIENT_CHANGE:
             break
-    return memory, variance, chosen
+    return memory, variance, selected
 
 
 def _matrix_root(covariance: Array) -> Array:
@@ -203,16 +204,17 @@ def _satterthwaite(
     variance: Array,
     covariance: Array,
 ) -> Array:
-    """Return degrees of freedom per parameter: 2 / var(log of its variance).
+    """Return degrees of freedom per parameter, 2 / var(log of its variance).
 
-    The log variance moves with log innovation variances (whose own variance is 2 / samples) and
-    with the AR coefficients (asymptotic covariance R^-1 / samples, R the autocovariance matrix in
-    units of the innovation); derivatives are central differences.
+    Satterthwaite, Biometrics Bulletin 2 (1946). The log variance depends on log innovation
+    variances (whose own variance is 2 / samples) and on the AR coefficients (asymptotic covariance
+    R^-1 / samples, R the autocovariance matrix in units of the innovation); derivatives are central
+    differences.
     """
     samples = problem.samples
     free = np.flatnonzero(np.diag(covariance) > 0.0)
     base = np.diag(covariance)[free]
-    spread = np.zeros(len(free))
+    variance_of_log = np.zeros(len(free))
     blocks = _information_per_output(problem, optimum, noise)
     total = np.diag(problem.prior_precision) + sum(
         b / v for b, v in zip(blocks, variance, strict=True)
@@ -222,7 +224,7 @@ def _satterthwaite(
         slope = np.einsum(
             "ij,jk,ki->i", covariance[free], blocks[j] / variance[j], covariance[:, free]
         )
-        spread += (slope / base) ** 2 * 2.0 / samples
+        variance_of_log += (slope / base) ** 2 * 2.0 / samples
         if memory.order == 0:
             continue
         scatter = np.linalg.inv(_toeplitz(memory)) / samples
@@ -231,16 +233,16 @@ def _satterthwaite(
             width = 0.1 * np.sqrt(scatter[k, k])
             change = np.zeros_like(total)
             for sign in (1.0, -1.0):
-                moved = memory.coefficient.copy()
-                moved[k] += sign * width
-                # Interior of the record only: a moved coefficient need not be stationary.
-                change += sign * _filtered_information(problem, optimum, j, moved)
+                shifted = memory.coefficient.copy()
+                shifted[k] += sign * width
+                # Interior of the record only: a shifted coefficient need not be stationary.
+                change += sign * _filtered_information(problem, optimum, j, shifted)
             change /= 2.0 * width * variance[j]
             inner = -np.einsum("ij,jk,ki->i", covariance[free], change, covariance[:, free])
             slopes[k] = inner / base
-        spread += np.einsum("ki,kl,li->i", slopes, scatter, slopes)
+        variance_of_log += np.einsum("ki,kl,li->i", slopes, scatter, slopes)
     dof = np.full(len(covariance), np.inf)
-    dof[free] = np.maximum(2.0 / np.maximum(spread, 1e-12), SMALLEST_DOF)
+    dof[free] = np.maximum(2.0 / np.maximum(variance_of_log, 1e-12), SMALLEST_DOF)
     return dof
 
 

@@ -1,4 +1,4 @@
-"""Output error as one of the methods: start values, search, intervals, one result."""
+"""Output error as a method: start values, search, intervals, result."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def fit_output_error(
     model, maneuvers
         Model and data; the states need not be measured.
     coloured_noise : bool
-        Model the memory of the noise, refit with it and let the intervals stand on it (default).
-        Without, noise is taken as white for the estimate and the covariance is corrected by the
-        residual autocorrelation (Morelli & Klein 1997), the standard that covers 87-90 %.
+        Estimate AR models of the noise, refit with them and base the intervals on them (default).
+        Otherwise the noise is taken as white for the estimate, and the covariance is corrected by
+        the residual autocorrelation (Morelli & Klein 1997), the standard that covers 87-90 %.
     start : Array, optional
-        Whole start vector; equation error gives it without.
+        Whole start vector; by default from equation error.
     highest_order, criterion, multiple_starts
         See `fit_with_ar_noise`.
 
@@ -95,9 +95,9 @@ def _maneuver_influence(problem: OutputProblem, fit: ArNoiseFit) -> dict[str, fl
     for number, residual in enumerate(fit.optimum.residuals):
         part, score = np.zeros((size, size)), np.zeros(size)
         own = problem.columns(number)
-        for j, memory in enumerate(fit.noise):
+        for j, ar_model in enumerate(fit.noise):
             J = slopes[number][j]
-            white = memory.whiten(residual[j][:, None])[:, 0]
+            white = ar_model.whiten(residual[j][:, None])[:, 0]
             part[np.ix_(own, own)] += J.T @ J / fit.innovation_variance[j]
             score[own] += J.T @ white / fit.innovation_variance[j]
         parts.append(part)
@@ -106,30 +106,33 @@ def _maneuver_influence(problem: OutputProblem, fit: ArNoiseFit) -> dict[str, fl
 
 
 def _warnings(problem: OutputProblem, fit: ArNoiseFit) -> tuple[str, ...]:
-    found = []
+    warnings = []
     if not fit.optimum.converged:
-        found.append(
+        warnings.append(
             f"no convergence: the last step was {fit.optimum.step:.3g} Cramer-Rao bounds long"
         )
-    held = [n for n, free in zip(problem.names, fit.optimum.free, strict=True) if not free]
-    if held:
-        found.append(f"on a bound, so without an interval: {', '.join(held)}")
-    return tuple(found)
+    on_bound = [n for n, free in zip(problem.names, fit.optimum.free, strict=True) if not free]
+    if on_bound:
+        warnings.append(f"on a bound, so without an interval: {', '.join(on_bound)}")
+    return tuple(warnings)
 
 
 def coloured_output_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array:
-    """Return the white covariance corrected by residual autocorrelations (the usual sandwich)."""
+    """Return M^-1 (sum S' R S) M^-1, the white covariance corrected for coloured residuals.
+
+    Morelli & Klein, Journal of Guidance, Control and Dynamics 20 (1997).
+    """
     white = fit.covariance_white
-    middle = np.zeros_like(white)
+    score_covariance = np.zeros_like(white)
     for number, response in enumerate(fit.optimum.responses):
         columns = problem.columns(number)
         for j, variance in enumerate(fit.optimum.variance):
             residual = fit.optimum.residuals[number][j]
             part = coloured_score_covariance(residual, response.sensitivities[j]) / variance**2
-            middle[np.ix_(columns, columns)] += part
-    result = white @ middle @ white
+            score_covariance[np.ix_(columns, columns)] += part
+    result = white @ score_covariance @ white
     result = 0.5 * (result + result.T)
-    low = np.diag(result) <= 0.0
-    result[low], result[:, low] = white[low], white[:, low]
+    not_positive = np.diag(result) <= 0.0
+    result[not_positive], result[:, not_positive] = white[not_positive], white[:, not_positive]
     result += unidentifiable_covariance(fit.optimum.information, fit.optimum.free)
     return np.asarray(result, dtype=np.float64)

@@ -1,8 +1,4 @@
-"""Estimates that run beside the data: recursive least squares and recursive Fourier regression.
-
-Ljung, System Identification, 2nd ed., sec. 11.2; Morelli, Real-time parameter estimation in the
-frequency domain, Journal of Guidance, Control and Dynamics 23 (2000).
-"""
+"""Recursive (real-time) estimation: least squares and regression on Fourier transforms."""
 
 from __future__ import annotations
 
@@ -27,12 +23,15 @@ from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.output_error_problem import check_shapes
 
 Spectrum = NDArray[np.complexfloating]
-START_VARIANCE = 1e8  # of scaled regressors: a start that weighs nothing
+START_VARIANCE = 1e8  # of scaled regressors: a start with negligible weight
 SPACING_HZ = 0.04  # spacing of the running transforms
 
 
 def update(theta: Array, P: Array, regressors: Array, targets: Array, forgetting: float) -> Array:
     """Run recursive least squares over samples, in place.
+
+    The gain is K = P x / (lambda + x'P x); theta moves by K (z - x'theta), P becomes (P - K x'P) /
+    lambda with the forgetting factor lambda (Ljung, System Identification, 2nd ed., sec. 11.2).
 
     Parameters
     ----------
@@ -82,13 +81,13 @@ def fit_recursive_least_squares(
     """
     if not 0.0 < forgetting <= 1.0:
         raise IdentificationError(f"forgetting {forgetting}, expected above 0 and at most 1")
-    names, rows = regression_equations(model, maneuvers, bandwidth=bandwidth)
+    names, equations = regression_equations(model, maneuvers, bandwidth=bandwidth)
     theta = np.zeros(len(names))
     histories: list[Array] = []
-    for equation in sorted({row.equation for row in rows}):
-        mine = [row for row in rows if row.equation == equation]
+    for equation in sorted({row.equation for row in equations}):
+        mine = [row for row in equations if row.equation == equation]
         X = np.vstack([row.regressors for row in mine])
-        y = np.concatenate([row.target for row in mine])
+        y = np.concatenate([row.dependent for row in mine])
         active = np.flatnonzero(X.any(axis=0))
         if theta[active].any():
             raise IdentificationError(
@@ -105,7 +104,7 @@ def fit_recursive_least_squares(
         theta[active] = estimate / scale
     batch = fit_equation_error(model, maneuvers, bandwidth=bandwidth)
     return _with_batch_statistics(
-        batch, "recursive least squares", names, theta, np.sum(histories, axis=0), rows
+        batch, "recursive least squares", names, theta, np.sum(histories, axis=0), equations
     )
 
 
@@ -116,7 +115,10 @@ def fit_recursive_fourier(
     limits_hz: tuple[float, float] = (0.1, 2.0),
     every_s: float = 1.0,
 ) -> FitResult:
-    """Fit by regression on running Fourier transforms, an estimate every second.
+    """Fit by regression on recursive Fourier transforms, an estimate every second.
+
+    Morelli, Real-time parameter estimation in the frequency domain, Journal of Guidance, Control
+    and Dynamics 23 (2000).
 
     Rates need no differentiation: the transform of a rate is j w times that of the state. Trim
     and drift are kept out by the lowest frequency and by starting from the first sample.
@@ -138,9 +140,9 @@ def fit_recursive_fourier(
     if len(f) < 4:
         raise IdentificationError(f"band {limits_hz} Hz holds {len(f)} lines, at least 4 needed")
     s = 2j * np.pi * f
-    past = (np.zeros((count, count)), np.zeros(count))
+    previous = (np.zeros((count, count)), np.zeros(count))
     history: list[Array] = []
-    normal, right = past
+    normal, right = previous
     whole: dict[int, list[tuple[Spectrum, Spectrum]]] = {}
     for maneuver in maneuvers:
         last: dict[int, tuple[Spectrum, Spectrum]] = {}
@@ -155,7 +157,7 @@ def fit_recursive_fourier(
         for k in [*range(hop - 1, maneuver.samples - 1, hop), maneuver.samples - 1]:
             z = running[k]
             end = np.exp(-s * time_s[k])[:, None] * signals[k, : len(measured)]
-            normal, right = past[0].copy(), past[1].copy()
+            normal, right = previous[0].copy(), previous[1].copy()
             for row in sorted(set(entries.row.tolist())):
                 X: Spectrum = np.zeros((len(f), count), dtype=np.complex128)
                 for t in np.flatnonzero(entries.row == row):
@@ -168,25 +170,25 @@ def fit_recursive_fourier(
                 history.append(solve_normal_equations(normal, right))
             except IdentificationError:
                 continue  # before the first input there is nothing to estimate
-        past = (normal, right)
+        previous = (normal, right)
         for row, lines in last.items():
             whole.setdefault(row, []).append(lines)
     theta = solve_normal_equations(normal, right)
     batch = fit_equation_error(model, maneuvers)
-    # Equations have unlike residuals: the sandwich weighs each with its own power.
-    middle = np.zeros_like(normal)
+    # Equations have residuals of different power, so each weighs the score covariance with its own.
+    score_covariance = np.zeros_like(normal)
     for parts in whole.values():
         power = float(np.mean([np.mean(np.abs(y - X @ theta) ** 2) for X, y in parts]))
         for X, _ in parts:
-            middle += (X.conj().T @ X).real * power
+            score_covariance += (X.conj().T @ X).real * power
     inverse = covariance_from_information(normal)
     covariance = batch.covariance.copy()
-    covariance[:count, :count] = inverse @ middle @ inverse
-    names, rows = regression_equations(model, maneuvers)
+    covariance[:count, :count] = inverse @ score_covariance @ inverse
+    names, equations = regression_equations(model, maneuvers)
     full = batch.estimate.copy()
     full[:count] = theta
     result = _with_batch_statistics(
-        batch, "recursive Fourier regression", names, full, np.array(history), rows
+        batch, "recursive Fourier regression", names, full, np.array(history), equations
     )
     return replace(result, covariance=covariance, covariance_white=covariance)
 
@@ -197,15 +199,15 @@ def _with_batch_statistics(
     names: tuple[str, ...],
     theta: Array,
     history: Array,
-    rows: list[RegressionEquation],
+    equations: list[RegressionEquation],
 ) -> FitResult:
     """Return a result with the residuals and covariance of the batch regression."""
     residuals = tuple(
-        np.column_stack([row.residual(theta) for row in rows if row.maneuver == number])
+        np.column_stack([row.residual(theta) for row in equations if row.maneuver == number])
         for number in range(len(batch.residuals))
     )
     fitted = tuple(
-        np.column_stack([row.fitted(theta) for row in rows if row.maneuver == number])
+        np.column_stack([row.fitted(theta) for row in equations if row.maneuver == number])
         for number in range(len(batch.residuals))
     )
     return FitResult(

@@ -1,8 +1,4 @@
-"""A model as regressions of measured rates and outputs on states and inputs; solving them.
-
-Klein & Morelli, Aircraft System Identification, ch. 5. Rates come from differentiation where they
-were not measured.
-"""
+"""The equations of a model as linear regressions, and their least-squares solution."""
 
 from __future__ import annotations
 
@@ -28,35 +24,49 @@ NO_EXCITATION = "a parameter has no regressor: its state or input never moved"
 
 @dataclass(frozen=True, slots=True)
 class RegressionEquation:
-    """One regression: `target` = `regressors` @ theta + residual, in one maneuver.
+    """One equation of the model in one maneuver, z = X theta + residual.
 
-    `equation` numbers the equation across maneuvers, `columns` are the parameters whose regressor
-    ever moves and `block` those regressors, (samples, columns); `noisy`, one per parameter, marks
-    regressors made of measured states (inputs and constants are exact).
+    Klein & Morelli, Aircraft System Identification, ch. 5.
+
+    Attributes
+    ----------
+    equation : int
+        Number of the equation, the same in every maneuver.
+    label : str
+        State or output it is of.
+    maneuver : int
+    dependent : Array, shape (samples,)
+        The dependent variable z: rate of a state or output, known terms subtracted.
+    columns : IntArray, shape (active,)
+        Parameters whose regressor is not zero throughout.
+    active_regressors : Array, shape (samples, active)
+        Their columns of X.
+    noisy_regressors : Array, shape (parameters,)
+        1 where a regressor is a measured state; inputs and constants are exact.
     """
 
     equation: int
     label: str
     maneuver: int
-    target: Array
+    dependent: Array
     columns: IntArray
-    block: Array
-    noisy: Array
+    active_regressors: Array
+    noisy_regressors: Array
 
     @property
     def regressors(self) -> Array:
         """Regressors of every parameter, (samples, parameters)."""
-        dense = np.zeros((len(self.target), len(self.noisy)))
-        dense[:, self.columns] = self.block
+        dense = np.zeros((len(self.dependent), len(self.noisy_regressors)))
+        dense[:, self.columns] = self.active_regressors
         return dense
 
     def fitted(self, theta: Array) -> Array:
-        """Return what the regression says at parameter values `theta`."""
-        return np.asarray(self.block @ theta[self.columns], dtype=np.float64)
+        """Return the modelled dependent variable at parameter values `theta`."""
+        return np.asarray(self.active_regressors @ theta[self.columns], dtype=np.float64)
 
     def residual(self, theta: Array) -> Array:
-        """Return the target minus `fitted`."""
-        return self.target - self.fitted(theta)
+        """Return the dependent variable minus `fitted`."""
+        return self.dependent - self.fitted(theta)
 
 
 def regression_equations(
@@ -68,6 +78,10 @@ def regression_equations(
 ) -> tuple[tuple[str, ...], list[RegressionEquation]]:
     """Write the model as regressions.
 
+    A state equation is x_i' - (known A x + B u)_i = sum_j theta_j g_j z_j + b_i, an output equation
+    the same for y - (known C x + D u) (Klein & Morelli, Aircraft System Identification, ch. 5).
+    Rates come from differentiation where they were not measured.
+
     Parameters
     ----------
     model : LinearModel
@@ -75,7 +89,7 @@ def regression_equations(
     maneuvers : sequence of Maneuver
         Data; measured rates are used as they are, others come from differentiation.
     bandwidth : float, optional
-        Half-power frequency of smoothing and differentiation, Hz; found from the data without.
+        Half-power frequency of smoothing and differentiation, Hz; by default from the data.
     use_rates : bool
         Use measured rates where a maneuver has them.
 
@@ -83,8 +97,8 @@ def regression_equations(
     -------
     names : tuple of str
         Parameters: the common ones, then rate biases and output biases per maneuver.
-    rows : list of Row
-        State equations, then outputs that are no state, where anything is free.
+    equations : list of RegressionEquation
+        State equations, then outputs that are no state, if any entry is free.
     """
     measured = model.measured_states()
     n_common = len(model.parameters)
@@ -96,13 +110,13 @@ def regression_equations(
         names += [f"bias.{y}@{number}" for y in extra_biases]
     n_local = len(model.state_biases) + len(extra_biases)
     state_entries, output_entries = model.entries("AB"), model.entries("CD")
-    rows: list[RegressionEquation] = []
+    equations: list[RegressionEquation] = []
     for number, maneuver in enumerate(maneuvers):
         check_shapes(model, maneuver)
         states, inputs, rates, outputs = _signals(model, maneuver, measured, bandwidth, use_rates)
         z = np.hstack([states, inputs])
         place = n_common + number * n_local
-        for entries, fixed, left, indices, biases, offset in (
+        for entries, fixed, measured_side, indices, biases, offset in (
             (state_entries, np.hstack([model.A, model.B]), rates, range(len(model.states)),
              [model.states.index(s) for s in model.state_biases], place),
             (output_entries, np.hstack([model.C, model.D]), outputs, extra,
@@ -119,22 +133,22 @@ def regression_equations(
                     regressors[parameter] = regressor if other is None else other + regressor
                 if i in biases:
                     regressors[offset + biases.index(i)] = np.ones(len(z))
-                moving = sorted(p for p, regressor in regressors.items() if regressor.any())
-                if not moving:
+                active = sorted(p for p, regressor in regressors.items() if regressor.any())
+                if not active:
                     continue
-                is_state = left is rates
-                rows.append(
+                is_state = measured_side is rates
+                equations.append(
                     RegressionEquation(
                         equation=i if is_state else len(model.states) + i,
                         label=model.states[i] if is_state else model.outputs[i],
                         maneuver=number,
-                        target=left[:, i] - z @ fixed[i],
-                        columns=np.array(moving, dtype=np.int64),
-                        block=np.stack([regressors[p] for p in moving]).T,
-                        noisy=noisy,
+                        dependent=measured_side[:, i] - z @ fixed[i],
+                        columns=np.array(active, dtype=np.int64),
+                        active_regressors=np.stack([regressors[p] for p in active]).T,
+                        noisy_regressors=noisy,
                     )
                 )
-    return tuple(names), rows
+    return tuple(names), equations
 
 
 def _signals(
@@ -152,7 +166,7 @@ def _signals(
     states, rates = smooth_and_differentiate(raw, maneuver.dt_s, edge)
     inputs = maneuver.inputs
     if model.hold == "zoh":
-        # A held input jumps at its sample; seen at that instant it is the mean of both sides.
+        # A held input jumps at its sample; at that instant it is the mean of both sides.
         inputs = 0.5 * (inputs + np.vstack([inputs[:1], inputs[:-1]]))
     outputs = maneuver.outputs
     if outputs.shape[1] > len(measured):
@@ -161,38 +175,39 @@ def _signals(
 
 
 def solve_least_squares(
-    rows: Sequence[RegressionEquation], n_parameters: int, weights: Array | None = None
+    equations: Sequence[RegressionEquation], n_parameters: int, weights: Array | None = None
 ) -> Array:
-    """Solve the stacked regressions by normal equations, columns scaled first.
+    """Solve the stacked regressions, theta = (X'WX)^-1 X'Wz, columns scaled first.
 
     Parameters
     ----------
-    rows : sequence of Row
-        Regressions.
+    equations : sequence of RegressionEquation
     n_parameters : int
         Length of the solution.
     weights : Array, optional
-        One weight per row of `rows`.
+        One weight per equation.
 
     Raises
     ------
     IdentificationError
         If the regressors are collinear to working precision.
     """
-    normal, right = normal_equations(rows, n_parameters, weights)
+    normal, right = normal_equations(equations, n_parameters, weights)
     return solve_normal_equations(normal, right)
 
 
 def normal_equations(
-    rows: Sequence[RegressionEquation], n_parameters: int, weights: Array | None = None
+    equations: Sequence[RegressionEquation], n_parameters: int, weights: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return X'WX and X'Wy over all rows."""
+    """Return X'WX and X'Wz, summed over all equations."""
     normal = np.zeros((n_parameters, n_parameters))
     right = np.zeros(n_parameters)
-    for k, row in enumerate(rows):
+    for k, row in enumerate(equations):
         weight = 1.0 if weights is None else float(weights[k])
-        normal[np.ix_(row.columns, row.columns)] += weight * (row.block.T @ row.block)
-        right[row.columns] += weight * (row.block.T @ row.target)
+        normal[np.ix_(row.columns, row.columns)] += weight * (
+            row.active_regressors.T @ row.active_regressors
+        )
+        right[row.columns] += weight * (row.active_regressors.T @ row.dependent)
     return normal, right
 
 

@@ -1,4 +1,4 @@
-"""Start values from the cheaper methods: equation error first, the model's own numbers else."""
+"""Start values of a search: from equation error, else the model's own."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 def start_values(problem: OutputProblem) -> Array:
     """Return the whole start vector of an output-error search.
 
-    Equation error gives the common parameters and rate biases where every state is measured and
-    the result does not diverge over the maneuver; the model's start values stand in otherwise.
+    Equation error gives the common parameters and rate biases if every state is measured and the
+    simulation with them does not diverge; otherwise the model's start values are used.
     """
     theta = problem.first_guess()
-    told = regression_estimates(problem.model, problem.maneuvers)
-    better = np.array([told.get(name, x) for name, x in zip(problem.names, theta, strict=True)])
+    estimates = regression_estimates(problem.model, problem.maneuvers)
+    better = np.array(
+        [estimates.get(name, x) for name, x in zip(problem.names, theta, strict=True)]
+    )
     better = np.asarray(np.clip(better, problem.lower, problem.upper), dtype=np.float64)
     if problem.outputs(better) is None:
         return theta
@@ -31,20 +33,20 @@ def start_values(problem: OutputProblem) -> Array:
 
 
 def regression_estimates(model: LinearModel, maneuvers: Sequence[Maneuver]) -> dict[str, float]:
-    """Return what equation error says of a model's parameters and biases, by name.
+    """Return equation-error estimates of a model's parameters and biases, by name.
 
-    Places of accelerometers and delays enter no regression; they are left out, and all the rest is
-    told as if they were zero. Nothing is told where a state is not measured or two are collinear.
+    Accelerometer offsets and delays enter no regression; they are left out as if they were zero.
+    The result is empty if a state is not measured or regressors are collinear.
     """
     places = {lever.parameter for lever in model.accelerometer_offsets}
-    plain = replace(
+    without_offsets = replace(
         model,
         accelerometer_offsets=(),
         delays=(),
         parameters=tuple(p for p in model.parameters if p.name not in places),
     )
     try:
-        names, rows = regression_equations(plain, maneuvers)
+        names, rows = regression_equations(without_offsets, maneuvers)
         estimate = solve_least_squares(rows, len(names))
     except IdentificationError:
         return {}

@@ -1,8 +1,4 @@
-"""Stepwise regression: let each equation choose its terms by significance.
-
-Klein & Morelli, Aircraft System Identification, sec. 5.4: a term enters when its partial F is
-above the limit and leaves when it falls below; refitted terms get the structure's own covariance.
-"""
+"""Stepwise regression: model structure of each equation by significance of its terms."""
 
 from __future__ import annotations
 
@@ -26,41 +22,44 @@ GAIN_LIMIT = 0.005  # a term must also lift R2 by half a percent
 def choose_terms(
     X: Array, y: Array, forced: BoolArray, *, f_in: float = F_IN, gain: float = GAIN_LIMIT
 ) -> list[int]:
-    """Return the columns of X that earn their place.
+    """Return the columns of X that are significant.
+
+    A term enters if its partial F, (RSS_without - RSS_with) / s^2, exceeds the limit, and leaves if
+    it falls below (Klein & Morelli, Aircraft System Identification, sec. 5.4).
 
     Parameters
     ----------
     X : Array, shape (samples, candidates)
     y : Array, shape (samples,)
     forced : Array of bool, shape (candidates,)
-        Columns that are always in (bias).
+        Columns that are always in the model (bias).
     f_in : float
         Partial F to enter and to stay.
     gain : float
-        Least rise of R2.
+        Least increase of R2 by a term.
     """
-    chosen = [int(k) for k in np.flatnonzero(forced)]
-    total = float(np.sum((y - (y.mean() if chosen else 0.0)) ** 2))
+    selected = [int(k) for k in np.flatnonzero(forced)]
+    total = float(np.sum((y - (y.mean() if selected else 0.0)) ** 2))
     for _ in range(4 * X.shape[1]):
-        rss = _rss(X[:, chosen], y)
+        rss = _rss(X[:, selected], y)
         best, best_f, best_rss = -1, 0.0, rss
         for k in range(X.shape[1]):
-            if k in chosen or not X[:, k].any():
+            if k in selected or not X[:, k].any():
                 continue
-            trial = _rss(X[:, [*chosen, k]], y)
-            f = (rss - trial) / max(trial / max(len(y) - len(chosen) - 1, 1), 1e-300)
+            trial = _rss(X[:, [*selected, k]], y)
+            f = (rss - trial) / max(trial / max(len(y) - len(selected) - 1, 1), 1e-300)
             if f > best_f:
                 best, best_f, best_rss = k, f, trial
         if best < 0 or best_f < f_in or (rss - best_rss) < gain * total:
             break
-        chosen.append(best)
-        for k in [c for c in chosen if not forced[c]]:
-            rest = [c for c in chosen if c != k]
-            now, without = _rss(X[:, chosen], y), _rss(X[:, rest], y)
-            f = (without - now) / max(now / max(len(y) - len(chosen), 1), 1e-300)
+        selected.append(best)
+        for k in [c for c in selected if not forced[c]]:
+            rest = [c for c in selected if c != k]
+            now, without = _rss(X[:, selected], y), _rss(X[:, rest], y)
+            f = (without - now) / max(now / max(len(y) - len(selected), 1), 1e-300)
             if f < f_in:
-                chosen = rest
-    return sorted(chosen)
+                selected = rest
+    return sorted(selected)
 
 
 def fit_stepwise(
@@ -84,35 +83,36 @@ def fit_stepwise(
     Returns
     -------
     FitResult
-        Dropped parameters are zero with zero variance and named in a warning.
+        Dropped parameters are zero with zero variance and named in a warning; the others have the
+        covariance of the selected structure.
     """
-    names, rows = regression_equations(model, maneuvers, bandwidth=bandwidth)
-    kept: set[str] = set()
-    for equation in {row.equation for row in rows}:
-        mine = [row for row in rows if row.equation == equation]
-        X = np.vstack([row.regressors for row in mine])
-        y = np.concatenate([row.target for row in mine])
+    names, equations = regression_equations(model, maneuvers, bandwidth=bandwidth)
+    retained: set[str] = set()
+    for equation in {block.equation for block in equations}:
+        own = [block for block in equations if block.equation == equation]
+        X = np.vstack([block.regressors for block in own])
+        y = np.concatenate([block.dependent for block in own])
         forced = np.array([name.startswith("bias") for name in names]) & X.any(axis=0)
-        kept |= {names[k] for k in choose_terms(X, y, forced, f_in=f_in)}
-    dropped = [p.name for p in model.parameters if p.name not in kept]
-    if not kept & {p.name for p in model.parameters}:
+        retained |= {names[k] for k in choose_terms(X, y, forced, f_in=f_in)}
+    dropped = [p.name for p in model.parameters if p.name not in retained]
+    if not retained & {p.name for p in model.parameters}:
         raise IdentificationError(
             "no term of the model is significant: these data hold nothing of this aircraft"
         )
     smaller = replace(
         model,
-        terms=tuple(t for t in model.terms if t.parameter in kept),
-        parameters=tuple(p for p in model.parameters if p.name in kept),
+        terms=tuple(t for t in model.terms if t.parameter in retained),
+        parameters=tuple(p for p in model.parameters if p.name in retained),
     )
     result = fit_equation_error(smaller, maneuvers, bandwidth=bandwidth)
     place = [names.index(name) for name in result.names]
     estimate = np.zeros(len(names))
     estimate[place] = result.estimate
-    wide = []
+    covariances = []
     for covariance in (result.covariance, result.covariance_white):
         full = np.zeros((len(names), len(names)))
         full[np.ix_(place, place)] = covariance
-        wide.append(full)
+        covariances.append(full)
     warnings = result.warnings
     if dropped:
         warnings = (*warnings, f"not significant, set to zero: {', '.join(dropped)}")
@@ -122,8 +122,8 @@ def fit_stepwise(
         model=model,
         names=names,
         estimate=estimate,
-        covariance=wide[0],
-        covariance_white=wide[1],
+        covariance=covariances[0],
+        covariance_white=covariances[1],
         degrees_of_freedom=np.full(len(names), float(result.degrees_of_freedom[0])),
         warnings=warnings,
         details={"kept": float(len(smaller.parameters))},
@@ -135,5 +135,5 @@ def _rss(X: Array, y: Array) -> float:
         return float(y @ y)
     scale = np.sqrt(np.sum(X**2, axis=0))
     solution, _, _, _ = np.linalg.lstsq(np.asarray(X / scale, dtype=np.float64), y, rcond=1e-12)
-    miss = y - (X / scale) @ solution
-    return float(miss @ miss)
+    residual = y - (X / scale) @ solution
+    return float(residual @ residual)
