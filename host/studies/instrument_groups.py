@@ -3,6 +3,8 @@
 One flight, decoded once; each error of the instrument's file is made ten times and a tenth as
 large, and both answers of `host identify` are found again. An error that moves no interval is told
 by the data themselves: then many deviations of it are put into the data, and the answer stays.
+Errors of servos and of the clock are looked at twice: on this flight, whose pots and GPS settle
+them, and on the same one had there been neither.
 """
 
 from __future__ import annotations
@@ -18,8 +20,12 @@ from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
+from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.linear import identify
+from host.sysid.flight.recorded import recording_of_table
 from host.sysid.flight.tables import even_columns
+from host.twin.faults import Fault
+from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 
 AIRCRAFT = "ultrastick25e"
@@ -40,7 +46,10 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "delays": ("delay_share", "delay_least_s"),
     "filter model": ("filter_model_s",),
     "thrust": ("thrust_share",),
-    "servo": ("servo_bandwidth_share",),
+    "servo scale": ("servo_scale",),
+    "servo zero": ("servo_zero_rad",),
+    "servo delay": ("servo_delay_s",),
+    "servo speed": ("servo_bandwidth_share",),
     "density": ("density_share", "fuselage_heat_share"),
     "barometer offset": ("baro_offset_pa",),
     "clock": ("clock_share",),
@@ -53,6 +62,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
 }
 Interval = tuple[float, float]  # value, half-width
 Columns = Mapping[str, Array]
+Flown = tuple[Columns, SensorErrorModel]  # and the instrument as it was on that flight
 
 
 def _shifted(names: tuple[str, ...], by: float) -> Callable[[Columns], dict[str, Array]]:
@@ -74,16 +84,24 @@ TOLD: dict[str, tuple[Callable[[Columns], dict[str, Array]], str]] = {
         _shifted(("static_pa",), 10.0 * 57.7),
         "only changes of height are looked at; its part of density is in density_share",
     ),
+    "servo zero": (
+        _shifted(("elevator_rad", "aileron_rad", "rudder_rad"), 10.0 * 0.01),
+        "every maneuver has constants of its own",
+    ),
     "GPS place": (
         _shifted(("altitude_m",), 10.0 * 2.9),
         "only velocities and changes of height are looked at",
     ),
 }
-# Not in the columns as they are flown here.
-ELSEWHERE = {
-    "servo": "pots measure what the servo did",
-    "clock": "GPS tells the clock's scale while it is decoded (physical/timebase)",
+# What pots and GPS settle: looked at on a flight without them too.
+SETTLED = {
+    "servo scale": "pots measured what the servos did",
+    "servo zero": "pots measured what the servos did",
+    "servo delay": "pots measured what the servos did",
+    "servo speed": "pots measured what the servos did",
+    "clock": "GPS told the clock's scale while it was decoded (physical/timebase)",
 }
+POTS = ("pot_elevator", "pot_aileron_left", "pot_aileron_right", "pot_rudder")
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +135,10 @@ def answers(
     return result
 
 
-def reaches(columns: Columns, groups: Mapping[str, tuple[str, ...]]) -> Iterator[Reach]:
+def reaches(flown: Flown, groups: Mapping[str, tuple[str, ...]]) -> Iterator[Reach]:
     """Find both answers again with every group a tenth and ten times as large."""
-    airframe, data = airframe_data(AIRCRAFT), sensor_error_model(AIRCRAFT)
+    columns, data = flown
+    airframe = airframe_data(AIRCRAFT)
     usual = answers(columns, airframe, data)
     for group, names in groups.items():
         both = []
@@ -142,38 +161,59 @@ def scaled_airframe(airframe: AirframeData, group: str, factor: float) -> Airfra
     return airframe
 
 
-def shift_with(columns: Columns, group: str) -> tuple[float, str]:
+def shift_with(flown: Flown, group: str) -> tuple[float, str]:
     """Return the largest shift of a value, in half-widths, with many deviations in the data.
 
     The file says so too: it states ten times as much.
     """
-    airframe = airframe_data(AIRCRAFT)
-    data = sensor_error_model(AIRCRAFT).scaled(10.0, *GROUPS[group])
+    columns, airframe = flown[0], airframe_data(AIRCRAFT)
+    data = flown[1].scaled(10.0, *GROUPS[group])
     usual = answers(columns, airframe, data)
     there = answers(TOLD[group][0](columns), airframe, data)
     return max((abs(there[n][0] - v) / h, n) for n, (v, h) in usual.items())
 
 
-def flight(card: str, seed: int) -> dict[str, Array]:
-    """Return the columns of one virtual flight through the recorder."""
-    return even_columns(virtual_flight(card, seed).table)[0]
+def flight(card: str, seed: int, *, bare: bool = False) -> Flown:
+    """Return one virtual flight through the recorder; bare: no pot and no GPS was fitted."""
+    plan = load(card)
+    if bare:
+        missing = (*(Fault("pot_open", 0.0, channel=pot) for pot in POTS), Fault("gps_off", 0.0))
+        plan = replace(plan, faults=missing)
+    table = virtual_flight(plan, seed).table
+    columns, _ = even_columns(table)
+    recording = recording_of_table(columns, table.attrs)
+    data = sensor_error_model(AIRCRAFT).recorded(recording)
+    return surface_positions(columns, data), data
 
 
-def lines(columns: Columns, groups: Mapping[str, tuple[str, ...]]) -> Iterator[str]:
+def lines(flown: Flown, bare: Flown, groups: Mapping[str, tuple[str, ...]]) -> Iterator[str]:
     """Return the table, row by row as it is found."""
     yield f"{'group':20s} {'a tenth':>9s} {'ten times':>10s}  interval that moves most"
-    for r in reaches(columns, groups):
-        row = f"{r.group:20s} {100 * r.tenth[0]:+8.1f}% {100 * r.ten[0]:+9.1f}%  {r.ten[1]}"
-        if r.moves:
-            yield row
-        elif r.group in TOLD:
-            moved, name = shift_with(columns, r.group)
-            yield (
-                f"{row}; told by the data: many deviations in them move {name} by"
-                f" {moved:.2f} half-widths: {TOLD[r.group][1]}"
-            )
-        else:
-            yield f"{row}; {ELSEWHERE.get(r.group, 'MOVES NOTHING')}"
+    for r in reaches(flown, groups):
+        why = SETTLED.get(r.group, "")
+        yield _row(r) + (_why(flown, r, why) if not r.moves else "")
+    settled = {name: names for name, names in groups.items() if name in SETTLED}
+    if settled:
+        yield "the same flight without pots and GPS"
+        for r in reaches(bare, settled):
+            yield _row(r) + (_why(bare, r, "") if not r.moves else "")
+
+
+def _row(r: Reach) -> str:
+    return f"{r.group:20s} {100 * r.tenth[0]:+8.1f}% {100 * r.ten[0]:+9.1f}%  {r.ten[1]}"
+
+
+def _why(flown: Flown, r: Reach, settled: str) -> str:
+    """Return why a group moves no interval."""
+    if settled:
+        return f"; {settled}"
+    if r.group not in TOLD:
+        return "; MOVES NOTHING"
+    moved, name = shift_with(flown, r.group)
+    return (
+        f"; told by the data: many deviations in them move {name} by {moved:.2f} half-widths:"
+        f" {TOLD[r.group][1]}"
+    )
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -184,7 +224,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--group", action="append", choices=list(GROUPS))
     options = parser.parse_args(arguments)
     groups = {name: GROUPS[name] for name in options.group or GROUPS}
-    for line in lines(flight(options.card, options.seed), groups):
+    flown, bare = (flight(options.card, options.seed, bare=bare) for bare in (False, True))
+    for line in lines(flown, bare, groups):
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
     return 0

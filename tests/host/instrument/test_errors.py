@@ -1,6 +1,7 @@
 """One standard deviation of each named error: who says it, and that it reaches every reader."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,12 @@ from host.aircraft.mass_properties import airframe_data
 from host.errors import CalibrationError
 from host.instrument.deviations import deviations, sensor_error_model
 from host.instrument.instrument_errors import EVEN, instrument_errors, standard_errors
+from host.instrument.recording import Recording
 from host.physical.calibration import load_calibration
 from host.resources import resource
 from host.sysid.compatibility.path_preparation import prior
+from host.sysid.flight.tables import FlightColumns
+from host.sysid.pipeline.aircraft_data import aircraft_known
 from host.twin.flight.draws import DRAWN, draw
 from host.twin.outcome.instrument import calibration
 
@@ -66,6 +70,30 @@ def test_a_line_nobody_measured_and_a_missing_key_take_named_defaults(tmp_path: 
     path.write_text(head + line, encoding="utf-8")
     one = deviations(sensor_error_model(NAME, load_calibration(path)), airframe_data(NAME))
     assert {n for n in one if one[n] != standard[n]} == {"alpha_zero_rad", "alpha_scale"}
+
+
+def test_a_log_made_with_default_lines_has_sensors_out_of_the_box(tmp_path: Path) -> None:
+    """Lines that nobody measured count where they made the columns; a table [error] goes first."""
+    known, default = aircraft_known(NAME), load_calibration()
+    table = FlightColumns({}, [], Recording(), None)
+    assert known.flown(table) == known.instrument
+    found = deviations(known.flown(replace(table, calibration=default)), airframe_data(NAME))
+    # hw/calibration/default.toml: a vane mounted by eye, a pitot untared
+    assert found["alpha_zero_rad"] == pytest.approx(np.deg2rad(2.1) / math.sqrt(2.0), rel=0.01)
+    assert found["pitot_drift_pa"] == pytest.approx(250.0 / math.sqrt(2.0))
+    assert found["elevator_scale"] == pytest.approx(0.05)
+    path = measured(tmp_path)
+    own = load_calibration(path)
+    assert not own.defaults()
+    calibrated = aircraft_known(NAME, path)
+    assert calibrated.flown(replace(table, calibration=own)) == calibrated.instrument
+    text = resource("default.toml").read_text(encoding="utf-8")
+    path.write_text(
+        f"{text}[error.vane_zero_rad]\nsigma = 0.001\nsource = 'a template'\n", encoding="utf-8"
+    )
+    half = aircraft_known(NAME, path).flown(replace(table, calibration=load_calibration(path)))
+    assert half.errors["vane_zero_rad"].sigma("alpha_a") == pytest.approx(0.001)
+    assert half.errors["pot_scale"].sigma("pot_rudder") == pytest.approx(0.05)
 
 
 def test_an_error_table_says_size_law_constancy_and_who_shares_it(tmp_path: Path) -> None:

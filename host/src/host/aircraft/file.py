@@ -55,7 +55,7 @@ _OPTIONAL: Mapping[str, Mapping[str, float]] = {
 
 # What is known before the first flight: enough to identify an aircraft, not to fly it here.
 MEASURED = ("mass", "geometry", "trim", "sensors")
-MEASURED_IF_THERE = ("propulsion",)
+MEASURED_IF_THERE = ("propulsion", "servo")
 _MEASURED_TRIM = ("airspeed_mps",)
 _LONGEST = 200  # numbers of one list
 _LENGTHS = {"alpha_rad": (2, _LONGEST), "stall_alpha_rad": (2, 2)}
@@ -221,8 +221,8 @@ def load_measured(source: str | Path) -> Aircraft:
     Returns
     -------
     Aircraft
-        Of a measured file aerodynamics, servo and surfaces are zeros, and without a section
-        propulsion there is none.
+        Of a measured file aerodynamics and surfaces are zeros, servo too without a section of that
+        name, and without a section propulsion there is none.
 
     Raises
     ------
@@ -236,7 +236,8 @@ def load_measured(source: str | Path) -> Aircraft:
     wanted = {name: _SCALARS[name] for name in (*MEASURED, *there)}
     found = _loaded(source, document, wanted | {"trim": _MEASURED_TRIM})
     scalars, vectors = dict(found.scalars), dict(found.vectors)
-    for section in ("aerodynamics", "servo", "surfaces"):
+    unsaid = (name for name in ("aerodynamics", "servo", "surfaces") if name not in there)
+    for section in unsaid:
         scalars |= {f"{section}.{key}": 0.0 for key in _SCALARS[section]}
         vectors |= {f"{section}.{key}": np.zeros(2) for key in _VECTORS[section]}
     return replace(found, scalars=scalars, vectors=vectors)

@@ -36,7 +36,6 @@ class AirframeData:
     chord_m: float
     mass_share: float = 0.01
     inertia_share: float = 0.05
-    pressure_share: float = 0.02
     imu_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     vanes_m: tuple[tuple[float, float, float], ...] = ()
     upwash: float = 0.0

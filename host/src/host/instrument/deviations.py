@@ -13,16 +13,25 @@ from dataclasses import dataclass, field, replace
 from host.aircraft.file import load_measured
 from host.aircraft.mass_properties import AirframeData, Place, place
 from host.instrument.instrument_errors import InstrumentErrors, instrument_errors, standard_errors
+from host.instrument.recording import Recording
 from host.physical.calibration import Calibration
 
+LEAST_CLOCK_SHARE = 1e-5  # GPS leaves 0.2 ppm: less than this is nothing beside 1 % of anything
+SERVO_HZ, SERVO_RATE_RADPS = 8.0, 2.617994  # as measured for the Ultra Stick 25e: 150 deg/s
 VANE_LATE_S = 8e-3  # about a vane's delay at trim: the filter model's error is a share of it
+POTS = {
+    "elevator": ("pot_elevator",),
+    "aileron": ("pot_aileron_left", "pot_aileron_right"),
+    "rudder": ("pot_rudder",),
+}
 
 
 @dataclass(frozen=True, slots=True)
 class SensorErrorModel:
     """Places and dynamics of the sensors from the aircraft file, and what may be wrong with them.
 
-    Places are in metres from the nominal CG.
+    Places are in metres from the nominal CG. `recording` is of the flight that is looked at: errors
+    of servos and clock are in some flights only.
     """
 
     imu_m: Place
@@ -34,14 +43,29 @@ class SensorErrorModel:
     friction_speed_mps: float
     pitot_lag_s: float
     imu_bandwidth_hz: float = 42.0  # MPU-6000 register map, DLPF_CFG 3
+    servo_hz: float = 0.0  # 0: the aircraft file has no servo
+    servo_rate_radps: float = 0.0
     errors: InstrumentErrors = field(default_factory=standard_errors)
+    recording: Recording = field(default_factory=Recording)
+
+    @property
+    def servo(self) -> tuple[float, float]:
+        """Bandwidth (Hz) and fastest rate (rad/s) of the servos; usual ones where no file has."""
+        known = self.servo_hz > 0.0
+        return (self.servo_hz, self.servo_rate_radps) if known else (SERVO_HZ, SERVO_RATE_RADPS)
+
+    def recorded(self, recording: Recording) -> SensorErrorModel:
+        """Return the same for a flight recorded so."""
+        return replace(self, recording=recording)
 
     def scaled(self, factor: float, *names: str) -> SensorErrorModel:
         """Return the same with some errors, or all, that many times as large."""
         return replace(self, errors=self.errors.scaled(factor, *names))
 
 
-def sensor_error_model(source: str, calibration: Calibration | None = None) -> SensorErrorModel:
+def sensor_error_model(
+    source: str, calibration: Calibration | None = None, *, defaults: bool = False
+) -> SensorErrorModel:
     """Return the sensors of an aircraft by name or file, and what they may be wrong by.
 
     Parameters
@@ -50,6 +74,8 @@ def sensor_error_model(source: str, calibration: Calibration | None = None) -> S
         Aircraft.
     calibration : Calibration, optional
         Of the instrument; standard errors without.
+    defaults : bool
+        Whether its lines that nobody measured speak too, as `instrument_errors` takes it.
 
     Raises
     ------
@@ -69,7 +95,9 @@ def sensor_error_model(source: str, calibration: Calibration | None = None) -> S
         vane_friction_rad=number("sensors.vane_friction_rad"),
         friction_speed_mps=number("trim.airspeed_mps"),
         pitot_lag_s=number("sensors.pitot_lag_s"),
-        errors=instrument_errors(loaded, calibration),
+        servo_hz=number("servo.bandwidth_hz"),
+        servo_rate_radps=number("servo.rate_limit_radps"),
+        errors=instrument_errors(loaded, calibration, defaults=defaults),
     )
 
 
@@ -111,11 +139,12 @@ def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str
         "beta_lag_share": late["beta"],
         "pitot_delay_s": e["delay_share"].of_mean("dp_a", "dp_b") * instrument.pitot_lag_s,
         "friction_share": e["vane_friction_share"].of_mean(),
-        "elevator_scale": e["pot_scale"].of_mean("pot_elevator"),
-        "aileron_scale": e["pot_scale"].of_mean("pot_aileron_left", "pot_aileron_right"),
-        "rudder_scale": e["pot_scale"].of_mean("pot_rudder"),
+        **surface_deviations(instrument),
         "thrust_share": e["thrust_share"].of_mean(),
     }
+    clock = clock_share(instrument)
+    if clock > 0.0:
+        result["clock_share"] = clock
     for axis in "xyz":
         result |= {
             f"cg_{axis}_m": e["cg_m"].sigma(axis),
@@ -127,6 +156,42 @@ def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str
             f"tilt_{axis}_rad": e["misalignment_rad"].sigma(axis),
         }
     return {name: float(value) for name, value in result.items()}
+
+
+def surface_deviations(instrument: SensorErrorModel) -> dict[str, float]:
+    """Return one deviation of what is open of the surfaces: of pots, of servos without a pot."""
+    e, commanded = instrument.errors, instrument.recording.commanded
+    result = {
+        f"{surface}_scale": e["pot_scale"].of_mean(*pots)
+        for surface, pots in POTS.items()
+        if surface not in commanded
+    }
+    result |= {f"{surface}_servo_scale": e["servo_scale"].sigma(surface) for surface in commanded}
+    if commanded:
+        result["servo_delay_s"] = max(servo_delay_s(instrument, surface) for surface in commanded)
+    return result
+
+
+def servo_delay_s(instrument: SensorErrorModel, surface: str) -> float:
+    """Return one deviation of a servo's delay, s: below 3 Hz a lag of the first order is one."""
+    e, (hertz, _) = instrument.errors, instrument.servo
+    share = "servo_bandwidth_share" if instrument.servo_hz > 0.0 else "servo_unknown_share"
+    lag_s = 1.0 / (2.0 * math.pi * hertz)
+    return math.hypot(e[share].sigma(surface) * lag_s, e["servo_delay_s"].sigma(surface))
+
+
+def dynamic_pressure_share(errors: InstrumentErrors, qbar_pa: float) -> float:
+    """Return one deviation of a dynamic pressure as the pitots read it, as a share of it."""
+    zero = errors["pitot_zero_pa"].of_mean() / qbar_pa
+    return math.hypot(errors["pitot_scale"].of_mean(), zero)
+
+
+def clock_share(instrument: SensorErrorModel) -> float:
+    """Return one deviation of the clock's scale: as GPS left it, else the resonator's."""
+    left = instrument.recording.clock_share
+    if left is None:
+        return instrument.errors["clock_share"].sigma("mega")
+    return left if left >= LEAST_CLOCK_SHARE else 0.0
 
 
 def imu_delay_s(instrument: SensorErrorModel) -> float:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from host.aircraft.file import Aircraft
 from host.errors import CalibrationError
+from host.instrument.recording import SURFACES
 from host.physical.calibration import Calibration, Line
 
 STANDARD = Path(__file__).with_name("standard.toml")
@@ -31,6 +32,7 @@ LINES = {
         ("pot_zero_rad", "pot_scale"),
     ),
 }
+PULSES = {f"pulse.{surface}": ("servo_zero_rad", "servo_scale") for surface in SURFACES}
 IMU_LINES = {
     "imu.gyro": ("gyro_bias_radps", "gyro_scale"),
     "imu.accel": ("accel_bias_mps2", "accel_scale"),
@@ -122,7 +124,10 @@ def standard_errors() -> InstrumentErrors:
 
 
 def instrument_errors(
-    aircraft: Aircraft | None = None, calibration: Calibration | None = None
+    aircraft: Aircraft | None = None,
+    calibration: Calibration | None = None,
+    *,
+    defaults: bool = False,
 ) -> InstrumentErrors:
     """Return what an instrument may be wrong by.
 
@@ -131,8 +136,10 @@ def instrument_errors(
     aircraft : Aircraft, optional
         Gives tolerances of mass, places and upwash.
     calibration : Calibration, optional
-        Gives the deviations of its measured lines and its tables [error.NAME]. A line that nobody
-        measured on this instrument says nothing: the standard holds.
+        Gives the deviations of its measured lines and its tables [error.NAME].
+    defaults : bool
+        Whether a line that nobody measured on this instrument speaks too: the columns were made
+        with it. Its deviations are those of a sensor out of the box. Without, the standard holds.
 
     Raises
     ------
@@ -148,7 +155,7 @@ def instrument_errors(
                 found[name] = replace(error, width=(tolerance,) * len(error.sensors), source=source)
     if calibration is not None:
         for name, line in calibration.lines.items():
-            if not line.default:
+            if defaults or not line.default:
                 _take_line(found, name, line)
         for name, table in calibration.errors.items():
             where = f"{calibration.path}: [error.{name}]"
@@ -172,6 +179,9 @@ def _take_line(found: dict[str, NamedError], name: str, line: Line) -> None:
         sensors, by_zero = found[zero].sensors, line.zero_sigma
     elif name.startswith("channel.") and channel in LINES:
         zero, scale = LINES[channel]
+        sensors, by_zero = (channel,), line.zero_sigma * abs(line.slope[0])
+    elif name in PULSES:
+        zero, scale = PULSES[name]
         sensors, by_zero = (channel,), line.zero_sigma * abs(line.slope[0])
     else:
         return

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from host.constants import NORMAL_95
+from host.instrument.deviations import SensorErrorModel, clock_share
+
 IN_WORDS = {
     "mass_share": "mass", "ixx_share": "Ixx", "iyy_share": "Iyy", "izz_share": "Izz",
     "pitot_scale": "scale of the pitot", "pitot_zero_pa": "zero of the pitot",
@@ -13,6 +16,10 @@ IN_WORDS = {
     "imu_delay_s": "delay of the IMU",
     "elevator_scale": "pot of the elevator", "aileron_scale": "pot of the ailerons",
     "rudder_scale": "pot of the rudder",
+    "elevator_servo_scale": "servo of the elevator",
+    "aileron_servo_scale": "servos of the ailerons",
+    "rudder_servo_scale": "servo of the rudder",
+    "servo_delay_s": "delay of the servos", "clock_share": "clock",
 }  # fmt: skip
 _ALONG = {
     "cg_{}_m": "place of the CG along {}", "imu_{}_m": "place of the IMU along {}",
@@ -25,3 +32,19 @@ _ALONG = {
 IN_WORDS |= {
     name.format(axis): words.format(axis) for name, words in _ALONG.items() for axis in "xyz"
 }
+
+
+def recording_words(instrument: SensorErrorModel) -> list[str]:
+    """Return what is open of a flight's servos and clock, for its notes."""
+    hertz, rate = instrument.servo
+    whose = "the aircraft file's servos" if instrument.servo_hz > 0.0 else "usual servos"
+    lines = []
+    if instrument.recording.commanded:
+        lines.append(
+            f"{', '.join(instrument.recording.commanded)}: the command through {whose}"
+            f" ({hertz:g} Hz, {rate:.3g} rad/s); a pot knows better"
+        )
+    if instrument.recording.clock_share is None:
+        share = 100.0 * NORMAL_95 * clock_share(instrument)
+        lines.append(f"no GPS checked the clock: {share:.2g} % of its scale are open (95 %)")
+    return lines

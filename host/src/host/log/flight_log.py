@@ -153,7 +153,7 @@ class FlightLog:
         -------
         pandas.DataFrame
             One row per identification frame, columns of `host.physical.columns.COLUMNS`; units,
-            sources of the inputs and calibration in ``attrs``.
+            sources of the inputs, calibration and what GPS leaves open of the clock in ``attrs``.
         """
         import pandas as pd
 
@@ -161,6 +161,9 @@ class FlightLog:
         table.attrs["units"] = {column.name: column.unit for column in COLUMNS}
         table.attrs["inputs"] = dict(self.inputs)
         table.attrs["calibration"] = self.calibration.name
+        clock = self.clock  # None: GPS checked nothing
+        checked = clock is not None and clock.applied
+        table.attrs["clock_half_width"] = clock.half_width if clock and checked else None
         return table
 
     def columns(self, *, aligned: bool = True) -> Columns:

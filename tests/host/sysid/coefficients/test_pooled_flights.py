@@ -66,6 +66,20 @@ def test_the_sharper_flight_counts_more() -> None:
     assert found.value == pytest.approx(4.0 * 0.8 + 4.05 * 0.2)
 
 
+def test_an_error_that_one_flight_has_is_certain_in_the_other() -> None:
+    """A flight with GPS and pots beside one without: the clock is no error of the first."""
+    first = fit(np.array([4.0, -11.0]))
+    own = {"clock_share": first.errors["cg_x_m"], "tilt_y_rad": first.errors["tilt_y_rad"]}
+    alone = replace(first, errors=own)
+    found = pool_fits([first, alone])
+    assert tuple(found.errors) == ("cg_x_m", "tilt_y_rad", "clock_share")
+    for name in ("cg_x_m", "clock_share"):
+        assert found.errors[name] == pytest.approx((0.1, 0.5))
+    # Either moves half of the answer by its 0.06, and they are two errors, not one.
+    expected = np.hypot(0.02, 0.06) / np.sqrt(2.0)
+    assert found.derivatives[1].half_width == pytest.approx(1.96 * expected)
+
+
 def test_flights_that_do_not_agree_widen_the_interval() -> None:
     values = [np.array([4.0 + shift, -11.0]) for shift in (-0.3, -0.1, 0.1, 0.3)]
     wide, fair = (pool_fits([fit(v) for v in own]) for own in (values, values[:1] * 4))

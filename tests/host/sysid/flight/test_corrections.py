@@ -10,7 +10,8 @@ import pandas as pd
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
-from host.instrument.deviations import sensor_error_model
+from host.instrument.deviations import dynamic_pressure_share, sensor_error_model
+from host.instrument.instrument_errors import InstrumentErrors, standard_errors
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
@@ -183,14 +184,15 @@ def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
     assert wide.half_width()[k] == pytest.approx(expected_half, rel=1e-3)
 
 
-def test_a_coefficient_carries_the_larger_of_airframe_and_sensor() -> None:
+def test_a_better_pitot_narrows_a_coefficient() -> None:
     columns, maneuver, model = short_period()
     result = fit("output-error-white", model, [maneuver])
-    airframe = AirframeData("a", 2.0, 0.04, 0.08, 0.12, 0.0, 0.3, 1.2, 0.25, pressure_share=0.02)
+    airframe = AirframeData("a", 2.0, 0.04, 0.08, 0.12, 0.0, 0.3, 1.2, 0.25)
     condition = Condition(17.0, float(columns["qbar_pa"].mean()))
+    standard = standard_errors()
 
-    def half(*moved: Moved) -> float:
-        table = coefficients(result, airframe, condition, moved)
+    def half(*moved: Moved, errors: InstrumentErrors | None = None) -> float:
+        table = coefficients(result, airframe, condition, moved, errors)
         return next(c.half_width / abs(c.value) for c in table if c.name == "Cm_alpha")
 
     def pitot(share: float) -> Moved:
@@ -198,11 +200,16 @@ def test_a_coefficient_carries_the_larger_of_airframe_and_sensor() -> None:
 
     turned = result.estimate.copy()
     turned[result.index("M_alpha")] *= 1.03
+    # Where reconstruction says nothing of the pitots, their own file does.
     plain = half()
-    assert half(pitot(0.01)) == pytest.approx(plain, rel=1e-9)
-    assert half(pitot(0.05)) == pytest.approx(
-        np.sqrt(plain**2 + 1.96**2 * ((1.0 - 1.0 / 1.05) ** 2 - 0.02**2)), rel=1e-3
-    )
+    share = dynamic_pressure_share(standard, condition.qbar_pa)
+    assert 0.01 < share < 0.03
+    none = half(errors=standard.scaled(0.0, "pitot_scale", "pitot_zero_pa"))
+    assert plain == pytest.approx(np.hypot(none, 1.96 * share), rel=1e-3)
+    # Where it does, that alone counts, larger or smaller.
+    for moved in (0.001, 0.01, 0.05):
+        expected = np.hypot(none, 1.96 * (1.0 - 1.0 / (1.0 + moved)))
+        assert half(pitot(moved)) == pytest.approx(expected, rel=1e-3)
     assert half(Moved("imu_tilt_y_rad", turned, 1.0, 1.0)) == pytest.approx(
         np.hypot(plain, 1.96 * 0.03), rel=1e-3
     )

@@ -15,6 +15,8 @@ from host.aircraft.gains import dimensional_name, from_dimensional
 from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
 from host.constants import NORMAL_95
+from host.instrument.deviations import dynamic_pressure_share
+from host.instrument.instrument_errors import InstrumentErrors, standard_errors
 from host.instrument.words import IN_WORDS
 from host.sysid.models.consider_covariance import consider_covariance, dominant_error_source
 from host.sysid.models.fit_result import FitResult
@@ -61,6 +63,7 @@ def coefficients(
     airframe: AirframeData,
     condition: Condition,
     moved: Sequence[Moved] = (),
+    errors: InstrumentErrors | None = None,
 ) -> tuple[Coefficient, ...]:
     """Convert dimensional derivatives of the templates to coefficients.
 
@@ -74,12 +77,14 @@ def coefficients(
         Airspeed and dynamic pressure of the maneuvers.
     moved : sequence of Moved
         By errors of sensors.
+    errors : InstrumentErrors, optional
+        What the pitots may be wrong by, where `moved` has nothing of them; standard ones without.
 
     Returns
     -------
     tuple of Coefficient
         The interval adds mass, inertia, dynamic pressure, upwash and what moved it to the fit's
-        own. Errors of pitot and vanes are what pressure and upwash allow for: the larger counts.
+        own. Errors of the vanes are what upwash allows for: the larger counts.
     """
 
     def converted(derivatives: Array, a: AirframeData, at: Condition) -> Array:
@@ -101,6 +106,11 @@ def coefficients(
         cause: (converted(result.estimate, a, at) - value) / WIGGLE * share
         for cause, (share, a, at) in _assumed(airframe, condition).items()
     }
+    if not any(SHARED.get(m.error) == QBAR for m in moved):
+        # Coefficients go with dynamic pressure inversely.
+        assumed[QBAR] = -value * dynamic_pressure_share(
+            errors or standard_errors(), condition.qbar_pa
+        )
     turned = np.array([name.endswith(("_alpha", "_beta")) for name in names])
     assumed[VANE] = np.asarray(turned * value * airframe.upwash * airframe.upwash_share)
     sensed: dict[str, list[Array]] = {}
@@ -132,7 +142,7 @@ def coefficients(
 def _variances(assumed: dict[str, Array], sensed: dict[str, list[Array]]) -> dict[str, Array]:
     """Return what each cause adds to the variances of all coefficients.
 
-    Errors of pitot and vanes are what pressure and upwash allow for: the larger counts.
+    Errors of the vanes are what upwash allows for: the larger counts.
     """
     found = {
         cause: np.diag(consider_covariance(np.stack(shifts))) for cause, shifts in sensed.items()
@@ -156,7 +166,6 @@ def _assumed(a: AirframeData, at: Condition) -> dict[str, tuple[float, AirframeD
         "Ixx": (a.inertia_share, replace(a, ixx_kgm2=a.ixx_kgm2 * more), at),
         "Iyy": (a.inertia_share, replace(a, iyy_kgm2=a.iyy_kgm2 * more), at),
         "Izz": (a.inertia_share, replace(a, izz_kgm2=a.izz_kgm2 * more), at),
-        QBAR: (a.pressure_share, a, replace(at, qbar_pa=at.qbar_pa * more)),
     }
 
 

@@ -61,6 +61,10 @@ ERROR_GROUPS = {
     ),
     "thrust": ("thrust_share",),
     "surface pots": ("elevator_scale", "aileron_scale", "rudder_scale"),
+    "servos": (
+        "elevator_servo_scale", "aileron_servo_scale", "rudder_servo_scale", "servo_delay_s",
+    ),
+    "clock": ("clock_share",),
 }  # fmt: skip
 
 
@@ -229,7 +233,7 @@ class CoefficientEstimator:
             {k: v[flying] for k, v in columns.items()},
             spans,
             self.airframe,
-            self.instrument,
+            flight.instrument or self.instrument,
             self.powerplant,
             self.model,
         )
@@ -319,7 +323,9 @@ def _main_causes(fit: CoefficientFit) -> dict[str, tuple[str, float]]:
     for k, d in enumerate(fit.derivatives):
         shares = {}
         for cause, members in ERROR_GROUPS.items():
-            at = [count + names.index(m) for m in members]
+            at = [count + names.index(m) for m in members if m in names]
+            if not at:
+                continue
             with_them = fit.covariance[k, at]
             narrowed = with_them @ np.linalg.solve(fit.covariance[np.ix_(at, at)], with_them)
             shares[cause] = float(narrowed / max(fit.covariance[k, k], 1e-300))

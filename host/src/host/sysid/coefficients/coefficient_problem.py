@@ -54,6 +54,8 @@ class EquationData:
     lift, drag : Array, shape (m,)
     along_mps2 : float
         Mean specific force along the path of the whole flight.
+    span_s : float
+        How long the flight lasted.
     """
 
     signals: dict[str, Array]
@@ -62,6 +64,7 @@ class EquationData:
     lift: Array
     drag: Array
     along_mps2: float
+    span_s: float
 
 
 @dataclass(slots=True)
@@ -146,6 +149,7 @@ class FlightProblem:
             Corrected signals for the same sensor errors, where they are known already.
         """
         table = dict(zip(self.error_names, errors.tolist(), strict=True))
+        record = record.on_clock(table.get("clock_share", 0.0))
         s = signals or apply_sensor_errors(record, table, self.sensors, self.condition[0])
         found = equations(
             self.model,
@@ -162,7 +166,8 @@ class FlightProblem:
         if coefficients is not None:
             by_name = {name: _residual(e, coefficients[name]) for name, e in by_name.items()}
         spectra = equation_spectra(by_name, self.windows)
-        return EquationData(s, by_name, spectra, found.lift, found.drag, found.along_mps2)
+        span_s = record.samples * record.dt_s
+        return EquationData(s, by_name, spectra, found.lift, found.drag, found.along_mps2, span_s)
 
 
 def _residual(equation: Equation, coefficients: Array) -> Equation:
@@ -297,9 +302,9 @@ def mean_levels(problem: FlightProblem, data: EquationData) -> Array:
     """
     s, record = data.signals, problem.record
     static = record.columns["static_pa"]
-    span = record.samples * record.dt_s
-    climb = -(static[-1] - static[0]) / (float(np.mean(density(record))) * GRAVITY_MPS2 * span)
-    gain = (s["V"][-1] - s["V"][0]) / span
+    span_s = data.span_s
+    climb = -(static[-1] - static[0]) / (float(np.mean(density(record))) * GRAVITY_MPS2 * span_s)
+    gain = (s["V"][-1] - s["V"][0]) / span_s
     balance = data.along_mps2 - gain - GRAVITY_MPS2 * climb / problem.condition[0]
     inside = _force_samples(problem)
     return np.array([balance, *(float(x[inside].mean()) for x in (data.drag, data.lift))])

@@ -56,10 +56,11 @@ COEFFICIENT_ROUNDS, JOINT_ROUNDS = 3, 2
 # Consider parameters: not estimated, only in the intervals. A vane's lag of 0.5 ms looks like an
 # arm of 8 mm, and estimating the arm biased CL_de by 15 % and CY_beta by 11 % (simulated flights,
 # seeds 300-303). Pitot and density stay as calibrated too: the flight determines them no better,
-# and estimating them biased CL_alpha by 0.5 % and CD_0 (seeds 900-939).
+# and estimating them biased CL_alpha by 0.5 % and CD_0 (seeds 900-939). A delay of the servos looks
+# like one of IMU and vanes, and nothing tells the clock alone.
 CONSIDERED = (
     "cg_x_m", "imu_x_m", "ixx_share", "iyy_share", "izz_share",
-    "pitot_scale", "pitot_drift_pa", "density_share",
+    "pitot_scale", "pitot_drift_pa", "density_share", "servo_delay_s", "clock_share",
 )  # fmt: skip
 FIXED = 1e30  # inverse variance of what is not estimated, or not yet
 COLUMNS = (
@@ -167,7 +168,8 @@ def _search(problem: FlightProblem, sd: Array) -> SearchResult:
     iterate = _Iterate(
         np.zeros(len(position)), np.zeros(len(sd)), {}, ({}, {}), np.zeros((3, len(sd)))
     )
-    considered = np.array([problem.error_names.index(n) for n in CONSIDERED])
+    known = problem.error_names  # of servos and clock only where the flight has such errors
+    considered = np.array([known.index(n) for n in CONSIDERED if n in known])
     for round_ in range(COEFFICIENT_ROUNDS + JOINT_ROUNDS):
         data, spectra = _linearise(problem, iterate, sd, round_)
         gusts = sum(values.shape[1] for values in spectra[0].gusts.values())

@@ -3,13 +3,15 @@
 Each flight is fitted alone. The part of its covariance P that is correlated with the sensor errors,
 L L' with L = P_xe P_ee^(-1/2), is the same error in every flight and is not averaged. The rest is
 the flight's own noise, and its inverse is the weight of the flight. An error that is new at every
-power-on is treated as common too, so intervals are rather too wide. Where flights scatter more than
-noise and errors allow, the interval is widened (`numerics/maneuver_agreement`).
+power-on is treated as common too, so intervals are rather too wide. An error that only some flights
+have (of servos, of a clock without GPS) is zero and certain in the others. Where flights scatter
+more than noise and errors allow, the interval is widened (`numerics/maneuver_agreement`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -41,11 +43,16 @@ def pool_fits(fits: Sequence[CoefficientFit]) -> CoefficientFit:
         return fits[0]
     count = len(fits[0].derivatives)
     names = [d.name for d in fits[0].derivatives]
+    mine = [tuple(fit.errors) for fit in fits]
+    errors = tuple(dict.fromkeys(name for own in mine for name in own))
+    fits = [_with_all_errors(fit, errors) for fit in fits]
     found = np.stack([_state(fit) for fit in fits])
     common = np.stack([_common_error_root(fit.covariance, count) for fit in fits])
     own = np.stack([f.covariance - c @ c.T for f, c in zip(fits, common, strict=True)])
     noise = np.maximum(np.einsum("kii->ki", own), 1e-300)
     weight = np.full_like(found, 1.0 / len(fits))
+    has = np.array([[name in own for name in errors] for own in mine], dtype=np.float64)
+    weight[:, count:] = has / has.sum(axis=0)
     weight[:, :count] = (1.0 / noise / np.sum(1.0 / noise, axis=0))[:, :count]
     state = np.sum(weight * found, axis=0)
     covariance = np.einsum("ki,kij,kj->ij", weight, own, weight)
@@ -58,14 +65,14 @@ def pool_fits(fits: Sequence[CoefficientFit]) -> CoefficientFit:
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     floors = np.mean([[_floor(d) for d in fit.derivatives] for fit in fits], axis=0)
     sizes = np.maximum(np.abs(state[:count]), floors)
-    errors = zip(fits[0].errors, state[count:].tolist(), sd[count:].tolist(), strict=True)
+    known = zip(errors, state[count:].tolist(), sd[count:].tolist(), strict=True)
     return CoefficientFit(
         derivatives=tuple(
             Derivative(name, float(state[k]), float(NORMAL_95 * sd[k]), float(sizes[k]))
             for k, name in enumerate(names)
         ),
         covariance=covariance,
-        errors={name: (value, deviation) for name, value, deviation in errors},
+        errors={name: (value, deviation) for name, value, deviation in known},
         condition=_mean_condition([fit.condition for fit in fits]),
         histories={
             name: CoefficientHistory(
@@ -77,6 +84,18 @@ def pool_fits(fits: Sequence[CoefficientFit]) -> CoefficientFit:
         prediction=_predictions([fit.prediction for fit in fits]),
         maneuver_agreement=agreement,
     )
+
+
+def _with_all_errors(fit: CoefficientFit, errors: Sequence[str]) -> CoefficientFit:
+    """Return a fit with errors that its flight does not have, zero and certain, in this order."""
+    if tuple(fit.errors) == tuple(errors):
+        return fit
+    count, own = len(fit.derivatives), list(fit.errors)
+    at = [*range(count), *(count + list(errors).index(name) for name in own)]
+    covariance = np.zeros((count + len(errors),) * 2)
+    covariance[np.ix_(at, at)] = fit.covariance
+    every = {name: fit.errors.get(name, (0.0, 0.0)) for name in errors}
+    return replace(fit, covariance=covariance, errors=every)
 
 
 def _state(fit: CoefficientFit) -> Array:

@@ -6,6 +6,7 @@ same low-pass goes over every signal, so that an equation between them stays one
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -14,12 +15,12 @@ from numpy.typing import NDArray
 
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
+from host.instrument.recording import SURFACES
 
 PASS_HZ, STOP_HZ = 9.0, 13.0
 FIT_RATE_HZ = 33.0  # rate of the fit: nothing is left above 13 Hz, a fit takes a third of the time
 # Over this rate a vane slides for certain; its noise after the low-pass is about 0.015 rad/s.
 SLIDING_RADPS = 0.02
-SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 ATTITUDE_CROSSOVER_RADPS = 2.0 * np.pi * 0.05  # attitude: filter below, integrated gyro above
 Spectrum = NDArray[np.complex128]
 
@@ -65,6 +66,18 @@ class Record:
         """Return the time derivative."""
         slope = float(values[-1] - values[0]) / ((self.samples - 1) * self.dt_s)
         return self.passed(values, self.jw * (np.abs(self.jw) < 2.0 * np.pi * STOP_HZ)) + slope
+
+    def on_clock(self, share: float) -> Record:
+        """Return the same for a clock that was slow by a share: all took longer than it says."""
+        if share == 0.0:
+            return self
+        result = copy.copy(self)
+        result.dt_s, result.jw, result.latest = (
+            self.dt_s * (1.0 + share),
+            self.jw / (1.0 + share),
+            {},
+        )
+        return result
 
     def made(self, name: str, of: tuple[float, ...], make: Callable[[], Array]) -> Array:
         """Return `make()`, or what it last gave under this name for the same numbers."""
@@ -181,15 +194,31 @@ def apply_sensor_errors(
     w = up * u - (p * y - q * x)
     v = side * u - (r * x - p * z)
     u = u - (q * z - r * y)
-    de, da, dr = record.made("surfaces", (), lambda: np.stack([*map(record.smooth, SURFACES)]))
+    surfaces = _surfaces(record, e, data.recording.commanded)
     return {
         "V": V, "qbar": qbar,
         "alpha": np.arctan2(w, u), "beta": np.arctan2(v, np.hypot(u, w)),
         "p": p, "q": q, "r": r, "pd": pd, "qd": qd, "rd": rd, "ax": ax, "ay": ay, "az": az,
-        "de": de / (1.0 + e["elevator_scale"]),
-        "da": da / (1.0 + e["aileron_scale"]),
-        "dr": dr / (1.0 + e["rudder_scale"]),
+        **dict(zip(("de", "da", "dr"), surfaces, strict=True)),
     }  # fmt: skip
+
+
+def _surfaces(record: Record, e: Mapping[str, float], commanded: tuple[str, ...]) -> list[Array]:
+    """Return what the surfaces did: errors of pots, or of servos that were only commanded."""
+    late_s = e.get("servo_delay_s", 0.0)
+
+    def moved() -> Array:
+        late = [np.exp(-record.jw * late_s) if s in commanded else 1.0 for s in SURFACES]
+        names = [f"{s}_rad" for s in SURFACES]
+        return np.stack([record.smooth(n, by) for n, by in zip(names, late, strict=True)])
+
+    shares = [e.get(f"{s}_{'servo_' * (s in commanded)}scale", 0.0) for s in SURFACES]
+    positions = record.made("surfaces", (late_s,), moved)
+    return [
+        # A servo goes further than it is told; a pot says more than there is.
+        x * (1.0 + share) if s in commanded else x / (1.0 + share)
+        for s, x, share in zip(SURFACES, positions, shares, strict=True)
+    ]
 
 
 def _invert_lag(record: Record, name: str, delay_s: float, lag_s: float) -> Array:

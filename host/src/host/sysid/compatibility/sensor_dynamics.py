@@ -17,6 +17,7 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, vane_delay_s
 from host.instrument.deviations import deviations as drawn
+from host.instrument.recording import SURFACES
 from host.sysid.compatibility.flight_path import AIR, DELAYS
 from host.sysid.compatibility.path_preparation import (
     NO_OFFSETS,
@@ -37,7 +38,9 @@ DELAYED_COLUMNS = {
     PITOT_DELAY: PRESSURE,
     IMU_DELAY: (*INERTIAL, *ANGLES, *PRESSURE, "phi_rad", "theta_rad"),
 }
-POTS = {f"{name}_scale": f"{name}_rad" for name in ("elevator", "aileron", "rudder")}
+SERVO_DELAY, CLOCK = "servo_delay_s", "clock_share"
+POTS = {f"{name}_scale": f"{name}_rad" for name in SURFACES}
+SERVOS = {f"{name}_servo_scale": f"{name}_rad" for name in SURFACES}
 PLACES = tuple(f"{what}_{a}_m" for what in ("imu", "cg", "vane") for a in "xyz")
 
 
@@ -99,7 +102,7 @@ def residual_errors(found: Compatibility, columns: Mapping[str, Array]) -> dict[
     if i is None:
         return {}
     every = drawn(i, NO_OFFSETS)
-    wanted = (*PLACES, *POTS, FRICTION, IMU_DELAY, PITOT_DELAY)
+    wanted = (*PLACES, *POTS, *SERVOS, SERVO_DELAY, CLOCK, FRICTION, IMU_DELAY, PITOT_DELAY)
     return {n: every[n] for n in wanted if n in every} | {
         VANE_DELAY: vane_delay_of(found, i, columns)[1]
     }
@@ -115,7 +118,16 @@ def perturb_columns(
     if error in POTS:
         name = POTS[error]
         return result | ({name: columns[name] / (1.0 + size)} if name in columns else {})
+    if error in SERVOS:
+        name = SERVOS[error]
+        return result | ({name: columns[name] * (1.0 + size)} if name in columns else {})
+    if error == CLOCK:
+        return result | {"t_s": columns["t_s"] * (1.0 + size)}
     i = found.instrument
+    if error == SERVO_DELAY and i is not None:
+        return advance_in_time(
+            result, tuple(f"{name}_rad" for name in i.recording.commanded), -size
+        )
     if error == FRICTION and i is not None:
         dt_s = float(columns["t_s"][1] - columns["t_s"][0])
         more = replace(i, vane_friction_rad=size * i.vane_friction_rad)

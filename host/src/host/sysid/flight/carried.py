@@ -149,8 +149,11 @@ def _changed(
             return values
         return values + np.column_stack([other[n] - still[n] for n in names])
 
+    same = other.get("t_s") is still.get("t_s")
+    longer = 1.0 if same else float(np.ptp(other["t_s"]) / np.ptp(still["t_s"]))
     return replace(
         maneuver,
+        dt_s=maneuver.dt_s * longer,
         inputs=moved(model.inputs, maneuver.inputs),
         outputs=moved(model.outputs, maneuver.outputs),
     )

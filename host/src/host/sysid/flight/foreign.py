@@ -12,6 +12,8 @@ import numpy as np
 
 from host.arrays import Array
 from host.extras import install_hint
+from host.instrument.recording import Recording
+from host.physical.calibration import Calibration
 from host.sysid.flight.text_table import HEAD_BYTES, read_text
 from host.sysid.identification_error import IdentificationError
 
@@ -35,7 +37,8 @@ OTHERS = (
 class Foreign:
     """Columns of numbers, why others are none, and what was left out of a column.
 
-    `twice` are names that several columns have.
+    `twice` are names that several columns have; `recording` is what the source shows of itself,
+    `calibration` what made the columns of a log.
     """
 
     columns: dict[str, Array] = field(default_factory=dict)
@@ -43,6 +46,8 @@ class Foreign:
     remarks: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     twice: frozenset[str] = frozenset()
+    recording: Recording = field(default_factory=Recording)
+    calibration: Calibration | None = None
 
 
 def read_foreign(source: Path) -> Foreign:

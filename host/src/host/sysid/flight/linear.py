@@ -255,7 +255,9 @@ class LinearEstimator:
             shifts += systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
         found: tuple[Coefficient, ...] = ()
         if self.airframe is not None:
-            found = coefficients(statistical, self.airframe, e.condition, shifts)
+            own = e.used[0].flight.instrument
+            errors = own.errors if own is not None else None
+            found = coefficients(statistical, self.airframe, e.condition, shifts, errors)
         return LinearIntervals(statistical, shifts, carried(statistical, shifts), found)
 
     def validation(self, estimate: LinearEstimate, intervals: LinearIntervals) -> LinearValidation:

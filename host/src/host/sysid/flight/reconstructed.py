@@ -14,6 +14,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
+from host.instrument.deviations import SensorErrorModel
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import (
@@ -45,6 +46,8 @@ class ReconstructedFlight:
         What was taken out of `corrected`, and what stays open of it.
     delays_open : bool
         Whether delays and places of the sensors are left for a fit to estimate.
+    instrument : SensorErrorModel or None
+        As it was on this flight: with the servos and the clock of its recording.
     """
 
     source: str
@@ -53,6 +56,7 @@ class ReconstructedFlight:
     maneuvers: tuple[Found, ...]
     compatibility: Compatibility | None
     delays_open: bool
+    instrument: SensorErrorModel | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +105,7 @@ def reconstructed(
     source: str = "",
     airframe: AirframeData | None = None,
     compatibility: Compatibility | None = None,
+    instrument: SensorErrorModel | None = None,
 ) -> ReconstructedFlight:
     """Return a flight with its columns corrected by all that is known.
 
@@ -115,6 +120,8 @@ def reconstructed(
         Gives places of the sensors.
     compatibility : Compatibility, optional
         What the sensors say of each other; told errors are taken out.
+    instrument : SensorErrorModel, optional
+        As it was on this flight.
     """
     told = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
     delays_open = True
@@ -128,7 +135,7 @@ def reconstructed(
     if compatibility is not None:
         corrected = correct_columns(corrected, told, pressure_share(compatibility))
     return ReconstructedFlight(
-        source, columns, corrected, tuple(maneuvers), compatibility, delays_open
+        source, columns, corrected, tuple(maneuvers), compatibility, delays_open, instrument
     )
 
 

@@ -6,6 +6,7 @@ Foreign names, units and signs come in through a map (`column_map`).
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,8 @@ import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
 from host.files.regular import file_or_folder
+from host.instrument.recording import Recording
+from host.physical.calibration import Calibration, load_calibration
 from host.sysid.flight.column_map import listed, mapped, read_map
 from host.sysid.flight.consistent import HINT
 from host.sysid.flight.foreign import (
@@ -26,6 +29,7 @@ from host.sysid.flight.foreign import (
 )
 from host.sysid.flight.measured import measured
 from host.sysid.flight.plausible import SURFACES, check
+from host.sysid.flight.recorded import recording_of_log, recording_of_table
 from host.sysid.identification_error import IdentificationError
 from host.terminal import command_line
 
@@ -59,6 +63,17 @@ BACKWARD_S = 1.0  # rows may swap places; a step back over more is another recor
 MOST_EMPTY = 20  # rows of the even grid for each row that was recorded
 
 
+@dataclass(frozen=True, slots=True)
+class FlightColumns:
+    """SI columns on an even grid, notes about what was done to them, how they were recorded, and of
+    a log the calibration that made them."""
+
+    columns: dict[str, Array]
+    notes: list[str]
+    recording: Recording
+    calibration: Calibration | None
+
+
 def read_columns(
     source: Path | FlightLog | pd.DataFrame,
     mapping: Path | None = None,
@@ -66,7 +81,19 @@ def read_columns(
     calibration: Path | None = None,
     also: Collection[str] = (),
 ) -> tuple[dict[str, Array], list[str]]:
-    """Return the columns identification uses, and notes about what was done to them.
+    """Return columns and notes of `read_flight_columns`, whose arguments these are."""
+    found = read_flight_columns(source, mapping, calibration=calibration, also=also)
+    return found.columns, found.notes
+
+
+def read_flight_columns(
+    source: Path | FlightLog | pd.DataFrame,
+    mapping: Path | None = None,
+    *,
+    calibration: Path | None = None,
+    also: Collection[str] = (),
+) -> FlightColumns:
+    """Return the columns identification uses, notes about them, and how they were recorded.
 
     Parameters
     ----------
@@ -111,7 +138,7 @@ def read_columns(
     columns = _even(used, notes, foreign=not recorded)
     if not recorded:
         notes += check(columns)
-    return columns, notes
+    return FlightColumns(columns, notes, found.recording, found.calibration)
 
 
 def source_name(source: str | Path | FlightLog | pd.DataFrame) -> str:
@@ -132,10 +159,13 @@ def _read(
 
     if isinstance(source, FlightLog):
         columns, notes = _columns_of(source, wanted)
-        return Foreign(columns, notes=notes), True
+        return _of_log(source, columns, notes), True
     if not isinstance(source, Path):
         found = from_frame(_with_its_index(source))
+        found.recording = recording_of_table(found.columns, source.attrs)
         if "calibration" in source.attrs:  # of `FlightLog.table`
+            default = load_calibration()
+            found.calibration = default if source.attrs["calibration"] == default.name else None
             return found, True
     else:
         file_or_folder(source, IdentificationError)
@@ -145,6 +175,7 @@ def _read(
             if log is not None:
                 return log, True
         found = read_foreign(source)
+        found.recording = recording_of_table(found.columns, {})
     if calibration is not None:
         found.notes.append("--calibration is for logs: here only its standard deviations count")
     return found, False
@@ -166,17 +197,14 @@ def _recorded(
     if source.is_file():
         refuse_other(source)
     try:
-        columns, notes = _log(source, calibration, wanted)
+        return _log(source, calibration, wanted)
     except NotALogError:
         if maybe_table and source.is_file() and is_text(source):
             return None
         raise
-    return Foreign(columns, notes=notes)
 
 
-def _log(
-    source: Path, calibration: Path | None, wanted: Collection[str]
-) -> tuple[dict[str, Array], list[str]]:
+def _log(source: Path, calibration: Path | None, wanted: Collection[str]) -> Foreign:
     from host.log import read_log
     from host.log.source import find_flights, newest
 
@@ -189,7 +217,13 @@ def _log(
     log = read_log(source, calibration=calibration)
     raw, found = _columns_of(log, wanted)
     lost = 0 if log.complete == "complete" else 1  # what is lost is said first
-    return raw, [*found[:lost], *notes, *found[lost:]]
+    notes = [*found[:lost], *notes, *found[lost:]]
+    return _of_log(log, raw, notes)
+
+
+def _of_log(log: FlightLog, columns: dict[str, Array], notes: list[str]) -> Foreign:
+    recording = recording_of_log(log)
+    return Foreign(columns, notes=notes, recording=recording, calibration=log.calibration)
 
 
 def _columns_of(log: FlightLog, wanted: Collection[str]) -> tuple[dict[str, Array], list[str]]:
@@ -213,7 +247,9 @@ def _columns_of(log: FlightLog, wanted: Collection[str]) -> tuple[dict[str, Arra
     poor_columns = [c for c in calibration_note(log)["default_columns"] if c in USED]
     if poor_columns:
         notes.append(
-            "default calibration, not this instrument's own, under: " + ", ".join(poor_columns)
+            "default calibration, not this instrument's own, under: "
+            + ", ".join(poor_columns)
+            + "; its deviations are those of sensors out of the box, and so are the intervals"
         )
     poor = [f"{name} {how}" for name, how in log.inputs.items() if how != "measured"]
     if poor:

@@ -10,6 +10,7 @@ from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import NoPropulsionError, Powerplant, powerplant
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.physical.calibration import load_calibration
+from host.sysid.flight.tables import FlightColumns
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,14 @@ class AircraftData:
     instrument: SensorErrorModel
     powerplant: Powerplant | None
     doubts: tuple[str, ...]
+
+    def flown(self, flight: FlightColumns) -> SensorErrorModel:
+        """Return the instrument as it was on a flight: its servos, its clock, and where a
+        calibration made the columns, what that says of sensors nobody measured."""
+        made_by, instrument = flight.calibration, self.instrument
+        if made_by is not None and made_by.defaults():
+            instrument = sensor_error_model(self.source, made_by, defaults=True)
+        return instrument.recorded(flight.recording)
 
 
 def aircraft_data(source: str | Path, calibration: str | Path | None = None) -> AircraftData:

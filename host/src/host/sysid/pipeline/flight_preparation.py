@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from host.instrument.words import recording_words
 from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
+from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.chosen import chosen
 from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
-from host.sysid.flight.tables import read_columns, source_name
+from host.sysid.flight.tables import read_flight_columns, source_name
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData
 
@@ -71,13 +73,16 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         If it cannot be read, or what was asked for is not in it.
     """
     opened = Path(source) if isinstance(source, str) else source
-    columns, notes = read_columns(opened, how.mapping, calibration=how.calibration, also=how.also)
+    read = read_flight_columns(opened, how.mapping, calibration=how.calibration, also=how.also)
+    columns, notes = read.columns, read.notes
+    instrument = known.flown(read) if known else None
+    if instrument is not None:
+        columns = surface_positions(columns, instrument)
+        notes += recording_words(instrument)
     found = chosen(columns, from_s=how.from_s, to_s=how.to_s, numbers=how.maneuvers)
     agreement = None
     try:
-        agreement = reconstruct(
-            columns, known.airframe if known else None, known.instrument if known else None
-        )
+        agreement = reconstruct(columns, known.airframe if known else None, instrument)
     except IdentificationError as error:
         notes.append(str(error))
     flight = reconstructed(
@@ -87,6 +92,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         airframe=known.airframe if known else None,
         # Without sensor positions a vane ahead of the CG looks like a delayed one.
         compatibility=agreement if known is not None and how.corrections else None,
+        instrument=instrument,
     )
     return PreparedFlight(flight, agreement, tuple(notes))
 

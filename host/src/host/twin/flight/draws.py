@@ -19,6 +19,7 @@ from host.instrument.instrument_errors import (
     instrument_errors,
     standard_errors,
 )
+from host.instrument.recording import SURFACES
 
 PITOT_PA_PER_COUNT = 4.8828125  # MPXV7002DP on a 10-bit converter, hw/calibration/default.toml
 VANES = ("alpha_a", "alpha_b", "beta_a", "beta_b")
@@ -56,7 +57,10 @@ DRAWN: tuple[tuple[str, str, tuple[str, ...], int, float], ...] = (
     ("baro_offset_pa", "baro_offset_pa", ("baro",), 0, 1.0),
     ("vane_friction_share", "vane_friction_share", VANES, 1, 1.0),
     ("thrust_share", "thrust_share", ("propeller",), 0, 1.0),
-    ("servo_bandwidth_share", "servo_bandwidth_share", ("elevator", "aileron", "rudder"), 1, 1.0),
+    ("servo_bandwidth_share", "servo_bandwidth_share", SURFACES, 1, 1.0),
+    ("servo_scale_share", "servo_scale", SURFACES, 1, 1.0),
+    ("servo_zero_rad", "servo_zero_rad", SURFACES, 1, 1.0),
+    ("servo_delay_s", "servo_delay_s", SURFACES, 1, 1.0),
 )  # fmt: skip
 
 # Switches of a card and the draws they leave nominal.
@@ -82,7 +86,12 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "barometer_offset": ("baro_offset_pa",),
     "friction_tolerance": ("vane_friction_share",),
     "thrust_tolerance": ("thrust_share",),
-    "servo_tolerance": ("servo_bandwidth_share",),
+    "servo_tolerance": (
+        "servo_bandwidth_share",
+        "servo_scale_share",
+        "servo_zero_rad",
+        "servo_delay_s",
+    ),
 }
 
 

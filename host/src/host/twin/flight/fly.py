@@ -49,7 +49,7 @@ LINK_OK, LINK_LOST, LINK_PRESET = 0, 1, 2  # state of the radio in one receiver 
 
 
 class Hands(NamedTuple):
-    """Numbers of the pilot and the radio that the kernel needs."""
+    """Numbers of the pilot, the radio and what the servos make of it that the kernel needs."""
 
     bank_gain: float
     pitch_gain: float
@@ -62,6 +62,9 @@ class Hands(NamedTuple):
     ground_steps: int
     cut_step: int
     height_m: float
+    servo_gain: Array  # of elevator, aileron, rudder: deflection over what the pulse asks for
+    servo_zero_rad: Array
+    servo_late_us: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,7 +223,7 @@ def fly_steps(
                 if link[row] == LINK_PRESET:
                     pulses[row, k] = preset_us[k]
 
-        # A servo moves when its pulse has ended.
+        # A servo moves when its pulse has ended, some later than others.
         since_us = (i % hands.period_steps) * step_s * 1e6
         row = i // hands.period_steps
         end = 0.0
@@ -228,15 +231,13 @@ def fly_steps(
             end += pulses[row, k]
             if link[row] == LINK_LOST:
                 command[3] = 0.0  # without pulses a servo stays, a speed controller stops
-            elif since_us >= end:
-                if k == 0:
-                    command[1] = (pulses[row, 0] - NEUTRAL_US) / THROW_US * limit[1]
-                elif k == 1:
-                    command[0] = (pulses[row, 1] - NEUTRAL_US) / THROW_US * limit[0]
-                elif k == 2:
-                    command[2] = (pulses[row, 2] - NEUTRAL_US) / THROW_US * limit[2]
-                else:
+            elif k == 3:
+                if since_us >= end:
                     command[3] = (pulses[row, 3] - IDLE_US) / (2.0 * THROW_US)
+            elif since_us >= end + hands.servo_late_us:
+                j = 1 - k if k < 2 else 2  # the receiver's first channel is the aileron
+                asked_rad = (pulses[row, k] - NEUTRAL_US) / THROW_US * limit[j]
+                command[j] = hands.servo_gain[j] * asked_rad + hands.servo_zero_rad[j]
             end += GAP_US
         if i >= hands.cut_step or not flying:
             command[3] = 0.0
@@ -333,6 +334,9 @@ def fly(
         ground_steps=round(card.flight.ground_s / STEP_S),
         cut_step=n if math.isinf(cut) else round(cut / STEP_S),
         height_m=card.flight.height_m,
+        servo_gain=1.0 + draws.vector("servo_scale_share"),
+        servo_zero_rad=draws.vector("servo_zero_rad"),
+        servo_late_us=1e6 * float(draws.vector("servo_delay_s")[0]),
     )
     wind = np.array([card.air.wind_north_mps, card.air.wind_east_mps, 0.0])
     heading = math.radians(card.flight.heading_deg)

@@ -12,6 +12,7 @@ from host.export.toml import dumps
 from host.instrument.instrument_errors import (
     IMU_LINES,
     LINES,
+    PULSES,
     InstrumentErrors,
     NamedError,
     instrument_errors,
@@ -22,7 +23,9 @@ from host.twin.flight.fly import IDLE_US, NEUTRAL_US, THROW_US
 from host.twin.sensors.analog import CHANNELS
 from host.twin.testcard.cards import AXES
 
-OF_LINES = {name for pair in (*LINES.values(), *IMU_LINES.values()) for name in pair}
+OF_LINES = {
+    name for pair in (*LINES.values(), *PULSES.values(), *IMU_LINES.values()) for name in pair
+}
 
 
 def calibration(aircraft: Aircraft, errors: InstrumentErrors | None = None) -> str:
@@ -45,7 +48,7 @@ def calibration(aircraft: Aircraft, errors: InstrumentErrors | None = None) -> s
         entry["slope_sigma"] = float(f"{errors[scale].sigma(name):.4g}")
         entry["source"] = source
         channels[name] = entry
-    pulses: dict[str, object] = {}
+    pulses: dict[str, dict[str, object]] = {}
     for axis in AXES:
         throttle = axis == "throttle"
         limit = 0.5 if throttle else aircraft.scalar(f"surfaces.{axis}_limit_rad")
@@ -57,6 +60,10 @@ def calibration(aircraft: Aircraft, errors: InstrumentErrors | None = None) -> s
             "slope_sigma": 0.01,
             "source": "virtual transmitter: full throw is +-400 us",
         }
+        if not throttle:
+            zero, scale = PULSES[f"pulse.{axis}"]
+            pulses[axis]["zero_sigma"] = float(f"{errors[zero].sigma(axis) / limit * THROW_US:.4g}")
+            pulses[axis]["slope_sigma"] = float(f"{errors[scale].sigma(axis):.4g}")
     imu = {}
     for name, (zero, scale) in IMU_LINES.items():
         sensor = name.partition(".")[2]

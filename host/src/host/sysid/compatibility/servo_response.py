@@ -1,0 +1,62 @@
+"""Surfaces behind their servos, where the columns have the commands.
+
+A servo follows its pulse as a first order of limited rate (Stevens & Lewis, Aircraft Control and
+Simulation, 2nd ed., sec. 4.1, with a limit). On a virtual flight of the card `demo` commands are
+22 ms ahead of the surfaces; through the servos of the aircraft file 1 to 3 ms are left, the age of
+a pulse in its row.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from host.arrays import Array
+from host.instrument.deviations import SensorErrorModel
+
+
+def surface_positions(
+    columns: Mapping[str, Array], instrument: SensorErrorModel
+) -> dict[str, Array]:
+    """Return columns with commanded surfaces where their servos had brought them.
+
+    Parameters
+    ----------
+    columns : mapping of (n,) arrays
+        SI, on an even grid.
+    instrument : SensorErrorModel
+        Says which surfaces are commanded, and how fast servos are.
+    """
+    dt_s = float(columns["t_s"][1] - columns["t_s"][0])
+    return {
+        name: servo_response(values, dt_s, *instrument.servo)
+        if name.removesuffix("_rad") in instrument.recording.commanded
+        else values
+        for name, values in columns.items()
+    }
+
+
+def servo_response(
+    command_rad: Array, dt_s: float, bandwidth_hz: float, rate_radps: float
+) -> Array:
+    """Return what a servo makes of a command that is held from row to row, (n,), rad.
+
+    Exact between rows: as fast as it can until the rest decays.
+    """
+    omega = 2.0 * math.pi * bandwidth_hz
+    far = rate_radps / omega if rate_radps > 0.0 else math.inf
+    decay = math.exp(-omega * dt_s)
+    result = np.empty(len(command_rad))
+    at = float(command_rad[0])
+    for k, target in enumerate(command_rad.tolist()):
+        result[k] = at
+        rest = target - at
+        if abs(rest) <= far:
+            at = target - rest * decay
+            continue
+        running_s = min((abs(rest) - far) / rate_radps, dt_s)
+        rest -= math.copysign(rate_radps * running_s, rest)
+        at = target - rest * math.exp(-omega * (dt_s - running_s))
+    return result

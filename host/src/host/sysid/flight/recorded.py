@@ -1,0 +1,62 @@
+"""How a source was recorded: which surfaces are commands, and who checked its clock.
+
+A log says so itself. A table that `host decode` wrote shows it: a surface is measured where its
+column is that of its pots, and the clock is checked where GPS spoke for long enough. Of a table of
+others nothing is known: its surfaces count as measured and its clock as right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from host.arrays import Array
+from host.constants import NORMAL_95
+from host.instrument.recording import SURFACES, Recording
+
+if TYPE_CHECKING:
+    from host.log import FlightLog
+
+OURS = "mega_drives"  # no table of others has this column
+GPS, GPS_SPAN_S = "v_north_mps", 20.0  # as `physical/timebase` wants it
+SAME_RAD = 1e-6  # a table of text has six digits or more
+MOSTLY = 0.5
+
+
+def recording_of_log(log: FlightLog) -> Recording:
+    """Return what a log says of itself."""
+    commanded = tuple(s for s in SURFACES if log.inputs.get(s) == "commanded")
+    clock = log.clock
+    checked = clock is not None and clock.applied
+    return Recording(commanded, clock.half_width / NORMAL_95 if clock and checked else None)
+
+
+def recording_of_table(columns: Mapping[str, Array], said: Mapping[Any, Any]) -> Recording:
+    """Return what a table shows; `said` is what `FlightLog.table` noted beside it, or nothing."""
+    if "inputs" in said and "clock_half_width" in said:
+        half, inputs = said["clock_half_width"], said["inputs"]
+        commanded = tuple(s for s in SURFACES if inputs.get(s) == "commanded")
+        return Recording(commanded, None if half is None else float(half) / NORMAL_95)
+    if OURS not in columns:
+        return Recording()
+    commanded = tuple(s for s in SURFACES if f"{s}_rad" in columns and not _measured(columns, s))
+    heard = columns["t_s"][np.isfinite(columns[GPS])] if GPS in columns else np.empty(0)
+    checked = len(heard) > 0 and float(np.ptp(heard)) >= GPS_SPAN_S
+    return Recording(commanded, 0.0 if checked else None)
+
+
+def _measured(columns: Mapping[str, Array], surface: str) -> bool:
+    """Return whether a surface's column is what its pots said."""
+    if surface == "aileron":
+        pots = [columns.get(f"aileron_{side}_rad") for side in ("left", "right")]
+    else:
+        pots = [columns.get(f"{surface}_pot_rad")]
+    known = [pot for pot in pots if pot is not None]
+    if len(known) < len(pots):
+        return False
+    pot = known[0] if len(known) == 1 else 0.5 * (known[0] - known[1])
+    near = np.abs(columns[f"{surface}_rad"] - pot) < SAME_RAD
+    seen = np.isfinite(columns[f"{surface}_rad"])
+    return bool(np.sum(near & seen) >= MOSTLY * np.sum(seen))
