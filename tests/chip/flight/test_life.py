@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 MakeRig = Callable[..., "FlightRig"]
 FLOWN_S = 12.0
 LONGEST_REST_MS, LONG_REST_MS = 4.0, 2.5
+LOOK_MS = 1.6  # a servo's frame is 20 ms, and stick to servo may take 22 ms
 
 
 def test_flight_states_its_load_and_never_rests_long(make_rig: MakeRig, tmp_path: Path) -> None:
@@ -49,6 +50,20 @@ def test_flight_states_its_load_and_never_rests_long(make_rig: MakeRig, tmp_path
     t_us = log.frames["baro"]["t_us"].astype(np.int64)
     assert len(t_us) > 250
     assert 1e6 / np.diff(t_us).mean() == pytest.approx(25.0, abs=0.2)
+
+
+def test_no_task_keeps_the_receiver_waiting(make_rig: MakeRig) -> None:
+    """From one look at the receiver to the next, the second's frame of health in between."""
+    from simavr_bench import LogKind
+
+    rig = make_rig(imu_hz=200.0)
+    rig.take_off()
+    for name in [name for name in rig.chip.symbols if "9PilotLink4step" in name]:
+        rig.chip.watch_pc(name)
+    rig.chip.run_s(5.0)
+    looks = rig.chip.records(LogKind.PC)["cycle"].astype(np.int64)
+    assert len(looks) > 5000
+    assert np.diff(looks).max() / 16e3 < LOOK_MS
 
 
 def test_relay_whose_contact_opens_in_flight_is_released(make_rig: MakeRig, tmp_path: Path) -> None:
