@@ -16,7 +16,7 @@ from host.physical.calibration import load_calibration
 from host.resources import resource
 from host.sysid.compatibility.path_preparation import prior
 from host.sysid.flight.tables import FlightColumns
-from host.sysid.pipeline.aircraft_data import aircraft_known
+from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.twin.flight.draws import DRAWN, draw
 from host.twin.outcome.instrument import calibration
 
@@ -74,7 +74,7 @@ def test_a_line_nobody_measured_and_a_missing_key_take_named_defaults(tmp_path: 
 
 def test_a_log_made_with_default_lines_has_sensors_out_of_the_box(tmp_path: Path) -> None:
     """Lines that nobody measured count where they made the columns; a table [error] goes first."""
-    known, default = aircraft_known(NAME), load_calibration()
+    known, default = aircraft_data(NAME), load_calibration()
     table = FlightColumns({}, [], Recording(), None)
     assert known.flown(table) == known.instrument
     found = deviations(known.flown(replace(table, calibration=default)), airframe_data(NAME))
@@ -85,13 +85,13 @@ def test_a_log_made_with_default_lines_has_sensors_out_of_the_box(tmp_path: Path
     path = measured(tmp_path)
     own = load_calibration(path)
     assert not own.defaults()
-    calibrated = aircraft_known(NAME, path)
+    calibrated = aircraft_data(NAME, path)
     assert calibrated.flown(replace(table, calibration=own)) == calibrated.instrument
     text = resource("default.toml").read_text(encoding="utf-8")
     path.write_text(
         f"{text}[error.vane_zero_rad]\nsigma = 0.001\nsource = 'a template'\n", encoding="utf-8"
     )
-    half = aircraft_known(NAME, path).flown(replace(table, calibration=load_calibration(path)))
+    half = aircraft_data(NAME, path).flown(replace(table, calibration=load_calibration(path)))
     assert half.errors["vane_zero_rad"].sigma("alpha_a") == pytest.approx(0.001)
     assert half.errors["pot_scale"].sigma("pot_rudder") == pytest.approx(0.05)
 
