@@ -98,7 +98,7 @@ def powerplant(source: str) -> Powerplant:
     if "propulsion.diameter_m" not in loaded.scalars:
         raise NoPropulsionError(
             f"aircraft {source}: no section [propulsion]; coefficients straight from"
-            " flight need the thrust: add it, or leave '--model coefficients' out"
+            " flight need the thrust: add it, or leave 'coefficients' out of argument models"
         )
     frame = loaded.airframe()
     return Powerplant(

@@ -31,8 +31,13 @@ def run(args: argparse.Namespace) -> int:
     from host.sysid.answer.verdict import maneuver_lines
     from host.sysid.flight.linear import maneuvers_of
     from host.sysid.flight.tables import read_columns
+    from host.sysid.identification_error import IdentificationError
+    from host.sysid.pipeline.arguments import option_words
 
-    columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
+    try:
+        columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
+    except IdentificationError as error:
+        raise IdentificationError(option_words(str(error))) from error
     graded = maneuvers_of(columns)
     if args.json:
         print(json_text({"notes": notes, "maneuvers": maneuver_document(graded)}))

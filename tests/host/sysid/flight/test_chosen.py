@@ -79,7 +79,7 @@ def test_a_model_of_ones_own_is_fitted_where_its_input_moved(flight: Columns) ->
         ({"from_s": 15.0, "to_s": 15.01}, "samples, at least 8"),
         ({"from_s": 20.0, "to_s": 10.0}, "start is not before the end"),
         ({"from_s": float("nan")}, "start is not before the end"),
-        ({"from_s": 12.0, "numbers": [1]}, "exclude each other"),
+        ({"from_s": 12.0, "numbers": [1]}, "excludes argument from_s"),
         ({"numbers": [5]}, "no maneuver 5: there are 4"),
         ({"numbers": [0]}, "no maneuver 0: there are 4"),
     ],

@@ -76,7 +76,7 @@ def check_outputs(places: OutputPaths) -> None:
     if whole_ones:
         if not places.source:
             raise IdentificationError(
-                f"{whole_ones[0]}: an aircraft needs mass and geometry; give --aircraft"
+                f"{whole_ones[0]}: an aircraft needs mass and geometry; give argument aircraft"
             )
         from host.aircraft import file as aircraft
 
@@ -147,7 +147,9 @@ def _write_aircraft(
     from host.sysid.answer.aircraft_export import save_aircraft
 
     if not source:
-        raise IdentificationError(f"{path}: an aircraft needs mass and geometry; give --aircraft")
+        raise IdentificationError(
+            f"{path}: an aircraft needs mass and geometry; give argument aircraft"
+        )
     save_aircraft(path, tables, source, direct.fit.condition if direct else None)
     return path
 

@@ -43,7 +43,9 @@ def chosen(
     if from_s is None and to_s is None:
         return _numbered(columns, numbers) if numbers else find(columns)
     if numbers:
-        raise IdentificationError("--maneuver and --from/--to exclude each other: give one of them")
+        raise IdentificationError(
+            "argument maneuvers excludes argument from_s and argument to_s: give one of them"
+        )
     return _stretch(columns, from_s, to_s)
 
 
@@ -60,7 +62,7 @@ def _stretch(columns: Mapping[str, Array], from_s: float | None, to_s: float | N
     t = columns["t_s"]
     first = float(t[0]) if from_s is None else from_s
     last = float(t[-1]) if to_s is None else to_s
-    asked = f"--from {first:g} --to {last:g}"
+    asked = f"argument from_s {first:g}, argument to_s {last:g}"
     if not first < last:
         raise IdentificationError(f"{asked}: the start is not before the end")
     first, last = max(first, float(t[0])), min(last, float(t[-1]))

@@ -24,7 +24,7 @@ SOMEHOW = 0.05  # the same of a wind angle, which gusts turn too
 QUIET_RADPS = 0.02  # noise of a still sensor follows nothing
 BLOCK_S, SLOW_S = 0.1, 0.5  # slopes are those of means over this long; slow: pitot and GPS
 FEWEST = 32  # means
-HINT = "give its unit or sign in the map (--map)"
+HINT = "give its unit or sign in the map (argument mapping)"
 
 
 @dataclass(frozen=True, slots=True)

@@ -312,18 +312,21 @@ class LinearEstimator:
         if not all("airspeed_mps" in flight.corrected for flight in flights):
             raise IdentificationError(
                 "identification needs airspeed_mps, which the data do not have; name its column in"
-                " a map (--map)"
+                " a map (argument mapping)"
             )
         every = [f for flight in flights for f in flight.maneuvers]
         if not every:
             raise NoManeuverError(
-                "no maneuver found: no surface moved by more than 1.4 degrees at once; give --from"
-                " and --to, or fly a doublet or 3-2-1-1 of 3 degrees or more"
+                "no maneuver found: no surface moved by more than 1.4 degrees at once; give"
+                " argument from_s and argument to_s, or fly a doublet or 3-2-1-1 of 3 degrees or"
+                " more"
             )
         axes = AXIS_OF[self.template] if self.own is None else moving(self.own.inputs)
         mine = flown_maneuvers(
             flights, [once([f for f in x.maneuvers if f.axis in axes]) for x in flights]
         )
+        # The order in which flights are given shall not choose the maneuver that is held out.
+        mine.sort(key=lambda m: [(f.start_s, f.end_s, f.amplitude) for f in m.flight.maneuvers])
         if not mine:
             raise NoManeuverError(
                 f"no maneuver of {', '.join(axes)} for {self.template}; found"

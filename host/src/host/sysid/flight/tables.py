@@ -124,7 +124,7 @@ def read_flight_columns(
         theirs = {}
     if "t_s" not in raw:
         raise IdentificationError(
-            f"{called}: no column t_s; name it in a map (--map); "
+            f"{called}: no column t_s; name it in a map (argument mapping); "
             + listed(found.columns, found.unusable)
         )
     used = {k: raw[k] for k in wanted if k in raw}
@@ -177,7 +177,7 @@ def _read(
         found = read_foreign(source)
         found.recording = recording_of_table(found.columns, {})
     if calibration is not None:
-        found.notes.append("--calibration is for logs: here only its standard deviations count")
+        found.notes.append("a calibration is for logs: here only its standard deviations count")
     return found, False
 
 
