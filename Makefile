@@ -71,4 +71,4 @@ card-images: setup sitl ## 10 000 cards altered at random, under sanitizers, and
 	@$(PYTHON) tests/sitl/card_images.py $(IMAGES); bad=$$?; cd tests/chip && $(CHIP_PYTHON) -m flight.card_images $(CHIP_IMAGES) && exit $$bad
 
 clean: ## remove what builds made; .venv and downloads stay
-	rm -rf .pio build/sitl build/sitl-sanitized build/logs
+	rm -rf .pio build/unit-tests build/sitl build/sitl-sanitized build/logs

@@ -28,8 +28,9 @@ LOGS = ROOT / "build" / "logs"
 BIN = Path(sys.executable).parent
 PYTHON = sys.executable
 
-# Two at a time: most stages keep one core busy, and a small machine has two.
-WORKERS = min(2, os.cpu_count() or 1)
+# A stage keeps one core busy and waits now and then, for a device's silence or a bus in real time.
+# Three at a time at the most: each may take 0.7 GB.
+WORKERS = min(3, 1 + (os.cpu_count() or 1))
 TAIL_LINES = 40
 GENERATOR = re.compile(r"/generate(_\w+)?\.py$")
 
@@ -82,8 +83,6 @@ def stages() -> list[Stage]:
     pio = str(BIN / "pio")
     ruff = str(BIN / "ruff")
     generators = sorted({"protocol/generate.py", *(f for f in python if GENERATOR.search(f))})
-    native = (pio, "test", "-e", "native", "--junit-output-path", str(report_path("native")))
-    avr = (pio, "test", "-e", "simavr", "--junit-output-path", str(report_path("avr")))
     found = [
         Stage(
             "format",
@@ -100,33 +99,39 @@ def stages() -> list[Stage]:
             "committed generated files are current",
             tuple((PYTHON, f, "--check") for f in generators),
         ),
-        Stage("native", "firmware unit tests on this computer", (native,), report=True),
-        # PlatformIO cleans its build folder when the project changed: never two at a time.
-        Stage("mega", "image of the Mega", ((pio, "run"),), after=("native",)),
-        Stage(
-            "avr",
-            "the same unit tests on a simulated ATmega2560",
-            (avr,),
-            after=("native", "mega"),
-            report=True,
-        ),
+        Stage("mega", "image of the Mega", ((pio, "run"),)),
         Stage(
             "library",
             "the firmware as a library for this computer",
             ((PYTHON, "firmware/toolchain/build_sitl.py"),),
         ),
+        unit_tests("native", "native", "firmware unit tests on this computer"),
+        unit_tests("avr", "simavr", "the same unit tests on a simulated ATmega2560"),
+        *pytest_stages(),
     ]
-    found += pytest_stages()
-    return found
+    # What others need first, then the longest: the last to end is a short one.
+    first = ("mega", "library", "chip", "host", "types", "native", "avr", "sitl")
+    return sorted(found, key=lambda stage: (*first, stage.name).index(stage.name))
+
+
+def unit_tests(name: str, environment: str, title: str) -> Stage:
+    """Describe the unit tests of an environment.
+
+    Each has a build folder of its own: PlatformIO empties one when the project changed, whoever
+    else is building there.
+    """
+    test = (str(BIN / "pio"), "test", "-e", environment)
+    folder = f"PLATFORMIO_BUILD_DIR={ROOT / 'build' / 'unit-tests' / name}"
+    command = ("env", folder, *test, "--junit-output-path", str(report_path(name)))
+    return Stage(name, title, (command,), report=True)
 
 
 def pytest_stages() -> Iterator[Stage]:
     """Describe one stage per folder of tests/ that pytest can run."""
     needs = {"sitl": ("library",), "chip": ("mega",)}
-    after = {"chip": ("native", "mega", "avr"), "layering": ("mega",)}
-    order = {"layering": 0, "protocol": 1, "host": 2, "sitl": 3, "chip": 4}
+    after = {"host": ("mega", "library"), "chip": ("library",), "layering": ("mega",)}
     folders = {path.relative_to(ROOT / "tests").parts[0] for path in _test_files()}
-    for name in sorted(folders - {"firmware"}, key=lambda folder: (order.get(folder, 9), folder)):
+    for name in sorted(folders - {"firmware"}):
         command = (PYTHON, "-m", "pytest", f"tests/{name}", f"--junit-xml={report_path(name)}")
         yield Stage(
             name,
