@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from host.cli import main
 from host.errors import UsageError
+from host.files.user_text import MOST_VALUES
 
 import host
 from tests.host.logs import flight, written
@@ -107,7 +108,7 @@ def test_a_text_beyond_all_bounds(name: str, capsys: pytest.CaptureFixture[str])
         "a large integer": "format = 1" + "0" * 400,
         "no number": "format = nan",
         "a long text": f'name = "{"x" * 30_000}"',
-        "values": "x = [" + "1," * 300_000 + "]",
+        "values": "x = [" + "1," * MOST_VALUES + "]",
     }
     for what, text in texts.items():
         Path("beyond.toml").write_text(text)

@@ -87,13 +87,13 @@ def parse_toml(text: str, name: str, error: type[UsageError]) -> dict[str, Any]:
 def _refuse_excess(document: dict[str, Any], name: str, error: type[UsageError]) -> None:
     """Walk through all values without recursion."""
     left: list[tuple[str, int, object]] = [("", 0, document)]
-    count = 0
+    count = 1
     while left:
         where, depth, value = left.pop()
-        count += 1
-        if count > MOST_VALUES:
-            raise error(f"{name}: more than {MOST_VALUES} values")
         if isinstance(value, dict | list):
+            count += len(value)
+            if count > MOST_VALUES:
+                raise error(f"{name}: more than {MOST_VALUES} values")
             if depth >= DEEPEST:
                 raise error(f"{name}: {where}: nested deeper than {DEEPEST} lists or tables")
             inner = value.items() if isinstance(value, dict) else enumerate(value)
