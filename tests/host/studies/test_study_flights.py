@@ -14,6 +14,8 @@ from studies.coefficients import CoefficientTally, true_delays, truths
 from studies.flights import PRINCIPAL
 from studies.thesis_flights import CASES, lines, nrmse, re_enact
 
+pytestmark = pytest.mark.usefixtures("machine_code")
+
 
 @pytest.fixture(scope="module")
 def flight() -> VirtualFlight:

@@ -9,6 +9,8 @@ from studies.aircraft import navion_structured
 from studies.coverage import NOISES, coloured_noise, run_case
 from studies.data import noisy
 
+pytestmark = pytest.mark.usefixtures("machine_code")
+
 
 def test_regression_finds_the_coefficients_of_a_long_record() -> None:
     rng = np.random.default_rng(1)

@@ -16,6 +16,8 @@ from scipy import linalg, signal
 from studies.aircraft import navion, navion_free, navion_structured
 from studies.data import TRUTH, clean, gusty, noisy
 
+pytestmark = pytest.mark.usefixtures("machine_code")
+
 CHEAP = [m for m in methods() if m not in ("hopfield-line-search", "hopfield")]
 
 

@@ -17,6 +17,8 @@ from studies.data import noisy
 from studies.inputs import SHAPES
 from studies.systems import random_system, simulated
 
+pytestmark = pytest.mark.usefixtures("machine_code")
+
 DT_S = 0.01
 
 

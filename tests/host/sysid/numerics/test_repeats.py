@@ -8,6 +8,8 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 from studies.aircraft import navion_structured
 from studies.data import TRUTH, noisy
 
+pytestmark = pytest.mark.usefixtures("machine_code")
+
 MODEL = navion_structured()
 PLACE = MODEL.parameter_names.index("M_alpha")
 
