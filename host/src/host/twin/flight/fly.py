@@ -213,9 +213,11 @@ def fly_steps(
             held[3] = min(max(held[3], 0.0), 1.0)
             if not flying:
                 held[3] = 0.0
-            pulses[row, 0] = NEUTRAL_US + THROW_US * held[1] / limit[1]
-            pulses[row, 1] = NEUTRAL_US + THROW_US * held[0] / limit[0]
-            pulses[row, 2] = NEUTRAL_US + THROW_US * held[2] / limit[2]
+            # Trim tabs were set before the test: neutral is where the surface stands straight.
+            zero = hands.servo_zero_rad
+            pulses[row, 0] = NEUTRAL_US + THROW_US * (held[1] - zero[1]) / limit[1]
+            pulses[row, 1] = NEUTRAL_US + THROW_US * (held[0] - zero[0]) / limit[0]
+            pulses[row, 2] = NEUTRAL_US + THROW_US * (held[2] - zero[2]) / limit[2]
             pulses[row, 3] = IDLE_US + 2.0 * THROW_US * held[3]
             pulses[row, 4] = SWITCH_DIRECT_US
             for k in range(5):
@@ -237,7 +239,8 @@ def fly_steps(
             elif since_us >= end + hands.servo_late_us:
                 j = 1 - k if k < 2 else 2  # the receiver's first channel is the aileron
                 asked_rad = (pulses[row, k] - NEUTRAL_US) / THROW_US * limit[j]
-                command[j] = hands.servo_gain[j] * asked_rad + hands.servo_zero_rad[j]
+                asked_rad += hands.servo_zero_rad[j]
+                command[j] = hands.servo_gain[j] * asked_rad
             end += GAP_US
         if i >= hands.cut_step or not flying:
             command[3] = 0.0
