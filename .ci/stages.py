@@ -29,8 +29,8 @@ BIN = Path(sys.executable).parent
 PYTHON = sys.executable
 
 # A stage keeps one core busy and waits now and then, for a device's silence or a bus in real time.
-# Three at a time at the most: each may take 0.7 GB.
-WORKERS = min(3, 1 + (os.cpu_count() or 1))
+# Four at a time at the most: each may take 0.7 GB, and more would wait for the two longest.
+WORKERS = min(4, 1 + (os.cpu_count() or 1))
 TAIL_LINES = 40
 GENERATOR = re.compile(r"/generate(_\w+)?\.py$")
 

@@ -8,7 +8,7 @@ from host.log import FlightLog, read_log
 from numpy.typing import NDArray
 
 from tests.protocol.flights import ident, slow, wrapped
-from tests.protocol.log_writer import LogWriter, Rows, Timed
+from tests.protocol.log_writer import LogWriter, Timed
 
 ROOT = Path(__file__).resolve().parents[2]
 START_US = 2_000_000
@@ -48,8 +48,3 @@ def read(path: Path, data: bytes, **options: Any) -> FlightLog:
     file = path / "flight.bin"
     file.write_bytes(data)
     return read_log(file, **options)
-
-
-def rows_of(log: FlightLog, name: str) -> Rows:
-    """Return the raw frames of a kind."""
-    return log.frames[name]

@@ -70,3 +70,20 @@ def test_an_unknown_stage_is_a_usage_error() -> None:
     )
     assert done.returncode == 2
     assert "no stage nonsense" in done.stderr
+
+
+def test_a_stage_waits_only_for_stages_before_it(runner: ModuleType) -> None:
+    """What stands behind it would not be waited for, and could hold up the workers."""
+    runner.ROOT = ROOT
+    listed = [stage.name for stage in runner.stages()]
+    assert len(set(listed)) == len(listed) > 15
+    for stage in runner.stages():
+        before = listed[: listed.index(stage.name)]
+        assert set(stage.needs + stage.after) <= set(before), stage.name
+
+
+def test_each_environment_builds_in_a_folder_of_its_own(runner: ModuleType) -> None:
+    """PlatformIO empties a folder when the project changed, whoever is building there."""
+    commands = [runner.unit_tests(name, name, "").commands[0] for name in ("native", "avr")]
+    chosen = {word for command in commands for word in command if "BUILD_DIR=" in word}
+    assert len(chosen) == 2

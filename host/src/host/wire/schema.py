@@ -106,11 +106,6 @@ class Schema:
         """Frames by name."""
         return {frame.name: frame for frame in self.frames}
 
-    @cached_property
-    def by_id(self) -> dict[int, Frame]:
-        """Frames by id."""
-        return {frame.id: frame for frame in self.frames}
-
     def bit(self, table: str, name: str) -> int:
         """Return the mask of one named bit, 0 if this format does not have it."""
         names = self.bits.get(table, ())
