@@ -18,10 +18,9 @@ from host.sysid.compatibility.reconstruction import (
     compatibility_lines,
     reconstruct,
 )
-from host.sysid.flight.tables import even_columns
-from host.twin.virtual import virtual_flight
 
-NAME = "ultrastick25e"
+from tests.host.sysid.recorded import NAME, flown, reconstructed
+
 NAMES = tuple(name for own in OBSERVABLE_GROUPS.values() for name in own)
 
 
@@ -66,12 +65,11 @@ def test_a_doubted_file_is_named_with_the_errors_it_claims_too_small() -> None:
 
 
 def test_a_recorded_flight_doubts_a_file_that_claims_a_fifth_and_no_honest_one() -> None:
-    columns, _ = even_columns(virtual_flight("demo", 901).table)
-    airframe, data = airframe_data(NAME), sensor_error_model(NAME)
-    honest = reconstruct(columns, airframe, data)
+    _, columns = flown("demo", 901)
+    honest = reconstructed("demo", 901)
     assert not honest.calibration_tests[0].rejected
     assert honest.calibration_tests[0].directions > 8
-    bold = reconstruct(columns, airframe, data.scaled(0.2))
+    bold = reconstruct(columns, airframe_data(NAME), sensor_error_model(NAME).scaled(0.2))
     assert bold.calibration_tests[0].rejected
     assert any("claims less than this flight shows" in line for line in compatibility_lines(bold))
     told = compatibility_document(bold)["calibration"]

@@ -23,22 +23,20 @@ from host.sysid.compatibility.reconstruction import (
     reconstruct,
 )
 from host.sysid.compatibility.strapdown import rotation, strapdown
-from host.sysid.flight.tables import even_columns
 from host.sysid.identification_error import IdentificationError
 from host.twin.flight.fly import FlightRecord
 from host.twin.sensors.sensor_delays import FILTERS, sensor_delays
-from host.twin.virtual import virtual_flight
 
-NAME = "ultrastick25e"
+from tests.host.sysid import recorded
+from tests.host.sysid.recorded import NAME, Columns
+
 AIRFRAME, INSTRUMENT = airframe_data(NAME), sensor_error_model(NAME)
-Columns = dict[str, np.ndarray]
 
 
 @lru_cache(maxsize=4)
 def flown(seed: int) -> tuple[Columns, dict[str, float]]:
     """Return a recorded flight in light turbulence and what its sensors are wrong by."""
-    flight = virtual_flight("survey", seed)
-    columns, _ = even_columns(flight.table)
+    flight, columns = recorded.flown("survey", seed)
     return columns, truth(flight.record)
 
 
@@ -130,8 +128,8 @@ def test_slopes_are_those_of_finite_differences() -> None:
 def test_errors_of_recorded_flights_are_inside_their_intervals() -> None:
     inside, told = [], set()
     for seed in (1, 2, 3, 4):
-        columns, true = flown(seed)
-        found = reconstruct(columns, AIRFRAME, INSTRUMENT)
+        _, true = flown(seed)
+        found = recorded.reconstructed("survey", seed)
         assert found.gps
         for name, value in true.items():
             finding = found[name]
@@ -151,7 +149,7 @@ def late(t: np.ndarray, series: np.ndarray, delay_s: float) -> np.ndarray:
 
 def test_injected_bias_scale_and_delay_come_back() -> None:
     columns, _ = flown(1)
-    before = reconstruct(columns, AIRFRAME, INSTRUMENT)
+    before = recorded.reconstructed("survey", 1)
     wrong = dict(columns)
     wrong["q_radps"] = columns["q_radps"] + 0.006
     wrong["ay_mps2"] = columns["ay_mps2"] - 0.15

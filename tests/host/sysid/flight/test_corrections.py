@@ -10,13 +10,13 @@ import pandas as pd
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
-from host.instrument.deviations import dynamic_pressure_share, sensor_error_model
+from host.instrument.deviations import dynamic_pressure_share
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.answer.verdict import model_lines, verdict_lines
-from host.sysid.compatibility.reconstruction import Compatibility, Finding, reconstruct
+from host.sysid.compatibility.reconstruction import Compatibility, Finding
 from host.sysid.compatibility.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
     advance_delayed,
@@ -28,23 +28,19 @@ from host.sysid.compatibility.sensor_corrections import (
 from host.sysid.flight import linear, linear_model
 from host.sysid.flight.carried import carried, systematic_error_shifts
 from host.sysid.flight.linear import identify
-from host.sysid.flight.tables import even_columns
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
-from host.twin.virtual import virtual_flight
 
-NAME = "ultrastick25e"
-Columns = dict[str, np.ndarray]
+from tests.host.sysid import recorded
+from tests.host.sysid.recorded import NAME, Columns
 
 
 @pytest.fixture(scope="module")
 def flown() -> tuple[Columns, list[dict[str, Any]], Compatibility]:
     """One recorded flight in light turbulence, its maneuvers, what its sensors are wrong by."""
-    flight = virtual_flight("demo", 901)
-    columns, _ = even_columns(flight.table)
-    found = reconstruct(columns, airframe_data(NAME), sensor_error_model(NAME))
-    return columns, flight.maneuvers, found
+    flight, columns = recorded.flown("demo", 901)
+    return columns, flight.maneuvers, recorded.reconstructed("demo", 901)
 
 
 def finding(name: str, value: float, half: float, prior: float) -> Finding:
@@ -284,7 +280,7 @@ def test_a_delay_at_its_bound_is_called_so(
         replace(d, limit_s=0.001) if d.name == "delay_vanes_s" else d for d in STANDARD_DELAYS
     )
     for module in (linear, linear_model):
-        monkeypatch.setattr(module, "DELAYS", tight)
+        monkeypatch.setattr(module, "STANDARD_DELAYS", tight)
     answers = identify(columns, airframe=airframe_data(NAME))
     for answer in answers:
         assert "delay_vanes_s" in answer.at_bound
