@@ -262,3 +262,111 @@ TEST_CASE("a course is known up to 360 degrees, to the hundredth") {
     CHECK_EQ(out.course, told[i]);
   }
 }
+
+TEST_CASE("each original half counts once: twice the first is a loss, twice the second too") {
+  ImuReceiver receiver;
+  send_original(receiver, kFirst, kCalm, 0);
+  CHECK(send_original(receiver, kSecond, kPlace, 1000) == ImuResult::kSample);
+  CHECK(send_original(receiver, kSecond, kPlace, 1500) == ImuResult::kHalf);
+  CHECK_EQ(receiver.good(), 1);
+  CHECK_EQ(receiver.lost(), 1);
+  send_original(receiver, kFirst, kCalm, 20000);
+  CHECK_EQ(receiver.lost(), 1);
+  send_original(receiver, kFirst, kCalm, 21000);
+  CHECK_EQ(receiver.lost(), 2);
+}
+
+TEST_CASE("original packets behind our own have no time and no age of the IMU") {
+  ImuReceiver receiver;
+  uint8_t bytes[frames::kImuPacketSize];
+  frames::ImuPacket packet = {};
+  packet.kind = frames::kImuPacketKind;
+  packet.t_us = 5000;
+  packet.age = 300;
+  memcpy(bytes, &packet, sizeof bytes);
+  core::put_le(bytes + 34, core::crc16(core::kCrc16Start, bytes, 34));
+  REQUIRE(receiver.packet(kOwn, bytes, sizeof bytes, 0) == ImuResult::kSample);
+  send_original(receiver, kFirst, kCalm, 1000);
+  REQUIRE(send_original(receiver, kSecond, kPlace, 2000) == ImuResult::kSample);
+  CHECK(receiver.sample().imu_t_us == 0U);
+  CHECK_EQ(receiver.sample().age_4us, 0);
+}
+
+TEST_CASE("a whole packet in a longer one, of another kind or to another address is bad") {
+  uint8_t bytes[40] = {};
+  frames::ImuPacket packet = {};
+  packet.kind = frames::kImuPacketKind;
+  memcpy(bytes, &packet, sizeof packet);
+  core::put_le(bytes + 34, core::crc16(core::kCrc16Start, bytes, 34));
+  ImuReceiver receiver;
+  CHECK(receiver.packet(kOwn, bytes, 37, 0) == ImuResult::kBad);
+  CHECK(receiver.packet(kOwn + 1, bytes, 36, 0) == ImuResult::kBad);
+  bytes[0] = frames::kImuPacketKind + 1;
+  core::put_le(bytes + 34, core::crc16(core::kCrc16Start, bytes, 34));
+  CHECK(receiver.packet(kOwn, bytes, 36, 0) == ImuResult::kBad);
+  CHECK_EQ(receiver.good(), 0);
+}
+
+TEST_CASE("the number of the last sample with an earlier time is another sample") {
+  ImuReceiver receiver;
+  send(receiver, 10, 5000, 1000);
+  CHECK(send(receiver, 10, 4000, 2000) == ImuResult::kSample);
+}
+
+TEST_CASE("an age is that of the packet and the time since, and is never cut to 16 bits") {
+  ImuReceiver receiver;
+  uint8_t bytes[frames::kImuPacketSize];
+  frames::ImuPacket packet = {};
+  packet.kind = frames::kImuPacketKind;
+  packet.age = 60000;
+  memcpy(bytes, &packet, sizeof bytes);
+  core::put_le(bytes + 34, core::crc16(core::kCrc16Start, bytes, 34));
+  receiver.packet(kOwn, bytes, sizeof bytes, 0);
+  CHECK_EQ(receiver.age_4us(4UL * 5534UL), 65534U);
+  CHECK_EQ(receiver.age_4us(4UL * 6000UL), frames::kIdentImuAgeInvalid);
+}
+
+TEST_CASE("the status tells the temperature, the gyro's offset does not") {
+  ImuReceiver receiver;
+  frames::AttitudeFrame attitude;
+  send(receiver, 1, 5000, 0, static_cast<uint8_t>(frames::ImuAux::kGyroBias));
+  REQUIRE(receiver.take_attitude(attitude));
+  const int16_t temperature = attitude.temperature;
+  CHECK(temperature != 101);
+  CHECK_EQ(attitude.product_id, 0);
+}
+
+TEST_CASE("counters stop at their end") {
+  ImuReceiver receiver;
+  const uint8_t bytes[1] = {};
+  for (uint32_t i = 0; i < 65540; ++i) receiver.packet(99, bytes, 1, 0);
+  CHECK_EQ(receiver.bad(), 65535U);
+}
+
+TEST_CASE("an original value at the end of its scale is saturated, one step before it is not") {
+  ImuReceiver receiver;
+  float values[8] = {1.0F, 2.0F, 3.0F, 32766.0F, -32766.0F, 6.0F, 7.0F, 8.0F};
+  send_original(receiver, kFirst, values, 0);
+  send_original(receiver, kSecond, kPlace, 1000);
+  CHECK(receiver.sample().unsaturated);
+  values[3] = 32767.0F;
+  send_original(receiver, kFirst, values, 20000);
+  send_original(receiver, kSecond, kPlace, 21000);
+  CHECK_EQ(receiver.sample().p, 32767);
+  CHECK(!receiver.sample().unsaturated);
+}
+
+TEST_CASE("less than no fix is no fix, less than no satellite none, any kind of fix is one") {
+  ImuReceiver receiver;
+  frames::GpsFrame gps;
+  float place[8] = {9.0F, 30.0F, -120.0F, 74.5F, 359.5F, 12.0F, -1.0F, 7.0F};
+  send_original(receiver, kSecond, place, 0);
+  REQUIRE(receiver.take_position(gps));
+  CHECK_EQ(gps.fix, 0);
+  place[6] = 3.0F;
+  place[7] = -1.0F;
+  send_original(receiver, kSecond, place, 1000);
+  REQUIRE(receiver.take_position(gps));
+  CHECK_EQ(gps.fix, 3);
+  CHECK_EQ(gps.satellites, 0);
+}
