@@ -103,7 +103,8 @@ def analysed(flight: VirtualFlight, seed: int, factor: float) -> Row:
     try:
         found = reconstruct(columns, airframe, data)
         row["check"] = {
-            c.name: [c.times, c.directions, c.probability] for c in found.calibration_tests
+            c.name: [c.rms_ratio, c.degrees_of_freedom, c.probability]
+            for c in found.calibration_tests
         }
         row["doubted"] = found.calibration_tests[0].rejected
     except IdentificationError as error:

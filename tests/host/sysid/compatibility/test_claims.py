@@ -6,8 +6,8 @@ from host.aircraft.mass_properties import airframe_data
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.sysid.compatibility.calibration_consistency import (
-    ALARM,
     OBSERVABLE_GROUPS,
+    SIGNIFICANCE,
     ConsistencyTest,
     calibration_lines,
     consistency_tests,
@@ -42,21 +42,21 @@ def test_alarms_come_as_often_as_stated(times: float, least: float, most: float)
     noise = np.geomspace(0.1, 2.0, len(NAMES))
     found = [consistency_tests(NAMES, *drawn(rng, times, noise), prior(None)) for _ in range(500)]
     assert least <= np.mean([f[0].rejected for f in found]) <= most
-    rms = np.sqrt(np.mean([f[0].times ** 2 for f in found]))
+    rms = np.sqrt(np.mean([f[0].rms_ratio ** 2 for f in found]))
     assert pytest.approx(rms, abs=0.05) == 1.0 if times == 1.0 else 2.0 < rms < 3.0
 
 
 def test_what_the_flight_does_not_tell_is_not_judged() -> None:
     rng = np.random.default_rng(5)
     found = consistency_tests(NAMES, *drawn(rng, 1.0, np.full(len(NAMES), 30.0)), prior(None))
-    assert all(c.directions == 0 and not c.rejected for c in found)
+    assert all(c.degrees_of_freedom == 0 and not c.rejected for c in found)
     assert calibration_lines(found) == []
 
 
 def test_a_doubted_file_is_named_with_the_errors_it_claims_too_small() -> None:
     found = (
-        ConsistencyTest("all", 2.5, 9, ALARM / 10.0),
-        ConsistencyTest("gyro_scale", 3.1, 3, ALARM / 10.0),
+        ConsistencyTest("all", 2.5, 9, SIGNIFICANCE / 10.0),
+        ConsistencyTest("gyro_scale", 3.1, 3, SIGNIFICANCE / 10.0),
         ConsistencyTest("vane_scale", 1.1, 2, 0.4),
     )
     (line,) = calibration_lines(found)
@@ -68,7 +68,7 @@ def test_a_recorded_flight_doubts_a_file_that_claims_a_fifth_and_no_honest_one()
     _, columns = flown("demo", 901)
     honest = reconstructed("demo", 901)
     assert not honest.calibration_tests[0].rejected
-    assert honest.calibration_tests[0].directions > 8
+    assert honest.calibration_tests[0].degrees_of_freedom > 8
     bold = reconstruct(columns, airframe_data(NAME), sensor_error_model(NAME).scaled(0.2))
     assert bold.calibration_tests[0].rejected
     assert any("claims less than this flight shows" in line for line in compatibility_lines(bold))

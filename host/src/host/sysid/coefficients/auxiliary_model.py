@@ -77,7 +77,7 @@ def simulate_noise_free(
     high_pass = jw / (
         jw + ATTITUDE_CROSSOVER_RADPS
     )  # slow trim changes are outside the linear model
-    de, da, dr = (record.passed(s[k], high_pass) for k in ("de", "da", "dr"))
+    de, da, dr = (record.filtered(s[k], high_pass) for k in ("de", "da", "dr"))
     # Short period and lateral motion in wind and body axes (Etkin & Reid, ch. 4).
     short_period = _simulate(
         np.array(
@@ -120,16 +120,16 @@ def simulate_noise_free(
     omega = 2.0 * np.pi * sensors.vane_hz_per_mps * V
     # Second-order vane; upwash and the vane's own motion added.
     vane = 1.0 / (1.0 + 2.0 * sensors.vane_damping * jw / omega + (jw / omega) ** 2)
-    theta = alpha_0 + record.passed(q, 1.0 / (jw + ATTITUDE_CROSSOVER_RADPS))
+    theta = alpha_0 + record.filtered(q, 1.0 / (jw + ATTITUDE_CROSSOVER_RADPS))
     columns = {
         "ax_mps2": ax + qd * z - rd * y,
         "ay_mps2": unit * CY + rd * x - pd * z,
         "az_mps2": az + pd * y - qd * x,
         "p_radps": p, "q_radps": q, "r_radps": r,
-        "alpha_rad": record.passed(
+        "alpha_rad": record.filtered(
             (1.0 + sensors.upwash) * (alpha - q * sensors.vanes_m[0] / V), vane
         ),
-        "beta_rad": record.passed(beta + r * sensors.vanes_m[0] / V, vane),
+        "beta_rad": record.filtered(beta + r * sensors.vanes_m[0] / V, vane),
         "qbar_pa": np.full(n, qbar), "density_kgpm3": np.full(n, 2.0 * qbar / V**2),
         "elevator_rad": de + float(np.mean(s["de"])), "aileron_rad": da, "rudder_rad": dr,
         "phi_rad": phi, "theta_rad": theta,

@@ -1,1 +1,1 @@
-"""Do the sensors agree with each other? Flight-path reconstruction and corrections."""
+"""Data compatibility: flight-path reconstruction and corrections of the sensors."""

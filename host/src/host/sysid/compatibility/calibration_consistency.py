@@ -1,11 +1,4 @@
-"""Does the flight contradict what the instrument's file claims? Errors found against errors stated.
-
-An error found is drawn from what the file states, and the flight's own noise on top. Where the file
-is honest, an estimate that has the file for its prior scatters by S - P, prior less posterior
-covariance, so its square over that is chi-squared. Only directions count of which the flight tells
-something. Bar-Shalom, Li & Kirubarajan, Estimation with Applications to Tracking and Navigation,
-sec. 5.4 (normalised innovation squared), for the same test of a filter.
-"""
+"""Test whether the flight is consistent with the standard deviations of the instrument's file."""
 
 from __future__ import annotations
 
@@ -18,7 +11,7 @@ from scipy import special
 from host.arrays import Array
 from host.sysid.compatibility.flight_path import FLOW, INERTIAL, PITOT, PLACES
 
-# Groups that kinematics can see, by the names of the instrument's file, and their unknowns.
+# Groups of errors that kinematics can observe, by their names in the file, and their unknowns.
 OBSERVABLE_GROUPS: dict[str, tuple[str, ...]] = {
     "gyro_bias_radps": INERTIAL[0:3],
     "gyro_scale": INERTIAL[3:6],
@@ -31,47 +24,53 @@ OBSERVABLE_GROUPS: dict[str, tuple[str, ...]] = {
     "pitot_zero_pa": PITOT[1:],
     "place_m": PLACES,
 }
-ALARM = 0.01  # how often an honest file may be doubted
-LEAST_INFORMATION = 0.3  # of the prior's variance, that a direction counts
+SIGNIFICANCE = 0.01  # of the test: how often a correct file may be rejected
+LEAST_INFORMATION = 0.3  # reduction of the prior variance from which a direction counts
 
 
 @dataclass(frozen=True, slots=True)
 class ConsistencyTest:
-    """What the flight says of one group of errors, or of all: its own word against the file's.
+    """Consistency of one group of errors, or of all, with the file's standard deviations.
 
     Attributes
     ----------
     name : str
-        Of the instrument's file; ``all`` for the whole.
-    times : float
-        How many times as large as stated the errors found are, rms.
-    directions : int
-        How many combinations of them the flight tells; 0: nothing can be said.
+        Group in the instrument's file; ``all`` for all groups together.
+    rms_ratio : float
+        Root mean square of the errors found over that stated.
+    degrees_of_freedom : int
+        Number of combinations of them that the flight informs; 0: no test is possible.
     probability : float
-        Of errors as large as that, were the file honest.
+        Probability of errors as large as these if the file is correct.
     """
 
     name: str
-    times: float
-    directions: int
+    rms_ratio: float
+    degrees_of_freedom: int
     probability: float
 
     @property
     def rejected(self) -> bool:
-        """Whether the file claims less than the flight shows."""
-        return self.probability < ALARM
+        """Whether the file states less than the flight shows."""
+        return self.probability < SIGNIFICANCE
 
 
 def consistency_tests(
     names: Sequence[str], found: Array, covariance: Array, prior: Mapping[str, tuple[float, float]]
 ) -> tuple[ConsistencyTest, ...]:
-    """Return the test of all visible errors together, then of each group.
+    """Test all observable errors together, then each group.
+
+    If the file is correct, an estimate with the file as prior has the covariance S - P, prior less
+    posterior, and its normalised square z' (S - P)^-1 z is chi-square distributed (the test of
+    normalised estimation errors of a filter: Bar-Shalom, Li & Kirubarajan, Estimation with
+    Applications to Tracking and Navigation, sec. 5.4). Only directions that the flight informs
+    count.
 
     Parameters
     ----------
     names : sequence of str
-        Unknowns, in the order of `found` (n,) and `covariance` (n, n), which have the prior in
-        them.
+        Unknowns, in the order of the estimates `found` (n,) and their `covariance` (n, n), both
+        with the prior.
     prior : mapping
         Mean and standard deviation of each, as the file states them.
     """
@@ -87,24 +86,24 @@ def consistency_tests(
 
 
 def _consistency_test(name: str, own: Sequence[int], z: Array, P: Array) -> ConsistencyTest:
-    told, directions = np.linalg.eigh(np.eye(len(own)) - P[np.ix_(own, own)])
-    kept = told > LEAST_INFORMATION
-    count = int(kept.sum())
+    information, directions = np.linalg.eigh(np.eye(len(own)) - P[np.ix_(own, own)])
+    informed = information > LEAST_INFORMATION
+    count = int(informed.sum())
     if not count:
         return ConsistencyTest(name, 0.0, 0, 1.0)
-    square = float(np.sum((directions[:, kept].T @ z[own]) ** 2 / told[kept]))
+    statistic = float(np.sum((directions[:, informed].T @ z[own]) ** 2 / information[informed]))
     return ConsistencyTest(
-        name, float(np.sqrt(square / count)), count, float(special.chdtrc(count, square))
+        name, float(np.sqrt(statistic / count)), count, float(special.chdtrc(count, statistic))
     )
 
 
 def calibration_lines(found: Sequence[ConsistencyTest]) -> list[str]:
-    """Return what a verdict says of a file that claims too little; nothing of an honest one."""
+    """Return the verdict's lines on a file that states too little; none if it is consistent."""
     if not found or not found[0].rejected:
         return []
     named = [c for c in found[1:] if c.rejected]
     worst = named or sorted(found[1:], key=lambda c: c.probability)[:1]
-    parts = ", ".join(f"{c.name} {c.times:.1f} times" for c in worst)
+    parts = ", ".join(f"{c.name} {c.rms_ratio:.1f} times" for c in worst)
     return [
         f"the calibration claims less than this flight shows: {parts}; intervals are too narrow:"
         " calibrate again, or state larger deviations"

@@ -1,9 +1,8 @@
-"""Kinematics of a flight from its own inertial sensors, with exact first-order slopes.
+"""Kinematic model of flight-path reconstruction, with exact first-order sensitivities.
 
-Rates turn the attitude, specific force and gravity move the velocity: nothing aerodynamic, so what
-vanes, pitot, barometer and GPS say must agree with it whatever the aircraft is. Errors of the
-inertial sensors become errors of attitude (small turns in the earth's frame) and velocity by
-integrals along the path: Titterton & Weston, Strapdown Inertial Navigation Technology, sec. 12.3.
+Angular rates give the attitude, specific force and gravity the velocity. These kinematics contain
+no aerodynamics, so that vanes, pitot, barometer and GPS must agree with them for any aircraft
+(Klein & Morelli, Aircraft System Identification, ch. 10).
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ INERTIAL = (
 FLOW = ("alpha_scale", "alpha_zero_rad", "beta_scale", "beta_zero_rad")
 PITOT = ("pitot_scale", "pitot_zero_pa")
 DELAYS = ("vane_delay_s", "pitot_delay_s")
-PLACES = ("vane_x_m", "vane_z_m")  # of the vanes from the IMU, beyond the drawing
+PLACES = ("vane_x_m", "vane_z_m")  # errors of the vanes' position from the IMU
 WITH_GPS = ("gps_delay_s", "wind_north_mps", "wind_east_mps")
 START = ("north_mps", "east_mps", "down_mps", "turn_north_rad", "turn_east_rad", "turn_down_rad")
 AIR = ("airspeed_mps", "alpha_rad", "beta_rad")
@@ -44,7 +43,7 @@ LEAST_SPEED_MPS = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A stretch of flight on an even grid, at the CG; `start` is a first guess of it.
+    """A segment of flight on an even grid, at the CG.
 
     Attributes
     ----------
@@ -53,9 +52,9 @@ class Segment:
     density_kgpm3 : float
         Mean.
     airspeed_mps : Array, shape (n,)
-        As measured, smoothed: a gust from ahead changes what an angle means.
+        As measured, smoothed: a longitudinal gust changes the angle of a given velocity.
     measured : Array, shape (p, blocks)
-        Means over the blocks of samples that count as one.
+        Means over blocks of samples.
     attitude : Array, shape (3, 3)
         First guess at the first sample, body to north-east-down.
     velocity_mps : Array, shape (3,)
@@ -63,9 +62,9 @@ class Segment:
     fixes : IntArray, shape (blocks,)
         Sample of the GPS fix in a block, -1 where there is none.
     vane_s2 : float
-        One over the square of the vanes' natural frequency (rad/s); 0: a pure delay.
+        Inverse square of the vanes' natural frequency (rad/s); 0: a pure delay.
     vane_m : tuple of float
-        Where the vanes are by the drawing, x and z from the CG.
+        Position of the vanes by the aircraft file, x and z from the CG, m.
     """
 
     dt_s: float
@@ -83,24 +82,24 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class PathModel:
-    """What minimisation wants to know of a model: its name and its outputs."""
+    """Name and outputs of the model, as the search needs them."""
 
     name: str
     outputs: tuple[str, ...]
 
 
 class PathProblem:
-    """Outputs of all stretches as a function of sensor errors, wind and start values.
+    """Outputs of all segments as a function of sensor errors, wind and initial values.
 
     Parameters
     ----------
     segments : sequence of Segment
     outputs : tuple of str
-        Of `AIR`, `HEIGHT` and `GPS`, in the order of `Stretch.measured`.
+        Of `AIR`, `HEIGHT` and `GPS`, in the order of `Segment.measured`.
     prior : dict
         Mean and standard deviation of every common unknown; those not in it are not free.
     start_sd : Array, shape (6,)
-        Standard deviations of the first guess of velocity and turn.
+        Standard deviations of the first guess of velocity, m/s, and attitude, rad.
     block : int
         Samples averaged to one.
     """
@@ -142,25 +141,25 @@ class PathProblem:
 
     @property
     def samples(self) -> int:
-        """Blocks of all stretches together."""
+        """Blocks of all segments together."""
         return sum(s.measured.shape[1] for s in self.segments)
 
     def counted(self, output: str) -> int:
-        """Return how many blocks of all stretches say something of an output."""
+        """Return the number of blocks of all segments in which an output was measured."""
         if output in GPS:
             return sum(int(np.sum(s.fixes >= 0)) for s in self.segments)
         return self.samples
 
     def columns(self, maneuver: int) -> IntArray:
-        """Return which unknowns a stretch depends on."""
+        """Return which unknowns a segment depends on."""
         return self._index[maneuver]
 
     def measured(self, maneuver: int) -> Array:
-        """Return the measured outputs of a stretch, (p, blocks)."""
+        """Return the measured outputs of a segment, (p, blocks)."""
         return self.segments[maneuver].measured
 
     def respond(self, theta: Array) -> list[Response] | None:
-        """Return outputs and slopes of all stretches; None if one is not finite."""
+        """Return outputs and sensitivities of all segments; None if one is not finite."""
         found = [self._one(s, theta[i]) for s, i in zip(self.segments, self._index, strict=True)]
         return found if all(np.isfinite(r.y).all() for r in found) else None
 
@@ -170,23 +169,23 @@ class PathProblem:
     def _one(self, s: Segment, local: Array) -> Response:
         common = len(self.common)
         errors = self._value(local, INERTIAL)
-        spread, stretch, tilt = 1.0 + errors[3:6], 1.0 + errors[9:12], errors[12:15]
-        plain = (s.rates - errors[0:3]) / spread, (s.force - errors[6:9]) / stretch
-        rates, force = (x + cross(tilt, x) for x in plain)
+        gyro_gain, accel_gain, tilt = 1.0 + errors[3:6], 1.0 + errors[9:12], errors[12:15]
+        unaligned = (s.rates - errors[0:3]) / gyro_gain, (s.force - errors[6:9]) / accel_gain
+        rates, force = (x + cross(tilt, x) for x in unaligned)
         own = local[common:]
         attitude = rotation_from_vector(own[3:6]) @ s.attitude
         C, v = strapdown(rates, force, attitude, s.velocity_mps + own[0:3], s.dt_s)
         step_s = self.block * s.dt_s
-        through = v - np.append(self._value(local, WITH_GPS[1:]), 0.0)
+        air_velocity = v - np.append(self._value(local, WITH_GPS[1:]), 0.0)
         mean_C = self._mean(C)
         width = common + len(own)
         ground, fall, air = path_sensitivities(
             mean_C,
-            self._mean(plain[0]),
-            self._mean(plain[1]),
+            self._mean(unaligned[0]),
+            self._mean(unaligned[1]),
             np.einsum("nij,nj->ni", mean_C, self._mean(force)),
-            self._mean(through),
-            np.stack([spread, stretch]),
+            self._mean(air_velocity),
+            np.stack([gyro_gain, accel_gain]),
             self._inertial_place,
             self._wind_place,
             common,
@@ -197,9 +196,9 @@ class PathProblem:
 
         y, slopes = [], []
         if AIR[0] in self.model.outputs:
-            flow = np.einsum("nij,ni->nj", C, through)
-            for late, slope in self._air(s, local, flow, air, rates):
-                y.append(late)
+            flow = np.einsum("nij,ni->nj", C, air_velocity)
+            for delayed, slope in self._air(s, local, flow, air, rates):
+                y.append(delayed)
                 slopes.append(slope)
         if HEIGHT in self.model.outputs:
             slope = -fall
@@ -209,41 +208,48 @@ class PathProblem:
         if GPS[0] in self.model.outputs:
             delay = self._value(local, WITH_GPS[:1])[0]
             for axis in range(3):
-                # GPS hops over the motion of a multisine: only its fixes count, one by one.
+                # Between fixes the table interpolates GPS; only the fixes count.
                 t = np.arange(len(v)) * s.dt_s
-                late = np.interp(t - delay, t, v[:, axis])
+                delayed = np.interp(t - delay, t, v[:, axis])
                 back = np.clip(np.arange(len(ground)) - round(delay / step_s), 0, len(ground) - 1)
                 slope = ground[back, axis]
-                self._add(slope, WITH_GPS[0], -np.gradient(late, s.dt_s)[s.fixes])
+                self._add(slope, WITH_GPS[0], -np.gradient(delayed, s.dt_s)[s.fixes])
                 slope[s.fixes < 0] = 0.0
                 row = self.model.outputs.index(GPS[axis])
-                y.append(np.where(s.fixes < 0, s.measured[row], late[s.fixes]))
+                y.append(np.where(s.fixes < 0, s.measured[row], delayed[s.fixes]))
                 slopes.append(slope)
         return Response(np.stack(y), np.ascontiguousarray(np.stack(slopes)))
 
     def _air(
         self, s: Segment, local: Array, flow: Array, x: Array, rates: Array
     ) -> list[tuple[Array, Array]]:
-        """Return airspeed, alpha and beta as the sensors tell them, with slopes."""
+        """Return airspeed, alpha and beta as the sensors read them, with sensitivities.
+
+        The pitot reads V_m^2 = (1 + scale) V^2 + 2 zero / rho; a vane at (x, z) reads
+        (1 + scale) (atan(w / u) - q x / u) + zero, or (1 + scale) (atan(v / u) + (r x - p z) / u) +
+        zero, behind its dynamics (Klein & Morelli, Aircraft System Identification, ch. 10).
+        """
         alpha_scale, alpha_zero, beta_scale, beta_zero = self._value(local, FLOW)
         scale, zero = self._value(local, PITOT)
         vane_delay, pitot_delay = self._value(local, DELAYS)
-        # Angles are taken against the air as it came, gusts from ahead (3 % of speed) included.
+        # Angles refer to the measured airspeed, which has longitudinal gusts (3 % of speed) in it.
         least = LEAST_SPEED_MPS**2
-        came = np.maximum(s.airspeed_mps**2 - 2.0 * zero / s.density_kgpm3, least) / (1.0 + scale)
-        u = np.sqrt(np.maximum(came - flow[:, 1] ** 2 - flow[:, 2] ** 2, least))
+        square_speed = np.maximum(s.airspeed_mps**2 - 2.0 * zero / s.density_kgpm3, least) / (
+            1.0 + scale
+        )
+        u = np.sqrt(np.maximum(square_speed - flow[:, 1] ** 2 - flow[:, 2] ** 2, least))
         speed = np.maximum(np.linalg.norm(flow, axis=1), LEAST_SPEED_MPS)
         square = (1.0 + scale) * speed**2 + 2.0 * zero / s.density_kgpm3
-        told = np.sqrt(np.maximum(square, least))
+        sensed = np.sqrt(np.maximum(square, least))
         result = []
 
-        late, change = self._late(told, pitot_delay, s.dt_s)
-        middle, size = self._mean(flow), self._mean(told)
-        slope = ((1.0 + scale) / size)[:, None] * np.einsum("ni,nik->nk", middle, x)
+        delayed, change = self._late(sensed, pitot_delay, s.dt_s)
+        mean_flow, size = self._mean(flow), self._mean(sensed)
+        slope = ((1.0 + scale) / size)[:, None] * np.einsum("ni,nik->nk", mean_flow, x)
         self._add(slope, "pitot_scale", self._mean(speed) ** 2 / (2.0 * size))
         self._add(slope, "pitot_zero_pa", 1.0 / (s.density_kgpm3 * size))
         self._add(slope, "pitot_delay_s", change)
-        result.append((late, slope))
+        result.append((delayed, slope))
         arm_x, arm_z = self._value(local, PLACES) + s.vane_m
         by_x, by_z = rates[:, [1, 2]] * [-1.0, 1.0] / u[:, None], -rates[:, 0] / u
         for across, gain, offset, name in (
@@ -254,24 +260,26 @@ class PathProblem:
             angle = np.arctan2(flow[:, across], u) + arm_x * along
             if across == 1:
                 angle = angle + arm_z * by_z
-            told = (1.0 + gain) * angle + offset
-            # A vane is a spring: what it swings beyond a delay tau is (tau^2/2 - 1/omega^2) s^2.
-            swing = 0.5 * vane_delay**2 - s.vane_s2 if s.vane_s2 else 0.0
-            told = told + swing * np.gradient(np.gradient(told, s.dt_s), s.dt_s)
-            late, change = self._late(told, vane_delay, s.dt_s)
-            ahead, aside = self._mean(u), middle[:, across]
-            part = (1.0 + gain) / (ahead**2 + aside**2)
-            drawn = np.einsum("ni,nik->nk", middle[:, 1:], x[:, 1:]) / ahead[:, None]
-            slope = part[:, None] * (ahead[:, None] * x[:, across] + aside[:, None] * drawn)
-            self._add(slope, "pitot_scale", 0.5 * part * aside * self._mean(came) / ahead)
-            self._add(slope, "pitot_zero_pa", part * aside / (s.density_kgpm3 * ahead))
+            sensed = (1.0 + gain) * angle + offset
+            # A vane is of second order: beyond its delay tau it has (tau^2/2 - 1/omega^2) s^2.
+            curvature_s2 = 0.5 * vane_delay**2 - s.vane_s2 if s.vane_s2 else 0.0
+            sensed = sensed + curvature_s2 * np.gradient(np.gradient(sensed, s.dt_s), s.dt_s)
+            delayed, change = self._late(sensed, vane_delay, s.dt_s)
+            forward, sideways = self._mean(u), mean_flow[:, across]
+            part = (1.0 + gain) / (forward**2 + sideways**2)
+            in_plane = np.einsum("ni,nik->nk", mean_flow[:, 1:], x[:, 1:]) / forward[:, None]
+            slope = part[:, None] * (forward[:, None] * x[:, across] + sideways[:, None] * in_plane)
+            self._add(
+                slope, "pitot_scale", 0.5 * part * sideways * self._mean(square_speed) / forward
+            )
+            self._add(slope, "pitot_zero_pa", part * sideways / (s.density_kgpm3 * forward))
             self._add(slope, f"{name}_scale", self._mean(angle))
             self._add(slope, f"{name}_zero_rad", np.ones(len(slope)))
             self._add(slope, "vane_x_m", (1.0 + gain) * self._mean(along))
             if across == 1:
                 self._add(slope, "vane_z_m", (1.0 + gain) * self._mean(by_z))
             self._add(slope, "vane_delay_s", change)
-            result.append((late, slope))
+            result.append((delayed, slope))
         return result
 
     def _add(self, slope: Array, name: str, value: Array) -> None:
@@ -279,11 +287,11 @@ class PathProblem:
             slope[:, self._place[name]] += value
 
     def _late(self, signal: Array, delay_s: float, dt_s: float) -> tuple[Array, Array]:
-        """Return block means of a signal read `delay_s` earlier, and their slope by it."""
+        """Return block means of a signal delayed by `delay_s`, and their derivative by it."""
         t = np.arange(len(signal)) * dt_s
-        late = np.interp(t - delay_s, t, signal)
-        rate = np.gradient(late, dt_s)
-        return self._mean(late), -self._mean(rate)
+        delayed = np.interp(t - delay_s, t, signal)
+        rate = np.gradient(delayed, dt_s)
+        return self._mean(delayed), -self._mean(rate)
 
     def _mean(self, signal: Array) -> Array:
         blocks = signal.reshape(-1, self.block, *signal.shape[1:])

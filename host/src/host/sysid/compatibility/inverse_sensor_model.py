@@ -1,7 +1,7 @@
-"""Flight signals at the CG, corrected for sensors whose errors are assumed known.
+"""Inverse sensor model: flight signals at the CG for assumed sensor errors.
 
-The whole flight is corrected in the frequency domain: delays and lags are undone there, and the
-same low-pass goes over every signal, so that an equation between them stays one.
+The whole flight is corrected in the frequency domain. Delays and lags are inverted there, and every
+signal passes the same low-pass, so that equations between signals still hold.
 """
 
 from __future__ import annotations
@@ -18,23 +18,27 @@ from host.instrument.deviations import SensorErrorModel
 from host.instrument.recording import SURFACES
 
 PASS_HZ, STOP_HZ = 9.0, 13.0
-FIT_RATE_HZ = 33.0  # rate of the fit: nothing is left above 13 Hz, a fit takes a third of the time
-# Over this rate a vane slides for certain; its noise after the low-pass is about 0.015 rad/s.
+FIT_RATE_HZ = 33.0  # signals end at 13 Hz; a fit takes a third of the time
+# Above this rate a vane slides; noise of its rate after the low-pass is about 0.015 rad/s.
 SLIDING_RADPS = 0.02
-ATTITUDE_CROSSOVER_RADPS = 2.0 * np.pi * 0.05  # attitude: filter below, integrated gyro above
+ATTITUDE_CROSSOVER_RADPS = 2.0 * np.pi * 0.05  # attitude filter below, integrated gyro above
 Spectrum = NDArray[np.complex128]
 
 
 @dataclass(slots=True)
 class Record:
-    """Columns of a flight on an even grid, and their spectra without the line through the ends."""
+    """Columns of a flight on an even grid, and their spectra.
+
+    The straight line through the ends of a column is removed before the transform, so that nothing
+    wraps; `cache` holds results for repeated sensor errors.
+    """
 
     dt_s: float
     columns: dict[str, Array]
     jw: Spectrum = field(init=False)
     low_pass: Array = field(init=False)
     spectra: dict[str, Spectrum] = field(init=False)
-    latest: dict[str, tuple[tuple[float, ...], Array]] = field(init=False, default_factory=dict)
+    cache: dict[str, tuple[tuple[float, ...], Array]] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         hertz = np.fft.rfftfreq(self.samples, self.dt_s)
@@ -52,42 +56,42 @@ class Record:
         return np.linspace(float(values[0]), float(values[-1]), len(values))
 
     def smooth(self, name: str, through: Spectrum | float = 1.0) -> Array:
-        """Return a column through the low-pass and a filter of unit gain at rest."""
+        """Return a column behind the low-pass and a filter of unit static gain."""
         spectrum = self.spectra[name] * self.low_pass * through
         back: Array = np.fft.irfft(spectrum, self.samples)
         return back + self._line(self.columns[name])
 
-    def passed(self, values: Array, through: Spectrum | Array) -> Array:
-        """Return values, the line through their ends removed, through a filter."""
+    def filtered(self, values: Array, through: Spectrum | Array) -> Array:
+        """Return filtered values, the line through their ends removed."""
         spectrum = np.fft.rfft(values - self._line(values)) * through
         return np.asarray(np.fft.irfft(spectrum, self.samples), dtype=np.float64)
 
     def rate(self, values: Array) -> Array:
         """Return the time derivative."""
         slope = float(values[-1] - values[0]) / ((self.samples - 1) * self.dt_s)
-        return self.passed(values, self.jw * (np.abs(self.jw) < 2.0 * np.pi * STOP_HZ)) + slope
+        return self.filtered(values, self.jw * (np.abs(self.jw) < 2.0 * np.pi * STOP_HZ)) + slope
 
     def on_clock(self, share: float) -> Record:
-        """Return the same for a clock that was slow by a share: all took longer than it says."""
+        """Return the record as of a clock that was slow by a relative error `share`."""
         if share == 0.0:
             return self
         result = copy.copy(self)
-        result.dt_s, result.jw, result.latest = (
+        result.dt_s, result.jw, result.cache = (
             self.dt_s * (1.0 + share),
             self.jw / (1.0 + share),
             {},
         )
         return result
 
-    def made(self, name: str, of: tuple[float, ...], make: Callable[[], Array]) -> Array:
-        """Return `make()`, or what it last gave under this name for the same numbers."""
-        if name not in self.latest or self.latest[name][0] != of:
-            self.latest[name] = of, make()
-        return self.latest[name][1]
+    def cached(self, name: str, of: tuple[float, ...], make: Callable[[], Array]) -> Array:
+        """Return `make()`, or its last result under this name for the same numbers."""
+        if name not in self.cache or self.cache[name][0] != of:
+            self.cache[name] = of, make()
+        return self.cache[name][1]
 
 
 def usable_length(samples: int) -> int:
-    """Return the largest length up to `samples` that transforms fast (factors 2, 3, 5)."""
+    """Return the largest length up to `samples` with a fast transform (factors 2, 3, 5)."""
     best = 1
     twos = 1
     while twos <= samples:
@@ -103,28 +107,35 @@ def usable_length(samples: int) -> int:
 
 
 def decimate(columns: Mapping[str, Array], dt_s: float) -> Record:
-    """Return a record at the rate of the fit; its first sample keeps its time.
+    """Return a record decimated to the rate of the fit; its first sample keeps its time.
+
+    Ljung, System Identification, 2nd ed., ch. 14. The signals are band-limited in the transform.
 
     Parameters
     ----------
     columns : mapping of (n,) arrays
-        On an even grid; n must transform fast (`usable_length`).
+        On an even grid; n of `usable_length`.
     dt_s : float
+        Sample period, s.
     """
     samples = len(next(iter(columns.values())))
-    fewer = min(usable_length(round(samples * dt_s * FIT_RATE_HZ)), samples)
-    at = np.arange(fewer) * (samples / fewer)
+    decimated_samples = min(usable_length(round(samples * dt_s * FIT_RATE_HZ)), samples)
+    at = np.arange(decimated_samples) * (samples / decimated_samples)
     result = {}
     for name, values in columns.items():
         line = np.linspace(float(values[0]), float(values[-1]), samples)
-        spectrum = np.fft.rfft(values - line)[: fewer // 2 + 1]
-        back: Array = np.fft.irfft(spectrum, fewer) * (fewer / samples)
+        spectrum = np.fft.rfft(values - line)[: decimated_samples // 2 + 1]
+        back: Array = np.fft.irfft(spectrum, decimated_samples) * (decimated_samples / samples)
         result[name] = back + np.interp(at, np.arange(samples), line)
-    return Record(dt_s * samples / fewer, result)
+    return Record(dt_s * samples / decimated_samples, result)
 
 
 def attitude(record: Record, s: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Return phi, theta: the attitude filter's at low, the integrated gyro's at high frequency."""
+    """Return phi and theta, rad, by a complementary filter.
+
+    Low frequencies come from the attitude filter, high ones from phi' = p + tan(theta) (q sin(phi)
+    + r cos(phi)) and theta' = q cos(phi) - r sin(phi).
+    """
     phi, theta = record.smooth("phi_rad"), record.smooth("theta_rad")
     across = s["q"] * np.sin(phi) + s["r"] * np.cos(phi)
     rates = (s["p"] + np.tan(theta) * across, s["q"] * np.cos(phi) - s["r"] * np.sin(phi))
@@ -132,7 +143,7 @@ def attitude(record: Record, s: Mapping[str, Array]) -> tuple[Array, Array]:
     for angle, rate in zip((phi, theta), rates, strict=True):
         both = ATTITUDE_CROSSOVER_RADPS * angle + rate
         line = np.linspace(both[0], both[-1], len(both)) / ATTITUDE_CROSSOVER_RADPS
-        blended.append(record.passed(both, 1.0 / (record.jw + ATTITUDE_CROSSOVER_RADPS)) + line)
+        blended.append(record.filtered(both, 1.0 / (record.jw + ATTITUDE_CROSSOVER_RADPS)) + line)
     return blended[0], blended[1]
 
 
@@ -145,10 +156,10 @@ def apply_sensor_errors(
     ----------
     record : Record
     errors : mapping
-        Names of `instrument_errors.deviations`.
+        Values by the names of `host.instrument.deviations.deviations`.
     data : SensorErrorModel
     airspeed_mps : float
-        Mean of the maneuvers: sets the vanes' frequency.
+        Mean of the maneuvers, m/s: it gives the vanes' natural frequency.
 
     Returns
     -------
@@ -158,22 +169,26 @@ def apply_sensor_errors(
     """
     e = errors
     pitot = e["pitot_delay_s"], data.pitot_lag_s
-    pressure = record.made("qbar_pa", pitot, lambda: _invert_lag(record, "qbar_pa", *pitot))
+    pressure = record.cached("qbar_pa", pitot, lambda: _invert_lag(record, "qbar_pa", *pitot))
     qbar = (pressure - e["pitot_drift_pa"]) / (1.0 + e["pitot_scale"])
     density = record.columns["density_kgpm3"] * (1.0 + e["density_share"])
     V = np.sqrt(2.0 * np.maximum(qbar, 1.0) / density)
     tilt = [e[f"tilt_{a}_rad"] for a in "xyz"]
-    turned = np.linalg.inv(
+    alignment = np.linalg.inv(
         [[1.0, tilt[2], -tilt[1]], [-tilt[2], 1.0, tilt[0]], [tilt[1], -tilt[0], 1.0]]
     )
     inertial = _inertial_signals(
         record, e["imu_delay_s"], 1.0 / (2.0 * np.pi * data.imu_bandwidth_hz)
     )
-    spread = np.array([[1.0 + e[f"gyro_{a}_scale"]] for a in "xyz"])
-    stretch = np.array([[1.0 + e[f"accel_{a}_scale"]] for a in "xyz"])
-    p, q, r = turned @ ((inertial[:3] - [[e[f"gyro_{a}_bias_radps"]] for a in "xyz"]) / spread)
-    pd, qd, rd = turned @ (inertial[3:6] / spread)
-    ax, ay, az = turned @ ((inertial[6:] - [[e[f"accel_{a}_bias_mps2"]] for a in "xyz"]) / stretch)
+    gyro_gain = np.array([[1.0 + e[f"gyro_{a}_scale"]] for a in "xyz"])
+    accel_gain = np.array([[1.0 + e[f"accel_{a}_scale"]] for a in "xyz"])
+    p, q, r = alignment @ (
+        (inertial[:3] - [[e[f"gyro_{a}_bias_radps"]] for a in "xyz"]) / gyro_gain
+    )
+    pd, qd, rd = alignment @ (inertial[3:6] / gyro_gain)
+    ax, ay, az = alignment @ (
+        (inertial[6:] - [[e[f"accel_{a}_bias_mps2"]] for a in "xyz"]) / accel_gain
+    )
     x, y, z = (
         data.imu_m[k] + e[f"imu_{a}_m"] - e[f"cg_{a}_m"] for k, a in enumerate("xyz")
     )  # fmt: skip
@@ -213,7 +228,7 @@ def _surfaces(record: Record, e: Mapping[str, float], commanded: tuple[str, ...]
         return np.stack([record.smooth(n, by) for n, by in zip(names, late, strict=True)])
 
     shares = [e.get(f"{s}_{'servo_' * (s in commanded)}scale", 0.0) for s in SURFACES]
-    positions = record.made("surfaces", (late_s,), moved)
+    positions = record.cached("surfaces", (late_s,), moved)
     return [
         # A servo goes further than it is told; a pot says more than there is.
         x * (1.0 + share) if s in commanded else x / (1.0 + share)
@@ -222,36 +237,43 @@ def _surfaces(record: Record, e: Mapping[str, float], commanded: tuple[str, ...]
 
 
 def _invert_lag(record: Record, name: str, delay_s: float, lag_s: float) -> Array:
-    """Return a column without its delay and the lag of the first order behind it."""
+    """Return a column with its delay and first-order lag inverted."""
     return record.smooth(name, (1.0 + record.jw * lag_s) * np.exp(record.jw * delay_s))
 
 
 def _inertial_signals(record: Record, delay_s: float, pole_s: float) -> Array:
-    """Return p, q, r, their derivatives and ax, ay, az without delay and low-pass, (9, n)."""
+    """Return p, q, r, their derivatives and ax, ay, az, delay and low-pass inverted, (9, n)."""
 
     def make() -> Array:
         columns = "p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2"
         rows = [_invert_lag(record, name, delay_s - pole_s, pole_s) for name in columns]
         return np.stack([*rows[:3], *map(record.rate, rows[:3]), *rows[3:]])
 
-    return record.made("inertial", (delay_s, pole_s), make)
+    return record.cached("inertial", (delay_s, pole_s), make)
 
 
 def _vane_angle(
     record: Record, name: str, e: Mapping[str, float], data: SensorErrorModel, airspeed_mps: float
 ) -> Array:
-    """Return the flow angle a vane was pushed by: inertia, damping and dry friction undone."""
-    omega = 2.0 * np.pi * data.vane_hz_per_mps * airspeed_mps * (1.0 + e[f"{name}_lag_share"])
-    hold = data.vane_friction_rad * (1.0 + e["friction_share"])
-    hold *= (data.friction_speed_mps / airspeed_mps) ** 2
+    """Return the flow angle at a vane: second-order dynamics and dry friction inverted.
 
-    def pushed() -> Array:
+    delta'' + 2 zeta omega delta' + omega^2 delta = omega^2 (flow angle - friction sign(delta')),
+    with omega proportional to airspeed and friction to its inverse square.
+    """
+    omega = 2.0 * np.pi * data.vane_hz_per_mps * airspeed_mps * (1.0 + e[f"{name}_lag_share"])
+    friction_rad = data.vane_friction_rad * (1.0 + e["friction_share"])
+    friction_rad *= (data.friction_speed_mps / airspeed_mps) ** 2
+
+    def inverse_dynamics() -> Array:
         inverse = 1.0 + 2.0 * data.vane_damping * record.jw / omega + (record.jw / omega) ** 2
         return record.smooth(f"{name}_rad", inverse)
 
-    def sliding() -> Array:
-        moving = record.rate(record.smooth(f"{name}_rad"))
-        return record.passed(np.tanh(moving / SLIDING_RADPS), record.low_pass)
+    def rate_sign() -> Array:
+        vane_rate = record.rate(record.smooth(f"{name}_rad"))
+        return record.filtered(np.tanh(vane_rate / SLIDING_RADPS), record.low_pass)
 
-    against = record.made(f"{name} friction", (), sliding)
-    return record.made(f"{name}_rad", (omega, data.vane_damping), pushed) + hold * against
+    sign = record.cached(f"{name} friction", (), rate_sign)
+    return (
+        record.cached(f"{name}_rad", (omega, data.vane_damping), inverse_dynamics)
+        + friction_rad * sign
+    )

@@ -1,4 +1,4 @@
-"""Prepare a flight for reconstruction: what is open before it, corrections, lively stretches."""
+"""Prepare a flight for reconstruction: priors, corrections, segments with excitation."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from host.sysid.compatibility.strapdown import rotation
 from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.differentiation import local_polynomial
 
-BLOCK_S = 0.05  # samples are averaged to this: a trainer's motion is far below 10 Hz
+BLOCK_S = 0.05  # samples are averaged over this: the motion of a trainer is far below 10 Hz
 SEGMENT_S = 12.0
 SHORT_SEGMENT_S = 6.0  # without GPS nothing holds the path for longer
 # Without GPS a tilt of the IMU, a bias of an accelerometer and the attitude look alike.
 WITHOUT_GPS = (*INERTIAL[0:3], *FLOW, *DELAYS)
 MOST_SEGMENTS = 8
-LEAST_EXCITATION = 0.1  # of the liveliest stretch: what an axis has before any is chosen
+LEAST_EXCITATION = 0.1  # of the most excited segment: initial value of each axis
 QUADRANTS = 4  # of heading: wind and pitot scale need them
-INPUT_LAGS = (*range(0, 10), *range(10, 31, 2))  # in blocks: what an answer to a surface lasts
+INPUT_LAGS = (*range(0, 10), *range(10, 31, 2))  # in blocks: duration of a response
 START_SD = np.array([1.0, 1.0, 1.0, *np.radians([5.0, 5.0, 20.0])])
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
 SMOOTH_S = 0.03  # half a window for derivatives: 9 Hz at 100 Hz
@@ -48,7 +48,7 @@ SMOOTHED = "airspeed_mps smoothed"
 FIX_BEND_MPS = 1e-6
 NO_OFFSETS = AirframeData("nothing but places", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
 FLYING_SHARE = 0.5  # of the median airspeed
-# What no calibration says: deviation of the steady wind, delays of vanes and GPS.
+# Not in any calibration: deviation of the steady wind, mean and deviation of delays.
 WIND_SD_MPS = 10.0
 VANE_DELAY_S = (0.010, 0.010)
 GPS_DELAY_S = (0.10, 0.08)
@@ -59,12 +59,12 @@ def prepare_path_problem(
     airframe: AirframeData | None,
     instrument: SensorErrorModel | None,
 ) -> tuple[PathProblem, list[Array], tuple[tuple[float, float], ...]]:
-    """Return the problem, what the pilot did in every stretch, and when the stretches were (s).
+    """Return the problem, the lagged inputs of every segment, and begin and end of each (s).
 
     Raises
     ------
     IdentificationError
-        If inertial sensors or all air data are missing, or nothing of the flight is long enough.
+        If inertial sensors or all air data are missing, or no part of the flight is long enough.
     """
     inertial = [*(f"{a}_radps" for a in "pqr"), *(f"a{a}_mps2" for a in "xyz")]
     missing = [c for c in (*inertial, *AIR, "t_s") if c not in columns]
@@ -97,10 +97,10 @@ def prepare_path_problem(
         for cut in cuts
     ]
     start_sd = START_SD if gps else np.where(np.arange(len(START)) == 5, 1e-6, START_SD)
-    open_now = prior(instrument)
+    priors = prior(instrument)
     if not gps:
-        open_now = {k: v for k, v in open_now.items() if k in WITHOUT_GPS}
-    problem = PathProblem(segments, outputs, open_now, start_sd, block)
+        priors = {k: v for k, v in priors.items() if k in WITHOUT_GPS}
+    problem = PathProblem(segments, outputs, priors, start_sd, block)
     t = data["t_s"]
     when = tuple((float(t[c.start]), float(t[c.stop - 1])) for c in cuts)
     return problem, [_lagged_inputs(columns, cut, block) for cut in cuts], when
@@ -126,7 +126,7 @@ def prior(instrument: SensorErrorModel | None) -> dict[str, tuple[float, float]]
     }
     result |= {name: (0.0, known[name]) for name in (*FLOW, *PITOT)}
     result |= dict(zip(DELAYS, (VANE_DELAY_S, (i.pitot_lag_s, i.pitot_lag_s)), strict=True))
-    # Both were measured from the same point: where the balance is does not matter.
+    # Both were measured from the same point, so the position of the CG does not matter.
     place = float(np.hypot(sd["imu_x_m"], sd["vane_x_m"]))
     result |= dict.fromkeys(PLACES, (0.0, place))
     wind = (0.0, WIND_SD_MPS)
@@ -135,7 +135,7 @@ def prior(instrument: SensorErrorModel | None) -> dict[str, tuple[float, float]]
 
 
 def density_share(instrument: SensorErrorModel | None) -> float:
-    """Return one deviation of density as a share: instruments and a fuselage that is warm."""
+    """Return the relative standard deviation of density: instruments and a warm fuselage."""
     e = (instrument or unknown_sensors()).errors
     return float(np.hypot(e["density_share"].of_mean(), e["fuselage_heat_share"].of_mean()))
 
@@ -143,41 +143,42 @@ def density_share(instrument: SensorErrorModel | None) -> float:
 def compensate_friction(
     data: Mapping[str, Array], name: str, i: SensorErrorModel, dt_s: float
 ) -> Array:
-    """Return a vane's angle with its dry friction undone: it hangs back where it moves."""
+    """Return a vane's angle (rad) with dry friction compensated, by the sign of its rate."""
     angle = data[name]
     window = 2 * max(2, round(SMOOTH_S / dt_s)) + 1
     moving = local_polynomial(angle[:, None], window, 2, derivative=1, dt_s=dt_s)[:, 0]
-    slower = i.friction_speed_mps / np.maximum(data[AIR[0]], LEAST_SPEED_MPS)
-    hold = i.vane_friction_rad * np.minimum(slower, 3.0) ** 2
-    return np.asarray(angle + hold * np.tanh(moving / SLIDING_RADPS))
+    speed_ratio = i.friction_speed_mps / np.maximum(data[AIR[0]], LEAST_SPEED_MPS)
+    friction_rad = i.vane_friction_rad * np.minimum(speed_ratio, 3.0) ** 2
+    return np.asarray(angle + friction_rad * np.tanh(moving / SLIDING_RADPS))
 
 
 def compensate_lowpass(signal: Array, i: SensorErrorModel, dt_s: float) -> Array:
-    """Return an inertial signal with the loss of its low-pass and of interpolation undone."""
+    """Return an inertial signal with low-pass and interpolation inverted to second order."""
     lost_s2 = 0.5 / (2.0 * np.pi * i.imu_bandwidth_hz) ** 2 + dt_s**2 / 12.0
     return np.asarray(signal - lost_s2 * np.gradient(np.gradient(signal, dt_s), dt_s))
 
 
 def _at_cg(data: dict[str, Array], airframe: AirframeData, dt_s: float) -> dict[str, Array]:
-    """Move accelerometers with rates smoothed for their derivative, take upwash off the vanes.
+    """Return data with accelerometers moved to the CG and vanes without upwash.
 
-    The vanes stay where they are: what they feel of a rotation is as late as all they say.
+    Rates are smoothed for their derivative. The vanes' arms are part of the model instead, because
+    the effect of a rotation on a vane has the vane's delay.
     """
     smooth = dict(data)
     window = 2 * max(2, round(SMOOTH_S / dt_s)) + 1
     for axis in "pqr":
         name = f"{axis}_radps"
         smooth[name] = local_polynomial(data[name][:, None], window, 2)[:, 0]
-    moved = transfer_to_cg(smooth, replace(airframe, vanes_m=()))
-    straight = np.arctan(np.tan(data["alpha_rad"]) / (1.0 + airframe.upwash))
+    at_cg = transfer_to_cg(smooth, replace(airframe, vanes_m=()))
+    without_upwash = np.arctan(np.tan(data["alpha_rad"]) / (1.0 + airframe.upwash))
     rates = {f"{axis}_radps": data[f"{axis}_radps"] for axis in "pqr"}
-    return {**moved, **rates, "alpha_rad": straight}
+    return {**at_cg, **rates, "alpha_rad": without_upwash}
 
 
 def _select_segments(
     data: Mapping[str, Array], dt_s: float, block: int, length_s: float
 ) -> list[slice]:
-    """Return the stretches that tell most: something of every heading, then of every axis."""
+    """Return the segments with most excitation: one per quadrant of heading, then by axes."""
     samples = max(block, round(length_s / dt_s) // block * block)
     speed = np.nan_to_num(data["airspeed_mps"])
     flying = speed > max(FLYING_SHARE * float(np.median(speed)), LEAST_SPEED_MPS)
@@ -191,11 +192,11 @@ def _select_segments(
             f"data compatibility: no {length_s:.0f} s of flight without interruption"
         )
     rates = np.stack([data[f"{a}_radps"] for a in "pqr"])
-    # Each axis by its own liveliest: rolling is quick, and tells nothing of the alpha vane.
+    # Each axis relative to its maximum: rolling is fast and does not inform the alpha vane.
     moving = np.array([np.var(rates[:, c], axis=1) for c in candidates])
     shares = moving / np.maximum(moving.max(axis=0), 1e-12)
-    life = {c.start: share for c, share in zip(candidates, shares, strict=True)}
-    chosen: list[slice] = []
+    excitation = {c.start: share for c, share in zip(candidates, shares, strict=True)}
+    selected: list[slice] = []
     if "psi_rad" in data:
         middle = np.array([np.median(data["psi_rad"][c]) for c in candidates])
         for quadrant in range(QUADRANTS):
@@ -205,18 +206,20 @@ def _select_segments(
                 for c, psi in zip(candidates, np.mod(middle, 2.0 * np.pi), strict=True)
                 if low <= psi < low + 2.0 * np.pi / QUADRANTS
             ]
-            chosen += sorted(own, key=lambda c: -float(np.sum(life[c.start])))[:1]
-    rest = [c for c in candidates if c not in chosen]
-    while rest and len(chosen) < MOST_SEGMENTS:
-        known = LEAST_EXCITATION + sum((life[c.start] for c in chosen), np.zeros(len(rates)))
-        best = max(rest, key=lambda c: float(np.sum(np.log(known + life[c.start]))))
-        chosen.append(best)
+            selected += sorted(own, key=lambda c: -float(np.sum(excitation[c.start])))[:1]
+    rest = [c for c in candidates if c not in selected]
+    while rest and len(selected) < MOST_SEGMENTS:
+        known = LEAST_EXCITATION + sum(
+            (excitation[c.start] for c in selected), np.zeros(len(rates))
+        )
+        best = max(rest, key=lambda c: float(np.sum(np.log(known + excitation[c.start]))))
+        selected.append(best)
         rest.remove(best)
-    return sorted(chosen, key=lambda c: c.start)
+    return sorted(selected, key=lambda c: c.start)
 
 
 def _fixes(data: Mapping[str, Array]) -> BoolArray:
-    """Return at which samples GPS spoke: between them a decoded table runs straight."""
+    """Return which samples are GPS fixes: between them a decoded table is linear."""
     bend = sum(np.abs(np.diff(data[name], n=2)) for name in GPS)
     bend = np.concatenate([[0.0], bend, [0.0]])
     known = bend > FIX_BEND_MPS
@@ -225,7 +228,7 @@ def _fixes(data: Mapping[str, Array]) -> BoolArray:
 
 
 def _lagged_inputs(columns: Mapping[str, Array], cut: slice, block: int) -> Array:
-    """Return what the pilot did, at lags of whole blocks, (blocks, surfaces x lags)."""
+    """Return the control inputs at lags of whole blocks, (blocks, surfaces x lags)."""
     at = np.arange(cut.start, cut.stop)
     lagged = [
         columns[name][np.maximum(at - lag * block, 0)].reshape(-1, block).mean(axis=1)
@@ -254,7 +257,7 @@ def _segment(
     for row, name in enumerate(outputs):
         if name in GPS:
             measured[row] = np.where(at < 0, measured[row], data[name][cut][at])
-    # Without a compass or GPS heading is anything, and nothing depends on it.
+    # Without a compass or GPS heading is arbitrary, and nothing depends on it.
     angles = [
         float(data.get(f"{a}_rad", zero)[cut.start if f"{a}_rad" in data else 0])
         for a in ("phi", "theta", "psi")
@@ -263,10 +266,10 @@ def _segment(
         angles[2] = 0.0
     attitude = rotation(*angles)
     speed, alpha, beta = (float(np.median(data[name][cut][:block])) for name in AIR)
-    through = speed * np.array(
+    air_velocity = speed * np.array(
         [np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)]
     )
-    velocity = attitude @ through
+    velocity = attitude @ air_velocity
     if gps:
         velocity = np.array([float(np.median(data[name][cut][:block])) for name in GPS])
     density = data.get("density_kgpm3", np.full(cut.stop, 1.225))

@@ -1,4 +1,4 @@
-"""Vanes and accelerometers moved to the CG by what is known of their places."""
+"""Transfer of vanes and accelerometers to the CG."""
 
 from __future__ import annotations
 
@@ -9,15 +9,23 @@ from host.arrays import Array
 
 
 def transfer_to_cg(columns: dict[str, Array], airframe: AirframeData) -> dict[str, Array]:
-    """Move vanes and accelerometers to the CG.
+    """Return columns with vanes and accelerometers moved to the CG.
 
-    A vane at r sees the air of the CG plus omega x r, and over-reads by the upwash; an
-    accelerometer at r feels omega' x r + omega x (omega x r) more than the CG. The mean of the
-    vanes is corrected for the mean of their positions: roll cancels between two tips.
+    The air at a vane at r moves by omega x r relative to that at the CG, and upwash increases its
+    angle. An accelerometer at r measures omega' x r + omega x (omega x r) more than at the CG
+    (Klein & Morelli, Aircraft System Identification, ch. 10). The mean of the vanes is corrected
+    for the mean of their positions: roll cancels between two tips.
+
+    Parameters
+    ----------
+    columns : dict of Array, shape (n,)
+        SI; missing rates count as zero.
+    airframe : AirframeData
+        Positions of the sensors from the CG, m, and upwash.
     """
     result = dict(columns)
-    still = np.zeros(len(columns["t_s"]))  # a record of one axis has not all rates
-    rates = [columns.get(f"{a}_radps", still) for a in "pqr"]
+    zero = np.zeros(len(columns["t_s"]))  # a record of one axis has not all rates
+    rates = [columns.get(f"{a}_radps", zero) for a in "pqr"]
     p, q, r = rates
     if airframe.vanes_m:
         x, y, z = np.mean(airframe.vanes_m, axis=0)
@@ -32,10 +40,14 @@ def transfer_to_cg(columns: dict[str, Array], airframe: AirframeData) -> dict[st
         x, y, z = airframe.imu_m
         dt_s = float(np.median(np.diff(columns["t_s"])))
         dp, dq, dr = (np.gradient(rate, dt_s) for rate in rates)
-        felt = {
+        lever_arm_acceleration = {
             "ax_mps2": dq * z - dr * y + q * (p * y - q * x) - r * (r * x - p * z),
             "ay_mps2": dr * x - dp * z + r * (q * z - r * y) - p * (p * y - q * x),
             "az_mps2": dp * y - dq * x + p * (r * x - p * z) - q * (q * z - r * y),
         }
-        result |= {name: columns[name] - more for name, more in felt.items() if name in columns}
+        result |= {
+            name: columns[name] - offset
+            for name, offset in lever_arm_acceleration.items()
+            if name in columns
+        }
     return result

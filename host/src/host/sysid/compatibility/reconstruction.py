@@ -1,9 +1,9 @@
-"""Data compatibility: do vanes, pitot, barometer and GPS agree with what the inertial sensors say?
+"""Data compatibility check: vanes, pitot, barometer and GPS against the inertial sensors.
 
-Flight-path reconstruction by output error over the kinematics (`flight_path`): sensor errors and
-wind are common to all stretches of the flight, start values their own. What the calibration leaves
-open is the prior, so that an interval never pretends. Klein & Morelli, Aircraft System
-Identification, ch. 10; Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 10.
+Flight-path reconstruction over the kinematics of `flight_path`. Sensor errors and wind are common
+to all segments of the flight, initial values belong to one. The calibration is the prior. Klein &
+Morelli, Aircraft System Identification, ch. 10; Jategaonkar, Flight Vehicle System Identification,
+2nd ed., ch. 10.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from host.sysid.identification_error import IdentificationError
 # Posterior over prior deviation below which the data inform an error; above, the calibration does.
 POSTERIOR_PRIOR_RATIO = 0.7
 VANE_MODEL_SD = 0.006  # of scale: dry friction known to 20 % of its 3 %
-# Without GPS only vanes and pitot hold the path, gusts and all: on eight flights rms errors
-# were up to 2.5 times what the equations say, more for biases of the gyro.
+# Without GPS only vanes and pitot, gusts included, determine the path: on eight flights rms errors
+# were up to 2.5 times the computed deviations, more for biases of the gyro.
 NO_GPS_INFLATION = 2.5
 UNOBSERVABLE_WITHOUT_GPS = INERTIAL[0:3]
 REASONS = {
@@ -52,10 +52,10 @@ NOT_EXCITED_NO_GPS = "not told from attitude and gusts without GPS; the calibrat
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One sensor error: estimate, 95 % half-width, and the half-width the calibration left open.
+    """One sensor error: estimate, its 95 % half-width, and the half-width of the calibration.
 
-    `data_informed` is false where the data say no more than the calibration did; `reason` says why
-    and what to fly.
+    `data_informed` is false if the data add little to the calibration; `reason` then says why, and
+    what to fly.
     """
 
     name: str
@@ -67,27 +67,27 @@ class Finding:
 
     @property
     def significant(self) -> bool:
-        """Whether the data tell an error that is not zero."""
+        """Whether the data show an error that is not zero."""
         return self.data_informed and abs(self.value) > self.half_width
 
 
 @dataclass(frozen=True)
 class Compatibility:
-    """What flight-path reconstruction found.
+    """Result of flight-path reconstruction.
 
     Attributes
     ----------
     findings : tuple of Finding
         Sensor errors, delays behind the IMU, steady wind.
     rms : dict
-        Residual of each output, over all stretches.
+        Root mean square of the residual of each output, in its unit.
     segments : tuple of (from, to), s
-        What it rests on.
+        Begin and end of the segments it used.
     gps : bool
     instrument : SensorErrorModel, optional
-        What the calibration leaves open, as far as it was told.
+        Errors that the calibration leaves open, if given.
     calibration_tests : tuple of ConsistencyTest
-        What the flight says of the file's own deviations: all together, then group by group.
+        Consistency with the file's standard deviations: all together, then by group.
     """
 
     findings: tuple[Finding, ...]
@@ -107,25 +107,25 @@ def reconstruct(
     airframe: AirframeData | None = None,
     instrument: SensorErrorModel | None = None,
 ) -> Compatibility:
-    """Reconstruct the flight path and estimate what the sensors are wrong by.
+    """Reconstruct the flight path and estimate the errors of the sensors.
 
     Parameters
     ----------
     columns : mapping
         Even SI columns as `tables.read_columns` gives them, not yet corrected for position.
     airframe : AirframeData, optional
-        Places of the sensors and upwash; without, vanes and IMU are taken to sit at the CG.
+        Places of the sensors and upwash; by default vanes and IMU are at the CG.
     instrument : SensorErrorModel, optional
-        What the calibration leaves open; usual values without.
+        Errors that the calibration leaves open; standard ones by default.
 
     Raises
     ------
     IdentificationError
-        If inertial sensors or all air data are missing, nothing of the flight is long enough, or
-        the equations do not settle.
+        If inertial sensors or all air data are missing, no part of the flight is long enough, or
+        the iteration does not converge.
     """
-    problem, follows, when = prepare_path_problem(columns, airframe, instrument)
-    fit = fit_path(problem, follows)
+    problem, lagged_inputs, when = prepare_path_problem(columns, airframe, instrument)
+    fit = fit_path(problem, lagged_inputs)
     if not fit.converged:
         raise IdentificationError(
             f"data compatibility: no agreement after {fit.iterations} iterations; a sensor is"
@@ -136,11 +136,11 @@ def reconstruct(
     covariance = fit.covariance[:count, :count]
     scales = [problem.common.index(name) for name in FLOW[::2]]
     covariance[scales, scales] += VANE_MODEL_SD**2
-    before = prior(instrument)
-    wide = covariance if gps else NO_GPS_INFLATION**2 * covariance
-    judged = consistency_tests(problem.common, fit.theta[:count], wide, before)
+    priors = prior(instrument)
+    inflated = covariance if gps else NO_GPS_INFLATION**2 * covariance
+    tests = consistency_tests(problem.common, fit.theta[:count], inflated, priors)
     findings = []
-    for name, (mean, sd) in before.items():
+    for name, (mean, sd) in priors.items():
         known = name in problem.common and (gps or name not in UNOBSERVABLE_WITHOUT_GPS)
         k = problem.common.index(name) if known else None
         deviation = sd if k is None else float(np.sqrt(covariance[k, k]))
@@ -161,7 +161,7 @@ def reconstruct(
         name: float(np.sqrt(q / problem.counted(name)))
         for name, q in zip(problem.model.outputs, squares, strict=True)
     }
-    return Compatibility(tuple(findings), rms, when, gps, instrument, judged)
+    return Compatibility(tuple(findings), rms, when, gps, instrument, tests)
 
 
 def _reason(name: str, *, gps: bool) -> str:
@@ -171,14 +171,14 @@ def _reason(name: str, *, gps: bool) -> str:
 
 
 def compatibility_lines(found: Compatibility) -> list[str]:
-    """Return the paragraph of a verdict: errors found, then what the data cannot tell and why."""
+    """Return the verdict's paragraph: errors found, then those not informed and why."""
     lines = [
         f"data compatibility over {len(found.segments)} stretches,"
         f" {'with' if found.gps else 'without'} GPS:"
     ]
-    wrong = [f for f in found.findings if f.significant]
-    lines += [f"  {f.name:20s} {f.value:11.4g}  +- {f.half_width:8.2g}" for f in wrong]
-    if not wrong:
+    significant = [f for f in found.findings if f.significant]
+    lines += [f"  {f.name:20s} {f.value:11.4g}  +- {f.half_width:8.2g}" for f in significant]
+    if not significant:
         lines.append("  no sensor error stands out of its interval")
     lines += [f"  {line}" for line in calibration_lines(found.calibration_tests)]
     reasons: dict[str, list[str]] = {}
@@ -192,15 +192,15 @@ def compatibility_lines(found: Compatibility) -> list[str]:
 
 
 def compatibility_document(found: Compatibility) -> dict[str, object]:
-    """Return everything for JSON."""
+    """Return the result for JSON."""
     return {
         "gps": found.gps,
         "stretches_s": [list(s) for s in found.segments],
         "residual_rms": found.rms,
         "calibration": {
             c.name: {
-                "times": c.times,
-                "directions": c.directions,
+                "times": c.rms_ratio,
+                "directions": c.degrees_of_freedom,
                 "probability": c.probability,
                 "doubted": c.rejected,
             }

@@ -1,8 +1,6 @@
-"""Take out of a flight's columns what its reconstruction told, and say what stays open.
+"""Correct a flight's columns by reconstructed sensor errors; what remains uncertain.
 
-Signals obey s = (1 + scale) x + bias in the IMU's own, turned axes; V squared of a pitot likewise.
-What reconstruction does not tell is left as the calibration has it: its value is the
-calibration's word, and its uncertainty stays in the intervals.
+Errors that the data do not inform are left as calibrated; their uncertainty stays in the intervals.
 """
 
 from __future__ import annotations
@@ -21,8 +19,8 @@ from host.sysid.compatibility.reconstruction import Compatibility
 
 RATES = tuple(f"{a}_radps" for a in "pqr")
 FORCES = tuple(f"a{a}_mps2" for a in "xyz")
-INSTANTANEOUS_ERRORS = (*INERTIAL, *FLOW, *PITOT)  # errors of single instants
-# The pitot's delay stays in: told on six of twelve survey flights, 8 ms too long in the mean.
+INSTANTANEOUS_ERRORS = (*INERTIAL, *FLOW, *PITOT)  # without delays
+# The pitot's delay is not corrected: informed on six of twelve survey flights, 8 ms too long.
 DELAYED_COLUMNS = {DELAYS[0]: AIR[1:]}
 CORRECTABLE = (*INSTANTANEOUS_ERRORS, *DELAYED_COLUMNS)
 LEAST_PRESSURE_SHARE = 0.1
@@ -30,7 +28,7 @@ LEAST_PRESSURE_SHARE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """One error taken out: value, 95 % half-width left, and what the calibration left open."""
+    """One corrected error: value, its 95 % half-width, and that of the calibration."""
 
     name: str
     value: float
@@ -39,7 +37,7 @@ class Correction:
 
 
 def corrections(found: Compatibility) -> tuple[Correction, ...]:
-    """Return what the data tell and the columns can be rid of."""
+    """Return the errors that the data inform and that columns can be corrected for."""
     return tuple(
         Correction(f.name, f.value, f.half_width, f.prior_half_width)
         for f in found.findings
@@ -48,7 +46,7 @@ def corrections(found: Compatibility) -> tuple[Correction, ...]:
 
 
 def residual_deviations(found: Compatibility) -> dict[str, float]:
-    """Return what stays open of every error: told ones as found, others as calibrated."""
+    """Return the standard deviation that remains of every error: estimated or calibrated."""
     return {
         f.name: (f.half_width if f.data_informed else f.prior_half_width) / NORMAL_95
         for f in found.findings
@@ -57,7 +55,7 @@ def residual_deviations(found: Compatibility) -> dict[str, float]:
 
 
 def pressure_share(found: Compatibility) -> float:
-    """Return the part of an error of V squared that is the pitot's, not the density's."""
+    """Return the share of an error of V squared that is due to the pitot, not to density."""
     total = found["pitot_scale"].prior_half_width / NORMAL_95
     density = density_share(found.instrument)
     return max(1.0 - (density / max(total, density)) ** 2, LEAST_PRESSURE_SHARE)
@@ -66,16 +64,19 @@ def pressure_share(found: Compatibility) -> float:
 def correct_columns(
     columns: Mapping[str, Array], errors: Mapping[str, float], part: float = 1.0
 ) -> dict[str, Array]:
-    """Return columns without errors of single instants.
+    """Return columns corrected for errors of scale, zero, bias and misalignment.
+
+    A sensor reads s = (1 + scale) x + bias in the IMU's own, misaligned axes; the pitot likewise
+    for V squared (Klein & Morelli, Aircraft System Identification, ch. 10).
 
     Parameters
     ----------
     columns : mapping of (n,) arrays
         SI, already at the CG.
     errors : mapping
-        Names of `INSTANTANEOUS_ERRORS` to values; others are not looked at.
+        Names of `INSTANTANEOUS_ERRORS` to values; others are ignored.
     part : float
-        Of ``pitot_scale`` that is dynamic pressure; the rest is density.
+        Share of ``pitot_scale`` that is due to dynamic pressure; the rest is density.
     """
     result = dict(columns)
     at = errors.get
@@ -86,13 +87,13 @@ def correct_columns(
     ):
         if not all(name in columns for name in names):
             continue
-        plain = np.stack(
+        corrected = np.stack(
             [
                 (columns[name] - at(offset.format(a), 0.0)) / (1.0 + at(gain.format(a), 0.0))
                 for name, a in zip(names, "xyz", strict=True)
             ]
         )
-        result |= zip(names, plain + np.cross(tilt, plain, axisb=0, axisc=0), strict=True)
+        result |= zip(names, corrected + np.cross(tilt, corrected, axisb=0, axisc=0), strict=True)
     for name in ("alpha", "beta"):
         if f"{name}_rad" in columns:
             zero, scale = at(f"{name}_zero_rad", 0.0), at(f"{name}_scale", 0.0)
@@ -104,19 +105,19 @@ def _correct_pitot(
     columns: Mapping[str, Array], scale: float, zero: float, part: float
 ) -> dict[str, Array]:
     density = columns.get("density_kgpm3", np.array(1.225))
-    fixed = {}
+    corrected = {}
     if AIR[0] in columns:
         square = columns[AIR[0]] ** 2 - 2.0 * zero / density
-        fixed[AIR[0]] = np.sqrt(np.maximum(square, 0.0) / (1.0 + scale))
+        corrected[AIR[0]] = np.sqrt(np.maximum(square, 0.0) / (1.0 + scale))
     if "qbar_pa" in columns:
-        fixed["qbar_pa"] = (columns["qbar_pa"] - zero) / (1.0 + part * scale)
+        corrected["qbar_pa"] = (columns["qbar_pa"] - zero) / (1.0 + part * scale)
     if "density_kgpm3" in columns:
-        fixed["density_kgpm3"] = density * (1.0 + scale) / (1.0 + part * scale)
-    return fixed
+        corrected["density_kgpm3"] = density * (1.0 + scale) / (1.0 + part * scale)
+    return corrected
 
 
 def advance_delayed(columns: Mapping[str, Array], delays: Mapping[str, float]) -> dict[str, Array]:
-    """Return columns read later by their sensors' delays (s) behind the IMU."""
+    """Return columns advanced by their sensors' delays (s) behind the IMU."""
     result = dict(columns)
     for delay, names in DELAYED_COLUMNS.items():
         for name in names:
@@ -127,7 +128,7 @@ def advance_delayed(columns: Mapping[str, Array], delays: Mapping[str, float]) -
 
 
 def correction_lines(taken: Sequence[Correction]) -> list[str]:
-    """Return what was taken out of the columns, for a verdict."""
+    """Return the verdict's lines on the corrections."""
     if not taken:
         return []
     parts = ", ".join(f"{c.name} {c.value:.3g} +- {c.half_width:.2g}" for c in taken)
@@ -140,7 +141,7 @@ def correction_lines(taken: Sequence[Correction]) -> list[str]:
 
 
 def correction_document(taken: Sequence[Correction]) -> dict[str, dict[str, float]]:
-    """Return the same for JSON."""
+    """Return the corrections for JSON."""
     return {
         c.name: {
             "value": c.value,

@@ -1,8 +1,8 @@
-"""A flight's columns as the air met the CG, for the linear fits, and what one error makes of them.
+"""Invert known sensor dynamics, move signals to the CG, and perturb columns by residual errors.
 
-Vanes stick, swing and lag, the IMU's low-pass takes some of fast motion away, and all of them sit
-beside the CG. What the aircraft file and the reconstruction say of that is undone first. What stays
-open of it no linear fit can tell in gusts, so it is not estimated there but carried.
+Vanes have friction, dynamics and delay, the IMU has a low-pass, and none is at the CG. The aircraft
+file and the reconstruction give values for these, which are inverted before the linear fits. The
+errors that remain cannot be estimated in gusts; they are consider parameters of the fits.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, vane_delay_s
-from host.instrument.deviations import deviations as drawn
+from host.instrument.deviations import deviations as prior_deviations
 from host.instrument.recording import SURFACES
 from host.sysid.compatibility.flight_path import AIR, DELAYS
 from host.sysid.compatibility.path_preparation import (
@@ -47,7 +47,7 @@ PLACES = tuple(f"{what}_{a}_m" for what in ("imu", "cg", "vane") for a in "xyz")
 def columns_at_cg(
     columns: Mapping[str, Array], airframe: AirframeData, found: Compatibility
 ) -> dict[str, Array]:
-    """Return columns as perfect sensors at the CG would have written them, as far as is known.
+    """Return columns as perfect sensors at the CG would measure them, as far as is known.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def columns_at_cg(
         SI, as decoded.
     airframe : AirframeData
     found : Compatibility
-        Its instrument must be known; told delays are taken out.
+        Its estimated delays are removed; without its instrument only places are corrected.
     """
     i = found.instrument
     if i is None:
@@ -76,32 +76,36 @@ def columns_at_cg(
 def invert_vane_dynamics(
     angle: Array, tau_s: float, i: SensorErrorModel, columns: Mapping[str, Array], dt_s: float
 ) -> Array:
-    """Return a vane's angle with its delay and second-order dynamics taken out."""
+    """Return a vane's angle (rad) with its delay and second-order dynamics removed.
+
+    To second order in s the vane is exp(-tau s) (1 - (tau^2 / 2 - 1 / omega^2) s^2), with the
+    natural frequency omega proportional to airspeed; both factors are inverted.
+    """
     t = columns["t_s"]
-    prompt = np.interp(t + tau_s, t, angle)
+    undelayed = np.interp(t + tau_s, t, angle)
     omega = 2.0 * np.pi * i.vane_hz_per_mps * float(np.median(columns[AIR[0]]))
-    swing = 0.5 * tau_s**2 - 1.0 / omega**2
-    return np.asarray(prompt - swing * np.gradient(np.gradient(prompt, dt_s), dt_s))
+    curvature_s2 = 0.5 * tau_s**2 - 1.0 / omega**2
+    return np.asarray(undelayed - curvature_s2 * np.gradient(np.gradient(undelayed, dt_s), dt_s))
 
 
 def vane_delay_of(
     found: Compatibility, i: SensorErrorModel, columns: Mapping[str, Array]
 ) -> tuple[float, float]:
-    """Return the vanes' delay and its deviation, s: as told, else of the spring by the file."""
-    told = next((f for f in found.findings if f.name == VANE_DELAY and f.data_informed), None)
-    if told is not None:
-        return told.value, told.half_width / NORMAL_95
+    """Return the vanes' delay and its deviation, s: reconstructed, else 2 zeta / omega."""
+    estimated = next((f for f in found.findings if f.name == VANE_DELAY and f.data_informed), None)
+    if estimated is not None:
+        return estimated.value, estimated.half_width / NORMAL_95
     omega = 2.0 * np.pi * i.vane_hz_per_mps * float(np.median(columns[AIR[0]]))
     nominal = 2.0 * i.vane_damping / omega
     return nominal, vane_delay_s(i, nominal)
 
 
 def residual_errors(found: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
-    """Return one deviation of every error beyond those of single instants, by name."""
+    """Return the deviation of every residual error of place, delay, pot and friction, by name."""
     i = found.instrument
     if i is None:
         return {}
-    every = drawn(i, NO_OFFSETS)
+    every = prior_deviations(i, NO_OFFSETS)
     wanted = (*PLACES, *POTS, *SERVOS, SERVO_DELAY, CLOCK, FRICTION, IMU_DELAY, PITOT_DELAY)
     return {n: every[n] for n in wanted if n in every} | {
         VANE_DELAY: vane_delay_of(found, i, columns)[1]
@@ -111,7 +115,7 @@ def residual_errors(found: Compatibility, columns: Mapping[str, Array]) -> dict[
 def perturb_columns(
     columns: Mapping[str, Array], error: str, size: float, found: Compatibility
 ) -> dict[str, Array]:
-    """Return columns already at the CG without one more error of `residual_errors`."""
+    """Return columns at the CG corrected for one error of `residual_errors` of a given size."""
     result = dict(columns)
     if error in DELAYED_COLUMNS:
         return advance_in_time(result, DELAYED_COLUMNS[error], size)
@@ -130,19 +134,19 @@ def perturb_columns(
         )
     if error == FRICTION and i is not None:
         dt_s = float(columns["t_s"][1] - columns["t_s"][0])
-        more = replace(i, vane_friction_rad=size * i.vane_friction_rad)
+        more_friction = replace(i, vane_friction_rad=size * i.vane_friction_rad)
         return result | {
-            n: compensate_friction(columns, n, more, dt_s) for n in ANGLES if n in columns
+            n: compensate_friction(columns, n, more_friction, dt_s) for n in ANGLES if n in columns
         }
     if error in PLACES:
         what, axis = error.split("_")[:2]
         size = -size if what == "cg" else size
         move = tuple(size if a == axis else 0.0 for a in "xyz")
-        here = (move[0], move[1], move[2])
+        place = (move[0], move[1], move[2])
         frame = replace(
             NO_OFFSETS,
-            imu_m=here if what != "vane" else NO_OFFSETS.imu_m,
-            vanes_m=(here,) if what != "imu" else (),
+            imu_m=place if what != "vane" else NO_OFFSETS.imu_m,
+            vanes_m=(place,) if what != "imu" else (),
         )
         return transfer_to_cg(result, frame)
     return result
@@ -151,6 +155,6 @@ def perturb_columns(
 def advance_in_time(
     columns: Mapping[str, Array], names: tuple[str, ...], delay_s: float
 ) -> dict[str, Array]:
-    """Return columns with some of them read later by a delay (s)."""
+    """Return columns with some of them advanced in time by a delay (s)."""
     t = columns["t_s"]
     return {k: np.interp(t + delay_s, t, v) if k in names else v for k, v in columns.items()}

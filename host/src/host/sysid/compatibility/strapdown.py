@@ -1,7 +1,4 @@
-"""Attitude and velocity from angular rates and specific force, their slopes, algebra of turns.
-
-Titterton & Weston, Strapdown Inertial Navigation Technology, ch. 3 and 11.
-"""
+"""Strapdown integration of attitude and velocity, and its sensitivities to sensor errors."""
 
 from __future__ import annotations
 
@@ -16,6 +13,9 @@ def strapdown(
 ) -> tuple[Array, Array]:
     """Integrate attitude (n, 3, 3; body to north-east-down) and velocity (n, 3), m/s.
 
+    C[k+1] = C[k] exp([omega x] dt), v' = C f + g over a flat, non-rotating earth (Titterton &
+    Weston, Strapdown Inertial Navigation Technology, ch. 3 and 11).
+
     Parameters
     ----------
     rates, force : Array, shape (n, 3)
@@ -27,14 +27,14 @@ def strapdown(
     dt_s : float
     """
     turn = _accumulated_rotations(attitude, _rotations(0.5 * dt_s * (rates[:-1] + rates[1:])))
-    push = np.einsum("nij,nj->ni", turn, force)
-    gained = 0.5 * dt_s * (push[:-1] + push[1:])
-    gained[:, 2] += GRAVITY_MPS2 * dt_s
-    return turn, np.cumsum(np.vstack([velocity, gained]), axis=0)
+    acceleration_ned = np.einsum("nij,nj->ni", turn, force)
+    increments = 0.5 * dt_s * (acceleration_ned[:-1] + acceleration_ned[1:])
+    increments[:, 2] += GRAVITY_MPS2 * dt_s
+    return turn, np.cumsum(np.vstack([velocity, increments]), axis=0)
 
 
 def _rotations(angle: Array) -> Array:
-    """Return the matrices (n, 3, 3) of turns by rotation vectors (n, 3), rad.
+    """Return the rotation matrices (n, 3, 3) of rotation vectors (n, 3), rad.
 
     Rodrigues' formula, I + sin(a)/a K + (1 - cos(a))/a^2 K^2.
     """
@@ -58,7 +58,7 @@ def _rotations(angle: Array) -> Array:
 
 
 def _accumulated_rotations(attitude: Array, turns: Array) -> Array:
-    """Return an attitude and what it becomes by every turn in a row, (n + 1, 3, 3).
+    """Return an attitude and its products with successive rotations, (n + 1, 3, 3).
 
     The record is cut into about as many pieces as each has samples, all multiplied side by side.
     """
@@ -84,8 +84,8 @@ def path_sensitivities(
     C: Array,
     rates: Array,
     force: Array,
-    felt: Array,
-    through: Array,
+    force_ned: Array,
+    air_velocity: Array,
     size: Array,
     place: IntArray,
     wind: IntArray,
@@ -94,57 +94,63 @@ def path_sensitivities(
     early: float,
     width: int,
 ) -> tuple[Array, Array, Array]:
-    """Integrate how errors of the inertial sensors turn and move the path.
+    """Integrate the sensitivities of attitude and velocity to errors of the inertial sensors.
+
+    The attitude error psi (small rotation, earth axes) obeys psi' = C d_omega, the velocity error
+    d_v' = C d_f - (C f) x psi, with errors d_omega and d_f of the measured rates and forces
+    (Titterton & Weston, Strapdown Inertial Navigation Technology, sec. 12.3).
 
     Parameters
     ----------
     C : Array, shape (blocks, 3, 3)
         Body to north-east-down.
     rates, force : Array, shape (blocks, 3)
-        Without errors of bias and scale, not yet turned by the tilt.
-    felt, through : Array, shape (blocks, 3)
-        Specific force and velocity through the air, north-east-down.
+        Corrected for bias and scale, rad/s and m/s2, not for misalignment.
+    force_ned, air_velocity : Array, shape (blocks, 3)
+        Specific force, m/s2, and velocity relative to the air, m/s, both north-east-down.
     size : Array, shape (2, 3)
-        One plus scale error of gyro and accelerometer.
+        One plus the scale error of gyro and accelerometer.
     place : IntArray, shape (2, 3, 3)
-        Columns of bias, scale and tilt of the axes of gyro and accelerometer, -1 if known.
+        Columns of bias, scale and misalignment of gyro and accelerometer axes, -1 if known.
     wind : IntArray, shape (2,)
         Columns of the wind to north and east, -1 if known.
     own : int
-        First column of the errors of the start: of velocity, then of attitude.
+        First column of the initial errors: of velocity, then of attitude.
     step_s, early : float
-        Length of a block, and the share of the first that lies before the first sample.
+        Length of a block, s, and the share of the first block before the first sample.
     width : int
         Unknowns.
 
     Returns
     -------
     Array, shape (blocks, 3, width)
-        Slopes of the velocity over the ground.
+        Sensitivities of the velocity over the ground.
     Array, shape (blocks, width)
-        Of the way downwards, m.
+        Of the distance downwards, m.
     Array, shape (blocks, 3, width)
-        Of the velocity through the air, body axes.
+        Of the velocity relative to the air, body axes.
     """
     axes = np.arange(3)
-    E = _integral_to_middle(_sensor_error_effect(C, rates, size[0], place[0], width), step_s, early)
-    E[:, axes, own + 3 + axes] += 1.0
-    pushed = _sensor_error_effect(C, force, size[1], place[1], width) - np.cross(
-        felt[:, :, None], E, axis=1
+    attitude_error = _integral_to_middle(
+        _sensor_error_effect(C, rates, size[0], place[0], width), step_s, early
     )
-    ground = _integral_to_middle(pushed, step_s, early)
+    attitude_error[:, axes, own + 3 + axes] += 1.0
+    acceleration_error = _sensor_error_effect(C, force, size[1], place[1], width) - np.cross(
+        force_ned[:, :, None], attitude_error, axis=1
+    )
+    ground = _integral_to_middle(acceleration_error, step_s, early)
     ground[:, axes, own + axes] += 1.0
     fall = _integral_to_middle(ground[:, 2], step_s, early)
-    moved = ground + np.cross(through[:, :, None], E, axis=1)
+    air_velocity_error = ground + np.cross(air_velocity[:, :, None], attitude_error, axis=1)
     for axis in np.flatnonzero(wind >= 0):
-        moved[:, axis, wind[axis]] -= 1.0
-    return ground, fall, C.transpose(0, 2, 1) @ moved
+        air_velocity_error[:, axis, wind[axis]] -= 1.0
+    return ground, fall, C.transpose(0, 2, 1) @ air_velocity_error
 
 
 def _sensor_error_effect(
     C: Array, signal: Array, size: Array, place: IntArray, width: int
 ) -> Array:
-    """Return what errors of a triple of sensors make of its signal, turned by C."""
+    """Return derivatives of a sensor triad's corrected signal by its errors, rotated by C."""
     out = np.zeros((len(C), 3, width))
     for axis in range(3):
         a, b = (axis + 1) % 3, (axis + 2) % 3
@@ -153,7 +159,7 @@ def _sensor_error_effect(
             out[:, :, bias] -= C[:, :, axis] / size[axis]
         if scale >= 0:
             out[:, :, scale] -= C[:, :, axis] * (signal[:, axis, None] / size[axis])
-        if tilt >= 0:  # a turn about the axis
+        if tilt >= 0:  # a rotation about the axis
             out[:, :, tilt] += C[:, :, b] * signal[:, a, None] - C[:, :, a] * signal[:, b, None]
     return out
 
@@ -177,7 +183,7 @@ def rotation(phi: float, theta: float, psi: float) -> Array:
 
 
 def rotation_from_vector(vector: Array) -> Array:
-    """Return the matrix (3, 3) of a turn about an axis, given as a vector (3,), rad."""
+    """Return the rotation matrix (3, 3) of a rotation vector (3,), rad (Rodrigues' formula)."""
     angle = float(np.linalg.norm(vector))
     x, y, z = vector
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
