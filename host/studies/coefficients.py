@@ -19,9 +19,9 @@ from host.aircraft.mass_properties import airframe_data
 from host.constants import NORMAL_95
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, identify_coefficients
-from host.sysid.flight.finder import Found
-from host.sysid.flight.linear import identify
-from host.sysid.flight.tables import even_columns
+from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.linear_estimator import identify
+from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
 from host.twin.sensors.sensor_delays import dlpf_for, sensor_delays
 from host.twin.testcard.cards import load
@@ -161,7 +161,9 @@ def add_thesis(tally: Tally, card: str, seed: int, method: str) -> None:
     expected = truths(maneuvers)
     columns, _ = even_columns(flight.table)
     windows = [
-        Found(f"{axis}_rad", str(m["kind"]), m["start_s"], m["input_end_s"], m["end_s"], 0.1, 9)
+        DetectedManeuver(
+            f"{axis}_rad", str(m["kind"]), m["start_s"], m["input_end_s"], m["end_s"], 0.1, 9
+        )
         for m in maneuvers
         for axis in m["axes"][:1]
     ]

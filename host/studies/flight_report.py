@@ -67,10 +67,10 @@ def coefficient_figure(tally: CoefficientTally) -> Figure:
     return figure
 
 
-Found = Sequence[tuple[Case, Sequence[Figures], Sequence[tuple[float, float]]]]
+DetectedManeuver = Sequence[tuple[Case, Sequence[Figures], Sequence[tuple[float, float]]]]
 
 
-def thesis_flights_table(found: Found) -> Table:
+def thesis_flights_table(found: DetectedManeuver) -> Table:
     """Return the thesis's figures re-enacted, medians over the seeds."""
     rows = tuple(
         (
@@ -98,7 +98,7 @@ def thesis_flights_table(found: Found) -> Table:
     )  # fmt: skip
 
 
-def thesis_flights_figure(found: Found) -> Figure:
+def thesis_flights_figure(found: DetectedManeuver) -> Figure:
     """Draw what the program prints beside what it divides away."""
     figure = Figure(figsize=(9, 4.2))
     axis = figure.subplots()

@@ -22,9 +22,9 @@ from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.finder import Found, find
-from host.sysid.flight.linear import identify
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.linear_estimator import identify
+from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.identification_error import IdentificationError
 
 FIRST_SEED = 200
@@ -98,7 +98,7 @@ class Tally:
         return lines
 
 
-def overlap(found: Found, maneuver: dict[str, Any], clock: float) -> float:
+def overlap(found: DetectedManeuver, maneuver: dict[str, Any], clock: float) -> float:
     """Return intersection over union of a found window and a true one, 0 on another axis."""
     if not any(found.axis.startswith(axis) for axis in maneuver["axes"]):
         return 0.0
@@ -113,7 +113,7 @@ def add_flight(tally: Tally, folder: Path, *, fit: bool, aircraft: str = "ultras
     truth = read_truth(folder / "flight.truth.toml")
     columns, _ = read_columns(folder / "flight.csv")
     clock = 1.0 + float(truth["drawn"]["clock_share"])
-    found = find(columns)
+    found = detect_maneuvers(columns)
     best = np.array([[overlap(f, m, clock) for f in found] for m in truth["maneuver"]])
     tally.maneuvers += len(best)
     tally.found += int(np.sum(best.max(axis=1, initial=0.0) >= OVERLAP))

@@ -34,7 +34,7 @@ from host.aircraft.airframe import (
 from host.aircraft.attitude import euler
 from host.aircraft.rigid_body import derivative, step
 from host.compiled import compiled_fast
-from host.sysid.aerodynamics.varying import VaryingModel
+from host.sysid.aerodynamics.varying_airspeed import VaryingModel
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.templates import Trim
 from host.twin.flight import pilot

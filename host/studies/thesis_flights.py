@@ -19,8 +19,8 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.equation_error import fit_equation_error
 from host.sysid.estimators.hopfield import free_run, line_search, network
-from host.sysid.flight.linear import identify
-from host.sysid.flight.tables import even_columns
+from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
     thesis_program_error_percent,

@@ -346,7 +346,11 @@ PLANTED = [
     (import_breaches, "host/src/host/decode.py", "def f():\n    import protocol.generate"),
     (import_breaches, "protocol/generate.py", "import host.wire.schema"),
     (floor_breaches, "host/src/host/wire/blocks.py", "from host.physical.table import rows"),
-    (floor_breaches, "host/src/host/sysid/models/model.py", "import host.sysid.flight.finder"),
+    (
+        floor_breaches,
+        "host/src/host/sysid/models/model.py",
+        "import host.sysid.flight.maneuver_detection",
+    ),
     (
         floor_breaches,
         "host/src/host/aircraft/air.py",
@@ -359,13 +363,13 @@ PLANTED = [
     (floor_breaches, "host/src/host/twin/flight/fly.py", 'import_module("host.sysid.models")'),
     (
         floor_breaches,
-        "host/src/host/sysid/flight/linear.py",
+        "host/src/host/sysid/flight/linear_estimator.py",
         "from host.planning import card_planning",
     ),
     (floor_breaches, "host/src/host/errors.py", "from host.aircraft.file import AircraftError"),
     (
         never_breaches,
-        "host/src/host/sysid/aerodynamics/varying.py",
+        "host/src/host/sysid/aerodynamics/varying_airspeed.py",
         "def f():\n    if True:\n        from host.twin.flight.fly import fly",
     ),
     (
@@ -380,7 +384,11 @@ PLANTED = [
         "host/src/host/twin/sensors/imu.py",
         "from host.twin.testcard.cards import Sensors",
     ),
-    (import_breaches, "host/src/host/sysid/flight/linear.py", "from studies import linear"),
+    (
+        import_breaches,
+        "host/src/host/sysid/flight/linear_estimator.py",
+        "from studies import linear",
+    ),
     (import_breaches, "host/studies/linear.py", "from tests.host import logs"),
     (floor_breaches, "host/src/host/log/head.py", "from host.sysid.models.model import Term"),
     (floor_breaches, "host/src/host/log/head.py", "from host.decode.log_summary import summarise"),
@@ -425,7 +433,7 @@ ALLOWED = [
     ("firmware/boards/sitl/clock.cpp", '#include <vector>\n#include "boards/sitl/clock.h"'),
     ("firmware/boards/arduimu/clock.cpp", '#include "boards/avr/awake.h"'),
     ("tests/firmware/test_a/test_a.cpp", 'TEST_CASE("INFO") { CHECK_EQ(1, 1); REQUIRE(true); }'),
-    ("host/src/host/sysid/flight/linear.py", "from host.sysid.models.model import Term"),
+    ("host/src/host/sysid/flight/linear_estimator.py", "from host.sysid.models.model import Term"),
     ("host/src/host/decode.py", "import numpy\nfrom host.wire.schema import load"),
     (
         "host/src/host/verbs/info.py",

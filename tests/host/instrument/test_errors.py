@@ -15,7 +15,7 @@ from host.instrument.recording import Recording
 from host.physical.calibration import load_calibration
 from host.resources import resource
 from host.sysid.compatibility.path_preparation import prior
-from host.sysid.flight.tables import FlightColumns
+from host.sysid.flight.flight_tables import FlightColumns
 from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.twin.flight.draws import DRAWN, draw
 from host.twin.outcome.instrument import calibration

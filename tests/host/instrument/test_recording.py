@@ -17,9 +17,9 @@ from host.resources import resource
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.compatibility.servo_response import servo_response, surface_positions
-from host.sysid.flight.linear import identify
+from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.recorded import recording_of_table
-from host.sysid.flight.tables import even_columns
 from host.twin.faults import Fault
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from host.sysid.estimators.hopfield import LAMBDA, STEP_S, largest_stable_gain, network
 from host.sysid.estimators.method_registry import METHODS
-from host.sysid.flight.finder import Found
+from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.models.diagnostics import GRADES, NOT_IDENTIFIABLE
 from host.sysid.models.state_space_model import free_model
 from studies.__main__ import main
@@ -128,7 +128,7 @@ def test_program_writes_a_table_twice_and_a_picture(
 
 
 def test_overlap_counts_axis_and_both_ends() -> None:
-    found = Found("elevator_rad", "doublet", 10.0, 11.0, 14.0, 0.05, 3)
+    found = DetectedManeuver("elevator_rad", "doublet", 10.0, 11.0, 14.0, 0.05, 3)
     truth = {"axes": ["elevator"], "start_s": 10.0, "end_s": 15.0}
     assert overlap(found, truth, 1.0) == pytest.approx(0.8)
     assert overlap(found, {**truth, "axes": ["rudder"]}, 1.0) == 0.0

@@ -13,9 +13,9 @@ from host.cli import main
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.compatibility.position_correction import transfer_to_cg
-from host.sysid.flight.finder import find, grade
-from host.sysid.flight.linear import identify
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.linear_estimator import identify
+from host.sysid.flight.maneuver_detection import detect_maneuvers, grade
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
 from host.sysid.models.templates import Trim, longitudinal
@@ -34,7 +34,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
 
 def test_every_maneuver_is_found_and_nothing_else(flown: tuple[Path, dict[str, Any]]) -> None:
     columns, _ = read_columns(flown[0])
-    found = find(columns)
+    found = detect_maneuvers(columns)
     truth = flown[1]["maneuver"]
     assert isinstance(truth, list)
     assert len(found) == len(truth)
@@ -58,13 +58,13 @@ def test_a_bad_test_point_is_named_before_anyone_fits_it() -> None:
         "elevator_rad": elevator + 1e-4 * rng.standard_normal(len(t)),
         "q_radps": 0.02 * rng.standard_normal(len(t)),
     }
-    found = find(columns)
+    found = detect_maneuvers(columns)
     assert [f.kind for f in found] == ["doublet"]
     remarks = " ".join(grade(columns, found[0]).remarks)
     assert "larger input" in remarks
     assert "pilot corrects" in remarks
     quiet = {**columns, "elevator_rad": 1e-3 * rng.standard_normal(len(t))}
-    assert find(quiet) == []
+    assert detect_maneuvers(quiet) == []
 
 
 def test_a_sweep_is_found_from_its_first_slow_swing() -> None:
@@ -72,7 +72,7 @@ def test_a_sweep_is_found_from_its_first_slow_swing() -> None:
     inside = (t > 8.0) & (t < 33.0)
     phase = 2.0 * np.pi * (0.2 * (t - 8.0) + 0.076 * (t - 8.0) ** 2)
     columns = {"t_s": t, "elevator_rad": np.where(inside, 0.06 * np.sin(phase), 0.0)}
-    found = find(columns)
+    found = detect_maneuvers(columns)
     assert [f.kind for f in found] == ["sweep"]
     assert found[0].start_s == pytest.approx(8.0, abs=0.6)
     assert found[0].input_end_s == pytest.approx(33.0, abs=0.3)

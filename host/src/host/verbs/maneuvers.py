@@ -29,8 +29,8 @@ def run(args: argparse.Namespace) -> int:
     from host.errors import ExitCode
     from host.sysid.answer.json_document import json_text, maneuver_document
     from host.sysid.answer.verdict import maneuver_lines
-    from host.sysid.flight.linear import maneuvers_of
-    from host.sysid.flight.tables import read_columns
+    from host.sysid.flight.flight_tables import read_columns
+    from host.sysid.flight.linear_estimator import maneuvers_of
     from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.arguments import option_words
 

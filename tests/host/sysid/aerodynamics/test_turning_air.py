@@ -2,7 +2,7 @@
 
 import numpy as np
 from host.arrays import Array
-from host.sysid.aerodynamics.turning_air import gust_motion, turning
+from host.sysid.aerodynamics.gust_reckoning import gust_motion, turning
 from host.sysid.estimators.method_registry import fit
 from scipy.spatial.transform import Rotation
 from studies.gusts import AXES, DT_S

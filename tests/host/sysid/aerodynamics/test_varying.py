@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.sysid import Maneuver, fit
-from host.sysid.aerodynamics.varying import VaryingModel
+from host.sysid.aerodynamics.varying_airspeed import VaryingModel
 from host.sysid.identification_error import IdentificationError
 from studies.gusts import AXES, DT_S, gusty_aircraft
 from studies.nonlinear_gusts import NonlinearFlight, fly_nonlinear, varying

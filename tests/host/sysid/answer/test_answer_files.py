@@ -12,8 +12,8 @@ from host.cli import main
 from host.sysid.answer.atomic_files import atomic_write
 from host.sysid.answer.mat_file import labels, mat_name, write_mat
 from host.sysid.answer.output_files import OutputPaths, check_outputs
-from host.sysid.flight.linear import Answer, identify
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.linear_estimator import Answer, identify
 from host.sysid.identification_error import IdentificationError
 from scipy import io
 

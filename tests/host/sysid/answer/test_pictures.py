@@ -19,8 +19,8 @@ from host.sysid.answer.figure_kinds import (
     shown,
     spectra,
 )
-from host.sysid.flight.linear import identify
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.linear_estimator import identify
 
 
 @pytest.fixture(scope="module")

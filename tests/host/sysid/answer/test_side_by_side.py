@@ -8,10 +8,10 @@ from host.cli import main
 from host.sysid.answer.method_comparison import method_table
 from host.sysid.answer.verdict import verdict_lines
 from host.sysid.estimators.method_registry import methods
-from host.sysid.flight.chosen import chosen
-from host.sysid.flight.linear import Answer, identify
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.linear_estimator import Answer, identify
 from host.sysid.flight.linear_model import STAGED
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.maneuver_selection import select_maneuvers
 
 SLOW = {"hopfield-line-search", "genetic", "unscented-kalman", "filter-error"}
 
@@ -23,7 +23,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Answer]:
     options = ["--seed", "3", "--firmware", "none", "--no-picture", "-o", str(folder)]
     assert main(["simulate", "demo", *options]) == 0
     columns = read_columns(Path(folder / "flight.csv"))[0]
-    windows = chosen(columns, numbers=[1])
+    windows = select_maneuvers(columns, numbers=[1])
     found = {}
     for method in dict.fromkeys((*STAGED, *methods())):
         if method in SLOW:

@@ -7,7 +7,7 @@ import pytest
 from host.aircraft.mass_properties import Condition
 from host.sysid.answer.verdict import model_lines, unpredicted, verdict_lines
 from host.sysid.estimators.method_registry import fit
-from host.sysid.flight.linear import Answer
+from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.diagnostics import SignalFit, collinearity, reference_values
 from host.sysid.models.modal_analysis import modes, modes_of
 from host.sysid.models.residual_delays import STANDARD_DELAYS
@@ -23,8 +23,8 @@ def answer() -> Answer:
     return Answer(
         template="own", method="equation-error", model=model, trim=Trim(50.0, 0.0, 0.0),
         condition=Condition(50.0, 1500.0), maneuvers=(record,), used=(), held_out=(),
-        result=result, fits=(), validation=(), refused=(), together=collinearity(result),
-        modes=(), coefficients=(), still=(), delays={},
+        result=result, fits=(), validation=(), refused=(), collinearity=collinearity(result),
+        modes=(), coefficients=(), constant_inputs=(), delays={},
     )  # fmt: skip
 
 
@@ -47,9 +47,9 @@ def test_a_wide_interval_is_named_and_a_bound_is_not_trusted(answer: Answer) -> 
 
 
 def test_collinear_data_without_a_pair_are_no_empty_brackets(answer: Answer) -> None:
-    severe = replace(answer.together, condition=1e9, pairs=())
+    severe = replace(answer.collinearity, condition=1e9, pairs=())
     assert "  the data are close to collinear" in verdict_lines(
-        [replace(answer, together=severe)], []
+        [replace(answer, collinearity=severe)], []
     )
 
 

@@ -17,8 +17,8 @@ from host.sysid.coefficients.coefficient_estimator import (
     merged_windows,
 )
 from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
-from host.sysid.flight.finder import Found
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.maneuver_detection import DetectedManeuver
 from scipy import io
 
 NAME = "ultrastick25e"
@@ -202,8 +202,8 @@ def test_without_an_aircraft_there_is_one_clear_line(
 
 
 def test_aileron_and_rudder_flown_together_are_one_window() -> None:
-    def item(axis: str, first: float, last: float) -> Found:
-        return Found(axis, "multisine", first, last - 3.0, last, 0.1, 9)
+    def item(axis: str, first: float, last: float) -> DetectedManeuver:
+        return DetectedManeuver(axis, "multisine", first, last - 3.0, last, 0.1, 9)
 
     windows = merged_windows(
         [

@@ -14,8 +14,8 @@ from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.window_spectra import Window
 from host.sysid.compatibility.inverse_sensor_model import Record, apply_sensor_errors, usable_length
-from host.sysid.flight.finder import Found
-from host.sysid.flight.tables import even_columns
+from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight
@@ -157,7 +157,7 @@ def test_what_is_missing_is_named() -> None:
 
 def test_a_flight_of_two_seconds_is_refused_in_one_line() -> None:
     t = np.arange(200) * 0.01
-    moved = Found("elevator_rad", "window", 0.5, 1.0, 1.9, 0.1, 0)
+    moved = DetectedManeuver("elevator_rad", "window", 0.5, 1.0, 1.9, 0.1, 0)
     with pytest.raises(IdentificationError, match="more than the 3 s after the launch"):
         identify_coefficients({"t_s": t, "airspeed_mps": np.full(200, 17.0)}, NAME, windows=[moved])
 

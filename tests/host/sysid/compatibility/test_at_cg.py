@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import AirframeData
 from host.instrument.deviations import sensor_error_model
-from host.instrument.words import IN_WORDS
+from host.instrument.error_labels import ERROR_LABELS
 from host.sysid import Maneuver
 from host.sysid.compatibility.reconstruction import Compatibility, Finding
 from host.sysid.compatibility.sensor_corrections import INSTANTANEOUS_ERRORS
@@ -17,7 +17,7 @@ from host.sysid.compatibility.sensor_dynamics import (
     residual_errors,
 )
 from host.sysid.estimators.filter_error_gust import fit_with_gust, gust_model
-from host.sysid.flight.carried import systematic_error_shifts
+from host.sysid.flight.systematic_errors import systematic_error_shifts
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim, template
@@ -79,8 +79,8 @@ def test_what_stays_open_is_what_tolerances_leave() -> None:
 
 def test_every_error_that_moves_an_answer_has_words() -> None:
     """A table says 'delay of the vanes', not the name of a variable."""
-    assert {*INSTANTANEOUS_ERRORS, *residual_errors(told(0.007), still(10))} <= IN_WORDS.keys()
-    assert not any("_" in words for words in IN_WORDS.values())
+    assert {*INSTANTANEOUS_ERRORS, *residual_errors(told(0.007), still(10))} <= ERROR_LABELS.keys()
+    assert not any("_" in words for words in ERROR_LABELS.values())
 
 
 def test_a_place_is_felt_by_what_sits_there() -> None:

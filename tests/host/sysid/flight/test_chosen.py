@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from host.cli import main
-from host.sysid.flight.chosen import chosen, moving
-from host.sysid.flight.finder import AXES, find, grade
-from host.sysid.flight.linear import identify
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.linear_estimator import identify
+from host.sysid.flight.maneuver_detection import AXES, detect_maneuvers, grade
+from host.sysid.flight.maneuver_selection import excited_axes, select_maneuvers
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import model_from
 
@@ -45,16 +45,16 @@ def fitted(columns: Columns, **options: Any) -> list[tuple[float, float]]:
 
 
 def test_a_stretch_of_two_surfaces_is_one_record(flight: Columns) -> None:
-    found = find(flight)
-    windows = chosen(flight, from_s=found[2].start_s - 1.0, to_s=found[3].end_s)
+    found = detect_maneuvers(flight)
+    windows = select_maneuvers(flight, from_s=found[2].start_s - 1.0, to_s=found[3].end_s)
     assert windows is not None
     assert {f.axis for f in windows} == {"aileron_rad", "rudder_rad"}
     assert len(fitted(flight, names=("lateral",), windows=windows)) == 1
 
 
 def test_a_maneuver_named_twice_counts_once(flight: Columns) -> None:
-    windows = chosen(flight, numbers=(2, 1, 2))
-    assert windows == find(flight)[:2]
+    windows = select_maneuvers(flight, numbers=(2, 1, 2))
+    assert windows == detect_maneuvers(flight)[:2]
 
 
 def test_a_model_without_constants_is_simulated_as_it_is(flight: Columns) -> None:
@@ -65,11 +65,13 @@ def test_a_model_without_constants_is_simulated_as_it_is(flight: Columns) -> Non
 
 
 def test_a_model_of_ones_own_is_fitted_where_its_input_moved(flight: Columns) -> None:
-    expected = [f.fit_window() for f in find(flight) if f.axis == "elevator_rad"]
+    expected = [f.fit_window() for f in detect_maneuvers(flight) if f.axis == "elevator_rad"]
     assert len(expected) == 2
     assert fitted(flight, names=("own",), user_model=SHORT_PERIOD) == expected
     with pytest.raises(IdentificationError, match="no maneuver of elevator_rad for own; found"):
-        identify(flight, names=("own",), user_model=SHORT_PERIOD, windows=find(flight)[2:])
+        identify(
+            flight, names=("own",), user_model=SHORT_PERIOD, windows=detect_maneuvers(flight)[2:]
+        )
 
 
 @pytest.mark.parametrize(
@@ -88,26 +90,26 @@ def test_what_cannot_be_chosen_says_why(
     options: dict[str, Any], words: str, flight: Columns
 ) -> None:
     with pytest.raises(IdentificationError, match=words):
-        chosen(flight, **options)
+        select_maneuvers(flight, **options)
 
 
 def test_a_stretch_with_nothing_to_fit_says_why(flight: Columns) -> None:
     t = flight["t_s"]
     gap = {**flight, "bridged": ((t > 14.0) & (t < 14.5)).astype(float)}
     with pytest.raises(IdentificationError, match=r"a gap there, at 14\.0"):
-        chosen(gap, from_s=12.0, to_s=16.0)
+        select_maneuvers(gap, from_s=12.0, to_s=16.0)
     still = {**flight, **{f"{s}_rad": 0.0 * t for s in ("elevator", "aileron", "rudder")}}
     with pytest.raises(IdentificationError, match="no surface moved there"):
-        chosen(still, from_s=12.0, to_s=16.0)
+        select_maneuvers(still, from_s=12.0, to_s=16.0)
     with pytest.raises(IdentificationError, match="none was found"):
-        chosen(still, numbers=[1])
+        select_maneuvers(still, numbers=[1])
     with pytest.raises(IdentificationError, match="the data have none of elevator_rad"):
-        chosen({"t_s": t, "q_radps": flight["q_radps"]}, from_s=12.0, to_s=16.0)
+        select_maneuvers({"t_s": t, "q_radps": flight["q_radps"]}, from_s=12.0, to_s=16.0)
 
 
 def test_missing_columns_are_named_not_stumbled_over(flight: Columns) -> None:
     few = {k: flight[k] for k in ("t_s", "elevator_rad", "alpha_rad")}
-    mark = grade(few, find(few)[0])
+    mark = grade(few, detect_maneuvers(few)[0])
     assert mark.score == 0.0
     assert mark.remarks == ("no q_radps: cannot be graded",)
     with pytest.raises(IdentificationError, match="needs airspeed_mps"):
@@ -162,5 +164,5 @@ def test_a_model_may_name_columns_of_its_own(tmp_path: Path) -> None:
 
 
 def test_maneuvers_of_a_model_are_those_its_inputs_name() -> None:
-    assert moving(("elevator_pot_rad", "rudder_rad")) == ("elevator_rad", "rudder_rad")
-    assert moving(("gust_mps",)) == AXES
+    assert excited_axes(("elevator_pot_rad", "rudder_rad")) == ("elevator_rad", "rudder_rad")
+    assert excited_axes(("gust_mps",)) == AXES

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from host.cli import main
-from host.sysid.flight.plausible import check
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.unit_sign_checks import check
 from host.sysid.identification_error import IdentificationError
 
 Columns = dict[str, np.ndarray]

@@ -13,7 +13,7 @@ from host.cli import main
 from host.instrument.deviations import dynamic_pressure_share
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
 from host.sysid import Maneuver, fit
-from host.sysid.aerodynamics.coefficient_table import Moved, coefficients
+from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.answer.verdict import model_lines, verdict_lines
 from host.sysid.compatibility.reconstruction import Compatibility, Finding
@@ -25,9 +25,9 @@ from host.sysid.compatibility.sensor_corrections import (
     pressure_share,
     residual_deviations,
 )
-from host.sysid.flight import linear, linear_model
-from host.sysid.flight.carried import carried, systematic_error_shifts
-from host.sysid.flight.linear import identify
+from host.sysid.flight import linear_estimator, linear_model
+from host.sysid.flight.linear_estimator import identify
+from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.output_error_problem import OutputProblem
@@ -171,7 +171,7 @@ def test_one_step_foretells_the_fit_of_disturbed_data() -> None:
             step / result.estimate[:6], expected / result.estimate[:6], atol=0.1 * largest
         )
     assert moved["pitot_scale"].qbar_gain == pytest.approx(1.0 - 0.02 * pressure_share(found), 1e-3)
-    wide = carried(result, tuple(moved.values()))
+    wide = add_systematic_covariance(result, tuple(moved.values()))
     k = result.index("M_alpha")
     expected_half = np.hypot(
         result.half_width()[k],
@@ -187,12 +187,12 @@ def test_a_better_pitot_narrows_a_coefficient() -> None:
     condition = Condition(17.0, float(columns["qbar_pa"].mean()))
     standard = standard_errors()
 
-    def half(*moved: Moved, errors: InstrumentErrors | None = None) -> float:
+    def half(*moved: ShiftedEstimate, errors: InstrumentErrors | None = None) -> float:
         table = coefficients(result, airframe, condition, moved, errors)
         return next(c.half_width / abs(c.value) for c in table if c.name == "Cm_alpha")
 
-    def pitot(share: float) -> Moved:
-        return Moved("pitot_scale", result.estimate, 1.0, 1.0 + share)
+    def pitot(share: float) -> ShiftedEstimate:
+        return ShiftedEstimate("pitot_scale", result.estimate, 1.0, 1.0 + share)
 
     turned = result.estimate.copy()
     turned[result.index("M_alpha")] *= 1.03
@@ -206,7 +206,7 @@ def test_a_better_pitot_narrows_a_coefficient() -> None:
     for moved in (0.001, 0.01, 0.05):
         expected = np.hypot(none, 1.96 * (1.0 - 1.0 / (1.0 + moved)))
         assert half(pitot(moved)) == pytest.approx(expected, rel=1e-3)
-    assert half(Moved("imu_tilt_y_rad", turned, 1.0, 1.0)) == pytest.approx(
+    assert half(ShiftedEstimate("imu_tilt_y_rad", turned, 1.0, 1.0)) == pytest.approx(
         np.hypot(plain, 1.96 * 0.03), rel=1e-3
     )
 
@@ -279,7 +279,7 @@ def test_a_delay_at_its_bound_is_called_so(
     tight = tuple(
         replace(d, limit_s=0.001) if d.name == "delay_vanes_s" else d for d in STANDARD_DELAYS
     )
-    for module in (linear, linear_model):
+    for module in (linear_estimator, linear_model):
         monkeypatch.setattr(module, "STANDARD_DELAYS", tight)
     answers = identify(columns, airframe=airframe_data(NAME))
     for answer in answers:

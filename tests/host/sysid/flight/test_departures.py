@@ -12,13 +12,13 @@ from host.instrument.deviations import unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.estimators.start_values import regression_estimates, start_values
-from host.sysid.flight import linear
-from host.sysid.flight.departures import spin_of
-from host.sysid.flight.finder import Found
-from host.sysid.flight.linear import identify
+from host.sysid.flight import linear_estimator
+from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.linear_model import imu_place_m, without_attitude
-from host.sysid.flight.reconstructed import flown_maneuvers, reconstructed
-from host.sysid.flight.tables import even_columns
+from host.sysid.flight.maneuver_detection import DetectedManeuver
+from host.sysid.flight.reconstructed_flight import flown_maneuvers, reconstruct_flight
+from host.sysid.flight.trim_departure import spin_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template
@@ -52,10 +52,12 @@ def bare() -> AirframeData:
     return replace(airframe_data(NAME), imu_m=(0.0, 0.0, 0.0), vanes_m=(), upwash=0.0)
 
 
-def windows(maneuvers: list[dict[str, Any]]) -> list[Found]:
+def windows(maneuvers: list[dict[str, Any]]) -> list[DetectedManeuver]:
     """Return the maneuvers as the finder would."""
     return [
-        Found(f"{m['axes'][0]}_rad", m["kind"], m["start_s"], m["input_end_s"], m["end_s"], 0.1, 9)
+        DetectedManeuver(
+            f"{m['axes'][0]}_rad", m["kind"], m["start_s"], m["input_end_s"], m["end_s"], 0.1, 9
+        )
         for m in maneuvers
     ]
 
@@ -82,7 +84,7 @@ def test_airspeed_that_falls_with_the_rudder_is_not_taken_for_a_derivative(
 
     moved = misses()
 
-    monkeypatch.setattr(linear, "departure", lambda *_: None)
+    monkeypatch.setattr(linear_estimator, "correct_trim_departure", lambda *_: None)
     plain = misses()
     for name in ("Cn_p", "Cn_da"):
         assert plain[name] > 0.2, name
@@ -103,7 +105,7 @@ def test_equation_error_gives_the_start_though_places_and_delays_are_free(
         delays=STANDARD_DELAYS,
     )
     found = windows(maneuvers)
-    flown = flown_maneuvers([reconstructed(columns, found)], [found])
+    flown = flown_maneuvers([reconstruct_flight(columns, found)], [found])
     cut = [m.cut(full) for m in flown]
     told = regression_estimates(full, cut)
     assert "imu_x_m" not in told

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.flight.finder import find
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.maneuver_detection import detect_maneuvers
 from host.sysid.identification_error import IdentificationError
 from scipy import io
 
@@ -224,7 +224,7 @@ def test_a_maneuver_over_a_gap_is_left_out(
         half = np.floor((t - start_s) / 0.4)
         table["Elev"] += np.where(half == 0.0, 5.0, np.where(half == 1.0, -5.0, 0.0))
     table.to_csv(tmp_path / "x.csv", index=False)
-    whole = find(read(tmp_path / "x.csv")[0])
+    whole = detect_maneuvers(read(tmp_path / "x.csv")[0])
     assert [round(f.start_s) for f in whole] == [10, 30, 50]
     gap = (t > 31.0) & (t < 31.5)
     if how == "cells":
@@ -233,7 +233,7 @@ def test_a_maneuver_over_a_gap_is_left_out(
         table = table[~gap]
     table.to_csv(tmp_path / "x.csv", index=False)
     columns, notes = read(tmp_path / "x.csv")
-    assert [round(f.start_s) for f in find(columns)] == [10, 50]
+    assert [round(f.start_s) for f in detect_maneuvers(columns)] == [10, 50]
     assert any("maneuvers over" in n and "0.5" in n for n in notes)
 
 

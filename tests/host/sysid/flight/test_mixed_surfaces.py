@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.sysid.answer.verdict import verdict_lines
-from host.sysid.flight.linear import identify
-from host.sysid.flight.tables import read_columns
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.linear_estimator import identify
 from scipy.signal import lsim
 
 

@@ -8,7 +8,7 @@ from host.aircraft.mass_properties import Condition
 from host.sysid import Maneuver, fit
 from host.sysid.answer.json_document import answer_document
 from host.sysid.answer.verdict import model_lines, verdict_lines
-from host.sysid.flight.linear import Answer
+from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.diagnostics import (
     NOT_IDENTIFIABLE,
     WEAKLY_IDENTIFIABLE,
@@ -144,10 +144,10 @@ def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
         fits=(),
         validation=(),
         refused=found.flags,
-        together=collinearity(result),
+        collinearity=collinearity(result),
         modes=(),
         coefficients=(),
-        still=(),
+        constant_inputs=(),
         delays={},
     )
     text = verdict_lines([answer], [])

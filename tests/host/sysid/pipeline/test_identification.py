@@ -19,8 +19,8 @@ from host.sysid.answer.output_files import OutputPaths
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.answer.verdict import MARKS
 from host.sysid.coefficients.coefficient_model import standard_model
-from host.sysid.flight import chosen, finder
-from host.sysid.flight.linear import LinearEstimator
+from host.sysid.flight import maneuver_detection, maneuver_selection
+from host.sysid.flight.linear_estimator import LinearEstimator
 from host.sysid.models.templates import Trim, template
 from host.sysid.pipeline.flight_preparation import ReadingOptions, prepare
 from host.sysid.pipeline.identification import Identification
@@ -224,13 +224,13 @@ def test_maneuvers_are_found_once_a_flight(
 ) -> None:
     calls = []
 
-    def counted(columns: Mapping[str, Any]) -> list[finder.Found]:
+    def counted(columns: Mapping[str, Any]) -> list[maneuver_detection.DetectedManeuver]:
         calls.append(1)
-        return finder.find(columns)
+        return maneuver_detection.detect_maneuvers(columns)
 
-    monkeypatch.setattr(chosen, "find", counted)
-    monkeypatch.setattr("host.sysid.flight.linear.find", counted)
-    monkeypatch.setattr("host.sysid.coefficients.coefficient_estimator.find", counted)
+    monkeypatch.setattr(maneuver_selection, "detect_maneuvers", counted)
+    monkeypatch.setattr("host.sysid.flight.linear_estimator.detect_maneuvers", counted)
+    monkeypatch.setattr("host.sysid.coefficients.coefficient_estimator.detect_maneuvers", counted)
     source = flights[0] / "flight.csv"
     methods = ("equation-error", "equation-error-robust")
     host.identify(source, aircraft=NAME, models=MODELS, methods=methods)

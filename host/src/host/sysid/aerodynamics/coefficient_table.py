@@ -16,8 +16,8 @@ from host.aircraft.mass_properties import AirframeData, Condition
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.instrument.deviations import dynamic_pressure_share
+from host.instrument.error_labels import ERROR_LABELS
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
-from host.instrument.words import IN_WORDS
 from host.sysid.models.consider_covariance import consider_covariance, dominant_error_source
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.templates import Trim
@@ -46,7 +46,7 @@ class CoefficientTable:
 
 
 @dataclass(frozen=True, slots=True)
-class Moved:
+class ShiftedEstimate:
     """An estimate (P,) with one deviation of a sensor's error in it, and its condition then.
 
     `airspeed_gain` and `qbar_gain` are over those of the answer.
@@ -62,7 +62,7 @@ def coefficients(
     result: FitResult,
     airframe: AirframeData,
     condition: Condition,
-    moved: Sequence[Moved] = (),
+    moved: Sequence[ShiftedEstimate] = (),
     errors: InstrumentErrors | None = None,
 ) -> tuple[Coefficient, ...]:
     """Convert dimensional derivatives of the templates to coefficients.
@@ -117,7 +117,7 @@ def coefficients(
     for m in moved:
         there = Condition(condition.airspeed_mps * m.airspeed_gain, condition.qbar_pa * m.qbar_gain)
         shift = converted(m.estimate, airframe, there) - value
-        cause = SHARED.get(m.error) or IN_WORDS.get(m.error, m.error)
+        cause = SHARED.get(m.error) or ERROR_LABELS.get(m.error, m.error)
         sensed.setdefault(cause, []).append(shift)
     parts = _variances(assumed, sensed)
     extra = sum(parts.values(), np.zeros(len(names)))

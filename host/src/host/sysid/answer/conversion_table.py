@@ -18,7 +18,7 @@ from host.constants import NORMAL_95
 from host.files.quantities import Quantity
 from host.files.user_text import shown
 from host.instrument.deviations import sensor_error_model
-from host.instrument.words import IN_WORDS
+from host.instrument.error_labels import ERROR_LABELS
 from host.sysid.aerodynamics.derivative_conversion import (
     COEFFICIENTS,
     CONSIDERED_ERRORS,
@@ -89,7 +89,7 @@ class Conversion:
             part = self.found.covariance[k, j] ** 2 / max(self.found.covariance[j, j], 1e-300)
             shares[error] = part / max(own, 1e-300)
         cause = max(shares, key=shares.__getitem__)
-        return IN_WORDS[cause] if shares[cause] >= NAMED_SHARE else ""
+        return ERROR_LABELS[cause] if shares[cause] >= NAMED_SHARE else ""
 
 
 def convert(path: Path, aircraft: str, at: FlightCondition) -> Conversion:

@@ -13,9 +13,9 @@ from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.verdict import unpredicted
 from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.compatibility.sensor_corrections import correction_document
-from host.sysid.flight.finder import Found, Grade
-from host.sysid.flight.linear import Answer
-from host.sysid.flight.reconstructed import found_name
+from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
+from host.sysid.flight.reconstructed_flight import maneuver_name
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(number, float) and not isfinite(number) else number
 
 
-def maneuver_document(graded: Sequence[tuple[Found, Grade]]) -> list[dict[str, Any]]:
+def maneuver_document(graded: Sequence[tuple[DetectedManeuver, Grade]]) -> list[dict[str, Any]]:
     """Return the maneuvers with their grades."""
     return [
         {
@@ -139,12 +139,12 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
         },
         "residual_kind": result.residual_kind,
         "collinear": [
-            {"names": [a, b], "correlation": value} for a, b, value in answer.together.pairs
+            {"names": [a, b], "correlation": value} for a, b, value in answer.collinearity.pairs
         ],
-        "information_condition": answer.together.condition,
-        "constant_inputs": list(answer.still),
+        "information_condition": answer.collinearity.condition,
+        "constant_inputs": list(answer.constant_inputs),
         "maneuvers": [m.name for m in answer.maneuvers],
-        "held_out": [found_name(f) for f in answer.held_out],
+        "held_out": [maneuver_name(f) for f in answer.held_out],
     }
 
 

@@ -13,7 +13,7 @@ from host.extras import install_hint
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.atomic_files import atomic_write, check_destination, file_names
 from host.sysid.answer.mat_file import labels, write_mat
-from host.sysid.flight.linear import Answer
+from host.sysid.flight.linear_estimator import Answer
 from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:

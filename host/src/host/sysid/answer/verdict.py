@@ -15,8 +15,8 @@ from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.compatibility.sensor_corrections import correction_lines
-from host.sysid.flight.finder import Found, Grade
-from host.sysid.flight.linear import Answer, from_zero
+from host.sysid.flight.linear_estimator import Answer, from_zero
+from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
 from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
 from host.sysid.models.modal_analysis import Mode
 from host.sysid.models.residual_delays import STANDARD_DELAYS
@@ -47,7 +47,7 @@ NEEDS = {
 }
 
 
-def maneuver_lines(graded: Sequence[tuple[Found, Grade]]) -> list[str]:
+def maneuver_lines(graded: Sequence[tuple[DetectedManeuver, Grade]]) -> list[str]:
     """Return the list of maneuvers for people."""
     lines = [f"{len(graded)} maneuvers found"]
     for number, (item, mark) in enumerate(graded, start=1):
@@ -188,10 +188,10 @@ def _inputs(answer: Answer, both: set[str]) -> list[str]:
         )
     lines += [
         f"  {name} never moved: its derivatives are the bias under another name"
-        for name in answer.still
+        for name in answer.constant_inputs
     ]
-    if answer.together.severe:
-        pairs = ", ".join(f"{a} with {b}" for a, b, _ in answer.together.pairs[:3])
+    if answer.collinearity.severe:
+        pairs = ", ".join(f"{a} with {b}" for a, b, _ in answer.collinearity.pairs[:3])
         lines.append("  the data are close to collinear" + (f" ({pairs})" if pairs else ""))
     return lines
 

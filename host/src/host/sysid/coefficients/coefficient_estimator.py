@@ -32,8 +32,12 @@ from host.sysid.coefficients.deletion_diagnostics import CrossValidation
 from host.sysid.coefficients.pooled_flights import pool_fits
 from host.sysid.coefficients.window_spectra import SHORTEST_S, Window
 from host.sysid.flight.estimator import answer_of
-from host.sysid.flight.finder import FLYING_SHARE, Found, find
-from host.sysid.flight.reconstructed import ReconstructedFlight, found_name, reconstructed
+from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver, detect_maneuvers
+from host.sysid.flight.reconstructed_flight import (
+    ReconstructedFlight,
+    maneuver_name,
+    reconstruct_flight,
+)
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.consider_covariance import dominant_error_source
 from host.sysid.models.modal_analysis import Mode
@@ -93,7 +97,7 @@ class CoefficientAnswer:
 
     model: CoefficientModel
     fit: CoefficientFit
-    used: tuple[Found, ...]
+    used: tuple[DetectedManeuver, ...]
     flights: tuple[int, ...]
     windows: tuple[Window, ...]
     causes: dict[str, tuple[str, float]]
@@ -111,7 +115,7 @@ class CoefficientAnswer:
         """Names of the maneuvers, with the number of the flight if there are several."""
         several = max(self.flights, default=0) > 0
         return tuple(
-            found_name(item) + (f" of flight {k + 1}" if several else "")
+            maneuver_name(item) + (f" of flight {k + 1}" if several else "")
             for item, k in zip(self.used, self.flights, strict=True)
         )
 
@@ -140,7 +144,7 @@ class CoefficientEstimate:
     """The estimate of one flight: end of the search, maneuvers and their windows."""
 
     search: SearchResult
-    used: tuple[Found, ...]
+    used: tuple[DetectedManeuver, ...]
     windows: tuple[Window, ...]
 
 
@@ -260,7 +264,7 @@ def identify_coefficients(
     columns: Mapping[str, Array],
     aircraft: str,
     *,
-    windows: Sequence[Found] | None = None,
+    windows: Sequence[DetectedManeuver] | None = None,
     model: CoefficientModel | None = None,
     airframe: AirframeData | None = None,
     instrument: SensorErrorModel | None = None,
@@ -270,7 +274,7 @@ def identify_coefficients(
     Parameters
     ----------
     columns : mapping
-        SI columns on an even grid, as `host.sysid.flight.tables` returns them.
+        SI columns on an even grid, as `host.sysid.flight.flight_tables` returns them.
     aircraft : str
         Name or path of the aircraft file.
     windows : sequence of Found, optional
@@ -289,11 +293,11 @@ def identify_coefficients(
         If a column or an axis is missing, or the aircraft file lacks what is needed.
     """
     by = coefficient_estimator(aircraft, model=model, airframe=airframe, instrument=instrument)
-    found = find(columns) if windows is None else windows
-    return answer_of(by, [reconstructed(columns, found)])
+    found = detect_maneuvers(columns) if windows is None else windows
+    return answer_of(by, [reconstruct_flight(columns, found)])
 
 
-def merged_windows(found: Sequence[Found]) -> list[Window]:
+def merged_windows(found: Sequence[DetectedManeuver]) -> list[Window]:
     """Return the windows of maneuvers; overlapping aileron and rudder maneuvers are one."""
     windows: list[Window] = []
     for item in sorted(found, key=lambda f: (f.axis != "elevator_rad", f.start_s)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol, TypeVar
 
-from host.sysid.flight.reconstructed import ReconstructedFlight
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 
 E = TypeVar("E")
 W = TypeVar("W")

@@ -10,7 +10,7 @@ import numpy as np
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.sysid.compatibility.path_preparation import NO_OFFSETS
 from host.sysid.estimators.start_values import regression_estimates
-from host.sysid.flight.reconstructed import FlownManeuver
+from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.state_space_model import LinearModel, without_outputs

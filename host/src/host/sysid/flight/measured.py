@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
-from host.sysid.flight.finder import FLYING_SHARE
+from host.sysid.flight.maneuver_detection import FLYING_SHARE
 
 FAR = 100.0  # of the range that 96 % of the values lie in
 FEW = 0.02  # of all values: more are no spikes

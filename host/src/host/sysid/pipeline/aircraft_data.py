@@ -10,7 +10,7 @@ from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import NoPropulsionError, Powerplant, powerplant
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.physical.calibration import load_calibration
-from host.sysid.flight.tables import FlightColumns
+from host.sysid.flight.flight_tables import FlightColumns
 
 
 @dataclass(frozen=True, slots=True)

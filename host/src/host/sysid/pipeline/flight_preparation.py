@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.instrument.words import recording_words
+from host.instrument.error_labels import recording_words
 from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
 from host.sysid.compatibility.servo_response import surface_positions
-from host.sysid.flight.chosen import chosen
-from host.sysid.flight.reconstructed import ReconstructedFlight, reconstructed
-from host.sysid.flight.tables import read_flight_columns, source_name
+from host.sysid.flight.flight_tables import read_flight_columns, source_name
+from host.sysid.flight.maneuver_selection import select_maneuvers
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData
 
@@ -79,13 +79,13 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     if instrument is not None:
         columns = surface_positions(columns, instrument)
         notes += recording_words(instrument)
-    found = chosen(columns, from_s=how.from_s, to_s=how.to_s, numbers=how.maneuvers)
+    found = select_maneuvers(columns, from_s=how.from_s, to_s=how.to_s, numbers=how.maneuvers)
     agreement = None
     try:
         agreement = reconstruct(columns, known.airframe if known else None, instrument)
     except IdentificationError as error:
         notes.append(str(error))
-    flight = reconstructed(
+    flight = reconstruct_flight(
         columns,
         found,
         source=source_name(source),

@@ -27,8 +27,8 @@ from host.sysid.compatibility.reconstruction import (
     compatibility_document,
     compatibility_lines,
 )
-from host.sysid.flight.linear import Answer
-from host.sysid.flight.reconstructed import ReconstructedFlight
+from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.pipeline.aircraft_data import AircraftData
 from host.sysid.pipeline.arguments import numbers_of, path_of, seconds_of
 from host.sysid.pipeline.estimate_table import estimate_table, mode_table

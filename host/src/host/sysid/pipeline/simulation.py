@@ -13,10 +13,10 @@ from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.coefficients.coefficient_modes import LinearSystem
-from host.sysid.flight.chosen import moving, once
 from host.sysid.flight.free_simulation import fits_of, free_simulation, frozen_model
-from host.sysid.flight.linear import Answer
-from host.sysid.flight.reconstructed import ReconstructedFlight, flown_maneuvers
+from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.maneuver_selection import excited_axes, merge_overlapping
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight, flown_maneuvers
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.maneuver import Maneuver
@@ -140,8 +140,8 @@ def simulate(
     found: list[SimulatedModel] = []
     not_simulated: list[str] = []
     for label, model in _models(linear, direct):
-        axes = moving(model.inputs)
-        own = [once([f for f in flight.maneuvers if f.axis in axes])]
+        axes = excited_axes(model.inputs)
+        own = [merge_overlapping([f for f in flight.maneuvers if f.axis in axes])]
         try:
             data = [m.cut(model) for m in flown_maneuvers([flight], own)]
         except IdentificationError as error:

@@ -12,8 +12,8 @@ from host.physical.calibration import load_calibration
 from host.sysid.answer.truth_comparison import read_truth
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
 from host.sysid.flight.estimator import answer_of
-from host.sysid.flight.linear import Answer, LinearEstimator
-from host.sysid.flight.reconstructed import ReconstructedFlight
+from host.sysid.flight.linear_estimator import Answer, LinearEstimator
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData, aircraft_data
 from host.sysid.pipeline.arguments import numbers_of, path_of, paths_of, seconds_of

@@ -25,7 +25,7 @@ from host.sysid.compatibility.sensor_corrections import (
 )
 from host.sysid.compatibility.sensor_dynamics import columns_at_cg
 from host.sysid.flight.column_map import like
-from host.sysid.flight.finder import Found
+from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -53,7 +53,7 @@ class ReconstructedFlight:
     source: str
     recorded: Mapping[str, Array]
     corrected: Mapping[str, Array]
-    maneuvers: tuple[Found, ...]
+    maneuvers: tuple[DetectedManeuver, ...]
     compatibility: Compatibility | None
     delays_open: bool
     instrument: SensorErrorModel | None = None
@@ -63,7 +63,7 @@ class ReconstructedFlight:
 class FlownManeuver:
     """A maneuver in its flight; `label` is what an answer calls it."""
 
-    found: Found
+    found: DetectedManeuver
     flight: ReconstructedFlight
     label: str
 
@@ -98,9 +98,9 @@ class FlownManeuver:
         )
 
 
-def reconstructed(
+def reconstruct_flight(
     columns: Mapping[str, Array],
-    maneuvers: Sequence[Found],
+    maneuvers: Sequence[DetectedManeuver],
     *,
     source: str = "",
     airframe: AirframeData | None = None,
@@ -139,20 +139,20 @@ def reconstructed(
     )
 
 
-def found_name(item: Found) -> str:
+def maneuver_name(item: DetectedManeuver) -> str:
     """Return what a maneuver is called in an answer."""
     return f"{item.kind} on {item.axis.split('_')[0]} at {item.start_s:.1f} s"
 
 
 def flown_maneuvers(
-    flights: Sequence[ReconstructedFlight], found: Sequence[Sequence[Found]]
+    flights: Sequence[ReconstructedFlight], found: Sequence[Sequence[DetectedManeuver]]
 ) -> list[FlownManeuver]:
     """Return the maneuvers of several flights one behind the other, each by its own name."""
     return [
         FlownManeuver(
             item,
             flight,
-            found_name(item) + (f" of flight {number}" if len(flights) > 1 else ""),
+            maneuver_name(item) + (f" of flight {number}" if len(flights) > 1 else ""),
         )
         for number, (flight, items) in enumerate(zip(flights, found, strict=True), start=1)
         for item in items

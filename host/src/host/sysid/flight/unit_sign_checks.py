@@ -12,7 +12,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
-from host.sysid.flight.consistent import BLOCK_S, FEWEST, HINT, SURE, block_means, consistent
+from host.sysid.flight.kinematic_checks import BLOCK_S, FEWEST, HINT, SURE, block_means, consistent
 from host.sysid.identification_error import IdentificationError
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")

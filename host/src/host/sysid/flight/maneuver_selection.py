@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.flight.finder import AXES, Found, find
+from host.sysid.flight.maneuver_detection import AXES, DetectedManeuver, detect_maneuvers
 from host.sysid.identification_error import IdentificationError
 
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
@@ -17,13 +17,13 @@ SHARED_S = 0.1  # windows that overlap by more are one
 STILL_RAD = 1e-3  # a surface that moves less excites nothing: the pots resolve as much
 
 
-def chosen(
+def select_maneuvers(
     columns: Mapping[str, Array],
     *,
     from_s: float | None = None,
     to_s: float | None = None,
     numbers: Sequence[int] = (),
-) -> list[Found]:
+) -> list[DetectedManeuver]:
     """Return the maneuvers the user asked for; all that are found where nothing was asked.
 
     Parameters
@@ -41,7 +41,7 @@ def chosen(
         If there is no such maneuver, or the stretch holds nothing to fit.
     """
     if from_s is None and to_s is None:
-        return _numbered(columns, numbers) if numbers else find(columns)
+        return _numbered(columns, numbers) if numbers else detect_maneuvers(columns)
     if numbers:
         raise IdentificationError(
             "argument maneuvers excludes argument from_s and argument to_s: give one of them"
@@ -49,8 +49,8 @@ def chosen(
     return _stretch(columns, from_s, to_s)
 
 
-def _numbered(columns: Mapping[str, Array], numbers: Sequence[int]) -> list[Found]:
-    found = find(columns)
+def _numbered(columns: Mapping[str, Array], numbers: Sequence[int]) -> list[DetectedManeuver]:
+    found = detect_maneuvers(columns)
     wrong = [n for n in numbers if not 1 <= n <= len(found)]
     if wrong:
         there = f"there are {len(found)}" if found else "none was found"
@@ -58,7 +58,9 @@ def _numbered(columns: Mapping[str, Array], numbers: Sequence[int]) -> list[Foun
     return [found[n - 1] for n in sorted(set(numbers))]
 
 
-def _stretch(columns: Mapping[str, Array], from_s: float | None, to_s: float | None) -> list[Found]:
+def _stretch(
+    columns: Mapping[str, Array], from_s: float | None, to_s: float | None
+) -> list[DetectedManeuver]:
     t = columns["t_s"]
     first = float(t[0]) if from_s is None else from_s
     last = float(t[-1]) if to_s is None else to_s
@@ -85,15 +87,15 @@ def _stretch(columns: Mapping[str, Array], from_s: float | None, to_s: float | N
             f"{asked}: no surface moved there; `host maneuvers` lists where one did"
         )
     return [
-        Found(axis, "window", first + 0.3, last, last, size / 2.0, 0)
+        DetectedManeuver(axis, "window", first + 0.3, last, last, size / 2.0, 0)
         for axis, size in swing.items()
         if size > 0.5 * max(swing.values())
     ]
 
 
-def once(found: Sequence[Found]) -> list[Found]:
+def merge_overlapping(found: Sequence[DetectedManeuver]) -> list[DetectedManeuver]:
     """Join windows that share samples: surfaces that moved together are one record."""
-    joined: list[Found] = []
+    joined: list[DetectedManeuver] = []
     for item in sorted(found, key=lambda f: f.start_s):
         before = joined[-1] if joined else None
         if before is not None and item.start_s < before.end_s - SHARED_S:
@@ -105,7 +107,7 @@ def once(found: Sequence[Found]) -> list[Found]:
     return joined
 
 
-def moving(inputs: Sequence[str]) -> tuple[str, ...]:
+def excited_axes(inputs: Sequence[str]) -> tuple[str, ...]:
     """Return on which axes to look for maneuvers of a model: its inputs, or all that they name.
 
     `elevator_pot_rad` moves with the elevator; of `gust_mps` nobody knows when it moved.

@@ -17,8 +17,7 @@ from host.files.regular import file_or_folder
 from host.instrument.recording import Recording
 from host.physical.calibration import Calibration, load_calibration
 from host.sysid.flight.column_map import listed, mapped, read_map
-from host.sysid.flight.consistent import HINT
-from host.sysid.flight.foreign import (
+from host.sysid.flight.foreign_tables import (
     TEXT_KINDS,
     Foreign,
     from_frame,
@@ -27,9 +26,10 @@ from host.sysid.flight.foreign import (
     refuse_other,
     same_length,
 )
+from host.sysid.flight.kinematic_checks import HINT
 from host.sysid.flight.measured import measured
-from host.sysid.flight.plausible import SURFACES, check
 from host.sysid.flight.recorded import recording_of_log, recording_of_table
+from host.sysid.flight.unit_sign_checks import SURFACES, check
 from host.sysid.identification_error import IdentificationError
 from host.terminal import command_line
 

@@ -32,7 +32,7 @@ AXES = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class DetectedManeuver:
     """One test input and its response, times in the time of the table, s."""
 
     axis: str
@@ -48,7 +48,7 @@ class Found:
         return self.start_s - 0.3, self.end_s
 
 
-def find(columns: Mapping[str, Array]) -> list[Found]:
+def detect_maneuvers(columns: Mapping[str, Array]) -> list[DetectedManeuver]:
     """Return the maneuvers of a flight in order of time.
 
     Parameters
@@ -64,7 +64,7 @@ def find(columns: Mapping[str, Array]) -> list[Found]:
     if "airspeed_mps" in columns:
         speed = np.nan_to_num(np.asarray(columns["airspeed_mps"]))
         flying = speed > FLYING_SHARE * float(np.median(speed))
-    found: list[Found] = []
+    found: list[DetectedManeuver] = []
     for axis in AXES:
         if axis in columns:
             series = np.nan_to_num(np.asarray(columns[axis], dtype=np.float64))
@@ -77,7 +77,7 @@ def find(columns: Mapping[str, Array]) -> list[Found]:
     return [f for f in found if not np.any((holes > f.start_s) & (holes < f.end_s))]
 
 
-def _find_axis(axis: str, t: Array, series: Array, flying: BoolArray) -> list[Found]:
+def _find_axis(axis: str, t: Array, series: Array, flying: BoolArray) -> list[DetectedManeuver]:
     dt_s = float(np.median(np.diff(t)))
     lag = max(1, round(LAG_S / dt_s))
     smooth = _median3(series)
@@ -99,7 +99,9 @@ def _find_axis(axis: str, t: Array, series: Array, flying: BoolArray) -> list[Fo
     return result
 
 
-def _describe(axis: str, t: Array, series: Array, group: IntArray, lag: int) -> list[Found]:
+def _describe(
+    axis: str, t: Array, series: Array, group: IntArray, lag: int
+) -> list[DetectedManeuver]:
     first, last = int(group[0]), int(group[-1])
     before = series[max(0, first - lag - round(TRIM_S / float(t[1] - t[0]))) : max(1, first - lag)]
     trim = float(np.median(before))
@@ -122,7 +124,7 @@ def _describe(axis: str, t: Array, series: Array, group: IntArray, lag: int) -> 
     if kind in ("sweep", "multisine"):
         start = _slow_start(t, series, start, amplitude)
     return [
-        Found(
+        DetectedManeuver(
             axis=axis,
             kind=kind,
             start_s=float(t[start]),
@@ -185,9 +187,9 @@ def _median3(series: Array) -> Array:
     return np.asarray(np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0))
 
 
-def _bounded(found: list[Found], last_s: float) -> list[Found]:
+def _bounded(found: list[DetectedManeuver], last_s: float) -> list[DetectedManeuver]:
     """End each window where the next input begins, and drop echoes inside a stronger input."""
-    kept: list[Found] = []
+    kept: list[DetectedManeuver] = []
     for item in found:
         overlaps = [
             k for k in kept if item.start_s < k.input_end_s and k.start_s < item.input_end_s
@@ -209,7 +211,7 @@ def _bounded(found: list[Found], last_s: float) -> list[Found]:
         limit = kept[k + 1].start_s if k + 1 < len(kept) else last_s
         end = min(item.end_s, max(limit, item.input_end_s), last_s)
         result.append(
-            Found(
+            DetectedManeuver(
                 item.axis,
                 item.kind,
                 item.start_s,
@@ -244,7 +246,7 @@ RESPONSE_OF = {
 }
 
 
-def grade(columns: Mapping[str, Array], item: Found) -> Grade:
+def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
     """Grade one maneuver: amplitude, trim before, noise, pilot feedback."""
     if RESPONSE_OF[item.axis] not in columns:
         return Grade(0.0, 0.0, 0.0, 0.0, (f"no {RESPONSE_OF[item.axis]}: cannot be graded",))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, clock_share
 
-IN_WORDS = {
+ERROR_LABELS = {
     "mass_share": "mass", "ixx_share": "Ixx", "iyy_share": "Iyy", "izz_share": "Izz",
     "pitot_scale": "scale of the pitot", "pitot_zero_pa": "zero of the pitot",
     "pitot_drift_pa": "drift of the pitot", "pitot_delay_s": "delay of the pitot",
@@ -29,7 +29,7 @@ _ALONG = {
     "accel_bias_{}_mps2": "zero of the accelerometer along {}",
     "accel_scale_{}": "scale of the accelerometer along {}",
 }  # fmt: skip
-IN_WORDS |= {
+ERROR_LABELS |= {
     name.format(axis): words.format(axis) for name, words in _ALONG.items() for axis in "xyz"
 }
 

@@ -1,10 +1,10 @@
-"""What a linear answer owes to airspeed and attitude that did not stay where it is linear.
+"""Correction of a linear fit for airspeed and attitude that varied during the maneuver.
 
 Within 20 s of a multisine airspeed moves by some percent, and with it every derivative, in step
 with the surfaces that brake the aircraft. On a simulated flight in calm air, perfect sensors, the
 lateral fit has N_p 39 %, N_da twofold and L_dr 53 % off by that. What the departures are is known
-(`aircraft/varying.py`), so the answer is moved by one Gauss-Newton step of its own method: N_p is
-then 0.5, N_da 11 and L_dr 5 % off.
+(`aerodynamics/varying_airspeed.py`), so the estimate is corrected by one Gauss-Newton step of its
+own method: N_p is then 0.5, N_da 11 and L_dr 5 % off.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
-from host.sysid.aerodynamics.coefficient_table import Moved
-from host.sysid.aerodynamics.varying import BENDS, MEASURED, VaryingModel
-from host.sysid.flight.carried import follower
+from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
+from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERMS, VaryingModel
+from host.sysid.flight.systematic_errors import follower
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.templates import Trim
 
-LEFT = 0.25  # of the step: what one step and terms of second order leave open
+REMAINDER_SHARE = 0.25  # of the step: what one step and terms of second order leave open
 DEPARTURES = "departures from the linear model"
 
 
@@ -33,10 +33,10 @@ class Departure:
     """By how much an estimate moves (P,), and what one step and second order leave open of it."""
 
     step: Array
-    remainder: Moved
+    remainder: ShiftedEstimate
 
 
-def departure(
+def correct_trim_departure(
     result: FitResult,
     maneuvers: Sequence[Maneuver],
     cuts: Sequence[Mapping[str, Array]],
@@ -44,7 +44,7 @@ def departure(
     trim: Trim,
     powerplant: Powerplant | None = None,
 ) -> Departure | None:
-    """Return what the departures from its trim move the result of a template by.
+    """Return the shift of the estimate of a template by the departures from its trim.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def departure(
         None where departures of the model are not known or not measured.
     """
     base = result.model
-    if base.name not in BENDS or not all(name in cuts[0] for name in MEASURED):
+    if base.name not in SECOND_ORDER_TERMS or not all(name in cuts[0] for name in MEASURED):
         return None
     follow = follower(result, maneuvers, trim)
     if follow is None:
@@ -85,7 +85,9 @@ def departure(
     step = follow(wide, trim, data)
     if not np.isfinite(step).all():
         return None
-    return Departure(step, Moved(DEPARTURES, result.estimate + step + LEFT * step, 1.0, 1.0))
+    return Departure(
+        step, ShiftedEstimate(DEPARTURES, result.estimate + step + REMAINDER_SHARE * step, 1.0, 1.0)
+    )
 
 
 def spin_of(

@@ -20,7 +20,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
-from host.sysid.aerodynamics.turning_air import AXES, gust_motion, turning
+from host.sysid.aerodynamics.gust_reckoning import AXES, gust_motion, turning
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
@@ -34,7 +34,7 @@ MEASURED = (
 SMOOTH_S = 0.1  # of airspeed: its noise would multiply every term
 # Second-order terms with a parameter of their own: name, row, factors. Drag is a parabola in lift;
 # dihedral, roll by yawing and yaw by rolling follow lift, so the angle of attack.
-BENDS = {
+SECOND_ORDER_TERMS = {
     "longitudinal": (("D_alpha_alpha", "airspeed_mps", "alpha_rad"),),
     "lateral": (
         ("L_beta_alpha", "p_radps", "beta_rad"),
@@ -45,7 +45,7 @@ BENDS = {
 }
 # What airspeed does to a motion it is no state of: the propeller's torque does not grow with V^2,
 # what holds against it in trim does (left out, Cn_r is 4 % off in still air).
-PULLS: dict[str, tuple[tuple[str, str], ...]] = {
+AIRSPEED_TERMS: dict[str, tuple[tuple[str, str], ...]] = {
     "longitudinal": (),
     "lateral": (("Y_V", "beta_rad"), ("L_V", "p_radps"), ("N_V", "r_radps")),
 }
@@ -81,9 +81,10 @@ class VaryingModel:
     spin_kgm2ps: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if self.axis not in BENDS:
+        if self.axis not in SECOND_ORDER_TERMS:
             raise IdentificationError(
-                f"departures of '{self.axis}', known are those of {' and '.join(BENDS)}"
+                f"departures of '{self.axis}', known are those of"
+                f" {' and '.join(SECOND_ORDER_TERMS)}"
             )
 
     @property
@@ -116,7 +117,7 @@ class VaryingModel:
 
     def _build(self, *, turning_air: bool) -> LinearModel:
         base, scaled = self.base, self.scaled
-        bends, airspeed = BENDS[self.axis], PULLS[self.axis]
+        bends, airspeed = SECOND_ORDER_TERMS[self.axis], AIRSPEED_TERMS[self.axis]
         n, m, p = len(base.states), len(base.inputs), len(base.outputs)
         terms = list(base.terms)
         for term in base.terms:
@@ -208,9 +209,9 @@ class VaryingModel:
         angle = _deviation(columns["alpha_rad"])
         inputs += [
             _between(_deviation(angle * _deviation(columns[column])))
-            for _, _, column in BENDS[self.axis]
+            for _, _, column in SECOND_ORDER_TERMS[self.axis]
         ]
-        if PULLS[self.axis]:
+        if AIRSPEED_TERMS[self.axis]:
             inputs.append(_between(ratio - 1.0))
         gust, steady = gust_motion(columns, dt_s)
         motions = [gust, *(steady[:, :, k] for k in range(len(AXES)))]

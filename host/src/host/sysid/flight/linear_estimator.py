@@ -17,7 +17,7 @@ from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
     CoefficientTable,
-    Moved,
+    ShiftedEstimate,
     coefficients,
     trim_of,
 )
@@ -25,11 +25,7 @@ from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import Correction, corrections
 from host.sysid.estimators.filter_error_gust import VANES, fit_with_gust
 from host.sysid.estimators.method_registry import fit
-from host.sysid.flight.carried import carried, systematic_error_shifts
-from host.sysid.flight.chosen import moving, once
-from host.sysid.flight.departures import Departure, departure
 from host.sysid.flight.estimator import answer_of
-from host.sysid.flight.finder import Found, Grade, find, grade
 from host.sysid.flight.free_simulation import fits_of, free_simulation, frozen_model
 from host.sysid.flight.linear_model import (
     AXIS_OF,
@@ -40,12 +36,16 @@ from host.sysid.flight.linear_model import (
     with_drag_arm,
     without_attitude,
 )
-from host.sysid.flight.reconstructed import (
+from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade, detect_maneuvers, grade
+from host.sysid.flight.maneuver_selection import excited_axes, merge_overlapping
+from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
     flown_maneuvers,
-    reconstructed,
+    reconstruct_flight,
 )
+from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
+from host.sysid.flight.trim_departure import Departure, correct_trim_departure
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
     Collinearity,
@@ -82,16 +82,16 @@ class Answer:
     trim: Trim
     condition: Condition
     maneuvers: tuple[Maneuver, ...]
-    used: tuple[Found, ...]
-    held_out: tuple[Found, ...]
+    used: tuple[DetectedManeuver, ...]
+    held_out: tuple[DetectedManeuver, ...]
     result: FitResult
     fits: tuple[SignalFit, ...]
     validation: tuple[SignalFit, ...]
     refused: tuple[IdentifiabilityFlag, ...]
-    together: Collinearity
+    collinearity: Collinearity
     modes: tuple[Mode, ...]
     coefficients: tuple[Coefficient, ...]
-    still: tuple[str, ...]
+    constant_inputs: tuple[str, ...]
     delays: dict[str, tuple[float, float]]
     corrections: tuple[Correction, ...] = ()
     simulated: tuple[Array, ...] = ()  # outputs of the maneuvers by free simulation
@@ -164,7 +164,7 @@ class LinearIntervals:
     systematic error of `shifts`; coefficients with mass and inertia in theirs."""
 
     statistical: FitResult
-    shifts: tuple[Moved, ...]
+    shifts: tuple[ShiftedEstimate, ...]
     total: FitResult
     coefficients: tuple[Coefficient, ...]
 
@@ -227,7 +227,7 @@ class LinearEstimator:
         cuts = [m.inside() for m in used]
         left = None
         if self.airframe is not None and self.own is None and found.residual_kind in FREE:
-            left = departure(found, data, cuts, self.airframe, trim, self.powerplant)
+            left = correct_trim_departure(found, data, cuts, self.airframe, trim, self.powerplant)
         return LinearEstimate(
             template=self.template if self.own is None else model.name,
             method=method,
@@ -248,7 +248,9 @@ class LinearEstimator:
         e = estimate
         scattered = inflate_covariance(e.fit, maneuver_agreement(e.fit))
         statistical = replace(scattered, estimate=e.estimate)
-        shifts: tuple[Moved, ...] = () if e.departure is None else (e.departure.remainder,)
+        shifts: tuple[ShiftedEstimate, ...] = (
+            () if e.departure is None else (e.departure.remainder,)
+        )
         carriers = [m.flight.compatibility for m in e.used]
         known = [c for c in carriers if c is not None]
         if len(known) == len(carriers):
@@ -258,7 +260,9 @@ class LinearEstimator:
             own = e.used[0].flight.instrument
             errors = own.errors if own is not None else None
             found = coefficients(statistical, self.airframe, e.condition, shifts, errors)
-        return LinearIntervals(statistical, shifts, carried(statistical, shifts), found)
+        return LinearIntervals(
+            statistical, shifts, add_systematic_covariance(statistical, shifts), found
+        )
 
     def validation(self, estimate: LinearEstimate, intervals: LinearIntervals) -> LinearValidation:
         """Simulate the model freely over the maneuvers fitted and those held out."""
@@ -296,10 +300,10 @@ class LinearEstimator:
             fits=validation.fits,
             validation=validation.held_out,
             refused=assess_identifiability(total, e.maneuvers).flags,
-            together=collinearity(intervals.statistical),
+            collinearity=collinearity(intervals.statistical),
             modes=modes(total),
             coefficients=intervals.coefficients,
-            still=constant_inputs(e.model, e.maneuvers),
+            constant_inputs=constant_inputs(e.model, e.maneuvers),
             delays=e.delays,
             corrections=() if carrier is None else corrections(carrier),
             simulated=validation.simulated,
@@ -321,9 +325,10 @@ class LinearEstimator:
                 " argument from_s and argument to_s, or fly a doublet or 3-2-1-1 of 3 degrees or"
                 " more"
             )
-        axes = AXIS_OF[self.template] if self.own is None else moving(self.own.inputs)
+        axes = AXIS_OF[self.template] if self.own is None else excited_axes(self.own.inputs)
         mine = flown_maneuvers(
-            flights, [once([f for f in x.maneuvers if f.axis in axes]) for x in flights]
+            flights,
+            [merge_overlapping([f for f in x.maneuvers if f.axis in axes]) for x in flights],
         )
         # The order in which flights are given shall not choose the maneuver that is held out.
         mine.sort(key=lambda m: [(f.start_s, f.end_s, f.amplitude) for f in m.flight.maneuvers])
@@ -356,9 +361,9 @@ class LinearEstimator:
         return model, method
 
 
-def maneuvers_of(columns: Mapping[str, Array]) -> list[tuple[Found, Grade]]:
+def maneuvers_of(columns: Mapping[str, Array]) -> list[tuple[DetectedManeuver, Grade]]:
     """Return the maneuvers of a flight with their grades."""
-    return [(item, grade(columns, item)) for item in find(columns)]
+    return [(item, grade(columns, item)) for item in detect_maneuvers(columns)]
 
 
 def identify(
@@ -367,7 +372,7 @@ def identify(
     names: Sequence[str] = ("longitudinal", "lateral"),
     method: str = DEFAULT_METHOD,
     airframe: AirframeData | None = None,
-    windows: Sequence[Found] | None = None,
+    windows: Sequence[DetectedManeuver] | None = None,
     user_model: LinearModel | None = None,
     with_delays: bool = True,
     compatibility: Compatibility | None = None,
@@ -407,8 +412,8 @@ def identify(
         raise IdentificationError(
             f"no template '{strangers[0]}'; there are {', '.join(AXIS_OF)}, or give a TOML file"
         )
-    found = find(columns) if windows is None else windows
-    flight = reconstructed(columns, found, airframe=airframe, compatibility=compatibility)
+    found = detect_maneuvers(columns) if windows is None else windows
+    flight = reconstruct_flight(columns, found, airframe=airframe, compatibility=compatibility)
     flight = replace(flight, delays_open=flight.delays_open and with_delays)
     answers: list[Answer] = []
     failed: list[str] = []

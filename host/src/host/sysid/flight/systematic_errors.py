@@ -1,8 +1,8 @@
-"""How far an answer moves with errors of sensors that nobody knows: one step for each.
+"""Sensitivity of an estimate to systematic sensor errors: one Gauss-Newton step for each.
 
-A deviation of every open error changes the data and, through the trim, the model. The estimate
-follows by one Gauss-Newton step of its own method about the answer, filter error's innovations or
-output error's residuals: no fit is repeated.
+One standard deviation of every uncorrected error changes the data and, through the trim, the model.
+The shift of the estimate is one Gauss-Newton step of its own method, with the innovations of filter
+error or the residuals of output error. No fit is repeated.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
-from host.sysid.aerodynamics.coefficient_table import Moved, trim_of
+from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, trim_of
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
@@ -44,8 +44,8 @@ def systematic_error_shifts(
     cuts: Sequence[Mapping[str, Array]],
     known: Sequence[Compatibility],
     trim: Trim,
-) -> tuple[Moved, ...]:
-    """Return the shift of the estimate by one deviation of each error of the sensors left open.
+) -> tuple[ShiftedEstimate, ...]:
+    """Return the shift of the estimate for one standard deviation of each uncorrected sensor error.
 
     Parameters
     ----------
@@ -93,13 +93,13 @@ def systematic_error_shifts(
         model = result.model if bent is trim else _retrimmed(result.model, bent)
         steps.append(follow(model, bent, changed))
     return tuple(
-        Moved(error, result.estimate + step, *gain)
+        ShiftedEstimate(error, result.estimate + step, *gain)
         for error, step, gain in zip(errors, steps, gains, strict=True)
     )
 
 
 def _open_deviations(known: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
-    """Return one deviation of every error that stays open in a flight, by name."""
+    """Return one standard deviation of every uncorrected error of a flight, by name."""
     told = {e: sd for e, sd in residual_deviations(known).items() if e in INSTANTANEOUS_ERRORS}
     return {e: sd for e, sd in (told | residual_errors(known, columns)).items() if sd > 0.0}
 
@@ -107,14 +107,14 @@ def _open_deviations(known: Compatibility, columns: Mapping[str, Array]) -> dict
 def _without_one(
     columns: Mapping[str, Array], error: str, deviation: float, known: Compatibility
 ) -> dict[str, Array]:
-    """Return columns with one error less."""
+    """Return columns with one standard deviation of an error removed."""
     if error in INSTANTANEOUS_ERRORS:
         return correct_columns(columns, {error: deviation}, pressure_share(known))
     return perturb_columns(columns, error, deviation, known)
 
 
-def carried(result: FitResult, moved: Sequence[Moved]) -> FitResult:
-    """Return the result with the errors' part in its covariance."""
+def add_systematic_covariance(result: FitResult, moved: Sequence[ShiftedEstimate]) -> FitResult:
+    """Return the result with the systematic errors added to its covariance."""
     if not moved:
         return result
     shifts = np.stack([m.estimate - result.estimate for m in moved])
@@ -131,7 +131,7 @@ def _mean_of(cuts: Sequence[Mapping[str, Array]]) -> tuple[Trim, Condition]:
 
 
 def _bent(trim: Trim, still: Trim, there: Trim) -> Trim:
-    """Return a trim moved by what two means differ by."""
+    """Return a trim shifted by the difference of two means."""
     return replace(
         trim,
         airspeed_mps=trim.airspeed_mps + there.airspeed_mps - still.airspeed_mps,
@@ -142,7 +142,7 @@ def _bent(trim: Trim, still: Trim, there: Trim) -> Trim:
 def _changed(
     model: LinearModel, maneuver: Maneuver, still: Mapping[str, Array], other: Mapping[str, Array]
 ) -> Maneuver:
-    """Return a maneuver with the difference of two sets of columns in it."""
+    """Return a maneuver with the difference of two sets of columns added."""
 
     def moved(names: Sequence[str], values: Array) -> Array:
         if all(other[n] is still[n] for n in names):
@@ -208,7 +208,7 @@ class _Outputs:
         self.inverse[held], self.inverse[:, held] = 0.0, 0.0  # not rounding: a bound stays one
 
     def step(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
-        """Return by how much the whole estimate moves with model and data, (P,)."""
+        """Return the change of the whole estimate for a new model and data, (P,)."""
         assert self.responses is not None
         result = np.zeros(self.length)
         other = OutputProblem(model, changed).outputs(self.theta)
@@ -226,7 +226,7 @@ class _Outputs:
 
 
 def _is_template(model: LinearModel, trim: Trim) -> bool:
-    """Return whether a model is what the template of its name gives about a trim."""
+    """Return whether a model equals the template of its name at a trim."""
     if model.name not in TEMPLATES:
         return False
     fresh = _about(model, trim)
@@ -235,7 +235,7 @@ def _is_template(model: LinearModel, trim: Trim) -> bool:
 
 
 def _about(model: LinearModel, trim: Trim) -> LinearModel:
-    """Return the template of a model's name about another trim, levers left out."""
+    """Return the template of a model's name at another trim, without lever arms."""
     forces = any(y.startswith("a") and y.endswith("_mps2") for y in model.outputs)
     fresh = template(model.name, trim, accelerometers=forces)
     return without_outputs(fresh, [y for y in fresh.outputs if y not in model.outputs])
