@@ -36,13 +36,16 @@ def test_a_measured_aircraft_gives_what_identification_needs(tmp_path: Path) -> 
 
 def test_it_is_that_of_a_flyable_file_with_the_same_numbers(tmp_path: Path) -> None:
     document = read_document("ultrastick25e")
-    for section in ("aerodynamics", "servo", "surfaces"):
+    for section in ("aerodynamics", "surfaces"):
         del document[section]
     less = dumps(document | {"kind": "measured"})
     assert airframe_data(mine(tmp_path, less)) == airframe_data("ultrastick25e")
     assert sensor_error_model(mine(tmp_path, less)) == sensor_error_model("ultrastick25e")
     ours, theirs = powerplant(mine(tmp_path, less)), powerplant("ultrastick25e")
     assert ours.slope(700.0, 17.0, 1.2) == theirs.slope(700.0, 17.0, 1.2)
+    del document["servo"]  # usual servos then
+    without = sensor_error_model(mine(tmp_path, dumps(document | {"kind": "measured"})))
+    assert (without.servo_hz, without.servo) == (0.0, (8.0, 2.617994))
 
 
 def test_places_count_from_the_cg_wherever_it_is(tmp_path: Path) -> None:
