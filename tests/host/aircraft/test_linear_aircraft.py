@@ -13,7 +13,7 @@ from host.aircraft import file as aircraft
 from host.aircraft.airframe import Array
 from host.aircraft.file import Aircraft, AircraftError
 from host.aircraft.linear_aircraft import load
-from host.aircraft.linearisation import linearise, modes, straight_derivatives
+from host.aircraft.linearisation import linear_aircraft_derivatives, linearise, modes
 from host.aircraft.rigid_body import run
 from host.aircraft.trim import solve
 from host.cli import main
@@ -153,7 +153,7 @@ def test_two_saved_models_fly_together_and_others_are_refused(tmp_path: Path) ->
     base = load("ultrastick25e")
     both = [saved(tmp_path, name)[0] for name in ("longitudinal", "lateral")]
     flown = with_models(base, both)
-    d = straight_derivatives(flown.airframe(), solve(flown.airframe(), 18.0))
+    d = linear_aircraft_derivatives(flown.airframe(), solve(flown.airframe(), 18.0))
     longitudinal, lateral = (tomllib.loads(path.read_text())["parameters"] for path in both)
     assert d["M_q"] == pytest.approx(longitudinal["M_q"]["start"], rel=1e-6)
     assert d["L_p"] == pytest.approx(lateral["L_p"]["start"], rel=1e-6)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from host.aircraft import file as aircraft
 from host.aircraft.airframe import ROTOR, STATE_COUNT, Airframe, Array
-from host.aircraft.analytic_derivatives import hand_matrices
+from host.aircraft.analytic_derivatives import analytic_matrices
 from host.aircraft.attitude import euler, quaternion, to_body
 from host.aircraft.file import Aircraft
 from host.aircraft.linearisation import linearise, modes
@@ -163,7 +163,7 @@ def test_linearisation_agrees_with_the_formulas_within_one_percent(name: str) ->
     linear = linearise(frame, trim)
 
     def worst(changed: Aircraft) -> float:
-        by_hand = hand_matrices(
+        by_hand = analytic_matrices(
             changed,
             airspeed_mps=airspeed_mps,
             alpha_rad=trim.alpha_rad,

@@ -28,9 +28,9 @@ def test_designed_inputs_reach_the_wanted_excursions(plan: planning.Plan) -> Non
     assert len(plan.points) == 12
     for point in plan.points:
         reached = {
-            "elevator": point.alpha_deg / planning.WANTED["alpha_deg"],
-            "rudder": point.beta_deg / planning.WANTED["beta_deg"],
-            "aileron": point.bank_deg / planning.WANTED["bank_deg"],
+            "elevator": point.alpha_deg / planning.TARGET_EXCURSIONS["alpha_deg"],
+            "rudder": point.beta_deg / planning.TARGET_EXCURSIONS["beta_deg"],
+            "aileron": point.bank_deg / planning.TARGET_EXCURSIONS["bank_deg"],
         }[point.axes[0]]
         assert 0.75 < reached < 1.25, point
         assert point.width_s >= 0.2

@@ -80,6 +80,7 @@ def turbulence(air: Air, height_m: float) -> Turbulence:
     height_m : float
         Height over the ground; the formulas hold from 3 to 300 m and are clamped there.
     """
+    # MIL-F-8785C 3.7.3, low altitude, height in feet.
     feet = min(max(height_m, 3.0), 304.8) / 0.3048
     shape = 0.177 + 0.000823 * feet
     length_w = air.length_w_m or feet * 0.3048
@@ -111,6 +112,7 @@ def gust_step(
     out : (6,) array
         Body axes, m/s and rad/s. A gust w that grows ahead is air that turns nose-down.
     """
+    # Dryden forms of MIL-F-8785C 3.7.2: u of first order, v and w of second.
     v = max(airspeed_mps, 1.0)
     root = 1.0 / math.sqrt(step_s)
     tau_u, tau_w = t.length_u_m / v, t.length_w_m / v
@@ -124,6 +126,7 @@ def gust_step(
     three = math.sqrt(3.0)
     gust_v = t.sigma_u_mps * math.sqrt(tau_u) * (three * z[1] + (1.0 - three) * z[2])
     gust_w = t.sigma_w_mps * math.sqrt(tau_w) * (three * z[3] + (1.0 - three) * z[4])
+    # p_g, q_g and r_g of MIL-F-8785C 3.7.5, with the span as the scale.
     roll = (
         t.sigma_w_mps
         * math.sqrt(0.8 * math.pi / v)

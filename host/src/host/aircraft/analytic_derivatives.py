@@ -15,7 +15,7 @@ from host.aircraft.file import Aircraft
 from host.constants import GRAVITY_MPS2
 
 
-def hand_matrices(
+def analytic_matrices(
     aircraft: Aircraft,
     *,
     airspeed_mps: float,

@@ -12,7 +12,7 @@ import numpy as np
 
 from host.aircraft.aircraft_ranges import RANGES
 from host.aircraft.airframe import COEFFICIENTS, Airframe, Array
-from host.aircraft.linear_dynamics import Straight
+from host.aircraft.linear_dynamics import LinearDynamics
 from host.aircraft.size_ratios import doubts, impossible
 from host.constants import GRAVITY_MPS2
 from host.errors import UsageError
@@ -86,7 +86,7 @@ class Aircraft:
     scalars: Mapping[str, float]
     vectors: Mapping[str, Array]
     sources: Mapping[str, str]
-    straight: Straight | None = None
+    straight: LinearDynamics | None = None
 
     def scalar(self, key: str) -> float:
         """Return one number by "section.key"."""

@@ -12,7 +12,7 @@ from host.aircraft import file as aircraft
 from host.aircraft.aircraft_ranges import RANGES
 from host.aircraft.airframe import Array
 from host.aircraft.file import Aircraft, AircraftError, read_document
-from host.aircraft.linear_dynamics import Straight
+from host.aircraft.linear_dynamics import LinearDynamics
 from host.constants import GRAVITY_MPS2
 from host.files.quantities import Quantity
 
@@ -70,14 +70,14 @@ def load(source: str | Path) -> Aircraft:
             )
     # Of a motor it says nothing: the throttle moves, the aircraft does not feel it.
     wide = np.hstack([matrices["longitudinal_b"], np.zeros((4, 1))])
-    straight = Straight(
+    straight = LinearDynamics(
         **numbers,
         longitudinal_a=matrices["longitudinal_a"],
         longitudinal_b=wide,
         lateral_a=matrices["lateral_a"],
         lateral_b=matrices["lateral_b"],
     )
-    return flown_straight(
+    return with_linear_dynamics(
         base,
         straight,
         name=str(document.get("name", Path(source).stem)),
@@ -85,7 +85,9 @@ def load(source: str | Path) -> Aircraft:
     )
 
 
-def flown_straight(base: Aircraft, straight: Straight, *, name: str, title: str) -> Aircraft:
+def with_linear_dynamics(
+    base: Aircraft, straight: LinearDynamics, *, name: str, title: str
+) -> Aircraft:
     """Return `base` with straight lines for its aerodynamics and propulsion."""
     speed = math.hypot(straight.u_mps, straight.w_mps)
     return replace(

@@ -1,8 +1,8 @@
 """A linear aircraft: dimensional matrices about one steady flight, as the equations of motion take
 them.
 
-Gravity, attitude and path stay those of a rigid body; only what air and motor do is a straight
-line. About its steady flight such an aircraft has exactly the A and B it was made from.
+Gravity, attitude and path are those of a rigid body; only the forces and moments of air and motor
+are linear. At its steady flight such an aircraft has exactly the A and B it was made from.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ LONGITUDINAL, LATERAL = (0, 2, 4), (1, 3, 5)  # of u v w p q r
 
 
 @dataclass(frozen=True, slots=True)
-class Straight:
+class LinearDynamics:
     """x' = A x + B u about level flight.
 
     Attributes

@@ -97,7 +97,7 @@ def linearise(frame: Airframe, trim: Trim, width: float = 1e-5) -> Linear:
     )
 
 
-def straight_derivatives(frame: Airframe, trim: Trim) -> dict[str, float]:
+def linear_aircraft_derivatives(frame: Airframe, trim: Trim) -> dict[str, float]:
     """Return the dimensional derivatives of a linear aircraft, ``X_u`` ... ``N_dr``, SI, radians.
 
     Parameters

@@ -236,12 +236,13 @@ def derivative(
         mz += -ly * tx - drive * az
         fx += tx
         fz += tz
-    # Gyroscopic moment of the rotor: - omega x h.
+    # Gyroscopic moment of the rotor: - omega x h (Stevens & Lewis, ch. 1).
     mx -= q * hz
     my -= r * hx - p * hz
     mz -= -q * hx
 
     ixx, iyy, izz, ixz = frame.ixx_kgm2, frame.iyy_kgm2, frame.izz_kgm2, frame.ixz_kgm2
+    # Euler's equations with a product of inertia Ixz (Stevens & Lewis, ch. 1).
     ex = mx - (izz - iyy) * q * r + ixz * p * q
     ez = mz - (iyy - ixx) * p * q - ixz * q * r
     det = ixx * izz - ixz * ixz
@@ -270,6 +271,7 @@ def derivative(
     out[V] = sy + gy + p * x[W] - r * x[U]
     out[W] = sz + gz + q * x[U] - p * x[V]
 
+    # Quaternion kinematics (Stevens & Lewis, ch. 1).
     out[Q0] = 0.5 * (-x[Q1] * p - x[Q2] * q - x[Q3] * r)
     out[Q1] = 0.5 * (x[Q0] * p + x[Q2] * r - x[Q3] * q)
     out[Q2] = 0.5 * (x[Q0] * q - x[Q1] * r + x[Q3] * p)

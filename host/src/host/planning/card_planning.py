@@ -57,7 +57,7 @@ LATERAL_SHOWN = (
     "N_dr",
 )  # fmt: skip
 # Excursions a first test flight of a trainer keeps to; amplitudes of a designed card aim at them.
-WANTED = {"alpha_deg": 3.5, "beta_deg": 6.0, "bank_deg": 30.0}
+TARGET_EXCURSIONS = {"alpha_deg": 3.5, "beta_deg": 6.0, "bank_deg": 30.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,9 +249,9 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
     """Make a card for an aircraft from its prior model.
 
     Elevator 3-2-1-1 with a unit of 0.3 and a doublet half of 0.5 short-period periods, rudder
-    doublet of half dutch-roll periods, aileron doublet long against the roll mode; amplitudes
-    for the excursions of `WANTED`, found by flying each input once and scaling. (Jategaonkar,
-    Flight Vehicle System Identification, chapter 2.)
+    doublet of half dutch-roll periods, aileron doublet long against the roll mode; amplitudes for
+    the excursions of `TARGET_EXCURSIONS`, found by flying each input once and scaling (Jategaonkar,
+    Flight Vehicle System Identification, chapter 2).
 
     Parameters
     ----------
@@ -285,9 +285,9 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
     for s, w in zip(draft, record.schedule.windows, strict=True):
         p = _point(record, data, s, w)
         excursion = {
-            "elevator": (p.alpha_deg, WANTED["alpha_deg"]),
-            "rudder": (p.beta_deg, WANTED["beta_deg"]),
-            "aileron": (p.bank_deg, WANTED["bank_deg"]),
+            "elevator": (p.alpha_deg, TARGET_EXCURSIONS["alpha_deg"]),
+            "rudder": (p.beta_deg, TARGET_EXCURSIONS["beta_deg"]),
+            "aileron": (p.bank_deg, TARGET_EXCURSIONS["bank_deg"]),
         }[s.axes[0]]
         limit = math.degrees(aircraft.scalar(f"surfaces.{s.axes[0]}_limit_rad"))
         amplitude = min(s.amplitudes[0] * excursion[1] / excursion[0], 0.5 * limit)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from host.aircraft.file import Aircraft, AircraftError
-from host.aircraft.linear_aircraft import flown_straight, load
-from host.aircraft.linear_dynamics import Straight
+from host.aircraft.linear_aircraft import load, with_linear_dynamics
+from host.aircraft.linear_dynamics import LinearDynamics
 from host.aircraft.linearisation import linearise
 from host.aircraft.trim import solve
 from host.errors import UsageError
@@ -87,7 +87,7 @@ def with_models(base: Aircraft, models: Sequence[Path]) -> Aircraft:
         own_a[np.ix_(rows, rows)] = found_a
         own_b[np.ix_(rows, columns)] = found_b
         a[axis], b[axis] = t @ own_a @ np.linalg.inv(t), t @ own_b
-    straight = Straight(
+    straight = LinearDynamics(
         u_mps=speed * math.cos(alpha),
         w_mps=speed * math.sin(alpha),
         elevator_rad=float(trimmed.command[0]),
@@ -98,7 +98,7 @@ def with_models(base: Aircraft, models: Sequence[Path]) -> Aircraft:
         lateral_b=b["lateral"],
     )
     names = ", ".join(path.name for path in models)
-    return flown_straight(
+    return with_linear_dynamics(
         base, straight, name=base.name, title=f"{base.title}, linear, with {names}"
     )
 

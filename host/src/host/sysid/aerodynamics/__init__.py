@@ -1,1 +1,1 @@
-"""What is known of the aircraft beside the log: geometry, mass, instrument errors, priors."""
+"""Dimensional derivatives and non-dimensional coefficients, at a trim and away from it."""

@@ -1,7 +1,7 @@
-"""What identification must know of the airframe, and turning derivatives into coefficients.
+"""Coefficients of a linear answer from its dimensional derivatives, with intervals.
 
-Conversions are written at the trim of the maneuvers; the uncertainty of mass, inertia, dynamic
-pressure and reference sizes is carried into the intervals beside that of the fit.
+Conversions are at the trim of the maneuvers. The uncertainty of mass, inertia, dynamic pressure and
+reference sizes is added to that of the fit.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How gusts turn with the aircraft: their motion found by dead reckoning, and what it does.
+"""Gusts in body axes by dead reckoning, and their effect on the rates of the flow.
 
 A gust written in body axes (MIL-F-8785C) turns with the aircraft, so that speeds through the air
 follow the rates by more than they do in still air: a gust along the path of a tenth of the airspeed

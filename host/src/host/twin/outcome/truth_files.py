@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from host.aircraft.airframe import AILERON, ELEVATOR, Q0, Q3, RUDDER, STATES, Airframe, Array
 from host.aircraft.attitude import euler
-from host.aircraft.linearisation import linearise, modes, straight_derivatives
+from host.aircraft.linearisation import linear_aircraft_derivatives, linearise, modes
 from host.aircraft.local_derivatives import local_derivatives
 from host.aircraft.trim import TrimError, solve
 from host.export.toml import dumps
@@ -115,7 +115,7 @@ def _maneuver(
             "thrust_n": float(record.thrust_n[inside].mean()),
         },
         "derivatives": (
-            straight_derivatives(frame, record.trim)
+            linear_aircraft_derivatives(frame, record.trim)
             if frame.linear > 0.0
             else local_derivatives(frame, at, spread)
         ),
