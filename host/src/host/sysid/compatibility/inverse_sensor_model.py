@@ -219,7 +219,7 @@ def apply_sensor_errors(
 
 
 def _surfaces(record: Record, e: Mapping[str, float], commanded: tuple[str, ...]) -> list[Array]:
-    """Return what the surfaces did: errors of pots, or of servos that were only commanded."""
+    """Return surface positions, rad, corrected for errors of pots or of commanded servos."""
     late_s = e.get("servo_delay_s", 0.0)
 
     def moved() -> Array:
@@ -230,7 +230,7 @@ def _surfaces(record: Record, e: Mapping[str, float], commanded: tuple[str, ...]
     shares = [e.get(f"{s}_{'servo_' * (s in commanded)}scale", 0.0) for s in SURFACES]
     positions = record.cached("surfaces", (late_s,), moved)
     return [
-        # A servo goes further than it is told; a pot says more than there is.
+        # A servo moves (1 + scale) times its command; a pot reads (1 + scale) times the position.
         x * (1.0 + share) if s in commanded else x / (1.0 + share)
         for s, x, share in zip(SURFACES, positions, shares, strict=True)
     ]
