@@ -53,7 +53,7 @@ class RefusalCheck:
     Attributes
     ----------
     names : tuple of str
-    judgement : Judgement
+    judgement : Identifiability
         Of the fit, which knows neither truth nor noise.
     shares : Array
         Analytic bounds over reference values: |parameter|, or what would contribute 5 % of its row.
