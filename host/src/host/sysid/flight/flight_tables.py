@@ -353,8 +353,8 @@ def _even(columns: dict[str, Array], notes: list[str], *, foreign: bool) -> dict
     index = _rows(columns["t_s"], notes)
     columns = {name: values[index] for name, values in columns.items()}
     if foreign:
-        columns, told = measured(columns, SENSORS, LONGEST_GAP_S)
-        notes += told
+        columns, dropout_notes = measured(columns, SENSORS, LONGEST_GAP_S)
+        notes += dropout_notes
     t = columns["t_s"]
     steps = {name: _step_s(t[np.isfinite(columns[name])]) for name in FITTED if name in columns}
     dt_s = min((step for step in steps.values() if step > 0.0), default=_step_s(t))

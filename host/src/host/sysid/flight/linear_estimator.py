@@ -274,11 +274,11 @@ class LinearEstimator:
         same = ours and not intervals.shifts
         frozen = frozen_model(e.model, total)
         simulated = list(total.fitted) if same else free_simulation(frozen, e.maneuvers)
-        unseen = [m.cut(e.model) for m in e.held_out]
+        held_out = [m.cut(e.model) for m in e.held_out]
         return LinearValidation(
             tuple(simulated),
             fits_of(e.model, e.maneuvers, simulated),
-            fits_of(e.model, unseen, free_simulation(frozen, unseen)),
+            fits_of(e.model, held_out, free_simulation(frozen, held_out)),
         )
 
     def answer(

@@ -90,7 +90,7 @@ def without_attitude(model: LinearModel, used: Sequence[FlownManeuver]) -> Linea
     It is made of the same gyro and of accelerometers that take side force for gravity: on the
     recorded demonstration flight 15 of 15 intervals hold the truth without it, 12 with it.
     """
-    told = regression_estimates(model, [m.cut(model) for m in used])
-    model = model.with_start([told.get(p.name, p.start) for p in model.parameters])
+    regression = regression_estimates(model, [m.cut(model) for m in used])
+    model = model.with_start([regression.get(p.name, p.start) for p in model.parameters])
     reduced = without_outputs(model, ("phi_rad",))
     return replace(reduced, state_biases=tuple(s for s in reduced.state_biases if s != "phi_rad"))

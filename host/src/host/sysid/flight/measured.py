@@ -58,8 +58,8 @@ def measured(
             first[starts] = True
             values[~first] = np.nan
         elif len(lengths) and np.median(lengths) == 1:
-            told = _stuck(t, values, starts[inside], lengths[inside], moving, longest_s)
-            notes += [f"{name}: {note}" for note in told]
+            dropout_notes = _stuck(t, values, starts[inside], lengths[inside], moving, longest_s)
+            notes += [f"{name}: {note}" for note in dropout_notes]
         result[name] = values
     if held:
         rates = ", ".join(f"{name} every {rows} rows" for name, rows in held.items())

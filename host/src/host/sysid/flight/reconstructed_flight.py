@@ -119,21 +119,21 @@ def reconstruct_flight(
     airframe : AirframeData, optional
         Gives places of the sensors.
     compatibility : Compatibility, optional
-        What the sensors say of each other; told errors are taken out.
+        Data-compatibility check; the sensor errors that it estimates are removed.
     instrument : SensorErrorModel, optional
         As it was on this flight.
     """
-    told = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
+    sensor_errors = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
     delays_open = True
     if airframe is not None and compatibility is not None and compatibility.instrument is not None:
         corrected = columns_at_cg(columns, airframe, compatibility)
         delays_open = False
     else:
-        corrected = advance_delayed(columns, told)
+        corrected = advance_delayed(columns, sensor_errors)
         if airframe is not None:
             corrected = transfer_to_cg(corrected, airframe)
     if compatibility is not None:
-        corrected = correct_columns(corrected, told, pressure_share(compatibility))
+        corrected = correct_columns(corrected, sensor_errors, pressure_share(compatibility))
     return ReconstructedFlight(
         source, columns, corrected, tuple(maneuvers), compatibility, delays_open, instrument
     )

@@ -42,8 +42,8 @@ def recording_of_table(columns: Mapping[str, Array], said: Mapping[Any, Any]) ->
     if OURS not in columns:
         return Recording()
     commanded = tuple(s for s in SURFACES if f"{s}_rad" in columns and not _measured(columns, s))
-    heard = columns["t_s"][np.isfinite(columns[GPS])] if GPS in columns else np.empty(0)
-    checked = len(heard) > 0 and float(np.ptp(heard)) >= GPS_SPAN_S
+    fix_times_s = columns["t_s"][np.isfinite(columns[GPS])] if GPS in columns else np.empty(0)
+    checked = len(fix_times_s) > 0 and float(np.ptp(fix_times_s)) >= GPS_SPAN_S
     return Recording(commanded, 0.0 if checked else None)
 
 

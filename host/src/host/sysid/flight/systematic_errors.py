@@ -100,8 +100,14 @@ def systematic_error_shifts(
 
 def _open_deviations(known: Compatibility, columns: Mapping[str, Array]) -> dict[str, float]:
     """Return one standard deviation of every uncorrected error of a flight, by name."""
-    told = {e: sd for e, sd in residual_deviations(known).items() if e in INSTANTANEOUS_ERRORS}
-    return {e: sd for e, sd in (told | residual_errors(known, columns)).items() if sd > 0.0}
+    corrected_error_sd = {
+        e: sd for e, sd in residual_deviations(known).items() if e in INSTANTANEOUS_ERRORS
+    }
+    return {
+        e: sd
+        for e, sd in (corrected_error_sd | residual_errors(known, columns)).items()
+        if sd > 0.0
+    }
 
 
 def _without_one(

@@ -14,7 +14,7 @@ from host.sysid.identification_error import IdentificationError
 if TYPE_CHECKING:
     import pandas as pd
 
-HEAD_BYTES = 65536  # a dialect is told from these
+HEAD_BYTES = 65536  # the dialect is recognised from these
 HEAD_LINES = 60
 DELIMITERS = ",;\t|"
 SPACES = " "  # any run of blanks
