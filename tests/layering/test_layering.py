@@ -348,7 +348,7 @@ PLANTED = [
     (floor_breaches, "host/src/host/wire/blocks.py", "from host.physical.table import rows"),
     (
         floor_breaches,
-        "host/src/host/sysid/models/model.py",
+        "host/src/host/sysid/models/state_space_model.py",
         "import host.sysid.flight.maneuver_detection",
     ),
     (
@@ -357,8 +357,16 @@ PLANTED = [
         "def f():\n    from host.twin.flight import fly",
     ),
     (floor_breaches, "host/src/host/aircraft/trim.py", "from host.instrument import errors"),
-    (floor_breaches, "host/src/host/instrument/errors.py", "from host.sysid import Maneuver"),
-    (floor_breaches, "host/src/host/twin/flight/fly.py", "import host.sysid.models.model"),
+    (
+        floor_breaches,
+        "host/src/host/instrument/instrument_errors.py",
+        "from host.sysid import Maneuver",
+    ),
+    (
+        floor_breaches,
+        "host/src/host/twin/flight/fly.py",
+        "import host.sysid.models.state_space_model",
+    ),
     (floor_breaches, "host/src/host/twin/flight/fly.py", "from ...sysid.models import model"),
     (floor_breaches, "host/src/host/twin/flight/fly.py", 'import_module("host.sysid.models")'),
     (
@@ -377,8 +385,12 @@ PLANTED = [
         "host/src/host/sysid/answer/truth_comparison.py",
         "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from host import twin",
     ),
-    (never_breaches, "host/src/host/sysid/models/model.py", "from ... import twin"),
-    (never_breaches, "host/src/host/sysid/models/model.py", 'importlib.import_module("host.twin")'),
+    (never_breaches, "host/src/host/sysid/models/state_space_model.py", "from ... import twin"),
+    (
+        never_breaches,
+        "host/src/host/sysid/models/state_space_model.py",
+        'importlib.import_module("host.twin")',
+    ),
     (
         never_breaches,
         "host/src/host/twin/sensors/imu.py",
@@ -390,7 +402,11 @@ PLANTED = [
         "from studies import linear",
     ),
     (import_breaches, "host/studies/linear.py", "from tests.host import logs"),
-    (floor_breaches, "host/src/host/log/head.py", "from host.sysid.models.model import Term"),
+    (
+        floor_breaches,
+        "host/src/host/log/head.py",
+        "from host.sysid.models.state_space_model import Term",
+    ),
     (floor_breaches, "host/src/host/log/head.py", "from host.decode.log_summary import summarise"),
     (import_breaches, "tests/simulator/simavr_bench/relay.py", "from flight.rig import make_card"),
     (simulator_breaches, "tests/simulator/speed.py", 'PINS = "hw/pin_map.toml"'),
@@ -433,7 +449,10 @@ ALLOWED = [
     ("firmware/boards/sitl/clock.cpp", '#include <vector>\n#include "boards/sitl/clock.h"'),
     ("firmware/boards/arduimu/clock.cpp", '#include "boards/avr/awake.h"'),
     ("tests/firmware/test_a/test_a.cpp", 'TEST_CASE("INFO") { CHECK_EQ(1, 1); REQUIRE(true); }'),
-    ("host/src/host/sysid/flight/linear_estimator.py", "from host.sysid.models.model import Term"),
+    (
+        "host/src/host/sysid/flight/linear_estimator.py",
+        "from host.sysid.models.state_space_model import Term",
+    ),
     ("host/src/host/decode.py", "import numpy\nfrom host.wire.schema import load"),
     (
         "host/src/host/verbs/info.py",
@@ -441,9 +460,12 @@ ALLOWED = [
     ),
     (
         "host/src/host/planning/card_planning.py",
-        "from host.twin.virtual import a\nimport host.sysid.errors",
+        "from host.twin.virtual import a\nimport host.sysid.identification_error",
     ),
-    ("host/src/host/sysid/models/model.py", "from . import result\nfrom host.aircraft import file"),
+    (
+        "host/src/host/sysid/models/state_space_model.py",
+        "from . import result\nfrom host.aircraft import file",
+    ),
     (
         "host/studies/linear.py",
         "from host.twin.virtual import a\nimport studies.gusts",

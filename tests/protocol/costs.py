@@ -32,7 +32,7 @@ from host.decode.log_summary import summarise
 from host.errors import HostError
 from host.log import read_log
 from host.original.rows import read_rows
-from host.original.table import make_table
+from host.original.row_table import make_table
 from host.physical.calibration import load_calibration
 calibration = load_calibration()
 warnings.simplefilter("ignore")
@@ -160,7 +160,8 @@ def measured(path: Path) -> tuple[float, int, str]:
         [sys.executable, "-c", READ, str(path)], capture_output=True, text=True, check=False
     )
     if ran.returncode:
-        return float("inf"), 0, ran.stderr.strip().rpartition("\n")[2]
+        last = ran.stderr.strip().rpartition("\n")[2]
+        raise SystemExit(f"costs: {path.name} was not measured: {last}")
     said = json.loads(ran.stdout)
     return said["s"], said["bytes"], said["end"]
 

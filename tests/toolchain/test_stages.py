@@ -72,9 +72,11 @@ def test_an_unknown_stage_is_a_usage_error() -> None:
     assert "no stage nonsense" in done.stderr
 
 
-def test_a_stage_waits_only_for_stages_before_it(runner: ModuleType) -> None:
+def test_a_stage_waits_only_for_stages_before_it(
+    runner: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What stands behind it would not be waited for, and could hold up the workers."""
-    runner.ROOT = ROOT
+    monkeypatch.setattr(runner, "ROOT", ROOT)
     listed = [stage.name for stage in runner.stages()]
     assert len(set(listed)) == len(listed) > 15
     for stage in runner.stages():
