@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from flight.rig import FlightRig
 
 MakeRig = Callable[..., "FlightRig"]
-FLOWN_S = 12.0
+FLOWN_S = 14.0
+STEADY_S = 8.0  # at the end, everything there again
 LONGEST_REST_MS, LONG_REST_MS = 4.0, 2.5
 LOOK_MS = 1.6  # a servo's frame is 20 ms, and stick to servo may take 22 ms
 
@@ -28,14 +29,15 @@ def test_flight_states_its_load_and_never_rests_long(make_rig: MakeRig, tmp_path
     rig.chip.watch("PH5")
     rig.take_off()
     since = rig.chip.cycle
-    rig.chip.clear_statistics()
     rig.gps.silent = True
     rig.chip.run_s(4.0)
     rig.gps.silent, rig.gps.baud, rig.gps.enabled = False, 9600, set()
     rig.chip.drive("PG0", False)
     rig.chip.run_s(0.3)
     rig.chip.drive("PG0", None)
-    rig.chip.run_s(FLOWN_S - 4.3)
+    rig.chip.run_s(FLOWN_S - 4.3 - STEADY_S)
+    rig.chip.clear_statistics()
+    rig.chip.run_s(STEADY_S)
     busy = rig.chip.load_now().busy_fraction
     assert rig.relay.engaged
     at, _ = rig.chip.edges("PH5")
@@ -45,8 +47,9 @@ def test_flight_states_its_load_and_never_rests_long(make_rig: MakeRig, tmp_path
     assert np.minimum(rests_ms[1:], rests_ms[:-1]).max() <= LONG_REST_MS
     rig.land()
     log = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin"))
-    stated = log.frames["system"]["cpu_load"][-10:].astype(float) / 1000
-    assert stated.mean() == pytest.approx(busy, abs=0.015)
+    # The seconds that lie whole in it.
+    stated = log.frames["system"]["cpu_load"][1 - round(STEADY_S) :].astype(float) / 1000
+    assert stated.mean() == pytest.approx(busy, abs=0.01)
     t_us = log.frames["baro"]["t_us"].astype(np.int64)
     assert len(t_us) > 250
     assert 1e6 / np.diff(t_us).mean() == pytest.approx(25.0, abs=0.2)

@@ -219,7 +219,7 @@ def test_the_command_names_what_is_wrong(
     own = written(tmp_path, ROWS | {"Cm": ["alpha", "gamma"]})
     for models, said in (
         ([str(own)], "unknown term 'gamma'"),
-        (["coefficients", str(own)], "one model of the coefficients at a time"),
+        (["coefficients", str(own)], "several models of the coefficients; give one at a time"),
     ):
         flags = [x for model in models for x in ("--model", model)]
         assert main(["identify", str(table), "--aircraft", NAME, *flags]) == 2
