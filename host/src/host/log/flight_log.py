@@ -113,6 +113,12 @@ class FlightLog:
         """The Mega's clock against GPS, None without enough GPS solutions."""
         return fit_gps([_gps_pairs(session) for session in self._unplaced])
 
+    @property
+    def clock_half_width(self) -> float | None:
+        """What GPS leaves open of the clock's scale (95 %), None where it was not put right."""
+        clock = self.clock
+        return clock.half_width if clock is not None and clock.applied else None
+
     @cached_property
     def _unplaced(self) -> list[Session]:
         block_us = block_times_us(self.blocks, self.store["system"])
@@ -161,9 +167,7 @@ class FlightLog:
         table.attrs["units"] = {column.name: column.unit for column in COLUMNS}
         table.attrs["inputs"] = dict(self.inputs)
         table.attrs["calibration"] = self.calibration.name
-        clock = self.clock  # None: GPS checked nothing
-        checked = clock is not None and clock.applied
-        table.attrs["clock_half_width"] = clock.half_width if clock and checked else None
+        table.attrs["clock_half_width"] = self.clock_half_width
         return table
 
     def columns(self, *, aligned: bool = True) -> Columns:

@@ -28,9 +28,8 @@ MOSTLY = 0.5
 def recording_of_log(log: FlightLog) -> Recording:
     """Return what a log says of itself."""
     commanded = tuple(s for s in SURFACES if log.inputs.get(s) == "commanded")
-    clock = log.clock
-    checked = clock is not None and clock.applied
-    return Recording(commanded, clock.half_width / NORMAL_95 if clock and checked else None)
+    half = log.clock_half_width
+    return Recording(commanded, None if half is None else half / NORMAL_95)
 
 
 def recording_of_table(columns: Mapping[str, Array], said: Mapping[Any, Any]) -> Recording:
