@@ -73,7 +73,7 @@ def add(flight: VirtualFlight, method: str, told: Tally, printed: Tally) -> None
     flown = (frame.mass_kg, frame.ixx_kgm2, frame.iyy_kgm2, frame.izz_kgm2, frame.ixz_kgm2)
     for answer in answers:
         local = true_coefficients({"maneuver": maneuvers}, answer.template)
-        doubted = {r.name for r in answer.refused}
+        doubted = {r.name for r in answer.identifiability_flags}
         for c in answer.coefficients:
             truth, flagged = local[c.name], not from_zero(c)
             told.add(

@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
     from host.sysid.answer.json_document import json_text, maneuver_document
-    from host.sysid.answer.verdict import maneuver_lines
+    from host.sysid.answer.maneuver_list import maneuver_lines
     from host.sysid.flight.flight_tables import read_columns
     from host.sysid.flight.linear_estimator import maneuvers_of
     from host.sysid.identification_error import IdentificationError

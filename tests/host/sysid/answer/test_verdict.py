@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
-from host.sysid.answer.verdict import model_lines, unpredicted, verdict_lines
+from host.sysid.answer.estimate_lines import model_lines
+from host.sysid.answer.unpredicted_states import unpredicted_states
+from host.sysid.answer.verdict import verdict_lines
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.diagnostics import SignalFit, collinearity, reference_values
@@ -23,8 +25,8 @@ def answer() -> Answer:
     return Answer(
         template="own", method="equation-error", model=model, trim=Trim(50.0, 0.0, 0.0),
         condition=Condition(50.0, 1500.0), maneuvers=(record,), used=(), held_out=(),
-        result=result, fits=(), validation=(), refused=(), collinearity=collinearity(result),
-        modes=(), coefficients=(), constant_inputs=(), delays={},
+        result=result, fits=(), validation=(), identifiability_flags=(), modes=(),
+        collinearity=collinearity(result), coefficients=(), constant_inputs=(), delays={},
     )  # fmt: skip
 
 
@@ -60,7 +62,7 @@ def test_what_is_not_predicted_is_not_trusted(answer: Answer) -> None:
     speed = answer.model.states[0]
     failing = SignalFit(speed, 0.0, 0.8, 0.5, 0.0, 0.5)
     lost = replace(answer, result=sure, validation=(failing,), modes=modes(sure))
-    assert unpredicted(lost) == [speed]
+    assert unpredicted_states(lost) == [speed]
     lines = verdict_lines([lost], [])
     trusted = next(line for line in lines if "trust" in line).split(":  ")[1].split(", ")
     told = next(line for line in lines if "whatever the interval" in line)

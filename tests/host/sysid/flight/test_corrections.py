@@ -14,8 +14,9 @@ from host.instrument.deviations import dynamic_pressure_share
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, coefficients
+from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.answer.verdict import model_lines, verdict_lines
+from host.sysid.answer.verdict import verdict_lines
 from host.sysid.compatibility.reconstruction import Compatibility, Finding
 from host.sysid.compatibility.sensor_corrections import (
     INSTANTANEOUS_ERRORS,

@@ -29,7 +29,7 @@ def test_surfaces_that_the_transmitter_mixes_are_not_told_apart(
     columns, _ = read_columns(tmp_path / "mixed.csv")
     [answer] = identify(columns, names=("lateral",), method=method)
     assert len(answer.used) == 1  # both surfaces moved in the same record
-    refused = {r.name for r in answer.refused}
+    refused = {r.name for r in answer.identifiability_flags}
     left_out = {n for n in ("L_da", "L_dr", "N_da", "N_dr") if answer.result.value(n) == 0.0}
     assert len(left_out) == (2 if method == "stepwise" else 0)
     assert left_out or {"L_da", "L_dr", "N_da", "N_dr"} <= refused

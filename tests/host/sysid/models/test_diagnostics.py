@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
 from host.sysid import Maneuver, fit
+from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.json_document import answer_document
-from host.sysid.answer.verdict import model_lines, verdict_lines
+from host.sysid.answer.verdict import verdict_lines
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.diagnostics import (
     NOT_IDENTIFIABLE,
@@ -143,7 +144,7 @@ def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
         result=result,
         fits=(),
         validation=(),
-        refused=found.flags,
+        identifiability_flags=found.flags,
         collinearity=collinearity(result),
         modes=(),
         coefficients=(),

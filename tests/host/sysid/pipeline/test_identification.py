@@ -15,9 +15,9 @@ import pytest
 from host.cli import main
 from host.errors import HostError
 from host.sysid.answer.answer_figures import draw_coefficients
+from host.sysid.answer.marks import MARKS
 from host.sysid.answer.output_files import OutputPaths
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
-from host.sysid.answer.verdict import MARKS
 from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.flight import maneuver_detection, maneuver_selection
 from host.sysid.flight.linear_estimator import LinearEstimator

@@ -21,10 +21,10 @@ from host.sysid.answer.figure_kinds import (
     save,
     spectra,
 )
+from host.sysid.answer.linear_verdict import not_relied_on
 from host.sysid.answer.mat_file import labels
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.truth_comparison import true_coefficients
-from host.sysid.answer.verdict import not_relied_on
 from host.sysid.compatibility.inverse_sensor_model import FIT_RATE_HZ
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.diagnostics import reference_values
@@ -86,7 +86,7 @@ def draw(answer: Answer, name: str) -> dict[str, Figure]:
     result = answer.result
     traces, kind = _linear_traces(answer)
     title = f"{answer.template}, {answer.method}: measured (grey), {kind} (red)"
-    loose = not_relied_on(answer)
+    unreliable = not_relied_on(answer)
     half = result.half_width()
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
     bars = [
@@ -95,7 +95,7 @@ def draw(answer: Answer, name: str) -> dict[str, Figure]:
             float(result.estimate[k]),
             float(half[k]),
             max(float(size[k]), 1e-300),
-            label in loose,
+            label in unreliable,
         )
         for k, label in enumerate(p.name for p in answer.model.parameters)
         if half[k] > 0.0 and not label.startswith("imu_")

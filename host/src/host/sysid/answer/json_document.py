@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.sysid.answer.parameter_units import parameter_unit
-from host.sysid.answer.verdict import unpredicted
+from host.sysid.answer.unpredicted_states import unpredicted_states
 from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.compatibility.sensor_corrections import correction_document
 from host.sysid.flight.linear_estimator import Answer
@@ -107,7 +107,7 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
             for name, (value, width) in answer.delays.items()
         },
         "at_bound": list(answer.at_bound),
-        "unpredicted": unpredicted(answer),
+        "unpredicted": unpredicted_states(answer),
         "corrections": correction_document(answer.corrections),
         "refused": [
             {
@@ -117,7 +117,7 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
                 "relative_bound": r.relative_bound,
                 "reason": r.reason,
             }
-            for r in answer.refused
+            for r in answer.identifiability_flags
         ],
         "coefficients": {
             c.name: {"value": c.value, "half_width": c.half_width, "fit_error": c.fit_error}

@@ -99,7 +99,7 @@ def _linear(answer: Answer) -> dict[str, Any]:
         "qbar_pa": answer.condition.qbar_pa,
         "alpha_rad": answer.trim.alpha_rad,
         "theta_rad": answer.trim.theta_rad,
-        "refused": _cells(r.name for r in answer.refused),
+        "refused": _cells(r.name for r in answer.identifiability_flags),
         "delays": _pairs(answer.delays),
         "coefficients": _pairs({c.name: (c.value, c.half_width) for c in answer.coefficients}),
         "modes": _modes(answer.modes),

@@ -52,5 +52,5 @@ def _cell(answer: Answer, name: str) -> str:
     k = result.index(name)
     half = float(result.half_width()[k])
     wide = f"{half:.2g}" if half > 0.0 else "-"
-    poor = not result.converged or name in {r.name for r in answer.refused}
+    poor = not result.converged or name in {r.name for r in answer.identifiability_flags}
     return f"{result.estimate[k]:10.4g} +- {wide:>7s}{'*' if poor else ' '}"

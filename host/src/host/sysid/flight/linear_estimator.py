@@ -87,7 +87,7 @@ class Answer:
     result: FitResult
     fits: tuple[SignalFit, ...]
     validation: tuple[SignalFit, ...]
-    refused: tuple[IdentifiabilityFlag, ...]
+    identifiability_flags: tuple[IdentifiabilityFlag, ...]
     collinearity: Collinearity
     modes: tuple[Mode, ...]
     coefficients: tuple[Coefficient, ...]
@@ -299,7 +299,7 @@ class LinearEstimator:
             result=total,
             fits=validation.fits,
             validation=validation.held_out,
-            refused=assess_identifiability(total, e.maneuvers).flags,
+            identifiability_flags=assess_identifiability(total, e.maneuvers).flags,
             collinearity=collinearity(intervals.statistical),
             modes=modes(total),
             coefficients=intervals.coefficients,

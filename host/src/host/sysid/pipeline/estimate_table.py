@@ -39,7 +39,7 @@ def estimate_table(linear: Sequence[Answer], direct: CoefficientAnswer | None) -
         By model and name. `half_width` is of the two-sided 95 % interval; `relative_half_width` is
         over the value, or over what would contribute 5 % of the largest of its equation; `unit` is
         SI and radian, ``1`` of a pure number; `verdict` is one of
-        `host.sysid.answer.verdict.MARKS`, empty where nothing is judged;
+        `host.sysid.answer.marks.MARKS`, empty where nothing is judged;
         `widened_by` is what widens the interval most.
     """
     rows: dict[tuple[str, str], tuple[Any, ...]] = {}

@@ -10,17 +10,13 @@ from typing import TYPE_CHECKING, Any
 from host.aircraft.prior.prior_table import PriorTable
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.answer_figures import draw_all
+from host.sysid.answer.estimate_lines import coefficient_lines, model_lines
 from host.sysid.answer.json_document import answer_document, coefficient_document, json_text
 from host.sysid.answer.method_comparison import method_table
 from host.sysid.answer.output_files import OutputPaths, check_outputs, write_outputs
 from host.sysid.answer.prior_comparison import prior_document, prior_lines
 from host.sysid.answer.truth_comparison import truth_document, truth_report_lines
-from host.sysid.answer.verdict import (
-    coefficient_lines,
-    model_lines,
-    removed_error_lines,
-    verdict_lines,
-)
+from host.sysid.answer.verdict import removed_error_lines, verdict_lines
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.compatibility.reconstruction import (
     Compatibility,

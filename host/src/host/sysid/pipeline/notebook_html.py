@@ -6,7 +6,7 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from host.sysid.answer.verdict import CAREFUL, SMALL, TRUSTED
+from host.sysid.answer.marks import CAREFUL, SMALL, TRUSTED
 from host.text import shown
 
 if TYPE_CHECKING:

@@ -1,0 +1,92 @@
+"""The verdict on coefficients fitted directly: a mark for each, causes, what to measure or fly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from host.sysid.answer.advised_inputs import advised_input
+from host.sysid.answer.marks import (
+    CAREFUL,
+    TRUST,
+    TRUSTED,
+    UNSURE,
+    USELESS,
+    Verdict,
+    first_lines,
+)
+from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
+from host.sysid.coefficients.coefficient_model import standard_model
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+
+WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
+
+
+def coefficient_verdict(answer: CoefficientAnswer) -> Verdict:
+    """Return what of the coefficients may be relied on."""
+    along = sum(w.longitudinal for w in answer.windows)
+    own = "" if answer.model == standard_model() else f" by the terms of '{answer.model.name}'"
+    heading = (
+        f"coefficients{own}: {along} maneuvers of the elevator, {len(answer.windows) - along} of"
+        " aileron and rudder fitted jointly, errors of the instrument beside them"
+    )
+    marks = {}
+    for d in answer.fit.derivatives:
+        sharp = TRUSTED if d.share <= TRUST else CAREFUL
+        marks[d.name] = sharp if not d.flagged else USELESS if d.share > 1.0 else UNSURE
+    lines = [
+        *first_lines(heading, marks, FLAG_SHARE),
+        *_flag_lines(answer, marks),
+        *_agreement_lines(answer),
+        _prediction_line(answer),
+    ]
+    return Verdict(heading, marks, tuple(lines))
+
+
+def _flag_lines(answer: CoefficientAnswer, marks: Mapping[str, str]) -> list[str]:
+    """Return what is too wide, what widens it, and what to do about it."""
+    lines, advice = [], set()
+    for d in answer.fit.derivatives:
+        if not d.flagged:
+            continue
+        cause, part = answer.causes.get(d.name, ("", 0.0))
+        why = f"{100.0 * part:.0f} % of the variance is {cause}" if cause else "excited too little"
+        lines.append(f"  {marks[d.name]} {d.name}: +- {100.0 * min(d.share, 99.99):.0f} %, {why}")
+        fly = advised_input(d.name) or "a larger input"
+        advice.add(f"measure {cause} better" if cause else f"fly {fly}")
+    if advice:
+        lines.append(f"  to learn them, {'; '.join(sorted(advice))}")
+    return lines
+
+
+def _agreement_lines(answer: CoefficientAnswer) -> list[str]:
+    """Return on which coefficients the maneuvers do not agree."""
+    found = answer.fit.maneuver_agreement
+    return [
+        f"  maneuvers do not agree on {name}: they scatter {found.factor[k]:.1f} times what noise"
+        f" allows (chi-square {found.chi_square[k]:.1f} on {found.maneuvers[k] - 1.0:.1f}),"
+        " interval widened to it"
+        for k, name in enumerate(found.names)
+        if found.factor[k] > 1.0
+    ]
+
+
+def _prediction_line(answer: CoefficientAnswer) -> str:
+    """Return whether each maneuver is predicted by a fit to the others."""
+    found, count = answer.fit.prediction, len(answer.windows)
+    if found is None:
+        return (
+            "  no maneuver could be left out to be predicted: each alone tells a term; fly every"
+            " input at least twice"
+        )
+    poor = [
+        f"{name} (NRMSE {100.0 * unseen:.1f} %, fitted {100.0 * found.fitted[name]:.1f} %)"
+        for name, unseen in found.left_out.items()
+        if unseen > WORSE * found.fitted[name]
+    ]
+    return (
+        f"  prediction of unseen maneuvers ({len(found.windows)} of {count}, each by the others): "
+        + ("fails for " + ", ".join(poor) if poor else "holds for every coefficient")
+    )

@@ -1,0 +1,117 @@
+"""Estimates, modes and figures of fit of an answer as a table for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from host.constants import DEG_PER_RAD
+from host.sysid.answer.parameter_units import parameter_unit
+from host.sysid.answer.unpredicted_states import reasons_of_states, unpredicted_states
+from host.sysid.flight.linear_estimator import Answer, from_zero
+from host.sysid.models.modal_analysis import Mode
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+
+PARTICIPATION = 0.25  # in a mode: a state with more makes it what it is
+
+
+def model_lines(answer: Answer) -> list[str]:
+    """Return estimates, modes and fit as a table for people."""
+    result = answer.result
+    half = result.half_width()
+    lines = [
+        f"{answer.template} at {answer.condition.airspeed_mps:.2f} m/s,"
+        f" alpha {answer.trim.alpha_rad * DEG_PER_RAD:.1f} deg; value and 95 % half-width"
+    ]
+    grades = {
+        r.name: r.grade for r in answer.identifiability_flags if not r.name.startswith("imu_")
+    }
+    for k, name in enumerate(answer.model.parameter_names):
+        mark = f"  {grades[name]}" if name in grades else ""
+        mark += "  at its bound" if name in answer.at_bound else ""
+        unit = parameter_unit(answer.model, name)
+        lines.append(
+            f"  {name:16s} {result.estimate[k]:11.5g}  +- {half[k]:9.3g}  {unit:7s}{mark}".rstrip()
+        )
+    for name, (value, width) in answer.delays.items():
+        mark = "  at its bound" if name in answer.at_bound else ""
+        lines.append(f"  {name:16s} {value:11.5g}  +- {width:9.3g}  s      {mark}".rstrip())
+    if answer.coefficients:
+        lines.append(
+            "  coefficients (mass, inertia, pressure, places, pots and delays in the half-width)"
+        )
+        lines += [
+            f"  {c.name:16s} {c.value:11.5g}  +- {c.half_width:9.3g}"
+            + ("" if from_zero(c) else "  not told from zero")
+            for c in answer.coefficients
+        ]
+    failing = unpredicted_states(answer)
+    for mode in answer.modes:
+        in_it = _participating(answer, mode, failing)
+        mark = f"  not to be relied on: {reasons_of_states(answer, in_it)}" if in_it else ""
+        lines.append(_mode_line(mode) + mark)
+    for kind, fits in (
+        ("free simulation, fitted data", answer.fits),
+        ("free simulation, held-out data", answer.validation),
+    ):
+        if fits:
+            shares = ", ".join(f"{f.name} {100.0 * f.nrmse:.1f} %" for f in fits)
+            lines.append(f"  NRMSE ({kind}): {shares}")
+    return lines
+
+
+def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
+    """Return coefficients, modes, delays and fit as a table for people."""
+    flight = answer.fit.condition
+    lines = [
+        f"coefficients at {flight.airspeed_mps:.2f} m/s, alpha"
+        f" {flight.alpha_rad * DEG_PER_RAD:.1f} deg, CL {flight.lift:.3f}; value, 95 % half-width,"
+        " what widens it most"
+    ]
+    for d in answer.fit.derivatives:
+        small = " of 5 % of the row" if d.reference > abs(d.value) else ""
+        cause = answer.causes.get(d.name, ("", 0.0))[0]
+        line = f"  {d.name:9s} {d.value:10.4f}  +- {d.half_width:8.4f}  {100.0 * d.share:6.1f} %"
+        line += f"{small}  {cause}" + ("  flagged" if d.flagged else "")
+        lines.append(line.rstrip())
+    lines.append("  CD_0 is the drag at zero lift, surfaces as flown")
+    lines += [_mode_line(mode) for mode in answer.modes]
+    delays = ", ".join(
+        f"{name.split('_')[1]} {1e3 * value:+.2f} +- {1e3 * half:.2f} ms"
+        for name, (value, half) in answer.delays.items()
+    )
+    lines.append(f"  residual delays: {delays}")
+    shares = ", ".join(f"{n} {100.0 * x.nrmse:.1f} %" for n, x in answer.fit.histories.items())
+    lines.append(f"  NRMSE (one-step, fitted data, gusts in it): {shares}")
+    if answer.fit.prediction is not None:
+        both = answer.fit.prediction.fitted, answer.fit.prediction.left_out
+        shares = ", ".join(
+            f"{name} {100.0 * fitted:.1f} / {100.0 * both[1][name]:.1f} %"
+            for name, fitted in both[0].items()
+        )
+        lines.append(f"  the same below 4.5 Hz, fitted / unseen (leave-one-out): {shares}")
+    return lines
+
+
+def _participating(answer: Answer, mode: Mode, states: Sequence[str]) -> list[str]:
+    """Return those of some states that take a good part in a mode."""
+    values, right = np.linalg.eig(answer.result.matrices()[0])
+    left = np.linalg.inv(right)
+    k = int(np.argmin(np.abs(values - mode.eigenvalue)))
+    part = np.abs(left[k] * right[:, k])
+    shares = dict(zip(answer.model.states, part / part.sum(), strict=True))
+    return [state for state in states if shares[state] > PARTICIPATION]
+
+
+def _mode_line(mode: Mode) -> str:
+    half = mode.frequency_half_width_radps
+    if not mode.oscillatory:
+        return f"  {mode.name}: {mode.eigenvalue.real:.3f} +- {half:.3f} 1/s"
+    return (
+        f"  {mode.name}: {mode.frequency_radps:.3f} +- {half:.3f} rad/s,"
+        f" damping {mode.damping:.3f} +- {mode.damping_half_width:.3f}"
+    )

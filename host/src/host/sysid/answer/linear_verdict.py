@@ -1,0 +1,180 @@
+"""The verdict on a linear model: a mark for each parameter, the reasons, what to fly again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import ceil
+
+from host.sysid.answer.advised_inputs import advised_input
+from host.sysid.answer.correlated_inputs import correlated_inputs, derivatives_of_both
+from host.sysid.answer.marks import (
+    CAREFUL,
+    FAIR,
+    SMALL,
+    TRUST,
+    TRUSTED,
+    UNSURE,
+    USELESS,
+    Verdict,
+    first_lines,
+    names_marked,
+)
+from host.sysid.answer.unpredicted_states import (
+    failing_outputs,
+    parameters_of_states,
+    reasons_of_states,
+    unpredicted_states,
+)
+from host.sysid.flight.linear_estimator import Answer
+from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
+
+PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircraft
+
+
+def linear_verdict(answer: Answer) -> Verdict:
+    """Return what of a linear model may be relied on."""
+    count = len(answer.used)
+    fitted = "1 maneuver fitted" if count == 1 else f"{count} maneuvers fitted jointly"
+    heading = (
+        f"{answer.template}: {fitted} by {answer.result.method}, {len(answer.held_out)} held out"
+    )
+    shares = relative_half_widths(answer)
+    marks = _marks(answer, shares)
+    lines = first_lines(heading, marks, FAIR)
+    if not answer.result.converged:
+        wrong = "  no convergence: estimates and intervals mean nothing, use another method"
+        lines.insert(1, wrong)
+    lines += _width_lines(answer, marks, shares)
+    lines += _unpredicted_lines(answer)
+    lines += _identifiability_lines(answer)
+    lines += _input_lines(answer)
+    lines += _data_lines(answer)
+    return Verdict(heading, marks, tuple(lines))
+
+
+def relative_half_widths(answer: Answer) -> dict[str, float]:
+    """Return each parameter's 95 % half-width over what it is judged against."""
+    half = answer.result.half_width()
+    size = reference_values(answer.model, answer.maneuvers, answer.result.estimate)
+    return {
+        p.name: float(half[k]) / max(float(size[k]), 1e-300)
+        for k, p in enumerate(answer.model.parameters)
+    }
+
+
+def not_relied_on(answer: Answer) -> set[str]:
+    """Return the parameters that the verdict does not let a reader use."""
+    wide = {name for name, share in relative_half_widths(answer).items() if share > FAIR}
+    unidentified = {r.name for r in answer.identifiability_flags if r.grade == NOT_IDENTIFIABLE}
+    return wide | unidentified | parameters_of_states(answer, unpredicted_states(answer))
+
+
+def _marks(answer: Answer, shares: Mapping[str, float]) -> dict[str, str]:
+    result = answer.result
+    half = result.half_width()
+    size = reference_values(answer.model, answer.maneuvers, result.estimate)
+    flags = {r.name: r.grade for r in answer.identifiability_flags}
+    doubtful = parameters_of_states(answer, unpredicted_states(answer))
+    doubtful |= derivatives_of_both(answer)
+    marks = {}
+    for k, parameter in enumerate(answer.model.parameters):
+        name = parameter.name
+        if name.startswith(PLACE):
+            continue
+        if not result.converged or flags.get(name) == NOT_IDENTIFIABLE:
+            marks[name] = USELESS
+        elif name in flags or half[k] == 0.0 or name in doubtful or shares[name] > FAIR:
+            marks[name] = UNSURE  # a half-width of zero is that of a bound
+        elif size[k] > abs(float(result.estimate[k])):
+            marks[name] = SMALL
+        else:
+            marks[name] = TRUSTED if shares[name] <= TRUST else CAREFUL
+    return marks
+
+
+def _width_lines(
+    answer: Answer, marks: Mapping[str, str], shares: Mapping[str, float]
+) -> list[str]:
+    """Return which parameters only their width rules out, and which are small."""
+    flagged = {r.name for r in answer.identifiability_flags}
+    doubtful = parameters_of_states(answer, unpredicted_states(answer))
+    doubtful |= derivatives_of_both(answer)
+    lines = []
+    wide = [
+        f"{name} ({ceil(100.0 * shares[name])} %)"
+        for name in names_marked(marks, UNSURE)
+        if shares[name] > FAIR and name not in flagged | doubtful
+    ]
+    if wide:
+        lines.append(f"  do not rely on (above 30 %):  {', '.join(wide)}")
+    if little := names_marked(marks, SMALL):
+        lines.append(f"  less than 5 % of their row, known to be:  {', '.join(little)}")
+    return lines
+
+
+def _unpredicted_lines(answer: Answer) -> list[str]:
+    """Return which parameters lean on a state that the model does not carry."""
+    states = unpredicted_states(answer)
+    leaning = parameters_of_states(answer, states)
+    leaning -= {r.name for r in answer.identifiability_flags}
+    if not leaning:
+        return []
+    names = ", ".join(n for n in answer.model.parameter_names if n in leaning)
+    reasons = reasons_of_states(answer, states)
+    return [f"  do not rely on {names}, whatever the interval: {reasons}"]
+
+
+def _identifiability_lines(answer: Answer) -> list[str]:
+    """Return what cannot be identified and why, and what to fly to learn it."""
+    flags = [r for r in answer.identifiability_flags if not r.name.startswith(PLACE)]
+    lines = []
+    for flag in flags:
+        warning = "do not use" if flag.grade == NOT_IDENTIFIABLE else "doubtful,"
+        lines.append(f"  {warning} {flag.name}: {flag.reason}")
+    inputs = {advised_input(flag.name) for flag in flags} - {""}
+    if inputs:
+        lines.append(f"  to learn them, fly {'; '.join(sorted(inputs))}")
+    return lines
+
+
+def _input_lines(answer: Answer) -> list[str]:
+    """Return what is said of inputs that moved together, or not at all."""
+    lines = [
+        f"  {one} and {other} move together: fly them one at a time, without a mixer, or leave"
+        " one out of a model of your own"
+        for one, other in correlated_inputs(answer)
+    ]
+    if both := derivatives_of_both(answer):
+        lines.append(
+            f"  do not rely on {', '.join(sorted(both))}: of both inputs, one was left out"
+        )
+    lines += [
+        f"  {name} never moved: its derivatives are the bias under another name"
+        for name in answer.constant_inputs
+    ]
+    if answer.collinearity.severe:
+        pairs = ", ".join(f"{a} with {b}" for a, b, _ in answer.collinearity.pairs[:3])
+        lines.append("  the data are close to collinear" + (f" ({pairs})" if pairs else ""))
+    return lines
+
+
+def _data_lines(answer: Answer) -> list[str]:
+    """Return what bounds and warnings say, and whether unseen data were predicted."""
+    lines = [
+        f"  {name} is at its bound: no delay of that sensor, but what the model lacks there"
+        for name in answer.at_bound
+    ]
+    lines += [f"  warning: {warning}" for warning in answer.result.warnings]
+    failing = failing_outputs(answer)
+    poor = [f.name for f in answer.validation if f.name in failing]
+    if answer.validation:
+        lines.append(
+            "  prediction of the unseen maneuver: "
+            + ("fails for " + ", ".join(poor) if poor else "holds for every output")
+        )
+    else:
+        lines.append(
+            "  nothing was left to be predicted: what the model lacks is in no interval; fly each"
+            " input three times"
+        )
+    return lines
