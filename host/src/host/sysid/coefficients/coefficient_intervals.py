@@ -1,4 +1,4 @@
-"""From the end of the search to the result: geometric prior, intervals, maneuver agreement."""
+"""Build the final coefficient fit: geometric prior, intervals, maneuver agreement."""
 
 from __future__ import annotations
 
