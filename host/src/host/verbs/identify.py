@@ -137,8 +137,8 @@ def _places(args: argparse.Namespace) -> OutputPaths:
     return OutputPaths(
         plots=args.plots,
         mat=args.mat,
-        model=args.save_model,
-        aircraft=args.save_aircraft,
+        save_model=args.save_model,
+        save_aircraft=args.save_aircraft,
         source=args.aircraft,
         given=tuple(path for path in given if path is not None),
     )

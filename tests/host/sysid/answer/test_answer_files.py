@@ -53,15 +53,18 @@ QUICK = ("--model", "short-period", "--method", "equation-error")
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--plots", "FILE"], "FILE: a file; name a folder"),
+        (["--plots", "FILE"], "--plots FILE: a file; name a folder"),
         (["--plots", "FILE/in"], "no folder can be in it"),
         (["--mat", "FOLDER.mat"], "a folder; name a file in it"),
         (["--mat", "FILE"], "expected .mat"),
         (["--save-model", "x.txt"], "expected .toml or .mat or .xml"),
         (["--save-model", "x.xml"], "give --aircraft"),
         (["--save-aircraft", "x.toml"], "give --aircraft"),
-        (["--save-aircraft", "x.mat", "--aircraft", "ultrastick25e"], "expected .toml or .xml"),
-        (["--mat", "x.mat", "--save-model", "x.mat"], "both name"),
+        (
+            ["--save-aircraft", "x.mat", "--aircraft", "ultrastick25e"],
+            "--save-aircraft x.mat: ends in '.mat', expected .toml or .xml",
+        ),
+        (["--mat", "x.mat", "--save-model", "x.mat"], "--mat and --save-model both name x.mat"),
     ],
 )
 def test_a_place_that_is_none_is_refused_before_the_flight_is_read(
@@ -86,9 +89,9 @@ def test_an_output_does_not_replace_what_it_is_made_from(
     assert own.read_bytes() == flight.read_bytes()
     model = tmp_path / "mine.toml"
     model.write_text("# mine\n")
-    with pytest.raises(IdentificationError, match="made from"):
+    with pytest.raises(IdentificationError, match=r"argument save_model .* made from"):
         same = tmp_path / "../" / tmp_path.name / "mine.toml"
-        check_outputs(OutputPaths(None, None, same, None, None, (flight, model)))
+        check_outputs(OutputPaths(save_model=same, given=(flight, model)))
 
 
 def test_models_named_after_the_first_replace_no_source(
@@ -112,7 +115,7 @@ def test_a_file_in_a_folder_that_takes_none_is_refused_before_the_work(
     path.write_text("before")
     monkeypatch.setattr(os, "access", lambda place, _: Path(place) != tmp_path)
     with pytest.raises(IdentificationError, match=f"no permission to write to {tmp_path}$"):
-        check_outputs(OutputPaths(None, None, path, None, None, ()))
+        check_outputs(OutputPaths(save_model=path))
 
 
 def test_without_room_the_answer_is_said_and_nothing_is_left(

@@ -330,7 +330,7 @@ def test_a_hostile_model_writes_into_its_folder_only(
     assert found.table.index.get_level_values("model").nunique() == len(names)
     assert {p.resolve().parent for p in written} == {folder}
     assert len({p.name.lower() for p in written}) == len(written) == 4 * len(names)
-    written = found.save(OutputPaths(None, None, saved, None, None, ()))
+    written = found.save(OutputPaths(save_model=saved))
     assert {p.resolve().parent for p in written} == {saved.parent}
     assert len({p.name.lower() for p in written}) == len(names)
 

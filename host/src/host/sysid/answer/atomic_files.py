@@ -51,19 +51,33 @@ def atomic_write(path: Path) -> Iterator[Path]:
                 part.unlink(missing_ok=True)
 
 
-def check_destination(option: str, path: Path, *, folder: bool) -> None:
-    """Raise IdentificationError where a file, or a folder for files, cannot be at a place."""
+def check_destination(called: str, path: Path, *, folder: bool) -> None:
+    """Check that a file, or a folder for files, can be written at a place.
+
+    Parameters
+    ----------
+    called : str
+        What the message calls it: an argument or an option.
+    path : Path
+    folder : bool
+        Whether it is to be a folder.
+
+    Raises
+    ------
+    IdentificationError
+        If it cannot.
+    """
     if folder and path.exists() and not path.is_dir():
-        raise IdentificationError(f"{option} {path}: a file; name a folder")
+        raise IdentificationError(f"{called} {path}: a file; name a folder")
     if not folder and path.is_dir():
-        raise IdentificationError(f"{option} {path}: a folder; name a file in it")
+        raise IdentificationError(f"{called} {path}: a folder; name a file in it")
     above = next(p for p in (path, *path.absolute().parents) if p.exists())
     if above != path and not above.is_dir():
-        raise IdentificationError(f"{option} {path}: {above} is a file, no folder can be in it")
+        raise IdentificationError(f"{called} {path}: {above} is a file, no folder can be in it")
     # A file there before is replaced: that is written to its folder.
     for place in (above, above.parent) if above.is_file() else (above,):
         if not os.access(place, os.W_OK):
-            raise IdentificationError(f"{option} {path}: no permission to write to {place}")
+            raise IdentificationError(f"{called} {path}: no permission to write to {place}")
 
 
 def file_names(labels: Iterable[str]) -> list[str]:

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 ENDINGS = {
-    "--mat": (".mat",),
-    "--save-model": (".toml", ".mat", ".xml"),
-    "--save-aircraft": (".toml", ".xml"),
+    "mat": (".mat",),
+    "save_model": (".toml", ".mat", ".xml"),
+    "save_aircraft": (".toml", ".xml"),
 }
 
 
@@ -30,21 +30,30 @@ ENDINGS = {
 class OutputPaths:
     """Where the user wants files, and the aircraft that the answer is made with.
 
-    `given` are the files the answer is made from, which no output may replace.
+    Attributes
+    ----------
+    plots : Path, optional
+        Folder for pictures.
+    mat, save_model, save_aircraft : Path, optional
+        Files; their endings choose the format (`ENDINGS`).
+    source : str, optional
+        Aircraft by name or file: mass and geometry of what is saved.
+    given : tuple of Path
+        Files the answer is made from, which no output may replace.
     """
 
-    plots: Path | None
-    mat: Path | None
-    model: Path | None
-    aircraft: Path | None
-    source: str | None
-    given: tuple[Path, ...]
+    plots: Path | None = None
+    mat: Path | None = None
+    save_model: Path | None = None
+    save_aircraft: Path | None = None
+    source: str | None = None
+    given: tuple[Path, ...] = ()
 
     @property
     def files(self) -> dict[str, Path]:
-        """Every file asked for, by its option."""
-        asked = {"--mat": self.mat, "--save-model": self.model, "--save-aircraft": self.aircraft}
-        return {option: path for option, path in asked.items() if path is not None}
+        """Every file asked for, by its argument."""
+        asked = {name: getattr(self, name) for name in ENDINGS}
+        return {name: path for name, path in asked.items() if path is not None}
 
 
 def check_outputs(places: OutputPaths) -> None:
@@ -57,22 +66,22 @@ def check_outputs(places: OutputPaths) -> None:
         source, an aircraft without what it is made of, pictures without matplotlib.
     """
     taken: dict[Path, str] = {}
-    for option, path in places.files.items():
-        known = ENDINGS[option]
+    for name, path in places.files.items():
+        known, argument = ENDINGS[name], f"argument {name}"
         if path.suffix.lower() not in known:
             raise IdentificationError(
-                f"{option} {path}: ends in '{path.suffix}', expected {' or '.join(known)}"
+                f"{argument} {path}: ends in '{path.suffix}', expected {' or '.join(known)}"
             )
-        check_destination(option, path, folder=False)
+        check_destination(argument, path, folder=False)
         if any(path.exists() and given.exists() and path.samefile(given) for given in places.given):
             raise IdentificationError(
-                f"{option} {path} is what the answer is made from; name another file"
+                f"{argument} {path} is what the answer is made from; name another file"
             )
-        other = taken.setdefault(path.absolute(), option)
-        if other != option:
-            raise IdentificationError(f"{other} and {option} both name {path}; name two files")
-    made = [p for p in (places.model, places.aircraft) if p is not None]
-    whole_ones = [p for p in made if p is places.aircraft or p.suffix.lower() == ".xml"]
+        other = taken.setdefault(path.absolute(), argument)
+        if other != argument:
+            raise IdentificationError(f"{other} and {argument} both name {path}; name two files")
+    made = [p for p in (places.save_model, places.save_aircraft) if p is not None]
+    whole_ones = [p for p in made if p is places.save_aircraft or p.suffix.lower() == ".xml"]
     if whole_ones:
         if not places.source:
             raise IdentificationError(
@@ -82,7 +91,7 @@ def check_outputs(places: OutputPaths) -> None:
 
         aircraft.load(places.source)  # one that was only measured has no tables to put answers in
     if places.plots is not None:
-        check_destination("--plots", places.plots, folder=True)
+        check_destination("argument plots", places.plots, folder=True)
         if importlib.util.find_spec("matplotlib") is None:
             raise IdentificationError(f"pictures need matplotlib: {install_hint('matplotlib')}")
 
@@ -98,7 +107,7 @@ def write_outputs(
 
     Parameters
     ----------
-    places : Places
+    places : OutputPaths
         Looked at by `check_outputs` before.
     answers : sequence of Answer
         Linear models.
@@ -119,18 +128,18 @@ def write_outputs(
         write_mat(places.mat, answers, direct)
         written.append(places.mat)
     tables = list(direct.tables) if direct else [a.table for a in answers]
-    for path in (places.aircraft, places.model):
+    for path in (places.save_aircraft, places.save_model):
         # Coefficients alone are an aircraft, not a linear model.
-        plain = path is places.model and bool(answers)
+        plain = path is places.save_model and bool(answers)
         if path is None or path.suffix.lower() == ".mat":
             continue
         if not plain or path.suffix.lower() == ".xml":
             written.append(_write_aircraft(path, tables, places.source, direct))
-    if places.model is not None and places.model.suffix.lower() == ".mat":
-        write_mat(places.model, answers, direct)
-        written.append(places.model)
-    elif places.model is not None and places.model.suffix.lower() == ".toml":
-        written += _write_models(places.model, answers, (*places.given, *written))
+    if places.save_model is not None and places.save_model.suffix.lower() == ".mat":
+        write_mat(places.save_model, answers, direct)
+        written.append(places.save_model)
+    elif places.save_model is not None and places.save_model.suffix.lower() == ".toml":
+        written += _write_models(places.save_model, answers, (*places.given, *written))
     if places.plots is not None:
         from host.sysid.answer.answer_figures import draw_all, save_all
 
@@ -168,7 +177,8 @@ def _write_models(path: Path, answers: Sequence[Answer], kept: Sequence[Path]) -
         own = path.with_name(f"{path.stem}_{behind}{path.suffix}") if number else path
         if own.exists() and any(k.exists() and own.samefile(k) for k in kept):
             raise IdentificationError(
-                f"--save-model {path}: the model {label} would replace {own}; name another file"
+                f"argument save_model {path}: the model {label} would replace {own};"
+                " name another file"
             )
         named[own] = answer
     for own, answer in named.items():

@@ -84,8 +84,10 @@ def listed(given: Any) -> list[Any]:
 
 OPTIONS = {
     "aircraft": "--aircraft", "calibration": "--calibration", "from_s": "--from",
-    "maneuvers": "--maneuver", "mapping": "--map", "methods": "--method", "models": "--model",
-    "prior": "--prior", "to_s": "--to", "truth": "--truth",
+    "maneuvers": "--maneuver", "mapping": "--map", "mat": "--mat", "methods": "--method",
+    "models": "--model", "plots": "--plots", "prior": "--prior",
+    "save_aircraft": "--save-aircraft", "save_model": "--save-model", "to_s": "--to",
+    "truth": "--truth",
 }  # fmt: skip
 _ARGUMENT = re.compile(rf"\bargument ({'|'.join(OPTIONS)})\b")
 
