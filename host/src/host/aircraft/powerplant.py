@@ -10,11 +10,11 @@ import numpy as np
 
 from host.aircraft.airframe import Airframe
 from host.aircraft.file import AircraftError, load_measured
-from host.aircraft.propulsion import motor_torque, propeller, rotor_history
+from host.aircraft.propulsion import RotorInputs, motor_torque, propeller, rotor_history
 from host.arrays import Array
 
 Step = Callable[[float, float, float, float], tuple[float, float, float]]
-History = Callable[[Array, Array, Array, float, float, int], Array]
+History = Callable[[RotorInputs, float, float, int], Array]
 SUBSTEPS = 3  # a rotor takes 0.1 s and more to answer; records come at 33 Hz
 START_RADPS = 600.0  # forgotten within half a second
 SETTLED, SETTLING_S = 200, 0.03  # samples until a rotor keeps its speed, and their distance
@@ -30,8 +30,7 @@ class Powerplant:
         From rotor speed, throttle, airspeed and density to thrust (N), torque of the air and of the
         motor (N m).
     history : callable
-        From throttle, airspeed and density of a flight, the first rotor speed (rad/s), the length
-        of a step (s) and the steps in a sample to thrust, rotor speed and motor torque, (3, n).
+        `propulsion.rotor_history` of this aircraft.
     rotor_kgm2 : float
     axis : (3,) Array
         Unit vector of thrust, body axes.
@@ -49,14 +48,12 @@ class Powerplant:
         self, throttle: Array, airspeed_mps: Array, density_kgpm3: Array, dt_s: float
     ) -> tuple[Array, Array, Array]:
         """Return thrust (N), rotor speed (rad/s) and motor torque (N m), each (n,)."""
-        thrust, spin, drive = self.history(
+        inputs = RotorInputs(
             np.ascontiguousarray(throttle),
             np.ascontiguousarray(airspeed_mps),
             np.ascontiguousarray(density_kgpm3),
-            START_RADPS,
-            dt_s / SUBSTEPS,
-            SUBSTEPS,
         )
+        thrust, spin, drive = self.history(inputs, START_RADPS, dt_s / SUBSTEPS, SUBSTEPS)
         return thrust, spin, drive
 
     def settled_slopes(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,14 @@ from host.aircraft.airframe import Airframe, Array
 from host.compiled import compiled_fast, compiled_part
 
 WORTH_COMPILING = 1e5  # steps of the rotor, half a second of Python
+
+
+class RotorInputs(NamedTuple):
+    """Throttle, axial airspeed and density of a flight, each shape (n,)."""
+
+    throttle: Array
+    axial_mps: Array
+    density_kgpm3: Array
 
 
 @compiled_part
@@ -65,46 +73,45 @@ def motor_torque(frame: Airframe, throttle: float, rotor_radps: float) -> float:
 
 
 def rotor_history(
-    frame: Airframe,
-    throttle: Array,
-    axial_mps: Array,
-    density_kgpm3: Array,
-    start_radps: float,
-    part_s: float,
-    parts: int,
+    frame: Airframe, inputs: RotorInputs, start_radps: float, part_s: float, parts: int
 ) -> Array:
-    """Run the rotor through a flight, each sample as `parts` Euler steps of `part_s`.
+    """Run the rotor through a flight.
 
-    Returns rows of thrust (N), rotor speed (rad/s) and motor torque (N m), shape (3, n).
+    Parameters
+    ----------
+    frame : Airframe
+    inputs : RotorInputs
+    start_radps : float
+        Rotor speed before the first sample.
+    part_s, parts : float, int
+        Length of an Euler step, and steps in a sample.
+
+    Returns
+    -------
+    Array, shape (3, n)
+        Thrust (N), rotor speed (rad/s) and motor torque (N m).
     """
-    flown = throttle, axial_mps, density_kgpm3
-    if rotor_steps.pays(len(throttle) * parts, WORTH_COMPILING):
-        return rotor_steps(frame, *flown, start_radps, part_s, parts)
+    if rotor_steps.pays(len(inputs.throttle) * parts, WORTH_COMPILING):
+        return rotor_steps(frame, inputs, start_radps, part_s, parts)
     # Half the time of the same steps on scalars of numpy.
     curves = ("ct_polynomial", "cp_polynomial", "motor_power_polynomial_w")
     lists: Any = {name: tuple(getattr(frame, name).tolist()) for name in curves}
     plain = frame._replace(**lists)
-    columns = (column.tolist() for column in flown)
-    return np.asarray(rotor_steps.function(plain, *columns, start_radps, part_s, parts))
+    columns = RotorInputs(*(column.tolist() for column in inputs))
+    return np.asarray(rotor_steps.function(plain, columns, start_radps, part_s, parts))
 
 
 @compiled_fast
 def rotor_steps(
-    frame: Airframe,
-    throttle: Array,
-    axial_mps: Array,
-    density_kgpm3: Array,
-    start_radps: float,
-    part_s: float,
-    parts: int,
+    frame: Airframe, inputs: RotorInputs, start_radps: float, part_s: float, parts: int
 ) -> Array:
     """Do the work of `rotor_history`; columns and polynomials may be lists in Python."""
-    result = np.empty((3, len(throttle)))
+    result = np.empty((3, len(inputs.throttle)))
     speed, push, torque = start_radps, 0.0, 0.0
-    for i in range(len(throttle)):
+    for i in range(len(inputs.throttle)):
         for _ in range(parts):
-            push, load = propeller(frame, speed, axial_mps[i], density_kgpm3[i])
-            torque = motor_torque(frame, throttle[i], speed)
+            push, load = propeller(frame, speed, inputs.axial_mps[i], inputs.density_kgpm3[i])
+            torque = motor_torque(frame, inputs.throttle[i], speed)
             speed = max(speed + part_s * (torque - load) / frame.rotor_inertia_kgm2, 0.0)
         result[0, i], result[1, i], result[2, i] = push, speed, torque
     return result

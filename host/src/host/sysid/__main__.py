@@ -14,7 +14,7 @@ import numpy as np
 
 import host
 from host.aircraft.file import load_measured
-from host.aircraft.propulsion import rotor_steps
+from host.aircraft.propulsion import RotorInputs, rotor_steps
 from host.sysid.estimators.hopfield import iterate, iterate_until
 from host.sysid.numerics.recursion import propagate_block
 
@@ -29,7 +29,7 @@ def build_kernels() -> None:
     F, S, out = np.eye(2), np.zeros((2, 3)), np.zeros((2, 4, 3))
     propagate_block(F, F, S, S.copy(), np.zeros((4, 6)), 0, 4, out)
     half = np.full(2, 0.5)
-    rotor_steps(load_measured(AIRCRAFT).airframe(), half, half, half, 600.0, 0.01, 3)
+    rotor_steps(load_measured(AIRCRAFT).airframe(), RotorInputs(half, half, half), 600.0, 0.01, 3)
 
 
 def main() -> int:
