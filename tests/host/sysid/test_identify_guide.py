@@ -45,7 +45,7 @@ def test_it_is_that_of_a_flyable_file_with_the_same_numbers(tmp_path: Path) -> N
     assert ours.slope(700.0, 17.0, 1.2) == theirs.slope(700.0, 17.0, 1.2)
     del document["servo"]  # usual servos then
     without = sensor_error_model(mine(tmp_path, dumps(document | {"kind": "measured"})))
-    assert (without.servo_hz, without.servo) == (0.0, (8.0, 2.617994))
+    assert (without.servo_hz, without.servo) == (0.0, (8.0, 5.236))
 
 
 def test_places_count_from_the_cg_wherever_it_is(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from host.aircraft import usual_servo
 from host.aircraft.airframe import COEFFICIENTS, Array
 from host.aircraft.file import FOLDER
 from host.constants import GRAVITY_MPS2
@@ -36,42 +37,73 @@ NODES = 5
 
 
 def lift_slope(aspect_ratio: float) -> float:
-    """Return the lift slope (1/rad) of an unswept wing [1]."""
+    """Return the lift slope of an unswept wing, 1/rad: Helmbold-Polhamus [1].
+
+    Parameters
+    ----------
+    aspect_ratio : float
+        Span squared over area.
+    """
     kappa = SECTION_SLOPE_PERRAD / (2.0 * math.pi)
     return 2.0 * math.pi * aspect_ratio / (2.0 + math.sqrt(4.0 + (aspect_ratio / kappa) ** 2))
 
 
 def rolling_slope(aspect_ratio: float) -> float:
-    """Return the section lift slope (1/rad) left in antisymmetric loading: A / (A + 4) [2]."""
+    """Return the lift slope under antisymmetric load, 1/rad: the section's times A / (A + 4) [2].
+
+    Parameters
+    ----------
+    aspect_ratio : float
+        A, span squared over area.
+    """
     return SECTION_SLOPE_PERRAD * aspect_ratio / (aspect_ratio + 4.0)
 
 
 def flap(chord_share: float) -> float:
-    """Return the share of its angle by which a plain flap turns the zero-lift line [5]."""
+    """Return the effectiveness of a plain flap, rad of zero-lift line per rad of flap [5].
+
+    Parameters
+    ----------
+    chord_share : float
+        Chord of the flap over that of the surface, 0 to 1.
+    """
     theta = math.acos(2.0 * chord_share - 1.0)
     return FLAP_EFFICIENCY * (1.0 - (theta - math.sin(theta)) / math.pi)
 
 
 def downwash_slope(aspect_ratio: float, arm_spans: float, height_spans: float) -> float:
-    """Return d epsilon / d alpha of a rectangular, unswept wing [1]."""
+    """Return the downwash slope d epsilon / d alpha of a rectangular, unswept wing [1].
+
+    Parameters
+    ----------
+    aspect_ratio : float
+        Of the wing.
+    arm_spans, height_spans : float
+        Place of the tail behind and above the wing, in spans.
+    """
     by_aspect = 1.0 / aspect_ratio - 1.0 / (1.0 + aspect_ratio**1.7)
     by_height = (1.0 - abs(height_spans)) / (2.0 * arm_spans) ** (1.0 / 3.0)
     return 4.44 * float(np.power(by_aspect * by_height, 1.19))
 
 
 def derive(d: Mapping[str, object]) -> dict[str, Array]:
-    """Return the tables of an aircraft file from dimensions.
+    """Return the aerodynamic tables of an aircraft file from its dimensions.
 
     Parameters
     ----------
     d : mapping
-        Keys of the files in `dimensions/`; rectangular wing.
+        A file of `dimensions/`, each key ending in its unit; the wing is rectangular.
 
     Returns
     -------
-    dict of (5,) arrays
-        ``alpha_rad`` and all of `airframe.COEFFICIENTS`, at angles of attack from fastest to
-        slowest flight, moments about the CG.
+    dict of Array, shape (NODES,)
+        ``alpha_rad`` from fastest to slowest flight, and all of `airframe.COEFFICIENTS` there,
+        per radian, moments about the CG.
+
+    Raises
+    ------
+    KeyError
+        If a dimension is missing.
     """
 
     def n(key: str) -> float:
@@ -167,7 +199,23 @@ def derive(d: Mapping[str, object]) -> dict[str, Array]:
 
 
 def document(d: Mapping[str, object]) -> dict[str, object]:
-    """Return the whole aircraft file of a set of dimensions."""
+    """Return the whole aircraft file of a set of dimensions.
+
+    Parameters
+    ----------
+    d : mapping
+        A file of `dimensions/`.
+
+    Returns
+    -------
+    dict
+        As `host.export.toml.dumps` writes it and `host.aircraft.file.load` reads it.
+
+    Raises
+    ------
+    KeyError
+        If a dimension is missing.
+    """
 
     def n(key: str) -> float:
         return float(str(d[key]))
@@ -258,10 +306,10 @@ def document(d: Mapping[str, object]) -> dict[str, object]:
             },
         },
         "servo": {
-            "bandwidth_hz": 8.0,
-            "rate_limit_radps": 5.236,
-            "source": "Futaba S3010, 0.20 s per 60 deg at 4.8 V (thesis)",
-            "sources": {"bandwidth_hz": "as measured for servos of the Ultra Stick 25e"},
+            "bandwidth_hz": usual_servo.BANDWIDTH_HZ,
+            "rate_limit_radps": usual_servo.RATE_LIMIT_RADPS,
+            "source": usual_servo.RATE_LIMIT_SOURCE,
+            "sources": {"bandwidth_hz": usual_servo.BANDWIDTH_SOURCE},
         },
         "surfaces": {
             "elevator_limit_rad": 0.3491,
@@ -289,14 +337,31 @@ def document(d: Mapping[str, object]) -> dict[str, object]:
 
 
 def generate(source: Path) -> str:
-    """Return the text of the aircraft file of one dimensions file."""
+    """Return the text of the aircraft file of one dimensions file.
+
+    Parameters
+    ----------
+    source : Path
+        TOML file of `dimensions/`.
+
+    Raises
+    ------
+    KeyError, tomllib.TOMLDecodeError
+        If a dimension is missing, or the file is no TOML.
+    """
     d = tomllib.loads(source.read_text(encoding="utf-8"))
     head = f"# Generated by host/aircraft/handbook.py from dimensions/{source.name}.\n"
     return head + dumps(document(d))
 
 
 def main(arguments: list[str]) -> int:
-    """Write every generated aircraft file, or with --check compare; return an exit code."""
+    """Write every generated aircraft file, or with ``--check`` compare them.
+
+    Returns
+    -------
+    int
+        Exit code: 0, or 6 if a committed file is not what the dimensions give.
+    """
     stale = []
     for source in sorted(DIMENSIONS.glob("*.toml")):
         target = FOLDER / source.name

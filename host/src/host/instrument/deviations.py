@@ -1,8 +1,7 @@
-"""The instrument as identification meets it: sensors' places and dynamics, one deviation of each
-unknown.
+"""Sensor error model of identification: places, dynamics, one standard deviation per error.
 
-Every unknown moves the corrected signals or the known mass properties. The mean of two sensors is
-read: the deviation of the mean is what counts.
+Every error moves the corrected signals or the known mass properties. Two sensors of a kind are
+averaged, so the deviation of their mean counts.
 """
 
 from __future__ import annotations
@@ -10,15 +9,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+from host.aircraft import usual_servo
 from host.aircraft.file import load_measured
 from host.aircraft.mass_properties import AirframeData, Place, place
 from host.instrument.instrument_errors import InstrumentErrors, instrument_errors, standard_errors
 from host.instrument.recording import Recording
 from host.physical.calibration import Calibration
 
-LEAST_CLOCK_SHARE = 1e-5  # GPS leaves 0.2 ppm: less than this is nothing beside 1 % of anything
-SERVO_HZ, SERVO_RATE_RADPS = 8.0, 2.617994  # as measured for the Ultra Stick 25e: 150 deg/s
-VANE_LATE_S = 8e-3  # about a vane's delay at trim: the filter model's error is a share of it
+LEAST_CLOCK_SHARE = 1e-5  # GPS leaves 0.2 ppm, which no interval shows
+VANE_DELAY_S = 8e-3  # about a vane's delay at trim: the filter model's error is a share of it
 POTS = {
     "elevator": ("pot_elevator",),
     "aileron": ("pot_aileron_left", "pot_aileron_right"),
@@ -28,10 +27,10 @@ POTS = {
 
 @dataclass(frozen=True, slots=True)
 class SensorErrorModel:
-    """Places and dynamics of the sensors from the aircraft file, and what may be wrong with them.
+    """Places and dynamics of the sensors from the aircraft file, and their errors.
 
-    Places are in metres from the nominal CG. `recording` is of the flight that is looked at: errors
-    of servos and clock are in some flights only.
+    Places are in metres from the nominal CG. `recording` is that of one flight: only some flights
+    have errors of servos and clock.
     """
 
     imu_m: Place
@@ -50,9 +49,10 @@ class SensorErrorModel:
 
     @property
     def servo(self) -> tuple[float, float]:
-        """Bandwidth (Hz) and fastest rate (rad/s) of the servos; usual ones where no file has."""
-        known = self.servo_hz > 0.0
-        return (self.servo_hz, self.servo_rate_radps) if known else (SERVO_HZ, SERVO_RATE_RADPS)
+        """Bandwidth (Hz) and rate limit (rad/s) of the servos; usual ones if the file has none."""
+        if self.servo_hz > 0.0:
+            return self.servo_hz, self.servo_rate_radps
+        return usual_servo.BANDWIDTH_HZ, usual_servo.RATE_LIMIT_RADPS
 
     def recorded(self, recording: Recording) -> SensorErrorModel:
         """Return the same for a flight recorded so."""
@@ -66,7 +66,7 @@ class SensorErrorModel:
 def sensor_error_model(
     source: str, calibration: Calibration | None = None, *, defaults: bool = False
 ) -> SensorErrorModel:
-    """Return the sensors of an aircraft by name or file, and what they may be wrong by.
+    """Return the sensors of an aircraft by name or file, and their errors.
 
     Parameters
     ----------
@@ -75,13 +75,13 @@ def sensor_error_model(
     calibration : Calibration, optional
         Of the instrument; standard errors without.
     defaults : bool
-        Whether its lines that nobody measured speak too, as `instrument_errors` takes it.
+        Whether its lines that nobody measured count too, as in `instrument_errors`.
 
     Raises
     ------
     host.errors.UsageError
-        If there is no such file, it does not describe its sensors, or the calibration says
-        something of an error that cannot be.
+        If there is no such file, it does not describe its sensors, or an error of the calibration
+        is unknown or impossible.
     """
     loaded = load_measured(source)
     number, vector, cg = loaded.scalar, loaded.vector, loaded.vector("mass.cg_m")
@@ -102,7 +102,7 @@ def sensor_error_model(
 
 
 def unknown_sensors() -> SensorErrorModel:
-    """Return sensors of which no aircraft file says anything."""
+    """Return the sensors of an aircraft without a file: typical dynamics, places at the CG."""
     nowhere = (0.0, 0.0, 0.0)
     return SensorErrorModel(
         nowhere, nowhere, upwash=0.1, vane_hz_per_mps=1.0, vane_damping=0.1,
@@ -111,12 +111,24 @@ def unknown_sensors() -> SensorErrorModel:
 
 
 def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str, float]:
-    """Return one standard deviation of every unknown of the coefficients, by name."""
+    """Return the prior standard deviation of every error that moves a coefficient.
+
+    Parameters
+    ----------
+    instrument : SensorErrorModel
+    airframe : AirframeData
+        Its shares of mass and inertia count too.
+
+    Returns
+    -------
+    dict of str to float
+        By name; a name ends in the unit of its value.
+    """
     e = instrument.errors
     vanes = {"alpha": ("alpha_a", "alpha_b"), "beta": ("beta_a", "beta_b")}
-    late = {
+    lag_share = {
         name: math.hypot(
-            e["delay_share"].of_mean(*pair), e["filter_model_s"].of_mean(pair[0]) / VANE_LATE_S
+            e["delay_share"].of_mean(*pair), e["filter_model_s"].of_mean(pair[0]) / VANE_DELAY_S
         )
         for name, pair in vanes.items()
     }
@@ -135,8 +147,8 @@ def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str
         "pitot_drift_pa": e["pitot_zero_pa"].of_mean(),
         "density_share": e["density_share"].of_mean(),
         "imu_delay_s": imu_delay_s(instrument),
-        "alpha_lag_share": late["alpha"],
-        "beta_lag_share": late["beta"],
+        "alpha_lag_share": lag_share["alpha"],
+        "beta_lag_share": lag_share["beta"],
         "pitot_delay_s": e["delay_share"].of_mean("dp_a", "dp_b") * instrument.pitot_lag_s,
         "friction_share": e["vane_friction_share"].of_mean(),
         **surface_deviations(instrument),
@@ -159,7 +171,7 @@ def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str
 
 
 def surface_deviations(instrument: SensorErrorModel) -> dict[str, float]:
-    """Return one deviation of what is open of the surfaces: of pots, of servos without a pot."""
+    """Return the standard deviations of the surfaces: of a pot, or of the servo without one."""
     e, commanded = instrument.errors, instrument.recording.commanded
     result = {
         f"{surface}_scale": e["pot_scale"].of_mean(*pots)
@@ -173,7 +185,10 @@ def surface_deviations(instrument: SensorErrorModel) -> dict[str, float]:
 
 
 def servo_delay_s(instrument: SensorErrorModel, surface: str) -> float:
-    """Return one deviation of a servo's delay, s: below 3 Hz a lag of the first order is one."""
+    """Return one standard deviation of a servo's delay, s.
+
+    Below 3 Hz its first-order lag is a delay, so the error of its bandwidth is in it.
+    """
     e, (hertz, _) = instrument.errors, instrument.servo
     share = "servo_bandwidth_share" if instrument.servo_hz > 0.0 else "servo_unknown_share"
     lag_s = 1.0 / (2.0 * math.pi * hertz)
@@ -181,13 +196,13 @@ def servo_delay_s(instrument: SensorErrorModel, surface: str) -> float:
 
 
 def dynamic_pressure_share(errors: InstrumentErrors, qbar_pa: float) -> float:
-    """Return one deviation of a dynamic pressure as the pitots read it, as a share of it."""
+    """Return one standard deviation of the pitots' dynamic pressure, as a share of it."""
     zero = errors["pitot_zero_pa"].of_mean() / qbar_pa
     return math.hypot(errors["pitot_scale"].of_mean(), zero)
 
 
 def clock_share(instrument: SensorErrorModel) -> float:
-    """Return one deviation of the clock's scale: as GPS left it, else the resonator's."""
+    """Return one standard deviation of the clock's scale: after GPS, else the resonator's."""
     left = instrument.recording.clock_share
     if left is None:
         return instrument.errors["clock_share"].sigma("mega")
@@ -195,13 +210,13 @@ def clock_share(instrument: SensorErrorModel) -> float:
 
 
 def imu_delay_s(instrument: SensorErrorModel) -> float:
-    """Return one deviation of the IMU's delay, s: what its filter's model leaves in it too."""
+    """Return one standard deviation of the IMU's delay, s, with the error of its filter model."""
     e = instrument.errors
     return math.hypot(e["delay_least_s"].sigma("imu"), e["filter_model_s"].sigma("imu"))
 
 
 def vane_delay_s(instrument: SensorErrorModel, nominal_s: float) -> float:
-    """Return one deviation of the vanes' mean delay, s."""
+    """Return one standard deviation of the vanes' mean delay, s."""
     e = instrument.errors
     share, least = e["delay_share"], e["delay_least_s"]
     pairs = (("alpha_a", "alpha_b"), ("beta_a", "beta_b"))

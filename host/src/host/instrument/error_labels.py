@@ -1,4 +1,4 @@
-"""What an error of instrument or aircraft is called in a sentence."""
+"""Names of the errors of instrument and aircraft in sentences, and notes on what is uncertain."""
 
 from __future__ import annotations
 
@@ -34,8 +34,19 @@ ERROR_LABELS |= {
 }
 
 
-def recording_words(instrument: SensorErrorModel) -> list[str]:
-    """Return what is open of a flight's servos and clock, for its notes."""
+def recording_notes(instrument: SensorErrorModel) -> list[str]:
+    """Return the notes of a flight on surfaces without a pot and on a clock without GPS.
+
+    Parameters
+    ----------
+    instrument : SensorErrorModel
+        Of that flight: its `recording` says which surfaces were only commanded.
+
+    Returns
+    -------
+    list of str
+        A sentence for each, none where pots and GPS measured.
+    """
     hertz, rate = instrument.servo
     whose = "the aircraft file's servos" if instrument.servo_hz > 0.0 else "usual servos"
     lines = []

@@ -1,7 +1,7 @@
-"""Every error an instrument may have, by name: how large, how drawn, for whom, and who says so.
+"""Every error of an instrument by name: its size, distribution, sensors, and source.
 
-`standard.toml` has them all; a calibration and an aircraft file say better. Identification takes
-one standard deviation of each from here, the virtual flight draws from here.
+`standard.toml` has them all. A calibration and an aircraft file replace what they know better.
+Identification takes one standard deviation of each from here; the virtual flight draws from here.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from host.instrument.recording import SURFACES
 from host.physical.calibration import Calibration, Line
 
 STANDARD = Path(__file__).with_name("standard.toml")
-EVEN = 1.0 / math.sqrt(3.0)  # standard deviation of an even distribution over its half-width
+UNIFORM_SD_PER_HALF_WIDTH = 1.0 / math.sqrt(3.0)  # "even" in the files
 DISTRIBUTIONS = ("even", "normal")
 DRAWN = ("instrument", "flight")
 KEYS = ("sigma", "half_width", "distribution", "drawn", "shared", "source")
@@ -58,7 +58,7 @@ class NamedError:
         Those of the sensors that have one value in common; others have their own.
     source : str
     aircraft_file : str
-        Which tolerance of an aircraft file says it; empty: none.
+        The tolerance of an aircraft file that gives it; empty: none.
     """
 
     name: str
@@ -73,7 +73,7 @@ class NamedError:
     @property
     def sigmas(self) -> tuple[float, ...]:
         """One standard deviation of each sensor."""
-        return tuple(w * (EVEN if self.distribution == "even" else 1.0) for w in self.width)
+        return tuple(w * _sd_per_width(self.distribution) for w in self.width)
 
     def sigma(self, sensor: str) -> float:
         """Return one standard deviation of a sensor's error."""
@@ -116,10 +116,10 @@ def standard_errors() -> InstrumentErrors:
     document = tomllib.loads(STANDARD.read_text(encoding="utf-8"))
     found = {}
     for name, table in document["error"].items():
-        said = table.get("aircraft_file", "")
-        blank = NamedError(name, tuple(table["sensors"]), (), "even", "flight", (), "", said)
+        key = table.get("aircraft_file", "")
+        blank = NamedError(name, tuple(table["sensors"]), (), "even", "flight", (), "", key)
         kept = {k: v for k, v in table.items() if k in KEYS}
-        found[name] = _said(blank, kept, f"{STANDARD.name}: [error.{name}]")
+        found[name] = _apply_table(blank, kept, f"{STANDARD.name}: [error.{name}]")
     return InstrumentErrors(found)
 
 
@@ -138,8 +138,9 @@ def instrument_errors(
     calibration : Calibration, optional
         Gives the deviations of its measured lines and its tables [error.NAME].
     defaults : bool
-        Whether a line that nobody measured on this instrument speaks too: the columns were made
-        with it. Its deviations are those of a sensor out of the box. Without, the standard holds.
+        Whether a line that nobody measured on this instrument counts too, because the columns
+        were made with it. Its deviations are those of a sensor out of the box. Without, the
+        standard holds.
 
     Raises
     ------
@@ -156,7 +157,7 @@ def instrument_errors(
     if calibration is not None:
         for name, line in calibration.lines.items():
             if defaults or not line.default:
-                _take_line(found, name, line)
+                _apply_line(found, name, line)
         for name, table in calibration.errors.items():
             where = f"{calibration.path}: [error.{name}]"
             if name not in found:
@@ -167,12 +168,12 @@ def instrument_errors(
                 raise CalibrationError(
                     f"{where} belongs into the aircraft file, as {found[name].aircraft_file}"
                 )
-            found[name] = _said(found[name], table, where)
+            found[name] = _apply_table(found[name], table, where)
     return InstrumentErrors(found)
 
 
-def _take_line(found: dict[str, NamedError], name: str, line: Line) -> None:
-    """Put the deviations of a calibration's line where they belong."""
+def _apply_line(found: dict[str, NamedError], name: str, line: Line) -> None:
+    """Replace the deviations of zero and slope of the sensors that a calibration's line is of."""
     channel = name.partition(".")[2]
     if name in IMU_LINES:
         zero, scale = IMU_LINES[name]
@@ -187,15 +188,15 @@ def _take_line(found: dict[str, NamedError], name: str, line: Line) -> None:
         return
     for error, sigma in ((zero, by_zero), (scale, line.slope_sigma)):
         old = found[error]
-        width = sigma / (EVEN if old.distribution == "even" else 1.0)
+        width = sigma / _sd_per_width(old.distribution)
         widths = tuple(
             width if s in sensors else w for s, w in zip(old.sensors, old.width, strict=True)
         )
         found[error] = replace(old, width=widths, source=line.source)
 
 
-def _said(error: NamedError, table: Mapping[str, object], where: str) -> NamedError:
-    """Return an error with what a table says of it."""
+def _apply_table(error: NamedError, table: Mapping[str, object], where: str) -> NamedError:
+    """Return an error with the keys of its table in place of what it had; refuse a wrong one."""
     unknown = [key for key in table if key not in KEYS]
     if unknown:
         raise CalibrationError(f"{where} has {unknown[0]!r}, expected of {', '.join(KEYS)}")
@@ -211,7 +212,7 @@ def _said(error: NamedError, table: Mapping[str, object], where: str) -> NamedEr
     distribution = str(table.get("distribution", error.distribution))
     width = error.width
     if distribution != error.distribution and width:
-        ratio = EVEN if error.distribution == "even" else 1.0 / EVEN
+        ratio = _sd_per_width(error.distribution) / _sd_per_width(distribution)
         width = tuple(ratio * w for w in width)  # the same deviation
     if "sigma" in table and "half_width" in table:
         raise CalibrationError(f"{where} has sigma and half_width, expected one of them")
@@ -220,9 +221,9 @@ def _said(error: NamedError, table: Mapping[str, object], where: str) -> NamedEr
             continue
         if key == "half_width" and distribution != "even":
             raise CalibrationError(f"{where} is {distribution} and has half_width, expected sigma")
-        width = _numbers(table[key], len(error.sensors), f"{where} {key}")
+        width = _one_per_sensor(table[key], len(error.sensors), f"{where} {key}")
         if key == "sigma" and distribution == "even":
-            width = tuple(w / EVEN for w in width)
+            width = tuple(w / UNIFORM_SD_PER_HALF_WIDTH for w in width)
     if not width:
         raise CalibrationError(f"{where} has no sigma")
     return replace(
@@ -235,7 +236,12 @@ def _said(error: NamedError, table: Mapping[str, object], where: str) -> NamedEr
     )
 
 
-def _numbers(value: object, count: int, where: str) -> tuple[float, ...]:
+def _sd_per_width(distribution: str) -> float:
+    """Return the standard deviation of a distribution over its width."""
+    return UNIFORM_SD_PER_HALF_WIDTH if distribution == "even" else 1.0
+
+
+def _one_per_sensor(value: object, count: int, where: str) -> tuple[float, ...]:
     """Return one number per sensor, of a number or a list."""
     listed = value if isinstance(value, list) else [value] * count
     good = [

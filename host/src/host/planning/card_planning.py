@@ -1,9 +1,8 @@
-"""Test points before they are flown: what the aircraft will do, and what the data will tell.
+"""Test points before they are flown: excursions of the aircraft and bounds of its derivatives.
 
-Excursions come from flying the nominal aircraft in calm air with exact inputs. Bounds come from
-`host.sysid` (sensitivities of output error on that flight, sensors' white noise), so they are
-the Cramer-Rao bounds of the whole card: all longitudinal test points together, all lateral ones
-together.
+Excursions come from flying the nominal aircraft in calm air with exact inputs. Bounds are
+Cramer-Rao bounds of the whole card: sensitivities of output error on that flight and the sensors'
+white noise, all longitudinal test points together, all lateral ones together.
 """
 
 from __future__ import annotations
@@ -62,7 +61,22 @@ TARGET_EXCURSIONS = {"alpha_deg": 3.5, "beta_deg": 6.0, "bank_deg": 30.0}
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One test point of a card and what to expect of it (largest changes from trim)."""
+    """One test point of a card, and the largest changes from trim to expect of it.
+
+    Attributes
+    ----------
+    kind : str
+        Input, as test cards name it.
+    axes : tuple of str
+    amplitudes : tuple of float
+        One per axis, deg.
+    width_s, duration_s : float
+        Of a step of the input, and of the test point.
+    airspeed_mps, alpha_deg, beta_deg, bank_deg, pitch_deg : float
+    roll_rate_degps, pitch_rate_degps, yaw_rate_degps : float
+    load_factor : tuple of float
+        Least and largest.
+    """
 
     kind: str
     axes: tuple[str, ...]
@@ -82,7 +96,14 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Predicted value of a derivative and its 95 % half-width from the whole card."""
+    """Predicted value of a derivative and its 95 % half-width from the whole card.
+
+    Attributes
+    ----------
+    name : str
+    value, half_width : float
+        In the units of the linear model.
+    """
 
     name: str
     value: float
@@ -115,7 +136,12 @@ class Plan:
 
 
 def exact(card: Card) -> Card:
-    """Return the card in calm air, with exact inputs and no faults."""
+    """Return the card in calm air, with exact inputs and no faults, at 25 Hz or more.
+
+    Parameters
+    ----------
+    card : Card
+    """
     calm = replace(card.air, wind_north_mps=0.0, wind_east_mps=0.0, turbulence_mps=0.0)
     pilot = Pilot(
         timing_s=0.0, amplitude=0.0, drift=0.0, remnant=0.0, early=0.0,
@@ -129,7 +155,7 @@ def exact(card: Card) -> Card:
 
 
 def judge(card: Card) -> Plan:
-    """Fly a card ideally and predict what it will tell.
+    """Fly a card ideally and predict the bounds of its derivatives.
 
     Parameters
     ----------
@@ -182,7 +208,13 @@ def _bounds(
     windows: list[tuple[Window, int]],
     shown: tuple[str, ...],
 ) -> list[Bound]:
-    """Fit the windows once each; a repeated one counts as often in the information."""
+    """Return bounds from the information of the windows, a repeated one as often as it is flown.
+
+    Raises
+    ------
+    IdentificationError
+        The model's response grows without bound, or the fit fails.
+    """
     cuts = [
         Maneuver.from_table(table, model, from_s=w.start_s - 0.3, to_s=w.end_s) for w, _ in windows
     ]
@@ -263,6 +295,11 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
     Returns
     -------
     Card
+
+    Raises
+    ------
+    AircraftError, TrimError
+        The aircraft cannot be read, or not be trimmed at that airspeed.
     """
     aircraft = load(name)
     speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")
@@ -302,7 +339,17 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
 
 
 def document(card: Card) -> dict[str, object]:
-    """Return a designed card as `tomlout.dumps` takes it."""
+    """Return a designed card as `host.export.toml.dumps` takes it.
+
+    Parameters
+    ----------
+    card : Card
+
+    Returns
+    -------
+    dict
+        Equal test points one after the other are one segment with its ``repeat``.
+    """
     listed: list[dict[str, object]] = []
     for s in card.segments:
         row: dict[str, object] = {"kind": s.kind}

@@ -29,7 +29,18 @@ INPUTS = {
 
 
 def is_model(source: str | Path) -> bool:
-    """Return whether a file is a model as `host identify --save-model` writes it."""
+    """Return whether a file is a model as `host identify --save-model` writes it.
+
+    Parameters
+    ----------
+    source : str or Path
+        Anything; a name of an aircraft is no file.
+
+    Raises
+    ------
+    AircraftError
+        If a TOML file cannot be read.
+    """
     path = Path(source)
     if path.suffix != ".toml" or not path.is_file():
         return False

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from host.instrument.error_labels import recording_words
+from host.instrument.error_labels import recording_notes
 from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
 from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
@@ -78,7 +78,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     instrument = known.flown(read) if known else None
     if instrument is not None:
         columns = surface_positions(columns, instrument)
-        notes += recording_words(instrument)
+        notes += recording_notes(instrument)
     found = select_maneuvers(columns, from_s=how.from_s, to_s=how.to_s, numbers=how.maneuvers)
     agreement = None
     try:

@@ -10,7 +10,11 @@ from host.aircraft.file import load
 from host.aircraft.mass_properties import airframe_data
 from host.errors import CalibrationError
 from host.instrument.deviations import deviations, sensor_error_model
-from host.instrument.instrument_errors import EVEN, instrument_errors, standard_errors
+from host.instrument.instrument_errors import (
+    UNIFORM_SD_PER_HALF_WIDTH,
+    instrument_errors,
+    standard_errors,
+)
 from host.instrument.recording import Recording
 from host.physical.calibration import load_calibration
 from host.resources import resource
@@ -118,7 +122,7 @@ source = "flash lamp and oscilloscope"
     assert scale.of_mean("alpha_a", "alpha_b") == pytest.approx(0.01)  # of one value, not of two
     assert scale.of_mean("beta_a", "beta_b") == pytest.approx(0.01 / math.sqrt(2.0))
     late = errors["delay_share"]
-    assert late.sigma("alpha_b") == pytest.approx(0.3 * EVEN)
+    assert late.sigma("alpha_b") == pytest.approx(0.3 * UNIFORM_SD_PER_HALF_WIDTH)
     draws = [
         draw(plane, np.random.default_rng(k), tolerances=True, errors=errors) for k in range(300)
     ]
@@ -126,7 +130,8 @@ source = "flash lamp and oscilloscope"
     assert np.array_equal(drawn[:, 0], drawn[:, 1])
     assert np.all(drawn[:, 2] != drawn[:, 3])
     assert np.std(drawn[:, 0]) == pytest.approx(0.01, rel=0.2)
-    assert np.abs(drawn[:, 0]).max() > 0.01 / EVEN  # beyond an even one of the same deviation
+    # Beyond an even distribution of the same deviation.
+    assert np.abs(drawn[:, 0]).max() > 0.01 / UNIFORM_SD_PER_HALF_WIDTH
 
 
 @pytest.mark.parametrize(
