@@ -17,6 +17,7 @@ from types import FrameType
 from typing import TextIO
 
 from host.errors import ExitCode, HostError
+from host.placed_arguments import PlacedParser
 from host.terminal import cleaned_streams
 
 # name -> one line of help. A verb is listed when its module is in the tree.
@@ -166,7 +167,9 @@ def _run(arguments: list[str]) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="store_true", help="print the version and stop")
-    subparsers = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs")
+    subparsers = parser.add_subparsers(
+        dest="verb", metavar="VERB", title="verbs", parser_class=PlacedParser
+    )
     chosen = next((one for one in arguments if not one.startswith("-")), None)
     module = None
     for name, text in known.items():

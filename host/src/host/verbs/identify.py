@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from host.placed_arguments import StorePlaced, of_each, stretches_of_each
+
 if TYPE_CHECKING:
     from host.sysid.answer.output_files import OutputPaths
 
@@ -21,10 +23,13 @@ def add_parser(subparsers: Any) -> None:
         description="Find the maneuvers of a flight, fit a model to them jointly, check it on"
         " maneuvers it has not seen, and say what of it can be trusted.",
     )
-    parser.add_argument("source", type=Path, nargs="*",
-                        help="log, CSV, Parquet, MAT; several are fitted together")  # fmt: skip
-    parser.add_argument("--map", type=Path, metavar="TOML", help="foreign names, units and signs")
-    parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
+    parser.add_files("log, CSV, Parquet, MAT; several are fitted together. --from and --to belong"
+                     " to the source before them")  # fmt: skip
+    parser.add_argument("--map", type=Path, metavar="TOML", action=StorePlaced, default=[],
+                        help="foreign names, units and signs; once for all sources, or behind each"
+                        " that needs one")  # fmt: skip
+    parser.add_argument("--calibration", type=Path, metavar="TOML", action=StorePlaced, default=[],
+                        help="calibration of a log; as --map")  # fmt: skip
     parser.add_argument(
         "--model",
         action="append",
@@ -42,17 +47,25 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: mass, sizes, sensors;"
                         " gives coefficients")  # fmt: skip
-    parser.add_argument("--truth", type=Path, metavar="TOML", action="append",
+    parser.add_argument("--truth", type=Path, metavar="TOML", action=StorePlaced, default=[],
                         help="truth of a simulated flight: compare with it; of several flights"
-                        " repeatable")  # fmt: skip
+                        " one each")  # fmt: skip
     parser.add_argument("--prior", type=Path, metavar="FILE",
                         help="coefficients to compare with: TOML, AVL, Datcom")  # fmt: skip
-    parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="start of the fit")
-    parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="end of the fit")
+    parser.add_argument("--from", dest="ends", type=float, metavar="S",
+                        action=StorePlaced, const=0, default=[],
+                        help="start of a stretch of the source before it: fitted whatever moved"
+                        " in it, in place of the maneuvers found; repeatable")  # fmt: skip
+    parser.add_argument("--to", dest="ends", action=StorePlaced, const=1, type=float, metavar="S",
+                        default=[], help="end of it")  # fmt: skip
     parser.add_argument("--maneuver", type=int, action="append", metavar="N",
                         help="use only maneuver N of `host maneuvers`; repeatable")  # fmt: skip
     parser.add_argument("--no-corrections", action="store_true",
                         help="leave sensor errors that the flight tells in the data")  # fmt: skip
+    _add_outputs(parser)
+
+
+def _add_outputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--mat", type=Path, metavar="FILE", help="write a MAT file")
     parser.add_argument("--plots", type=Path, metavar="DIR", help="write pictures")
@@ -104,13 +117,12 @@ def _run(args: argparse.Namespace) -> int:
         aircraft=args.aircraft,
         models=args.model,
         methods=args.method,
-        calibration=args.calibration,
-        mapping=args.map,
+        calibration=of_each("--calibration", args.calibration, len(args.source)),
+        mapping=of_each("--map", args.map, len(args.source)),
         maneuvers=args.maneuver or (),
-        from_s=args.from_s,
-        to_s=args.to_s,
+        stretches=stretches_of_each(args.ends, len(args.source)),
         corrections=not args.no_corrections,
-        truth=args.truth,
+        truth=[path for _, path in args.truth],
         prior=args.prior,
     )
     if args.json:
@@ -132,7 +144,8 @@ def _places(args: argparse.Namespace) -> OutputPaths:
     """Return where files go, and every file that the answer is made from."""
     from host.sysid.answer.output_files import OutputPaths
 
-    given = [*args.source, args.map, args.calibration, *(args.truth or ()), args.prior]
+    placed = [*args.map, *args.calibration, *args.truth]
+    given = [*args.source, *(path for _, path in placed), args.prior]
     given += [Path(name) for name in (args.aircraft, *(args.model or ())) if name]
     return OutputPaths(
         plots=args.plots,

@@ -11,7 +11,11 @@ from host.cli import main
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import AXES, detect_maneuvers, grade
-from host.sysid.flight.maneuver_selection import excited_axes, select_maneuvers
+from host.sysid.flight.maneuver_selection import (
+    excited_axes,
+    merge_overlapping,
+    select_maneuvers,
+)
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import model_from
 
@@ -46,8 +50,7 @@ def fitted(columns: Columns, **options: Any) -> list[tuple[float, float]]:
 
 def test_a_stretch_of_two_surfaces_is_one_record(flight: Columns) -> None:
     found = detect_maneuvers(flight)
-    windows = select_maneuvers(flight, from_s=found[2].start_s - 1.0, to_s=found[3].end_s)
-    assert windows is not None
+    windows = select_maneuvers(flight, stretches=[(found[2].start_s - 1.0, found[3].end_s)])
     assert {f.axis for f in windows} == {"aileron_rad", "rudder_rad"}
     assert len(fitted(flight, names=("lateral",), windows=windows)) == 1
 
@@ -77,11 +80,11 @@ def test_a_model_of_ones_own_is_fitted_where_its_input_moved(flight: Columns) ->
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"from_s": 100.0, "to_s": 120.0}, "0 samples, at least 8 .* from 0.02 to 39"),
-        ({"from_s": 15.0, "to_s": 15.01}, "samples, at least 8"),
-        ({"from_s": 20.0, "to_s": 10.0}, "start is not before the end"),
-        ({"from_s": float("nan")}, "start is not before the end"),
-        ({"from_s": 12.0, "numbers": [1]}, "excludes argument from_s"),
+        ({"stretches": [(100.0, 120.0)]}, "0 samples, at least 8 .* from 0.02 to 39"),
+        ({"stretches": [(12.0, 14.0), (15.0, 15.01)]}, "samples, at least 8"),
+        ({"stretches": [(20.0, 10.0)]}, "start is not before the end"),
+        ({"stretches": [(float("nan"), None)]}, "start is not before the end"),
+        ({"stretches": [(12.0, None)], "numbers": [1]}, "excludes argument from_s"),
         ({"numbers": [5]}, "no maneuver 5: there are 4"),
         ({"numbers": [0]}, "no maneuver 0: there are 4"),
     ],
@@ -93,18 +96,42 @@ def test_what_cannot_be_chosen_says_why(
         select_maneuvers(flight, **options)
 
 
-def test_a_stretch_with_nothing_to_fit_says_why(flight: Columns) -> None:
+def test_a_gap_divides_a_stretch(flight: Columns) -> None:
     t = flight["t_s"]
     gap = {**flight, "bridged": ((t > 14.0) & (t < 14.5)).astype(float)}
-    with pytest.raises(IdentificationError, match=r"a gap there, at 14\.0"):
-        select_maneuvers(gap, from_s=12.0, to_s=16.0)
-    still = {**flight, **{f"{s}_rad": 0.0 * t for s in ("elevator", "aileron", "rudder")}}
-    with pytest.raises(IdentificationError, match="no surface moved there"):
-        select_maneuvers(still, from_s=12.0, to_s=16.0)
+    before, after = merge_overlapping(select_maneuvers(gap, stretches=[(12.0, 16.0)]))
+    assert before.fit_window() == pytest.approx((12.0, 14.0), abs=0.011)
+    assert after.fit_window() == pytest.approx((14.5, 16.0), abs=0.011)
+    with pytest.raises(IdentificationError, match="nothing but gaps"):
+        select_maneuvers(gap, stretches=[(14.1, 14.4)])
+    none = {**flight, **{f"{s}_rad": 0.0 * t for s in ("elevator", "aileron", "rudder")}}
     with pytest.raises(IdentificationError, match="none was found"):
-        select_maneuvers(still, numbers=[1])
-    with pytest.raises(IdentificationError, match="the data have none of elevator_rad"):
-        select_maneuvers({"t_s": t, "q_radps": flight["q_radps"]}, from_s=12.0, to_s=16.0)
+        select_maneuvers(none, numbers=[1])
+
+
+def test_a_stretch_is_a_maneuver_whatever_moved_in_it(flight: Columns) -> None:
+    """A model asked for is fitted where another surface led; by default it is left out."""
+    [aileron] = [f for f in detect_maneuvers(flight) if f.axis == "aileron_rad"]
+    windows = select_maneuvers(flight, stretches=[aileron.fit_window()])
+    assert {f.axis for f in windows} == {"aileron_rad"}
+    elevator = flight["elevator_rad"] + 0.01 * np.sin(5.0 * flight["t_s"])
+    columns = {**flight, "elevator_rad": elevator}
+    options: dict[str, Any] = {"windows": windows, "method": "equation-error"}
+    [answer] = identify(columns, names=("own",), user_model=SHORT_PERIOD, **options)
+    assert [f.fit_window() for f in answer.used] == [pytest.approx(aileron.fit_window(), abs=0.02)]
+    with pytest.raises(IdentificationError, match="found only aileron_rad; argument models names"):
+        identify(columns, names=("short-period",), **options)
+
+
+def test_stretches_are_neither_graded_nor_held_out(flight: Columns) -> None:
+    t, elevator = flight["t_s"], np.zeros(len(flight["t_s"]))
+    for first in (12.0, 16.0, 20.0):
+        elevator[(t >= first) & (t < first + 0.3)] = 0.05
+    columns = {**flight, "elevator_rad": elevator}
+    stretches = [(12.0, 14.0), (16.0, 18.0), (20.0, 22.0)]  # each begins with its input
+    windows = select_maneuvers(columns, stretches=stretches)
+    used = fitted(columns, names=("own",), user_model=SHORT_PERIOD, windows=windows)
+    assert used == [pytest.approx(span, abs=0.011) for span in stretches]
 
 
 def test_missing_columns_are_named_not_stumbled_over(flight: Columns) -> None:

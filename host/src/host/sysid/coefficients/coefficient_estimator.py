@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -219,7 +219,9 @@ class CoefficientEstimator:
         columns = flight.recorded
         if "airspeed_mps" not in columns:
             raise IdentificationError("coefficients need the columns airspeed_mps and qbar_pa")
-        flying = _airborne_samples(columns)
+        # Who gives a stretch has looked: it may begin with the record.
+        given = any(f.given for f in flight.maneuvers)
+        flying = _airborne_samples(columns, 0.0 if given else SETTLED_S)
         t = columns["t_s"][flying]
         if len(t) == 0:
             raise IdentificationError(
@@ -230,9 +232,9 @@ class CoefficientEstimator:
             f
             for f in flight.maneuvers
             if f.axis != "throttle" and f.end_s - f.start_s + LEAD_S >= SHORTEST_S
-            and t[0] <= f.start_s - LEAD_S and f.end_s <= t[-1]
+            and t[0] <= f.start_s - (0.0 if f.given else LEAD_S) and f.end_s <= t[-1]
         ]  # fmt: skip
-        spans = merged_windows(found)
+        spans = [replace(w, first_s=max(w.first_s, float(t[0]))) for w in merged_windows(found)]
         search = search_coefficients(
             {k: v[flying] for k, v in columns.items()},
             spans,
@@ -312,11 +314,11 @@ def merged_windows(found: Sequence[DetectedManeuver]) -> list[Window]:
     return windows
 
 
-def _airborne_samples(columns: Mapping[str, Array]) -> slice:
+def _airborne_samples(columns: Mapping[str, Array], settled_s: float) -> slice:
     """Return the samples from some seconds after the launch to the end of the flight."""
     t, speed = columns["t_s"], columns["airspeed_mps"]
     up = np.flatnonzero(speed > FLYING_SHARE * float(np.median(speed)))
-    first = int(np.searchsorted(t, t[up[0]] + SETTLED_S, side="right"))
+    first = int(np.searchsorted(t, t[up[0]] + settled_s, side="right"))
     return slice(first, int(up[-1]) + 1)
 
 

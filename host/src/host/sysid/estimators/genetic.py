@@ -9,7 +9,7 @@ import numpy as np
 from scipy import optimize
 
 from host.arrays import Array
-from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.estimators.output_error_fit import fit_output_error, sample_periods
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -45,7 +45,7 @@ def fit_genetic(
     seed : int
         Of the random numbers: the answer is repeatable.
     polish : bool
-        Estimate AR models of the noise in the final fit.
+        Estimate AR models of the noise in the final fit; those of one sample period only.
     """
     problem = OutputProblem(model, maneuvers)
     count = len(model.parameters)
@@ -75,7 +75,9 @@ def fit_genetic(
         raise IdentificationError("genetic search: every trial diverges; give tighter bounds")
     theta = base.copy()
     theta[:count] = found.x
-    result = fit_output_error(model, maneuvers, start=theta, coloured_noise=polish)
+    result = fit_output_error(
+        model, maneuvers, start=theta, coloured_noise=polish and len(sample_periods(maneuvers)) == 1
+    )
     details = {**result.details, "search_score": float(found.fun), "search_best": found.x}
     return replace(result, method="genetic search, polished", details=details)
 

@@ -18,6 +18,8 @@ from host.sysid.numerics.maneuver_agreement import maneuver_influence
 from host.sysid.numerics.output_error import unidentifiable_covariance, whitened_sensitivities
 from host.sysid.numerics.output_error_problem import OutputProblem
 
+SAME_RATE = 1.02  # sample periods that differ by less: ceramic resonators do, by half a per cent
+
 
 def fit_output_error(
     model: LinearModel,
@@ -47,9 +49,12 @@ def fit_output_error(
     Raises
     ------
     IdentificationError
-        If no start is finite or the information is singular.
+        If no start is finite, the information is singular, or the noise of records of several
+        rates shall have a memory.
     """
     problem = OutputProblem(model, maneuvers)
+    if coloured_noise:
+        _check_rates(maneuvers)
     first = start_values(problem) if start is None else np.asarray(start, dtype=np.float64)
     if len(first) != len(problem.names):
         raise IdentificationError(
@@ -86,6 +91,25 @@ def fit_output_error(
             **_maneuver_influence(problem, fit),
         },
     )
+
+
+def sample_periods(maneuvers: Sequence[Maneuver]) -> list[float]:
+    """Return the different sample periods, s; those of two clocks of one rate are one."""
+    found: list[float] = []
+    for dt_s in sorted(m.dt_s for m in maneuvers):
+        if not found or dt_s > SAME_RATE * found[-1]:
+            found.append(dt_s)
+    return found
+
+
+def _check_rates(maneuvers: Sequence[Maneuver]) -> None:
+    """Refuse records of several rates: an autoregression is that of one sample period."""
+    periods = sample_periods(maneuvers)
+    if len(periods) > 1:
+        raise IdentificationError(
+            f"output-error estimates one noise model, and records of {periods[0]:g} and"
+            f" {periods[-1]:g} s a sample have two; use output-error-white or filter-error"
+        )
 
 
 def _maneuver_influence(problem: OutputProblem, fit: ArNoiseFit) -> dict[str, float | Array]:

@@ -193,6 +193,8 @@ class LinearEstimator:
         Gives coefficients.
     powerplant : Powerplant, optional
         Gives the rotor's spin.
+    named : bool
+        The user asked for this model: a stretch given is a maneuver of it, whatever moved more.
     """
 
     template: str
@@ -200,6 +202,7 @@ class LinearEstimator:
     method: str = DEFAULT_METHOD
     airframe: AirframeData | None = None
     powerplant: Powerplant | None = None
+    named: bool = False
 
     def estimate(self, flights: Sequence[ReconstructedFlight]) -> LinearEstimate:
         """Fit the model to the maneuvers of its axes, the last of an axis held out.
@@ -326,19 +329,28 @@ class LinearEstimator:
                 " more"
             )
         axes = AXIS_OF[self.template] if self.own is None else excited_axes(self.own.inputs)
+        named = self.named or self.own is not None
         mine = flown_maneuvers(
             flights,
-            [merge_overlapping([f for f in x.maneuvers if f.axis in axes]) for x in flights],
+            [
+                merge_overlapping([f for f in x.maneuvers if f.axis in axes or (f.given and named)])
+                for x in flights
+            ],
         )
         # The order in which flights are given shall not choose the maneuver that is held out.
         mine.sort(key=lambda m: [(f.start_s, f.end_s, f.amplitude) for f in m.flight.maneuvers])
         if not mine:
+            given = "; argument models names it all the same" if every[0].given else ""
             raise NoManeuverError(
                 f"no maneuver of {', '.join(axes)} for {self.template}; found"
-                f" only {', '.join(sorted({f.axis for f in every}))}"
+                f" only {', '.join(sorted({f.axis for f in every}))}{given}"
             )
-        good = [m for m in mine if grade(m.flight.corrected, m.found).score >= WEAK_GRADE] or mine
-        held = _held_out(good)
+        good = [
+            m
+            for m in mine
+            if m.found.given or grade(m.flight.corrected, m.found).score >= WEAK_GRADE
+        ] or mine
+        held = _held_out([m for m in good if not m.found.given])
         return [m for m in good if m not in held], held
 
     def _model(self, used: Sequence[FlownManeuver], trim: Trim) -> tuple[LinearModel, str]:
@@ -347,7 +359,8 @@ class LinearEstimator:
         free = frees_places(self.method)
         able = free and all(m.flight.delays_open for m in used)
         if self.own is None:
-            model = template_at(flight.corrected, self.template, trim, self.method, able=able)
+            shared = set.intersection(*(set(m.flight.corrected) for m in used))
+            model = template_at(shared, self.template, trim, self.method, able=able)
         else:
             model = self.own if able else without_standard_delays(self.own)
         instrument = None if flight.compatibility is None else flight.compatibility.instrument

@@ -26,7 +26,8 @@ SWEEP_LEAD_S = 25.0  # slow swings of a sweep are looked for this far before its
 STEADY_TREND = 0.6  # rank correlation of swing length with order: a sweep's swings shorten
 SWEEP_GAP_S = 1.2  # a 0.15 Hz sine is near its trim no longer than this
 RESPONSE_S = 3.0  # the window reaches this long past the last edge
-TRIM_S = 1.0  # quiet time before the input, part of the window given to a fit
+LEAD_S = 0.3  # of trim before the input, in a fit
+TRIM_S = 1.0  # quiet time before the input
 FLYING_SHARE = 0.5  # of the median airspeed: slower is not flight
 AXES = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
 
@@ -42,10 +43,11 @@ class DetectedManeuver:
     end_s: float
     amplitude: float
     edges: int
+    given: bool = False  # by the user, as a stretch of time: a maneuver whatever moved in it
 
     def fit_window(self) -> tuple[float, float]:
         """Return from and to with a moment of trim before the input."""
-        return self.start_s - 0.3, self.end_s
+        return self.start_s - LEAD_S, self.end_s
 
 
 def detect_maneuvers(columns: Mapping[str, Array]) -> list[DetectedManeuver]:
@@ -180,6 +182,12 @@ def _kind(runs: list[tuple[int, float]]) -> str:
         trend = float(np.corrcoef(rank, np.arange(len(rank)))[0, 1])
         return "sweep" if abs(trend) > STEADY_TREND else "multisine"
     return "multistep"
+
+
+def runs_of(chosen: BoolArray) -> list[IntArray]:
+    """Return the positions of each unbroken run of chosen samples."""
+    index = np.flatnonzero(chosen)
+    return np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(index) else []
 
 
 def _median3(series: Array) -> Array:

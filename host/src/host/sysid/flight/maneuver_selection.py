@@ -1,4 +1,4 @@
-"""Which part of a flight the user asked for: maneuvers by number, or a stretch of time."""
+"""Which part of a flight the user asked for: maneuvers by number, or stretches of time."""
 
 from __future__ import annotations
 
@@ -7,21 +7,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.arrays import Array
-from host.sysid.flight.maneuver_detection import AXES, DetectedManeuver, detect_maneuvers
+from host.arrays import Array, IntArray
+from host.sysid.flight.maneuver_detection import (
+    AXES,
+    LEAD_S,
+    DetectedManeuver,
+    detect_maneuvers,
+    runs_of,
+)
 from host.sysid.identification_error import IdentificationError
 
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 FEWEST = 8  # samples, as a maneuver needs
 SHARED_S = 0.1  # windows that overlap by more are one
-STILL_RAD = 1e-3  # a surface that moves less excites nothing: the pots resolve as much
+Stretch = tuple[float | None, float | None]  # from and to, s; None is the end of the record
 
 
 def select_maneuvers(
     columns: Mapping[str, Array],
     *,
-    from_s: float | None = None,
-    to_s: float | None = None,
+    stretches: Sequence[Stretch] = (),
     numbers: Sequence[int] = (),
 ) -> list[DetectedManeuver]:
     """Return the maneuvers the user asked for; all that are found where nothing was asked.
@@ -30,23 +35,24 @@ def select_maneuvers(
     ----------
     columns : mapping
         SI columns on an even grid.
-    from_s, to_s : float, optional
-        A stretch in the time of the table: one maneuver on each surface that leads in it.
+    stretches : sequence of (from, to)
+        In the time of the table, s: each is a maneuver, whatever moved in it. A gap of the data
+        divides it.
     numbers : sequence of int
         Numbers as `host maneuvers` counts them, from 1; one named twice counts once.
 
     Raises
     ------
     IdentificationError
-        If there is no such maneuver, or the stretch holds nothing to fit.
+        If there is no such maneuver, or a stretch holds too few samples.
     """
-    if from_s is None and to_s is None:
+    if not stretches:
         return _numbered(columns, numbers) if numbers else detect_maneuvers(columns)
     if numbers:
         raise IdentificationError(
             "argument maneuvers excludes argument from_s and argument to_s: give one of them"
         )
-    return _stretch(columns, from_s, to_s)
+    return [item for stretch in stretches for item in _stretch(columns, stretch)]
 
 
 def _numbered(columns: Mapping[str, Array], numbers: Sequence[int]) -> list[DetectedManeuver]:
@@ -58,38 +64,44 @@ def _numbered(columns: Mapping[str, Array], numbers: Sequence[int]) -> list[Dete
     return [found[n - 1] for n in sorted(set(numbers))]
 
 
-def _stretch(
-    columns: Mapping[str, Array], from_s: float | None, to_s: float | None
-) -> list[DetectedManeuver]:
+def _stretch(columns: Mapping[str, Array], stretch: Stretch) -> list[DetectedManeuver]:
+    """Return each part of a stretch between gaps, once for every surface that leads in it."""
     t = columns["t_s"]
-    first = float(t[0]) if from_s is None else from_s
-    last = float(t[-1]) if to_s is None else to_s
-    asked = f"argument from_s {first:g}, argument to_s {last:g}"
+    first = float(t[0]) if stretch[0] is None else stretch[0]
+    last = float(t[-1]) if stretch[1] is None else stretch[1]
+    asked = f"stretch (argument from_s {first:g}, argument to_s {last:g})"
     if not first < last:
         raise IdentificationError(f"{asked}: the start is not before the end")
-    first, last = max(first, float(t[0])), min(last, float(t[-1]))
     inside = (t >= first) & (t <= last)
     if inside.sum() < FEWEST:
         raise IdentificationError(
             f"{asked}: {inside.sum()} samples, at least {FEWEST} are needed; the data run from"
             f" {t[0]:.6g} to {t[-1]:.6g} s"
         )
-    holes = t[inside & (columns.get("bridged", np.zeros(len(t))) > 0.0)]
-    if len(holes):
-        raise IdentificationError(
-            f"{asked}: the data have a gap there, at {holes[0]:.6g} s; choose a stretch without"
-        )
-    swing = {axis: float(np.ptp(columns[axis][inside])) for axis in SURFACES if axis in columns}
-    if not swing:
-        raise IdentificationError(f"{asked}: the data have none of {', '.join(SURFACES)}")
-    if max(swing.values()) < STILL_RAD:
-        raise IdentificationError(
-            f"{asked}: no surface moved there; `host maneuvers` lists where one did"
-        )
+    measured = inside & ~(columns.get("bridged", np.zeros(len(t))) > 0.0)
+    parts = [part for part in runs_of(measured) if len(part) >= FEWEST]
+    if not parts:
+        raise IdentificationError(f"{asked}: the data have nothing but gaps there")
+    return [item for part in parts for item in _given(columns, part)]
+
+
+def _given(columns: Mapping[str, Array], part: IntArray) -> list[DetectedManeuver]:
+    t = columns["t_s"][part]
+    swing = {axis: float(np.ptp(columns[axis][part])) for axis in SURFACES if axis in columns}
+    leading = {a: size for a, size in swing.items() if size > 0.5 * max(swing.values())}
     return [
-        DetectedManeuver(axis, "window", first + 0.3, last, last, size / 2.0, 0)
-        for axis, size in swing.items()
-        if size > 0.5 * max(swing.values())
+        DetectedManeuver(
+            axis=axis,
+            kind="stretch",
+            start_s=float(t[0]) + LEAD_S,
+            input_end_s=float(t[-1]),
+            end_s=float(t[-1]),
+            amplitude=size / 2.0,
+            edges=0,
+            given=True,
+        )
+        # Of a stretch at rest any surface may be the one: the fit will say what it tells.
+        for axis, size in (leading or {SURFACES[0]: 0.0}).items()
     ]
 
 

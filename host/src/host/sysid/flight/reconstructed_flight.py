@@ -141,6 +141,9 @@ def reconstruct_flight(
 
 def maneuver_name(item: DetectedManeuver) -> str:
     """Return what a maneuver is called in an answer."""
+    if item.given:
+        first, last = item.fit_window()
+        return f"stretch from {first:.1f} to {last:.1f} s"
     return f"{item.kind} on {item.axis.split('_')[0]} at {item.start_s:.1f} s"
 
 

@@ -13,6 +13,7 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
+from host.sysid.flight.maneuver_selection import Stretch
 from host.sysid.identification_error import IdentificationError
 
 
@@ -56,6 +57,96 @@ def seconds_of(name: str, given: Any) -> float | None:
     if not isinstance(given, Real):
         raise _other(name, given, "a number of seconds")
     return float(given)
+
+
+def of_each_flight(name: str, given: Any, flights: int) -> list[Path | None]:
+    """Return a path of each flight, of one for all or of one of each (None where there is none).
+
+    Raises
+    ------
+    IdentificationError
+        If their number is another, or one is of another type.
+    """
+    if not isinstance(given, list | tuple):
+        return [path_of(name, given)] * flights
+    if len(given) != flights:
+        raise IdentificationError(
+            f"argument {name}: {len(given)} for {flights} flights; give one for all, or one of each"
+        )
+    return [path_of(name, one) for one in given]
+
+
+def stretches_of(given: Any, flights: int) -> list[tuple[Stretch, ...]]:
+    """Return the stretches of each flight.
+
+    Parameters
+    ----------
+    given : pair, list of pairs, or a list with one of these (or None) for each flight
+        From and to, s; None is the end of the record. Of one flight the outer list may be left out.
+    flights : int
+
+    Raises
+    ------
+    IdentificationError
+        If it is something else.
+    """
+    if given is None:
+        return [()] * flights
+    if flights == 1 and (found := _pairs(given)) is not None:
+        return [found]
+    each = [() if one is None else _pairs(one) for one in given] if listed(given) == given else []
+    if len(each) != flights:
+        raise IdentificationError(
+            f"argument stretches: {len(each)} for {flights} flights; give a list for each flight,"
+            " such as [[(10, 35), (60, 80)], [(5, 20)]]"
+        )
+    wrong = [number for number, one in enumerate(each, start=1) if one is None]
+    if wrong:
+        raise IdentificationError(
+            f"argument stretches of flight {wrong[0]} are no pairs of times, such as [(10, 35)]"
+        )
+    return [one for one in each if one is not None]
+
+
+def chosen_stretches(
+    stretches: Any, from_s: Any, to_s: Any, flights: int
+) -> list[tuple[Stretch, ...]]:
+    """Return the stretches of each flight, given as such or as one for every flight.
+
+    Raises
+    ------
+    IdentificationError
+        If both are given, or one is not what it should be.
+    """
+    ends = seconds_of("from_s", from_s), seconds_of("to_s", to_s)
+    if ends == (None, None):
+        return stretches_of(stretches, flights)
+    if stretches is not None:
+        raise IdentificationError(
+            "argument stretches excludes argument from_s and argument to_s: give one of them"
+        )
+    return [(ends,)] * flights
+
+
+def _pairs(given: Any) -> tuple[Stretch, ...] | None:
+    """Return a pair of times or several as several; None of anything else."""
+    if _is_pair(given):
+        given = [given]
+    if not isinstance(given, list | tuple) or not all(map(_is_pair, given)):
+        return None
+    return tuple((_seconds(first), _seconds(last)) for first, last in given)
+
+
+def _is_pair(given: Any) -> bool:
+    return (
+        isinstance(given, list | tuple)
+        and len(given) == 2
+        and all(end is None or isinstance(end, Real) for end in given)
+    )
+
+
+def _seconds(end: Real | None) -> float | None:
+    return None if end is None else float(end)
 
 
 def numbers_of(name: str, given: Any) -> tuple[int, ...]:

@@ -13,7 +13,7 @@ from host.instrument.error_labels import recording_notes
 from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
 from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
-from host.sysid.flight.maneuver_selection import select_maneuvers
+from host.sysid.flight.maneuver_selection import Stretch, select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData
@@ -38,8 +38,8 @@ class ReadingOptions:
         Foreign names, units and signs of a table.
     maneuvers : tuple of int
         Only these of each flight, counted from 1; all without.
-    from_s, to_s : float, optional
-        One span of time instead of the maneuvers.
+    stretches : tuple of (from, to)
+        Spans of time, s, instead of the maneuvers.
     corrections : bool
         Remove sensor errors that the data determine from the columns.
     also : tuple of str
@@ -49,8 +49,7 @@ class ReadingOptions:
     calibration: Path | None = None
     mapping: Path | None = None
     maneuvers: tuple[int, ...] = ()
-    from_s: float | None = None
-    to_s: float | None = None
+    stretches: tuple[Stretch, ...] = ()
     corrections: bool = True
     also: tuple[str, ...] = ()
 
@@ -79,7 +78,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     if instrument is not None:
         columns = surface_positions(columns, instrument)
         notes += recording_notes(instrument)
-    found = select_maneuvers(columns, from_s=how.from_s, to_s=how.to_s, numbers=how.maneuvers)
+    found = select_maneuvers(columns, stretches=how.stretches, numbers=how.maneuvers)
     agreement = None
     try:
         agreement = reconstruct(columns, known.airframe if known else None, instrument)

@@ -26,7 +26,7 @@ from host.sysid.compatibility.reconstruction import (
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.pipeline.aircraft_data import AircraftData
-from host.sysid.pipeline.arguments import numbers_of, path_of, seconds_of
+from host.sysid.pipeline.arguments import chosen_stretches, numbers_of, path_of
 from host.sysid.pipeline.estimate_table import estimate_table, mode_table
 from host.sysid.pipeline.flight_preparation import ReadingOptions, listed_flights, prepare
 from host.sysid.pipeline.notebook_html import answer_html
@@ -115,6 +115,7 @@ class Identification:
         calibration: str | Path | None = None,
         mapping: str | Path | None = None,
         maneuvers: int | Sequence[int] = (),
+        stretches: Sequence[Any] | None = None,
         from_s: float | None = None,
         to_s: float | None = None,
     ) -> Simulation:
@@ -126,7 +127,7 @@ class Identification:
             Read and corrected as those identified from.
         calibration, mapping : path, optional
             Where they are not those of this identification.
-        maneuvers, from_s, to_s
+        maneuvers, stretches, from_s, to_s
             As in `host.identify`; all maneuvers without.
 
         Raises
@@ -139,8 +140,7 @@ class Identification:
             calibration=path_of("calibration", calibration) or self.reading.calibration,
             mapping=path_of("mapping", mapping) or self.reading.mapping,
             maneuvers=numbers_of("maneuvers", maneuvers),
-            from_s=seconds_of("from_s", from_s),
-            to_s=seconds_of("to_s", to_s),
+            stretches=chosen_stretches(stretches, from_s, to_s, 1)[0],
         )
         [source] = listed_flights([flight])
         found = prepare(source, how, self.aircraft)

@@ -34,10 +34,13 @@ class Models:
     linear : tuple
         Name of a template and None, or the name and the model of a user.
     coefficients : CoefficientModel or None
+    named : bool
+        By the user; not those by default.
     """
 
     linear: tuple[tuple[str, LinearModel | None], ...]
     coefficients: CoefficientModel | None
+    named: bool
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -87,7 +90,7 @@ def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
         raise IdentificationError(
             "argument models names several models of the coefficients; give one at a time"
         )
-    return Models(tuple(linear), _terms(terms[0]) if terms else None)
+    return Models(tuple(linear), _terms(terms[0]) if terms else None, bool(listed(given)))
 
 
 def _terms(given: CoefficientModel | Path | str) -> CoefficientModel:

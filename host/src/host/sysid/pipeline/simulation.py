@@ -141,7 +141,7 @@ def simulate(
     not_simulated: list[str] = []
     for label, model in _models(linear, direct):
         axes = excited_axes(model.inputs)
-        own = [merge_overlapping([f for f in flight.maneuvers if f.axis in axes])]
+        own = [merge_overlapping([f for f in flight.maneuvers if f.axis in axes or f.given])]
         try:
             data = [m.cut(model) for m in flown_maneuvers([flight], own)]
         except IdentificationError as error:

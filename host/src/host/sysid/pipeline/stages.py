@@ -16,7 +16,13 @@ from host.sysid.flight.linear_estimator import Answer, LinearEstimator
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData, aircraft_data
-from host.sysid.pipeline.arguments import numbers_of, path_of, paths_of, seconds_of
+from host.sysid.pipeline.arguments import (
+    chosen_stretches,
+    numbers_of,
+    of_each_flight,
+    path_of,
+    paths_of,
+)
 from host.sysid.pipeline.flight_preparation import (
     ReadingOptions,
     collected_notes,
@@ -35,6 +41,8 @@ from host.sysid.pipeline.requested_models import (
 if TYPE_CHECKING:
     from host.sysid.pipeline.flight_preparation import Source
 
+OfEach = str | Path | None | Sequence[str | Path | None]  # one for all flights, or one of each
+
 
 def identify(
     flights: Source | Sequence[Source],
@@ -42,9 +50,10 @@ def identify(
     aircraft: str | Path | None = None,
     models: ModelName | Iterable[ModelName] | None = None,
     methods: str | Iterable[str] | None = None,
-    calibration: str | Path | None = None,
-    mapping: str | Path | None = None,
+    calibration: OfEach = None,
+    mapping: OfEach = None,
     maneuvers: int | Sequence[int] = (),
+    stretches: Sequence[Any] | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
     corrections: bool = True,
@@ -57,8 +66,8 @@ def identify(
     ----------
     flights : path, FlightLog, DataFrame or list of them
         Log, folder or card, CSV, Parquet or MAT; what `host.read_log` returns, or its table. All
-        maneuvers of several flights are fitted together; each keeps its own biases and its own
-        sensor errors.
+        maneuvers of several flights are fitted together, whatever their rates; each keeps its own
+        biases and initial states, each flight its own sensor errors.
     aircraft : str or Path, optional
         Name or file; gives coefficients, places of the sensors and their deviations.
     models : str, Path or several, optional
@@ -66,13 +75,19 @@ def identify(
     methods : str or several, optional
         Methods of linear models (`known_methods`); several are compared in one table.
     calibration : path, optional
-        Counts to SI of a log, and standard deviations of the sensor errors.
+        Counts to SI of a log, and standard deviations of the sensor errors. One for all flights, or
+        a list with one (or None) of each.
     mapping : path, optional
-        Foreign names, units and signs of a table.
+        Foreign names, units and signs of a table; of several flights as `calibration`.
     maneuvers : int or several
         Only these of each flight, as `host maneuvers` counts them.
+    stretches : list of (from, to), optional
+        Spans of time, s, instead of the maneuvers found: ``[(10, 35), (60, 80)]``; of several
+        flights a list of each, ``[[(10, 35), (60, 80)], [(5, 20)]]``. None stands for the end of
+        the record, and in place of a flight's list for all maneuvers found in it. Each is fitted
+        whatever moved in it, and none is held out; gaps of the data divide it.
     from_s, to_s : float, optional
-        One span of time instead of the maneuvers found.
+        The same for one stretch of every flight.
     corrections : bool
         Remove sensor errors that the data determine from the columns.
     truth : path or several, optional
@@ -88,19 +103,29 @@ def identify(
         If a file cannot be read.
     """
     asked, by = requested_models(models), requested_methods(methods)
-    how = ReadingOptions(
-        path_of("calibration", calibration),
-        path_of("mapping", mapping),
-        numbers_of("maneuvers", maneuvers),
-        seconds_of("from_s", from_s),
-        seconds_of("to_s", to_s),
-        corrections,
-        asked.signals,
-    )
-    known = aircraft_data(aircraft, calibration) if aircraft is not None else None
-    ready = [prepare(source, how, known) for source in listed_flights(flights)]
-    if known is None and how.calibration is not None:
-        load_calibration(how.calibration)  # unused with a table, but a misspelt name is an error
+    sources = listed_flights(flights)
+    spans = chosen_stretches(stretches, from_s, to_s, len(sources))
+    calibrations = of_each_flight("calibration", calibration, len(sources))
+    each = [
+        ReadingOptions(
+            made_by, named_by, numbers_of("maneuvers", maneuvers), span, corrections, asked.signals
+        )
+        for made_by, named_by, span in zip(
+            calibrations, of_each_flight("mapping", mapping, len(sources)), spans, strict=True
+        )
+    ]
+    by_calibration = {
+        made_by: aircraft_data(aircraft, made_by) if aircraft is not None else None
+        for made_by in calibrations
+    }
+    known = by_calibration[calibrations[0]]
+    ready = [
+        prepare(source, how, by_calibration[how.calibration])
+        for source, how in zip(sources, each, strict=True)
+    ]
+    for made_by in calibrations:
+        if known is None and made_by is not None:
+            load_calibration(made_by)  # unused with a table, but a misspelt name is an error
     notes = collected_notes(ready, known.doubts if known else ())
     recorded = distinct_flights([one.flight for one in ready])
     true = _truth(truth, len(recorded))
@@ -116,7 +141,7 @@ def identify(
         coefficients=direct,
         notes=(*notes, *doubts, *unfit),
         methods=by,
-        reading=how,
+        reading=each[0],
         aircraft=known,
         truth=true,
         prior=expected,
@@ -159,6 +184,7 @@ def _linear(
                 method,
                 airframe=known.airframe if known else None,
                 powerplant=known.powerplant if known else None,
+                named=asked.named,
             )
             try:
                 answers.append(answer_of(estimator, flights))
