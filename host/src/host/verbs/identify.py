@@ -62,6 +62,8 @@ def add_parser(subparsers: Any) -> None:
                         help="use only maneuver N of `host maneuvers`; repeatable")  # fmt: skip
     parser.add_argument("--no-corrections", action="store_true",
                         help="leave sensor errors that the flight tells in the data")  # fmt: skip
+    parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
+                        " whatever this check of the data finds; repeatable")  # fmt: skip
     _add_outputs(parser)
 
 
@@ -122,6 +124,7 @@ def _run(args: argparse.Namespace) -> int:
         maneuvers=args.maneuver or (),
         stretches=stretches_of_each(args.ends, len(args.source)),
         corrections=not args.no_corrections,
+        accept=args.accept or (),
         truth=[path for _, path in args.truth],
         prior=args.prior,
     )

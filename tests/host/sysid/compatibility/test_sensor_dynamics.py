@@ -8,7 +8,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.instrument.deviations import sensor_error_model
 from host.instrument.error_labels import ERROR_LABELS
 from host.sysid import Maneuver
-from host.sysid.compatibility.reconstruction import Compatibility, Finding
+from host.sysid.compatibility.reconstruction import Compatibility, SensorErrorEstimate
 from host.sysid.compatibility.sensor_corrections import INSTANTANEOUS_ERRORS
 from host.sysid.compatibility.sensor_dynamics import (
     IMU_DELAY,
@@ -29,8 +29,8 @@ SPEED_MPS = 20.0
 
 def told(delay_s: float) -> Compatibility:
     """Return a reconstruction that told the vanes' delay to half a millisecond."""
-    late = Finding("vane_delay_s", delay_s, 0.0005, 0.02, data_informed=True, reason="")
-    pitot = Finding("pitot_scale", 0.0, 0.03, 0.031, data_informed=False, reason="")
+    late = SensorErrorEstimate("vane_delay_s", delay_s, 0.0005, 0.02, data_informed=True, reason="")
+    pitot = SensorErrorEstimate("pitot_scale", 0.0, 0.03, 0.031, data_informed=False, reason="")
     return Compatibility((late, pitot), {}, (), gps=True, instrument=sensor_error_model(NAME))
 
 

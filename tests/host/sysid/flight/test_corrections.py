@@ -17,7 +17,7 @@ from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, coefficie
 from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.answer.verdict import verdict_lines
-from host.sysid.compatibility.reconstruction import Compatibility, Finding
+from host.sysid.compatibility.reconstruction import Compatibility, SensorErrorEstimate
 from host.sysid.compatibility.sensor_corrections import (
     INSTANTANEOUS_ERRORS,
     advance_delayed,
@@ -44,9 +44,9 @@ def flown() -> tuple[Columns, list[dict[str, Any]], Compatibility]:
     return columns, flight.maneuvers, recorded.reconstructed("demo", 901)
 
 
-def finding(name: str, value: float, half: float, prior: float) -> Finding:
+def finding(name: str, value: float, half: float, prior: float) -> SensorErrorEstimate:
     """Return a finding that is told if its interval says so."""
-    return Finding(name, value, half, prior, half < 0.7 * prior, "")
+    return SensorErrorEstimate(name, value, half, prior, half < 0.7 * prior, "")
 
 
 def motion(samples: int = 200) -> Columns:

@@ -1,12 +1,14 @@
 """Tables of others: every dialect gives the same flight, nothing doubtful passes in silence."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from host.sysid.flight.flight_tables import read_columns
+from host.sysid.flight.data_finding import wrong_units
+from host.sysid.flight.flight_tables import read_columns, read_flight_columns
 from host.sysid.flight.maneuver_detection import detect_maneuvers
 from host.sysid.identification_error import IdentificationError
 from scipy import io
@@ -308,8 +310,22 @@ def test_columns_of_several_rates_are_refused(
         ("alpha_rad", 'from = ["AOA"]', "expected"),
         ("aplha_rad", 'from = "AOA"', "did you mean alpha_rad"),
         ("beta_rad", 'from = "AOA", unit = "deg"', "beta_rad both come from 'AOA'"),
-        ("alpha_rad", 'from = "AOA"', "alpha_rad reaches .* in degrees"),
-        ("az_mps2", 'from = "Nz", sign = -1', "in g"),
+    ],
+)
+def test_a_wrong_line_of_the_map_is_refused(
+    name: str, line: str, reason: str, tmp_path: Path, foreign: pd.DataFrame
+) -> None:
+    foreign.to_csv(tmp_path / "x.csv", index=False)
+    (tmp_path / "map.toml").write_text(text_of({**LINES, name: line}))
+    with pytest.raises(IdentificationError, match=reason):
+        read_columns(tmp_path / "x.csv", tmp_path / "map.toml")
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "words"),
+    [
+        ("alpha_rad", 'from = "AOA"', "alpha_rad reaches .* likely degrees"),
+        ("az_mps2", 'from = "Nz", sign = -1', "likely g: give its unit"),
         ("az_mps2", 'from = "Nz", unit = "g"', "points up"),
         ("q_radps", 'from = "Q", unit = "deg/s", sign = -1', "turn opposite ways"),
         ("r_radps", 'from = "R"', "another unit"),
@@ -318,13 +334,22 @@ def test_columns_of_several_rates_are_refused(
         ("airspeed_mps", 'from = "TAS"', "qbar_pa is .* another unit"),
     ],
 )
-def test_a_wrong_line_of_the_map_is_found(
-    name: str, line: str, reason: str, tmp_path: Path, foreign: pd.DataFrame
+def test_a_wrong_unit_in_the_map_is_a_finding_and_read_right(
+    name: str,
+    line: str,
+    words: str,
+    tmp_path: Path,
+    foreign: pd.DataFrame,
+    flight: dict[str, np.ndarray],
 ) -> None:
     foreign.to_csv(tmp_path / "x.csv", index=False)
     (tmp_path / "map.toml").write_text(text_of({**LINES, name: line}))
-    with pytest.raises(IdentificationError, match=reason):
-        read_columns(tmp_path / "x.csv", tmp_path / "map.toml")
+    found = read_flight_columns(tmp_path / "x.csv", tmp_path / "map.toml")
+    said = "\n".join(finding.line for finding in found.findings)
+    assert re.search(words, said), said
+    assert name in wrong_units(found.findings)
+    assert f"read as {name}" in said, said
+    np.testing.assert_allclose(found.columns[name], flight[name], atol=1e-6)
 
 
 @pytest.mark.parametrize("surface", ["elevator_rad", "aileron_rad", "rudder_rad"])
@@ -337,7 +362,7 @@ def test_a_surface_that_works_backwards_is_told(
     (tmp_path / "map.toml").write_text(text_of({**LINES, surface: turned}))
     _, notes = read_columns(tmp_path / "x.csv", tmp_path / "map.toml")
     assert len(notes) == 1
-    assert notes[0].startswith(f"{surface} positive seems to")
+    assert notes[0].startswith(f"finding surface-sign: {surface} positive seems to")
 
 
 NUMBERED = {k: line.replace(line.split('"')[1], "{}") for k, line in LINES.items()}

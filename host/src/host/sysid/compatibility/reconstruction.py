@@ -51,7 +51,7 @@ NOT_EXCITED_NO_GPS = "not told from attitude and gusts without GPS; the calibrat
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class SensorErrorEstimate:
     """One sensor error: estimate, its 95 % half-width, and the half-width of the calibration.
 
     `data_informed` is false if the data add little to the calibration; `reason` then says why, and
@@ -77,7 +77,7 @@ class Compatibility:
 
     Attributes
     ----------
-    findings : tuple of Finding
+    findings : tuple of SensorErrorEstimate
         Sensor errors, delays behind the IMU, steady wind.
     rms : dict
         Root mean square of the residual of each output, in its unit.
@@ -90,14 +90,14 @@ class Compatibility:
         Consistency with the file's standard deviations: all together, then by group.
     """
 
-    findings: tuple[Finding, ...]
+    findings: tuple[SensorErrorEstimate, ...]
     rms: dict[str, float]
     segments: tuple[tuple[float, float], ...]
     gps: bool
     instrument: SensorErrorModel | None = None
     calibration_tests: tuple[ConsistencyTest, ...] = ()
 
-    def __getitem__(self, name: str) -> Finding:
+    def __getitem__(self, name: str) -> SensorErrorEstimate:
         """Return a finding by name."""
         return next(f for f in self.findings if f.name == name)
 
@@ -147,7 +147,7 @@ def reconstruct(
         deviation = deviation if gps else min(NO_GPS_INFLATION * deviation, sd)
         informed = deviation < POSTERIOR_PRIOR_RATIO * sd
         findings.append(
-            Finding(
+            SensorErrorEstimate(
                 name=name,
                 value=mean if k is None else float(fit.theta[k]),
                 half_width=NORMAL_95 * deviation,

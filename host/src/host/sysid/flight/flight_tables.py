@@ -6,7 +6,7 @@ Foreign names, units and signs come in through a map (`column_map`).
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,8 @@ from host.files.regular import file_or_folder
 from host.instrument.recording import Recording
 from host.physical.calibration import Calibration, load_calibration
 from host.sysid.flight.column_map import listed, mapped, read_map
+from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.finding_consequences import checked
 from host.sysid.flight.foreign_tables import (
     TEXT_KINDS,
     Foreign,
@@ -26,10 +28,9 @@ from host.sysid.flight.foreign_tables import (
     refuse_other,
     same_length,
 )
-from host.sysid.flight.kinematic_checks import HINT
 from host.sysid.flight.measured import measured
 from host.sysid.flight.recorded import recording_of_log, recording_of_table
-from host.sysid.flight.unit_sign_checks import SURFACES, check
+from host.sysid.flight.unit_sign_checks import SURFACES
 from host.sysid.identification_error import IdentificationError
 from host.terminal import command_line
 
@@ -60,18 +61,20 @@ LONGEST_GAP_S = 0.25
 FEWEST = 32
 SLOWEST_S, FASTEST_S = 0.5, 1e-4  # between rows: beyond, the unit of time is wrong
 BACKWARD_S = 1.0  # rows may swap places; a step back over more is another recording
+MOST_JUMP_RAD = 2.0 * np.pi + 0.5
 MOST_EMPTY = 20  # rows of the even grid for each row that was recorded
 
 
 @dataclass(frozen=True, slots=True)
 class FlightColumns:
-    """SI columns on an even grid, notes about what was done to them, how they were recorded, and of
-    a log the calibration that made them."""
+    """SI columns on an even grid, notes about what was done to them, how they were recorded, of a
+    log the calibration that made them, and what checks found in them."""
 
     columns: dict[str, Array]
     notes: list[str]
     recording: Recording
     calibration: Calibration | None
+    findings: list[Finding] = field(default_factory=list)
 
 
 def read_columns(
@@ -81,9 +84,10 @@ def read_columns(
     calibration: Path | None = None,
     also: Collection[str] = (),
 ) -> tuple[dict[str, Array], list[str]]:
-    """Return columns and notes of `read_flight_columns`, whose arguments these are."""
+    """Return columns and notes of `read_flight_columns`, whose arguments these are; its findings
+    stand behind the notes."""
     found = read_flight_columns(source, mapping, calibration=calibration, also=also)
-    return found.columns, found.notes
+    return found.columns, [*found.notes, *(finding.line for finding in found.findings)]
 
 
 def read_flight_columns(
@@ -92,6 +96,7 @@ def read_flight_columns(
     *,
     calibration: Path | None = None,
     also: Collection[str] = (),
+    accept: Collection[str] = (),
 ) -> FlightColumns:
     """Return the columns identification uses, notes about them, and how they were recorded.
 
@@ -106,6 +111,8 @@ def read_flight_columns(
         Calibration of a log; the default one without.
     also : collection of str
         Signals of a model of one's own, beside those that are always looked for.
+    accept : collection of str
+        Checks whose findings change nothing: the columns are used as they are.
 
     Raises
     ------
@@ -136,9 +143,10 @@ def read_flight_columns(
         notes += [f"{name}: {remark}"] if remark else []
     same_length(used, called)
     columns = _even(used, notes, foreign=not recorded)
+    findings: list[Finding] = []
     if not recorded:
-        notes += check(columns)
-    return FlightColumns(columns, notes, found.recording, found.calibration)
+        columns, findings = checked(columns, accept)
+    return FlightColumns(columns, notes, found.recording, found.calibration, findings)
 
 
 def source_name(source: str | Path | FlightLog | pd.DataFrame) -> str:
@@ -376,8 +384,7 @@ def _even(columns: dict[str, Array], notes: list[str], *, foreign: bool) -> dict
             slower.append(f"{name} {steps[name]:.3g} s")
         series = series[seen]
         if name in ANGLES:
-            _wraps(name, series)
-            series = np.unwrap(series)
+            series = _unwrapped(name, series, notes)
         result[name] = np.interp(grid, t[seen], series)
         if name in FITTED and not seen.all():
             bridged |= _over(grid, t[seen])
@@ -399,13 +406,13 @@ def _even(columns: dict[str, Array], notes: list[str], *, foreign: bool) -> dict
     return result
 
 
-def _wraps(name: str, series: Array) -> None:
-    """Refuse an angle that jumps by more than a turn: unwrapping would make an angle of it."""
+def _unwrapped(name: str, series: Array, notes: list[str]) -> Array:
+    """Return an angle without its jumps by a turn: of 360 where it is in degrees."""
     largest = float(np.max(np.abs(np.diff(series)), initial=0.0))
-    if largest > 2.0 * np.pi + 0.5:
-        raise IdentificationError(
-            f"{name} jumps by {largest:.3g} rad from one row to the next: in degrees? {HINT}"
-        )
+    if largest <= MOST_JUMP_RAD:
+        return np.asarray(np.unwrap(series))
+    notes.append(f"{name} jumps by {largest:.3g} rad from one row to the next: turns of 360 there")
+    return np.asarray(np.unwrap(series, period=360.0))
 
 
 def _long_s(t: Array) -> float:

@@ -3,7 +3,8 @@
 How an angle turns follows from the rates, how the wind angles and the speed change from the rates
 and the specific force. Each column that moves one of them must do so with a factor of one. Noise
 on either side only widens the range of factors that a regression allows, from both directions;
-what lies outside as a whole is a unit, a sign or another clock.
+what lies outside as a whole is a unit, a sign or another clock. Of speed against forward force it
+may as well be thrust that a sensor does not feel, wind that changes with height, or a slow pitot.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
-from host.sysid.identification_error import IdentificationError
+from host.sysid.flight.data_finding import HINT, Finding
 
 SURE, SOME = 0.5, 0.25  # partial correlation: less tells nothing about a sign, about a factor
 FACTOR = 1.5
@@ -24,7 +25,23 @@ SOMEHOW = 0.05  # the same of a wind angle, which gusts turn too
 QUIET_RADPS = 0.02  # noise of a still sensor follows nothing
 BLOCK_S, SLOW_S = 0.1, 0.5  # slopes are those of means over this long; slow: pitot and GPS
 FEWEST = 32  # means
-HINT = "give its unit or sign in the map (argument mapping)"
+UNIT_OF_FORCE = 5.0  # speed against force: thrust, wind and a slow pitot stay below, g is 9.8
+# What is compared, by the column that changes and what it is held against.
+CHECK_OF = {
+    ("theta_rad", "q_radps"): "theta-against-q",
+    ("phi_rad", "p_radps"): "phi-against-p",
+    ("psi_rad", "r_radps"): "psi-against-r",
+    ("alpha_rad", "q_radps"): "alpha-against-q",
+    ("beta_rad", "r_radps"): "beta-against-r",
+    ("alpha_rad", "az_mps2 over airspeed_mps"): "alpha-against-az",
+    ("beta_rad", "ay_mps2 over airspeed_mps"): "beta-against-ay",
+    ("airspeed_mps", "ax_mps2"): "airspeed-against-ax",
+    ("altitude_m", "v_down_mps"): "altitude-against-climb",
+}
+UNIT = "another unit of one of them"
+SPEED_CAUSES = (
+    "thrust that is not in ax_mps2", "wind that changes with height", "a slow pitot", UNIT,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,20 +55,44 @@ class Identity:
     follows: float = 0.0
 
 
-def consistent(flown: Mapping[str, Array], dt_s: float) -> list[str]:
-    """Return notes about angles that do not follow their rates.
+@dataclass(frozen=True, slots=True)
+class Factor:
+    """How many times as fast a column moves as another says: the range that noise leaves."""
+
+    law: Identity
+    name: str
+    low: float
+    high: float
+    certain: bool  # whether the sign is
+
+    @property
+    def off(self) -> float:
+        """How far the middle of the range is from one, as a logarithm; infinite if turned round."""
+        return float(abs(np.log(self.low * self.high)) / 2.0) if self.low > 0.0 else np.inf
+
+
+def consistent(flown: Mapping[str, Array], dt_s: float) -> list[Finding]:
+    """Return what does not follow from what it must follow, or not by a factor of one.
 
     Parameters
     ----------
     flown : mapping
         SI columns in flight, every `dt_s`.
-
-    Raises
-    ------
-    IdentificationError
-        If a column moves another with a factor far from one.
     """
-    notes = []
+    findings: list[Finding] = []
+    for law in identities(flown, dt_s):
+        found = _unrelated(law)
+        findings += [found] if found else [x for f in factors(law) if (x := _judge(f)) is not None]
+    return findings
+
+
+def misfit(flown: Mapping[str, Array], dt_s: float) -> float:
+    """Return how far all factors are from one together: what tells units that look alike."""
+    return float(sum(f.off for law in identities(flown, dt_s) for f in factors(law)))
+
+
+def identities(flown: Mapping[str, Array], dt_s: float) -> Iterator[Identity]:
+    """Return all identities that the columns allow."""
     duration_s = dt_s * len(flown["t_s"])
     for length_s, laws in ((BLOCK_S, _fast), (SLOW_S, _slow)):
         # A record whose clock runs too fast is short, and must not escape by that.
@@ -59,9 +100,7 @@ def consistent(flown: Mapping[str, Array], dt_s: float) -> list[str]:
         means = block_means(flown, block)
         if len(means["t_s"]) < FEWEST:
             continue
-        for law in laws(means):
-            notes += _judge(law)
-    return notes
+        yield from laws(means)
 
 
 def block_means(flown: Mapping[str, Array], block: int) -> dict[str, Array]:
@@ -70,19 +109,28 @@ def block_means(flown: Mapping[str, Array], block: int) -> dict[str, Array]:
     return {k: v[: count * block].reshape(count, block).mean(axis=1) for k, v in flown.items()}
 
 
-def _judge(law: Identity) -> list[str]:
+def _unrelated(law: Identity) -> Finding | None:
+    """Return what is to be said of a column that does not follow what turns it."""
     own = np.column_stack([np.ones(len(law.rate)), *law.beside])
     rate = _without(law.rate, own)
     power = float(rate @ rate)
-    whole = np.column_stack([own, *law.parts.values()])
-    left = _without(law.rate, whole)
+    left = _without(law.rate, np.column_stack([own, *law.parts.values()]))
     moved = min(float(np.std(law.rate)), max(float(np.std(v)) for v in law.parts.values()))
-    if moved > QUIET_RADPS and power > 0.0 and float(left @ left) > (1.0 - law.follows) * power:
-        return [
-            f"{law.name} does not follow {' and '.join(law.parts)}"
-            f" ({100.0 * (1.0 - float(left @ left) / power):.0f} % of its motion): another column,"
-            f" another clock, or a unit? {HINT}"
-        ]
+    if moved <= QUIET_RADPS or power == 0.0 or float(left @ left) <= (1.0 - law.follows) * power:
+        return None
+    names = list(law.parts)
+    return Finding(
+        CHECK_OF[law.name, names[0]],
+        _channels(law.name, *names),
+        f"{law.name} does not follow {' and '.join(names)}"
+        f" ({100.0 * (1.0 - float(left @ left) / power):.0f} % of its motion)",
+        ("another column", "another clock", "noise", f"a unit: {HINT}"),
+    )
+
+
+def factors(law: Identity) -> Iterator[Factor]:
+    """Return the factor of each part that is correlated with an identity, the others apart."""
+    own = np.column_stack([np.ones(len(law.rate)), *law.beside])
     for name, part in law.parts.items():
         others = [v for k, v in law.parts.items() if k != name]
         x, y = (_without(v, np.column_stack([own, *others])) for v in (part, law.rate))
@@ -90,19 +138,38 @@ def _judge(law: Identity) -> list[str]:
         if xx < 1e-12 * len(x) or xy**2 < SOME**2 * xx * yy:
             continue
         low, high = sorted((xy / xx, yy / xy))  # noise on the left side, noise on the right
-        if high < 0.0:
-            if xy**2 < SURE**2 * xx * yy:
-                continue
-            raise IdentificationError(
-                f"{law.name} and {name} turn opposite ways (factor {xy / xx:.2g} where 1 is right):"
-                f" one of them has the wrong sign; {HINT}"
-            )
-        if low > FACTOR or high < 1.0 / FACTOR:
-            raise IdentificationError(
-                f"{law.name} moves {low if low > 1.0 else high:.3g} times as fast as {name} says:"
-                f" one of them has another unit; {HINT}"
-            )
-    return []
+        yield Factor(law, name, low, high, xy**2 >= SURE**2 * xx * yy)
+
+
+def _judge(f: Factor) -> Finding | None:
+    """Return what is to be said of a factor; None if it may be one."""
+    check, speed = CHECK_OF[f.law.name, f.name], f.law.name == "airspeed_mps"
+    channels = _channels(f.law.name, f.name)
+    if f.high < 0.0:
+        if not f.certain:
+            return None
+        return Finding(
+            check,
+            channels,
+            f"{f.law.name} and {f.name} turn opposite ways (factor {f.high:.2g} where 1 is right)",
+            (f"the wrong sign of one of them: {HINT}",),
+            wrong_unit=True,
+        )
+    if f.low <= FACTOR and f.high >= 1.0 / FACTOR:
+        return None
+    times = f.low if f.low > 1.0 else f.high
+    return Finding(
+        check,
+        channels,
+        f"{f.law.name} moves {times:.3g} times as fast as {f.name} says",
+        SPEED_CAUSES if speed else (f"{UNIT}: {HINT}",),
+        wrong_unit=not speed or not 1.0 / UNIT_OF_FORCE < times < UNIT_OF_FORCE,
+    )
+
+
+def _channels(*names: str) -> tuple[str, ...]:
+    """Return the columns behind the names of what is compared."""
+    return tuple(part for name in names for part in name.split(" over "))
 
 
 def _without(values: Array, columns: Array) -> Array:

@@ -25,6 +25,7 @@ from host.sysid.compatibility.sensor_corrections import (
 )
 from host.sysid.compatibility.sensor_dynamics import columns_at_cg
 from host.sysid.flight.column_map import like
+from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
@@ -48,6 +49,8 @@ class ReconstructedFlight:
         Whether delays and places of the sensors are left for a fit to estimate.
     instrument : SensorErrorModel or None
         As it was on this flight: with the servos and the clock of its recording.
+    findings : tuple of Finding
+        What checks found in its columns.
     """
 
     source: str
@@ -57,6 +60,7 @@ class ReconstructedFlight:
     compatibility: Compatibility | None
     delays_open: bool
     instrument: SensorErrorModel | None = None
+    findings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +110,7 @@ def reconstruct_flight(
     airframe: AirframeData | None = None,
     compatibility: Compatibility | None = None,
     instrument: SensorErrorModel | None = None,
+    findings: Sequence[Finding] = (),
 ) -> ReconstructedFlight:
     """Return a flight with its columns corrected by all that is known.
 
@@ -122,6 +127,8 @@ def reconstruct_flight(
         Data-compatibility check; the sensor errors that it estimates are removed.
     instrument : SensorErrorModel, optional
         As it was on this flight.
+    findings : sequence of Finding
+        What checks found in its columns.
     """
     sensor_errors = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
     delays_open = True
@@ -135,7 +142,14 @@ def reconstruct_flight(
     if compatibility is not None:
         corrected = correct_columns(corrected, sensor_errors, pressure_share(compatibility))
     return ReconstructedFlight(
-        source, columns, corrected, tuple(maneuvers), compatibility, delays_open, instrument
+        source,
+        columns,
+        corrected,
+        tuple(maneuvers),
+        compatibility,
+        delays_open,
+        instrument,
+        tuple(findings),
     )
 
 

@@ -1,7 +1,7 @@
 """Units and signs that cannot be: gravity, kinematics and damping tell what a map forgot.
 
-A column in degrees or an axis turned round still fits some model well. What physics forbids is
-refused, what another convention could mean is a note.
+A column in degrees or an axis turned round still fits some model well. What physics forbids proves
+a wrong unit or sign; what another convention could mean is only in doubt.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
-from host.sysid.flight.kinematic_checks import BLOCK_S, FEWEST, HINT, SURE, block_means, consistent
-from host.sysid.identification_error import IdentificationError
+from host.sysid.flight.data_finding import HINT, Finding
+from host.sysid.flight.kinematic_checks import BLOCK_S, FEWEST, SURE, block_means, consistent
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")
 DOUBTFUL_RAD = 1.0  # of such an angle in flight, and of a surface at any moment
 IDLE_RAD = 0.0035  # a surface that swings less between its ends excites nothing
 STRONG = 10.0  # deviations
+WITHOUT_GRAVITY = 0.5  # of the size: with less along z, weight is not in it
 DENSITY = (0.4, 1.6)
 STATIC_PA = (2e4, 1.2e5)
 THROTTLE = (-0.2, 1.2)
@@ -33,140 +34,148 @@ SURFACES = {
 }  # fmt: skip
 
 
-def check(columns: Mapping[str, Array]) -> list[str]:
+def check(columns: Mapping[str, Array]) -> list[Finding]:
     """Return what looks like a forgotten unit or sign.
 
     Parameters
     ----------
     columns : mapping
         SI columns on an even grid.
-
-    Raises
-    ------
-    IdentificationError
-        If columns contradict physics or each other.
     """
+    flown, dt_s = airborne(columns)
+    if len(flown["t_s"]) < FEWEST:
+        return []
+    findings = [*_angles(flown), *_gravity(flown), *_air(flown), *_surface_sizes(flown)]
+    means = block_means(flown, max(1, round(BLOCK_S / dt_s)))
+    if len(means["t_s"]) >= FEWEST:
+        findings += [*_forces(means), *_surfaces(means)]
+    return _once([*findings, *consistent(flown, dt_s)])
+
+
+def airborne(columns: Mapping[str, Array]) -> tuple[dict[str, Array], float]:
+    """Return the columns in flight, and the time between samples, s."""
     dt_s = float(columns["t_s"][1] - columns["t_s"][0])
     flying = np.ones(len(columns["t_s"]), dtype=bool)
     if "airspeed_mps" in columns:
-        speed = columns["airspeed_mps"]
+        speed = np.abs(columns["airspeed_mps"])
         flying = speed > 0.5 * float(np.median(speed))
-    flown = {k: v[flying] for k, v in columns.items()}
-    if len(flown["t_s"]) < FEWEST:
-        return []
-    notes = _angles(flown)
-    notes += _gravity(flown)
-    _air(flown)
-    notes += _surface_sizes(flown)
-    means = block_means(flown, max(1, round(BLOCK_S / dt_s)))
-    if len(means["t_s"]) >= FEWEST:
-        _forces(means)
-        notes += _surfaces(means)
-    return notes + consistent(flown, dt_s)
+    return {k: v[flying] for k, v in columns.items()}, dt_s
 
 
-def _angles(flown: Mapping[str, Array]) -> list[str]:
-    notes = []
-    for name in BOUNDED:
-        if name not in flown:
-            continue
-        size = float(np.quantile(np.abs(flown[name]), 0.95))
-        if size > np.pi:
-            raise IdentificationError(
-                f"{name} reaches {size:.3g} rad in flight: in degrees? {HINT}"
-            )
-        if size > DOUBTFUL_RAD:
-            notes.append(f"{name} reaches {size:.2f} rad in flight: in degrees? {HINT}")
-    return notes
+def _once(findings: list[Finding]) -> list[Finding]:
+    """Return the first finding of each check about the same columns."""
+    return list({(f.check, f.channels): f for f in reversed(findings)}.values())[::-1]
 
 
-def _surface_sizes(flown: Mapping[str, Array]) -> list[str]:
+def _degrees(check: str, name: str, size: float, *, sure: bool) -> Finding:
+    return Finding(
+        check,
+        (name,),
+        f"{name} reaches {size:.3g} rad in flight",
+        (f"degrees: {HINT}",),
+        wrong_unit=sure,
+    )
+
+
+def _angles(flown: Mapping[str, Array]) -> list[Finding]:
+    sizes = {k: float(np.quantile(np.abs(flown[k]), 0.95)) for k in BOUNDED if k in flown}
+    return [
+        _degrees("angle-size", name, size, sure=size > np.pi)
+        for name, size in sizes.items()
+        if size > DOUBTFUL_RAD
+    ]
+
+
+def _surface_sizes(flown: Mapping[str, Array]) -> list[Finding]:
     """Look at the ends of surfaces: at rest for most of a flight, no quantile shows their unit."""
-    notes = []
+    findings = []
     for name in SURFACES:
         if name not in flown:
             continue
         low, high = np.quantile(flown[name], (0.001, 0.999))
         size, swing = max(-float(low), float(high)), float(high - low)
-        if size > 0.5 * np.pi:
-            raise IdentificationError(
-                f"{name} reaches {size:.3g} rad in flight: in degrees? {HINT}"
-            )
         if size > DOUBTFUL_RAD:
-            notes.append(f"{name} reaches {size:.2f} rad in flight: in degrees? {HINT}")
+            findings.append(_degrees("surface-size", name, size, sure=size > 0.5 * np.pi))
         elif 0.0 < swing < IDLE_RAD:
-            notes.append(
-                f"{name} moves by {np.rad2deg(swing):.2g} deg in all: idle, or in radians already"
-                f" where the map says degrees?"
-            )
-    return notes
+            text = f"{name} moves by {np.rad2deg(swing):.2g} deg in all"
+            causes = ("a surface that was left alone", "radians that the map takes for degrees")
+            findings.append(Finding("surface-idle", (name,), text, causes))
+    return findings
 
 
-def _gravity(flown: Mapping[str, Array]) -> list[str]:
-    if "az_mps2" not in flown:
+def _gravity(flown: Mapping[str, Array]) -> list[Finding]:
+    """Hold specific force against weight: in level flight it is as large and points up."""
+    names = tuple(k for k in ("ax_mps2", "ay_mps2", "az_mps2") if k in flown)
+    if "az_mps2" not in names:
         return []
-    axes = [flown[k] for k in ("ax_mps2", "ay_mps2", "az_mps2") if k in flown]
-    size = float(np.median(np.sqrt(sum(a**2 for a in axes))))
+    size = float(np.median(np.sqrt(sum(flown[k] ** 2 for k in names))))
     down = float(np.median(flown["az_mps2"]))
+    weighed = (abs(down), size if abs(down) > WITHOUT_GRAVITY * size else 0.0)
     for unit, one in (("g", 1.0), ("ft/s2", GRAVITY_MPS2 / 0.3048), ("mg", 1000.0)):
-        for name, found in (("specific force", size), ("az_mps2", abs(down))):
-            if 0.7 * one < found < 1.4 * one:
-                raise IdentificationError(
-                    f"{name} is {found:.3g} m/s2 in the median of the flight, not 9.8:"
-                    f" in {unit}? {HINT}"
-                )
+        if any(0.7 * one < found < 1.4 * one for found in weighed):
+            text = f"az_mps2 is {down:.3g} m/s2 in the median of the flight, not -9.8"
+            return [Finding("gravity", names, text, (f"{unit}: {HINT}",), wrong_unit=True)]
     if down > 0.5 * GRAVITY_MPS2:
-        raise IdentificationError(
-            f"az_mps2 is {down:+.3g} m/s2 in the median of the flight: the axis points up, ours"
-            f" down; {HINT}"
-        )
+        text = f"az_mps2 is {down:+.3g} m/s2 in the median of the flight, not -9.8"
+        up = f"an axis that points up, ours down: {HINT}"
+        return [Finding("gravity", ("az_mps2",), text, (up,), wrong_unit=True)]
     if not 0.5 * GRAVITY_MPS2 < size < 2.0 * GRAVITY_MPS2:
-        return [
-            f"specific force is {size:.3g} m/s2 in the median of the flight, not 9.8: accelerations"
-            " without gravity, or another unit?"
-        ]
+        text = f"specific force is {size:.3g} m/s2 in the median of the flight, not 9.8"
+        causes = ("accelerations without gravity", "deviations from trim", f"a unit: {HINT}")
+        return [Finding("gravity", names, text, causes)]
     return []
 
 
-def _air(flown: Mapping[str, Array]) -> None:
+def _air(flown: Mapping[str, Array]) -> list[Finding]:
+    findings: list[Finding] = []
     if "airspeed_mps" in flown and float(np.median(flown["airspeed_mps"])) <= 0.0:
-        raise IdentificationError(f"airspeed_mps is not above zero in flight: {HINT}")
-    for name, (least, most), unit in (
-        ("static_pa", STATIC_PA, "Pa"), ("throttle", THROTTLE, "of full"),
-    ):  # fmt: skip
+        text, sign = "airspeed_mps is not above zero in flight", f"its sign: {HINT}"
+        findings.append(Finding("airspeed-sign", ("airspeed_mps",), text, (sign,), wrong_unit=True))
+    for check, name, (least, most), unit in (
+        ("static-pressure", "static_pa", STATIC_PA, "Pa"),
+        ("throttle", "throttle", THROTTLE, "of full"),
+        ("density", "density_kgpm3", DENSITY, "kg/m3"),
+    ):
         middle = float(np.median(flown[name])) if name in flown else least
         if not least <= middle <= most:
-            raise IdentificationError(f"{name} is {middle:.4g} {unit}: {HINT}")
-    density = 1.225
-    if "density_kgpm3" in flown:
-        density = float(np.median(flown["density_kgpm3"]))
-        if not DENSITY[0] < density < DENSITY[1]:
-            raise IdentificationError(f"density_kgpm3 is {density:.3g} kg/m3: {HINT}")
+            text = f"{name} is {middle:.4g} {unit}"
+            findings.append(Finding(check, (name,), text, (f"a unit: {HINT}",), wrong_unit=True))
     if "airspeed_mps" in flown and "qbar_pa" in flown:
+        density = float(np.median(flown["density_kgpm3"])) if "density_kgpm3" in flown else 1.225
+        density = density if DENSITY[0] <= density <= DENSITY[1] else 1.225
         expected = 0.5 * density * float(np.median(flown["airspeed_mps"] ** 2))
         ratio = float(np.median(flown["qbar_pa"])) / max(expected, 1e-9)
         if not PITOT[0] < ratio < PITOT[1]:
-            raise IdentificationError(
-                f"qbar_pa is {ratio:.3g} times what airspeed_mps makes of it: one of them has"
-                f" another unit; {HINT}"
+            text = f"qbar_pa is {ratio:.3g} times what airspeed_mps makes of it"
+            pair, cause = ("qbar_pa", "airspeed_mps"), f"another unit of one of them: {HINT}"
+            findings.append(
+                Finding("airspeed-against-pressure", pair, text, (cause,), wrong_unit=True)
             )
+    return findings
 
 
-def _forces(means: Mapping[str, Array]) -> None:
+def _forces(means: Mapping[str, Array]) -> list[Finding]:
     """Hold the wind angles against the forces they make."""
-    for angle, force in (("alpha_rad", "az_mps2"), ("beta_rad", "ay_mps2")):
+    findings = []
+    for check, angle, force in (
+        ("alpha-against-az", "alpha_rad", "az_mps2"),
+        ("beta-against-ay", "beta_rad", "ay_mps2"),
+    ):
         if angle in means and force in means:
             agreement, _ = _correlation(np.diff(means[angle]), np.diff(means[force]))
             if agreement > SURE:
-                raise IdentificationError(
+                text = (
                     f"{angle} and {force} rise together (correlation {agreement:.2f}), where lift"
-                    f" and side force oppose: one of them has the wrong sign; {HINT}"
+                    " and side force oppose"
                 )
+                causes = (f"the wrong sign of one of them: {HINT}",)
+                findings.append(Finding(check, (angle, force), text, causes, wrong_unit=True))
+    return findings
 
 
-def _surfaces(means: Mapping[str, Array]) -> list[str]:
-    """Regress angular accelerations on surfaces; a note, for a canard may mean it."""
-    notes = []
+def _surfaces(means: Mapping[str, Array]) -> list[Finding]:
+    """Regress angular accelerations on surfaces; no proof, for a canard may mean it."""
+    findings = []
     for surface, (rate, beside, expected, wrong) in SURFACES.items():
         needed = (surface, rate, beside[0])  # without the wind angle its moment is the surface's
         if any(name not in means for name in needed):
@@ -179,12 +188,13 @@ def _surfaces(means: Mapping[str, Array]) -> list[str]:
         spread = float(np.sum((left - X / size @ beta) ** 2)) / max(len(left) - X.shape[1], 1)
         own = float(np.linalg.pinv((X / size).T @ (X / size))[0, 0])
         if expected * beta[0] < -STRONG * np.sqrt(spread * own):
-            notes.append(
-                f"{surface} positive seems to {wrong}, against our sign"
-                " (elevator trailing edge down, rudder trailing edge left, aileron rolls right):"
-                f" {HINT}"
+            text = (
+                f"{surface} positive seems to {wrong}, against our sign (elevator trailing edge"
+                " down, rudder trailing edge left, aileron rolls right)"
             )
-    return notes
+            causes = (f"the other sign: {HINT}", "feedback", "a canard")
+            findings.append(Finding("surface-sign", (surface,), text, causes))
+    return findings
 
 
 def _correlation(x: Array, y: Array) -> tuple[float, float]:

@@ -174,7 +174,8 @@ def listed(given: Any) -> list[Any]:
 
 
 OPTIONS = {
-    "aircraft": "--aircraft", "calibration": "--calibration", "from_s": "--from",
+    "accept": "--accept", "aircraft": "--aircraft", "calibration": "--calibration",
+    "from_s": "--from",
     "maneuvers": "--maneuver", "mapping": "--map", "mat": "--mat", "methods": "--method",
     "models": "--model", "plots": "--plots", "prior": "--prior",
     "save_aircraft": "--save-aircraft", "save_model": "--save-model", "to_s": "--to",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from host.instrument.error_labels import recording_notes
 from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
 from host.sysid.compatibility.servo_response import surface_positions
+from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
 from host.sysid.flight.maneuver_selection import Stretch, select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
@@ -44,6 +45,8 @@ class ReadingOptions:
         Remove sensor errors that the data determine from the columns.
     also : tuple of str
         Signals to read beside those that are always read.
+    accept : frozenset of str
+        Checks whose findings change nothing.
     """
 
     calibration: Path | None = None
@@ -52,6 +55,7 @@ class ReadingOptions:
     stretches: tuple[Stretch, ...] = ()
     corrections: bool = True
     also: tuple[str, ...] = ()
+    accept: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +65,11 @@ class PreparedFlight:
     flight: ReconstructedFlight
     agreement: Compatibility | None
     notes: tuple[str, ...]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What checks found in the columns of the flight."""
+        return self.flight.findings
 
 
 def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> PreparedFlight:
@@ -72,8 +81,10 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         If it cannot be read, or what was asked for is not in it.
     """
     opened = Path(source) if isinstance(source, str) else source
-    read = read_flight_columns(opened, how.mapping, calibration=how.calibration, also=how.also)
-    columns, notes = read.columns, read.notes
+    read = read_flight_columns(
+        opened, how.mapping, calibration=how.calibration, also=how.also, accept=how.accept
+    )
+    columns, notes, findings = read.columns, read.notes, read.findings
     instrument = known.flown(read) if known else None
     if instrument is not None:
         columns = surface_positions(columns, instrument)
@@ -92,6 +103,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         # Without sensor positions a vane ahead of the CG looks like a delayed one.
         compatibility=agreement if known is not None and how.corrections else None,
         instrument=instrument,
+        findings=findings,
     )
     return PreparedFlight(flight, agreement, tuple(notes))
 
@@ -147,3 +159,10 @@ def collected_notes(flights: Sequence[PreparedFlight], doubts: Collection[str]) 
         return [*flights[0].notes, *doubts]
     own = [f"{f.flight.source}: {note}" for f in flights for note in f.notes]
     return [*own, *doubts]
+
+
+def collected_findings(flights: Sequence[PreparedFlight]) -> tuple[Finding, ...]:
+    """Return all findings; with several flights each names the source of its flight."""
+    if len(flights) == 1:
+        return flights[0].findings
+    return tuple(replace(x, flight=f.flight.source) for f in flights for x in f.findings)

@@ -23,6 +23,7 @@ from host.sysid.compatibility.reconstruction import (
     compatibility_document,
     compatibility_lines,
 )
+from host.sysid.flight.data_finding import Finding, finding_document
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.pipeline.aircraft_data import AircraftData
@@ -55,6 +56,8 @@ class Identification:
         Fitted directly.
     notes : tuple of str
         What was done to the data, and which models could not be fitted.
+    findings : tuple of Finding
+        What checks found in the columns, and what was done about it.
     """
 
     flights: tuple[ReconstructedFlight, ...]
@@ -67,6 +70,7 @@ class Identification:
     aircraft: AircraftData | None = None
     truth: dict[str, Any] | None = None
     prior: PriorTable | None = None
+    findings: tuple[Finding, ...] = ()
 
     @property
     def table(self) -> pd.DataFrame:
@@ -84,7 +88,8 @@ class Identification:
     @property
     def verdict(self) -> tuple[str, ...]:
         """Lines on what to trust, what not and why, and what to fly again."""
-        return (*verdict_lines(self.answers, self.notes), *removed_error_lines(self.linear))
+        found = (finding.line for finding in self.findings)
+        return (*found, *verdict_lines(self.answers, self.notes), *removed_error_lines(self.linear))
 
     @property
     def answers(self) -> tuple[Answer | CoefficientAnswer, ...]:
@@ -160,6 +165,7 @@ class Identification:
         one = len(sources) == 1
         return {
             "source": sources[0] if one else sources,
+            "findings": [finding_document(finding) for finding in self.findings],
             "notes": list(self.notes),
             "data_compatibility": agreements[0] if one else agreements,
             "answers": documents,

@@ -11,6 +11,7 @@ from host.aircraft.prior.prior_table import PriorTable
 from host.physical.calibration import load_calibration
 from host.sysid.answer.truth_comparison import read_truth
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
+from host.sysid.flight.data_finding import accepted_checks
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear_estimator import Answer, LinearEstimator
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
@@ -18,6 +19,7 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData, aircraft_data
 from host.sysid.pipeline.arguments import (
     chosen_stretches,
+    listed,
     numbers_of,
     of_each_flight,
     path_of,
@@ -25,6 +27,7 @@ from host.sysid.pipeline.arguments import (
 )
 from host.sysid.pipeline.flight_preparation import (
     ReadingOptions,
+    collected_findings,
     collected_notes,
     distinct_flights,
     listed_flights,
@@ -57,6 +60,7 @@ def identify(
     from_s: float | None = None,
     to_s: float | None = None,
     corrections: bool = True,
+    accept: str | Iterable[str] = (),
     truth: str | Path | Sequence[str | Path] | None = None,
     prior: str | Path | None = None,
 ) -> Identification:
@@ -90,6 +94,8 @@ def identify(
         The same for one stretch of every flight.
     corrections : bool
         Remove sensor errors that the data determine from the columns.
+    accept : str or several
+        Checks of the data whose findings shall change nothing: columns are used as they are.
     truth : path or several, optional
         Of simulated flights, one of each: compared with.
     prior : path, optional
@@ -108,7 +114,13 @@ def identify(
     calibrations = of_each_flight("calibration", calibration, len(sources))
     each = [
         ReadingOptions(
-            made_by, named_by, numbers_of("maneuvers", maneuvers), span, corrections, asked.signals
+            made_by,
+            named_by,
+            numbers_of("maneuvers", maneuvers),
+            span,
+            corrections,
+            asked.signals,
+            accepted_checks(listed(accept)),
         )
         for made_by, named_by, span in zip(
             calibrations, of_each_flight("mapping", mapping, len(sources)), spans, strict=True
@@ -127,13 +139,14 @@ def identify(
         if known is None and made_by is not None:
             load_calibration(made_by)  # unused with a table, but a misspelt name is an error
     notes = collected_notes(ready, known.doubts if known else ())
+    findings = collected_findings(ready)
     recorded = distinct_flights([one.flight for one in ready])
     true = _truth(truth, len(recorded))
     expected = _prior(prior, recorded, known)
     direct, doubts = _coefficients(asked, known, recorded)
     linear, unfit = _linear(asked, by, known, recorded)
     if not linear and direct is None:
-        raise IdentificationError("; ".join([*unfit, *notes, *doubts]))
+        raise IdentificationError("; ".join([*unfit, *(f.line for f in findings), *notes, *doubts]))
     return Identification(
         flights=tuple(recorded),
         agreements=tuple(one.agreement for one in ready),
@@ -145,6 +158,7 @@ def identify(
         aircraft=known,
         truth=true,
         prior=expected,
+        findings=findings,
     )
 
 

@@ -1,0 +1,141 @@
+"""A finding: what a check of the data found, what may have caused it, what was done about it.
+
+A finding ends no work; only what cannot be fitted does. Each check has a short, stable name, which
+`--accept` takes: the column is then used as it is.
+
+How a verdict reads findings: `open_channels` names the columns of ours that are in doubt. What an
+answer takes from one of them is never under "trust": the derivatives in the equation of such a
+state, those it is multiplied by, those of such an input, and those of an output only that output
+tells. Leaving the column out, estimating its scale and `--accept` do not close a finding; `closed`
+is set only where the samples themselves are in no fit. `wrong_units` are the channels of which
+kinematics proves that a unit or a sign is wrong: no later evidence brings these back under "trust".
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from host.sysid.identification_error import IdentificationError
+
+# Every check and what it compares.
+CHECKS = {
+    "angle-size": "angles in flight are below pi",
+    "surface-size": "surfaces stay within 90 deg",
+    "surface-idle": "a surface moves by more than the width of a line",
+    "surface-sign": "a surface turns the aircraft the way our signs say",
+    "gravity": "specific force is about 9.8 m/s2, and az points down",
+    "airspeed-sign": "airspeed is above zero",
+    "static-pressure": "static pressure is one of air",
+    "density": "density is one of air",
+    "throttle": "throttle is a share of full",
+    "airspeed-against-pressure": "airspeed against dynamic pressure",
+    "theta-against-q": "pitch against pitch rate",
+    "phi-against-p": "bank against roll rate",
+    "psi-against-r": "heading against yaw rate",
+    "alpha-against-q": "angle of attack against pitch rate",
+    "beta-against-r": "sideslip against yaw rate",
+    "alpha-against-az": "angle of attack against lift over airspeed",
+    "beta-against-ay": "sideslip against side force over airspeed",
+    "airspeed-against-ax": "airspeed against forward force and weight",
+    "altitude-against-climb": "altitude against vertical speed",
+    "stuck-sensor": "a sensor moves where kinematics says that it must",
+    "small-inputs": "a surface moves enough for a maneuver to be found",
+    "calibration": "sensor errors are as small as their file says",
+    "sensor-agreement": "flight-path reconstruction brings the sensors together",
+}
+AS_IT_IS = "used as it is"
+HINT = "give its unit or sign in the map (argument mapping)"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One finding about the columns of a flight.
+
+    Attributes
+    ----------
+    check : str
+        One of `CHECKS`.
+    channels : tuple of str
+        Columns of ours that are in doubt; empty where none is.
+    text : str
+        What was found, in one sentence.
+    causes : tuple of str
+        What it may come from, the likeliest first.
+    done : str
+        What was done about it.
+    wrong_unit : bool
+        Whether kinematics proves that the unit or sign of a channel is wrong.
+    accepted : bool
+        Whether the user accepted it.
+    closed : bool
+        Whether the samples in doubt are in no fit.
+    flight : str
+        Its source, where there are several.
+    """
+
+    check: str
+    channels: tuple[str, ...]
+    text: str
+    causes: tuple[str, ...] = ()
+    done: str = AS_IT_IS
+    wrong_unit: bool = False
+    accepted: bool = False
+    closed: bool = False
+    flight: str = ""
+
+    @property
+    def line(self) -> str:
+        """The finding in one line."""
+        where = f"{self.flight}: " if self.flight else ""
+        causes = f"; likely {' or '.join(self.causes)}" if self.causes else ""
+        return f"{where}finding {self.check}: {self.text}{causes}; {self.done}"
+
+    def accept(self) -> Finding:
+        """Return the finding as the user accepted it."""
+        return replace(self, accepted=True, done=f"accepted, {AS_IT_IS}")
+
+
+def open_channels(findings: Iterable[Finding]) -> frozenset[str]:
+    """Return the columns in doubt, of which nothing may be under "trust"."""
+    return frozenset(name for f in findings if not f.closed for name in f.channels)
+
+
+def wrong_units(findings: Iterable[Finding]) -> frozenset[str]:
+    """Return the columns of which kinematics proves that a unit or sign is wrong."""
+    return frozenset(name for f in findings if f.wrong_unit for name in f.channels)
+
+
+def finding_document(finding: Finding) -> dict[str, Any]:
+    """Return a finding for JSON."""
+    return {
+        "check": finding.check,
+        "channels": list(finding.channels),
+        "text": finding.text,
+        "causes": list(finding.causes),
+        "done": finding.done,
+        "wrong_unit": finding.wrong_unit,
+        "accepted": finding.accepted,
+        "open": not finding.closed,
+        "flight": finding.flight or None,
+    }
+
+
+def accepted_checks(given: Sequence[str]) -> frozenset[str]:
+    """Return the names of checks that a user accepts.
+
+    Raises
+    ------
+    IdentificationError
+        If there is no such check.
+    """
+    for name in given:
+        if name not in CHECKS:
+            near = difflib.get_close_matches(str(name), CHECKS, n=1)
+            meant = f" (did you mean {near[0]}?)" if near else ""
+            raise IdentificationError(
+                f"argument accept: no check '{name}'{meant}; there are {', '.join(CHECKS)}"
+            )
+    return frozenset(given)

@@ -1,0 +1,68 @@
+"""What is done about findings: a unit read otherwise, a column left out, or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+from host.arrays import Array
+from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.unit_readings import reread
+from host.sysid.flight.unit_sign_checks import check
+
+MOST_READINGS = 4  # a map with more wrong lines is no map
+# Without these columns everything can still be fitted.
+LEFT_OUT = {
+    "airspeed-against-ax": "ax_mps2",
+    "psi-against-r": "psi_rad",
+    "altitude-against-climb": "altitude_m",
+    "airspeed-against-pressure": "qbar_pa",
+    "static-pressure": "static_pa",
+    "density": "density_kgpm3",
+    "throttle": "throttle",
+}
+
+
+def checked(
+    columns: Mapping[str, Array], accept: Collection[str] = ()
+) -> tuple[dict[str, Array], list[Finding]]:
+    """Return the columns as they are used, and all findings with what was done.
+
+    Parameters
+    ----------
+    columns : mapping
+        SI columns on an even grid.
+    accept : collection of str
+        Checks whose findings change nothing.
+    """
+    result, settled = dict(columns), []
+    findings = check(result)
+    accepted = [f.accept() for f in findings if f.check in accept]
+    for _ in range(MOST_READINGS):
+        asked = [f for f in findings if f.check not in accept]
+        if not (found := reread(result, asked)):
+            break
+        reading, left = found
+        result = reading.read(result)
+        remain = {(f.check, f.channels) for f in left}
+        times = f" (times {reading.gain:.4g})" if abs(reading.gain) != 1.0 else ""
+        for f in asked:
+            if (f.check, f.channels) not in remain:
+                settled.append(
+                    replace(
+                        f,
+                        done=f"read as {reading.words}{times}",
+                        wrong_unit=f.wrong_unit or not reading.weight,
+                    )
+                )
+        findings = left
+    for f in findings:
+        if f.check in accept:
+            continue
+        out = LEFT_OUT.get(f.check)
+        if out in result:
+            del result[out]
+            settled.append(replace(f, done=f"{out} left out"))
+        else:
+            settled.append(f)
+    return result, [*settled, *accepted]

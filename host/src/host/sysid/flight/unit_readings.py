@@ -1,0 +1,123 @@
+"""Other readings of a column: in which unit, or with which sign, would it agree with all others?
+
+A map that forgot a unit or a sign leaves a column that kinematics contradicts. Every unit that the
+column could come in is tried, twice converted too, the other sign, and angles or rates all in
+degrees; the reading that settles most findings is taken, and of several the one with factors
+nearest to one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.arrays import Array
+from host.constants import GRAVITY_MPS2, RAD_PER_DEG
+from host.sysid.flight.column_map import UNITS
+from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.kinematic_checks import misfit
+from host.sysid.flight.unit_sign_checks import SURFACES, airborne, check
+
+ANGLES = ("alpha_rad", "beta_rad", "phi_rad", "theta_rad", "psi_rad")
+RATES = ("p_radps", "q_radps", "r_radps")
+FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
+POSITIVE = ("airspeed_mps", "qbar_pa", "static_pa", "density_kgpm3", "throttle")
+ALIKE = 0.02  # factors that differ by less are one
+READABLE = ("throttle", "static-pressure", "density")  # ranges that prove a unit without a law
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Columns read in another way: each times `gain`, plus weight where it was left out."""
+
+    channels: tuple[str, ...]
+    words: str
+    gain: float = 1.0
+    weight: bool = False
+
+    def read(self, columns: Mapping[str, Array]) -> dict[str, Array]:
+        """Return all columns, these read in this way."""
+        changed = {k: columns[k] * self.gain for k in self.channels if k in columns}
+        if self.weight:
+            weight = _weight(columns)
+            changed = {k: values - weight[k] for k, values in changed.items()}
+        return {**columns, **changed}
+
+
+def reread(
+    columns: Mapping[str, Array], findings: Sequence[Finding]
+) -> tuple[Reading, list[Finding]] | None:
+    """Return the reading that settles most findings, and what is found then; None if none does.
+
+    Parameters
+    ----------
+    columns : mapping
+        SI columns on an even grid.
+    findings : sequence of Finding
+        Those of `check` that ask for a reading.
+    """
+    proven = [f for f in findings if f.wrong_unit or f.check == "gravity"]
+    before = check(columns)
+    best: tuple[tuple[int, float], Reading, list[Finding]] | None = None
+    for reading in _readings(columns, proven):
+        trial = reading.read(columns)
+        after = check(trial)
+        settled = {(f.check, f.channels) for f in before} - {(f.check, f.channels) for f in after}
+        if not settled & {(f.check, f.channels) for f in proven} or len(after) >= len(before):
+            continue
+        flown, dt_s = airborne(trial)
+        score = len(after), misfit(flown, dt_s)
+        if best is None or score < best[0]:
+            best = score, reading, after
+    return None if best is None else (best[1], best[2])
+
+
+def _readings(columns: Mapping[str, Array], findings: Sequence[Finding]) -> Iterator[Reading]:
+    """Return every way in which the columns of some findings could have been meant."""
+    names = dict.fromkeys(k for f in findings for k in f.channels if k in columns)
+    for name in names:
+        yield from _of_column(name)
+    groups: tuple[tuple[str, Callable[[str], bool]], ...] = (
+        ("angles", ANGLES.__contains__),
+        ("rates", RATES.__contains__),
+        ("angles and rates", (*ANGLES, *RATES).__contains__),
+        ("surfaces", SURFACES.__contains__),
+        ("angles, rates and surfaces", (*ANGLES, *RATES, *SURFACES).__contains__),
+    )
+    for words, belongs in groups:
+        together = tuple(k for k in columns if belongs(k))
+        if len(together) > 1 and set(together) & set(names):
+            yield Reading(together, f"{words} in degrees", RAD_PER_DEG)
+    forces = tuple(k for k in FORCES if k in columns)
+    if set(forces) & set(names):
+        for unit, factor in UNITS["mps2"].items():
+            yield Reading(forces, f"specific forces in {unit}", factor)
+        if "theta_rad" in columns:
+            yield Reading(forces, "accelerations without gravity", weight=True)
+
+
+def _of_column(name: str) -> Iterator[Reading]:
+    """Return the readings of one column: units, what was converted twice, the other sign."""
+    units = UNITS.get(name.rsplit("_", 1)[-1], {})
+    tried = [1.0]
+    for twice in (False, True):
+        for unit, factor in units.items():
+            gain = 1.0 / factor if twice else factor
+            if any(abs(gain / known - 1.0) < ALIKE for known in tried):
+                continue
+            tried.append(gain)
+            yield Reading(
+                (name,), f"{name} {'converted twice from' if twice else 'in'} {unit}", gain
+            )
+    if name not in POSITIVE or name == "airspeed_mps":
+        yield Reading((name,), f"{name} with the other sign", -1.0)
+
+
+def _weight(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Return gravity along the body axes, m/s2: what accelerations have and specific forces not."""
+    theta = columns["theta_rad"]
+    phi = columns.get("phi_rad", np.zeros(len(theta)))
+    along = (-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi))
+    return {k: GRAVITY_MPS2 * g for k, g in zip(FORCES, along, strict=True)}
