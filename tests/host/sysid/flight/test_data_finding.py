@@ -13,6 +13,7 @@ from host.sysid.flight.unit_sign_checks import check
 from host.sysid.identification_error import IdentificationError
 
 import host
+from tests.host.logs import ROOT
 
 G = 9.80665
 Columns = dict[str, np.ndarray]
@@ -133,3 +134,35 @@ def test_a_clean_record_has_no_finding(record: pd.DataFrame) -> None:
     columns: Columns = {str(k): record[k].to_numpy() for k in record}
     assert check(columns) == []
     assert open_channels([]) == frozenset()
+
+
+def test_small_inputs_are_fitted_as_one_stretch(record: pd.DataFrame) -> None:
+    moving = [k for k in record if k != "t_s" and str(k).endswith(("_rad", "_radps", "_mps2"))]
+    mean = record[moving].mean()
+    small = record.assign(**(mean + 0.15 * (record[moving] - mean)))
+    found = host.identify(small, models="short-period")
+    [finding] = [f for f in found.findings if f.check == "small-inputs"]
+    assert "is fitted as one stretch" in finding.done
+    assert finding.channels == ()
+    whole = host.identify(record, models="short-period", from_s=float(record["t_s"][0]))
+    for name in ("M_alpha", "M_q", "M_de"):
+        small_value, value = (x.linear[0].result.value(name) for x in (found, whole))
+        assert small_value == pytest.approx(value, rel=0.15), name
+
+
+THOR = ROOT / "tests/data/thor75"
+
+
+@pytest.mark.parametrize("aircraft", [[], ["--aircraft", "ultrastick25e"]])
+@pytest.mark.parametrize("stretch", [[], ["--from", "245", "--to", "265"]])
+def test_a_real_aircraft_goes_through_as_it_is(
+    aircraft: list[str], stretch: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Indicated airspeed, commands for positions, feedback: findings and doubts, no trust."""
+    source, mapping = THOR / "flight75_240_270.csv", THOR / "map.toml"
+    options = ["identify", str(source), *stretch, "--map", str(mapping), *aircraft, "--json"]
+    assert main(options) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["answers"]
+    said = " ".join(line for a in answer["answers"] for line in a["verdict"])
+    assert "trust (within 10 %):  nothing" in said

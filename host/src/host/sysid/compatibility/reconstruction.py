@@ -50,6 +50,10 @@ NOT_EXCITED = "the motion flown does not show it; the calibration stands"
 NOT_EXCITED_NO_GPS = "not told from attitude and gusts without GPS; the calibration stands"
 
 
+class NoAgreementError(IdentificationError):
+    """No errors within reach of the calibration make the sensors agree."""
+
+
 @dataclass(frozen=True, slots=True)
 class SensorErrorEstimate:
     """One sensor error: estimate, its 95 % half-width, and the half-width of the calibration.
@@ -121,13 +125,14 @@ def reconstruct(
     Raises
     ------
     IdentificationError
-        If inertial sensors or all air data are missing, no part of the flight is long enough, or
-        the iteration does not converge.
+        If inertial sensors or all air data are missing, or no part of the flight is long enough.
+    NoAgreementError
+        If the iteration does not converge.
     """
     problem, lagged_inputs, when = prepare_path_problem(columns, airframe, instrument)
     fit = fit_path(problem, lagged_inputs)
     if not fit.converged:
-        raise IdentificationError(
+        raise NoAgreementError(
             f"data compatibility: no agreement after {fit.iterations} iterations; a sensor is"
             " further off than its calibration allows"
         )

@@ -10,12 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from host.instrument.error_labels import recording_notes
-from host.sysid.compatibility.reconstruction import Compatibility, reconstruct
+from host.sysid.compatibility.reconstruction import (
+    Compatibility,
+    NoAgreementError,
+    reconstruct,
+)
 from host.sysid.compatibility.servo_response import surface_positions
+from host.sysid.flight.agreement_findings import calibration_findings, disagreement
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
 from host.sysid.flight.maneuver_selection import Stretch, select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
+from host.sysid.flight.small_inputs import whole_flight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData
 
@@ -90,11 +96,18 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         columns = surface_positions(columns, instrument)
         notes += recording_notes(instrument)
     found = select_maneuvers(columns, stretches=how.stretches, numbers=how.maneuvers)
+    if not found:
+        found, small = whole_flight(columns)
+        findings += small
     agreement = None
     try:
         agreement = reconstruct(columns, known.airframe if known else None, instrument)
+        findings += calibration_findings(agreement)
+    except NoAgreementError as error:
+        findings.append(disagreement(error, columns))
     except IdentificationError as error:
         notes.append(str(error))
+    findings = [f.accept() if f.check in how.accept and f.channels else f for f in findings]
     flight = reconstruct_flight(
         columns,
         found,

@@ -1,0 +1,42 @@
+"""What the data-compatibility check finds: sensors that disagree by more than their file allows."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from host.sysid.compatibility.calibration_consistency import calibration_lines
+from host.sysid.compatibility.reconstruction import Compatibility
+from host.sysid.flight.data_finding import Finding
+
+RATES = ("p_radps", "q_radps", "r_radps")
+FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
+AIR_DATA = ("airspeed_mps", "alpha_rad", "beta_rad")
+# The columns that a group of errors of an instrument's file moves.
+MOVED = {
+    "gyro": RATES,
+    "accel": FORCES,
+    "misalignment": FORCES,
+    "vane": ("alpha_rad", "beta_rad"),
+    "pitot": ("airspeed_mps",),
+    "place": ("alpha_rad", "beta_rad", *FORCES),
+}
+
+
+def calibration_findings(agreement: Compatibility) -> list[Finding]:
+    """Return the finding that sensor errors are larger than their file says; none if they fit."""
+    tests = agreement.calibration_tests
+    lines = calibration_lines(tests)
+    if not lines:
+        return []
+    named = [test.name for test in tests[1:] if test.rejected]
+    channels = [k for name in named for k in MOVED[name.split("_")[0]]]
+    causes = ("a calibration that is another instrument's", "wind that changes", "a wrong unit")
+    done = "intervals rest on the file all the same"
+    return [Finding("calibration", tuple(dict.fromkeys(channels)), lines[0], causes, done)]
+
+
+def disagreement(error: Exception, columns: Collection[str]) -> Finding:
+    """Return the finding that reconstruction brought the sensors to no agreement."""
+    channels = tuple(k for k in AIR_DATA if k in columns)
+    causes = ("a unit", "a sensor that is stuck or late", "wind that changes")
+    return Finding("sensor-agreement", channels, str(error), causes, "no error was estimated")

@@ -1,0 +1,44 @@
+"""A record in which no maneuver is found, though surfaces moved: all of the flight is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from host.arrays import Array
+from host.constants import DEG_PER_RAD
+from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver
+from host.sysid.flight.maneuver_selection import FEWEST, SURFACES, select_maneuvers
+
+STILL_RAD = 1e-3  # a surface that moves less excites nothing
+
+
+def whole_flight(columns: Mapping[str, Array]) -> tuple[list[DetectedManeuver], list[Finding]]:
+    """Return the whole flight as one stretch, and why; nothing where no surface moved.
+
+    Parameters
+    ----------
+    columns : mapping
+        SI columns on an even grid.
+    """
+    t = columns["t_s"]
+    flown = np.ones(len(t), dtype=bool)
+    if "airspeed_mps" in columns:
+        speed = columns["airspeed_mps"]
+        flown = speed > FLYING_SHARE * float(np.median(speed))
+    swing = {s: float(np.ptp(columns[s][flown])) for s in SURFACES if s in columns and flown.any()}
+    if flown.sum() < FEWEST or max(swing.values(), default=0.0) < STILL_RAD:
+        return [], []
+    first, last = np.flatnonzero(flown)[[0, -1]]
+    moved = ", ".join(f"{name} {DEG_PER_RAD * size:.2g} deg" for name, size in swing.items())
+    finding = Finding(
+        "small-inputs",
+        (),
+        f"no maneuver stands out of the record (from end to end move {moved})",
+        ("small inputs", "a flight without test points", "surfaces in another unit"),
+        f"all of it, {t[first]:.6g} to {t[last]:.6g} s, is fitted as one stretch",
+    )
+    stretch = float(t[first]), float(t[last])
+    return select_maneuvers(columns, stretches=[stretch]), [finding]
