@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import ceil
 from typing import TYPE_CHECKING
 
 from host.sysid.answer.advised_inputs import advised_input
+from host.sysid.answer.coefficient_rules import coefficient_doubts, unpredicted
+from host.sysid.answer.doubt import Doubt, reasons_by_name
 from host.sysid.answer.marks import (
     CAREFUL,
     TRUST,
@@ -21,28 +24,50 @@ from host.sysid.coefficients.coefficient_model import standard_model
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
-WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
 
+def coefficient_verdict(
+    answer: CoefficientAnswer, open_channels: Mapping[str, str] | None = None
+) -> Verdict:
+    """Return what of the coefficients may be relied on.
 
-def coefficient_verdict(answer: CoefficientAnswer) -> Verdict:
-    """Return what of the coefficients may be relied on."""
+    Parameters
+    ----------
+    answer : CoefficientAnswer
+    open_channels : mapping, optional
+        Column with an open finding of the data checks to what was found.
+    """
     along = sum(w.longitudinal for w in answer.windows)
     own = "" if answer.model == standard_model() else f" by the terms of '{answer.model.name}'"
     heading = (
         f"coefficients{own}: {along} maneuvers of the elevator, {len(answer.windows) - along} of"
         " aileron and rudder fitted jointly, errors of the instrument beside them"
     )
+    doubts = coefficient_doubts(answer, open_channels or {})
+    reasons = reasons_by_name(doubts)
     marks = {}
     for d in answer.fit.derivatives:
         sharp = TRUSTED if d.share <= TRUST else CAREFUL
-        marks[d.name] = sharp if not d.flagged else USELESS if d.share > 1.0 else UNSURE
+        wide = USELESS if d.share > 1.0 else UNSURE
+        marks[d.name] = wide if d.flagged or d.name in reasons else sharp
     lines = [
         *first_lines(heading, marks, FLAG_SHARE),
         *_flag_lines(answer, marks),
+        *_doubt_lines(doubts),
         *_agreement_lines(answer),
         _prediction_line(answer),
     ]
-    return Verdict(heading, marks, tuple(lines))
+    why = {
+        d.name: (f"95 % half-width {ceil(100.0 * d.share)} %", *reasons.get(d.name, ()))
+        for d in answer.fit.derivatives
+    }
+    return Verdict(heading, marks, tuple(lines), why)
+
+
+def _doubt_lines(doubts: Sequence[Doubt]) -> list[str]:
+    return [
+        f"  do not rely on {', '.join(one.names)}, whatever the interval: {one.reason}"
+        for one in doubts
+    ]
 
 
 def _flag_lines(answer: CoefficientAnswer, marks: Mapping[str, str]) -> list[str]:
@@ -81,11 +106,7 @@ def _prediction_line(answer: CoefficientAnswer) -> str:
             "  no maneuver could be left out to be predicted: each alone tells a term; fly every"
             " input at least twice"
         )
-    poor = [
-        f"{name} (NRMSE {100.0 * unseen:.1f} %, fitted {100.0 * found.fitted[name]:.1f} %)"
-        for name, unseen in found.left_out.items()
-        if unseen > WORSE * found.fitted[name]
-    ]
+    poor = [f"{name} ({words})" for name, words in unpredicted(answer).items()]
     return (
         f"  prediction of unseen maneuvers ({len(found.windows)} of {count}, each by the others): "
         + ("fails for " + ", ".join(poor) if poor else "holds for every coefficient")

@@ -9,7 +9,7 @@ import numpy as np
 
 from host.constants import DEG_PER_RAD
 from host.sysid.answer.parameter_units import parameter_unit
-from host.sysid.answer.unpredicted_states import reasons_of_states, unpredicted_states
+from host.sysid.answer.trust_rules import uncarried_states
 from host.sysid.flight.linear_estimator import Answer, from_zero
 from host.sysid.models.modal_analysis import Mode
 
@@ -49,10 +49,10 @@ def model_lines(answer: Answer) -> list[str]:
             + ("" if from_zero(c) else "  not told from zero")
             for c in answer.coefficients
         ]
-    failing = unpredicted_states(answer)
+    failing = uncarried_states(answer)
     for mode in answer.modes:
-        in_it = _participating(answer, mode, failing)
-        mark = f"  not to be relied on: {reasons_of_states(answer, in_it)}" if in_it else ""
+        in_it = _participating(answer, mode, list(failing))
+        mark = f"  not to be relied on: {', '.join(failing[s] for s in in_it)}" if in_it else ""
         lines.append(_mode_line(mode) + mark)
     for kind, fits in (
         ("free simulation, fitted data", answer.fits),

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from host.sysid.answer.marks import Verdict
 from host.sysid.answer.parameter_units import parameter_unit
-from host.sysid.answer.unpredicted_states import unpredicted_states
+from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, uncarried_states
+from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.compatibility.sensor_corrections import correction_document
 from host.sysid.flight.linear_estimator import Answer
@@ -73,7 +75,9 @@ def mode_document(modes: Sequence[Mode]) -> list[dict[str, Any]]:
     ]
 
 
-def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
+def answer_document(
+    answer: Answer, lines: Sequence[str], evidence: Evidence = NO_EVIDENCE
+) -> dict[str, Any]:
     """Return one fitted model: verdict, estimates with intervals, modes, figures of fit."""
     result = answer.result
     half = result.half_width()
@@ -82,6 +86,7 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
         "template": answer.template,
         "method": result.method,
         "verdict": list(lines),
+        "marks": _mark_document(verdict_of(answer, evidence)),
         "converged": result.converged,
         "warnings": list(result.warnings),
         "airspeed_mps": answer.condition.airspeed_mps,
@@ -107,7 +112,7 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
             for name, (value, width) in answer.delays.items()
         },
         "at_bound": list(answer.at_bound),
-        "unpredicted": unpredicted_states(answer),
+        "unpredicted": list(uncarried_states(answer)),
         "corrections": correction_document(answer.corrections),
         "refused": [
             {
@@ -137,6 +142,11 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
             }
             for kind, fits in (("fitted", answer.fits), ("held_out", answer.validation))
         },
+        "predictions": {
+            name: {"nrmse": p.nrmse, "largest": p.largest, "holds": p.holds}
+            for name, p in answer.predictions.items()
+        },
+        "driven_by_inputs": _coherence_document(answer),
         "residual_kind": result.residual_kind,
         "collinear": [
             {"names": [a, b], "correlation": value} for a, b, value in answer.collinearity.pairs
@@ -145,6 +155,29 @@ def answer_document(answer: Answer, lines: Sequence[str]) -> dict[str, Any]:
         "constant_inputs": list(answer.constant_inputs),
         "maneuvers": [m.name for m in answer.maneuvers],
         "held_out": [maneuver_name(f) for f in answer.held_out],
+    }
+
+
+def _coherence_document(answer: Answer) -> dict[str, Any]:
+    """Return of each output how much of the residual the inputs drive, and how surely."""
+    found = answer.coherence
+    if found is None:
+        return {}
+    return {
+        name: {
+            "power_ratio": float(found.ratio[k]),
+            "p_value": float(found.p_value[k]),
+            "coherent": name in found.coherent,
+        }
+        for k, name in enumerate(found.outputs)
+    }
+
+
+def _mark_document(verdict: Verdict) -> dict[str, Any]:
+    """Return every parameter's mark and why it stands there."""
+    return {
+        name: {"mark": mark, "reasons": list(verdict.reasons.get(name, ()))}
+        for name, mark in verdict.marks.items()
     }
 
 
@@ -176,7 +209,9 @@ def _repeats_document(found: ManeuverAgreement) -> dict[str, Any]:
     }
 
 
-def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dict[str, Any]:
+def coefficient_document(
+    answer: CoefficientAnswer, lines: Sequence[str], evidence: Evidence = NO_EVIDENCE
+) -> dict[str, Any]:
     """Return a direct fit of coefficients: verdict, values, modes, delays, instrument errors."""
     flight = answer.fit.condition
     return {
@@ -185,6 +220,7 @@ def coefficient_document(answer: CoefficientAnswer, lines: Sequence[str]) -> dic
         "terms": [name for name, _, _ in answer.model.named()],
         "method": METHOD,
         "verdict": list(lines),
+        "marks": _mark_document(verdict_of(answer, evidence)),
         "airspeed_mps": flight.airspeed_mps,
         "qbar_pa": flight.qbar_pa,
         "alpha_rad": flight.alpha_rad,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import ceil
 
 from host.sysid.answer.advised_inputs import advised_input
-from host.sysid.answer.correlated_inputs import correlated_inputs, derivatives_of_both
+from host.sysid.answer.correlated_inputs import correlated_inputs
+from host.sysid.answer.doubt import Doubt, reasons_by_name
 from host.sysid.answer.marks import (
     CAREFUL,
     FAIR,
@@ -19,37 +20,34 @@ from host.sysid.answer.marks import (
     first_lines,
     names_marked,
 )
-from host.sysid.answer.unpredicted_states import (
-    failing_outputs,
-    parameters_of_states,
-    reasons_of_states,
-    unpredicted_states,
-)
+from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, doubts_of, unpredicted
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
 
 PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircraft
 
 
-def linear_verdict(answer: Answer) -> Verdict:
-    """Return what of a linear model may be relied on."""
+def linear_verdict(answer: Answer, evidence: Evidence = NO_EVIDENCE) -> Verdict:
+    """Return what of a linear model may be relied on, with what stands beside it in evidence."""
     count = len(answer.used)
     fitted = "1 maneuver fitted" if count == 1 else f"{count} maneuvers fitted jointly"
     heading = (
         f"{answer.template}: {fitted} by {answer.result.method}, {len(answer.held_out)} held out"
     )
     shares = relative_half_widths(answer)
-    marks = _marks(answer, shares)
+    doubts = doubts_of(answer, evidence)
+    reasons = reasons_by_name(doubts)
+    marks = _marks(answer, shares, reasons)
     lines = first_lines(heading, marks, FAIR)
     if not answer.result.converged:
         wrong = "  no convergence: estimates and intervals mean nothing, use another method"
         lines.insert(1, wrong)
-    lines += _width_lines(answer, marks, shares)
-    lines += _unpredicted_lines(answer)
+    lines += _width_lines(answer, marks, shares, reasons)
+    lines += _doubt_lines(answer, doubts)
     lines += _identifiability_lines(answer)
     lines += _input_lines(answer)
     lines += _data_lines(answer)
-    return Verdict(heading, marks, tuple(lines))
+    return Verdict(heading, marks, tuple(lines), _all_reasons(answer, marks, shares, reasons))
 
 
 def relative_half_widths(answer: Answer) -> dict[str, float]:
@@ -64,18 +62,16 @@ def relative_half_widths(answer: Answer) -> dict[str, float]:
 
 def not_relied_on(answer: Answer) -> set[str]:
     """Return the parameters that the verdict does not let a reader use."""
-    wide = {name for name, share in relative_half_widths(answer).items() if share > FAIR}
-    unidentified = {r.name for r in answer.identifiability_flags if r.grade == NOT_IDENTIFIABLE}
-    return wide | unidentified | parameters_of_states(answer, unpredicted_states(answer))
+    marks = linear_verdict(answer).marks
+    return {name for name, mark in marks.items() if mark in (UNSURE, USELESS)}
 
 
-def _marks(answer: Answer, shares: Mapping[str, float]) -> dict[str, str]:
+def _marks(
+    answer: Answer, shares: Mapping[str, float], reasons: Mapping[str, tuple[str, ...]]
+) -> dict[str, str]:
     result = answer.result
-    half = result.half_width()
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
     flags = {r.name: r.grade for r in answer.identifiability_flags}
-    doubtful = parameters_of_states(answer, unpredicted_states(answer))
-    doubtful |= derivatives_of_both(answer)
     marks = {}
     for k, parameter in enumerate(answer.model.parameters):
         name = parameter.name
@@ -83,8 +79,8 @@ def _marks(answer: Answer, shares: Mapping[str, float]) -> dict[str, str]:
             continue
         if not result.converged or flags.get(name) == NOT_IDENTIFIABLE:
             marks[name] = USELESS
-        elif name in flags or half[k] == 0.0 or name in doubtful or shares[name] > FAIR:
-            marks[name] = UNSURE  # a half-width of zero is that of a bound
+        elif name in flags or name in reasons or shares[name] > FAIR:
+            marks[name] = UNSURE
         elif size[k] > abs(float(result.estimate[k])):
             marks[name] = SMALL
         else:
@@ -92,18 +88,36 @@ def _marks(answer: Answer, shares: Mapping[str, float]) -> dict[str, str]:
     return marks
 
 
+def _all_reasons(
+    answer: Answer,
+    marks: Mapping[str, str],
+    shares: Mapping[str, float],
+    doubts: Mapping[str, tuple[str, ...]],
+) -> dict[str, tuple[str, ...]]:
+    """Return why each parameter stands under its mark."""
+    flags = {r.name: r.reason for r in answer.identifiability_flags}
+    found = {}
+    for name in marks:
+        own = [f"95 % half-width {ceil(100.0 * shares[name])} %"]
+        own += [flags[name]] if name in flags else []
+        own += [] if answer.result.converged else ["no convergence"]
+        found[name] = (*own, *doubts.get(name, ()))
+    return found
+
+
 def _width_lines(
-    answer: Answer, marks: Mapping[str, str], shares: Mapping[str, float]
+    answer: Answer,
+    marks: Mapping[str, str],
+    shares: Mapping[str, float],
+    reasons: Mapping[str, tuple[str, ...]],
 ) -> list[str]:
     """Return which parameters only their width rules out, and which are small."""
     flagged = {r.name for r in answer.identifiability_flags}
-    doubtful = parameters_of_states(answer, unpredicted_states(answer))
-    doubtful |= derivatives_of_both(answer)
     lines = []
     wide = [
         f"{name} ({ceil(100.0 * shares[name])} %)"
         for name in names_marked(marks, UNSURE)
-        if shares[name] > FAIR and name not in flagged | doubtful
+        if name not in flagged and name not in reasons
     ]
     if wide:
         lines.append(f"  do not rely on (above 30 %):  {', '.join(wide)}")
@@ -112,16 +126,15 @@ def _width_lines(
     return lines
 
 
-def _unpredicted_lines(answer: Answer) -> list[str]:
-    """Return which parameters lean on a state that the model does not carry."""
-    states = unpredicted_states(answer)
-    leaning = parameters_of_states(answer, states)
-    leaning -= {r.name for r in answer.identifiability_flags}
-    if not leaning:
-        return []
-    names = ", ".join(n for n in answer.model.parameter_names if n in leaning)
-    reasons = reasons_of_states(answer, states)
-    return [f"  do not rely on {names}, whatever the interval: {reasons}"]
+def _doubt_lines(answer: Answer, doubts: Sequence[Doubt]) -> list[str]:
+    """Return a line for each doubt; what is not identifiable has its own."""
+    flagged = {r.name for r in answer.identifiability_flags}
+    lines = []
+    for one in doubts:
+        names = ", ".join(n for n in one.names if n not in flagged)
+        if names:
+            lines.append(f"  do not rely on {names}, whatever the interval: {one.reason}")
+    return lines
 
 
 def _identifiability_lines(answer: Answer) -> list[str]:
@@ -144,10 +157,6 @@ def _input_lines(answer: Answer) -> list[str]:
         " one out of a model of your own"
         for one, other in correlated_inputs(answer)
     ]
-    if both := derivatives_of_both(answer):
-        lines.append(
-            f"  do not rely on {', '.join(sorted(both))}: of both inputs, one was left out"
-        )
     lines += [
         f"  {name} never moved: its derivatives are the bias under another name"
         for name in answer.constant_inputs
@@ -165,8 +174,7 @@ def _data_lines(answer: Answer) -> list[str]:
         for name in answer.at_bound
     ]
     lines += [f"  warning: {warning}" for warning in answer.result.warnings]
-    failing = failing_outputs(answer)
-    poor = [f.name for f in answer.validation if f.name in failing]
+    poor = [f.name for f in unpredicted(answer)]
     if answer.validation:
         lines.append(
             "  prediction of the unseen maneuver: "

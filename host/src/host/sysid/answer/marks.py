@@ -25,11 +25,14 @@ class Verdict:
         Parameter to one of `MARKS`; what is neither derivative nor coefficient has none.
     lines : tuple of str
         The same in words, with the reasons and what to fly again; the heading is the first.
+    reasons : dict
+        Parameter to why it stands under its mark, a plain line each.
     """
 
     heading: str
     marks: dict[str, str]
     lines: tuple[str, ...]
+    reasons: dict[str, tuple[str, ...]]
 
 
 def names_marked(marks: Mapping[str, str], mark: str) -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from host.sysid.answer.coefficient_verdict import coefficient_verdict
 from host.sysid.answer.linear_verdict import linear_verdict
 from host.sysid.answer.marks import Verdict
+from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
 from host.sysid.compatibility.sensor_corrections import correction_lines
 from host.sysid.flight.linear_estimator import Answer
 
@@ -15,16 +16,29 @@ if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 
-def verdict_of(answer: Answer | CoefficientAnswer) -> Verdict:
-    """Return the verdict of one answer, a linear model or coefficients fitted directly."""
-    return linear_verdict(answer) if isinstance(answer, Answer) else coefficient_verdict(answer)
+def verdict_of(answer: Answer | CoefficientAnswer, evidence: Evidence = NO_EVIDENCE) -> Verdict:
+    """Return the verdict of one answer, a linear model or coefficients fitted directly.
+
+    Parameters
+    ----------
+    answer : Answer or CoefficientAnswer
+    evidence : Evidence, optional
+        What beside it speaks against it: other methods, findings of the data checks.
+    """
+    if isinstance(answer, Answer):
+        return linear_verdict(answer, evidence)
+    return coefficient_verdict(answer, evidence.open_channels)
 
 
-def verdict_lines(answers: Sequence[Answer | CoefficientAnswer], notes: Sequence[str]) -> list[str]:
+def verdict_lines(
+    answers: Sequence[Answer | CoefficientAnswer],
+    notes: Sequence[str],
+    evidence: Evidence = NO_EVIDENCE,
+) -> list[str]:
     """Return the verdict: notes first, then per model what to trust and what to re-fly."""
     lines = [f"note: {note}" for note in notes]
     for answer in answers:
-        lines += verdict_of(answer).lines
+        lines += verdict_of(answer, evidence).lines
     return lines
 
 

@@ -14,7 +14,9 @@ from host.sysid.models.diagnostics import SignalFit, signal_fits
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.information_inverse import covariance_from_information
+from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
+from host.sysid.numerics.output_error_problem import OutputProblem, Response
 
 
 def free_simulation(frozen: LinearModel, maneuvers: Sequence[Maneuver]) -> list[Array]:
@@ -38,6 +40,60 @@ def free_simulation(frozen: LinearModel, maneuvers: Sequence[Maneuver]) -> list[
         except IdentificationError:
             simulated.append(np.full_like(maneuver.outputs, np.nan))
     return simulated
+
+
+def responses_with_constants(problem: OutputProblem, estimate: Array) -> list[Response] | None:
+    """Return outputs and sensitivities at an estimate, constants of each maneuver fitted.
+
+    Outputs are linear in biases and start states: one weighted least-squares step finds them.
+
+    Parameters
+    ----------
+    problem : OutputProblem
+    estimate : Array, shape (P,)
+        Its first entries are the common parameters.
+
+    Returns
+    -------
+    list of Response or None
+        None where the model diverges.
+    """
+    theta, count = problem.first_guess(), problem.n_common
+    theta[:count] = estimate[:count]
+    responses = problem.respond(theta)
+    if responses is None:
+        return None
+    residuals = [problem.measured(k) - r.y for k, r in enumerate(responses)]
+    for number, (response, residual) in enumerate(zip(responses, residuals, strict=True)):
+        constants = response.sensitivities[:, :, count:]
+        weight = 1.0 / np.maximum(np.mean(residual**2, axis=1), 1e-300)
+        step = weighted_fit(residual[:, :, None], constants, weight)[:, 0]
+        theta[problem.columns(number)[count:]] += step
+    problem.release(responses)
+    return problem.respond(theta)
+
+
+def weighted_fit(errors: Array, columns: Array, weight: Array) -> Array:
+    """Return least-squares coefficients of columns in errors, (k, draws).
+
+    Parameters
+    ----------
+    errors : Array, shape (p, n, draws)
+    columns : Array, shape (p, n, k)
+    weight : Array, shape (p,)
+    """
+    information = np.einsum("j,jna,jnb->ab", weight, columns, columns, optimize=True)
+    right = np.einsum("j,jna,jnd->ad", weight, columns, errors, optimize=True)
+    return np.asarray(covariance_from_information(information) @ right)
+
+
+def residual_coherence(
+    model: LinearModel, estimate: Array, maneuvers: Sequence[Maneuver]
+) -> InputCoherence | None:
+    """Return whether inputs drive what a free simulation leaves; None where it diverges."""
+    problem = OutputProblem(model, maneuvers)
+    responses = responses_with_constants(problem, estimate)
+    return None if responses is None else input_coherence(problem, responses)
 
 
 def fits_of(

@@ -7,7 +7,7 @@ pipeline runs, `identify` the same for columns that are at hand.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,10 +23,16 @@ from host.sysid.aerodynamics.coefficient_table import (
 )
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import Correction, corrections
+from host.sysid.estimators.coherence_inflation import inflate_by_coherence
 from host.sysid.estimators.filter_error_gust import VANES, fit_with_gust
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.estimator import answer_of
-from host.sysid.flight.free_simulation import fits_of, free_simulation, frozen_model
+from host.sysid.flight.free_simulation import (
+    fits_of,
+    free_simulation,
+    frozen_model,
+    residual_coherence,
+)
 from host.sysid.flight.linear_model import (
     AXIS_OF,
     DEFAULT_METHOD,
@@ -38,6 +44,7 @@ from host.sysid.flight.linear_model import (
 )
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade, detect_maneuvers, grade
 from host.sysid.flight.maneuver_selection import excited_axes, merge_overlapping
+from host.sysid.flight.prediction_limits import Prediction, predictions
 from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
@@ -61,6 +68,7 @@ from host.sysid.models.modal_analysis import Mode, modes
 from host.sysid.models.residual_delays import STANDARD_DELAYS, without_standard_delays
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
+from host.sysid.numerics.input_coherence import InputCoherence
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
 
 
@@ -95,6 +103,10 @@ class Answer:
     delays: dict[str, tuple[float, float]]
     corrections: tuple[Correction, ...] = ()
     simulated: tuple[Array, ...] = ()  # outputs of the maneuvers by free simulation
+    own_model: bool = False  # of the user, not a template
+    coherence: InputCoherence | None = None  # of what free simulation leaves with the inputs
+    predictions: dict[str, Prediction] = field(default_factory=dict)  # of outputs held out
+    noise_covariance: Array | None = None  # of the estimate, without systematic errors
 
     @property
     def at_bound(self) -> tuple[str, ...]:
@@ -160,10 +172,12 @@ class LinearEstimate:
 
 @dataclass(frozen=True)
 class LinearIntervals:
-    """What the intervals count: `statistical` noise and scatter of maneuvers, `total` with every
-    systematic error of `shifts`; coefficients with mass and inertia in theirs."""
+    """What the intervals count: `statistical` noise, scatter of maneuvers and what inputs drive
+    beside the model (`coherence`), `total` with every systematic error of `shifts`; coefficients
+    with mass and inertia in theirs."""
 
     statistical: FitResult
+    coherence: InputCoherence | None
     shifts: tuple[ShiftedEstimate, ...]
     total: FitResult
     coefficients: tuple[Coefficient, ...]
@@ -171,11 +185,15 @@ class LinearIntervals:
 
 @dataclass(frozen=True)
 class LinearValidation:
-    """Free simulation of the maneuvers fitted, and of those held out."""
+    """Free simulation of the maneuvers fitted, and of those held out.
+
+    `predictions` sets the error of each output held out beside what noise and covariance allow.
+    """
 
     simulated: tuple[Array, ...]
     fits: tuple[SignalFit, ...]
     held_out: tuple[SignalFit, ...]
+    predictions: dict[str, Prediction]
 
 
 @dataclass(frozen=True)
@@ -251,6 +269,8 @@ class LinearEstimator:
         e = estimate
         scattered = inflate_covariance(e.fit, maneuver_agreement(e.fit))
         statistical = replace(scattered, estimate=e.estimate)
+        coherence = residual_coherence(e.model, e.estimate, e.maneuvers)
+        statistical = inflate_by_coherence(statistical, coherence)
         shifts: tuple[ShiftedEstimate, ...] = (
             () if e.departure is None else (e.departure.remainder,)
         )
@@ -264,7 +284,7 @@ class LinearEstimator:
             errors = own.errors if own is not None else None
             found = coefficients(statistical, self.airframe, e.condition, shifts, errors)
         return LinearIntervals(
-            statistical, shifts, add_systematic_covariance(statistical, shifts), found
+            statistical, coherence, shifts, add_systematic_covariance(statistical, shifts), found
         )
 
     def validation(self, estimate: LinearEstimate, intervals: LinearIntervals) -> LinearValidation:
@@ -278,10 +298,12 @@ class LinearEstimator:
         frozen = frozen_model(e.model, total)
         simulated = list(total.fitted) if same else free_simulation(frozen, e.maneuvers)
         held_out = [m.cut(e.model) for m in e.held_out]
+        unseen = free_simulation(frozen, held_out)
         return LinearValidation(
             tuple(simulated),
             fits_of(e.model, e.maneuvers, simulated),
-            fits_of(e.model, held_out, free_simulation(frozen, held_out)),
+            fits_of(e.model, held_out, unseen),
+            predictions(e.model, total, intervals.coherence, held_out, unseen),
         )
 
     def answer(
@@ -310,6 +332,10 @@ class LinearEstimator:
             delays=e.delays,
             corrections=() if carrier is None else corrections(carrier),
             simulated=validation.simulated,
+            own_model=self.own is not None,
+            coherence=intervals.coherence,
+            predictions=validation.predictions,
+            noise_covariance=intervals.statistical.covariance,
         )
 
     def _maneuvers(

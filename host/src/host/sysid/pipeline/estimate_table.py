@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from host.sysid.answer.mat_file import labels
 from host.sysid.answer.parameter_units import parameter_unit
+from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.linear_estimator import Answer
@@ -25,13 +26,19 @@ PLAIN = "1"  # unit of a number
 NO_CAUSE = ("", 0.0)
 
 
-def estimate_table(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> pd.DataFrame:
+def estimate_table(
+    linear: Sequence[Answer],
+    direct: CoefficientAnswer | None,
+    evidence: Evidence = NO_EVIDENCE,
+) -> pd.DataFrame:
     """Return every estimate, a row each: derivatives, delays, coefficients.
 
     Parameters
     ----------
     linear : sequence of Answer
     direct : CoefficientAnswer or None
+    evidence : Evidence, optional
+        What else the verdict counts.
 
     Returns
     -------
@@ -44,9 +51,9 @@ def estimate_table(linear: Sequence[Answer], direct: CoefficientAnswer | None) -
     """
     rows: dict[tuple[str, str], tuple[Any, ...]] = {}
     for answer, label in zip(linear, labels(linear), strict=True):
-        rows |= {(label, name): row for name, row in _linear_rows(answer)}
+        rows |= {(label, name): row for name, row in _linear_rows(answer, evidence)}
     if direct:
-        rows |= {(direct.template, name): row for name, row in _direct_rows(direct)}
+        rows |= {(direct.template, name): row for name, row in _direct_rows(direct, evidence)}
     return _frame(rows, ("model", "name"), COLUMNS)
 
 
@@ -60,8 +67,8 @@ def mode_table(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> pd
     return _frame(rows, ("model", "mode"), MODE_COLUMNS)
 
 
-def _linear_rows(answer: Answer) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    result, marks = answer.result, verdict_of(answer).marks
+def _linear_rows(answer: Answer, evidence: Evidence) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    result, marks = answer.result, verdict_of(answer, evidence).marks
     half = result.half_width()
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
     for k, p in enumerate(answer.model.parameters):
@@ -80,8 +87,10 @@ def _linear_rows(answer: Answer) -> Iterator[tuple[str, tuple[Any, ...]]]:
         yield c.name, (c.value, c.half_width, PLAIN, share, "", c.widened_by)
 
 
-def _direct_rows(answer: CoefficientAnswer) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    marks = verdict_of(answer).marks
+def _direct_rows(
+    answer: CoefficientAnswer, evidence: Evidence
+) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    marks = verdict_of(answer, evidence).marks
     for d in answer.fit.derivatives:
         cause = answer.causes.get(d.name, NO_CAUSE)[0]
         yield d.name, (d.value, d.half_width, PLAIN, d.share, marks[d.name], cause)

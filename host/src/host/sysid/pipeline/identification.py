@@ -15,6 +15,7 @@ from host.sysid.answer.json_document import answer_document, coefficient_documen
 from host.sysid.answer.method_comparison import method_table
 from host.sysid.answer.output_files import OutputPaths, check_outputs, write_outputs
 from host.sysid.answer.prior_comparison import prior_document, prior_lines
+from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.truth_comparison import truth_document, truth_report_lines
 from host.sysid.answer.verdict import removed_error_lines, verdict_lines
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
@@ -78,7 +79,7 @@ class Identification:
 
         A table of the caller's own: what is written into it changes no answer.
         """
-        return estimate_table(self.linear, self.coefficients)
+        return estimate_table(self.linear, self.coefficients, self.evidence)
 
     @property
     def modes(self) -> pd.DataFrame:
@@ -89,7 +90,13 @@ class Identification:
     def verdict(self) -> tuple[str, ...]:
         """Lines on what to trust, what not and why, and what to fly again."""
         found = (finding.line for finding in self.findings)
-        return (*found, *verdict_lines(self.answers, self.notes), *removed_error_lines(self.linear))
+        judged = verdict_lines(self.answers, self.notes, self.evidence)
+        return (*found, *judged, *removed_error_lines(self.linear))
+
+    @property
+    def evidence(self) -> Evidence:
+        """What the verdict counts beside each answer: other methods, findings of the checks."""
+        return Evidence(self.linear, self.findings)
 
     @property
     def answers(self) -> tuple[Answer | CoefficientAnswer, ...]:
@@ -153,13 +160,17 @@ class Identification:
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain lists, numbers and strings; several flights are lists."""
-        direct = self.coefficients
+        direct, evidence = self.coefficients, self.evidence
         documents = [
-            answer_document(a, verdict_lines([a], []) + removed_error_lines([a]))
+            answer_document(
+                a, verdict_lines([a], [], evidence) + removed_error_lines([a]), evidence
+            )
             for a in self.linear
         ]
         if direct:
-            documents.append(coefficient_document(direct, verdict_lines([direct], [])))
+            documents.append(
+                coefficient_document(direct, verdict_lines([direct], [], evidence), evidence)
+            )
         sources = [flight.source for flight in self.flights]
         agreements = [compatibility_document(a) if a else None for a in self.agreements]
         one = len(sources) == 1

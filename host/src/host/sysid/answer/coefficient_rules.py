@@ -1,0 +1,122 @@
+"""What must hold before a coefficient fitted directly is trusted: one short rule for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from host.sysid.answer.doubt import Doubt, doubt
+from host.sysid.answer.impossible_signs import impossible_signs
+from host.sysid.coefficients.coefficient_model import standard_model
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+
+WORSE = 1.25  # NRMSE of unseen over fitted maneuvers: more is a model that does not carry over
+FAILS = 1.0  # NRMSE below 4.5 Hz, gusts in it: the mean would do better
+FORCES = ("CL", "CD", "CX", "CZ")
+# Channel to the equations whose response it makes, and to the labels it multiplies; "" is all.
+LEANING: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "airspeed_mps": (("",), ()),
+    "qbar_pa": (("",), ()),
+    "ax_mps2": (FORCES, ()),
+    "az_mps2": (FORCES, ()),
+    "ay_mps2": (("CY",), ()),
+    "alpha_rad": (("CL", "CD"), ("alpha",)),
+    "beta_rad": ((), ("beta",)),
+    "p_radps": (("Cl",), ("p",)),
+    "q_radps": (("Cm",), ("q",)),
+    "r_radps": (("Cn",), ("r",)),
+    "elevator_rad": ((), ("de",)),
+    "aileron_rad": ((), ("da",)),
+    "rudder_rad": ((), ("dr",)),
+    "throttle": (("CD", "CX"), ()),
+}
+
+Channels = Mapping[str, str]
+
+
+def coefficient_doubts(answer: CoefficientAnswer, open_channels: Channels) -> list[Doubt]:
+    """Return every doubt about the coefficients, in the order of the rules.
+
+    Parameters
+    ----------
+    answer : CoefficientAnswer
+    open_channels : mapping
+        Column with an open finding of the data checks to what was found.
+    """
+    return [one for rule in RULES for one in rule(answer, open_channels)]
+
+
+def open_finding(answer: CoefficientAnswer, open_channels: Channels) -> list[Doubt]:
+    """The data checks found something in that channel, and nothing has closed it."""
+    found = []
+    for channel, finding in open_channels.items():
+        equations, labels = LEANING.get(channel, ((), ()))
+        names = [n for n in _names(answer) if n.startswith(equations) or n.split("_")[-1] in labels]
+        found += doubt(names, _names(answer), f"{channel} has an open finding: {finding}")
+    return found
+
+
+def fit_fails(answer: CoefficientAnswer, open_channels: Channels) -> list[Doubt]:
+    """The fitted data themselves are not explained."""
+    shares = answer.fit.prediction.fitted if answer.fit.prediction else {}
+    return [
+        one
+        for equation, nrmse in shares.items()
+        if not nrmse < FAILS
+        for one in _about(
+            answer, equation, f"the fit fails in {equation} (NRMSE {_percent(nrmse)})"
+        )
+    ]
+
+
+def not_predicted(answer: CoefficientAnswer, open_channels: Channels) -> list[Doubt]:
+    """A maneuver that was left out is predicted worse than those that were fitted."""
+    return [
+        one
+        for equation, words in unpredicted(answer).items()
+        for one in _about(answer, equation, f"{equation} is not predicted ({words})")
+    ]
+
+
+def impossible_sign(answer: CoefficientAnswer, open_channels: Channels) -> list[Doubt]:
+    """A sign that no aircraft has; of a user's own terms nothing is known."""
+    if answer.model != standard_model():
+        return []
+    values = {d.name: d.value for d in answer.fit.derivatives}
+    return [
+        one
+        for name, reason in impossible_signs(values).items()
+        for one in doubt([name], _names(answer), reason)
+    ]
+
+
+RULES: tuple[Callable[[CoefficientAnswer, Channels], list[Doubt]], ...] = (
+    open_finding, fit_fails, not_predicted, impossible_sign,
+)  # fmt: skip
+
+
+def unpredicted(answer: CoefficientAnswer) -> dict[str, str]:
+    """Return the equations that do not carry over to unseen maneuvers, with both figures."""
+    found = answer.fit.prediction
+    if found is None:
+        return {}
+    return {
+        name: f"NRMSE {100.0 * unseen:.1f} %, fitted {100.0 * found.fitted[name]:.1f} %"
+        for name, unseen in found.left_out.items()
+        if unseen > WORSE * found.fitted[name]
+    }
+
+
+def _about(answer: CoefficientAnswer, equation: str, reason: str) -> list[Doubt]:
+    names = [n for n in _names(answer) if n.split("_")[0] == equation]
+    return doubt(names, _names(answer), reason)
+
+
+def _names(answer: CoefficientAnswer) -> list[str]:
+    return [d.name for d in answer.fit.derivatives]
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"

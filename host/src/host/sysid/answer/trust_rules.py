@@ -1,0 +1,206 @@
+"""What must hold before a parameter of a linear model is trusted: one short rule for each.
+
+A rule returns doubts: parameters and a reason. A doubted parameter stands neither under "trust" nor
+under "use with care", whatever its interval. An interval counts noise and gusts, not what a model
+lacks: on a demonstration flight D_V was -0.33 +- 0.02 where -0.61 was true.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.sysid.answer.correlated_inputs import derivatives_of_both
+from host.sysid.answer.doubt import Doubt, doubt
+from host.sysid.answer.impossible_signs import impossible_signs
+from host.sysid.answer.method_agreement import disagreements
+from host.sysid.answer.parameter_places import leaning_on
+from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.linear_estimator import Answer
+from host.sysid.models.diagnostics import SignalFit
+from host.sysid.models.residual_delays import STANDARD_DELAYS
+
+FAILS = 0.5  # NRMSE of an output: a quarter of its variance is not explained
+WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
+WHITE_P = 0.01  # of Ljung-Box: above it the residual is a sensor's noise
+NEAR_BOUND = 1e-6  # of a bound's distance to the start, or of its size
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What beside an answer speaks against it.
+
+    Attributes
+    ----------
+    beside : tuple of Answer
+        All linear answers of the same data, this one among them.
+    findings : tuple of Finding
+        Of the data checks.
+    """
+
+    beside: tuple[Answer, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def open_channels(self) -> dict[str, str]:
+        """Columns with a finding that nothing has closed, and what was found."""
+        return {
+            name: f"{finding.check}, {finding.text}"
+            for finding in reversed(self.findings)
+            if not finding.closed
+            for name in finding.channels
+        }
+
+
+NO_EVIDENCE = Evidence()
+
+
+def doubts_of(answer: Answer, evidence: Evidence = NO_EVIDENCE) -> list[Doubt]:
+    """Return every doubt about the parameters of an answer, in the order of the rules."""
+    return [one for rule in RULES for one in rule(answer, evidence)]
+
+
+def fit_fails(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """The fitted data themselves are not explained, and not because a sensor is noisy."""
+    return [
+        one
+        for fit in answer.fits
+        if not fit.nrmse < FAILS and not (fit.nrmse < WORSE_THAN_NONE and fit.ljung_box_p > WHITE_P)
+        for one in _about(
+            answer, [fit.name], f"the fit fails in {fit.name} (NRMSE {_percent(fit.nrmse)})"
+        )
+    ]
+
+
+def not_predicted(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """The unseen maneuver differs by more than noise, gusts and the covariance allow."""
+    return [
+        one
+        for fit in unpredicted(answer)
+        for one in _about(answer, [fit.name], f"{fit.name} is not predicted{_allowed(answer, fit)}")
+    ]
+
+
+def driven_by_inputs(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """What the fit leaves is driven by the inputs: the model lacks something there."""
+    if answer.coherence is None:
+        return []
+    names = answer.coherence.coherent
+    return _about(answer, names, f"the inputs drive what the fit leaves of {', '.join(names)}")
+
+
+def delay_at_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """A delay at its bound is what a model lacks in that signal."""
+    groups = [g for g in (*STANDARD_DELAYS, *answer.model.delays) if g.name in answer.at_bound]
+    return [
+        one
+        for output in dict.fromkeys(y for g in groups for y in g.outputs)
+        for one in _about(answer, [output], f"the delay of {output} is at its bound")
+    ]
+
+
+def on_a_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """The search wanted a value beyond what was allowed."""
+    half = answer.result.half_width()
+    names = [
+        p.name
+        for k, p in enumerate(answer.model.parameters)
+        if any(_reached(float(answer.result.estimate[k]), b) for b in (p.lower, p.upper))
+        or (half[k] == 0.0 and answer.result.estimate[k] != 0.0)
+    ]
+    return _named(answer, names, "the estimate is on its bound")
+
+
+def impossible_sign(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """A sign that no aircraft has; of a user's own model only the bounds speak."""
+    if answer.own_model:
+        return []
+    values = {p.name: answer.result.value(p.name) for p in answer.model.parameters}
+    return [
+        one
+        for name, reason in impossible_signs(values).items()
+        for one in _named(answer, [name], reason)
+    ]
+
+
+def methods_disagree(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """Another method that is valid in this noise differs beyond the joint interval."""
+    return [
+        one
+        for name, reason in disagreements(answer, evidence.beside).items()
+        for one in _named(answer, [name], f"methods disagree: {reason}")
+    ]
+
+
+def one_input_for_two(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """Two inputs moved as one, and a regression left one of them out."""
+    return _named(answer, derivatives_of_both(answer), "of both inputs, one was left out")
+
+
+def open_finding(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """The data checks found something in that channel, and nothing has closed it."""
+    return [
+        one
+        for channel, finding in evidence.open_channels.items()
+        for one in _about(answer, [channel], f"{channel} has an open finding: {finding}")
+    ]
+
+
+Rule = Callable[[Answer, Evidence], list[Doubt]]
+RULES: tuple[Rule, ...] = (
+    open_finding, fit_fails, not_predicted, driven_by_inputs, delay_at_bound, on_a_bound,
+    impossible_sign, methods_disagree, one_input_for_two,
+)  # fmt: skip
+
+
+def unpredicted(answer: Answer) -> list[SignalFit]:
+    """Return the outputs of unseen maneuvers that the model does not predict.
+
+    Half of an output's deviation is a failure whatever is allowed: noise as slow as a phugoid
+    allows anything.
+    """
+    allowed = answer.predictions
+    return [
+        f
+        for f in answer.validation
+        if not f.nrmse < FAILS or (f.name in allowed and not allowed[f.name].holds)
+    ]
+
+
+def uncarried_states(answer: Answer) -> dict[str, str]:
+    """Return the states that the model does not carry, and why: for modes that consist of them."""
+    found = {f.name: f"{f.name} is not predicted" for f in unpredicted(answer)}
+    for group in (*STANDARD_DELAYS, *answer.model.delays):
+        if group.name in answer.at_bound:
+            found |= {
+                y: f"the delay of {y} is at its bound" for y in group.outputs if y not in found
+            }
+    return {s: found[s] for s in answer.model.states if s in found}
+
+
+def _about(answer: Answer, signals: Iterable[str], reason: str) -> list[Doubt]:
+    return _named(answer, leaning_on(answer.model, set(signals)), reason)
+
+
+def _named(answer: Answer, names: Iterable[str], reason: str) -> list[Doubt]:
+    aircraft = (p.name for p in answer.model.parameters if not p.name.startswith("imu_"))
+    return doubt(names, aircraft, reason)
+
+
+def _allowed(answer: Answer, fit: SignalFit) -> str:
+    found = answer.predictions.get(fit.name)
+    if found is None or found.holds:
+        return f" (NRMSE {_percent(fit.nrmse)})"
+    return f" (NRMSE {_percent(found.nrmse)}, noise and intervals allow {_percent(found.largest)})"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
+
+
+def _reached(value: float, bound: float) -> bool:
+    return bool(np.isfinite(bound)) and abs(value - bound) <= NEAR_BOUND * max(
+        abs(bound), NEAR_BOUND
+    )

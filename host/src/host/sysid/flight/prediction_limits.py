@@ -1,0 +1,148 @@
+"""How far a right model may miss a maneuver that it never saw: noise, gusts, its own covariance.
+
+The noise of an output is an AR model of what a free simulation leaves of the fitted maneuvers and
+the inputs do not drive (`numerics.input_coherence`); gusts are in it. The parameters are uncertain
+by their whole covariance. Constants and start states are fitted to the unseen maneuver too, which
+takes its part out of the error. Errors are drawn at random, and a gamma distribution through their
+mean squares gives the limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from host.arrays import Array
+from host.sysid.flight.free_simulation import responses_with_constants, weighted_fit
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.ar_noise import ArNoise
+from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
+from host.sysid.numerics.output_error_problem import OutputProblem
+
+SIGNIFICANCE = 0.01
+DRAWS, DRAW_SEED = 200, 1
+SETTLING = 200  # means before a drawn AR series counts
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """How an output of unseen maneuvers is predicted, in means over `BLOCK_S`.
+
+    Attributes
+    ----------
+    nrmse : float
+        Rms error over the deviation of the output.
+    largest : float
+        What noise, gusts and the covariance of the parameters allow.
+    """
+
+    nrmse: float
+    largest: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the error is within what is allowed."""
+        return self.nrmse <= self.largest
+
+
+def predictions(
+    model: LinearModel,
+    result: FitResult,
+    noise: InputCoherence | None,
+    maneuvers: Sequence[Maneuver],
+    simulated: Sequence[Array],
+) -> dict[str, Prediction]:
+    """Return how each output of unseen maneuvers is predicted; nothing without noise or maneuver.
+
+    Parameters
+    ----------
+    model : LinearModel
+    result : FitResult
+        With the covariance of all errors.
+    noise : InputCoherence or None
+        Of the maneuvers that were fitted.
+    maneuvers : sequence of Maneuver
+        Unseen.
+    simulated : sequence of Array, shape (samples, p)
+        Their free simulation.
+    """
+    if noise is None or not maneuvers:
+        return {}
+    blocks = [block_length(m.dt_s) for m in maneuvers]
+    measured = [block_means(m.outputs, n) for m, n in zip(maneuvers, blocks, strict=True)]
+    modelled = [block_means(y, n) for y, n in zip(simulated, blocks, strict=True)]
+    error = np.vstack(measured) - np.vstack(modelled)
+    spread = np.sqrt(np.mean(np.vstack([y - y.mean(axis=0) for y in measured]) ** 2, axis=0))
+    rms = np.sqrt(np.mean(error**2, axis=0)) / np.maximum(spread, 1e-300)
+    largest = largest_rms(model, result, noise, maneuvers) / np.maximum(spread, 1e-300)
+    return {
+        name: Prediction(float(rms[k]), float(largest[k])) for k, name in enumerate(model.outputs)
+    }
+
+
+def largest_rms(
+    model: LinearModel,
+    result: FitResult,
+    noise: InputCoherence,
+    maneuvers: Sequence[Maneuver],
+) -> Array:
+    """Return the rms error of each output that a right model rarely exceeds, in means, (p,).
+
+    It is exceeded in 1 % of cases by any output; infinite where the model diverges.
+    """
+    count, outputs = len(model.parameter_names), len(model.outputs)
+    value, vector = np.linalg.eigh(result.covariance[:count, :count])
+    root = vector * np.sqrt(np.maximum(value, 0.0))
+    rng = np.random.default_rng(DRAW_SEED)
+    parameters = rng.standard_normal((DRAWS, count)) @ root.T
+    squares, samples = np.zeros((DRAWS, outputs)), 0
+    for maneuver in maneuvers:
+        slopes = _slopes(model, result, maneuver)
+        if slopes is None:
+            return np.full(outputs, np.inf)
+        means = slopes.shape[1]
+        drawn = np.stack(
+            [
+                drawn_noise(rng, memory, variance, means, DRAWS)
+                for memory, variance in zip(noise.noise, noise.innovation_variance, strict=True)
+            ]
+        )  # (p, means, draws)
+        drawn += slopes[:, :, :count] @ parameters.T
+        left = _without_constants(drawn, slopes[:, :, count:], np.mean(drawn**2, axis=(1, 2)))
+        squares += np.sum(left**2, axis=1).T
+        samples += means
+    squares /= samples
+    mean, spread = np.mean(squares, axis=0), np.var(squares, axis=0)
+    shape = mean**2 / np.maximum(spread, 1e-300)
+    level = (1.0 - SIGNIFICANCE) ** (1.0 / outputs)
+    return np.asarray(np.sqrt(special.gammaincinv(shape, level) * mean / shape))
+
+
+def drawn_noise(
+    rng: np.random.Generator, memory: ArNoise, variance: float, samples: int, draws: int
+) -> Array:
+    """Return stationary AR noise of an innovation variance, (samples, draws)."""
+    series = rng.standard_normal((SETTLING + samples, draws)) * np.sqrt(variance)
+    for k in range(memory.order, len(series)):
+        for lag, part in enumerate(memory.coefficient, start=1):
+            series[k] += part * series[k - lag]
+    return np.asarray(series[SETTLING:])
+
+
+def _slopes(model: LinearModel, result: FitResult, maneuver: Maneuver) -> Array | None:
+    """Return the sensitivities at the estimate, constants fitted, (p, means, P + constants)."""
+    responses = responses_with_constants(OutputProblem(model, [maneuver]), result.estimate)
+    if responses is None:
+        return None
+    block = block_length(maneuver.dt_s)
+    return np.stack([block_means(J, block) for J in responses[0].sensitivities])
+
+
+def _without_constants(errors: Array, columns: Array, power: Array) -> Array:
+    weight = 1.0 / np.maximum(power, 1e-300)
+    return np.asarray(errors - columns @ weighted_fit(errors, columns, weight))

@@ -1,0 +1,326 @@
+"""Test whether what a fit leaves is driven by the inputs, in noise of any colour.
+
+The columns of `input_regressors` are added to one output. If the model is right they explain no
+more than noise does by chance: an F test of the added columns, everything whitened by AR models of
+the noise and freed of what the model's own parameters could still take (a Lagrange multiplier test;
+Engle, Handbook of Econometrics II, 1984, ch. 13). All lags are tested as one, so their number is
+counted by the degrees of freedom; the number of outputs by Sidak's level.
+
+The noise model is estimated beside those columns (restricted likelihood): what inputs drive is
+then not taken for noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from host.arrays import Array
+from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
+from host.sysid.numerics.information_inverse import covariance_from_information
+from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
+from host.sysid.numerics.output_error_problem import OutputProblem, Response
+
+SIGNIFICANCE = 0.01
+HIGHEST_ORDER = 6
+ROUNDS_WITHOUT, ROUNDS_BESIDE = 2, 3  # of the noise models: first without the added columns
+# Means over this long are tested: of quicker samples an AR model of low order cannot tell slow
+# gusts beside a sensor's white noise.
+BLOCK_S = 0.05
+FEWEST_FREEDOM = 30.0  # of the noise along a column, for a test
+RANK = 1e-9  # of the largest eigenvalue of the scaled columns: less is rounding
+
+
+@dataclass(frozen=True)
+class InputCoherence:
+    """Residuals of a fit against what its inputs could drive.
+
+    Attributes
+    ----------
+    outputs : tuple of str
+    ratio : Array, shape (p,)
+        F: power along the added columns over that of noise; 1 if the model is right.
+    p_value : Array, shape (p,)
+        Of each output alone.
+    columns : Array, shape (p,)
+        Degrees of freedom of the numerator.
+    noise : tuple of ArNoise
+        Of each output, beside what the inputs drive.
+    innovation_variance : Array, shape (p,)
+    information : Array, shape (p, P, P)
+        Of each output, whitened by this noise.
+    prior_precision : Array, shape (P,)
+    """
+
+    outputs: tuple[str, ...]
+    ratio: Array
+    p_value: Array
+    columns: Array
+    noise: tuple[ArNoise, ...]
+    innovation_variance: Array
+    information: Array
+    prior_precision: Array
+
+    @property
+    def coherent(self) -> tuple[str, ...]:
+        """Outputs whose residual the inputs drive; 1 % of right fits name any."""
+        level = 1.0 - (1.0 - SIGNIFICANCE) ** (1.0 / len(self.outputs))
+        return tuple(n for n, p in zip(self.outputs, self.p_value, strict=True) if p < level)
+
+    def covariance(self) -> Array:
+        """Return the covariance in this noise, (P, P)."""
+        total = np.diag(self.prior_precision) + np.sum(self.information, axis=0)
+        return covariance_from_information(total)
+
+    def widened_covariance(self) -> Array:
+        """Return the covariance if the model lacks along its parameters what it lacks beside them.
+
+        The power of a coherent residual over that of noise is `ratio` along the columns that the
+        parameters cannot take. Along those that they took it cannot be seen, and is held to be the
+        same: the score of that output has `ratio` times its variance (as by a Birge ratio).
+        """
+        inverse = self.covariance()
+        weight = np.array(
+            [max(r, 1.0) if n in self.coherent else 1.0
+             for n, r in zip(self.outputs, self.ratio, strict=True)]
+        )  # fmt: skip
+        score = np.diag(self.prior_precision) + np.einsum("j,jkl->kl", weight, self.information)
+        return np.asarray(inverse @ score @ inverse)
+
+
+@dataclass(frozen=True)
+class _Data:
+    """Residuals, sensitivities and added columns of one output, a list entry per maneuver."""
+
+    residuals: Sequence[Array]  # (samples,)
+    slopes: Sequence[Array]  # (samples, P)
+    added: Sequence[Array]  # (samples, k)
+
+
+def input_coherence(
+    problem: OutputProblem,
+    responses: Sequence[Response],
+    *,
+    highest_order: int = HIGHEST_ORDER,
+) -> InputCoherence:
+    """Test the residuals of a free simulation against what the inputs drive.
+
+    Parameters
+    ----------
+    problem : OutputProblem
+        Model and data.
+    responses : sequence of Response
+        Of the model at the estimate, one of each maneuver.
+    highest_order : int
+        Of the AR models.
+    """
+    data = _data(problem, responses)
+    prior = problem.prior_precision
+    noise = [ArNoise.white() for _ in data]
+    variance = np.array([np.mean(np.concatenate(d.residuals) ** 2) for d in data])
+    variance = np.maximum(variance, problem.least_variance)
+    whitened = [_whitened(d, n) for d, n in zip(data, noise, strict=True)]
+    for number in range(ROUNDS_WITHOUT + ROUNDS_BESIDE):
+        total = np.diag(prior) + sum(
+            _gram(w.slopes) / v for w, v in zip(whitened, variance, strict=True)
+        )
+        score = sum(
+            _cross(w.slopes, w.residuals) / v for w, v in zip(whitened, variance, strict=True)
+        )
+        updated = [
+            _noise_model(d, w, v, total, score, highest_order, beside=number >= ROUNDS_WITHOUT)
+            for d, w, v in zip(data, whitened, variance, strict=True)
+        ]
+        noise = [n for n, _ in updated]
+        variance = np.maximum([v for _, v in updated], problem.least_variance)
+        whitened = [_whitened(d, n) for d, n in zip(data, noise, strict=True)]
+    information = np.array([_gram(w.slopes) / v for w, v in zip(whitened, variance, strict=True)])
+    total = np.diag(prior) + np.sum(information, axis=0)
+    score = _score(whitened, variance)
+    ratio, p_value, columns = [], [], []
+    for d, w, n, v in zip(data, whitened, noise, variance, strict=True):
+        excess, count, freedom = _added_power(d, w, n, v, _reduced(w, v, total, score))
+        ratio.append(excess / max(count, 1))
+        columns.append(count)
+        p_value.append(special.fdtrc(count, freedom, ratio[-1]) if count else 1.0)
+    return InputCoherence(
+        outputs=problem.model.outputs,
+        ratio=np.array(ratio),
+        p_value=np.array(p_value),
+        columns=np.array(columns, dtype=np.float64),
+        noise=tuple(noise),
+        innovation_variance=variance,
+        information=information,
+        prior_precision=prior,
+    )
+
+
+def _data(problem: OutputProblem, responses: Sequence[Response]) -> list[_Data]:
+    model, size = problem.model, len(problem.names)
+    shortest_s = min(m.samples * m.dt_s for m in problem.maneuvers)
+    knots_s = lag_knots_s(max(m.dt_s for m in problem.maneuvers), shortest_s)
+    moving = [j for j, y in enumerate(model.outputs) if y in model.states]
+    added = [
+        input_regressors(m.inputs, r.y[moving].T, m.dt_s, knots_s)
+        for m, r in zip(problem.maneuvers, responses, strict=True)
+    ]
+    blocks = [block_length(m.dt_s) for m in problem.maneuvers]
+    added = [block_means(Z, block) for Z, block in zip(added, blocks, strict=True)]
+    found = []
+    for j in range(len(model.outputs)):
+        slopes, residuals = [], []
+        for number, (response, block) in enumerate(zip(responses, blocks, strict=True)):
+            own = block_means(response.sensitivities[j], block)
+            whole = np.zeros((len(own), size))
+            whole[:, problem.columns(number)] = own
+            slopes.append(whole)
+            left = problem.measured(number)[j] - response.y[j]
+            residuals.append(block_means(left[:, None], block)[:, 0])
+        found.append(_Data(residuals, slopes, added))
+    return found
+
+
+def block_length(dt_s: float) -> int:
+    """Return how many samples a mean is taken over."""
+    return max(1, round(BLOCK_S / dt_s))
+
+
+def block_means(values: Array, block: int) -> Array:
+    """Return the means of successive blocks of samples, (samples // block, columns)."""
+    count = len(values) // block
+    return np.asarray(values[: count * block].reshape(count, block, -1).mean(axis=1))
+
+
+def _whitened(data: _Data, noise: ArNoise) -> _Data:
+    return _Data(
+        [noise.whiten(e[:, None])[:, 0] for e in data.residuals],
+        [noise.whiten(J) for J in data.slopes],
+        [noise.whiten(Z) for Z in data.added],
+    )
+
+
+def _gram(blocks: Sequence[Array]) -> Array:
+    return np.asarray(sum(b.T @ b for b in blocks))
+
+
+def _cross(left: Sequence[Array], right: Sequence[Array]) -> Array:
+    return np.asarray(sum(a.T @ b for a, b in zip(left, right, strict=True)))
+
+
+def _score(whitened: Sequence[_Data], variance: Array) -> Array:
+    parts = [_cross(w.slopes, w.residuals) / v for w, v in zip(whitened, variance, strict=True)]
+    return np.asarray(sum(parts))
+
+
+def _reduced(w: _Data, variance: float, total: Array, score: Array) -> tuple[Array, Array, Array]:
+    """Return information and score of the added columns, freed of the parameters; and the link."""
+    link = covariance_from_information(total) @ _cross(w.slopes, w.added) / variance
+    inner = _gram(w.added) / variance - _cross(w.added, w.slopes) @ link / variance
+    right = _cross(w.added, w.residuals) / variance - link.T @ score
+    return inner, right, link
+
+
+def _scaled_eigen(inner: Array, w: _Data, variance: float) -> tuple[Array, Array, Array]:
+    """Return scale, eigenvalues and vectors of the columns that are not spoken for."""
+    scale = np.sqrt(np.maximum(np.diag(_gram(w.added)) / variance, 1e-300))
+    value, vector = np.linalg.eigh(inner / np.outer(scale, scale))
+    kept = value > RANK * max(float(value[-1]), RANK)
+    return scale, value[kept], vector[:, kept]
+
+
+def _added_power(
+    data: _Data, w: _Data, noise: ArNoise, variance: float, reduced: tuple[Array, Array, Array]
+) -> tuple[float, int, float]:
+    """Return the power that the added columns explain, in units of noise, and both freedoms."""
+    inner, right, link = reduced
+    scale, value, vector = _scaled_eigen(inner, w, variance)
+    root = (vector / np.sqrt(value)) / scale[:, None]
+    directions = [(Z - J @ link) @ root for J, Z in zip(data.slopes, data.added, strict=True)]
+    samples = sum(len(e) for e in data.residuals)
+    known, log_variance = _known_directions(directions, noise, variance, samples)
+    parts = known.T @ (root.T @ right)
+    return float(parts @ parts), len(parts), max(2.0 / log_variance, 1.0)
+
+
+def _known_directions(
+    directions: Sequence[Array], noise: ArNoise, variance: float, samples: int
+) -> tuple[Array, float]:
+    """Return directions along which the noise's power is known, and the variance of its logarithm.
+
+    The degrees of freedom of a power are 2 / var(log power) (Satterthwaite, Biometrics Bulletin 2,
+    1946). The innovation variance has 2 / samples. The AR coefficients have the asymptotic
+    covariance R^-1 / samples; with coefficient k the power of a direction x, w when whitened, moves
+    by -2 sum w[t] x[t - k]. Slow noise is known to few degrees of freedom along slow directions:
+    those below `FEWEST_FREEDOM` are left out, for nothing could be told there.
+
+    Parameters
+    ----------
+    directions : sequence of Array, shape (samples, k)
+        Of each maneuver; orthonormal when whitened, in units of noise.
+    noise : ArNoise
+    variance : float
+        Of the innovations.
+    samples : int
+
+    Returns
+    -------
+    Array, shape (k, known)
+    float
+    """
+    count, order = directions[0].shape[1], noise.order
+    if order == 0:
+        return np.eye(count), 2.0 / samples
+    slopes = np.zeros((order, count, count))
+    for x in directions:
+        w = noise.whiten(x)[order:] / variance
+        for k in range(1, order + 1):
+            slopes[k - 1] -= w.T @ x[order - k : len(x) - k]
+    slopes += np.swapaxes(slopes, 1, 2)
+    rooted = np.einsum("ab,bij->aij", noise.start_whitener, slopes)  # R^-1 = root' root
+    value, vector = np.linalg.eigh(np.einsum("aij,ajk->ik", rooted, rooted) / samples)
+    known = vector[:, value + 2.0 / samples <= 2.0 / FEWEST_FREEDOM]
+    if known.shape[1] == 0:
+        return known, 2.0 / samples
+    mean = np.einsum("ij,aik,kj->a", known, rooted, known) / known.shape[1]
+    return known, 2.0 / samples + float(mean @ mean) / samples
+
+
+def _noise_model(
+    data: _Data,
+    w: _Data,
+    variance: float,
+    total: Array,
+    score: Array,
+    highest: int,
+    *,
+    beside: bool,
+) -> tuple[ArNoise, float]:
+    """Return the AR model of an output's noise and its innovation variance.
+
+    `beside` says whether the added columns take their share first.
+    """
+    inverse = covariance_from_information(total)
+    value, vector = np.linalg.eigh(inverse)
+    lower = vector * np.sqrt(np.maximum(value, 0.0))
+    own = inverse @ score
+    added: Array = np.zeros(data.added[0].shape[1])
+    root: Array = np.zeros((len(added), 0))
+    link: Array = np.zeros((len(own), len(added)))
+    if beside:
+        inner, right, link = _reduced(w, variance, total, score)
+        scale, kept, directions = _scaled_eigen(inner, w, variance)
+        root = (directions / np.sqrt(kept)) / scale[:, None]  # of the added columns' covariance
+        added = root @ (root.T @ right)
+        own = own - link @ added
+    residuals, shares = [], []
+    for e, J, Z in zip(data.residuals, data.slopes, data.added, strict=True):
+        residuals.append(e - J @ own - Z @ added)
+        shares.append(np.hstack([J @ lower, (Z - J @ link) @ root]))
+    moments = lagged_moments(residuals, shares, highest)
+    count = sum(len(e) for e in residuals) - highest * len(residuals)
+    order = choose_order(moments, count)
+    coefficient, innovation = fit_ar(moments[: order + 1, : order + 1], order)
+    return ArNoise.from_coefficient(coefficient), max(innovation / count, 1e-300)
