@@ -10,6 +10,7 @@ import pytest
 
 if TYPE_CHECKING:
     from flight.rig import FlightRig
+    from simavr_bench.card_journal import CardJournal
 
 MakeRig = Callable[..., "FlightRig"]
 
@@ -23,15 +24,21 @@ def flight_elf(request: pytest.FixtureRequest) -> Path:
 
 
 @pytest.fixture(scope="session")
-def flying(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[FlightRig]:
-    """A rig in flight, the Mega driving: for children made by in_fork only."""
-    from flight.rig import FlightRig, make_card
+def recording(
+    flight_elf: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[FlightRig, CardJournal]]:
+    """A rig in flight with a journal of its card: for children made by in_fork only."""
+    from flight.faults.run import ready_rig
 
-    card = make_card(tmp_path_factory.mktemp("flying") / "card.img")
-    rig = FlightRig(flight_elf, card, in_place=False)
-    rig.take_off()
-    yield rig
+    rig, journal = ready_rig(flight_elf, tmp_path_factory.mktemp("recording"))
+    yield rig, journal
     rig.chip.close()
+
+
+@pytest.fixture(scope="session")
+def flying(recording: tuple[FlightRig, CardJournal]) -> FlightRig:
+    """The same rig, the Mega driving: for children made by in_fork only."""
+    return recording[0]
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,8 +32,9 @@ def usual_compiler() -> str:
     return os.environ.get(CHOICE) or TESTED[0]
 
 
+@cache
 def build_image(environment: str, compiler: str | None = None) -> Path:
-    """Build the image that `pio run` makes.
+    """Build the image that `pio run` makes, once in a process.
 
     Parameters
     ----------

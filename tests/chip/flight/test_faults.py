@@ -33,26 +33,16 @@ CHOSEN = (
 )
 
 
-@pytest.fixture(scope="module")
-def in_flight(
-    flight_elf: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[FlightRig, CardJournal]:
-    """A rig in flight with a journal of its card: for children made by in_fork only."""
-    from flight.faults.run import ready_rig
-
-    return ready_rig(flight_elf, tmp_path_factory.mktemp("faults"))
-
-
 @pytest.mark.parametrize("injected", CHOSEN)
 def test_fault_in_flight(
-    in_flight: tuple[FlightRig, CardJournal], tmp_path: Path, injected: str
+    recording: tuple[FlightRig, CardJournal], tmp_path: Path, injected: str
 ) -> None:
     from flight.faults.rows import FAULTS
     from flight.faults.run import run_fault
     from simavr_bench import in_fork
 
     fault = next(fault for fault in FAULTS if fault.injected == injected)
-    assert in_fork(partial(run_fault, *in_flight, fault, tmp_path)).wrong == []
+    assert in_fork(partial(run_fault, *recording, fault, tmp_path)).wrong == []
 
 
 @pytest.mark.parametrize(
@@ -97,7 +87,7 @@ def test_refused_block_with_either_transistor(
 
 
 def test_an_expectation_that_is_not_met_is_said(
-    in_flight: tuple[FlightRig, CardJournal], tmp_path: Path
+    recording: tuple[FlightRig, CardJournal], tmp_path: Path
 ) -> None:
     """A flight without a fault, judged as if the receiver, the IMU and the card had failed."""
     from flight.faults.card import drops_are_counted
@@ -111,6 +101,6 @@ def test_an_expectation_that_is_not_met_is_said(
         row = replace(
             NONE, check=check, events=("imu_lost",), engaged=False, fault_s=1.5, after_s=1.0
         )
-        wrong = in_fork(partial(run_fault, *in_flight, row, tmp_path)).wrong
+        wrong = in_fork(partial(run_fault, *recording, row, tmp_path)).wrong
         assert wrong[:2] == ["the Mega drives", "no event imu_lost"]
         assert len(wrong) >= 3

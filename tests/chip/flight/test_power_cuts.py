@@ -12,6 +12,7 @@ import pytest
 if TYPE_CHECKING:
     from flight.cut_boots import GroundWrites
     from flight.cut_flight import Flight
+    from flight.cut_reboot import RebootBench
     from simavr_bench.card_journal import Journal
 
 
@@ -76,15 +77,23 @@ def test_next_boot_records_whatever_write_was_cut(
     assert sum(cut.beats is not None for cut in cuts) >= 4
 
 
-@pytest.mark.parametrize("boot", range(4))
-def test_true_cut_and_the_next_boot(
-    flight_elf: Path, flight: Flight, tmp_path: Path, boot: int
-) -> None:
-    from flight.cut_reboot import BOOTS, RebootBench, compare_with
+@pytest.fixture(scope="module")
+def reboots(
+    flight_elf: Path, flight: Flight, tmp_path_factory: pytest.TempPathFactory
+) -> RebootBench:
+    """The same flight again, in the air."""
+    from flight.cut_reboot import RebootBench
 
-    bench = RebootBench.take_off(flight_elf, flight.plan, flight.base, tmp_path, seed=5)
-    assert compare_with(flight, bench) == ""
-    assert bench.cut(31_234_567, BOOTS[boot]).wrong == []
+    folder = tmp_path_factory.mktemp("reboots")
+    return RebootBench.take_off(flight_elf, flight.plan, flight.base, folder, seed=5)
+
+
+@pytest.mark.parametrize("boot", range(4))
+def test_true_cut_and_the_next_boot(flight: Flight, reboots: RebootBench, boot: int) -> None:
+    from flight.cut_reboot import BOOTS, compare_with
+
+    assert compare_with(flight, reboots) == ""
+    assert reboots.cut(31_234_567, BOOTS[boot]).wrong == []
 
 
 def altered(journal: Journal, rows: list[int]) -> Journal:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -141,18 +142,23 @@ def test_packets_that_meet_the_end_of_a_scan_do_not_stop_the_next(
     assert 0.1 < float(at_once.mean()) < 1.0
 
 
-def test_converter_that_was_disturbed_is_started_anew(make_rig: MakeRig, tmp_path: Path) -> None:
+def test_converter_that_was_disturbed_is_started_anew(flying: FlightRig, tmp_path: Path) -> None:
+    from simavr_bench import in_fork
+
+    in_fork(partial(disturb_converter, flying, tmp_path))
+
+
+def disturb_converter(rig: FlightRig, folder: Path) -> None:
+    """Switch the converter off in the middle of a scan and look at the log."""
     from flight.rig import take_log
 
-    rig = make_rig(imu_hz=100.0)
-    rig.take_off()
     rig.chip.run_s(1.0)
     while rig.chip.read_array("adc_left", "u1")[0] != 20:
         rig.chip.run_s(0.00005)
     rig.chip.poke(ADCSRA, b"\x00")
     rig.chip.run_s(1.0)
-    rig.land()
-    log = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin"))
+    rig.chip.power_off()
+    log = host.read_log(take_log(rig.save_card(folder / "card.img"), folder / "flight.bin"))
     ident = log.frames["ident"]
     gaps_us = np.diff(ident["t_us"].astype(np.int64))
     # The scan that ended in nothing costs its frame the analogue values, and nobody else anything.

@@ -23,16 +23,6 @@ RESUMED_S = 2.0
 PHASES_MS = tuple(range(0, 78, 3))  # a block is written every 73 ms, sent within 8
 
 
-@pytest.fixture(scope="module")
-def recording(
-    flight_elf: Path, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[FlightRig, CardJournal]:
-    """A rig in flight with a journal of its card: for children made by in_fork only."""
-    from flight.faults.run import ready_rig
-
-    return ready_rig(flight_elf, tmp_path_factory.mktemp("recording"))
-
-
 def resumed_s(rig: FlightRig, journal: CardJournal, cause: str, wait_ms: float) -> float:
     """Reset after a wait; give the time until a block is on its way to the card."""
     from flight.cut_flight import FILE_BLOCKS, place_of_file
