@@ -21,7 +21,7 @@ from host.aircraft.gains import dimensional_gains
 from host.aircraft.linearisation import linearise
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.arrays import Array
-from host.sysid.aerodynamics.coefficient_template import in_coefficients
+from host.sysid.aerodynamics.coefficient_template import coefficient_template
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import MATRICES, LinearModel
 from host.sysid.models.templates import Trim, template
@@ -117,7 +117,7 @@ def gusty_aircraft(airspeed_mps: float | None = None) -> GustyAircraft:
         base = template(axis, Trim(V, alpha, theta), hold="zoh")
         true_A, true_B = change @ A @ np.linalg.inv(change), change @ B
         base = _with_known_thrust(base, true_A, true_B, known, airframe, condition)
-        model = in_coefficients(base, airframe, condition)
+        model = coefficient_template(base, airframe, condition)
         dimensional = dict(
             zip((p.name for p in base.parameters), _entries(base, true_A, true_B), strict=True)
         )

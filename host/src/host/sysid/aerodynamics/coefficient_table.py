@@ -62,7 +62,7 @@ def coefficients(
     result: FitResult,
     airframe: AirframeData,
     condition: Condition,
-    moved: Sequence[ShiftedEstimate] = (),
+    shifts: Sequence[ShiftedEstimate] = (),
     errors: InstrumentErrors | None = None,
 ) -> tuple[Coefficient, ...]:
     """Convert dimensional derivatives of the templates to coefficients.
@@ -75,15 +75,15 @@ def coefficients(
         Mass properties and sizes.
     condition : Condition
         Airspeed and dynamic pressure of the maneuvers.
-    moved : sequence of Moved
-        By errors of sensors.
+    shifts : sequence of ShiftedEstimate
+        Of the derivatives, by one deviation of each sensor error.
     errors : InstrumentErrors, optional
-        What the pitots may be wrong by, where `moved` has nothing of them; standard ones without.
+        What the pitots may be wrong by, where `shifts` has nothing of them; standard ones without.
 
     Returns
     -------
     tuple of Coefficient
-        The interval adds mass, inertia, dynamic pressure, upwash and what moved it to the fit's
+        The interval adds mass, inertia, dynamic pressure, upwash and the shifts to the fit's
         own. Errors of the vanes are what upwash allows for: the larger counts.
     """
 
@@ -103,18 +103,18 @@ def coefficients(
     )
     fit_error = np.sqrt(np.einsum("ij,jk,ik->i", slopes, result.covariance, slopes))
     assumed: dict[str, Array] = {
-        cause: (converted(result.estimate, a, at) - value) / WIGGLE * share
-        for cause, (share, a, at) in _assumed(airframe, condition).items()
+        cause: (converted(result.estimate, a, at) - value) / PERTURBATION * share
+        for cause, (share, a, at) in _perturbed_mass_properties(airframe, condition).items()
     }
-    if not any(SHARED.get(m.error) == QBAR for m in moved):
+    if not any(SHARED.get(m.error) == QBAR for m in shifts):
         # Coefficients go with dynamic pressure inversely.
         assumed[QBAR] = -value * dynamic_pressure_share(
             errors or standard_errors(), condition.qbar_pa
         )
-    turned = np.array([name.endswith(("_alpha", "_beta")) for name in names])
-    assumed[VANE] = np.asarray(turned * value * airframe.upwash * airframe.upwash_share)
+    of_flow_angle = np.array([name.endswith(("_alpha", "_beta")) for name in names])
+    assumed[VANE] = np.asarray(of_flow_angle * value * airframe.upwash * airframe.upwash_share)
     sensed: dict[str, list[Array]] = {}
-    for m in moved:
+    for m in shifts:
         there = Condition(condition.airspeed_mps * m.airspeed_gain, condition.qbar_pa * m.qbar_gain)
         shift = converted(m.estimate, airframe, there) - value
         cause = SHARED.get(m.error) or ERROR_LABELS.get(m.error, m.error)
@@ -153,14 +153,16 @@ def _variances(assumed: dict[str, Array], sensed: dict[str, list[Array]]) -> dic
     return found
 
 
-WIGGLE = 1e-4  # share by which what is known is moved, to see what that does
+PERTURBATION = 1e-4  # share by which a mass property is changed for its sensitivity
 QBAR, VANE = "dynamic pressure", "vanes"
 SHARED = {"pitot_scale": QBAR, "pitot_zero_pa": QBAR, "alpha_scale": VANE, "beta_scale": VANE}
 
 
-def _assumed(a: AirframeData, at: Condition) -> dict[str, tuple[float, AirframeData, Condition]]:
-    """Return what is known to what share, and airframe and condition with it moved."""
-    more = 1.0 + WIGGLE
+def _perturbed_mass_properties(
+    a: AirframeData, at: Condition
+) -> dict[str, tuple[float, AirframeData, Condition]]:
+    """Return tolerance, airframe and condition with each mass property perturbed, by its name."""
+    more = 1.0 + PERTURBATION
     return {
         "mass": (a.mass_share, replace(a, mass_kg=a.mass_kg * more), at),
         "Ixx": (a.inertia_share, replace(a, ixx_kgm2=a.ixx_kgm2 * more), at),

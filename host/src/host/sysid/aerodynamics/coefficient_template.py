@@ -16,7 +16,7 @@ from host.aircraft.mass_properties import AirframeData, Condition
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 
 
-def in_coefficients(
+def coefficient_template(
     model: LinearModel, airframe: AirframeData, condition: Condition
 ) -> LinearModel:
     """Return a template with coefficients in place of the derivatives they determine.

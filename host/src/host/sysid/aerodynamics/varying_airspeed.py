@@ -49,10 +49,11 @@ AIRSPEED_TERMS: dict[str, tuple[tuple[str, str], ...]] = {
     "longitudinal": (),
     "lateral": (("Y_V", "beta_rad"), ("L_V", "p_radps"), ("N_V", "r_radps")),
 }
-# Rows that feel the air turn with the aircraft.
-TURNED = {"longitudinal": ("airspeed_mps", "alpha_rad"), "lateral": ("beta_rad",)}
-# Whether it does, 1, or stays with the ground, 0: mean and deviation beforehand.
-TURNS = (0.5, 0.5)
+# States in whose equations a gust that turns with the aircraft appears.
+GUST_TURNING_STATES = {"longitudinal": ("airspeed_mps", "alpha_rad"), "lateral": ("beta_rad",)}
+# Prior mean and deviation of `gust_turns`: 1 if gusts turn with the aircraft, 0 if they stay with
+# the ground.
+GUST_TURNS_PRIOR = (0.5, 0.5)
 STEADY_SHARE = 0.1  # of the airspeed: deviation of the gust reckoning cannot tell
 
 
@@ -117,7 +118,7 @@ class VaryingModel:
 
     def _build(self, *, turning_air: bool) -> LinearModel:
         base, scaled = self.base, self.scaled
-        bends, airspeed = SECOND_ORDER_TERMS[self.axis], AIRSPEED_TERMS[self.axis]
+        second_order, airspeed = SECOND_ORDER_TERMS[self.axis], AIRSPEED_TERMS[self.axis]
         n, m, p = len(base.states), len(base.inputs), len(base.outputs)
         terms = list(base.terms)
         for term in base.terms:
@@ -127,15 +128,18 @@ class VaryingModel:
                 place = m + scaled.index(key)
                 terms.append(Term(matrix, term.row, place, term.parameter, term.gain))
         rests = m + len(scaled) + n + len(self.forces)
-        turned, gusts = TURNED[self.axis], rests + len(bends) + (len(airspeed) > 0)
-        size = gusts + len(turned) * (1 + len(AXES))
+        turning_states, gusts = (
+            GUST_TURNING_STATES[self.axis],
+            rests + len(second_order) + (len(airspeed) > 0),
+        )
+        size = gusts + len(turning_states) * (1 + len(AXES))
         B, D = np.zeros((n, size)), np.zeros((p, size))
         B[:, :m], D[:, :m] = base.B, base.D
         B[:, m + len(scaled) : m + len(scaled) + n] = np.eye(n)
         for k, force in enumerate(self.forces):
             D[base.outputs.index(force), m + len(scaled) + n + k] = 1.0
         turn = {"ax_mps2": np.cos(self.trim.alpha_rad), "az_mps2": np.sin(self.trim.alpha_rad)}
-        for k, (name, row, _) in enumerate(bends):
+        for k, (name, row, _) in enumerate(second_order):
             terms.append(Term("B", base.states.index(row), rests + k, name))
             for force in self.forces if row == "airspeed_mps" else ():
                 at = base.outputs.index(force)
@@ -149,11 +153,11 @@ class VaryingModel:
         if turning_air:
             share = STEADY_SHARE * self.trim.airspeed_mps
             more = (
-                Parameter("gust_turns", TURNS[0], prior_sd=TURNS[1]),
+                Parameter("gust_turns", GUST_TURNS_PRIOR[0], prior_sd=GUST_TURNS_PRIOR[1]),
                 *(Parameter(f"gust_{axis}", prior_sd=share) for axis in AXES),
             )
             # Per row the gust reckoned, behind it the constants it is known but for.
-            for k, row in enumerate(turned):
+            for k, row in enumerate(turning_states):
                 first = gusts + k * len(more)
                 at = base.states.index(row)
                 terms += [Term("B", at, first + j, extra.name) for j, extra in enumerate(more)]
@@ -164,16 +168,16 @@ class VaryingModel:
                 *base.inputs,
                 *(f"{column} by V^{power}" for column, power in scaled),
                 *(f"rest of {name}" for name in (*base.states, *self.forces)),
-                *(f"{column} by alpha on {row}" for _, row, column in bends),
+                *(f"{column} by alpha on {row}" for _, row, column in second_order),
                 *(("airspeed over its trim",) if airspeed else ()),
-                *(f"turning {of} on {row}" for row in turned for of in ("gust", *AXES)),
+                *(f"turning {of} on {row}" for row in turning_states for of in ("gust", *AXES)),
             ),
             B=B,
             D=D,
             terms=tuple(terms),
             parameters=(
                 *base.parameters,
-                *(Parameter(name) for name, *_ in (*bends, *airspeed)),
+                *(Parameter(name) for name, *_ in (*second_order, *airspeed)),
                 *more,
             ),
         )
@@ -203,20 +207,24 @@ class VaryingModel:
         inputs = [columns[c] for c in self.base.inputs]
         for column, power in self.scaled:
             change = (ratio**power - 1.0) * _deviation(columns[column])
-            inputs.append(change if column in self.base.inputs else _between(change))
-        inputs += [_between(_deviation(rest)) for rest in self._rates(columns, ratio)]
-        inputs += [_deviation(rest) for rest in self._forces(columns, ratio)]
+            inputs.append(change if column in self.base.inputs else _neighbour_means(change))
+        inputs += [
+            _neighbour_means(_deviation(rest)) for rest in self._nonlinear_rates(columns, ratio)
+        ]
+        inputs += [_deviation(rest) for rest in self._nonlinear_forces(columns, ratio)]
         angle = _deviation(columns["alpha_rad"])
         inputs += [
-            _between(_deviation(angle * _deviation(columns[column])))
+            _neighbour_means(_deviation(angle * _deviation(columns[column])))
             for _, _, column in SECOND_ORDER_TERMS[self.axis]
         ]
         if AIRSPEED_TERMS[self.axis]:
-            inputs.append(_between(ratio - 1.0))
+            inputs.append(_neighbour_means(ratio - 1.0))
         gust, steady = gust_motion(columns, dt_s)
         motions = [gust, *(steady[:, :, k] for k in range(len(AXES)))]
         turns = [turning(columns, motion) for motion in motions]
-        inputs += [_between(turn[row]) for row in TURNED[self.axis] for turn in turns]
+        inputs += [
+            _neighbour_means(turn[row]) for row in GUST_TURNING_STATES[self.axis] for turn in turns
+        ]
         outputs = np.column_stack([columns[y] for y in self.base.outputs])
         return Maneuver(dt_s, np.column_stack(inputs), outputs, name=name)
 
@@ -234,7 +242,7 @@ class VaryingModel:
         turning = term.matrix in "AB" and base.states[term.row] in ("alpha_rad", "beta_rad")
         return column, power - 1 if turning else power
 
-    def _rates(self, columns: Mapping[str, Array], ratio: Array) -> list[Array]:
+    def _nonlinear_rates(self, columns: Mapping[str, Array], ratio: Array) -> list[Array]:
         """Return, per state, what its rate has beyond aerodynamics and the linear kinematics."""
         whole = self._kinematics(columns, self.trim.airspeed_mps * ratio)
         known = self._known()
@@ -281,18 +289,20 @@ class VaryingModel:
             "r_radps": (a.ixz_kgm2 * x + a.ixx_kgm2 * z) / det,
         }
 
-    def _forces(self, columns: Mapping[str, Array], ratio: Array) -> list[Array]:
+    def _nonlinear_forces(self, columns: Mapping[str, Array], ratio: Array) -> list[Array]:
         """Return, per specific force, its second order in airspeed and in the turning of lift."""
         alpha, ax, az = columns["alpha_rad"], columns["ax_mps2"], columns["az_mps2"]
         along = _deviation(ax * np.cos(alpha) + az * np.sin(alpha))
         normal = _deviation(az * np.cos(alpha) - ax * np.sin(alpha))
         angle = _deviation(alpha)
         sine, cosine = np.sin(self.trim.alpha_rad), np.cos(self.trim.alpha_rad)
-        turned = {
+        by_rotation = {
             "ax_mps2": -angle * (cosine * normal + sine * along),
             "az_mps2": angle * (cosine * along - sine * normal),
         }
-        return [(ratio - 1.0) ** 2 * np.mean(columns[y]) + turned.get(y, 0.0) for y in self.forces]
+        return [
+            (ratio - 1.0) ** 2 * np.mean(columns[y]) + by_rotation.get(y, 0.0) for y in self.forces
+        ]
 
 
 def _smooth(values: Array, samples: float) -> Array:
@@ -306,7 +316,7 @@ def _deviation(values: Array) -> Array:
     return np.asarray(values - np.mean(values), dtype=np.float64)
 
 
-def _between(values: Array) -> Array:
+def _neighbour_means(values: Array) -> Array:
     """Return means of neighbours: an input is held over the sample that follows it."""
     result = np.array(values, dtype=np.float64)
     result[:-1] = 0.5 * (values[:-1] + values[1:])
