@@ -18,7 +18,7 @@ from host.sysid.models.model_file import read_model
 from tests.host.logs import ROOT
 
 TEXT = (ROOT / "host/IDENTIFY.md").read_text(encoding="utf-8")
-AIRCRAFT, MAP, MODEL = re.findall(r"```toml\n(.*?)```", TEXT, re.S)
+AIRCRAFT, MAP, MODEL, CONSTANTS = re.findall(r"```toml\n(.*?)```", TEXT, re.S)
 
 
 def mine(folder: Path, text: str = AIRCRAFT) -> str:
@@ -114,6 +114,20 @@ def test_the_model_is_read(tmp_path: Path) -> None:
     path.write_text(MODEL, encoding="utf-8")
     model = read_model(path)
     assert [p.name for p in model.parameters] == ["Z_alpha", "M_alpha", "M_q", "Z_de", "M_de"]
+
+
+def test_the_model_with_its_constants_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    kept = [x for x in MODEL.splitlines() if not x.startswith(("state_b", "output_b", "initial_s"))]
+    path.write_text(CONSTANTS + "\n".join(kept), encoding="utf-8")
+    model = read_model(path)
+    assert model.inputs == ("elevator_rad", "one")
+    assert model.initial_states == ("q_radps",)
+    assert model.known_starts == (("alpha_rad", 0.05),)
+    assert model.state_biases == ("alpha_rad",)
+    assert model.output_biases == ()
+    assert "b_q" in [p.name for p in model.parameters]
+    assert model.known_noise == (("q_radps", 0.004),)
 
 
 def test_every_option_is_documented(capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,6 +18,8 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.output_error_problem import check_shapes
 
+KNOWN_NOISE = ("output-error", "output-error-white")
+OWN_STARTS = ("extended-kalman", "unscented-kalman")
 NO_MOTION = 1e-30  # in any unit: an output that moves less holds nothing, and its square underflows
 
 
@@ -136,7 +138,7 @@ def fit(
     function: Callable[..., Any] = getattr(
         import_module(f"host.sysid.estimators.{entry.module}"), entry.function
     )
-    _check(model, maneuvers)
+    _check(method, model, maneuvers)
     try:
         # Every number of the result is checked below; during the search trials may overflow.
         with np.errstate(all="ignore"):
@@ -155,10 +157,17 @@ def fit(
     return result
 
 
-def _check(model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:
+def _check(method: str, model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:
     """Raise if no method can fit: columns that do not fit the model, outputs that never move."""
     if not model.parameter_names:
         raise IdentificationError(f"model {model.name} has no free parameter: nothing to fit")
+    if model.known_noise and method not in KNOWN_NOISE:
+        raise IdentificationError(f"{method} cannot hold known noise; {', '.join(KNOWN_NOISE)} can")
+    if (model.known_starts or model.shared_starts) and method in OWN_STARTS:
+        raise IdentificationError(
+            f"{method} starts from the first samples and cannot hold known or shared initial"
+            " states; output-error and filter-error can"
+        )
     for maneuver in maneuvers:
         check_shapes(model, maneuver)
     span = np.max([np.ptp(m.outputs, axis=0) for m in maneuvers], axis=0)

@@ -141,6 +141,7 @@ def _innovation_variances(
                 white = memory.whiten(optimum.residuals[number][j][:, None])
                 squares += float(np.sum(white**2))
             updated[j] = squares / max(problem.samples - share, 1.0)
+        updated = np.where(np.isnan(problem.known_variance), updated, problem.known_variance)
         converged = bool(np.all(np.abs(updated - variance) < 1e-6 * updated))
         variance = np.maximum(updated, 1e-300)
         if converged:
@@ -167,6 +168,10 @@ def _fit_ar_models(
         updated, change = [], 0.0
         variance = variance.copy()
         for j in range(len(memory)):
+            if np.isfinite(problem.known_variance[j]):  # known noise is white
+                selected[j] = 0
+                updated.append(ArNoise.white())
+                continue
             residuals = [r[j] for r in optimum.residuals]
             shares = [
                 response.sensitivities[j] @ lower[problem.columns(number)]
@@ -224,7 +229,8 @@ def _satterthwaite(
         slope = np.einsum(
             "ij,jk,ki->i", covariance[free], blocks[j] / variance[j], covariance[:, free]
         )
-        variance_of_log += (slope / base) ** 2 * 2.0 / samples
+        if np.isnan(problem.known_variance[j]):
+            variance_of_log += (slope / base) ** 2 * 2.0 / samples
         if memory.order == 0:
             continue
         scatter = np.linalg.inv(_toeplitz(memory)) / samples

@@ -67,7 +67,9 @@ def fit_output_error(
         criterion=criterion,
         multiple_starts=multiple_starts,
     )
-    covariance = fit.covariance if coloured_noise else coloured_output_covariance(problem, fit)
+    # Noise that is known is not judged by residuals.
+    as_modelled = coloured_noise or bool(np.isfinite(problem.known_variance).all())
+    covariance = fit.covariance if as_modelled else coloured_output_covariance(problem, fit)
     return FitResult(
         method="output error" if coloured_noise else "output error (white)",
         model=model,

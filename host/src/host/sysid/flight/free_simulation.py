@@ -1,14 +1,15 @@
-"""A fitted model run freely over maneuvers: only constants and start states are fitted to each."""
+"""A model run freely over maneuvers: constants and start states fitted to each, or none."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from host.arrays import Array
 from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.flight.window_prediction import Biases
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import SignalFit, signal_fits
 from host.sysid.models.fit_result import FitResult
@@ -18,28 +19,45 @@ from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.output_error_problem import OutputProblem, Response
 
+LEAD_S = 0.3  # of trim before the input, as `DetectedManeuver.fit_window` has it
+
+
+@dataclass(frozen=True, slots=True)
+class FreeRun:
+    """Outputs of a model over one maneuver, (samples, p), and the biases it was run with.
+
+    NaN where it diverges.
+    """
+
+    outputs: Array
+    biases: Biases
+
+
+def free_runs(
+    frozen: LinearModel, maneuvers: Sequence[Maneuver], *, constants: bool = True
+) -> list[FreeRun]:
+    """Run a model without free parameters over maneuvers.
+
+    Parameters
+    ----------
+    frozen : LinearModel
+        From `frozen_model`.
+    maneuvers : sequence of Maneuver
+    constants : bool
+        Fit the biases and start states that the model has to each maneuver. Otherwise they are
+        those of equilibrium in the 0.3 s before the input: nothing is fitted.
+    """
+    return [
+        (_fitted_run if constants else _trimmed_run)(frozen, maneuver) for maneuver in maneuvers
+    ]
+
 
 def free_simulation(frozen: LinearModel, maneuvers: Sequence[Maneuver]) -> list[Array]:
     """Return the outputs of a model without free parameters over maneuvers, (samples, outputs).
 
     Biases and start states that the model has are fitted to each; NaN where it diverges.
     """
-    simulated = []
-    for maneuver in maneuvers:
-        try:
-            problem = OutputProblem(frozen, [maneuver])
-            # Nothing but constants is free here, which the door would refuse.
-            best = fit_output_error(
-                frozen,
-                [maneuver],
-                coloured_noise=False,
-                start=problem.first_guess(),
-                multiple_starts=False,
-            )
-            simulated.append(best.fitted[0])
-        except IdentificationError:
-            simulated.append(np.full_like(maneuver.outputs, np.nan))
-    return simulated
+    return [run.outputs for run in free_runs(frozen, maneuvers)]
 
 
 def responses_with_constants(problem: OutputProblem, estimate: Array) -> list[Response] | None:
@@ -108,8 +126,83 @@ def fits_of(
 
 def frozen_model(model: LinearModel, result: FitResult) -> LinearModel:
     """Return the model frozen at the estimate, biases and start states left free."""
-    count = len(model.parameters)
-    A, B, C, D = model.matrices(result.estimate[:count])
+    return frozen_at(model, result.estimate[: len(model.parameters)])
+
+
+def frozen_at(model: LinearModel, theta: Array) -> LinearModel:
+    """Return the model frozen at values of its parameters, biases and start states left free."""
+    A, B, C, D = model.matrices(theta)
+    value = dict(zip((p.name for p in model.parameters), theta.tolist(), strict=True))
     return replace(
-        model, A=A, B=B, C=C, D=D, terms=(), parameters=(), delays=(), accelerometer_offsets=()
+        model,
+        A=A,
+        B=B,
+        C=C,
+        D=D,
+        terms=(),
+        parameters=(),
+        delays=(),
+        accelerometer_offsets=(),
+        known_starts=(*model.known_starts, *((s, value[p]) for s, p in model.shared_starts)),
+        shared_starts=(),
     )
+
+
+def _fitted_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
+    try:
+        problem = OutputProblem(frozen, [maneuver])
+        # Nothing but constants is free here, which the door would refuse.
+        best = fit_output_error(
+            frozen,
+            [maneuver],
+            coloured_noise=False,
+            start=problem.first_guess(),
+            multiple_starts=False,
+        )
+    except IdentificationError:
+        return _diverged(frozen, maneuver)
+    return FreeRun(best.fitted[0], _biases(frozen, best.estimate))
+
+
+def _trimmed_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
+    """Run from equilibrium at the mean of the time before the input."""
+    lead = slice(0, max(1, round(LEAD_S / maneuver.dt_s)))
+    y, u = maneuver.outputs[lead].mean(axis=0), maneuver.inputs[lead].mean(axis=0)
+    known = dict(frozen.known_starts)
+    x = np.array(
+        [
+            y[frozen.outputs.index(s)]
+            if s in frozen.outputs and s in frozen.initial_states
+            else known.get(s, 0.0)
+            for s in frozen.states
+        ]
+    )
+    rate, output = -(frozen.A @ x + frozen.B @ u), y - (frozen.C @ x + frozen.D @ u)
+    theta = np.array(
+        [
+            *(rate[frozen.states.index(s)] for s in frozen.state_biases),
+            *(output[frozen.outputs.index(name)] for name in frozen.output_biases),
+            *(x[frozen.states.index(s)] for s in frozen.initial_states),
+        ]
+    )
+    simulated = OutputProblem(frozen, [maneuver]).outputs(theta)
+    if simulated is None:
+        return _diverged(frozen, maneuver)
+    return FreeRun(simulated[0].T.copy(), _biases(frozen, theta))
+
+
+def _biases(frozen: LinearModel, theta: Array) -> Biases:
+    """Return the biases of constants in the order of `LinearModel.local_names`."""
+    rate, output = np.zeros(len(frozen.states)), np.zeros(len(frozen.outputs))
+    count = len(frozen.state_biases)
+    for state, value in zip(frozen.state_biases, theta, strict=False):
+        rate[frozen.states.index(state)] = value
+    for name, value in zip(frozen.output_biases, theta[count:], strict=False):
+        output[frozen.outputs.index(name)] = value
+    return Biases(rate, output)
+
+
+def _diverged(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
+    nothing = np.full_like(maneuver.outputs, np.nan)
+    rate, output = (np.full(len(names), np.nan) for names in (frozen.states, frozen.outputs))
+    return FreeRun(nothing, Biases(rate, output))

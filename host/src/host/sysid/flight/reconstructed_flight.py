@@ -29,7 +29,7 @@ from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import CONSTANT, LinearModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,13 +87,15 @@ class FlownManeuver:
             If the flight lacks one of them.
         """
         columns = self.flight.corrected
-        missing = [c for c in (*model.inputs, *model.outputs) if c not in columns]
+        needed = (*model.inputs, *model.outputs)
+        missing = [c for c in needed if c not in columns and c != CONSTANT]
         if missing:
             meant = like(missing[0], tuple(columns))
             raise IdentificationError(
                 f"model {model.name} needs {', '.join(missing)}{meant}, which the data do not have"
             )
         cut = self.inside()
+        cut[CONSTANT] = np.ones(len(cut["t_s"]))
         return Maneuver(
             dt_s=float(cut["t_s"][1] - cut["t_s"][0]),
             inputs=np.column_stack([cut[c] for c in model.inputs]),

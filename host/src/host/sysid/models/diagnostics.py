@@ -15,7 +15,7 @@ from host.arrays import Array
 from host.constants import NORMAL_95
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import CONSTANT, LinearModel
 
 CORRELATION_LIMIT = 0.9
 CONDITION_LIMIT = 1e5  # of the scaled information: more digits than any sensor has
@@ -400,7 +400,7 @@ def constant_inputs(model: LinearModel, maneuvers: Sequence[Maneuver]) -> tuple[
     """Return inputs that never change: each is collinear with a bias."""
     constant = []
     for k, name in enumerate(model.inputs):
-        if all(float(np.ptp(m.inputs[:, k])) == 0.0 for m in maneuvers):
+        if name != CONSTANT and all(float(np.ptp(m.inputs[:, k])) == 0.0 for m in maneuvers):
             constant.append(name)
     return tuple(constant)
 

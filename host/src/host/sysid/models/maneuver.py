@@ -9,11 +9,10 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.identification_error import IdentificationError
+from host.sysid.models.state_space_model import CONSTANT, LinearModel
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from host.sysid.models.state_space_model import LinearModel
 
 LARGEST = 1e30  # in any unit: no quantity of flight is larger, and its powers overflow
 JITTER_LIMIT = 0.02  # of one sample: a record with more is not on a uniform grid
@@ -121,6 +120,8 @@ class Maneuver:
         IdentificationError
             If a column is missing, the window is empty or time does not advance evenly.
         """
+        if CONSTANT in model.inputs:
+            table = table.assign(**{CONSTANT: 1.0})
         missing = [c for c in ("t_s", *model.inputs, *model.outputs) if c not in table.columns]
         if missing:
             raise IdentificationError(

@@ -29,7 +29,8 @@ An entry is a number, a parameter, ``gain*parameter`` or a sum of those; paramet
 of their own start at zero. Left out, `initial_states` are all, `state_biases` those of rows with
 a parameter, `output_biases` those of outputs that are no state: records hold total quantities, and
 without a constant of its own the trim would pass for a derivative. `delays` are those of vanes,
-IMU, attitude and pitot, with the priors of the templates. An empty list frees none.
+IMU, attitude and pitot, with the priors of the templates. An empty list frees none. Constants that
+are known, or the same in all records, and known noise: `model_constants.py`.
 """
 
 from __future__ import annotations
@@ -45,6 +46,13 @@ from host.arrays import Array
 from host.files.quantities import Quantity
 from host.files.user_text import shown
 from host.sysid.identification_error import IdentificationError
+from host.sysid.models.model_constants import (
+    Inputs,
+    ModelConstants,
+    read_constants,
+    read_noise,
+    with_constant_input,
+)
 from host.sysid.models.residual_delays import delays_of
 from host.sysid.models.state_space_model import (
     MATRICES,
@@ -64,7 +72,7 @@ _PIECE = re.compile(
 )
 KEYS = {
     "name", "states", "inputs", "outputs", "hold", "state_biases", "output_biases",
-    "initial_states", "parameters", "delays", "levers", "fit", "trim", *MATRICES,
+    "initial_states", "noise", "parameters", "delays", "levers", "fit", "trim", *MATRICES,
 }  # fmt: skip
 _LARGE = "M_alpha of an indoor model at 10 m/s: -1000 1/s2"
 _NUMBER = Quantity("", -1e6, 1e6, _LARGE)
@@ -111,17 +119,7 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         raise IdentificationError(
             f"{source}: unknown key {', '.join(unknown_keys)}; known are {', '.join(sorted(KEYS))}"
         )
-    signals = {
-        key: _names(document, key, source, needed=key in ("states", "inputs", "outputs"))
-        for key in (
-            "states",
-            "inputs",
-            "outputs",
-            "state_biases",
-            "output_biases",
-            "initial_states",
-        )
-    }
+    signals = {key: _names(document, key, source) for key in ("states", "inputs", "outputs")}
     n, m, p = (len(signals[key]) for key in ("states", "inputs", "outputs"))
     if max(n, m, p) > MOST_SIGNALS:
         raise IdentificationError(
@@ -134,25 +132,32 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         fixed[label], found = _matrix(document.get(label), label, shape, signals, source)
         terms += found
     accelerometer_offsets = _levers(document.get("levers", []), source)
-    _constants(document, signals, terms)
-    used = list(
-        dict.fromkeys([t.parameter for t in terms] + [x.parameter for x in accelerometer_offsets])
+    constants = _constants(document, signals, terms, source)
+    starts, rates = constants["initial_states"], constants["state_biases"]
+    inputs = with_constant_input(
+        Inputs(signals["inputs"], fixed["B"], fixed["D"], tuple(terms)),
+        signals["states"],
+        signals["outputs"],
+        rates,
+        constants["output_biases"],
     )
+    entering = [t.parameter for t in inputs.terms] + [x.parameter for x in accelerometer_offsets]
+    used = list(dict.fromkeys([*entering, *(name for _, name in starts.shared)]))
     parameters = _parameters(document.get("parameters", {}), used, source)
     return LinearModel(
         name=in_a_line(str(document.get("name", Path(source).stem))),
         states=signals["states"],
-        inputs=signals["inputs"],
+        inputs=inputs.names,
         outputs=signals["outputs"],
         A=fixed["A"],
-        B=fixed["B"],
+        B=inputs.B,
         C=fixed["C"],
-        D=fixed["D"],
-        terms=tuple(terms),
+        D=inputs.D,
+        terms=inputs.terms,
         parameters=parameters,
-        state_biases=signals["state_biases"],
-        output_biases=signals["output_biases"],
-        initial_states=signals["initial_states"],
+        state_biases=rates.own,
+        output_biases=constants["output_biases"].own,
+        initial_states=starts.own,
         delays=(
             _delays(document["delays"], used, source)
             if "delays" in document
@@ -160,15 +165,14 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         ),
         hold=str(document.get("hold", "foh")),
         accelerometer_offsets=accelerometer_offsets,
+        known_starts=starts.known,
+        shared_starts=starts.shared,
+        known_noise=read_noise(document.get("noise", {}), signals["outputs"], f"{source}: noise"),
     )
 
 
-def _names(
-    document: Mapping[str, object], key: str, source: str, *, needed: bool
-) -> tuple[str, ...]:
+def _names(document: Mapping[str, object], key: str, source: str) -> tuple[str, ...]:
     value = document.get(key)
-    if value is None and not needed:
-        return ()
     if not isinstance(value, list) or not all(isinstance(x, str) for x in value):
         raise IdentificationError(f"{source}: {key} must be a list of signal names")
     return tuple(cast(list[str], value))
@@ -229,16 +233,25 @@ def parse_entry(entry: object, where: str) -> tuple[float, list[tuple[str, float
 
 
 def _constants(
-    document: Mapping[str, object], signals: dict[str, tuple[str, ...]], terms: list[Term]
-) -> None:
-    """Fill in the free constants of keys that are left out."""
+    document: Mapping[str, object],
+    signals: Mapping[str, tuple[str, ...]],
+    terms: list[Term],
+    source: str,
+) -> dict[str, ModelConstants]:
+    """Return initial states and biases; those of keys that are left out are free."""
     free = {term.row for term in terms if term.matrix in "AB"}
     usual = {
         "initial_states": signals["states"],
         "state_biases": tuple(s for k, s in enumerate(signals["states"]) if k in free),
         "output_biases": tuple(y for y in signals["outputs"] if y not in signals["states"]),
     }
-    signals.update({key: names for key, names in usual.items() if key not in document})
+    of = {key: signals["outputs" if key == "output_biases" else "states"] for key in usual}
+    return {
+        key: read_constants(document[key], of[key], f"{source}: {key}")
+        if key in document
+        else ModelConstants(names)
+        for key, names in usual.items()
+    }
 
 
 def _table(value: object, allowed: Collection[str], where: str) -> dict[str, object]:
@@ -299,7 +312,7 @@ def _delays(value: object, used: list[str], source: str) -> tuple[DelayGroup, ..
         if not isinstance(name, str):
             raise IdentificationError(f"{source}: a delay needs name and outputs")
         where = f"{source}: delay {name}"
-        outputs = _names(table, "outputs", where, needed=True)
+        outputs = _names(table, "outputs", where)
         if name in used or name in (d.name for d in result):
             raise IdentificationError(f"{where}: another parameter has this name")
         twice = [y for y in outputs if any(y in d.outputs for d in result)]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 
 import numpy as np
 
 from host.sysid.models.fit_result import FitResult
+from host.sysid.models.model_constants import OWN
 from host.sysid.models.state_space_model import MATRICES, LinearModel
 from host.sysid.models.templates import Trim
 
@@ -29,8 +31,11 @@ def model_text(
     for key in ("states", "inputs", "outputs"):
         lines.append(f"{key} = {_list(getattr(model, key))}")
     lines.append(f'hold = "{model.hold}"')
-    for key in ("state_biases", "output_biases", "initial_states"):
+    for key in ("state_biases", "output_biases"):
         lines.append(f"{key} = {_list(getattr(model, key))}")
+    lines.append(f"initial_states = {_starts(model)}")
+    if model.known_noise:
+        lines.append(f"noise = {_table(dict(model.known_noise))}")
     if not model.delays:
         lines.append("delays = []")
     for label in MATRICES:
@@ -55,7 +60,7 @@ def model_text(
         half = result.half_width()
         for k, name in enumerate(result.names):
             lines.append(f"{_text(name)} = [{_plain(result.estimate[k])}, {_plain(half[k])}]")
-    if trim is not None:
+    if trim is not None and trim.known:
         lines.append("[trim]")
         for key in ("airspeed_mps", "alpha_rad", "theta_rad"):
             lines.append(f"{key} = {_plain(getattr(trim, key))}")
@@ -88,6 +93,19 @@ def _text(text: str) -> str:
 
 def _list(names: tuple[str, ...]) -> str:
     return "[" + ", ".join(_text(name) for name in names) + "]"
+
+
+def _starts(model: LinearModel) -> str:
+    """Return a list of the initial states that are free, a table where others are not zero."""
+    others: dict[str, float | str] = {**dict(model.known_starts), **dict(model.shared_starts)}
+    if not others:
+        return _list(model.initial_states)
+    return _table(dict.fromkeys(model.initial_states, OWN) | others)
+
+
+def _table(values: Mapping[str, float | str]) -> str:
+    pairs = (f"{k} = {_text(v) if isinstance(v, str) else _plain(v)}" for k, v in values.items())
+    return "{ " + ", ".join(pairs) + " }"
 
 
 def _entry(model: LinearModel, label: str, row: int, column: int) -> str:

@@ -18,6 +18,7 @@ from host.arrays import Array, IntArray
 from host.sysid.identification_error import IdentificationError
 
 MATRICES = ("A", "B", "C", "D")
+CONSTANT = "one"  # an input that is 1 at every sample: its entries are constants of all records
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +128,13 @@ class LinearModel:
         Input between its samples: ``zoh`` (zero-order hold) or ``foh`` (first-order hold).
     accelerometer_offsets : tuple of AccelerometerOffset
         Sensor offsets that mix state rates into outputs.
+    known_starts : tuple of (str, float)
+        States whose initial value is known; one that is neither here, in `shared_starts` nor in
+        `initial_states` starts at zero.
+    shared_starts : tuple of (str, str)
+        States whose initial value is a parameter, the same in all maneuvers.
+    known_noise : tuple of (str, float)
+        Outputs whose noise has a known standard deviation; that of others is estimated.
 
     Raises
     ------
@@ -150,6 +158,9 @@ class LinearModel:
     delays: tuple[DelayGroup, ...] = field(default=())
     hold: str = "zoh"
     accelerometer_offsets: tuple[AccelerometerOffset, ...] = ()
+    known_starts: tuple[tuple[str, float], ...] = ()
+    shared_starts: tuple[tuple[str, str], ...] = ()
+    known_noise: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         n, m, p = len(self.states), len(self.inputs), len(self.outputs)
@@ -181,12 +192,17 @@ class LinearModel:
             set(names)
             - {term.parameter for term in self.terms}
             - {lever.parameter for lever in self.accelerometer_offsets}
+            - {parameter for _, parameter in self.shared_starts}
         )
         if unused:
             raise IdentificationError(f"model {self.name}: {', '.join(unused)} enters no matrix")
         for what, chosen, known in (
             ("state bias", self.state_biases, self.states),
             ("initial state", self.initial_states, self.states),
+            ("initial state", tuple(x for x, _ in self.known_starts), self.states),
+            ("initial state", tuple(x for x, _ in self.shared_starts), self.states),
+            ("initial state", tuple(p for _, p in self.shared_starts), tuple(names)),
+            ("noise", tuple(x for x, _ in self.known_noise), self.outputs),
             ("output bias", self.output_biases, self.outputs),
             ("lever", tuple(x.output for x in self.accelerometer_offsets), self.outputs),
             ("lever", tuple(x.state for x in self.accelerometer_offsets), self.states),
@@ -350,10 +366,32 @@ def without_outputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
             if t.matrix in "AB" or t.row in place
         ),
         output_biases=tuple(y for y in model.output_biases if y not in names),
+        known_noise=tuple((y, sd) for y, sd in model.known_noise if y not in names),
         delays=tuple(d for d in delays if d.outputs),
         accelerometer_offsets=tuple(
             x for x in model.accelerometer_offsets if x.output not in names
         ),
+    )
+
+
+def without_inputs(model: LinearModel, names: Sequence[str]) -> LinearModel:
+    """Return a model without some of its inputs and the parameters that only these have."""
+    keep = [k for k, u in enumerate(model.inputs) if u not in names]
+    place = {old: new for new, old in enumerate(keep)}
+    terms = tuple(
+        replace(t, column=place[t.column]) if t.matrix in "BD" else t
+        for t in model.terms
+        if t.matrix in "AC" or t.column in place
+    )
+    left = {t.parameter for t in terms} | {x.parameter for x in model.accelerometer_offsets}
+    left |= {parameter for _, parameter in model.shared_starts}
+    return replace(
+        model,
+        inputs=tuple(model.inputs[k] for k in keep),
+        B=model.B[:, keep],
+        D=model.D[:, keep],
+        terms=terms,
+        parameters=tuple(p for p in model.parameters if p.name in left),
     )
 
 

@@ -29,17 +29,25 @@ from host.sysid.models.state_space_model import (
 
 @dataclass(frozen=True, slots=True)
 class Trim:
-    """The condition a template is linearised about: airspeed (m/s), alpha and theta (rad)."""
+    """The condition a template is linearised about: airspeed (m/s), alpha and theta (rad).
+
+    An airspeed of NaN is not known: then there are only templates that need none.
+    """
 
     airspeed_mps: float
     alpha_rad: float = 0.0
     theta_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.airspeed_mps) and self.airspeed_mps > 0.0):
+        if not (np.isnan(self.airspeed_mps) or 0.0 < self.airspeed_mps < np.inf):
             raise IdentificationError(
                 f"trim airspeed {self.airspeed_mps} m/s, expected a positive number"
             )
+
+    @property
+    def known(self) -> bool:
+        """Whether the airspeed is known."""
+        return bool(np.isfinite(self.airspeed_mps))
 
 
 @dataclass(slots=True)
@@ -381,14 +389,23 @@ TEMPLATES: dict[str, Callable[..., LinearModel]] = {
 }
 
 
+# Rates and angles alone: airspeed stands in no equation but those of the accelerometers.
+WITHOUT_AIRSPEED = ("short-period", "dutch-roll", "roll")
+
+
 def template(name: str, trim: Trim, **options: object) -> LinearModel:
     """Return a template by name.
 
     Raises
     ------
     IdentificationError
-        If there is no such template.
+        If there is no such template, or it needs an airspeed that is not known.
     """
     if name not in TEMPLATES:
         raise IdentificationError(f"no template '{name}'; there are {', '.join(TEMPLATES)}")
+    if not trim.known and name not in WITHOUT_AIRSPEED:
+        raise IdentificationError(
+            f"{name} needs airspeed_mps, which the data do not have; name its column in a map"
+            f" (argument mapping), or fit {', '.join(WITHOUT_AIRSPEED)}"
+        )
     return TEMPLATES[name](trim, **options)

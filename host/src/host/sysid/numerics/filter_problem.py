@@ -140,7 +140,12 @@ class FilterProblem:
             for name in own:
                 values[every.index(name)] = next(local)
             likelihood.append(values)
-        return likelihood[0], likelihood[1], likelihood[2]
+        start = likelihood[2]
+        for state, value in model.known_starts:
+            start[model.states.index(state)] = value
+        for state, name in model.shared_starts:
+            start[model.states.index(state)] = theta[self.names.index(name)]
+        return likelihood[0], likelihood[1], start
 
     def evaluate(self, theta: Array) -> InnovationLikelihood | None:
         """Return innovations and cost; None where the filter or the model fails.

@@ -156,6 +156,8 @@ def _innovation_sensitivities(
     start = np.zeros((n, width))
     for k, state in enumerate(model.initial_states):
         start[model.states.index(state), rows_known + len(model.output_biases) + k] = 1.0
+    for state, name in model.shared_starts:
+        start[model.states.index(state), problem.names.index(name)] = 1.0
     drive = np.zeros((n + w + p, n, width))
     drive[: n + w, :, :rows_known] = step_slopes.transpose(1, 0, 2)
     FK = gain.F @ gain.K

@@ -77,7 +77,8 @@ def minimise(
     noise : sequence of ArNoise, optional
         AR model of the noise of each output; white by default.
     variance : Array, optional
-        Known innovation variances, shape (p,); estimated by default.
+        Known innovation variances, shape (p,), NaN where estimated; those that the model states
+        without.
     step_limit : float
         The search ends when no parameter moves by more than this times its Cramer-Rao bound.
     max_iterations : int
@@ -216,12 +217,12 @@ def _evaluate(
         whitened.append(_whitened(residual, noise))
     squares = sum((np.einsum("jk,jk->j", w, w) for w in whitened), np.zeros(len(noise)))
     prior = 0.5 * float(np.sum(problem.prior_precision * (theta - problem.prior_mean) ** 2))
-    if variance is None:
-        estimated = np.maximum(squares / problem.samples, problem.least_variance)
-        cost = 0.5 * problem.samples * float(np.sum(np.log(estimated)))
-    else:
-        estimated = variance
-        cost = 0.5 * float(np.sum(squares / variance))
+    known = problem.known_variance if variance is None else variance
+    open_ = np.isnan(known)
+    estimated = np.maximum(squares / problem.samples, problem.least_variance)
+    cost = 0.5 * problem.samples * float(np.sum(np.log(estimated[open_])))
+    cost += 0.5 * float(np.sum((squares / known)[~open_]))
+    estimated = np.where(open_, estimated, known)
     if not np.isfinite(cost):
         return None
     return _Point(responses, residuals, whitened, estimated, cost + prior)

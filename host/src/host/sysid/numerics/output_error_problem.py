@@ -54,6 +54,8 @@ class OutputProblem:
     ----------
     least_variance : Array, shape (p,)
         Below it an estimated noise variance is rounding error.
+    known_variance : Array, shape (p,)
+        Of the noise of outputs for which the model states it; NaN where it is estimated.
 
     Raises
     ------
@@ -115,6 +117,12 @@ class OutputProblem:
         for k, state in enumerate(model.initial_states):
             position = common + n_rates + len(model.output_biases) + k
             self._start_parameter[model.states.index(state)] = position
+        own = [p.name for p in model.parameters]
+        for state, name in model.shared_starts:
+            self._start_parameter[model.states.index(state)] = own.index(name)
+        self._known_start = np.zeros(n)
+        for state, value in model.known_starts:
+            self._known_start[model.states.index(state)] = value
         self._start_slopes = np.zeros((n, width))
         for i in np.flatnonzero(self._start_parameter >= 0):
             self._start_slopes[i, self._start_parameter[i]] = 1.0
@@ -138,6 +146,8 @@ class OutputProblem:
         self._free_memory: list[list[Array]] = [[] for _ in self._parts]
         power = np.mean(np.square(self._parts[0].measured), axis=1)
         self.least_variance = 1e-20 * np.maximum(power, 1e-30)  # of an output that fits perfectly
+        noise = dict(model.known_noise)
+        self.known_variance = np.array([noise.get(y, np.nan) ** 2 for y in model.outputs])
         self.lower, self.upper, self.prior_mean, self.prior_precision = self._limits()
 
     def _limits(self) -> tuple[Array, Array, Array, Array]:
@@ -210,7 +220,7 @@ class OutputProblem:
             finite, z = simulate(
                 step,
                 part.drive,
-                local[self._start_parameter],
+                self._known_start + local[self._start_parameter],
             )
             if not finite:
                 return None
@@ -270,7 +280,7 @@ class OutputProblem:
             step, _ = discretise(
                 AB, n, m, model.hold == "foh", part.dt_s, none, none, none, np.zeros(0), 0
             )
-            start = local[self._start_parameter]
+            start = self._known_start + local[self._start_parameter]
             finite, z = simulate(step, part.drive, start)
             if not finite:
                 return None

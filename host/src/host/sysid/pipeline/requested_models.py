@@ -17,7 +17,7 @@ from host.sysid.flight.column_map import like
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.pipeline.arguments import listed
 
 COEFFICIENTS = "coefficients"
@@ -46,7 +46,7 @@ class Models:
     def signals(self) -> tuple[str, ...]:
         """Inputs and outputs of the user's own models."""
         own = {s for _, m in self.linear if m is not None for s in (*m.inputs, *m.outputs)}
-        return tuple(sorted(own))
+        return tuple(sorted(own - {CONSTANT}))
 
 
 def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
