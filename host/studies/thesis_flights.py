@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.equation_error import fit_equation_error
-from host.sysid.estimators.hopfield import free_run, line_search, network
+from host.sysid.estimators.hopfield import SWEEPS, free_run, line_search, network
 from host.sysid.flight.flight_tables import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.identification_error import IdentificationError
@@ -31,7 +31,6 @@ from host.sysid.models.state_space_model import LinearModel, free_model
 from host.twin.virtual import VirtualFlight, virtual_flight
 
 FIRST_SEED = 500
-SWEEPS = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +107,7 @@ def re_enact(case: Case, seed: int) -> Figures:
     window = cut(columns, model, float(chosen[0]["start_s"]), case.rows)
     names, W, b = network(model, [window])
     start = fit_equation_error(model, [window]).estimate
-    beta = line_search(model, window, names, W, b, start, sweeps=SWEEPS)
+    beta = line_search(model, [window], names, W, b, start, sweeps=SWEEPS).estimate
     measured = window.outputs
     simulated = free_run(model, window, beta)
     if simulated is None:

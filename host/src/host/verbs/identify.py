@@ -45,6 +45,11 @@ def add_parser(subparsers: Any) -> None:
         metavar="NAME",
         help="estimator, repeatable for a side-by-side table; 'list' shows them",
     )
+    parser.add_argument("--method-option", action="append", metavar="NAME=VALUE",
+                        help="of hopfield and hopfield-line-search: lambda, rho, iterations, start"
+                        " (least-squares, model, zero); of recursive: forgetting")  # fmt: skip
+    parser.add_argument("--history", type=Path, metavar="FILE",
+                        help="write how hopfield or recursive settled, as .csv")  # fmt: skip
     parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: mass, sizes, sensors;"
                         " gives coefficients")  # fmt: skip
     parser.add_argument("--truth", type=Path, metavar="TOML", action=StorePlaced, default=[],
@@ -64,6 +69,8 @@ def add_parser(subparsers: Any) -> None:
                         help="leave sensor errors that the flight tells in the data")  # fmt: skip
     parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
                         " whatever this check of the data finds; repeatable")  # fmt: skip
+    parser.add_argument("--no-delays", action="store_true",
+                        help="take every delay of a sensor as zero, estimate none")  # fmt: skip
     _add_outputs(parser)
 
 
@@ -102,6 +109,7 @@ def _run(args: argparse.Namespace) -> int:
     """Identify and print the answer: words first, then numbers."""
     from host.errors import ExitCode
     from host.sysid.answer.output_files import check_outputs
+    from host.sysid.estimators.method_options import read_options
     from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.arguments import option_words
     from host.sysid.pipeline.requested_models import known_methods
@@ -125,8 +133,10 @@ def _run(args: argparse.Namespace) -> int:
         stretches=stretches_of_each(args.ends, len(args.source)),
         corrections=not args.no_corrections,
         accept=args.accept or (),
+        delays=not args.no_delays,
         truth=[path for _, path in args.truth],
         prior=args.prior,
+        method_options=read_options(args.method_option or ()),
     )
     if args.json:
         text = option_words(found.to_json())
@@ -156,6 +166,7 @@ def _places(args: argparse.Namespace) -> OutputPaths:
         save_model=args.save_model,
         save_aircraft=args.save_aircraft,
         source=args.aircraft,
+        history=args.history,
         given=tuple(path for path in given if path is not None),
     )
 

@@ -69,7 +69,7 @@ def test_original_line_search_lowers_the_figure_it_prints() -> None:
     names, W, b = network(model, [maneuver])
     truth = fit("equation-error", model, [maneuver]).estimate
     start = 0.97 * truth
-    end = line_search(model, maneuver, names, W, b, start, sweeps=2)
+    end = line_search(model, [maneuver], names, W, b, start, sweeps=2).estimate
 
     def figure(beta: np.ndarray) -> float:
         problem = OutputProblem(model, [maneuver])

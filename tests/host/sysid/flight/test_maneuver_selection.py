@@ -182,7 +182,8 @@ def test_a_model_may_name_columns_of_its_own(tmp_path: Path) -> None:
     rows = [f"{x:.2f},17.0,{0.1 * np.sin(x):.6f},{np.cos(x):.6f}" for x in t]
     path, mapping = tmp_path / "own.csv", tmp_path / "map.toml"
     path.write_text("\n".join(["t_s,airspeed_mps,elevator_pot_rad,Flex 3", *rows]) + "\n")
-    mapping.write_text('[columns]\nflex_3 = { from = "Flex 3", scale = 2.0 }\n')
+    lines = '[columns]\nflex_3 = { from = "Flex 3", scale = 2.0 }\n'
+    mapping.write_text(lines + 'elevator_pot_rad = "elevator_pot_rad"\n')
     assert "elevator_pot_rad" not in read_columns(path)[0]
     columns, _ = read_columns(path, mapping, also=("elevator_pot_rad", "flex_3"))
     t = columns["t_s"]

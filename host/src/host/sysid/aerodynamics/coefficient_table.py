@@ -172,9 +172,12 @@ def _perturbed_mass_properties(
 
 
 def trim_of(columns: dict[str, Array]) -> tuple[Trim, Condition]:
-    """Return trim and condition as means of a cut of a flight table."""
+    """Return trim and condition as means of a cut of a flight table.
+
+    Without `airspeed_mps` the airspeed is NaN: not known.
+    """
     mean = {name: float(np.mean(values)) for name, values in columns.items()}
-    speed = mean["airspeed_mps"]
+    speed = mean.get("airspeed_mps", float("nan"))
     qbar = mean.get("qbar_pa", 0.5 * mean.get("density_kgpm3", 1.225) * speed**2)
     return (
         Trim(speed, mean.get("alpha_rad", 0.0), mean.get("theta_rad", mean.get("alpha_rad", 0.0))),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.constants import DEG_PER_RAD
+from host.sysid.answer.constant_lines import constant_lines
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.trust_rules import uncarried_states
 from host.sysid.flight.linear_estimator import Answer, from_zero
@@ -23,8 +24,9 @@ def model_lines(answer: Answer) -> list[str]:
     """Return estimates, modes and fit as a table for people."""
     result = answer.result
     half = result.half_width()
+    speed = f"{answer.condition.airspeed_mps:.2f} m/s" if answer.trim.known else "unknown airspeed"
     lines = [
-        f"{answer.template} at {answer.condition.airspeed_mps:.2f} m/s,"
+        f"{answer.template} at {speed},"
         f" alpha {answer.trim.alpha_rad * DEG_PER_RAD:.1f} deg; value and 95 % half-width"
     ]
     grades = {
@@ -49,6 +51,7 @@ def model_lines(answer: Answer) -> list[str]:
             + ("" if from_zero(c) else "  not told from zero")
             for c in answer.coefficients
         ]
+    lines += constant_lines(answer)
     failing = uncarried_states(answer)
     for mode in answer.modes:
         in_it = _participating(answer, mode, list(failing))

@@ -13,6 +13,7 @@ from host.extras import install_hint
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.atomic_files import atomic_write, check_destination, file_names
 from host.sysid.answer.mat_file import labels, write_mat
+from host.sysid.answer.settling_history import has_history, write_history
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.identification_error import IdentificationError
 
@@ -23,6 +24,7 @@ ENDINGS = {
     "mat": (".mat",),
     "save_model": (".toml", ".mat", ".xml"),
     "save_aircraft": (".toml", ".xml"),
+    "history": (".csv",),
 }
 
 
@@ -34,7 +36,7 @@ class OutputPaths:
     ----------
     plots : Path, optional
         Folder for pictures.
-    mat, save_model, save_aircraft : Path, optional
+    mat, save_model, save_aircraft, history : Path, optional
         Files; their endings choose the format (`ENDINGS`).
     source : str, optional
         Aircraft by name or file: mass and geometry of what is saved.
@@ -46,6 +48,7 @@ class OutputPaths:
     mat: Path | None = None
     save_model: Path | None = None
     save_aircraft: Path | None = None
+    history: Path | None = None
     source: str | None = None
     given: tuple[Path, ...] = ()
 
@@ -140,6 +143,8 @@ def write_outputs(
         written.append(places.save_model)
     elif places.save_model is not None and places.save_model.suffix.lower() == ".toml":
         written += _write_models(places.save_model, answers, (*places.given, *written))
+    if places.history is not None:
+        written += _write_histories(places.history, answers, (*places.given, *written))
     if places.plots is not None:
         from host.sysid.answer.answer_figures import draw_all, save_all
 
@@ -164,24 +169,44 @@ def _write_aircraft(
 
 
 def _write_models(path: Path, answers: Sequence[Answer], kept: Sequence[Path]) -> list[Path]:
-    """Write the first answer under the name given, the others with theirs behind it.
+    from host.sysid.models.model_text import model_text
+
+    named = _named("save_model", path, answers, kept)
+    for own, answer in named.items():
+        with atomic_write(own) as part:
+            part.write_text(model_text(answer.model, answer.result, answer.trim), encoding="utf-8")
+    return list(named)
+
+
+def _write_histories(path: Path, answers: Sequence[Answer], kept: Sequence[Path]) -> list[Path]:
+    settled = [a for a in answers if has_history(a)]
+    if not settled:
+        raise IdentificationError(
+            f"argument history {path}: no method here notes how it settles; hopfield,"
+            " hopfield-line-search, hopfield-whitened, recursive and recursive-fourier do"
+        )
+    named = _named("history", path, settled, kept)
+    for own, answer in named.items():
+        write_history(own, answer)
+    return list(named)
+
+
+def _named(
+    argument: str, path: Path, answers: Sequence[Answer], kept: Sequence[Path]
+) -> dict[Path, Answer]:
+    """Return the first answer under the name given, the others with theirs behind it.
 
     Those names are known only now: none may replace what the answer is made from or just wrote.
     """
-    from host.sysid.models.model_text import model_text
-
-    named = {}
+    named: dict[Path, Answer] = {}
     called = labels(answers)
     each = zip(answers, called, file_names(called), strict=True)
     for number, (answer, label, behind) in enumerate(each):
         own = path.with_name(f"{path.stem}_{behind}{path.suffix}") if number else path
         if own.exists() and any(k.exists() and own.samefile(k) for k in kept):
             raise IdentificationError(
-                f"argument save_model {path}: the model {label} would replace {own};"
+                f"argument {argument} {path}: the model {label} would replace {own};"
                 " name another file"
             )
         named[own] = answer
-    for own, answer in named.items():
-        with atomic_write(own) as part:
-            part.write_text(model_text(answer.model, answer.result, answer.trim), encoding="utf-8")
-    return list(named)
+    return named

@@ -27,7 +27,7 @@ def transfer_to_cg(columns: dict[str, Array], airframe: AirframeData) -> dict[st
     zero = np.zeros(len(columns["t_s"]))  # a record of one axis has not all rates
     rates = [columns.get(f"{a}_radps", zero) for a in "pqr"]
     p, q, r = rates
-    if airframe.vanes_m:
+    if airframe.vanes_m and "airspeed_mps" in columns:  # an angle of so many m/s of the vane
         x, y, z = np.mean(airframe.vanes_m, axis=0)
         speed = np.maximum(columns["airspeed_mps"], 1.0)
         if "alpha_rad" in columns:

@@ -16,6 +16,7 @@ None of them can beat equation error: their fixed point is its least-squares sol
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -35,6 +36,9 @@ LAMBDA = 0.001  # thesis, section 3.2.3
 RHO = 200.0
 STEP_S = 0.00025
 ITERATIONS = 200_000
+SWEEPS = 50
+LINE_SEARCH_LAMBDA = 1e-5  # of the original program
+RECORDED = 100  # points of the history of the printed iteration
 
 # r1, r2, r3 of the original program: -200:50.1:200, -.1:.0313:.1, -4:1.40123:4
 RHO_LIST = np.concatenate(
@@ -132,8 +136,9 @@ def fit_hopfield(
     variant: str = "printed",
     iterations: int | None = None,
     gain: float | None = None,
-    rho: float = RHO,
-    start: Array | None = None,
+    lambda_: float | None = None,
+    rho: float | Array | None = None,
+    start: Array | str | None = None,
     bandwidth: float | None = None,
 ) -> FitResult:
     """Fit by a Hopfield network.
@@ -147,14 +152,26 @@ def fit_hopfield(
     iterations : int, optional
         200 000 (printed), 50 sweeps (line search), 200 (whitened) without.
     gain : float, optional
-        dt times lambda; 0.9 of the largest stable one without (printed). The thesis's own
+        dt times lambda (printed); 0.9 of the largest stable one without. The thesis's own
         0.001 * 0.00025 diverges on its own example at 100 Hz.
-    rho : float
-        Limit of the sigmoid; parameters must stay below it.
-    start : Array, optional
-        Start; the model's start values without.
+    lambda_ : float, optional
+        Printed: lambda of a step of 0.00025 s, in place of `gain`. Line search: of every parameter,
+        1e-5 without, as in the program.
+    rho : float or Array, optional
+        Printed: limit of the sigmoid, 200 without; parameters must stay below it. Line search:
+        candidates, those of the program without.
+    start : Array or str, optional
+        ``least-squares``, ``model`` (its start values), ``zero``, or values. The line search starts
+        from least squares without, as the study of the thesis's flights does; others from the
+        model's start values.
     bandwidth : float, optional
         Of the differentiation, Hz.
+
+    Returns
+    -------
+    FitResult
+        Its details have `history` (points, parameters), and `history_step` (points,); of the line
+        search `history_error_percent`, the figure that the program prints.
 
     Raises
     ------
@@ -162,30 +179,31 @@ def fit_hopfield(
         If the iteration diverges.
     """
     names, W, b = network(model, maneuvers, bandwidth=bandwidth)
-    beta: Array = np.zeros(len(names))
-    beta[: len(model.parameters)] = model.start
-    if start is not None:
-        beta = np.array(start, dtype=np.float64)
+    reference = fit_equation_error(model, maneuvers, bandwidth=bandwidth)
+    if start is None:
+        start = "least-squares" if variant == "line-search" else "model"
+    beta = _start(model, names, start, reference)
     if variant == "printed":
-        steps = ITERATIONS if iterations is None else iterations
-        step = 0.9 * largest_stable_gain(W, rho) if gain is None else gain
-        beta, done = iterate(W, b, beta, step, rho, steps, 1e3 * rho)
-        if done < steps:
-            raise IdentificationError(
-                f"the Hopfield iteration diverged after {done} steps: dt*lambda {step:.3g} is above"
-                f" the stable {largest_stable_gain(W, rho):.3g}"
-            )
+        run = _printed(W, b, beta, gain, lambda_, rho, iterations or ITERATIONS)
     elif variant == "whitened":
-        steps = 200 if iterations is None else iterations
-        beta, done = _whitened(W, b, beta, steps)
+        run = _whitened(W, b, beta, iterations or 200)
     elif variant == "line-search":
-        done = 50 if iterations is None else iterations
-        beta = line_search(model, maneuvers[0], names, W, b, beta, sweeps=done)
+        run = line_search(
+            model,
+            maneuvers,
+            names,
+            W,
+            b,
+            beta,
+            sweeps=iterations or SWEEPS,
+            gains=None if lambda_ is None else np.full(len(names), lambda_),
+            rho_list=RHO_LIST if rho is None else np.atleast_1d(np.asarray(rho, dtype=np.float64)),
+        )
     else:
         raise IdentificationError(
             f"Hopfield '{variant}' unknown; use printed, line-search or whitened"
         )
-    reference = fit_equation_error(model, maneuvers, bandwidth=bandwidth)
+    beta = run.estimate
     distance = float(np.linalg.norm(beta - reference.estimate) / np.linalg.norm(reference.estimate))
     warnings: tuple[str, ...] = ()
     if distance > 0.01:
@@ -205,14 +223,89 @@ def fit_hopfield(
         fitted=reference.fitted,
         residual_kind="rate",
         noise_covariance=reference.noise_covariance,
-        iterations=done,
+        iterations=int(run.step[-1]),
         converged=distance <= 0.01,
         warnings=warnings,
-        details={"distance_to_fixed_point": distance},
+        details={
+            "distance_to_fixed_point": distance,
+            "history": run.history,
+            "history_step": run.step,
+            **({"history_error_percent": run.error_percent} if len(run.error_percent) else {}),
+        },
     )
 
 
-def _whitened(W: Array, b: Array, start: Array, iterations: int) -> tuple[Array, int]:
+@dataclass(frozen=True, slots=True)
+class NetworkRun:
+    """How an iteration went.
+
+    Attributes
+    ----------
+    step : Array, shape (K,)
+        Iterations or sweeps done.
+    history : Array, shape (K, P)
+        The parameters then, start and end included.
+    error_percent : Array, shape (K,)
+        The figure of the original program, where it is what the iteration looks at.
+    """
+
+    step: Array
+    history: Array
+    error_percent: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def estimate(self) -> Array:
+        """The parameters at the end."""
+        return np.asarray(self.history[-1], dtype=np.float64)
+
+
+def _start(
+    model: LinearModel, names: tuple[str, ...], start: Array | str, reference: FitResult
+) -> Array:
+    """Return the first values of all parameters and biases."""
+    if not isinstance(start, str):
+        return np.array(start, dtype=np.float64)
+    beta: Array = np.zeros(len(names))
+    if start == "least-squares":
+        beta = reference.estimate.copy()
+    elif start == "model":
+        beta[: len(model.parameters)] = model.start
+    return beta
+
+
+def _printed(
+    W: Array,
+    b: Array,
+    start: Array,
+    gain: float | None,
+    lambda_: float | None,
+    rho: float | Array | None,
+    iterations: int,
+) -> NetworkRun:
+    """Run the printed iteration; the state is noted about a hundred times."""
+    if rho is not None and np.size(rho) > 1:
+        raise IdentificationError("the printed network has one rho, only the line search several")
+    limit = RHO if rho is None else float(np.ravel(rho)[0])
+    stable = largest_stable_gain(W, limit)
+    step = 0.9 * stable if gain is None else gain
+    if lambda_ is not None:
+        step = lambda_ * STEP_S
+    beta, done, at, history = start, 0, [0], [start]
+    while done < iterations:
+        part = min(max(1, iterations // RECORDED), iterations - done)
+        beta, ran = iterate(W, b, beta, step, limit, part, 1e3 * abs(limit))
+        done += ran
+        if ran < part:
+            raise IdentificationError(
+                f"the Hopfield iteration diverged after {done} steps: dt*lambda {step:.3g} is above"
+                f" the stable {stable:.3g}"
+            )
+        at.append(done)
+        history.append(beta)
+    return NetworkRun(np.array(at, dtype=np.float64), np.array(history))
+
+
+def _whitened(W: Array, b: Array, start: Array, iterations: int) -> NetworkRun:
     """Run the printed iteration in coordinates L' beta with -W = L L', where W becomes -I."""
     scale = np.sqrt(-np.diag(W))
     if np.any(scale == 0.0):
@@ -225,13 +318,19 @@ def _whitened(W: Array, b: Array, start: Array, iterations: int) -> tuple[Array,
     rho = 10.0 * max(1.0, float(np.max(np.abs(right))))
     inside = np.ascontiguousarray(lower.T @ (scale * start))
     # gain * rho / 2 = 0.8: each step removes four fifths of the remaining way
-    beta, done = iterate(-np.eye(len(b)), right, inside, 1.6 / rho, rho, iterations, 1e3 * rho)
-    return np.linalg.solve(lower.T, beta) / scale, done
+    history = [inside]
+    for _ in range(iterations):
+        beta, done = iterate(-np.eye(len(b)), right, history[-1], 1.6 / rho, rho, 1, 1e3 * rho)
+        if done < 1:
+            break
+        history.append(beta)
+    back = np.linalg.solve(lower.T, np.array(history).T).T / scale
+    return NetworkRun(np.arange(len(history), dtype=np.float64), back)
 
 
 def line_search(
     model: LinearModel,
-    maneuver: Maneuver,
+    maneuvers: Sequence[Maneuver],
     names: tuple[str, ...],
     W: Array,
     b: Array,
@@ -240,13 +339,13 @@ def line_search(
     sweeps: int,
     gains: Array | None = None,
     rho_list: Array = RHO_LIST,
-) -> Array:
+) -> NetworkRun:
     """Run the original program: per coordinate, try every rho for one step, keep the best.
 
     Parameters
     ----------
-    model, maneuver
-        The simulation whose error decides (the program's own figure).
+    model, maneuvers
+        The simulation whose error decides: the program's own figure, the mean over the maneuvers.
     names, W, b
         Of `network`.
     start : Array
@@ -258,9 +357,10 @@ def line_search(
     rho_list : Array
         Candidates, of both signs: the sign of the step is searched for too.
     """
-    steps = np.full(len(names), 1e-5) if gains is None else gains
+    steps = np.full(len(names), LINE_SEARCH_LAMBDA) if gains is None else gains
     beta = np.array(start, dtype=np.float64)
-    best = _program_error(model, maneuver, beta)
+    best = _program_error(model, maneuvers, names, beta)
+    history, errors = [beta], [best]
     for _ in range(sweeps):
         before = best
         for i in range(len(beta)):
@@ -269,23 +369,30 @@ def line_search(
             for rho in rho_list:
                 trial = beta.copy()
                 trial[i] = kept + steps[i] * (rho**2 - kept**2) / (2.0 * rho) * v
-                error = _program_error(model, maneuver, trial)
+                error = _program_error(model, maneuvers, names, trial)
                 if error < best:
                     best, beta = error, trial
         if best == before:
             break
-    return beta
+        history.append(beta)
+        errors.append(best)
+    done = np.arange(len(history), dtype=np.float64)
+    return NetworkRun(done, np.array(history), np.array(errors))
 
 
-def free_run(model: LinearModel, maneuver: Maneuver, beta: Array) -> Array | None:
+def free_run(
+    model: LinearModel, maneuver: Maneuver, beta: Array, rate_bias: Array | None = None
+) -> Array | None:
     """Return the states (samples, n) from the first measured ones on, as the program simulates.
 
-    None if they diverge.
+    None if they diverge. The program has no biases; a model with them gives them, (n,).
     """
     n, m = len(model.states), len(model.inputs)
     A, B, _, _ = model.matrices(beta)
     AB = np.zeros((n, n + m + 1))
     AB[:, :n], AB[:, n : n + m] = A, B
+    if rate_bias is not None:
+        AB[:, -1] = rate_bias
     none = np.zeros(0, dtype=np.int64)
     step, _ = discretise(AB, n, m, False, maneuver.dt_s, none, none, none, np.zeros(0), 0)
     drive = np.hstack([maneuver.inputs, np.ones((maneuver.samples, 1))])
@@ -294,9 +401,15 @@ def free_run(model: LinearModel, maneuver: Maneuver, beta: Array) -> Array | Non
     return np.ascontiguousarray(z[:, :n]) if finite else None
 
 
-def _program_error(model: LinearModel, maneuver: Maneuver, beta: Array) -> float:
-    simulated = free_run(model, maneuver, beta)
-    if simulated is None:
-        return float("inf")
-    measured = maneuver.outputs[:, model.measured_states()]
-    return thesis_program_error_percent(measured, simulated)
+def _program_error(
+    model: LinearModel, maneuvers: Sequence[Maneuver], names: tuple[str, ...], beta: Array
+) -> float:
+    value, errors = dict(zip(names, beta.tolist(), strict=True)), []
+    for number, maneuver in enumerate(maneuvers, start=1):
+        bias = np.array([value.get(f"bias_rate.{s}@{number}", 0.0) for s in model.states])
+        simulated = free_run(model, maneuver, beta, bias)
+        if simulated is None:
+            return float("inf")
+        measured = maneuver.outputs[:, model.measured_states()]
+        errors.append(thesis_program_error_percent(measured, simulated))
+    return float(np.mean(errors))

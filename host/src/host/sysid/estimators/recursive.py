@@ -103,9 +103,16 @@ def fit_recursive_least_squares(
         histories.append(full)
         theta[active] = estimate / scale
     batch = fit_equation_error(model, maneuvers, bandwidth=bandwidth)
+    history = np.sum(histories, axis=0)
     return _with_batch_statistics(
-        batch, "recursive least squares", names, theta, np.sum(histories, axis=0), equations
+        batch, "recursive least squares", names, theta, history, _elapsed_s(maneuvers), equations
     )
+
+
+def _elapsed_s(maneuvers: Sequence[Maneuver]) -> Array:
+    """Return the time of every sample, maneuvers one behind the other, s."""
+    lengths = np.cumsum([0.0, *(m.samples * m.dt_s for m in maneuvers)])
+    return np.concatenate([m.time_s + t for m, t in zip(maneuvers, lengths, strict=False)])
 
 
 def fit_recursive_fourier(
@@ -142,6 +149,8 @@ def fit_recursive_fourier(
     s = 2j * np.pi * f
     previous = (np.zeros((count, count)), np.zeros(count))
     history: list[Array] = []
+    history_s: list[float] = []
+    begin_s = 0.0
     normal, right = previous
     whole: dict[int, list[tuple[Spectrum, Spectrum]]] = {}
     for maneuver in maneuvers:
@@ -170,7 +179,9 @@ def fit_recursive_fourier(
                 history.append(solve_normal_equations(normal, right))
             except IdentificationError:
                 continue  # before the first input there is nothing to estimate
+            history_s.append(begin_s + float(time_s[k]))
         previous = (normal, right)
+        begin_s += maneuver.samples * maneuver.dt_s
         for row, lines in last.items():
             whole.setdefault(row, []).append(lines)
     theta = solve_normal_equations(normal, right)
@@ -188,7 +199,13 @@ def fit_recursive_fourier(
     full = batch.estimate.copy()
     full[:count] = theta
     result = _with_batch_statistics(
-        batch, "recursive Fourier regression", names, full, np.array(history), equations
+        batch,
+        "recursive Fourier regression",
+        names,
+        full,
+        np.array(history),
+        np.array(history_s),
+        equations,
     )
     return replace(result, covariance=covariance, covariance_white=covariance)
 
@@ -199,6 +216,7 @@ def _with_batch_statistics(
     names: tuple[str, ...],
     theta: Array,
     history: Array,
+    history_s: Array,
     equations: list[RegressionEquation],
 ) -> FitResult:
     """Return a result with the residuals and covariance of the batch regression."""
@@ -224,5 +242,5 @@ def _with_batch_statistics(
         noise_covariance=batch.noise_covariance,
         iterations=len(history),
         converged=True,
-        details={"history": history},
+        details={"history": history, "history_s": history_s},
     )

@@ -6,7 +6,10 @@ alpha_rad = { from = "AOA", unit = "deg" }
 az_mps2 = { from = "Nz", unit = "g", sign = -1 }
 t_s = { from = "TimeUS", unit = "us" }
 density_kgpm3 = "rho"
+flap_rad = { from = "Flap", unit = "deg" }    # any name, for a model of one's own
 ```
+
+Of a table of others a map hides what it does not name, but for the time.
 """
 
 from __future__ import annotations
@@ -68,6 +71,13 @@ class Line:
 def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
     """Return the lines of a map by the name of our column.
 
+    Parameters
+    ----------
+    path : Path
+    known : sequence of str
+        Columns that identification or a model asks for; others are taken too, but for one that
+        looks like a misspelt one of these.
+
     Raises
     ------
     IdentificationError
@@ -78,7 +88,7 @@ def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
     if not isinstance(lines, dict) or not lines:
         raise IdentificationError(f"{path}: no table [columns]")
     for name in lines:
-        if name not in known:
+        if name not in known and _misspelt(name, known):
             raise IdentificationError(
                 f"{path}: unknown column {name}{like(name, known)}; ours are {', '.join(known)}"
             )
@@ -95,6 +105,13 @@ def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
                 f"{path}: {name} and {others[0]} both come from '{line.foreign}'"
             )
     return result
+
+
+def _misspelt(name: str, known: Sequence[str]) -> bool:
+    """Return whether a name is one of ours with a slip: as long, its letters almost the same."""
+    near = difflib.get_close_matches(name.lower(), [k.lower() for k in known], n=1, cutoff=0.85)
+    digit = any(c.isdigit() for c in name)
+    return bool(near) and abs(len(name) - len(near[0])) <= 1 and not digit
 
 
 def _line(where: str, name: str, line: object) -> Line:

@@ -120,15 +120,16 @@ def read_flight_columns(
         If the file or the map cannot be used.
     """
     wanted = ("t_s", *USED, *(name for name in also if name not in USED))
-    found, recorded = _read(source, mapping, calibration, wanted)
+    lines = read_map(mapping, wanted) if mapping is not None else {}
+    theirs = {name: line.foreign for name, line in lines.items()}
+    found, recorded = _read(source, mapping, calibration, (*wanted, *theirs.values()))
     called = source_name(source)
     raw, notes = dict(found.columns), found.notes
     if mapping is not None:
-        lines = read_map(mapping, wanted)
-        raw |= mapped(found.columns, found.unusable, lines, mapping, found.twice)
-        theirs = {name: line.foreign for name, line in lines.items()}
-    else:
-        theirs = {}
+        # A column of a log is ours; one of a table that happens to have our name need not be.
+        shown = raw if recorded else {k: v for k, v in raw.items() if k == "t_s"}
+        raw = shown | mapped(found.columns, found.unusable, lines, mapping, found.twice)
+        wanted = (*wanted, *(name for name in lines if name not in wanted))
     if "t_s" not in raw:
         raise IdentificationError(
             f"{called}: no column t_s; name it in a map (argument mapping); "

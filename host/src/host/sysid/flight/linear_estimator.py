@@ -37,8 +37,8 @@ from host.sysid.flight.linear_model import (
     AXIS_OF,
     DEFAULT_METHOD,
     GUST,
+    fitted_template,
     frees_places,
-    template_at,
     with_drag_arm,
     without_attitude,
 )
@@ -213,6 +213,8 @@ class LinearEstimator:
         Gives the rotor's spin.
     named : bool
         The user asked for this model: a stretch given is a maneuver of it, whatever moved more.
+    options : mapping
+        Of the method, as keyword arguments of its function.
     """
 
     template: str
@@ -221,6 +223,7 @@ class LinearEstimator:
     airframe: AirframeData | None = None
     powerplant: Powerplant | None = None
     named: bool = False
+    options: Mapping[str, object] = field(default_factory=dict)
 
     def estimate(self, flights: Sequence[ReconstructedFlight]) -> LinearEstimate:
         """Fit the model to the maneuvers of its axes, the last of an axis held out.
@@ -232,10 +235,10 @@ class LinearEstimator:
         """
         used, held = self._maneuvers(flights)
         trim, condition = trim_of(_together(used))
-        model, method = self._model(used, trim)
+        model, method, remarks = self._model(used, trim)
         data = [m.cut(model) for m in used]
         delays: dict[str, tuple[float, float]] = {}
-        if method == GUST and self.own is None and set(model.states) & set(VANES):
+        if method == GUST and self.own is None and trim.known and set(model.states) & set(VANES):
             staged = fit_with_gust(model, data, trim.airspeed_mps)
             found, model, delays = staged.result, staged.model, staged.delays
             data = list(staged.maneuvers)
@@ -244,11 +247,13 @@ class LinearEstimator:
             calm: dict[str, object] = (
                 {"multiple_starts": False} if single.startswith("output-error") else {}
             )
-            found = fit(single, model, data, **calm)
+            found = fit(single, model, data, **{**calm, **self.options})
+        found = replace(found, warnings=(*remarks, *found.warnings))
         cuts = [m.inside() for m in used]
         left = None
-        if self.airframe is not None and self.own is None and found.residual_kind in FREE:
-            left = correct_trim_departure(found, data, cuts, self.airframe, trim, self.powerplant)
+        airframe = self.airframe if trim.known else None
+        if airframe is not None and self.own is None and found.residual_kind in FREE:
+            left = correct_trim_departure(found, data, cuts, airframe, trim, self.powerplant)
         return LinearEstimate(
             template=self.template if self.own is None else model.name,
             method=method,
@@ -279,7 +284,7 @@ class LinearEstimator:
         if len(known) == len(carriers):
             shifts += systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
         found: tuple[Coefficient, ...] = ()
-        if self.airframe is not None:
+        if self.airframe is not None and e.trim.known:
             own = e.used[0].flight.instrument
             errors = own.errors if own is not None else None
             found = coefficients(statistical, self.airframe, e.condition, shifts, errors)
@@ -342,11 +347,6 @@ class LinearEstimator:
         self, flights: Sequence[ReconstructedFlight]
     ) -> tuple[list[FlownManeuver], list[FlownManeuver]]:
         """Return the maneuvers to fit and those to hold out."""
-        if not all("airspeed_mps" in flight.corrected for flight in flights):
-            raise IdentificationError(
-                "identification needs airspeed_mps, which the data do not have; name its column in"
-                " a map (argument mapping)"
-            )
         every = [f for flight in flights for f in flight.maneuvers]
         if not every:
             raise NoManeuverError(
@@ -379,14 +379,23 @@ class LinearEstimator:
         held = _held_out([m for m in good if not m.found.given])
         return [m for m in good if m not in held], held
 
-    def _model(self, used: Sequence[FlownManeuver], trim: Trim) -> tuple[LinearModel, str]:
-        """Return the model to fit, and the method that the default one comes to."""
+    def _model(
+        self, used: Sequence[FlownManeuver], trim: Trim
+    ) -> tuple[LinearModel, str, tuple[str, ...]]:
+        """Return the model to fit, the method that the default one comes to, and remarks."""
+        if self.method == GUST and not trim.known:
+            raise IdentificationError(
+                f"{GUST} needs airspeed_mps, which tells how fast gusts pass; give another method"
+            )
         flight = used[0].flight
         free = frees_places(self.method)
         able = free and all(m.flight.delays_open for m in used)
+        remarks: tuple[str, ...] = ()
         if self.own is None:
             shared = set.intersection(*(set(m.flight.corrected) for m in used))
-            model = template_at(shared, self.template, trim, self.method, able=able)
+            model, remarks = fitted_template(
+                shared, self.template, used, trim, self.method, able=able
+            )
         else:
             model = self.own if able else without_standard_delays(self.own)
         instrument = None if flight.compatibility is None else flight.compatibility.instrument
@@ -394,10 +403,11 @@ class LinearEstimator:
             model = with_drag_arm(model, trim, instrument)
         method = self.method
         if method == DEFAULT_METHOD:
-            method = GUST if "alpha_rad" in model.states else "output-error-white"
+            gust = "alpha_rad" in model.states and trim.known
+            method = GUST if gust else "output-error-white"
             if self.own is None and method != GUST and self.template == "lateral":
                 model = without_attitude(model, used)
-        return model, method
+        return model, method, remarks
 
 
 def maneuvers_of(columns: Mapping[str, Array]) -> list[tuple[DetectedManeuver, Grade]]:

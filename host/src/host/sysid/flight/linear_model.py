@@ -13,7 +13,11 @@ from host.sysid.estimators.start_values import regression_estimates
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.residual_delays import STANDARD_DELAYS
-from host.sysid.models.state_space_model import LinearModel, without_outputs
+from host.sysid.models.state_space_model import (
+    LinearModel,
+    without_inputs,
+    without_outputs,
+)
 from host.sysid.models.templates import TEMPLATES, Trim, template
 
 AXIS_OF = {
@@ -30,6 +34,11 @@ AXIS_OF = {
 # and rate filters are modelled worst: Cl_p 18 % low against 13 %, 6 of 15 intervals hold, not 12.
 GUST = "filter-error-gust"
 DEFAULT_METHOD = "flight"
+NO_AIRSPEED = (
+    "the data have no airspeed_mps: it is taken as constant; accelerations, gusts and coefficients"
+    " need it and are left out"
+)
+STILL_RAD = 1e-9  # a surface that moves less stands still but for rounding
 # One equation at a time: accelerations repeat the entries of others, and are left out.
 UNTIED = ("equation-error-total", "recursive", "neural-delta")
 STAGED = {
@@ -48,10 +57,41 @@ def template_at(
     return template(
         name,
         trim,
-        accelerometers=method not in UNTIED and all(c in columns for c in forces),
+        accelerometers=method not in UNTIED and trim.known and all(c in columns for c in forces),
         delays=STANDARD_DELAYS if able else (),
         imu_sd_m=imu_place_m(unknown_sensors()) if able else 0.0,
     )
+
+
+def fitted_template(
+    columns: Collection[str],
+    name: str,
+    used: Sequence[FlownManeuver],
+    trim: Trim,
+    method: str,
+    *,
+    able: bool,
+) -> tuple[LinearModel, tuple[str, ...]]:
+    """Return a template about a trim with the inputs that moved, and remarks on what it lacks.
+
+    A flying wing has no rudder, and a surface that stood still says nothing.
+    """
+    model = template_at(columns, name, trim, method, able=able)
+    remarks: tuple[str, ...] = () if trim.known else (NO_AIRSPEED,)
+    absent = [u for u in model.inputs if u not in columns]
+    still = [
+        u
+        for u in model.inputs
+        if u not in absent and all(float(np.ptp(m.inside()[u])) < STILL_RAD for m in used)
+    ]
+    out = absent + still
+    if not out or len(out) == len(model.inputs):
+        return model, remarks  # what is missing altogether is refused where the data are cut
+    why = [f"{u} is not in the data" for u in absent] + [f"{u} never moved" for u in still]
+    left = without_inputs(model, out)
+    kept = {p.name for p in left.parameters}
+    lost = [p.name for p in model.parameters if p.name not in kept]
+    return left, (*remarks, f"{', '.join(why)}: {', '.join(lost)} left out")
 
 
 def frees_places(method: str) -> bool:

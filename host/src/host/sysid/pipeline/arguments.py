@@ -175,7 +175,7 @@ def listed(given: Any) -> list[Any]:
 
 OPTIONS = {
     "accept": "--accept", "aircraft": "--aircraft", "calibration": "--calibration",
-    "from_s": "--from",
+    "from_s": "--from", "history": "--history",
     "maneuvers": "--maneuver", "mapping": "--map", "mat": "--mat", "methods": "--method",
     "models": "--model", "plots": "--plots", "prior": "--prior",
     "save_aircraft": "--save-aircraft", "save_model": "--save-model", "to_s": "--to",

@@ -49,6 +49,8 @@ class ReadingOptions:
         Spans of time, s, instead of the maneuvers.
     corrections : bool
         Remove sensor errors that the data determine from the columns.
+    delays : bool
+        Estimate residual delays and places of sensors that no aircraft file gives.
     also : tuple of str
         Signals to read beside those that are always read.
     accept : frozenset of str
@@ -60,6 +62,7 @@ class ReadingOptions:
     maneuvers: tuple[int, ...] = ()
     stretches: tuple[Stretch, ...] = ()
     corrections: bool = True
+    delays: bool = True
     also: tuple[str, ...] = ()
     accept: frozenset[str] = frozenset()
 
@@ -118,6 +121,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         instrument=instrument,
         findings=findings,
     )
+    flight = replace(flight, delays_open=flight.delays_open and how.delays)
     return PreparedFlight(flight, agreement, tuple(notes))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from host.aircraft.prior.prior_table import PriorTable
 from host.physical.calibration import load_calibration
 from host.sysid.answer.truth_comparison import read_truth
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
+from host.sysid.estimators.method_options import check_options, options_of
 from host.sysid.flight.data_finding import accepted_checks
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear_estimator import Answer, LinearEstimator
@@ -61,8 +62,10 @@ def identify(
     to_s: float | None = None,
     corrections: bool = True,
     accept: str | Iterable[str] = (),
+    delays: bool = True,
     truth: str | Path | Sequence[str | Path] | None = None,
     prior: str | Path | None = None,
+    method_options: Mapping[str, object] | None = None,
 ) -> Identification:
     """Find the maneuvers of flights, fit models to them jointly, check and judge the answer.
 
@@ -96,10 +99,14 @@ def identify(
         Remove sensor errors that the data determine from the columns.
     accept : str or several
         Checks of the data whose findings shall change nothing: columns are used as they are.
+    delays : bool
+        Estimate residual delays and places of sensors of linear models where nothing gives them.
     truth : path or several, optional
         Of simulated flights, one of each: compared with.
     prior : path, optional
         Coefficients to compare with: TOML, AVL, Datcom.
+    method_options : mapping, optional
+        Options by name of the methods that have some (`estimators.method_options.OPTIONS`).
 
     Raises
     ------
@@ -109,6 +116,8 @@ def identify(
         If a file cannot be read.
     """
     asked, by = requested_models(models), requested_methods(methods)
+    options = dict(method_options or {})
+    check_options(options, by)
     sources = listed_flights(flights)
     spans = chosen_stretches(stretches, from_s, to_s, len(sources))
     calibrations = of_each_flight("calibration", calibration, len(sources))
@@ -119,6 +128,7 @@ def identify(
             numbers_of("maneuvers", maneuvers),
             span,
             corrections,
+            delays,
             asked.signals,
             accepted_checks(listed(accept)),
         )
@@ -144,7 +154,7 @@ def identify(
     true = _truth(truth, len(recorded))
     expected = _prior(prior, recorded, known)
     direct, doubts = _coefficients(asked, known, recorded)
-    linear, unfit = _linear(asked, by, known, recorded)
+    linear, unfit = _linear(asked, by, options, known, recorded)
     if not linear and direct is None:
         raise IdentificationError("; ".join([*unfit, *(f.line for f in findings), *notes, *doubts]))
     return Identification(
@@ -184,6 +194,7 @@ def _coefficients(
 def _linear(
     asked: Models,
     by: Sequence[str],
+    options: Mapping[str, object],
     known: AircraftData | None,
     flights: Sequence[ReconstructedFlight],
 ) -> tuple[list[Answer], list[str]]:
@@ -199,6 +210,7 @@ def _linear(
                 airframe=known.airframe if known else None,
                 powerplant=known.powerplant if known else None,
                 named=asked.named,
+                options=options_of(method, options),
             )
             try:
                 answers.append(answer_of(estimator, flights))

@@ -1,0 +1,41 @@
+"""Constants of each maneuver in words: biases of equations and outputs, initial states."""
+
+from __future__ import annotations
+
+from host.sysid.answer.parameter_units import parameter_unit
+from host.sysid.flight.linear_estimator import Answer
+
+IN_A_LINE = 4  # maneuvers
+# Half-width over value from which a constant only trades with another: without the bank angle the
+# initial one and the bias of sideslip are the same motion.
+NOT_TOLD = 1e3
+
+
+def constant_lines(answer: Answer) -> list[str]:
+    """Return every constant with its 95 % half-width, maneuver by maneuver; known ones last."""
+    result, half = answer.result, answer.result.half_width()
+    found: dict[str, list[str]] = {}
+    for k, name in enumerate(result.names):
+        constant, at, _ = name.partition("@")
+        if at:
+            value = float(result.estimate[k])
+            told = half[k] < NOT_TOLD * max(abs(value), 1e-3)
+            words = f"{value:.4g} +- {half[k]:.2g}" if told else "not told"
+            found.setdefault(constant, []).append(words)
+    lines = []
+    if found:
+        lines.append(
+            "  constants of each maneuver (bias_rate of a state's equation, bias of an output,"
+            " initial state)"
+        )
+    for constant, values in found.items():
+        unit = parameter_unit(answer.model, f"{constant}@1")
+        for first in range(0, len(values), IN_A_LINE):
+            label = f"{constant} {unit}".rstrip() if first == 0 else ""
+            row = "".join(f"{x:>22s}" for x in values[first : first + IN_A_LINE])
+            lines.append(f"    {label:30s}{row}")
+    known = [f"initial.{name} {value:g}" for name, value in answer.model.known_starts]
+    known += [f"noise of {name} {sd:g}" for name, sd in answer.model.known_noise]
+    if known:
+        lines.append(f"  known: {', '.join(known)}")
+    return lines

@@ -1,0 +1,180 @@
+"""Records of part of the instruments: what the model needs is enough, and what is assumed is said.
+
+Tables of linear aircraft with a known truth, small sensor noise, columns left out.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.cli import main
+from host.sysid.flight.flight_tables import read_columns
+from host.sysid.identification_error import IdentificationError
+from scipy.signal import lsim
+
+import host
+
+DT_S = 0.02
+TRIM_ALPHA_RAD, SPEED_MPS = 0.06, 17.0
+SHORT_PERIOD = {"Z_alpha": -6.0, "Z_de": -0.9, "M_alpha": -80.0, "M_q": -9.0, "M_de": -90.0}
+LATERAL = {
+    "Y_beta": -0.5, "L_beta": -30.0, "L_p": -12.0, "L_r": 4.0, "L_da": 120.0,
+    "N_beta": 18.0, "N_p": -0.6, "N_r": -1.5, "N_da": 2.0,
+}  # fmt: skip
+
+
+def doublet(t: np.ndarray, at_s: float, side_s: float, size_rad: float) -> np.ndarray:
+    first = (t >= at_s) & (t < at_s + side_s)
+    second = (t >= at_s + side_s) & (t < at_s + 2.0 * side_s)
+    return size_rad * (first.astype(float) - second)
+
+
+def simulated(A: np.ndarray, B: np.ndarray, u: np.ndarray, seed: int) -> np.ndarray:
+    t = DT_S * np.arange(len(u))
+    _, _, x = lsim((A, B, np.eye(len(A)), np.zeros_like(B)), u, t)
+    rng = np.random.default_rng(seed)
+    return x + 2e-4 * rng.standard_normal(x.shape)
+
+
+@pytest.fixture(scope="module")
+def pitching() -> pd.DataFrame:
+    """Three elevator doublets of a short period; airspeed is there but constant."""
+    t = np.arange(0.0, 24.0, DT_S)
+    de = sum(doublet(t, at, 0.3, 0.06) for at in (2.0, 9.0, 16.0))
+    s = SHORT_PERIOD
+    x = simulated(
+        np.array([[s["Z_alpha"], 1.0], [s["M_alpha"], s["M_q"]]]),
+        np.array([[s["Z_de"]], [s["M_de"]]]),
+        de[:, None],
+        1,
+    )
+    return pd.DataFrame(
+        {"t_s": t, "alpha_rad": TRIM_ALPHA_RAD + x[:, 0], "q_radps": x[:, 1], "elevator_rad": de}
+    )
+
+
+@pytest.fixture(scope="module")
+def rolling() -> pd.DataFrame:
+    """Three aileron doublets of a wing without a rudder."""
+    t = np.arange(0.0, 24.0, DT_S)
+    da = sum(doublet(t, at, 0.4, 0.05) for at in (2.0, 9.0, 16.0))
+    s, g = LATERAL, 9.80665
+    A = np.array(
+        [
+            [s["Y_beta"], np.sin(TRIM_ALPHA_RAD), -np.cos(TRIM_ALPHA_RAD),
+             g / SPEED_MPS * np.cos(TRIM_ALPHA_RAD)],
+            [s["L_beta"], s["L_p"], s["L_r"], 0.0],
+            [s["N_beta"], s["N_p"], s["N_r"], 0.0],
+            [0.0, 1.0, np.tan(TRIM_ALPHA_RAD), 0.0],
+        ]
+    )  # fmt: skip
+    B = np.array([[0.0], [s["L_da"]], [s["N_da"]], [0.0]])
+    x = simulated(A, B, da[:, None], 2)
+    names = ("beta_rad", "p_radps", "r_radps", "phi_rad")
+    table = {"t_s": t, "airspeed_mps": SPEED_MPS + 0.01 * np.sin(t), "aileron_rad": da}
+    table |= {"alpha_rad": TRIM_ALPHA_RAD + 1e-3 * np.sin(t)}
+    table |= {"theta_rad": TRIM_ALPHA_RAD + 1e-3 * np.cos(t)}
+    return pd.DataFrame(table | dict(zip(names, x.T, strict=True)))
+
+
+def held(found: host.Identification, truth: dict[str, float]) -> None:
+    """Every parameter within its interval plus 1 % of the truth (the vane's angle is clipped)."""
+    [answer] = found.linear
+    half = answer.result.half_width()
+    for name, true in truth.items():
+        k = answer.result.index(name)
+        miss = abs(float(answer.result.estimate[k]) - true)
+        assert miss < 1.5 * half[k] + 0.01 * abs(true), (name, answer.result.estimate[k], half[k])
+
+
+def test_a_short_period_needs_no_airspeed_and_says_so(pitching: pd.DataFrame) -> None:
+    found = host.identify(pitching, models="short-period", delays=False)
+    held(found, SHORT_PERIOD)
+    assert any("no airspeed_mps: it is taken as constant" in line for line in found.verdict)
+    assert "at unknown airspeed" in found.to_text()
+    assert '"airspeed_mps": null' in found.to_json()
+
+
+def test_without_airspeed_an_aircraft_file_gives_no_coefficients(pitching: pd.DataFrame) -> None:
+    [answer] = host.identify(pitching, models="short-period", aircraft="ultrastick25e").linear
+    assert answer.coefficients == ()
+
+
+@pytest.mark.parametrize("method", ["filter-error-gust", "flight"])
+def test_what_needs_the_airspeed_says_so(pitching: pd.DataFrame, method: str) -> None:
+    model = "longitudinal" if method == "flight" else "short-period"
+    with pytest.raises(IdentificationError, match="needs airspeed_mps"):
+        host.identify(pitching, models=model, methods=method)
+
+
+def test_a_model_saved_without_airspeed_can_be_read(pitching: pd.DataFrame, tmp_path: Path) -> None:
+    table, saved = tmp_path / "pitch.csv", tmp_path / "m.toml"
+    pitching.to_csv(table, index=False)
+    words = ["identify", str(table), "--model", "short-period", "--save-model", str(saved)]
+    assert main(words) == 0
+    assert main(["identify", str(table), "--model", str(saved)]) == 0
+
+
+def test_a_flying_wing_has_no_rudder(rolling: pd.DataFrame) -> None:
+    found = host.identify(rolling, models="lateral", delays=False)
+    held(found, LATERAL)
+    assert found.linear[0].model.inputs == ("aileron_rad",)
+    assert any(
+        "rudder_rad is not in the data: Y_dr, L_dr, N_dr left out" in x for x in found.verdict
+    )
+
+
+def test_a_rudder_that_never_moved_is_left_out(rolling: pd.DataFrame) -> None:
+    found = host.identify(rolling.assign(rudder_rad=0.0), models="lateral", delays=False)
+    held(found, LATERAL)
+    assert any("rudder_rad never moved: Y_dr, L_dr, N_dr left out" in x for x in found.verdict)
+
+
+def test_no_delay_is_estimated_where_none_is_wanted(pitching: pd.DataFrame) -> None:
+    [free] = host.identify(pitching, models="short-period").linear
+    [none] = host.identify(pitching, models="short-period", delays=False).linear
+    assert "delay_vanes_s" in free.result.names
+    assert not any("delay" in name for name in none.result.names)
+    assert none.delays == {}
+
+
+def test_constants_of_each_maneuver_are_printed(pitching: pd.DataFrame) -> None:
+    found = host.identify(pitching, models="short-period", delays=False)
+    text = found.to_text()
+    for name in ("bias_rate.alpha_rad", "bias_rate.q_radps", "initial.alpha_rad"):
+        [line] = [x for x in text.splitlines() if x.strip().startswith(name)]
+        assert line.count("+-") == len(found.linear[0].used)
+        assert f'"{name}@1"' in found.to_json()
+
+
+def mapped(folder: Path, table: pd.DataFrame, lines: str) -> tuple[Path, Path]:
+    source, mapping = folder / "theirs.csv", folder / "map.toml"
+    table.to_csv(source, index=False)
+    mapping.write_text("[columns]\n" + lines)
+    return source, mapping
+
+
+THREE = 'alpha_rad = "alpha_rad"\nq_radps = "q_radps"\nelevator_rad = "elevator_rad"\n'
+
+
+def test_a_map_hides_what_it_does_not_name(pitching: pd.DataFrame, tmp_path: Path) -> None:
+    """A stranger's psi_rad in degrees stands in the table under our name, and nobody means it."""
+    table = pitching.assign(psi_rad=np.linspace(0.0, 5000.0, len(pitching)), throttle=40.0)
+    assert "psi_rad" not in read_columns(*mapped(tmp_path, table, THREE))[0]
+    shown = THREE + 'throttle = { from = "throttle", unit = "percent" }\n'
+    columns, _ = read_columns(*mapped(tmp_path, table, shown))
+    assert columns["throttle"][0] == pytest.approx(0.4)
+    assert "psi_rad" not in columns
+    with pytest.raises(IdentificationError, match="throttle is 40"):
+        read_columns(tmp_path / "theirs.csv")
+
+
+def test_a_map_takes_any_extra_column(pitching: pd.DataFrame, tmp_path: Path) -> None:
+    table = pitching.assign(Flap=10.0)
+    lines = THREE + 'flap_rad = { from = "Flap", unit = "deg" }\n'
+    columns, _ = read_columns(*mapped(tmp_path, table, lines))
+    assert columns["flap_rad"][0] == pytest.approx(np.deg2rad(10.0))
+    slip = THREE.replace("q_radps =", "q_rapds =")
+    with pytest.raises(IdentificationError, match=r"q_rapds \(did you mean q_radps\?\)"):
+        read_columns(*mapped(tmp_path, table, slip))
