@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from host.log import FlightLog, read_log
     from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.identification import Identification
+    from host.sysid.pipeline.prediction import Prediction, predict
     from host.sysid.pipeline.stages import identify
 
 __all__ = [
@@ -21,8 +22,10 @@ __all__ = [
     "IdentificationError",
     "LogError",
     "NotALogError",
+    "Prediction",
     "__version__",
     "identify",
+    "predict",
     "read_log",
 ]
 __version__ = "0.1.0"
@@ -36,7 +39,9 @@ _HOMES = {
     "IdentificationError": "host.sysid.identification_error",
     "LogError": "host.errors",
     "NotALogError": "host.errors",
+    "Prediction": "host.sysid.pipeline.prediction",
     "identify": "host.sysid.pipeline.stages",
+    "predict": "host.sysid.pipeline.prediction",
     "read_log": "host.log",
 }
 

@@ -30,6 +30,7 @@ VERBS = {
     "info": "say what a log is, from its head",
     "maneuvers": "find the test points of a log",
     "identify": "estimate the aircraft's derivatives with their uncertainty",
+    "predict": "run a saved model over another record",
     "convert": "turn derivatives into coefficients, and back",
 }
 _LONGEST_LINE = 2000  # characters

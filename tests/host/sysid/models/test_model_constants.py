@@ -50,8 +50,13 @@ def records(count: int, seed: int) -> list[Maneuver]:
     for k in range(count):
         t = DT_S * np.arange(200)
         u = np.column_stack([0.05 * np.sign(np.sin(2.0 * np.pi * (1.0 + 0.2 * k) * t)), t**0])
-        [y] = OutputProblem(frozen, [Maneuver(DT_S, u, np.zeros((200, 3)))]).outputs(np.zeros(0))
-        found.append(Maneuver(DT_S, u, y.T + rng.standard_normal((200, 3)) * NOISE, name=f"r{k}"))
+        outputs = OutputProblem(frozen, [Maneuver(DT_S, u, np.zeros((200, 3)))]).outputs(
+            np.zeros(0)
+        )
+        assert outputs is not None
+        found.append(
+            Maneuver(DT_S, u, outputs[0].T + rng.standard_normal((200, 3)) * NOISE, name=f"r{k}")
+        )
     return found
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED, MODEL, RESIDUAL, REFUSED, TRUTH = "0.7", "C3", "C0", "C3", "black"
+INPUT = "C2"
 SHOWN_UNITS = {
     "_radps": ("deg/s", DEG_PER_RAD),
     "_rad": ("deg", DEG_PER_RAD),
@@ -76,12 +77,27 @@ class Excitation:
     values: Array
 
 
-def histories(signals: dict[str, list[Trace]], title: str) -> Figure:
-    """Draw each signal measured and by the model, the difference beneath; angles in degrees."""
+def histories(
+    signals: dict[str, list[Trace]],
+    title: str,
+    inputs: Mapping[str, Sequence[tuple[Array, Array]]] | None = None,
+) -> Figure:
+    """Draw each signal measured and by the model, the difference beneath; angles in degrees.
+
+    Parameters
+    ----------
+    signals : dict
+        Traces of each output.
+    title : str
+    inputs : mapping, optional
+        Pieces of time (s) and value of each input, drawn beneath all outputs.
+    """
+    inputs = inputs or {}
     rows = len(signals)
     count = max((len(traces) for traces in signals.values()), default=1)
-    figure = _figure((max(9.0, 1.1 * count), 2.2 * rows))
-    panels = figure.subplots(2 * rows, 1, squeeze=False, height_ratios=[3, 1] * rows)
+    figure = _figure((max(9.0, 1.1 * count), 2.2 * rows + 1.1 * len(inputs)))
+    heights = [3, 1] * rows + [2] * len(inputs)
+    panels = figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights)
     axes = list(panels[:, 0])
     for k, (name, traces) in enumerate(signals.items()):
         over, under = axes[2 * k], axes[2 * k + 1]
@@ -106,6 +122,13 @@ def histories(signals: dict[str, list[Trace]], title: str) -> Figure:
                 textcoords="offset points",
                 fontsize=6,
             )
+    for axis, (name, pieces) in zip(axes[2 * rows :], inputs.items(), strict=True):
+        label, scale = shown(name)
+        for t_s, values in pieces:
+            axis.plot(t_s, scale * values, color=INPUT, lw=0.9)
+        axis.set_ylabel(label, fontsize=8)
+        axis.tick_params(labelsize=7, labelbottom=axis is axes[-1])
+        axis.set_xlim(axes[0].get_xlim())
     figure.suptitle(title, fontsize=10)
     axes[-1].set_xlabel("time, maneuvers one behind the other, s", fontsize=8)
     figure.align_ylabels(axes)

@@ -24,12 +24,12 @@ LEAD_S = 0.3  # of trim before the input, as `DetectedManeuver.fit_window` has i
 
 @dataclass(frozen=True, slots=True)
 class FreeRun:
-    """Outputs of a model over one maneuver, (samples, p), and the biases it was run with.
-
-    NaN where it diverges.
+    """Outputs (samples, p) and states (samples, n) of a model over one maneuver, and the biases it
+    was run with; NaN where it diverges.
     """
 
     outputs: Array
+    states: Array
     biases: Biases
 
 
@@ -161,7 +161,9 @@ def _fitted_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
         )
     except IdentificationError:
         return _diverged(frozen, maneuver)
-    return FreeRun(best.fitted[0], _biases(frozen, best.estimate))
+    return FreeRun(
+        best.fitted[0], _states(frozen, maneuver, best.estimate), _biases(frozen, best.estimate)
+    )
 
 
 def _trimmed_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
@@ -188,7 +190,25 @@ def _trimmed_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
     simulated = OutputProblem(frozen, [maneuver]).outputs(theta)
     if simulated is None:
         return _diverged(frozen, maneuver)
-    return FreeRun(simulated[0].T.copy(), _biases(frozen, theta))
+    return FreeRun(simulated[0].T.copy(), _states(frozen, maneuver, theta), _biases(frozen, theta))
+
+
+def _states(frozen: LinearModel, maneuver: Maneuver, theta: Array) -> Array:
+    """Return the states of the run with constants `theta`, (samples, n)."""
+    n, m = len(frozen.states), len(frozen.inputs)
+    bare = replace(
+        frozen,
+        outputs=frozen.states,
+        C=np.eye(n),
+        D=np.zeros((n, m)),
+        output_biases=(),
+        known_noise=(),
+    )
+    first, last = len(frozen.state_biases), len(frozen.state_biases) + len(frozen.output_biases)
+    own = np.concatenate([theta[:first], theta[last:]])
+    empty = replace(maneuver, outputs=np.zeros((maneuver.samples, n)), rates=None)
+    found = OutputProblem(bare, [empty]).outputs(own)
+    return np.full((maneuver.samples, n), np.nan) if found is None else found[0].T.copy()
 
 
 def _biases(frozen: LinearModel, theta: Array) -> Biases:
@@ -203,6 +223,6 @@ def _biases(frozen: LinearModel, theta: Array) -> Biases:
 
 
 def _diverged(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
-    nothing = np.full_like(maneuver.outputs, np.nan)
-    rate, output = (np.full(len(names), np.nan) for names in (frozen.states, frozen.outputs))
-    return FreeRun(nothing, Biases(rate, output))
+    n, p = len(frozen.states), len(frozen.outputs)
+    outputs, states = (np.full((maneuver.samples, k), np.nan) for k in (p, n))
+    return FreeRun(outputs, states, Biases(np.full(n, np.nan), np.full(p, np.nan)))

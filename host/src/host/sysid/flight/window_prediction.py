@@ -60,9 +60,10 @@ def window_errors(
     maneuvers: Sequence[Maneuver],
     columns: Sequence[Mapping[str, Array]],
     biases: Sequence[Biases],
+    states: Sequence[Array],
     length_s: float | None,
 ) -> WindowErrors | None:
-    """Return the errors over windows; None if a state is not measured or no window is as long.
+    """Return the errors over windows; None if no maneuver is as long.
 
     Parameters
     ----------
@@ -72,19 +73,19 @@ def window_errors(
     columns : sequence of mapping of (samples,) Array
         Of each maneuver: rates and attitude for the persistence; what is missing counts as zero.
     biases : sequence of Biases
+    states : sequence of Array, shape (samples, n)
+        Of the free simulation, for those that are no output: the bank angle of a lateral model.
     length_s : float or None
         None is one sample: the one-step prediction.
     """
-    if any(state not in model.outputs for state in model.states):
-        return None
     squares = np.zeros((2, len(model.outputs)))
     samples, windows, longest_s = 0, 0, 0.0
-    for maneuver, flown, bias in zip(maneuvers, columns, biases, strict=True):
+    for maneuver, flown, bias, free in zip(maneuvers, columns, biases, states, strict=True):
         steps = 1 if length_s is None else round(length_s / maneuver.dt_s)
         if steps < 1 or steps >= maneuver.samples:
             continue
         starts = np.arange(0, maneuver.samples - steps, max(1, steps // PARTS))
-        predicted = _restarted(model, maneuver, bias, starts, steps)
+        predicted = _restarted(model, maneuver, bias, free, starts, steps)
         held = _persistence(model, maneuver, flown, starts, steps)
         at = starts[:, None] + np.arange(1, steps + 1)
         for row, guess in zip(squares, (predicted, held), strict=True):
@@ -99,7 +100,12 @@ def window_errors(
 
 
 def _restarted(
-    model: LinearModel, maneuver: Maneuver, bias: Biases, starts: IntArray, steps: int
+    model: LinearModel,
+    maneuver: Maneuver,
+    bias: Biases,
+    free: Array,
+    starts: IntArray,
+    steps: int,
 ) -> Array:
     """Return the outputs after each step from measured states, (starts, steps, p)."""
     n, m = len(model.states), len(model.inputs)
@@ -111,8 +117,11 @@ def _restarted(
     drive = [u, np.ones((maneuver.samples, 1))]
     drive += [np.diff(u, axis=0, append=u[-1:])] if foh else []
     driven = np.hstack(drive)
-    measured = model.measured_states()
-    x = maneuver.outputs[starts][:, measured] - bias.output[measured]
+    x = free[starts].copy()
+    for k, state in enumerate(model.states):
+        if state in model.outputs:
+            row = model.outputs.index(state)
+            x[:, k] = maneuver.outputs[starts, row] - bias.output[row]
     result = np.empty((len(starts), steps, len(model.outputs)))
     for k in range(steps):
         x = np.hstack([x, driven[starts + k]]) @ step.T

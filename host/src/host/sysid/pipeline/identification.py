@@ -33,7 +33,7 @@ from host.sysid.pipeline.estimate_table import estimate_table, mode_table
 from host.sysid.pipeline.flight_preparation import ReadingOptions, listed_flights, prepare
 from host.sysid.pipeline.notebook_html import answer_html
 from host.sysid.pipeline.notebook_pictures import Pictures
-from host.sysid.pipeline.simulation import Simulation, simulate
+from host.sysid.pipeline.simulation import Simulation, identified_models, simulate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -156,7 +156,8 @@ class Identification:
         )
         [source] = listed_flights([flight])
         found = prepare(source, how, self.aircraft)
-        return simulate(self.linear, self.coefficients, found.flight, found.notes)
+        models = identified_models(self.linear, self.coefficients)
+        return simulate(models, found.flight, found.notes)
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain lists, numbers and strings; several flights are lists."""

@@ -1,8 +1,8 @@
-"""Free simulation of the identified models over another flight, by its measured surfaces."""
+"""Models over another flight, by its measured surfaces: free simulation, one step, windows."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,14 +13,16 @@ from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.coefficients.coefficient_modes import LinearSystem
-from host.sysid.flight.free_simulation import fits_of, free_simulation, frozen_model
+from host.sysid.flight.free_simulation import FreeRun, fits_of, free_runs, frozen_model
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.flight.maneuver_selection import excited_axes, merge_overlapping
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, flown_maneuvers
+from host.sysid.flight.window_prediction import WINDOWS_S, WindowErrors, window_errors
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import CONSTANT, LinearModel
+from host.sysid.models.theil_inequality import TheilInequality, theil_inequality
 from host.sysid.pipeline.notebook_html import answer_html
 from host.sysid.pipeline.notebook_pictures import Pictures
 
@@ -41,18 +43,56 @@ class SimulatedModel:
     label : str
     model : LinearModel
     maneuvers : tuple of Maneuver
-    simulated : tuple of Array, shape (n, outputs) each
+    columns : tuple of mapping of Array
+        All columns of each maneuver.
+    runs : tuple of FreeRun
+        Free simulation of each.
     """
 
     label: str
     model: LinearModel
     maneuvers: tuple[Maneuver, ...]
-    simulated: tuple[Array, ...]
+    columns: tuple[Mapping[str, Array], ...]
+    runs: tuple[FreeRun, ...]
+
+    @property
+    def simulated(self) -> tuple[Array, ...]:
+        """Outputs of the free simulation of each maneuver, (n, outputs) each."""
+        return tuple(run.outputs for run in self.runs)
+
+    @property
+    def spread(self) -> Array:
+        """Rms of each measured output about its mean in every maneuver, (p,)."""
+        about = np.concatenate([m.outputs - m.outputs.mean(axis=0) for m in self.maneuvers])
+        return np.asarray(np.sqrt(np.mean(about**2, axis=0)), dtype=np.float64)
 
     @property
     def fits(self) -> tuple[SignalFit, ...]:
-        """Figures of each output, all maneuvers together."""
+        """Figures of each output in free simulation, all maneuvers together."""
         return fits_of(self.model, self.maneuvers, self.simulated)
+
+    @property
+    def theil(self) -> tuple[TheilInequality, ...]:
+        """Theil's coefficient of each output in free simulation, and its parts."""
+        measured = [m.outputs for m in self.maneuvers]
+        return theil_inequality(self.model.outputs, measured, self.simulated)
+
+    @property
+    def one_step(self) -> WindowErrors | None:
+        """Errors one sample ahead of measured states."""
+        return self.window(None)
+
+    @property
+    def windows(self) -> tuple[WindowErrors, ...]:
+        """Errors over windows of 0.1, 0.5, 1 and 2 s from measured states, those that fit."""
+        found = [self.window(length_s) for length_s in WINDOWS_S]
+        return tuple(w for w in found if w is not None)
+
+    def window(self, length_s: float | None) -> WindowErrors | None:
+        """Return the errors over windows of one length, or of one sample."""
+        biases = [run.biases for run in self.runs]
+        states = [run.states for run in self.runs]
+        return window_errors(self.model, self.maneuvers, self.columns, biases, states, length_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +146,13 @@ class Simulation:
         return pd.concat(parts, ignore_index=True)
 
     def plot(self) -> Pictures:
-        """Return measured and simulated outputs of each model."""
+        """Return measured and simulated outputs of each model, its inputs beneath."""
         return Pictures(
             {
                 f"{m.label}_simulated": histories(
-                    dict(_traces(m)), f"{m.label}: measured (grey), free simulation (red), unseen"
+                    dict(_traces(m)),
+                    f"{m.label}: measured (grey), free simulation (red), unseen",
+                    dict(_inputs(m)),
                 )
                 for m in self.models
             }
@@ -125,12 +167,22 @@ class Simulation:
 
 
 def simulate(
-    linear: Sequence[Answer],
-    direct: CoefficientAnswer | None,
+    models: Iterable[tuple[str, LinearModel]],
     flight: ReconstructedFlight,
     notes: Sequence[str],
+    *,
+    constants: bool = True,
 ) -> Simulation:
-    """Run every model freely over the maneuvers of its axes; biases are fitted to each.
+    """Run every model freely over the maneuvers of its axes.
+
+    Parameters
+    ----------
+    models : iterable of (str, LinearModel)
+        Labels, and models without free parameters.
+    flight : ReconstructedFlight
+    notes : sequence of str
+    constants : bool
+        Fit biases and start states to each maneuver; without they are those of the trim before it.
 
     Raises
     ------
@@ -139,17 +191,19 @@ def simulate(
     """
     found: list[SimulatedModel] = []
     not_simulated: list[str] = []
-    for label, model in _models(linear, direct):
+    for label, model in models:
         axes = excited_axes(model.inputs)
         own = [merge_overlapping([f for f in flight.maneuvers if f.axis in axes or f.given])]
+        flown = flown_maneuvers([flight], own)
         try:
-            data = [m.cut(model) for m in flown_maneuvers([flight], own)]
+            data = [m.cut(model) for m in flown]
         except IdentificationError as error:
             not_simulated.append(f"{label}: {error}")
             continue
         if data:
-            simulated = free_simulation(model, data)
-            found.append(SimulatedModel(label, model, tuple(data), tuple(simulated)))
+            columns = tuple(m.inside() for m in flown)
+            runs = free_runs(model, data, constants=constants)
+            found.append(SimulatedModel(label, model, tuple(data), columns, tuple(runs)))
         else:
             not_simulated.append(f"{label}: no maneuver of {', '.join(axes)}")
     if not found:
@@ -157,7 +211,7 @@ def simulate(
     return Simulation(flight.source, tuple(found), (*notes, *not_simulated))
 
 
-def _models(
+def identified_models(
     linear: Sequence[Answer], direct: CoefficientAnswer | None
 ) -> Iterator[tuple[str, LinearModel]]:
     """Return every identified model with fixed parameters, by its label."""
@@ -186,12 +240,26 @@ def _linear_model(name: str, system: LinearSystem) -> LinearModel:
     )
 
 
+def _inputs(m: SimulatedModel) -> Iterator[tuple[str, list[tuple[Array, Array]]]]:
+    """Return every input as pieces of time and value, maneuvers one behind the other."""
+    for k, name in enumerate(m.model.inputs):
+        if name != CONSTANT:
+            yield name, [(t, u.inputs[:, k]) for t, u in zip(_times(m), m.maneuvers, strict=True)]
+
+
+def _times(m: SimulatedModel) -> Iterator[Array]:
+    """Return the time of each maneuver, one behind the other, s."""
+    begin = 0.0
+    for maneuver in m.maneuvers:
+        t = begin + maneuver.time_s
+        begin = float(t[-1]) + GAP_S
+        yield t
+
+
 def _traces(m: SimulatedModel) -> Iterator[tuple[str, list[Trace]]]:
     for k, name in enumerate(m.model.outputs):
-        traces, begin = [], 0.0
-        for maneuver, y in zip(m.maneuvers, m.simulated, strict=True):
-            t = begin + maneuver.time_s
-            begin = float(t[-1]) + GAP_S
+        traces = []
+        for t, maneuver, y in zip(_times(m), m.maneuvers, m.simulated, strict=True):
             title = maneuver.name if k == 0 else ""
             traces.append(Trace(t, maneuver.outputs[:, k], y[:, k], title))
         yield name, traces

@@ -1,0 +1,152 @@
+"""`host predict`: a saved model against another record, derivatives held."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from host.sysid.answer.json_document import json_text
+from host.sysid.flight.data_finding import accepted_checks
+from host.sysid.flight.free_simulation import frozen_at
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.model_file import read_model
+from host.sysid.models.state_space_model import CONSTANT
+from host.sysid.models.toml_document import read_document
+from host.sysid.pipeline.aircraft_data import aircraft_data
+from host.sysid.pipeline.arguments import (
+    chosen_stretches,
+    listed,
+    numbers_of,
+    of_each_flight,
+    path_of,
+)
+from host.sysid.pipeline.flight_preparation import ReadingOptions, listed_flights, prepare
+from host.sysid.pipeline.notebook_pictures import Pictures
+from host.sysid.pipeline.prediction_text import simulation_document, simulation_lines
+from host.sysid.pipeline.simulation import Simulation, simulate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from host.sysid.pipeline.flight_preparation import Source
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """A saved model over every record given.
+
+    Attributes
+    ----------
+    model : str
+        The file.
+    simulations : tuple of Simulation
+        One of each record.
+    constants : bool
+        Whether biases and start states were fitted.
+    """
+
+    model: str
+    simulations: tuple[Simulation, ...]
+    constants: bool
+
+    def to_text(self) -> str:
+        """Return the figures as people read them."""
+        lines = []
+        for one in self.simulations:
+            lines += [*simulation_lines(one, self.model, constants=self.constants), ""]
+        return "\n".join(lines[:-1])
+
+    def document(self) -> dict[str, Any]:
+        """Return the figures as plain lists, numbers and strings."""
+        return {
+            "model": self.model,
+            "constants_fitted": self.constants,
+            "records": [simulation_document(one) for one in self.simulations],
+        }
+
+    def to_json(self) -> str:
+        """Return the figures as JSON text; what is no finite number is null."""
+        return json_text(self.document())
+
+    def plot(self) -> Pictures:
+        """Return measured and simulated outputs with the inputs, a picture of each record."""
+        if len(self.simulations) == 1:
+            return self.simulations[0].plot()
+        figures: dict[str, Figure] = {}
+        for number, one in enumerate(self.simulations, start=1):
+            figures |= {f"{name}_{number}": figure for name, figure in one.plot().items()}
+        return Pictures(figures)
+
+
+def predict(
+    model: str | Path,
+    flights: Source | Sequence[Source],
+    *,
+    aircraft: str | Path | None = None,
+    calibration: str | Path | Sequence[str | Path | None] | None = None,
+    mapping: str | Path | Sequence[str | Path | None] | None = None,
+    maneuvers: int | Sequence[int] = (),
+    stretches: Sequence[Any] | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    corrections: bool = True,
+    accept: str | Iterable[str] = (),
+    constants: bool = True,
+) -> Prediction:
+    """Run a saved model over other records: derivatives held, only constants fitted.
+
+    Parameters
+    ----------
+    model : path
+        Of `host identify --save-model`, or a model file; its start values are held.
+    flights : path, FlightLog, DataFrame or list of them
+    aircraft, calibration, mapping, maneuvers, stretches, from_s, to_s, corrections, accept
+        As in `host.identify`.
+    constants : bool
+        Fit biases and start states to each maneuver. Without they are those of equilibrium in the
+        0.3 s before the input.
+
+    Raises
+    ------
+    host.errors.HostError
+        If a file cannot be read, or the model cannot be run over a record.
+    """
+    path = path_of("model", model)
+    assert path is not None
+    kind = read_document(path).get("kind")
+    if kind is not None:
+        raise IdentificationError(
+            f"{path}: of kind '{kind}', expected a linear model, as `host identify --save-model`"
+            " writes it"
+        )
+    own = read_model(path)
+    frozen = frozen_at(own, own.start)
+    signals = {*own.inputs, *own.outputs} - {CONSTANT}
+    sources = listed_flights(flights)
+    count = len(sources)
+    of_each = zip(
+        sources,
+        of_each_flight("calibration", calibration, count),
+        of_each_flight("mapping", mapping, count),
+        chosen_stretches(stretches, from_s, to_s, count),
+        strict=True,
+    )
+    found = []
+    for source, made_by, named_by, spans in of_each:
+        how = ReadingOptions(
+            made_by,
+            named_by,
+            numbers_of("maneuvers", maneuvers),
+            spans,
+            corrections,
+            also=tuple(sorted(signals)),
+            accept=accepted_checks(listed(accept)),
+        )
+        known = aircraft_data(aircraft, made_by) if aircraft is not None else None
+        ready = prepare(source, how, known)
+        models = [(own.name, frozen)]
+        notes = (*(finding.line for finding in ready.flight.findings), *ready.notes)
+        found.append(simulate(models, ready.flight, notes, constants=constants))
+    return Prediction(str(path), tuple(found), constants)

@@ -1,0 +1,85 @@
+"""`host predict`: a saved model against another record."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from host.placed_arguments import StorePlaced, of_each, stretches_of_each
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "predict",
+        help="run a saved model over another record",
+        description="Run a model of `host identify --save-model` over records it has not seen:"
+        " derivatives held, only biases and start states fitted. Says the error in free"
+        " simulation, one step ahead, and over windows beside that of kinematic persistence.",
+    )
+    parser.add_files("model of `host identify --save-model`, or yours; then records: log, CSV,"
+                     " Parquet, MAT. --from and --to belong to the record before them")  # fmt: skip
+    parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: places of the sensors;"
+                        " give it where the model was identified with it")  # fmt: skip
+    parser.add_argument("--map", type=Path, metavar="TOML", action=StorePlaced, default=[],
+                        help="foreign names, units and signs")  # fmt: skip
+    parser.add_argument("--calibration", type=Path, metavar="TOML", action=StorePlaced, default=[],
+                        help="calibration of a log")  # fmt: skip
+    parser.add_argument("--from", dest="ends", type=float, metavar="S", action=StorePlaced,
+                        const=0, default=[], help="start of a stretch")  # fmt: skip
+    parser.add_argument("--to", dest="ends", type=float, metavar="S", action=StorePlaced,
+                        const=1, default=[], help="end of it")  # fmt: skip
+    parser.add_argument("--maneuver", type=int, action="append", metavar="N",
+                        help="use only maneuver N of `host maneuvers`; repeatable")  # fmt: skip
+    parser.add_argument("--no-corrections", action="store_true",
+                        help="leave sensor errors that the flight tells in the data")  # fmt: skip
+    parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
+                        " whatever this check of the data finds; repeatable")  # fmt: skip
+    parser.add_argument("--no-constants", action="store_true",
+                        help="fit nothing: start from the trim before each input")  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--plots", type=Path, metavar="DIR",
+                        help="write pictures of outputs and inputs")  # fmt: skip
+
+
+def run(args: argparse.Namespace) -> int:
+    """Predict and print; messages name options where the library names arguments."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from host.errors import ExitCode
+    from host.sysid.answer.output_files import OutputPaths, check_outputs
+    from host.sysid.identification_error import IdentificationError
+    from host.sysid.pipeline.arguments import option_words
+    from host.sysid.pipeline.prediction import predict
+
+    try:
+        if len(args.source) < 2:
+            raise IdentificationError("name a saved model, and behind it the records it predicts")
+        model, *records = args.source
+        check_outputs(OutputPaths(plots=args.plots))
+        found = predict(
+            model,
+            records,
+            aircraft=args.aircraft,
+            calibration=of_each("--calibration", _behind(args.calibration), len(records)),
+            mapping=of_each("--map", _behind(args.map), len(records)),
+            maneuvers=args.maneuver or (),
+            stretches=stretches_of_each(_behind(args.ends), len(records)),
+            corrections=not args.no_corrections,
+            accept=args.accept or (),
+            constants=not args.no_constants,
+        )
+        print(option_words(found.to_json() if args.json else found.to_text()))
+        if args.plots is not None:
+            written = found.plot().save(args.plots)
+            print(f"wrote {len(written)} pictures in {args.plots}", file=sys.stderr)
+    except IdentificationError as error:
+        raise IdentificationError(option_words(str(error))) from error
+    return int(ExitCode.OK)
+
+
+def _behind(placed: list[tuple[Any, ...]]) -> list[Any]:
+    """Return arguments by the records before them: the model is the first file."""
+    return [(max(place - 1, 0), *rest) for place, *rest in placed]

@@ -1,0 +1,206 @@
+"""`host predict`: a saved model against other records, figures checked by hand."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.cli import main
+from host.sysid import Maneuver
+from host.sysid.flight.free_simulation import free_runs, frozen_at
+from host.sysid.flight.window_prediction import window_errors
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.model_file import model_from
+from host.sysid.models.theil_inequality import theil_inequality
+from scipy.signal import lsim
+
+import host
+
+DT_S = 0.02
+A = np.array([[-6.0, 1.0], [-80.0, -9.0]])
+B = np.array([[-0.9], [-90.0]])
+TRIM = np.array([0.06, 0.0])
+MODEL: dict[str, Any] = {
+    "name": "short-period",
+    "states": ["alpha_rad", "q_radps"],
+    "inputs": ["elevator_rad"],
+    "outputs": ["alpha_rad", "q_radps"],
+    "delays": [],
+    "A": [["Z_alpha", 1.0], ["M_alpha", "M_q"]],
+    "B": [["Z_de"], ["M_de"]],
+    "parameters": {"Z_alpha": -6.0, "M_alpha": -80.0, "M_q": -9.0, "Z_de": -0.9, "M_de": -90.0},
+}
+
+
+def recorded(seed: int, shift: float = 1.0, noise: float = 3e-4) -> pd.DataFrame:
+    """Two elevator doublets, trim before them; `shift` is a factor on M_alpha."""
+    t = np.arange(0.0, 16.0, DT_S)
+    de = sum(
+        0.06 * (((t >= a) & (t < a + 0.3)).astype(float) - ((t >= a + 0.3) & (t < a + 0.6)))
+        for a in (2.0, 9.0)
+    )
+    own = A * [[1.0, 1.0], [shift, 1.0]]
+    _, _, x = lsim((own, B, np.eye(2), np.zeros((2, 1))), de, t)
+    x = TRIM + x + noise * np.random.default_rng(seed).standard_normal(x.shape)
+    columns = {"t_s": t, "airspeed_mps": 17.0 + 0.01 * np.sin(t), "elevator_rad": de - 0.04}
+    return pd.DataFrame(columns | {"alpha_rad": x[:, 0], "q_radps": x[:, 1]})
+
+
+@pytest.fixture
+def saved(tmp_path: Path) -> Path:
+    """A model saved by `host identify` from one record."""
+    source, path = tmp_path / "one.csv", tmp_path / "model.toml"
+    recorded(1).to_csv(source, index=False)
+    words = ["identify", str(source), "--model", "short-period", "--no-delays"]
+    assert main([*words, "--save-model", str(path)]) == 0
+    return path
+
+
+def figures(text: str) -> dict[str, Any]:
+    [record] = json.loads(text)["records"]
+    [model] = record["models"]
+    return dict(model)
+
+
+def test_a_good_model_predicts_what_it_has_not_seen(saved: Path) -> None:
+    found = figures(host.predict(saved, recorded(2)).to_json())
+    free = found["free_simulation"]["q_radps"]
+    assert free["nrmse"] < 0.03
+    assert free["theil_covariance"] > 0.9
+    assert [w["length_s"] for w in found["windows"]] == [0.1, 0.5, 1.0, 2.0]
+    assert all(w["over_persistence"]["q_radps"] < 0.1 for w in found["windows"][1:])
+
+
+def test_derivatives_are_held(saved: Path) -> None:
+    """A record of another aircraft is not fitted: the model is seen to be wrong."""
+    right, wrong = (
+        figures(host.predict(saved, recorded(2, shift)).to_json()) for shift in (1.0, 1.5)
+    )
+    for signal in ("alpha_rad", "q_radps"):
+        good, bad = (f["free_simulation"][signal]["nrmse"] for f in (right, wrong))
+        assert bad > 5.0 * good
+
+
+def test_without_constants_nothing_is_fitted(saved: Path) -> None:
+    """A step of the sensor's zero in mid-record is absorbed by a fit, not without one."""
+    table = recorded(2, noise=0.0)
+    table["q_radps"] += np.where(table["t_s"] > 2.0, 0.1, 0.0)
+    fitted = figures(host.predict(saved, table, from_s=1.6, to_s=6.0).to_json())
+    held = figures(host.predict(saved, table, from_s=1.6, to_s=6.0, constants=False).to_json())
+    assert held["free_simulation"]["q_radps"]["theil_bias"] > 0.5
+    assert fitted["free_simulation"]["q_radps"]["theil_bias"] < 0.05
+    text = host.predict(saved, table, constants=False).to_text()
+    assert "nothing fitted" in text
+
+
+def test_theil_is_what_its_definition_says() -> None:
+    rng = np.random.default_rng(3)
+    z, y = rng.standard_normal((200, 1)) + 2.0, 0.5 * rng.standard_normal((200, 1)) + 1.0
+    [found] = theil_inequality(["x"], [z[:120], z[120:]], [y[:120], y[120:]])
+    mse = np.mean((z - y) ** 2)
+    assert found.coefficient == pytest.approx(
+        np.sqrt(mse) / (np.sqrt(np.mean(z**2)) + np.sqrt(np.mean(y**2)))
+    )
+    assert found.bias == pytest.approx((z.mean() - y.mean()) ** 2 / mse)
+    assert found.variance == pytest.approx((z.std() - y.std()) ** 2 / mse)
+    assert found.bias + found.variance + found.covariance == pytest.approx(1.0)
+
+
+def windows_by_scipy(u: np.ndarray, y: np.ndarray, steps: int) -> tuple[float, float]:
+    """Return rms errors of q over all windows: the model by scipy, and held."""
+    errors, held = [], []
+    for k in range(0, len(y) - steps, max(1, steps // 4)):
+        t = DT_S * np.arange(steps + 1)
+        about = u[k : k + steps + 1] + 0.04
+        _, _, x = lsim((A, B, np.eye(2), np.zeros((2, 1))), about, t, X0=y[k] - TRIM)
+        errors.append((x[1:] + TRIM - y[k + 1 : k + steps + 1])[:, 1])
+        held.append(y[k, 1] - y[k + 1 : k + steps + 1, 1])
+    return tuple(float(np.sqrt(np.mean(np.square(e)))) for e in (errors, held))  # type: ignore
+
+
+@pytest.mark.parametrize("length_s", [None, 0.1, 0.5])
+def test_windows_are_those_of_scipy(length_s: float | None) -> None:
+    table = recorded(4, shift=1.2)
+    u, y = table[["elevator_rad"]].to_numpy(), table[["alpha_rad", "q_radps"]].to_numpy()
+    own = model_from({**MODEL, "hold": "foh"})
+    frozen = frozen_at(own, own.start)
+    data = [Maneuver(DT_S, u, y)]
+    run = free_runs(frozen, data, constants=False)[0]
+    exact = type(run.biases)(-(A @ TRIM + B @ [-0.04]), np.zeros(2))
+    found = window_errors(frozen, data, [{}], [exact], [run.states], length_s)
+    assert found is not None
+    steps = 1 if length_s is None else round(length_s / DT_S)
+    model, held = windows_by_scipy(u[:, 0], y, steps)
+    assert found.model[1] == pytest.approx(model, rel=1e-6)
+    assert found.persistence[1] == pytest.approx(held, rel=1e-9)
+
+
+def test_persistence_integrates_the_attitude() -> None:
+    """A steady roll at 1 rad/s and 30 degrees of pitch: bank is predicted, at rest it is not."""
+    t = DT_S * np.arange(100)
+    phi = 0.2 + t
+    model = model_from(
+        {**MODEL, "states": ["p_radps", "phi_rad"], "outputs": ["p_radps", "phi_rad"],
+         "A": [["L_p", 0], [1, 0]], "B": [["L_da"], [0]], "inputs": ["aileron_rad"],
+         "parameters": {}}
+    )  # fmt: skip
+    frozen = frozen_at(model, model.start)
+    data = [Maneuver(DT_S, np.zeros((100, 1)), np.column_stack([np.ones(100), phi]))]
+    run = free_runs(frozen, data, constants=False)[0]
+    flown = {"p_radps": np.ones(100), "phi_rad": phi}
+    known = window_errors(frozen, data, [flown], [run.biases], [run.states], 0.5)
+    unknown = window_errors(frozen, data, [{}], [run.biases], [run.states], 0.5)
+    assert known is not None
+    assert unknown is not None
+    assert known.persistence[1] == pytest.approx(0.0, abs=1e-9)
+    assert unknown.persistence[1] > 0.1
+
+
+def test_simulate_of_an_identification_says_the_same(saved: Path) -> None:
+    identified = host.identify(recorded(1), models="short-period", delays=False)
+    [model] = identified.simulate(recorded(2)).models
+    found = figures(host.predict(saved, recorded(2)).to_json())
+    for fit, step in zip(model.fits, model.windows[1].relative, strict=True):
+        assert found["free_simulation"][fit.name]["nrmse"] == pytest.approx(fit.nrmse, rel=1e-6)
+        assert found["windows"][1]["over_persistence"][fit.name] == pytest.approx(step, rel=1e-6)
+
+
+def test_the_verb_prints_free_and_one_step_apart(
+    saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other, pictures = tmp_path / "other.csv", tmp_path / "pictures"
+    recorded(2).to_csv(other, index=False)
+    capsys.readouterr()
+    assert main(["predict", str(saved), str(other), str(other), "--plots", str(pictures)]) == 0
+    out = capsys.readouterr().out
+    first = out.split("\n\n")[0]
+    free, step, window = (
+        first.index(x) for x in ("free simulation:", "one step (", "windows from")
+    )
+    assert free < step < window
+    assert sorted(p.name for p in pictures.iterdir()) == [
+        "short-period_simulated_1.svg", "short-period_simulated_2.svg",
+    ]  # fmt: skip
+    assert "elevator" in (pictures / "short-period_simulated_1.svg").read_text()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ('kind = "linear"\n', "of kind 'linear', expected a linear model"),
+        ("nothing", "not TOML|cannot be read|expected"),
+    ],
+)
+def test_what_is_no_model_is_refused(tmp_path: Path, content: str, words: str) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(content)
+    with pytest.raises(IdentificationError, match=words) as caught:
+        host.predict(path, recorded(2))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_record_without_what_the_model_needs_says_which(saved: Path) -> None:
+    with pytest.raises(IdentificationError, match="needs q_radps"):
+        host.predict(saved, recorded(2).drop(columns=["q_radps"]))
