@@ -1,6 +1,6 @@
 """Linear flights of a small aircraft whose model is right, or wrong in one known way.
 
-The truth is a template at 17 m/s with the derivatives of a trainer of 1.8 kg; three maneuvers of an
+The truth is a template at 17 m/s with the derivatives of a trainer of 1.8 kg; four maneuvers of an
 axis, the last for prediction. What is wrong is in the flight, never in the model that is fitted,
 but for a missing derivative.
 """
@@ -22,7 +22,7 @@ from studies.inputs import steps
 
 AIRSPEED_MPS = 17.0
 DT_S = 0.02
-MANEUVER_S, MANEUVERS = 6.0, 3
+MANEUVER_S, MANEUVERS = 6.0, 4
 FINE = 4  # steps of integration per sample
 TRUTH = {
     "short-period": {
@@ -40,8 +40,8 @@ PRINCIPAL = {
     "lateral": ("L_p", "L_da", "N_beta", "N_r", "N_dr"),
 }
 NOISE_SD = {
-    "alpha_rad": 0.004, "q_radps": 0.01, "az_mps2": 0.15, "beta_rad": 0.004, "p_radps": 0.015,
-    "r_radps": 0.01, "phi_rad": 0.006, "ay_mps2": 0.08,
+    "alpha_rad": 0.002, "q_radps": 0.005, "az_mps2": 0.1, "beta_rad": 0.002, "p_radps": 0.007,
+    "r_radps": 0.005, "phi_rad": 0.004, "ay_mps2": 0.05,
 }  # fmt: skip
 COLOUR = {"white": np.zeros(0), "coloured": np.array([0.9])}
 GUST_RAD, GUST_S = 0.012, 1.0  # deviation (0.2 m/s) and time scale of vertical and side gusts

@@ -43,7 +43,7 @@ def coefficient_doubts(answer: CoefficientAnswer, open_channels: Channels) -> li
     ----------
     answer : CoefficientAnswer
     open_channels : mapping
-        Column with an open finding of the data checks to what was found.
+        Column with an open finding of the data checks to the check.
     """
     return [one for rule in RULES for one in rule(answer, open_channels)]
 
@@ -51,10 +51,10 @@ def coefficient_doubts(answer: CoefficientAnswer, open_channels: Channels) -> li
 def open_finding(answer: CoefficientAnswer, open_channels: Channels) -> list[Doubt]:
     """The data checks found something in that channel, and nothing has closed it."""
     found = []
-    for channel, finding in open_channels.items():
+    for channel, check in open_channels.items():
         equations, labels = LEANING.get(channel, ((), ()))
         names = [n for n in _names(answer) if n.startswith(equations) or n.split("_")[-1] in labels]
-        found += doubt(names, _names(answer), f"{channel} has an open finding: {finding}")
+        found += doubt(names, _names(answer), f"{channel} has an open finding ({check})")
     return found
 
 

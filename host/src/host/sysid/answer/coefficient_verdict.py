@@ -34,7 +34,7 @@ def coefficient_verdict(
     ----------
     answer : CoefficientAnswer
     open_channels : mapping, optional
-        Column with an open finding of the data checks to what was found.
+        Column with an open finding of the data checks to the check.
     """
     along = sum(w.longitudinal for w in answer.windows)
     own = "" if answer.model == standard_model() else f" by the terms of '{answer.model.name}'"
@@ -51,7 +51,6 @@ def coefficient_verdict(
         marks[d.name] = wide if d.flagged or d.name in reasons else sharp
     lines = [
         *first_lines(heading, marks, FLAG_SHARE),
-        *(f"  {remark}" for remark in answer.remarks),
         *_flag_lines(answer, marks),
         *_doubt_lines(doubts),
         *_agreement_lines(answer),

@@ -24,6 +24,8 @@ from host.sysid.models.residual_delays import STANDARD_DELAYS
 
 FAILS = 0.5  # NRMSE of an output: a quarter of its variance is not explained
 WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
+# Of power along what inputs drive over that of noise: half-widths are more than doubled by it.
+LARGE_RATIO = 4.0
 WHITE_P = 0.01  # of Ljung-Box: above it the residual is a sensor's noise
 NEAR_BOUND = 1e-6  # of a bound's distance to the start, or of its size
 
@@ -45,9 +47,9 @@ class Evidence:
 
     @property
     def open_channels(self) -> dict[str, str]:
-        """Columns with a finding that nothing has closed, and what was found."""
+        """Columns with a finding that nothing has closed, and the check that found it."""
         return {
-            name: f"{finding.check}, {finding.text}"
+            name: finding.check
             for finding in reversed(self.findings)
             if not finding.closed
             for name in finding.channels
@@ -84,11 +86,13 @@ def not_predicted(answer: Answer, evidence: Evidence) -> list[Doubt]:
 
 
 def driven_by_inputs(answer: Answer, evidence: Evidence) -> list[Doubt]:
-    """What the fit leaves is driven by the inputs: the model lacks something there."""
+    """The inputs drive more of what the fit leaves than widening can answer for."""
     if answer.coherence is None:
         return []
-    names = answer.coherence.coherent
-    return _about(answer, names, f"the inputs drive what the fit leaves of {', '.join(names)}")
+    names, likely = answer.coherence.dominated(LARGE_RATIO), answer.coherence.likely_error
+    like = f", most like {likely}" if likely else ""
+    reason = f"the inputs drive what the fit leaves of {', '.join(names)}{like}"
+    return _about(answer, names, reason)
 
 
 def delay_at_bound(answer: Answer, evidence: Evidence) -> list[Doubt]:
@@ -143,8 +147,8 @@ def open_finding(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """The data checks found something in that channel, and nothing has closed it."""
     return [
         one
-        for channel, finding in evidence.open_channels.items()
-        for one in _about(answer, [channel], f"{channel} has an open finding: {finding}")
+        for channel, check in evidence.open_channels.items()
+        for one in _about(answer, [channel], f"{channel} has an open finding ({check})")
     ]
 
 

@@ -7,7 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.estimators.output_error_ar_noise import HIGHEST_ORDER, ArNoiseFit, fit_with_ar_noise
+from host.sysid.estimators.coherence_inflation import inflate_by_coherence
+from host.sysid.estimators.output_error_ar_noise import (
+    HIGHEST_ORDER,
+    ArNoiseFit,
+    fit_with_ar_noise,
+    refit_beside_inputs,
+)
 from host.sysid.estimators.start_values import start_values
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
@@ -38,7 +44,8 @@ def fit_output_error(
     model, maneuvers
         Model and data; the states need not be measured.
     coloured_noise : bool
-        Estimate AR models of the noise, refit with them and base the intervals on them (default).
+        Estimate AR models of the noise, refit with them and base the intervals on them (default);
+        where the inputs drive the residual, noise is estimated beside that and intervals are wider.
         Otherwise the noise is taken as white for the estimate, and the covariance is corrected by
         the residual autocorrelation (Morelli & Klein 1997), the standard that covers 87-90 %.
     start : Array, optional
@@ -67,10 +74,13 @@ def fit_output_error(
         criterion=criterion,
         multiple_starts=multiple_starts,
     )
+    coherence = None
+    if coloured_noise and highest_order > 0:
+        fit, coherence = refit_beside_inputs(problem, fit, highest_order=highest_order)
     # Noise that is known is not judged by residuals.
     as_modelled = coloured_noise or bool(np.isfinite(problem.known_variance).all())
     covariance = fit.covariance if as_modelled else coloured_output_covariance(problem, fit)
-    return FitResult(
+    result = FitResult(
         method="output error" if coloured_noise else "output error (white)",
         model=model,
         names=problem.names,
@@ -93,6 +103,7 @@ def fit_output_error(
             **_maneuver_influence(problem, fit),
         },
     )
+    return inflate_by_coherence(result, coherence)
 
 
 def sample_periods(maneuvers: Sequence[Maneuver]) -> list[float]:

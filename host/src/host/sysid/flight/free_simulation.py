@@ -17,7 +17,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
-from host.sysid.numerics.output_error_problem import OutputProblem, Response
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 LEAD_S = 0.3  # of trim before the input, as `DetectedManeuver.fit_window` has it
 
@@ -60,20 +60,20 @@ def free_simulation(frozen: LinearModel, maneuvers: Sequence[Maneuver]) -> list[
     return [run.outputs for run in free_runs(frozen, maneuvers)]
 
 
-def responses_with_constants(problem: OutputProblem, estimate: Array) -> list[Response] | None:
-    """Return outputs and sensitivities at an estimate, constants of each maneuver fitted.
+def estimate_with_constants(problem: OutputProblem, estimate: Array) -> Array | None:
+    """Return an estimate with the constants of each maneuver fitted, (P,).
 
     Outputs are linear in biases and start states: one weighted least-squares step finds them.
 
     Parameters
     ----------
     problem : OutputProblem
-    estimate : Array, shape (P,)
+    estimate : Array
         Its first entries are the common parameters.
 
     Returns
     -------
-    list of Response or None
+    Array or None
         None where the model diverges.
     """
     theta, count = problem.first_guess(), problem.n_common
@@ -88,7 +88,7 @@ def responses_with_constants(problem: OutputProblem, estimate: Array) -> list[Re
         step = weighted_fit(residual[:, :, None], constants, weight)[:, 0]
         theta[problem.columns(number)[count:]] += step
     problem.release(responses)
-    return problem.respond(theta)
+    return theta
 
 
 def weighted_fit(errors: Array, columns: Array, weight: Array) -> Array:
@@ -110,8 +110,11 @@ def residual_coherence(
 ) -> InputCoherence | None:
     """Return whether inputs drive what a free simulation leaves; None where it diverges."""
     problem = OutputProblem(model, maneuvers)
-    responses = responses_with_constants(problem, estimate)
-    return None if responses is None else input_coherence(problem, responses)
+    theta = estimate_with_constants(problem, estimate)
+    responses = None if theta is None else problem.respond(theta)
+    if theta is None or responses is None:
+        return None
+    return input_coherence(problem, responses, theta)
 
 
 def fits_of(

@@ -16,16 +16,17 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
-from host.sysid.flight.free_simulation import responses_with_constants, weighted_fit
+from host.sysid.flight.free_simulation import estimate_with_constants, weighted_fit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
-from host.sysid.numerics.ar_noise import ArNoise
+from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 SIGNIFICANCE = 0.01
 DRAWS, DRAW_SEED = 200, 1
+LONGEST_LAG = 200  # of an autocorrelation that counts, means
 SETTLING = 200  # means before a drawn AR series counts
 
 
@@ -101,6 +102,8 @@ def largest_rms(
     rng = np.random.default_rng(DRAW_SEED)
     parameters = rng.standard_normal((DRAWS, count)) @ root.T
     squares, samples = np.zeros((DRAWS, outputs)), 0
+    freedom = [power_freedom(memory, noise.samples) for memory in noise.noise]
+    scale = np.sqrt(np.array([nu / rng.chisquare(nu, DRAWS) for nu in freedom]))  # of its power
     for maneuver in maneuvers:
         slopes = _slopes(model, result, maneuver)
         if slopes is None:
@@ -112,6 +115,7 @@ def largest_rms(
                 for memory, variance in zip(noise.noise, noise.innovation_variance, strict=True)
             ]
         )  # (p, means, draws)
+        drawn *= scale[:, None, :]
         drawn += slopes[:, :, :count] @ parameters.T
         left = _without_constants(drawn, slopes[:, :, count:], np.mean(drawn**2, axis=(1, 2)))
         squares += np.sum(left**2, axis=1).T
@@ -121,6 +125,16 @@ def largest_rms(
     shape = mean**2 / np.maximum(spread, 1e-300)
     level = (1.0 - SIGNIFICANCE) ** (1.0 / outputs)
     return np.asarray(np.sqrt(special.gammaincinv(shape, level) * mean / shape))
+
+
+def power_freedom(memory: ArNoise, samples: int) -> float:
+    """Return the degrees of freedom of the mean square of AR noise, samples / (1 + 2 sum rho^2).
+
+    Bartlett, Journal of the Royal Statistical Society, Supplement 8 (1946).
+    """
+    covariance = autocovariance(memory.coefficient, min(samples, LONGEST_LAG))
+    rho = covariance[1:] / covariance[0]
+    return max(samples / (1.0 + 2.0 * float(rho @ rho)), 2.0)
 
 
 def drawn_noise(
@@ -136,7 +150,9 @@ def drawn_noise(
 
 def _slopes(model: LinearModel, result: FitResult, maneuver: Maneuver) -> Array | None:
     """Return the sensitivities at the estimate, constants fitted, (p, means, P + constants)."""
-    responses = responses_with_constants(OutputProblem(model, [maneuver]), result.estimate)
+    problem = OutputProblem(model, [maneuver])
+    theta = estimate_with_constants(problem, result.estimate)
+    responses = None if theta is None else problem.respond(theta)
     if responses is None:
         return None
     block = block_length(maneuver.dt_s)

@@ -6,6 +6,9 @@ the noise and freed of what the model's own parameters could still take (a Lagra
 Engle, Handbook of Econometrics II, 1984, ch. 13). All lags are tested as one, so their number is
 counted by the degrees of freedom; the number of outputs by Sidak's level.
 
+A second test asks for the signatures of usual errors (`model_error_signatures`), each with its own
+shape in all outputs at once, so that a small error is seen; the level of 1 % is shared by halves.
+
 The noise model is estimated beside those columns (restricted likelihood): what inputs drive is
 then not taken for noise.
 """
@@ -22,9 +25,12 @@ from host.arrays import Array
 from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
+from host.sysid.numerics.model_error_signatures import model_error_signatures
 from host.sysid.numerics.output_error_problem import OutputProblem, Response
+from host.sysid.numerics.signature_test import SignatureTest, WhitenedOutput, signature_test
 
-SIGNIFICANCE = 0.01
+SIGNIFICANCE = 0.01  # from here on the model is said to lack something
+SUSPICION = 0.10  # from here on intervals count that it may
 HIGHEST_ORDER = 6
 ROUNDS_WITHOUT, ROUNDS_BESIDE = 2, 3  # of the noise models: first without the added columns
 # Means over this long are tested: of quicker samples an AR model of low order cannot tell slow
@@ -50,6 +56,10 @@ class InputCoherence:
     noise : tuple of ArNoise
         Of each output, beside what the inputs drive.
     innovation_variance : Array, shape (p,)
+    signature : SignatureTest
+        Of usual errors of a model.
+    samples : int
+        Means that were tested, of each output.
     information : Array, shape (p, P, P)
         Of each output, whitened by this noise.
     prior_precision : Array, shape (P,)
@@ -61,14 +71,45 @@ class InputCoherence:
     columns: Array
     noise: tuple[ArNoise, ...]
     innovation_variance: Array
+    signature: SignatureTest
+    samples: int
     information: Array
     prior_precision: Array
 
     @property
     def coherent(self) -> tuple[str, ...]:
         """Outputs whose residual the inputs drive; 1 % of right fits name any."""
-        level = 1.0 - (1.0 - SIGNIFICANCE) ** (1.0 / len(self.outputs))
-        return tuple(n for n, p in zip(self.outputs, self.p_value, strict=True) if p < level)
+        return self._outputs_at(SIGNIFICANCE)
+
+    @property
+    def suspected(self) -> tuple[str, ...]:
+        """The same at 10 %: for intervals an error that may be there counts too."""
+        return self._outputs_at(SUSPICION)
+
+    @property
+    def likely_error(self) -> str:
+        """What the model lacks or has wrong, by its signature; empty if none stands out."""
+        return self.signature.name if self.signature.p_value < 0.5 * SIGNIFICANCE else ""
+
+    def dominated(self, ratio: float) -> tuple[str, ...]:
+        """Return the coherent outputs whose power ratio is at least so large."""
+        powers = dict(zip(self.outputs, self._weights(), strict=True))
+        return tuple(name for name in self.coherent if powers[name] >= ratio)
+
+    def _outputs_at(self, significance: float) -> tuple[str, ...]:
+        """Return the outputs that either test names; each test takes half of the level."""
+        level = 1.0 - (1.0 - 0.5 * significance) ** (1.0 / len(self.outputs))
+        shown = self.signature.outputs if self.signature.p_value < 0.5 * significance else ()
+        return tuple(
+            n for n, p in zip(self.outputs, self.p_value, strict=True) if p < level or n in shown
+        )
+
+    def _weights(self) -> Array:
+        """Return the power ratio of each suspected output, 1 of the others."""
+        shown = self.signature.p_value < 0.5 * SUSPICION
+        least = max(self.signature.ratio, 1.0) if shown else 1.0
+        suspected = np.array([name in self.suspected for name in self.outputs])
+        return np.where(suspected, np.maximum(self.ratio, least), 1.0)
 
     def covariance(self) -> Array:
         """Return the covariance in this noise, (P, P)."""
@@ -83,11 +124,9 @@ class InputCoherence:
         same: the score of that output has `ratio` times its variance (as by a Birge ratio).
         """
         inverse = self.covariance()
-        weight = np.array(
-            [max(r, 1.0) if n in self.coherent else 1.0
-             for n, r in zip(self.outputs, self.ratio, strict=True)]
-        )  # fmt: skip
-        score = np.diag(self.prior_precision) + np.einsum("j,jkl->kl", weight, self.information)
+        score = np.diag(self.prior_precision) + np.einsum(
+            "j,jkl->kl", self._weights(), self.information
+        )
         return np.asarray(inverse @ score @ inverse)
 
 
@@ -100,11 +139,28 @@ class _Data:
     added: Sequence[Array]  # (samples, k)
 
 
+@dataclass(frozen=True)
+class _Fitted:
+    """The parameters in some noise: covariance, its root, and the score of the residual."""
+
+    inverse: Array
+    root: Array
+    score: Array
+
+    @classmethod
+    def of(cls, total: Array, score: Array) -> _Fitted:
+        inverse = covariance_from_information(total)
+        value, vector = np.linalg.eigh(inverse)
+        return cls(inverse, vector * np.sqrt(np.maximum(value, 0.0)), score)
+
+
 def input_coherence(
     problem: OutputProblem,
     responses: Sequence[Response],
+    theta: Array,
     *,
     highest_order: int = HIGHEST_ORDER,
+    block_s: float = BLOCK_S,
 ) -> InputCoherence:
     """Test the residuals of a free simulation against what the inputs drive.
 
@@ -114,11 +170,17 @@ def input_coherence(
         Model and data.
     responses : sequence of Response
         Of the model at the estimate, one of each maneuver.
+    theta : Array, shape (P,)
+        The estimate, constants of the maneuvers included.
     highest_order : int
         Of the AR models.
+    block_s : float
+        Residuals are taken in means over this long; 0 keeps the samples, and the noise models are
+        then those of samples.
     """
-    data = _data(problem, responses)
+    data = _data(problem, responses, block_s)
     prior = problem.prior_precision
+    pulled = prior * (problem.prior_mean - theta)
     noise = [ArNoise.white() for _ in data]
     variance = np.array([np.mean(np.concatenate(d.residuals) ** 2) for d in data])
     variance = np.maximum(variance, problem.least_variance)
@@ -127,11 +189,9 @@ def input_coherence(
         total = np.diag(prior) + sum(
             _gram(w.slopes) / v for w, v in zip(whitened, variance, strict=True)
         )
-        score = sum(
-            _cross(w.slopes, w.residuals) / v for w, v in zip(whitened, variance, strict=True)
-        )
+        fitted = _Fitted.of(total, pulled + _score(whitened, variance))
         updated = [
-            _noise_model(d, w, v, total, score, highest_order, beside=number >= ROUNDS_WITHOUT)
+            _noise_model(d, w, v, fitted, highest_order, beside=number >= ROUNDS_WITHOUT)
             for d, w, v in zip(data, whitened, variance, strict=True)
         ]
         noise = [n for n, _ in updated]
@@ -139,13 +199,36 @@ def input_coherence(
         whitened = [_whitened(d, n) for d, n in zip(data, noise, strict=True)]
     information = np.array([_gram(w.slopes) / v for w, v in zip(whitened, variance, strict=True)])
     total = np.diag(prior) + np.sum(information, axis=0)
-    score = _score(whitened, variance)
+    fitted = _Fitted.of(total, pulled + _score(whitened, variance))
     ratio, p_value, columns = [], [], []
     for d, w, n, v in zip(data, whitened, noise, variance, strict=True):
-        excess, count, freedom = _added_power(d, w, n, v, _reduced(w, v, total, score))
+        excess, count, freedom = _added_power(d, w, n, v, _reduced(w, v, fitted))
         ratio.append(excess / max(count, 1))
         columns.append(count)
         p_value.append(special.fdtrc(count, freedom, ratio[-1]) if count else 1.0)
+    found = [
+        model_error_signatures(problem, number, response, theta)
+        for number, response in enumerate(responses)
+    ]
+    signature = signature_test(
+        problem.model.outputs,
+        found[0].names,
+        [
+            WhitenedOutput(
+                slopes=w.slopes,
+                signatures=[
+                    block_means(s.columns[j], block_length(m.dt_s, block_s))
+                    for s, m in zip(found, problem.maneuvers, strict=True)
+                ],
+                residuals=w.residuals,
+                noise=noise[j],
+                variance=float(variance[j]),
+            )
+            for j, w in enumerate(whitened)
+        ],
+        fitted.inverse,
+        fitted.score,
+    )
     return InputCoherence(
         outputs=problem.model.outputs,
         ratio=np.array(ratio),
@@ -153,12 +236,14 @@ def input_coherence(
         columns=np.array(columns, dtype=np.float64),
         noise=tuple(noise),
         innovation_variance=variance,
+        signature=signature,
+        samples=sum(len(e) for e in data[0].residuals),
         information=information,
         prior_precision=prior,
     )
 
 
-def _data(problem: OutputProblem, responses: Sequence[Response]) -> list[_Data]:
+def _data(problem: OutputProblem, responses: Sequence[Response], block_s: float) -> list[_Data]:
     model, size = problem.model, len(problem.names)
     shortest_s = min(m.samples * m.dt_s for m in problem.maneuvers)
     knots_s = lag_knots_s(max(m.dt_s for m in problem.maneuvers), shortest_s)
@@ -167,7 +252,7 @@ def _data(problem: OutputProblem, responses: Sequence[Response]) -> list[_Data]:
         input_regressors(m.inputs, r.y[moving].T, m.dt_s, knots_s)
         for m, r in zip(problem.maneuvers, responses, strict=True)
     ]
-    blocks = [block_length(m.dt_s) for m in problem.maneuvers]
+    blocks = [block_length(m.dt_s, block_s) for m in problem.maneuvers]
     added = [block_means(Z, block) for Z, block in zip(added, blocks, strict=True)]
     found = []
     for j in range(len(model.outputs)):
@@ -183,9 +268,9 @@ def _data(problem: OutputProblem, responses: Sequence[Response]) -> list[_Data]:
     return found
 
 
-def block_length(dt_s: float) -> int:
+def block_length(dt_s: float, block_s: float = BLOCK_S) -> int:
     """Return how many samples a mean is taken over."""
-    return max(1, round(BLOCK_S / dt_s))
+    return max(1, round(block_s / dt_s))
 
 
 def block_means(values: Array, block: int) -> Array:
@@ -215,11 +300,11 @@ def _score(whitened: Sequence[_Data], variance: Array) -> Array:
     return np.asarray(sum(parts))
 
 
-def _reduced(w: _Data, variance: float, total: Array, score: Array) -> tuple[Array, Array, Array]:
+def _reduced(w: _Data, variance: float, fitted: _Fitted) -> tuple[Array, Array, Array]:
     """Return information and score of the added columns, freed of the parameters; and the link."""
-    link = covariance_from_information(total) @ _cross(w.slopes, w.added) / variance
+    link = fitted.inverse @ _cross(w.slopes, w.added) / variance
     inner = _gram(w.added) / variance - _cross(w.added, w.slopes) @ link / variance
-    right = _cross(w.added, w.residuals) / variance - link.T @ score
+    right = _cross(w.added, w.residuals) / variance - link.T @ fitted.score
     return inner, right, link
 
 
@@ -292,8 +377,7 @@ def _noise_model(
     data: _Data,
     w: _Data,
     variance: float,
-    total: Array,
-    score: Array,
+    fitted: _Fitted,
     highest: int,
     *,
     beside: bool,
@@ -302,15 +386,12 @@ def _noise_model(
 
     `beside` says whether the added columns take their share first.
     """
-    inverse = covariance_from_information(total)
-    value, vector = np.linalg.eigh(inverse)
-    lower = vector * np.sqrt(np.maximum(value, 0.0))
-    own = inverse @ score
+    own = fitted.inverse @ fitted.score
     added: Array = np.zeros(data.added[0].shape[1])
     root: Array = np.zeros((len(added), 0))
     link: Array = np.zeros((len(own), len(added)))
     if beside:
-        inner, right, link = _reduced(w, variance, total, score)
+        inner, right, link = _reduced(w, variance, fitted)
         scale, kept, directions = _scaled_eigen(inner, w, variance)
         root = (directions / np.sqrt(kept)) / scale[:, None]  # of the added columns' covariance
         added = root @ (root.T @ right)
@@ -318,7 +399,7 @@ def _noise_model(
     residuals, shares = [], []
     for e, J, Z in zip(data.residuals, data.slopes, data.added, strict=True):
         residuals.append(e - J @ own - Z @ added)
-        shares.append(np.hstack([J @ lower, (Z - J @ link) @ root]))
+        shares.append(np.hstack([J @ fitted.root, (Z - J @ link) @ root]))
     moments = lagged_moments(residuals, shares, highest)
     count = sum(len(e) for e in residuals) - highest * len(residuals)
     order = choose_order(moments, count)

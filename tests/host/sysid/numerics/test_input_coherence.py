@@ -1,0 +1,91 @@
+"""What inputs drive beside a model is told from noise of any colour, and false alarms are few."""
+
+import numpy as np
+import pytest
+from host.sysid.estimators.method_registry import fit
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.input_coherence import InputCoherence, block_means, input_coherence
+from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
+from host.sysid.numerics.output_error import minimise
+from host.sysid.numerics.output_error_problem import OutputProblem
+from scipy import signal
+from studies.aircraft import navion_structured
+from studies.coverage import coloured_noise
+from studies.inputs import multistep_3211
+
+DT_S, DURATION_S = 0.05, 20.0
+COLOURS = {"white": [], "AR(1) 0.5": [0.5], "AR(1) 0.9": [0.9]}
+
+
+def record(seed: int, colour: str, *, lag_s: float = 0.0, snr: float = 10.0) -> Maneuver:
+    model = navion_structured()
+    u = multistep_3211(0.05, DT_S, DURATION_S)
+    pole = np.exp(-DT_S / lag_s) if lag_s else 0.0
+    late = signal.lfilter([1.0 - pole], [1.0, -pole], u, axis=0)
+    blank = OutputProblem(model, [Maneuver(DT_S, late, np.zeros((len(u), 4)))])
+    response = blank.respond(np.concatenate([model.start, np.zeros(4)]))
+    assert response is not None
+    y = response[0].y.T
+    deviation = np.sqrt(np.mean(y**2, axis=0) / snr)
+    rng = np.random.default_rng([14, seed])
+    noise = coloured_noise(rng, np.array(COLOURS[colour]), len(u), deviation)
+    return Maneuver(DT_S, u, y + noise)
+
+
+def coherence_of(maneuver: Maneuver, model: LinearModel | None = None) -> InputCoherence:
+    model = model or navion_structured()
+    problem = OutputProblem(model, [maneuver])
+    found = minimise(problem, np.concatenate([model.start, np.zeros(4)]))
+    return input_coherence(problem, found.responses, found.theta)
+
+
+@pytest.mark.parametrize("colour", COLOURS)
+def test_right_models_are_rarely_accused(colour: str) -> None:
+    """One in a hundred is expected; the study counts hundreds, four of forty would be a defect."""
+    alarms = sum(bool(coherence_of(record(seed, colour)).coherent) for seed in range(40))
+    assert alarms <= 3
+
+
+@pytest.mark.parametrize("colour", COLOURS)
+def test_a_hidden_lag_is_seen_and_named(colour: str) -> None:
+    found = [coherence_of(record(seed, colour, lag_s=0.5, snr=40.0)) for seed in range(5)]
+    assert sum("q_radps" in one.coherent for one in found) >= 4
+    named = {one.likely_error for one in found}
+    assert colour == "AR(1) 0.9" or "a lag of elevator_rad" in named
+
+
+def test_the_noise_beside_the_inputs_is_that_of_a_right_model() -> None:
+    """The lag's residual has a memory of its own; white noise beside it stays white."""
+    right, wrong = (coherence_of(record(1, "white", lag_s=lag_s)) for lag_s in (0.0, 0.3))
+    assert max(n.order for n in right.noise) <= 2
+    assert np.all(wrong.innovation_variance < 2.0 * right.innovation_variance)
+
+
+def test_output_error_widens_by_what_its_noise_had_explained() -> None:
+    maneuver = record(2, "AR(1) 0.9", lag_s=0.5, snr=40.0)
+    result = fit("output-error", navion_structured(), [maneuver])
+    assert any("the inputs drive what the fit leaves" in w for w in result.warnings)
+    k, truth = result.index("M_de"), navion_structured().start[-1]
+    factor = np.asarray(result.details["driven_by_inputs"])[k]
+    assert factor > 1.5
+    assert abs(result.estimate[k] - truth) > result.half_width()[k] / factor  # it was too narrow
+    right = fit("output-error", navion_structured(), [record(3, "AR(1) 0.9", snr=40.0)])
+    assert "driven_by_inputs" not in right.details
+
+
+def test_lags_reach_seconds_in_few_columns() -> None:
+    knots_s = lag_knots_s(0.02, 20.0)
+    assert knots_s[0] == 0.0
+    assert knots_s[-1] == pytest.approx(3.2)
+    assert lag_knots_s(0.02, 4.0)[-1] <= 1.0
+    step = np.ones((200, 1))
+    step[0] = 0.0
+    columns = input_regressors(step, np.zeros((200, 0)), 0.02, knots_s)
+    assert columns.shape == (200, len(knots_s))
+    # The hats add up to one at every lag: together they are the sum of the input's past.
+    assert np.allclose(columns.sum(axis=1), np.minimum(np.arange(200), 161))
+
+
+def test_means_of_blocks_leave_the_rest_out() -> None:
+    assert np.allclose(block_means(np.arange(7.0)[:, None], 3)[:, 0], [1.0, 4.0])
