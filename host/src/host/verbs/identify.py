@@ -70,7 +70,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
                         " whatever this check of the data finds; repeatable")  # fmt: skip
     parser.add_argument("--no-delays", action="store_true",
-                        help="take every delay of a sensor as zero, estimate none")  # fmt: skip
+                        help="estimate no delay of a sensor")  # fmt: skip
     _add_outputs(parser)
 
 

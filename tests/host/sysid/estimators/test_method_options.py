@@ -137,3 +137,14 @@ def test_a_method_that_does_not_settle_has_no_history(
     assert identified(table, "equation-error", "--history", str(path)) == 2
     assert "no method here notes how it settles" in capsys.readouterr().err
     assert not path.exists()
+
+
+def test_the_answer_says_since_when_it_settled(
+    table: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert identified(table, "recursive") == 0
+    [line] = [x for x in capsys.readouterr().out.splitlines() if "within 10 % of its end" in x]
+    since = {x.split()[0]: float(x.split()[1]) for x in line.split(": ")[1].split(", ")}
+    assert 0.0 < since["M_alpha"] < 5.0
+    assert identified(table, "hopfield-line-search", "--method-option", "iterations=2") == 0
+    assert "error of the original program" in capsys.readouterr().out

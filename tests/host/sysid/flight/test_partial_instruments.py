@@ -11,6 +11,7 @@ import pytest
 from host.cli import main
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.identification_error import IdentificationError
+from host.twin.virtual import virtual_flight
 from scipy.signal import lsim
 
 import host
@@ -177,3 +178,15 @@ def test_a_map_takes_any_extra_column(pitching: pd.DataFrame, tmp_path: Path) ->
     slip = THREE.replace("q_radps =", "q_rapds =")
     with pytest.raises(IdentificationError, match=r"q_rapds \(did you mean q_radps\?\)"):
         read_columns(*mapped(tmp_path, table, slip))
+
+
+def test_delays_that_the_sensors_tell_are_not_taken_out_either() -> None:
+    """With an aircraft file reconstruction estimates the vanes' delay: not where none is wanted."""
+    flight = virtual_flight("demo", 3, chain="none")
+    both = [
+        host.identify(flight.table, aircraft="ultrastick25e", models="short-period", delays=delays)
+        for delays in (True, False)
+    ]
+    told = [[c.name for c in one.linear[0].corrections] for one in both]
+    assert "vane_delay_s" in told[0]
+    assert "vane_delay_s" not in told[1]

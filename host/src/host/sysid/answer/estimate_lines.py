@@ -10,6 +10,7 @@ import numpy as np
 from host.constants import DEG_PER_RAD
 from host.sysid.answer.constant_lines import constant_lines
 from host.sysid.answer.parameter_units import parameter_unit
+from host.sysid.answer.settling_history import settling_lines
 from host.sysid.answer.trust_rules import uncarried_states
 from host.sysid.flight.linear_estimator import Answer, from_zero
 from host.sysid.models.modal_analysis import Mode
@@ -51,7 +52,7 @@ def model_lines(answer: Answer) -> list[str]:
             + ("" if from_zero(c) else "  not told from zero")
             for c in answer.coefficients
         ]
-    lines += constant_lines(answer)
+    lines += [*constant_lines(answer), *settling_lines(answer)]
     failing = uncarried_states(answer)
     for mode in answer.modes:
         in_it = _participating(answer, mode, list(failing))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,19 @@ def corrections(found: Compatibility) -> tuple[Correction, ...]:
         Correction(f.name, f.value, f.half_width, f.prior_half_width)
         for f in found.findings
         if f.data_informed and f.name in CORRECTABLE
+    )
+
+
+def without_estimated_delays(found: Compatibility) -> Compatibility:
+    """Return a check whose delays count as not told: those of the aircraft file stand."""
+    return replace(
+        found,
+        findings=tuple(
+            replace(f, data_informed=False, reason="not asked for")
+            if f.name in DELAYED_COLUMNS
+            else f
+            for f in found.findings
+        ),
     )
 
 

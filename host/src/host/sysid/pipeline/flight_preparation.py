@@ -15,6 +15,7 @@ from host.sysid.compatibility.reconstruction import (
     NoAgreementError,
     reconstruct,
 )
+from host.sysid.compatibility.sensor_corrections import without_estimated_delays
 from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.agreement_findings import calibration_findings, disagreement
 from host.sysid.flight.data_finding import Finding
@@ -50,7 +51,7 @@ class ReadingOptions:
     corrections : bool
         Remove sensor errors that the data determine from the columns.
     delays : bool
-        Estimate residual delays and places of sensors that no aircraft file gives.
+        Estimate residual delays, and places of sensors that no aircraft file gives.
     also : tuple of str
         Signals to read beside those that are always read.
     accept : frozenset of str
@@ -105,6 +106,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     agreement = None
     try:
         agreement = reconstruct(columns, known.airframe if known else None, instrument)
+        agreement = agreement if how.delays else without_estimated_delays(agreement)
         findings += calibration_findings(agreement)
     except NoAgreementError as error:
         findings.append(disagreement(error, columns))

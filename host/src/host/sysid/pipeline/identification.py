@@ -130,6 +130,7 @@ class Identification:
         stretches: Sequence[Any] | None = None,
         from_s: float | None = None,
         to_s: float | None = None,
+        constants: bool = True,
     ) -> Simulation:
         """Fly every model over another flight by its measured surfaces, biases fitted to each.
 
@@ -141,6 +142,8 @@ class Identification:
             Where they are not those of this identification.
         maneuvers, stretches, from_s, to_s
             As in `host.identify`; all maneuvers without.
+        constants : bool
+            Fit biases and start states; without they are those of the trim before each input.
 
         Raises
         ------
@@ -157,7 +160,7 @@ class Identification:
         [source] = listed_flights([flight])
         found = prepare(source, how, self.aircraft)
         models = identified_models(self.linear, self.coefficients)
-        return simulate(models, found.flight, found.notes)
+        return simulate(models, found.flight, found.notes, constants=constants)
 
     def document(self) -> dict[str, Any]:
         """Return everything as plain lists, numbers and strings; several flights are lists."""
