@@ -85,6 +85,11 @@ def fit_filter_error(
     theta = _first_guess(problem, first, fit_first=start is None)
     output_sd = np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
     # Noise that the data do not show would decrease for ever, and the search would not end.
+    # The step of the numbers is noise of step^2 / 12 in any case.
+    steps = [m.resolution for m in maneuvers if m.resolution is not None]
+    if steps:
+        least_sd = np.max(steps, axis=0) / np.sqrt(12.0) / NOISE_FLOOR
+        output_sd = np.maximum(output_sd, least_sd)
     floor = np.log(NOISE_FLOOR) + np.concatenate(
         [theta[problem.n_model : problem.n_model + len(process)], np.log(output_sd)]
     )

@@ -91,7 +91,7 @@ def _score(problem: OutputProblem, base: Array, individual: Array) -> float:
         return float("inf")
     total = np.zeros(len(problem.model.outputs))
     for number, y in enumerate(outputs):
-        residual = problem.measured(number) - y
+        residual = problem.residual(number, y)
         # A constant per output replaces biases and initial states.
         residual = residual - residual.mean(axis=1, keepdims=True)
         total += np.sum(residual**2, axis=1)

@@ -107,13 +107,13 @@ def white_cost(problem: OutputProblem, theta: Array) -> float:
         return np.inf
     with np.errstate(over="ignore"):
         squares = np.sum(
-            [np.sum((problem.measured(k) - y) ** 2, axis=1) for k, y in enumerate(outputs)], axis=0
+            [np.sum(problem.residual(k, y) ** 2, axis=1) for k, y in enumerate(outputs)], axis=0
         )
     if not np.isfinite(squares).all():
         return np.inf
     prior = problem.prior_precision * (theta - problem.prior_mean) ** 2
-    power = np.maximum(squares / problem.samples, 1e-300)
-    return 0.5 * (problem.samples * float(np.sum(np.log(power))) + float(np.sum(prior)))
+    power = np.maximum(squares / problem.counts, 1e-300)
+    return 0.5 * (float(np.sum(problem.counts * np.log(power))) + float(np.sum(prior)))
 
 
 def _residuals_are_noise(problem: OutputProblem, optimum: Optimum) -> bool:

@@ -178,7 +178,7 @@ def _innovation_variances(
                 share += float(np.sum((block[j].T @ block[j]) * local)) / variance[j]
                 white = memory.whiten(optimum.residuals[number][j][:, None])
                 squares += float(np.sum(white**2))
-            updated[j] = squares / max(problem.samples - share, 1.0)
+            updated[j] = squares / max(problem.counts[j] - share, 1.0)
         updated = np.where(np.isnan(problem.known_variance), updated, problem.known_variance)
         converged = bool(np.all(np.abs(updated - variance) < 1e-6 * updated))
         variance = np.maximum(updated, 1e-300)
@@ -216,8 +216,10 @@ def _fit_ar_models(
                 for number, response in enumerate(optimum.responses)
             ]
             top = highest if selected[j] < 0 or round_number < 2 else selected[j]
+            if problem.counts[j] < problem.samples:
+                top = 0  # the memory between two values of a slow sensor is not seen
             moments = lagged_moments(residuals, shares, top)
-            count = problem.samples - top * len(residuals)
+            count = int(problem.counts[j]) - top * len(residuals)
             if orders is None and round_number < 2:
                 selected[j] = choose_order(moments, count, criterion=criterion)
             order = selected[j]

@@ -91,7 +91,7 @@ def fit_output_error(
         residuals=tuple(r.T.copy() for r in fit.optimum.residuals),
         fitted=tuple(r.y.T.copy() for r in fit.optimum.responses),
         residual_kind="output",
-        noise_covariance=np.atleast_2d(np.cov(np.hstack(fit.optimum.residuals))),
+        noise_covariance=_noise_covariance(problem, fit),
         iterations=fit.optimum.iterations,
         converged=fit.optimum.converged,
         warnings=_warnings(problem, fit),
@@ -123,6 +123,13 @@ def _check_rates(maneuvers: Sequence[Maneuver]) -> None:
             f"output-error estimates one noise model, and records of {periods[0]:g} and"
             f" {periods[-1]:g} s a sample have two; use output-error-white or filter-error"
         )
+
+
+def _noise_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array:
+    """Return the covariance of the residuals; those not measured are zero, and do not count."""
+    scale = np.sqrt(problem.samples / problem.counts)
+    covariance = np.atleast_2d(np.cov(np.hstack(fit.optimum.residuals)))
+    return np.asarray(covariance * np.outer(scale, scale), dtype=np.float64)
 
 
 def _maneuver_influence(problem: OutputProblem, fit: ArNoiseFit) -> dict[str, float | Array]:
@@ -164,8 +171,9 @@ def coloured_output_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array
     for number, response in enumerate(fit.optimum.responses):
         columns = problem.columns(number)
         for j, variance in enumerate(fit.optimum.variance):
-            residual = fit.optimum.residuals[number][j]
-            part = coloured_score_covariance(residual, response.sensitivities[j]) / variance**2
+            seen = problem.seen(number, j)
+            residual, slope = fit.optimum.residuals[number][j], response.sensitivities[j]
+            part = coloured_score_covariance(residual[seen], slope[seen]) / variance**2
             score_covariance[np.ix_(columns, columns)] += part
     result = white @ score_covariance @ white
     result = 0.5 * (result + result.T)

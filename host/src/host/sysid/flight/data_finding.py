@@ -95,7 +95,7 @@ class Finding:
 
     def accept(self) -> Finding:
         """Return the finding as the user accepted it."""
-        return replace(self, accepted=True, done=f"accepted, {AS_IT_IS}")
+        return replace(self, accepted=True, closed=False, done=f"accepted, {AS_IT_IS}")
 
 
 def open_channels(findings: Iterable[Finding]) -> frozenset[str]:

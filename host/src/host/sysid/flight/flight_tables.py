@@ -5,7 +5,7 @@ Foreign names, units and signs come in through a map (`column_map`).
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from host.files.regular import file_or_folder
 from host.instrument.recording import Recording
 from host.physical.calibration import Calibration, load_calibration
 from host.sysid.flight.column_map import listed, mapped, read_map
+from host.sysid.flight.column_sampling import Sampling, sampled_name
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.finding_consequences import checked
 from host.sysid.flight.foreign_tables import (
@@ -28,7 +29,7 @@ from host.sysid.flight.foreign_tables import (
     refuse_other,
     same_length,
 )
-from host.sysid.flight.measured import measured
+from host.sysid.flight.measured import Measured, measured
 from host.sysid.flight.recorded import recording_of_log, recording_of_table
 from host.sysid.flight.unit_sign_checks import SURFACES
 from host.sysid.identification_error import IdentificationError
@@ -68,13 +69,15 @@ MOST_EMPTY = 20  # rows of the even grid for each row that was recorded
 @dataclass(frozen=True, slots=True)
 class FlightColumns:
     """SI columns on an even grid, notes about what was done to them, how they were recorded, of a
-    log the calibration that made them, and what checks found in them."""
+    log the calibration that made them, what checks found in them, and the step of the numbers of
+    each quantised one."""
 
     columns: dict[str, Array]
     notes: list[str]
     recording: Recording
     calibration: Calibration | None
     findings: list[Finding] = field(default_factory=list)
+    resolution: dict[str, float] = field(default_factory=dict)
 
 
 def read_columns(
@@ -143,11 +146,40 @@ def read_flight_columns(
         remark = found.remarks.get(theirs.get(name, name))
         notes += [f"{name}: {remark}"] if remark else []
     same_length(used, called)
-    columns = _even(used, notes, foreign=not recorded)
-    findings: list[Finding] = []
-    if not recorded:
-        columns, findings = checked(columns, accept)
-    return FlightColumns(columns, notes, found.recording, found.calibration, findings)
+    if recorded:
+        columns = _even(used, notes)
+        return FlightColumns(columns, notes, found.recording, found.calibration)
+    seen = _measured(used, notes, accept)
+    even = _even(seen.columns, notes)
+    columns, findings = checked(even, accept)
+    return FlightColumns(
+        columns,
+        notes,
+        found.recording,
+        found.calibration,
+        [*seen.findings, *findings],
+        _resolutions(seen.sampling, even, columns),
+    )
+
+
+def _measured(columns: dict[str, Array], notes: list[str], accept: Collection[str]) -> Measured:
+    """Return the rows that are used, in order, what was not measured as missing, and findings."""
+    index = _rows(columns["t_s"], notes)
+    found = measured({k: v[index] for k, v in columns.items()}, SENSORS, LONGEST_GAP_S, accept)
+    notes += found.notes
+    return found
+
+
+def _resolutions(
+    sampling: Mapping[str, Sampling], even: Mapping[str, Array], used: Mapping[str, Array]
+) -> dict[str, float]:
+    """Return the step of each quantised column, in the unit in which the column is used."""
+    found = {}
+    for name, own in sampling.items():
+        if own.step > 0.0 and name in used:
+            span = float(np.ptp(even[name]))
+            found[name] = own.step * float(np.ptp(used[name])) / span if span else own.step
+    return found
 
 
 def source_name(source: str | Path | FlightLog | pd.DataFrame) -> str:
@@ -278,7 +310,7 @@ def even_columns(table: pd.DataFrame) -> tuple[dict[str, Array], list[str]]:
     if "t_s" not in raw:
         raise IdentificationError("no column t_s in the table")
     notes: list[str] = []
-    return _even(raw, notes, foreign=False), notes
+    return _even(raw, notes), notes
 
 
 def _rows(t: Array, notes: list[str]) -> IntArray:
@@ -357,13 +389,10 @@ def _grid(t: Array, dt_s: float, notes: list[str]) -> Array:
     return np.asarray(t[0] + dt_s * np.arange(count))
 
 
-def _even(columns: dict[str, Array], notes: list[str], *, foreign: bool) -> dict[str, Array]:
+def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     """Bring the table to an even grid, unwrap angles once, draw lines over gaps."""
     index = _rows(columns["t_s"], notes)
     columns = {name: values[index] for name, values in columns.items()}
-    if foreign:
-        columns, dropout_notes = measured(columns, SENSORS, LONGEST_GAP_S)
-        notes += dropout_notes
     t = columns["t_s"]
     steps = {name: _step_s(t[np.isfinite(columns[name])]) for name in FITTED if name in columns}
     dt_s = min((step for step in steps.values() if step > 0.0), default=_step_s(t))
@@ -387,6 +416,8 @@ def _even(columns: dict[str, Array], notes: list[str], *, foreign: bool) -> dict
         if name in ANGLES:
             series = _unwrapped(name, series, notes)
         result[name] = np.interp(grid, t[seen], series)
+        if steps.get(name, 0.0) > 1.5 * dt_s:
+            result[sampled_name(name)] = _at_instants(grid, t[seen])
         if name in FITTED and not seen.all():
             bridged |= _over(grid, t[seen])
             gaps = np.diff(t[seen])
@@ -416,6 +447,15 @@ def _unwrapped(name: str, series: Array, notes: list[str]) -> Array:
     return np.asarray(np.unwrap(series, period=360.0))
 
 
+def _at_instants(grid: Array, t: Array) -> Array:
+    """Return one at the grid's instants that are nearest to some of t, zero at all others."""
+    found = np.zeros(len(grid))
+    step_s = float(grid[1] - grid[0])
+    nearest = np.clip(np.round((t - grid[0]) / step_s), 0, len(grid) - 1).astype(np.int64)
+    found[nearest] = 1.0
+    return found
+
+
 def _long_s(t: Array) -> float:
     """Return from which length a gap between the instants t is no longer the way they come."""
     return max(LONGEST_GAP_S, 3.0 * float(np.median(np.diff(t))))
@@ -425,4 +465,6 @@ def _over(grid: Array, t: Array) -> BoolArray:
     """Return where the grid lies within a long gap between the instants t."""
     after = np.clip(np.searchsorted(t, grid), 1, len(t) - 1)
     inside = (grid > t[after - 1]) & (grid < t[after])
-    return np.asarray(inside & (t[after] - t[after - 1] > _long_s(t)))
+    between = inside & (t[after] - t[after - 1] > _long_s(t))
+    before, behind = (t[0] - grid[0] > _long_s(t)), (grid[-1] - t[-1] > _long_s(t))
+    return np.asarray(between | (before & (grid < t[0])) | (behind & (grid > t[-1])))

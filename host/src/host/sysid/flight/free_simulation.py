@@ -81,7 +81,7 @@ def estimate_with_constants(problem: OutputProblem, estimate: Array) -> Array | 
     responses = problem.respond(theta)
     if responses is None:
         return None
-    residuals = [problem.measured(k) - r.y for k, r in enumerate(responses)]
+    residuals = [problem.residual(k, r.y) for k, r in enumerate(responses)]
     for number, (response, residual) in enumerate(zip(responses, residuals, strict=True)):
         constants = response.sensitivities[:, :, count:]
         weight = 1.0 / np.maximum(np.mean(residual**2, axis=1), 1e-300)
@@ -209,7 +209,8 @@ def _states(frozen: LinearModel, maneuver: Maneuver, theta: Array) -> Array:
     )
     first, last = len(frozen.state_biases), len(frozen.state_biases) + len(frozen.output_biases)
     own = np.concatenate([theta[:first], theta[last:]])
-    empty = replace(maneuver, outputs=np.zeros((maneuver.samples, n)), rates=None)
+    nothing = np.zeros((maneuver.samples, n))
+    empty = Maneuver(maneuver.dt_s, maneuver.inputs, nothing, name=maneuver.name)
     found = OutputProblem(bare, [empty]).outputs(own)
     return np.full((maneuver.samples, n), np.nan) if found is None else found[0].T.copy()
 

@@ -18,10 +18,10 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.sysid.flight.data_finding import HINT, Finding
 
-SURE, SOME = 0.5, 0.25  # partial correlation: less tells nothing about a sign, about a factor
-FACTOR = 1.5
-FOLLOWS = 0.3  # of an angle's rate that the gyro explains: less is another signal
-SOMEHOW = 0.05  # the same of a wind angle, which gusts turn too
+SIGN_CORRELATION, FACTOR_CORRELATION = 0.5, 0.25  # partial: less tells nothing of either
+LARGEST_FACTOR = 1.5
+ANGLE_EXPLAINED = 0.3  # of an angle's rate that the gyro explains: less is another signal
+WIND_ANGLE_EXPLAINED = 0.05  # the same of a wind angle, which gusts turn too
 QUIET_RADPS = 0.02  # noise of a still sensor follows nothing
 BLOCK_S, SLOW_S = 0.1, 0.5  # slopes are those of means over this long; slow: pitot and GPS
 FEWEST = 32  # means
@@ -135,10 +135,10 @@ def factors(law: Identity) -> Iterator[Factor]:
         others = [v for k, v in law.parts.items() if k != name]
         x, y = (_without(v, np.column_stack([own, *others])) for v in (part, law.rate))
         xx, yy, xy = float(x @ x), float(y @ y), float(x @ y)
-        if xx < 1e-12 * len(x) or xy**2 < SOME**2 * xx * yy:
+        if xx < 1e-12 * len(x) or xy**2 < FACTOR_CORRELATION**2 * xx * yy:
             continue
         low, high = sorted((xy / xx, yy / xy))  # noise on the left side, noise on the right
-        yield Factor(law, name, low, high, xy**2 >= SURE**2 * xx * yy)
+        yield Factor(law, name, low, high, xy**2 >= SIGN_CORRELATION**2 * xx * yy)
 
 
 def _judge(f: Factor) -> Finding | None:
@@ -155,7 +155,7 @@ def _judge(f: Factor) -> Finding | None:
             (f"the wrong sign of one of them: {HINT}",),
             wrong_unit=True,
         )
-    if f.low <= FACTOR and f.high >= 1.0 / FACTOR:
+    if f.low <= LARGEST_FACTOR and f.high >= 1.0 / LARGEST_FACTOR:
         return None
     times = f.low if f.low > 1.0 else f.high
     return Finding(
@@ -194,7 +194,7 @@ def _fast(m: Mapping[str, Array]) -> Iterator[Identity]:
     )
     for name, rate, part, beside in laws:
         if name in m and rate in m:
-            yield _law(name, m, {rate: part}, (beside,), follows=FOLLOWS)
+            yield _law(name, m, {rate: part}, (beside,), follows=ANGLE_EXPLAINED)
     yield from _wind_angles(m, phi, theta, alpha, beta, (p, q, r))
 
 
@@ -221,7 +221,7 @@ def _wind_angles(
             down = m["az_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.cos(phi)
             lift = (np.cos(alpha) * down - np.sin(alpha) * along) / speed
             parts = {"q_radps": pitch, "az_mps2 over airspeed_mps": lift}
-            yield _law("alpha_rad", m, parts, follows=SOMEHOW)
+            yield _law("alpha_rad", m, parts, follows=WIND_ANGLE_EXPLAINED)
         else:
             made = (alpha, m.get("elevator_rad", zero))
             yield _law("alpha_rad", m, {"q_radps": pitch}, made)
@@ -229,7 +229,7 @@ def _wind_angles(
         if known and "ay_mps2" in m:
             side = (m["ay_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.sin(phi)) / speed
             parts = {"r_radps": yaw, "ay_mps2 over airspeed_mps": side}
-            yield _law("beta_rad", m, parts, follows=SOMEHOW)
+            yield _law("beta_rad", m, parts, follows=WIND_ANGLE_EXPLAINED)
         else:
             yield _law("beta_rad", m, {"r_radps": yaw}, (beta, phi, m.get("rudder_rad", zero)))
 

@@ -403,7 +403,9 @@ class LinearEstimator:
             model = with_drag_arm(model, trim, instrument)
         method = self.method
         if method == DEFAULT_METHOD:
-            gust = "alpha_rad" in model.states and trim.known
+            # A filter takes the line between two values of a slow sensor for measurements.
+            evenly = not any(m.cut(model).held for m in used)
+            gust = "alpha_rad" in model.states and trim.known and evenly
             method = GUST if gust else "output-error-white"
             if self.own is None and method != GUST and self.template == "lateral":
                 model = without_attitude(model, used)

@@ -6,23 +6,40 @@ its period on average. One that fills what is missing writes zero, the last valu
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from host.arrays import Array, BoolArray, IntArray
+from host.arrays import Array
+from host.sysid.flight.column_sampling import FEWEST, Sampling, sampling_of
+from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.maneuver_detection import FLYING_SHARE
+from host.sysid.flight.stuck_sensors import stuck_runs
 
-FAR = 100.0  # of the range that 96 % of the values lie in
-FEW = 0.02  # of all values: more are no spikes
-FEWEST = 32
-REGULAR, EVEN = 0.7, 0.2  # of the runs are as long as the median, to this share of it
+SPIKE_RANGES = 100.0  # beyond the middle: of the range that 96 % of the values lie in
+SPIKE_SHARE = 0.02  # of all values: more are no spikes
+LONGEST_HOLDS = 3.0  # a held sensor may stand still for as many of its periods
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Columns with what was not measured as missing, notes and findings about it, and how each
+    sensor was sampled."""
+
+    columns: dict[str, Array]
+    notes: list[str]
+    findings: list[Finding]
+    sampling: dict[str, Sampling]
 
 
 def measured(
-    columns: Mapping[str, Array], names: Sequence[str], longest_s: float
-) -> tuple[dict[str, Array], list[str]]:
-    """Return the columns with what was not measured as missing, and notes about it.
+    columns: Mapping[str, Array],
+    names: Sequence[str],
+    longest_s: float,
+    accept: Collection[str] = (),
+) -> Measured:
+    """Return the columns with what was not measured as missing.
 
     Parameters
     ----------
@@ -31,40 +48,39 @@ def measured(
     names : sequence of str
         Sensors to look at.
     longest_s : float
-        A sensor that stands still for longer, alone, has dropped out.
+        A sensor that must move and stands still for longer is stuck.
+    accept : collection of str
+        Checks whose findings change nothing.
     """
     t = columns["t_s"]
-    result, notes = dict(columns), []
+    raw, notes = dict(columns), []
     sensors = [name for name in names if name in columns]
     for name in sensors:
-        values = result[name].copy()
+        values = raw[name].copy()
         notes += [f"{name}: {note}" for note in _spikes(t, values)]
+        raw[name] = values
+    usual_s = float(np.median(np.diff(t)))
+    sampling = {name: sampling_of(raw[name]) for name in sensors}
+    result, findings = dict(raw), []
+    flying = _airborne(raw, len(t))  # at rest on the ground anything may stand still
+    look = {k: raw[k][flying] for k in ("t_s", *sensors)}
+    for name in sensors:
+        own = sampling[name]
+        values = np.where(own.sampled, raw[name], np.nan)
+        still_s = max(longest_s, LONGEST_HOLDS * own.hold * usual_s)
+        stuck = stuck_runs(look, name, own.step, still_s)
+        if stuck:
+            found = _stuck_finding(look, name, stuck)
+            accepted = found.check in accept
+            findings.append(found.accept() if accepted else found)
+            for first, end in () if accepted else stuck:
+                values[flying.start + first : flying.start + end] = np.nan
         result[name] = values
-    held = {}
-    for name in sensors:
-        period = _period(result[name])
-        if period:
-            held[name] = period
-    flying = _airborne(columns, len(t))  # at rest on the ground anything may stand still
-    moving = np.zeros(len(t), dtype=np.int64)
-    for name in sensors:
-        moving[1:] += np.diff(result[name]) != 0.0
-    for name in sensors:
-        values = result[name].copy()
-        starts, lengths = _runs(values)
-        inside = (starts >= flying.start) & (starts + lengths <= flying.stop)
-        if name in held:
-            first = np.zeros(len(t), dtype=bool)
-            first[starts] = True
-            values[~first] = np.nan
-        elif len(lengths) and np.median(lengths) == 1:
-            dropout_notes = _stuck(t, values, starts[inside], lengths[inside], moving, longest_s)
-            notes += [f"{name}: {note}" for note in dropout_notes]
-        result[name] = values
+    held = {name: s.hold for name, s in sampling.items() if s.hold > 1}
     if held:
         rates = ", ".join(f"{name} every {rows} rows" for name, rows in held.items())
-        notes.append(f"a slower sensor's last value repeated, read where it changes: {rates}")
-    return result, notes
+        notes.append(f"a slower sensor's last value repeated, read where it was sampled: {rates}")
+    return Measured(result, notes, findings, sampling)
 
 
 def _airborne(columns: Mapping[str, Array], rows: int) -> slice:
@@ -81,8 +97,8 @@ def _spikes(t: Array, values: Array) -> list[str]:
     if seen.sum() < FEWEST:
         return []
     low, middle, high = np.quantile(values[seen], (0.02, 0.5, 0.98))
-    far = np.flatnonzero(seen & (np.abs(values - middle) > FAR * (high - low)))
-    if not 0 < len(far) < FEW * seen.sum() or high <= low:
+    far = np.flatnonzero(seen & (np.abs(values - middle) > SPIKE_RANGES * (high - low)))
+    if not 0 < len(far) < SPIKE_SHARE * seen.sum() or high <= low:
         return []
     note = (
         f"{len(far)} value{'s' if len(far) > 1 else ''} far out of all others count as missing"
@@ -92,39 +108,17 @@ def _spikes(t: Array, values: Array) -> list[str]:
     return [note]
 
 
-def _runs(values: Array) -> tuple[IntArray, IntArray]:
-    """Return where equal values begin, and how many of them follow each other."""
-    starts = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
-    return starts, np.diff(np.append(starts, len(values)))
-
-
-def _period(values: Array) -> int:
-    """Return how many rows each value stays; 0 unless it is regular."""
-    if not np.isfinite(values).all():
-        return 0
-    lengths = _runs(values)[1][1:-1]  # ends are cut
-    if len(lengths) < FEWEST:
-        return 0
-    usual = float(np.median(lengths))
-    regular = float(np.mean(np.abs(lengths - usual) <= EVEN * usual)) >= REGULAR
-    return round(usual) if usual >= 2.0 and regular else 0
-
-
-def _stuck(
-    t: Array, values: Array, starts: IntArray, lengths: IntArray, moving: IntArray, longest_s: float
-) -> list[str]:
-    """Take out where a sensor stands still for long while others move."""
-    notes = []
-    ends = starts + lengths - 1
-    long = (t[ends] - t[starts] > longest_s) & np.isfinite(values[starts])
-    for start, last in zip(starts[long], ends[long], strict=True):
-        alone: BoolArray = moving[start + 1 : last + 1] > 0
-        if alone.mean() > 0.5:
-            notes.append(
-                f"stands still at {values[start]:.4g} for {t[last] - t[start]:.2f} s from"
-                f" {t[start]:.6g} s while others move: counts as missing"
-            )
-            values[start : last + 1] = np.nan
-    if len(notes) > 1:
-        return [f"{notes[0]}; and {len(notes) - 1} times more"]
-    return notes
+def _stuck_finding(
+    columns: Mapping[str, Array], name: str, stuck: Sequence[tuple[int, int]]
+) -> Finding:
+    t, (first, end) = columns["t_s"], stuck[0]
+    more = f", and {len(stuck) - 1} times more" if len(stuck) > 1 else ""
+    return Finding(
+        "stuck-sensor",
+        (name,),
+        f"{name} stands still at {columns[name][first]:.4g} for {t[end - 1] - t[first]:.2f} s from"
+        f" {t[first]:.6g} s while it must move{more}",
+        ("a dropout that the logger filled", "a sensor that sticks"),
+        "counts as missing there; maneuvers over it are left out",
+        closed=True,
+    )

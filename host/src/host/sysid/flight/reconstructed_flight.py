@@ -8,12 +8,12 @@ Coefficients take the columns as recorded, for they estimate those errors themse
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
-from host.arrays import Array
+from host.arrays import Array, BoolArray
 from host.instrument.deviations import SensorErrorModel
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import Compatibility
@@ -25,6 +25,7 @@ from host.sysid.compatibility.sensor_corrections import (
 )
 from host.sysid.compatibility.sensor_dynamics import columns_at_cg
 from host.sysid.flight.column_map import like
+from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
@@ -51,6 +52,8 @@ class ReconstructedFlight:
         As it was on this flight: with the servos and the clock of its recording.
     findings : tuple of Finding
         What checks found in its columns.
+    resolution : mapping
+        Step of the numbers of each quantised column.
     """
 
     source: str
@@ -61,6 +64,7 @@ class ReconstructedFlight:
     delays_open: bool
     instrument: SensorErrorModel | None = None
     findings: tuple[Finding, ...] = ()
+    resolution: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +105,16 @@ class FlownManeuver:
             inputs=np.column_stack([cut[c] for c in model.inputs]),
             outputs=np.column_stack([cut[c] for c in model.outputs]),
             name=self.label,
+            sampled=self._sampled(cut, model.outputs),
+            resolution=np.array([self.flight.resolution.get(c, 0.0) for c in model.outputs]),
         )
+
+    def _sampled(self, cut: Mapping[str, Array], outputs: Sequence[str]) -> BoolArray | None:
+        """Return at which samples each output was measured; None where all are at every one."""
+        if not any(sampled_name(c) in cut for c in outputs):
+            return None
+        every = np.ones(len(cut["t_s"]))
+        return np.column_stack([cut.get(sampled_name(c), every) > 0.5 for c in outputs])
 
 
 def reconstruct_flight(
@@ -113,6 +126,7 @@ def reconstruct_flight(
     compatibility: Compatibility | None = None,
     instrument: SensorErrorModel | None = None,
     findings: Sequence[Finding] = (),
+    resolution: Mapping[str, float] | None = None,
 ) -> ReconstructedFlight:
     """Return a flight with its columns corrected by all that is known.
 
@@ -131,6 +145,8 @@ def reconstruct_flight(
         As it was on this flight.
     findings : sequence of Finding
         What checks found in its columns.
+    resolution : mapping, optional
+        Step of the numbers of each quantised column.
     """
     sensor_errors = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
     delays_open = True
@@ -152,6 +168,7 @@ def reconstruct_flight(
         delays_open,
         instrument,
         tuple(findings),
+        resolution or {},
     )
 
 

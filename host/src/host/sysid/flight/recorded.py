@@ -19,10 +19,10 @@ from host.instrument.recording import SURFACES, Recording
 if TYPE_CHECKING:
     from host.log import FlightLog
 
-OURS = "mega_drives"  # no table of others has this column
-GPS, GPS_SPAN_S = "v_north_mps", 20.0  # as `physical/timebase` wants it
-SAME_RAD = 1e-6  # a table of text has six digits or more
-MOSTLY = 0.5
+OWN_COLUMN = "mega_drives"  # no table of others has this column
+GPS_COLUMN, GPS_SPAN_S = "v_north_mps", 20.0  # as `physical/timebase` wants it
+SAME_ANGLE_RAD = 1e-6  # a table of text has six digits or more
+MATCHING_SHARE = 0.5  # of the samples
 
 
 def recording_of_log(log: FlightLog) -> Recording:
@@ -38,10 +38,12 @@ def recording_of_table(columns: Mapping[str, Array], said: Mapping[Any, Any]) ->
         half, inputs = said["clock_half_width"], said["inputs"]
         commanded = tuple(s for s in SURFACES if inputs.get(s) == "commanded")
         return Recording(commanded, None if half is None else float(half) / NORMAL_95)
-    if OURS not in columns:
+    if OWN_COLUMN not in columns:
         return Recording()
     commanded = tuple(s for s in SURFACES if f"{s}_rad" in columns and not _measured(columns, s))
-    fix_times_s = columns["t_s"][np.isfinite(columns[GPS])] if GPS in columns else np.empty(0)
+    fix_times_s = (
+        columns["t_s"][np.isfinite(columns[GPS_COLUMN])] if GPS_COLUMN in columns else np.empty(0)
+    )
     checked = len(fix_times_s) > 0 and float(np.ptp(fix_times_s)) >= GPS_SPAN_S
     return Recording(commanded, 0.0 if checked else None)
 
@@ -56,6 +58,6 @@ def _measured(columns: Mapping[str, Array], surface: str) -> bool:
     if len(known) < len(pots):
         return False
     pot = known[0] if len(known) == 1 else 0.5 * (known[0] - known[1])
-    near = np.abs(columns[f"{surface}_rad"] - pot) < SAME_RAD
+    near = np.abs(columns[f"{surface}_rad"] - pot) < SAME_ANGLE_RAD
     seen = np.isfinite(columns[f"{surface}_rad"])
-    return bool(np.sum(near & seen) >= MOSTLY * np.sum(seen))
+    return bool(np.sum(near & seen) >= MATCHING_SHARE * np.sum(seen))

@@ -195,9 +195,9 @@ class _Outputs:
         if self.responses is None:
             return
         rests = [
-            np.sum((problem.measured(k) - r.y) ** 2, axis=1) for k, r in enumerate(self.responses)
+            np.sum(problem.residual(k, r.y) ** 2, axis=1) for k, r in enumerate(self.responses)
         ]
-        self.weight = problem.samples / np.maximum(np.sum(rests, axis=0), 1e-300)
+        self.weight = problem.counts / np.maximum(np.sum(rests, axis=0), 1e-300)
         H = np.diag(problem.prior_precision)
         for k, r in enumerate(self.responses):
             own = problem.columns(k)

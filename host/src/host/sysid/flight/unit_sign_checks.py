@@ -13,17 +13,23 @@ import numpy as np
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.sysid.flight.data_finding import HINT, Finding
-from host.sysid.flight.kinematic_checks import BLOCK_S, FEWEST, SURE, block_means, consistent
+from host.sysid.flight.kinematic_checks import (
+    BLOCK_S,
+    FEWEST,
+    SIGN_CORRELATION,
+    block_means,
+    consistent,
+)
 
 BOUNDED = ("alpha_rad", "beta_rad", "theta_rad")
 DOUBTFUL_RAD = 1.0  # of such an angle in flight, and of a surface at any moment
 IDLE_RAD = 0.0035  # a surface that swings less between its ends excites nothing
-STRONG = 10.0  # deviations
+SIGN_DEVIATIONS = 10.0  # deviations
 WITHOUT_GRAVITY = 0.5  # of the size: with less along z, weight is not in it
 DENSITY = (0.4, 1.6)
 STATIC_PA = (2e4, 1.2e5)
 THROTTLE = (-0.2, 1.2)
-PITOT = (0.5, 2.0)
+PRESSURE_RATIO = (0.5, 2.0)
 # Left side, regressors beside the surface, expected sign: elevator positive trailing edge down.
 SURFACES = {
     "elevator_rad": ("q_radps", ("alpha_rad", "q_radps"), -1.0, "pitch the nose up"),
@@ -53,12 +59,13 @@ def check(columns: Mapping[str, Array]) -> list[Finding]:
 
 
 def airborne(columns: Mapping[str, Array]) -> tuple[dict[str, Array], float]:
-    """Return the columns in flight, and the time between samples, s."""
+    """Return the columns in flight where they were measured, and the time between samples, s."""
     dt_s = float(columns["t_s"][1] - columns["t_s"][0])
     flying = np.ones(len(columns["t_s"]), dtype=bool)
     if "airspeed_mps" in columns:
         speed = np.abs(columns["airspeed_mps"])
         flying = speed > 0.5 * float(np.median(speed))
+    flying &= ~(columns.get("bridged", np.zeros(len(flying))) > 0.0)
     return {k: v[flying] for k, v in columns.items()}, dt_s
 
 
@@ -145,7 +152,7 @@ def _air(flown: Mapping[str, Array]) -> list[Finding]:
         density = density if DENSITY[0] <= density <= DENSITY[1] else 1.225
         expected = 0.5 * density * float(np.median(flown["airspeed_mps"] ** 2))
         ratio = float(np.median(flown["qbar_pa"])) / max(expected, 1e-9)
-        if not PITOT[0] < ratio < PITOT[1]:
+        if not PRESSURE_RATIO[0] < ratio < PRESSURE_RATIO[1]:
             text = f"qbar_pa is {ratio:.3g} times what airspeed_mps makes of it"
             pair, cause = ("qbar_pa", "airspeed_mps"), f"another unit of one of them: {HINT}"
             findings.append(
@@ -163,7 +170,7 @@ def _forces(means: Mapping[str, Array]) -> list[Finding]:
     ):
         if angle in means and force in means:
             agreement, _ = _correlation(np.diff(means[angle]), np.diff(means[force]))
-            if agreement > SURE:
+            if agreement > SIGN_CORRELATION:
                 text = (
                     f"{angle} and {force} rise together (correlation {agreement:.2f}), where lift"
                     " and side force oppose"
@@ -187,7 +194,7 @@ def _surfaces(means: Mapping[str, Array]) -> list[Finding]:
         beta, *_ = np.linalg.lstsq(X / size, left, rcond=None)
         spread = float(np.sum((left - X / size @ beta) ** 2)) / max(len(left) - X.shape[1], 1)
         own = float(np.linalg.pinv((X / size).T @ (X / size))[0, 0])
-        if expected * beta[0] < -STRONG * np.sqrt(spread * own):
+        if expected * beta[0] < -SIGN_DEVIATIONS * np.sqrt(spread * own):
             text = (
                 f"{surface} positive seems to {wrong}, against our sign (elevator trailing edge"
                 " down, rudder trailing edge left, aileron rolls right)"

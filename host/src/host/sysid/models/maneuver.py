@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.arrays import Array
+from host.arrays import Array, BoolArray
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 
@@ -34,6 +34,10 @@ class Maneuver:
         State rates where they were measured; None lets a method differentiate.
     name : str
         What the report calls it.
+    sampled : Array or None, shape (samples, n_outputs)
+        At which samples each output was measured; between them a line stands. None: at all.
+    resolution : Array or None, shape (n_outputs,)
+        Step of each output's numbers, 0 where none is known.
 
     Raises
     ------
@@ -47,6 +51,8 @@ class Maneuver:
     outputs: Array
     rates: Array | None = None
     name: str = "maneuver"
+    sampled: BoolArray | None = None
+    resolution: Array | None = None
 
     def __post_init__(self) -> None:
         for label in ("inputs", "outputs", "rates"):
@@ -75,6 +81,10 @@ class Maneuver:
                     f"{self.name}: {len(array)} samples of {label}, {len(self.outputs)} of outputs"
                 )
             object.__setattr__(self, label, array)
+        if self.sampled is not None and self.sampled.shape != self.outputs.shape:
+            raise IdentificationError(
+                f"{self.name}: sampled is {self.sampled.shape}, outputs {self.outputs.shape}"
+            )
         if len(self.outputs) < 8:
             raise IdentificationError(
                 f"{self.name}: {len(self.outputs)} samples, at least 8 are needed"
@@ -86,6 +96,11 @@ class Maneuver:
     def samples(self) -> int:
         """Number of samples."""
         return len(self.outputs)
+
+    @property
+    def held(self) -> bool:
+        """Whether an output was measured at some of the samples only."""
+        return self.sampled is not None and not bool(self.sampled.all())
 
     @property
     def time_s(self) -> Array:

@@ -262,7 +262,7 @@ def _data(problem: OutputProblem, responses: Sequence[Response], block_s: float)
             whole = np.zeros((len(own), size))
             whole[:, problem.columns(number)] = own
             slopes.append(whole)
-            left = problem.measured(number)[j] - response.y[j]
+            left = problem.residual(number, response.y)[j]
             residuals.append(block_means(left[:, None], block)[:, 0])
         found.append(_Data(residuals, slopes, added))
     return found

@@ -210,7 +210,7 @@ def _evaluate(
     residuals: list[Array] = []
     whitened: list[Array] = []
     for number, response in enumerate(responses):
-        residual = problem.measured(number) - response.y
+        residual = problem.residual(number, response.y)
         if not np.isfinite(residual).all():
             return None
         residuals.append(residual)
@@ -219,8 +219,8 @@ def _evaluate(
     prior = 0.5 * float(np.sum(problem.prior_precision * (theta - problem.prior_mean) ** 2))
     known = problem.known_variance if variance is None else variance
     open_ = np.isnan(known)
-    estimated = np.maximum(squares / problem.samples, problem.least_variance)
-    cost = 0.5 * problem.samples * float(np.sum(np.log(estimated[open_])))
+    estimated = np.maximum(squares / problem.counts, problem.least_variance)
+    cost = 0.5 * float(np.sum((problem.counts * np.log(estimated))[open_]))
     cost += 0.5 * float(np.sum((squares / known)[~open_]))
     estimated = np.where(open_, estimated, known)
     if not np.isfinite(cost):

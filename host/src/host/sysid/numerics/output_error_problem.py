@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.arrays import Array, IntArray
+from host.arrays import Array, BoolArray, IntArray
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import EntryTable, LinearModel
@@ -36,6 +36,7 @@ class Response:
 class _Part:
     drive: Array
     measured: Array
+    missing: BoolArray | None  # outputs at samples at which they were not measured, (p, samples)
     index: IntArray  # of the columns of this maneuver in the whole vector
     dt_s: float
 
@@ -53,9 +54,11 @@ class OutputProblem:
     Attributes
     ----------
     least_variance : Array, shape (p,)
-        Below it an estimated noise variance is rounding error.
+        Below it an estimated noise variance is rounding error, or that of the numbers' step.
     known_variance : Array, shape (p,)
         Of the noise of outputs for which the model states it; NaN where it is estimated.
+    counts : Array, shape (p,)
+        Samples at which each output was measured.
 
     Raises
     ------
@@ -88,6 +91,7 @@ class OutputProblem:
                 _Part(
                     drive=np.ascontiguousarray(np.hstack(columns)),
                     measured=np.ascontiguousarray(maneuver.outputs.T),
+                    missing=~np.asarray(maneuver.sampled).T if maneuver.held else None,
                     index=index.astype(np.int64),
                     dt_s=maneuver.dt_s,
                 )
@@ -148,6 +152,14 @@ class OutputProblem:
         self.least_variance = 1e-20 * np.maximum(power, 1e-30)  # of an output that fits perfectly
         noise = dict(model.known_noise)
         self.known_variance = np.array([noise.get(y, np.nan) ** 2 for y in model.outputs])
+        # A uniform step is noise of variance step^2 / 12 (Widrow & Kollar, Quantization Noise).
+        steps = [m.resolution for m in self.maneuvers if m.resolution is not None]
+        if steps:
+            self.least_variance = np.maximum(self.least_variance, np.max(steps, axis=0) ** 2 / 12.0)
+        self.counts = np.full(len(model.outputs), float(self.samples))
+        for part in self._parts:
+            if part.missing is not None:
+                self.counts -= np.sum(part.missing, axis=1)
         self.lower, self.upper, self.prior_mean, self.prior_precision = self._limits()
 
     def _limits(self) -> tuple[Array, Array, Array, Array]:
@@ -174,6 +186,19 @@ class OutputProblem:
     def measured(self, maneuver: int) -> Array:
         """Return the measured outputs of a maneuver, shape (p, samples)."""
         return self._parts[maneuver].measured
+
+    def residual(self, maneuver: int, y: Array) -> Array:
+        """Return measured less simulated outputs, (p, samples); zero where nothing was measured."""
+        result = self._parts[maneuver].measured - y
+        missing = self._parts[maneuver].missing
+        if missing is not None:
+            result[missing] = 0.0
+        return np.asarray(result)
+
+    def seen(self, maneuver: int, output: int) -> BoolArray | slice:
+        """Return at which samples of a maneuver an output was measured."""
+        missing = self._parts[maneuver].missing
+        return slice(None) if missing is None else ~missing[output]
 
     def first_guess(self) -> Array:
         """Return start values: the model's, and first measured samples as initial states."""
@@ -233,6 +258,8 @@ class OutputProblem:
             for row, output_slope in enumerate(CD_slopes):
                 slope[row] += z[:, : n + m] @ output_slope
             self._delay(y, slope, local, part.dt_s)
+            if part.missing is not None:
+                slope[part.missing] = 0.0  # what was not measured tells nothing
             result.append(Response(y, slope))
         return result
 

@@ -122,6 +122,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         compatibility=agreement if known is not None and how.corrections else None,
         instrument=instrument,
         findings=findings,
+        resolution=read.resolution,
     )
     flight = replace(flight, delays_open=flight.delays_open and how.delays)
     return PreparedFlight(flight, agreement, tuple(notes))
