@@ -190,3 +190,31 @@ def test_delays_that_the_sensors_tell_are_not_taken_out_either() -> None:
     told = [[c.name for c in one.linear[0].corrections] for one in both]
     assert "vane_delay_s" in told[0]
     assert "vane_delay_s" not in told[1]
+
+
+def test_known_constants_of_a_model_file_are_printed(
+    pitching: pd.DataFrame, tmp_path: Path
+) -> None:
+    """The start is known here, and so is the bias: alpha is measured about its trim."""
+    path = tmp_path / "m.toml"
+    path.write_text(
+        """states = ["alpha_rad", "q_radps"]
+inputs = ["elevator_rad"]
+outputs = ["alpha_rad", "q_radps"]
+A = [["Z_alpha", 1.0], ["M_alpha", "M_q"]]
+B = [["Z_de"], ["M_de"]]
+delays = []
+initial_states = { alpha_rad = 0.06, q_radps = 0.0 }
+state_biases = { alpha_rad = 0.36, q_radps = 4.8 }
+noise = { alpha_rad = 2e-4, q_radps = 2e-4 }
+"""
+    )
+    found = host.identify(pitching, models=path)
+    held(found, SHORT_PERIOD)
+    text = found.to_text()
+    assert (
+        "known: bias_rate.alpha_rad 0.36, bias_rate.q_radps 4.8, initial.alpha_rad 0.06,"
+        " initial.q_radps 0, noise.alpha_rad 0.0002, noise.q_radps 0.0002"
+    ) in text
+    assert '"bias_rate.q_radps": 4.8' in found.to_json()
+    assert "constants of each maneuver" not in text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.flight.linear_estimator import Answer
+from host.sysid.models.model_constants import known_constants
 
 IN_A_LINE = 4  # maneuvers
 # Half-width over value from which a constant only trades with another: without the bank angle the
@@ -34,8 +35,5 @@ def constant_lines(answer: Answer) -> list[str]:
             label = f"{constant} {unit}".rstrip() if first == 0 else ""
             row = "".join(f"{x:>22s}" for x in values[first : first + IN_A_LINE])
             lines.append(f"    {label:30s}{row}")
-    known = [f"initial.{name} {value:g}" for name, value in answer.model.known_starts]
-    known += [f"noise of {name} {sd:g}" for name, sd in answer.model.known_noise]
-    if known:
-        lines.append(f"  known: {', '.join(known)}")
-    return lines
+    known = [f"{name} {value:g}" for name, value in known_constants(answer.model).items()]
+    return [*lines, f"  known: {', '.join(known)}"] if known else lines

@@ -19,6 +19,7 @@ from host.sysid.flight.linear_estimator import Answer
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
 from host.sysid.flight.reconstructed_flight import maneuver_name
 from host.sysid.models.modal_analysis import Mode
+from host.sysid.models.model_constants import known_constants
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
@@ -107,6 +108,7 @@ def answer_document(
             }
             for k, name in enumerate(result.names)
         },
+        "known_constants": known_constants(answer.model),
         "delays_s": {
             name: {"value": value, "half_width": width}
             for name, (value, width) in answer.delays.items()

@@ -24,7 +24,7 @@ from host.arrays import Array
 from host.files.quantities import Quantity
 from host.files.user_text import shown
 from host.sysid.identification_error import IdentificationError
-from host.sysid.models.state_space_model import CONSTANT, Term
+from host.sysid.models.state_space_model import CONSTANT, LinearModel, Term
 
 OWN = "own"
 _NAME = re.compile(r"[A-Za-z_]\w*")
@@ -136,6 +136,26 @@ def with_constant_input(
             matrices[label][signals.index(name), column] += value
         terms += [Term(label, signals.index(name), column, by) for name, by in kind.shared]
     return Inputs(names, matrices["B"], matrices["D"], tuple(terms))
+
+
+def known_constants(model: LinearModel) -> dict[str, float]:
+    """Return every constant that the model states as a number, by the name of a free one.
+
+    ``bias_rate`` of a state's equation, ``bias`` of an output, ``initial`` state, ``noise`` of an
+    output.
+    """
+    found: dict[str, float] = {}
+    if CONSTANT in model.inputs:
+        column = model.inputs.index(CONSTANT)
+        for kind, label, names in (("bias_rate", "B", model.states), ("bias", "D", model.outputs)):
+            values = getattr(model, label)[:, column]
+            found |= {
+                f"{kind}.{name}": float(v)
+                for name, v in zip(names, values, strict=True)
+                if v != 0.0
+            }
+    found |= {f"initial.{state}": value for state, value in model.known_starts}
+    return found | {f"noise.{output}": sd for output, sd in model.known_noise}
 
 
 def _only(value: Mapping[str, object], signals: Sequence[str], where: str) -> None:
