@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from host.aircraft.file import FOLDER as AIRFRAMES
 from host.cli import main
 from host.sysid import Maneuver
 from host.sysid.flight.free_simulation import free_runs, frozen_at
@@ -14,6 +15,7 @@ from host.sysid.flight.window_prediction import window_errors
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import model_from
 from host.sysid.models.theil_inequality import theil_inequality
+from host.twin.virtual import virtual_flight
 from scipy.signal import lsim
 
 import host
@@ -189,7 +191,7 @@ def test_the_verb_prints_free_and_one_step_apart(
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ('kind = "linear"\n', "of kind 'linear', expected a linear model"),
+        ('kind = "linear"\n', "of kind 'linear', expected a linear model or an aircraft"),
         ("nothing", "not TOML|cannot be read|expected"),
     ],
 )
@@ -204,3 +206,17 @@ def test_what_is_no_model_is_refused(tmp_path: Path, content: str, words: str) -
 def test_a_record_without_what_the_model_needs_says_which(saved: Path) -> None:
     with pytest.raises(IdentificationError, match="needs q_radps"):
         host.predict(saved, recorded(2).drop(columns=["q_radps"]))
+
+
+def test_an_aircraft_file_predicts_both_axes() -> None:
+    """The aircraft that flew: short period and dutch roll come out of its file."""
+    flight = virtual_flight("calm", 3, chain="none")
+    found = host.predict(AIRFRAMES / "ultrastick25e.toml", flight.table, aircraft="ultrastick25e")
+    [simulation] = found.simulations
+    along, across = simulation.models
+    assert (along.label, across.label) == ("longitudinal", "lateral")
+    nrmse = {f.name: f.nrmse for m in (along, across) for f in m.fits}
+    assert nrmse["q_radps"] < 0.15
+    assert nrmse["p_radps"] < 0.15
+    assert nrmse["r_radps"] < 0.25
+    assert along.windows[1].relative[along.model.outputs.index("q_radps")] < 0.2

@@ -12,9 +12,10 @@ from host.sysid.flight.data_finding import accepted_checks
 from host.sysid.flight.free_simulation import frozen_at
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
-from host.sysid.models.state_space_model import CONSTANT
+from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.toml_document import read_document
 from host.sysid.pipeline.aircraft_data import aircraft_data
+from host.sysid.pipeline.aircraft_motion import aircraft_models
 from host.sysid.pipeline.arguments import (
     chosen_stretches,
     listed,
@@ -100,7 +101,8 @@ def predict(
     Parameters
     ----------
     model : path
-        Of `host identify --save-model`, or a model file; its start values are held.
+        Of `host identify --save-model`, or a model file, whose start values are held; of
+        coefficients the aircraft file, linearised at its trim.
     flights : path, FlightLog, DataFrame or list of them
     aircraft, calibration, mapping, maneuvers, stretches, from_s, to_s, corrections, accept
         As in `host.identify`.
@@ -115,15 +117,8 @@ def predict(
     """
     path = path_of("model", model)
     assert path is not None
-    kind = read_document(path).get("kind")
-    if kind is not None:
-        raise IdentificationError(
-            f"{path}: of kind '{kind}', expected a linear model, as `host identify --save-model`"
-            " writes it"
-        )
-    own = read_model(path)
-    frozen = frozen_at(own, own.start)
-    signals = {*own.inputs, *own.outputs} - {CONSTANT}
+    models = _saved_models(path)
+    signals = {name for _, m in models for name in (*m.inputs, *m.outputs)} - {CONSTANT}
     sources = listed_flights(flights)
     count = len(sources)
     of_each = zip(
@@ -146,7 +141,20 @@ def predict(
         )
         known = aircraft_data(aircraft, made_by) if aircraft is not None else None
         ready = prepare(source, how, known)
-        models = [(own.name, frozen)]
         notes = (*(finding.line for finding in ready.flight.findings), *ready.notes)
         found.append(simulate(models, ready.flight, notes, constants=constants))
     return Prediction(str(path), tuple(found), constants)
+
+
+def _saved_models(path: Path) -> list[tuple[str, LinearModel]]:
+    """Return the models of a file without free parameters: one, or both axes of an aircraft."""
+    kind = read_document(path).get("kind")
+    if kind == "nonlinear":
+        return aircraft_models(path)
+    if kind is not None:
+        raise IdentificationError(
+            f"{path}: of kind '{kind}', expected a linear model or an aircraft, as `host identify"
+            " --save-model` writes them"
+        )
+    own = read_model(path)
+    return [(own.name, frozen_at(own, own.start))]

@@ -12,7 +12,6 @@ from host.arrays import Array
 from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
-from host.sysid.coefficients.coefficient_modes import LinearSystem
 from host.sysid.flight.free_simulation import FreeRun, fits_of, free_runs, frozen_model
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.flight.maneuver_selection import excited_axes, merge_overlapping
@@ -219,23 +218,28 @@ def identified_models(
         yield label, frozen_model(answer.model, answer.result)
     if direct:
         for name, system in direct.systems.items():
-            yield f"{direct.template}_{name}", _linear_model(name, system)
+            yield (
+                f"{direct.template}_{name}",
+                motion_model(name, system.states, system.inputs, system.A, system.B),
+            )
 
 
-def _linear_model(name: str, system: LinearSystem) -> LinearModel:
-    """Return the linear system of the coefficients as a model; every state is an output."""
-    n, m = len(system.states), len(system.inputs)
+def motion_model(
+    name: str, states: tuple[str, ...], inputs: tuple[str, ...], A: Array, B: Array
+) -> LinearModel:
+    """Return linear motion as a model; every state is an output, kinematics have no bias."""
+    n, m = len(states), len(inputs)
     return LinearModel(
         name=name,
-        states=system.states,
-        inputs=system.inputs,
-        outputs=system.states,
-        A=system.A,
-        B=system.B,
+        states=states,
+        inputs=inputs,
+        outputs=states,
+        A=A,
+        B=B,
         C=np.eye(n),
         D=np.zeros((n, m)),
-        state_biases=tuple(s for s in system.states if s not in KINEMATIC),
-        initial_states=system.states,
+        state_biases=tuple(s for s in states if s not in KINEMATIC),
+        initial_states=states,
         hold="foh",
     )
 
