@@ -6,11 +6,12 @@ drive the residual (`numerics.input_coherence`), its power above noise counts in
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from host.arrays import Array
+from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.numerics.input_coherence import InputCoherence
 
@@ -18,13 +19,35 @@ REPORTED_FACTOR = 1.05  # times wider
 COUNTED = "driven_by_inputs"  # among the details of a result that was widened
 
 
-def inflate_by_coherence(result: FitResult, found: InputCoherence | None) -> FitResult:
+@dataclass(frozen=True)
+class NoiseExcess:
+    """A residual that is larger than the noise and gust model of its fit predicts.
+
+    Attributes
+    ----------
+    power : dict
+        Output to the power of the residual over what is predicted.
+    predicted : Array, shape (P, P)
+        Covariance of output error in the noise that is predicted.
+    """
+
+    power: dict[str, float]
+    predicted: Array
+
+
+def inflate_by_coherence(
+    result: FitResult,
+    found: InputCoherence | None,
+    excess: NoiseExcess | None = None,
+) -> FitResult:
     """Return the result with intervals that hold what the inputs drive beside the model.
 
-    They are widened where that is suspected at 10 %, and it is said at 1 %.
+    They are widened where that is suspected at 10 %, and it is said at 1 %. The bias by the error
+    that the residual looks most like is a consider covariance.
 
     Output error is widened to the covariance of that residual, other methods by its ratio to the
-    covariance in noise alone; no interval becomes narrower. The degrees of freedom are those of the
+    covariance in noise alone, or in the noise that they predict: slow gusts beyond it widen what
+    rests on slow motion. No interval becomes narrower. The degrees of freedom are those of the
     columns that showed it.
 
     Parameters
@@ -32,8 +55,10 @@ def inflate_by_coherence(result: FitResult, found: InputCoherence | None) -> Fit
     result : FitResult
     found : InputCoherence or None
         Of its free simulation. Nothing changes without, or if no output is coherent.
+    excess : NoiseExcess, optional
+        Outputs whose residual is larger than the fit's own noise and gust model predicts.
     """
-    if found is None or not found.suspected or COUNTED in result.details:
+    if found is None or not (found.suspected or excess) or COUNTED in result.details:
         return result
     count = len(result.model.parameter_names)
     own = np.diag(result.covariance)[:count]
@@ -41,25 +66,33 @@ def inflate_by_coherence(result: FitResult, found: InputCoherence | None) -> Fit
     if result.residual_kind == "output":
         ratio = wide / np.maximum(own, 1e-300)
     else:
-        ratio = wide / np.maximum(np.diag(found.covariance())[:count], 1e-300)
+        alone = found.covariance() if excess is None else excess.predicted
+        ratio = wide / np.maximum(np.diag(alone)[:count], 1e-300)
     factor = np.ones(len(result.covariance))
     factor[:count] = np.where(own > 0.0, np.sqrt(np.maximum(ratio, 1.0)), 1.0)
+    covariance = result.covariance * np.outer(factor, factor)
+    shift = np.where(own > 0.0, found.shift[:count], 0.0)
+    covariance[:count, :count] += consider_covariance(shift[None])
+    factor[:count] = np.sqrt(np.diag(covariance)[:count] / np.where(own > 0.0, own, 1.0))
+    factor[:count] = np.where(own > 0.0, factor[:count], 1.0)
     freedom = result.degrees_of_freedom.copy()
-    columns = [c for n, c in zip(found.outputs, found.columns, strict=True) if n in found.suspected]
+    pairs = zip(found.outputs, found.columns, strict=True)
+    columns = [float(c) for n, c in pairs if n in found.suspected]
     widened = np.flatnonzero(factor > 1.0)
-    freedom[widened] = np.minimum(freedom[widened], max(min(columns), 1.0))
+    freedom[widened] = np.minimum(freedom[widened], max(min(columns, default=np.inf), 1.0))
     return replace(
         result,
-        covariance=result.covariance * np.outer(factor, factor),
+        covariance=covariance,
         degrees_of_freedom=freedom,
-        warnings=(*result.warnings, *_lines(result, found, factor)),
+        warnings=(*result.warnings, *_lines(result, found, factor, excess)),
         details={**result.details, COUNTED: factor},
     )
 
 
-def _lines(result: FitResult, found: InputCoherence, factor: Array) -> list[str]:
-    if not found.coherent:
-        return []
+def _lines(
+    result: FitResult, found: InputCoherence, factor: Array, excess: NoiseExcess | None
+) -> list[str]:
+    """Return what is wrong and how much wider intervals are; both reasons widen as one."""
     widened = ", ".join(
         f"{p.name} {times:.1f}"
         for p, times in zip(result.model.parameters, factor, strict=False)
@@ -67,4 +100,15 @@ def _lines(result: FitResult, found: InputCoherence, factor: Array) -> list[str]
     )
     like = f", most like {found.likely_error}" if found.likely_error else ""
     times = f"intervals widened {widened} times" if widened else "intervals hold it already"
-    return [f"the inputs drive what the fit leaves of {', '.join(found.coherent)}{like}: {times}"]
+    lines = []
+    if found.coherent:
+        lines.append(
+            f"the inputs drive what the fit leaves of {', '.join(found.coherent)}{like}: {times}"
+        )
+    if excess:
+        larger = ", ".join(f"{name} {np.sqrt(power):.1f}" for name, power in excess.power.items())
+        lines.append(
+            f"free simulation misses by more than the fit's own gusts and noise allow (rms {larger}"
+            f" times): {times}"
+        )
+    return lines

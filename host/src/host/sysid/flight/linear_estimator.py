@@ -44,6 +44,7 @@ from host.sysid.flight.linear_model import (
 )
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade, detect_maneuvers, grade
 from host.sysid.flight.maneuver_selection import excited_axes, merge_overlapping
+from host.sysid.flight.noise_model_limits import excess_over_noise_model
 from host.sysid.flight.prediction_limits import Prediction, predictions
 from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
@@ -275,7 +276,8 @@ class LinearEstimator:
         scattered = inflate_covariance(e.fit, maneuver_agreement(e.fit))
         statistical = replace(scattered, estimate=e.estimate)
         coherence = residual_coherence(e.model, e.estimate, e.maneuvers)
-        statistical = inflate_by_coherence(statistical, coherence)
+        excess = excess_over_noise_model(e.model, statistical, e.maneuvers, e.trim.airspeed_mps)
+        statistical = inflate_by_coherence(statistical, coherence, excess)
         shifts: tuple[ShiftedEstimate, ...] = (
             () if e.departure is None else (e.departure.remainder,)
         )

@@ -91,6 +91,11 @@ class InputCoherence:
         """What the model lacks or has wrong, by its signature; empty if none stands out."""
         return self.signature.name if self.signature.p_value < 0.5 * SIGNIFICANCE else ""
 
+    @property
+    def shift(self) -> Array:
+        """Bias of the estimate by the error that is suspected, (P,); zero without."""
+        return self.signature.shift * float(self.signature.p_value < 0.5 * SUSPICION)
+
     def dominated(self, ratio: float) -> tuple[str, ...]:
         """Return the coherent outputs whose power ratio is at least so large."""
         powers = dict(zip(self.outputs, self._weights(), strict=True))
@@ -124,10 +129,8 @@ class InputCoherence:
         same: the score of that output has `ratio` times its variance (as by a Birge ratio).
         """
         inverse = self.covariance()
-        score = np.diag(self.prior_precision) + np.einsum(
-            "j,jkl->kl", self._weights(), self.information
-        )
-        return np.asarray(inverse @ score @ inverse)
+        weighed = np.einsum("j,jkl->kl", self._weights(), self.information)
+        return np.asarray(inverse @ (np.diag(self.prior_precision) + weighed) @ inverse)
 
 
 @dataclass(frozen=True)
@@ -266,6 +269,32 @@ def _data(problem: OutputProblem, responses: Sequence[Response], block_s: float)
             residuals.append(block_means(left[:, None], block)[:, 0])
         found.append(_Data(residuals, slopes, added))
     return found
+
+
+def covariance_in_noise(
+    problem: OutputProblem,
+    responses: Sequence[Response],
+    noise: Sequence[ArNoise],
+    variance: Array,
+) -> Array:
+    """Return the covariance of output error in AR noise of block means, (P, P).
+
+    Parameters
+    ----------
+    problem : OutputProblem
+    responses : sequence of Response
+    noise : sequence of ArNoise
+        Of the means of each output.
+    variance : Array, shape (p,)
+        Of their innovations.
+    """
+    total = np.diag(problem.prior_precision)
+    for number, (response, m) in enumerate(zip(responses, problem.maneuvers, strict=True)):
+        own = np.ix_(problem.columns(number), problem.columns(number))
+        for j, memory in enumerate(noise):
+            J = memory.whiten(block_means(response.sensitivities[j], block_length(m.dt_s)))
+            total[own] += J.T @ J / variance[j]
+    return covariance_from_information(total)
 
 
 def block_length(dt_s: float, block_s: float = BLOCK_S) -> int:

@@ -18,6 +18,7 @@ from host.arrays import Array
 from host.sysid.numerics.ar_noise import ArNoise
 
 TAKEN = 1e-4  # of a signature's power that the parameters leave: with less they are the same
+SAME = 1e-3  # of the largest eigenvalue of their correlation: less tells no two apart
 FEWEST_FREEDOM = 30.0  # of the noise along a signature, for a test
 SHOWS = 0.2  # of a signature's information: an output with more shows the error
 
@@ -32,15 +33,19 @@ class SignatureTest:
     p_value : float
         Corrected for the number of signatures.
     ratio : float
-        Mean power of all signatures over that of noise: 1 if the model is right.
+        Mean power over that of noise along all that signatures span: 1 if the model is right.
     outputs : tuple of str
         Those that show it.
+    shift : Array, shape (P,)
+        Of the estimate, had the model this error at the size that the residual shows: the bias of
+        omitted variables, -C J' W z a with signature z and size a (Klein & Morelli, ch. 5).
     """
 
     name: str
     p_value: float
     ratio: float
     outputs: tuple[str, ...]
+    shift: Array
 
 
 @dataclass(frozen=True)
@@ -98,11 +103,13 @@ def signature_test(
     left = np.diag(inner) > TAKEN * np.maximum(np.diag(gram), 1e-300)
     free = left & (_freedom(data, link) >= FEWEST_FREEDOM)
     if not free.any():
-        return SignatureTest("", 1.0, 1.0, ())
+        return SignatureTest("", 1.0, 1.0, (), np.zeros(len(score)))
     inner, power = inner[np.ix_(free, free)], np.diag(inner)[free]
-    squares = (right - link.T @ score)[free] ** 2 / power
-    values = np.linalg.eigvalsh(inner / np.sqrt(np.outer(power, power)))
+    scores = (right - link.T @ score)[free] / np.sqrt(power)
+    squares = scores**2
+    values, vectors = np.linalg.eigh(inner / np.sqrt(np.outer(power, power)))
     values = np.maximum(values, 0.0)
+    known = values > SAME * values[-1]
     different = float(np.sum(np.sqrt(values)) ** 2 / np.sum(values))
     freedom = _freedom(data, link)[free]
     single = special.fdtrc(1.0, freedom, squares)
@@ -112,8 +119,9 @@ def signature_test(
     return SignatureTest(
         name=names[place],
         p_value=float(-np.expm1(different * np.log1p(-min(single[best], 1.0 - 1e-16)))),
-        ratio=float(np.mean(squares)),
+        ratio=float(np.mean((vectors.T @ scores)[known] ** 2 / values[known])),
         outputs=tuple(y for y, part in zip(outputs, share, strict=True) if part > SHOWS),
+        shift=-link[:, place] * scores[best] / np.sqrt(power[best]),
     )
 
 

@@ -1,0 +1,127 @@
+"""Does a free simulation leave more than the fit's own gust and noise model predicts?
+
+Filter error explains what it cannot simulate as moving air. Driven by that air alone, its model
+would miss the measured outputs by a certain rms: more is a model error that the filter followed.
+Errors are drawn at random, constants of each maneuver are fitted to them as to the data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import linalg, special
+
+from host.arrays import Array
+from host.sysid.estimators.coherence_inflation import NoiseExcess
+from host.sysid.estimators.filter_error_gust import gust_model
+from host.sysid.estimators.innovations import PROCESS
+from host.sysid.flight.free_simulation import estimate_with_constants, weighted_fit
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
+from host.sysid.numerics.filter_problem import discrete_noise
+from host.sysid.numerics.input_coherence import (
+    HIGHEST_ORDER,
+    block_length,
+    block_means,
+    covariance_in_noise,
+)
+from host.sysid.numerics.output_error_problem import OutputProblem
+
+SIGNIFICANCE = 0.01
+DRAWS, DRAW_SEED = 100, 2
+
+
+def excess_over_noise_model(
+    model: LinearModel, result: FitResult, maneuvers: Sequence[Maneuver], airspeed_mps: float
+) -> NoiseExcess | None:
+    """Return the outputs whose residual is larger than predicted; None if there is none.
+
+    Parameters
+    ----------
+    model : LinearModel
+        As fitted, without the gust.
+    result : FitResult
+        Of filter error; of other methods nothing is returned.
+    maneuvers : sequence of Maneuver
+        That were fitted.
+    airspeed_mps : float
+        Of the trim, for the gust's time scale.
+
+    1 % of right models name any output.
+    """
+    process = [n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS)]
+    problem = OutputProblem(model, maneuvers)
+    theta = estimate_with_constants(problem, result.estimate)
+    responses = problem.respond(theta) if process and theta is not None else None
+    if responses is None:
+        return None
+    wide = model if set(process) <= set(model.states) else gust_model(model, airspeed_mps)
+    count, outputs = problem.n_common, len(model.outputs)
+    observed, samples = np.zeros(outputs), 0
+    squares = np.zeros((DRAWS, outputs))
+    moments = np.zeros((outputs, HIGHEST_ORDER + 1, HIGHEST_ORDER + 1))
+    rng = np.random.default_rng(DRAW_SEED)
+    for number, (maneuver, response) in enumerate(zip(maneuvers, responses, strict=True)):
+        block = block_length(maneuver.dt_s)
+        left = block_means((problem.measured(number) - response.y).T, block)
+        slopes = np.stack([block_means(J[:, count:], block) for J in response.sensitivities])
+        drawn = _drawn_errors(rng, wide, result, process, maneuver.dt_s, block, len(left))
+        for j, errors in enumerate(drawn):
+            moments[j] += sum(
+                lagged_moments([e], [np.zeros((len(e), 0))], HIGHEST_ORDER) for e in errors.T
+            )
+        weight = 1.0 / np.maximum(np.mean(drawn**2, axis=(1, 2)), 1e-300)
+        drawn -= slopes @ weighted_fit(drawn, slopes, weight)
+        observed += np.sum(left**2, axis=0)
+        squares += np.sum(drawn**2, axis=1).T
+        samples += len(left)
+    observed, squares = observed / samples, squares / samples
+    mean, spread = np.mean(squares, axis=0), np.maximum(np.var(squares, axis=0), 1e-300)
+    shape = mean**2 / spread
+    limit = special.gammaincinv(shape, (1.0 - SIGNIFICANCE) ** (1.0 / outputs)) * mean / shape
+    power = {
+        name: float(observed[j] / mean[j])
+        for j, name in enumerate(model.outputs)
+        if observed[j] > limit[j]
+    }
+    if not power:
+        return None
+    fitted = [fit_ar(m, HIGHEST_ORDER) for m in moments]
+    count = DRAWS * (samples - HIGHEST_ORDER * len(maneuvers))
+    noise = [ArNoise.from_coefficient(coefficient) for coefficient, _ in fitted]
+    variance = np.array([innovation / count for _, innovation in fitted])
+    return NoiseExcess(power, covariance_in_noise(problem, responses, noise, variance))
+
+
+def _drawn_errors(
+    rng: np.random.Generator,
+    wide: LinearModel,
+    result: FitResult,
+    process: Sequence[str],
+    dt_s: float,
+    block: int,
+    means: int,
+) -> Array:
+    """Return outputs of a model that process noise alone drives, and their noise, (p, n, draws)."""
+    A, _, C, _ = wide.matrices(result.estimate[: len(wide.parameters)])
+    index = [wide.states.index(s) for s in process]
+    intensity = np.zeros(len(A))
+    intensity[index] = np.asarray(result.details["process_deviation"]) ** 2
+    F, covariance = discrete_noise(A, intensity, block * dt_s)
+    value, vector = np.linalg.eigh(covariance)
+    root = vector * np.sqrt(np.maximum(value, 0.0))
+    x = np.zeros((len(A), DRAWS))
+    gusts = [k for k, s in enumerate(wide.states) if s.startswith("gust")]
+    if gusts:  # the air moves already when the record begins
+        own = np.ix_(gusts, gusts)
+        steady = linalg.solve_continuous_lyapunov(A[own], -np.diag(intensity[gusts]))
+        x[gusts] = linalg.cholesky(steady, lower=True) @ rng.standard_normal((len(gusts), DRAWS))
+    deviation = np.asarray(result.details["noise_deviation"]) / np.sqrt(block)
+    errors = rng.standard_normal((len(C), means, DRAWS)) * deviation[:, None, None]
+    for k in range(means):
+        errors[:, k] += C @ x
+        x = F @ x + root @ rng.standard_normal((len(A), DRAWS))
+    return np.asarray(errors)
