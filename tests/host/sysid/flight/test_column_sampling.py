@@ -1,6 +1,7 @@
 """Quantised, held and clean columns are data; a sensor that must move and does not is stuck."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -158,3 +159,19 @@ def test_spoilt_columns_give_the_unspoilt_estimates() -> None:
             true[case] += list(np.abs(estimate - truth) <= half)
     assert min(np.mean(x) for x in near.values()) > 0.95, near
     assert min(np.mean(x) for x in true.values()) > 0.84, true
+
+
+def test_intervals_hold_beside_a_clean_column() -> None:
+    """Its information drowned that of all others: 73 to 93 % held, none of M_alpha's."""
+    start = {name: 0.8 * value for name, value in TRUE.items()}
+    model = replace(longitudinal(TRIM), name="own")
+    model = model.with_start([start.get(p.name, p.start) for p in model.parameters])
+    clean = record(0, noise=0.0)
+    true = []
+    for names in (("alpha_rad",), ("theta_rad", "airspeed_mps"), ("q_radps",), tuple(NOISE)):
+        for seed in range(2):
+            table = record(seed).assign(**{name: clean[name] for name in names})
+            found = host.identify(table, models=model, stretches=[(0.0, 39.9)]).linear[0].result
+            half = found.half_width()
+            true += [abs(found.value(n) - x) <= half[found.index(n)] for n, x in TRUE.items()]
+    assert np.mean(true) > 0.9

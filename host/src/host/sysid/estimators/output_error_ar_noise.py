@@ -181,7 +181,8 @@ def _innovation_variances(
             updated[j] = squares / max(problem.counts[j] - share, 1.0)
         updated = np.where(np.isnan(problem.known_variance), updated, problem.known_variance)
         converged = bool(np.all(np.abs(updated - variance) < 1e-6 * updated))
-        variance = np.maximum(updated, 1e-300)
+        floor = np.where(np.isnan(problem.known_variance), problem.least_variance, 0.0)
+        variance = np.maximum(updated, np.maximum(floor, 1e-300))
         if converged:
             break
     return variance
@@ -224,7 +225,7 @@ def _fit_ar_models(
                 selected[j] = choose_order(moments, count, criterion=criterion)
             order = selected[j]
             coefficient, innovation = fit_ar(moments[: order + 1, : order + 1], order)
-            variance[j] = max(innovation / count, 1e-300)
+            variance[j] = max(innovation / count, problem.least_variance[j], 1e-300)
             old = memory[j].coefficient
             if len(old) == order:
                 change = max(change, float(np.max(np.abs(coefficient - old), initial=0.0)))

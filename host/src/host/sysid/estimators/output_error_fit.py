@@ -168,12 +168,22 @@ def coloured_output_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array
     """
     white = fit.covariance_white
     score_covariance = np.zeros_like(white)
+    # Of a clean column and of a coarse step the residuals do not show the noise that counts.
+    squares = np.sum([np.sum(r**2, axis=1) for r in fit.optimum.residuals], axis=0)
+    unseen = np.where(
+        fit.optimum.variance <= problem.least_variance,
+        fit.optimum.variance - squares / problem.counts,
+        0.0,
+    )
     for number, response in enumerate(fit.optimum.responses):
         columns = problem.columns(number)
         for j, variance in enumerate(fit.optimum.variance):
             seen = problem.seen(number, j)
             residual, slope = fit.optimum.residuals[number][j], response.sensitivities[j]
-            part = coloured_score_covariance(residual[seen], slope[seen]) / variance**2
+            part = coloured_score_covariance(residual[seen], slope[seen])
+            if unseen[j] > 0.0:
+                part += unseen[j] * slope[seen].T @ slope[seen]
+            part /= variance**2
             score_covariance[np.ix_(columns, columns)] += part
     result = white @ score_covariance @ white
     result = 0.5 * (result + result.T)

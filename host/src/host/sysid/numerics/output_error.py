@@ -220,7 +220,10 @@ def _evaluate(
     known = problem.known_variance if variance is None else variance
     open_ = np.isnan(known)
     estimated = np.maximum(squares / problem.counts, problem.least_variance)
-    cost = 0.5 * float(np.sum((problem.counts * np.log(estimated))[open_]))
+    # What a fit leaves below the least variance still counts, as residuals of known noise do.
+    rest = squares / problem.counts / estimated - 1.0
+    least = np.minimum(rest, 0.0)
+    cost = 0.5 * float(np.sum((problem.counts * (np.log(estimated) + least))[open_]))
     cost += 0.5 * float(np.sum((squares / known)[~open_]))
     estimated = np.where(open_, estimated, known)
     if not np.isfinite(cost):

@@ -15,6 +15,10 @@ from host.sysid.numerics.discretisation import discretise
 from host.sysid.numerics.fractional_delay import delay_columns
 from host.sysid.numerics.recursion import propagate, simulate
 
+# Of an output's motion: no column is better than this, nor the model of it. Without noise in one
+# column its information drowned that of all others, and 73 to 93 % of the intervals held.
+CLEAN_SHARE = 1e-3
+
 
 @dataclass(frozen=True, slots=True)
 class Response:
@@ -150,6 +154,8 @@ class OutputProblem:
         self._free_memory: list[list[Array]] = [[] for _ in self._parts]
         power = np.mean(np.square(self._parts[0].measured), axis=1)
         self.least_variance = 1e-20 * np.maximum(power, 1e-30)  # of an output that fits perfectly
+        spread = np.var(np.hstack([part.measured for part in self._parts]), axis=1)
+        self.least_variance = np.maximum(self.least_variance, CLEAN_SHARE**2 * spread)
         noise = dict(model.known_noise)
         self.known_variance = np.array([noise.get(y, np.nan) ** 2 for y in model.outputs])
         # A uniform step is noise of variance step^2 / 12 (Widrow & Kollar, Quantization Noise).
