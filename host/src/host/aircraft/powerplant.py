@@ -10,10 +10,17 @@ import numpy as np
 
 from host.aircraft.airframe import Airframe
 from host.aircraft.file import AircraftError, load_measured
-from host.aircraft.propulsion import RotorInputs, motor_torque, propeller, rotor_history
+from host.aircraft.propulsion import (
+    RotorInputs,
+    motor_torque,
+    propeller,
+    rotor_history,
+    thrust_of_power,
+)
 from host.arrays import Array
 
 Step = Callable[[float, float, float, float], tuple[float, float, float]]
+OfPower = Callable[[Array, Array, Array], Array]
 History = Callable[[RotorInputs, float, float, int], Array]
 SUBSTEPS = 3  # a rotor takes 0.1 s and more to answer; records come at 33 Hz
 START_RADPS = 600.0  # forgotten within half a second
@@ -36,6 +43,9 @@ class Powerplant:
         Unit vector of thrust, body axes.
     hub_m : (3,) Array
         From the nominal CG.
+    of_power : callable, optional
+        From shaft power (W), airspeed and density of a flight to thrust (N), (n,); none where the
+        aircraft file does not describe a propeller.
     """
 
     step: Step
@@ -43,6 +53,12 @@ class Powerplant:
     rotor_kgm2: float
     axis: Array
     hub_m: Array
+    of_power: OfPower | None = None
+
+    @property
+    def present(self) -> bool:
+        """Whether the aircraft file describes a propeller; else thrust is measured or none."""
+        return self.of_power is not None
 
     def run(
         self, throttle: Array, airspeed_mps: Array, density_kgpm3: Array, dt_s: float
@@ -83,6 +99,18 @@ class NoPropulsionError(AircraftError):
     """A measured aircraft without a section [propulsion]."""
 
 
+def without_propeller() -> Powerplant:
+    """Return an aircraft without a known propeller: no thrust, along x through the CG."""
+
+    def nothing(*_: float) -> tuple[float, float, float]:
+        return 0.0, 0.0, 0.0
+
+    def still(inputs: RotorInputs, *_: float) -> Array:
+        return np.zeros((3, len(inputs[0])))
+
+    return Powerplant(nothing, still, 0.0, np.array([1.0, 0.0, 0.0]), np.zeros(3))
+
+
 def powerplant(source: str) -> Powerplant:
     """Return the propeller and motor of an aircraft by name or file.
 
@@ -104,6 +132,7 @@ def powerplant(source: str) -> Powerplant:
         frame.rotor_inertia_kgm2,
         frame.thrust_axis,
         frame.hub_m - frame.cg_m,
+        partial(thrust_of_power, frame),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from host.aircraft.airframe import Airframe, Array
 from host.compiled import compiled_fast, compiled_part
 
+FASTEST_RADPS, BISECTIONS = 4000.0, 40  # 38 000 rpm
 WORTH_COMPILING = 1e5  # steps of the rotor, half a second of Python
 
 
@@ -115,3 +116,26 @@ def rotor_steps(
             speed = max(speed + part_s * (torque - load) / frame.rotor_inertia_kgm2, 0.0)
         result[0, i], result[1, i], result[2, i] = push, speed, torque
     return result
+
+
+def thrust_of_power(
+    frame: Airframe, power_w: Array, axial_mps: Array, density_kgpm3: Array
+) -> Array:
+    """Return the thrust (N) of a rotor that takes a shaft power, settled, each (n,).
+
+    The rotor speed is where the torque of the air times it is the power, by bisection.
+    """
+    d, limit, v = frame.propeller_diameter_m, frame.advance_ratio_max, np.maximum(axial_mps, 0.0)
+    low, high = np.zeros(len(power_w)), np.full(len(power_w), FASTEST_RADPS)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        n = middle / (2.0 * math.pi)
+        advance = np.minimum(v / (n * d), limit)
+        taken = density_kgpm3 * n**3 * d**5 * np.polyval(frame.cp_polynomial, advance)
+        low, high = np.where(taken > power_w, low, middle), np.where(taken > power_w, middle, high)
+    n = 0.5 * (low + high) / (2.0 * math.pi)
+    advance = np.minimum(v / (n * d), limit)
+    stopped = np.maximum(1.0 - limit * n * d / np.maximum(v, 1e-9), 0.0)
+    thrust = density_kgpm3 * n**2 * d**4 * np.polyval(frame.ct_polynomial, advance)
+    drag = 0.5 * density_kgpm3 * v**2 * frame.stopped_drag_area_m2 * stopped
+    return np.asarray(thrust - drag, dtype=np.float64)

@@ -190,7 +190,7 @@ def test_a_term_is_known_by_its_factors() -> None:
         ({"Cm": ["alpha", "CL^2"]}, "lift stands in CD only, as CL^2"),
         ({"Cm": ["alpha", "q*alpha", "alpha*q_hat"]}, "Cm: alpha_q stands there twice"),
         ({"CD": ["alpha", "de^2"]}, "CD: de2 stands there twice"),  # in [beside] too
-        ({"Cn": []}, "no terms for Cn; [rows] needs all six"),
+        ({row: [] for row in ROWS}, "[rows] needs one row or more"),
         ({"CX": ["alpha"]}, "unknown row CL"),
         ({"CW": ["alpha"]}, "unknown row CW"),
         ({"Cm": "alpha"}, "[rows]: expected lines such as"),

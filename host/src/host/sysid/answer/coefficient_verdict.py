@@ -51,6 +51,7 @@ def coefficient_verdict(
         marks[d.name] = wide if d.flagged or d.name in reasons else sharp
     lines = [
         *first_lines(heading, marks, FLAG_SHARE),
+        *(f"  {remark}" for remark in answer.remarks),
         *_flag_lines(answer, marks),
         *_doubt_lines(doubts),
         *_agreement_lines(answer),

@@ -50,6 +50,7 @@ def simulate_noise_free(
     airframe: AirframeData,
     sensors: SensorErrorModel,
     condition: tuple[float, float, float],
+    whole: tuple[bool, bool] = (True, True),
 ) -> tuple[Record, FlightHistory]:
     """Simulate the sensor columns and the history of a gust-free flight with the same surfaces.
 
@@ -63,6 +64,9 @@ def simulate_noise_free(
         Without errors.
     condition : tuple
         Airspeed (m/s), dynamic pressure (Pa), angle of attack (rad).
+    whole : tuple of bool
+        Whether lift and pitch, and side force, roll and yaw, have all their equations. Without, the
+        motion of that axis is the measured one: nothing is known to simulate it by.
 
     Raises
     ------
@@ -79,17 +83,19 @@ def simulate_noise_free(
     )  # slow trim changes are outside the linear model
     de, da, dr = (record.filtered(s[k], high_pass) for k in ("de", "da", "dr"))
     # Short period and lateral motion in wind and body axes (Etkin & Reid, ch. 4).
-    short_period = _simulate(
-        np.array(
-            [
-                [-lift * value("CL_alpha"), 1.0 - lift * value("CL_q") * hat_q],
-                [pitch * value("Cm_alpha"), pitch * value("Cm_q") * hat_q],
-            ]
-        ),
-        np.array([[-lift * value("CL_de")], [pitch * value("Cm_de")]]),
-        de[:, None],
-        record.dt_s,
-    )
+    short_period = np.column_stack([s["alpha"] - alpha_0, s["q"]])
+    if whole[0]:
+        short_period = _simulate(
+            np.array(
+                [
+                    [-lift * value("CL_alpha"), 1.0 - lift * value("CL_q") * hat_q],
+                    [pitch * value("Cm_alpha"), pitch * value("Cm_q") * hat_q],
+                ]
+            ),
+            np.array([[-lift * value("CL_de")], [pitch * value("Cm_de")]]),
+            de[:, None],
+            record.dt_s,
+        )
     scale = {"beta": 1.0, "p": hat_p, "r": hat_p}
     inertia = np.array([[a.ixx_kgm2, -a.ixz_kgm2], [-a.ixz_kgm2, a.izz_kgm2]])
     A, B = np.zeros((4, 4)), np.zeros((4, 2))
@@ -103,7 +109,9 @@ def simulate_noise_free(
         B[0, j] = lift * value(f"CY_{k}")
         moments = qbar * S * b * np.array([value(f"Cl_{k}"), value(f"Cn_{k}")])
         B[1:3, j] = np.linalg.solve(inertia, moments)
-    beta, p, r, phi = _simulate(A, B, np.column_stack([da, dr]), record.dt_s).T
+    beta, p, r, phi = s["beta"], s["p"], s["r"], history.phi_rad
+    if whole[1]:
+        beta, p, r, phi = _simulate(A, B, np.column_stack([da, dr]), record.dt_s).T
     alpha, q = alpha_0 + short_period[:, 0], short_period[:, 1]
     CL = a.mass_kg * GRAVITY_MPS2 / (qbar * S) + value("CL_de") * de
     CL = CL + value("CL_alpha") * short_period[:, 0] + value("CL_q") * q * hat_q

@@ -8,7 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from host.aircraft.mass_properties import AirframeData, airframe_data
-from host.aircraft.powerplant import NoPropulsionError, Powerplant, powerplant
+from host.aircraft.powerplant import (
+    NoPropulsionError,
+    Powerplant,
+    powerplant,
+    without_propeller,
+)
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
@@ -29,6 +34,7 @@ from host.sysid.coefficients.coefficient_modes import (
 )
 from host.sysid.coefficients.coefficient_search import search_coefficients
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
+from host.sysid.coefficients.flight_terms import flight_terms
 from host.sysid.coefficients.pooled_flights import pool_fits
 from host.sysid.coefficients.window_spectra import SHORTEST_S, Window
 from host.sysid.flight.estimator import answer_of
@@ -93,6 +99,8 @@ class CoefficientAnswer:
         ``longitudinal`` and ``lateral`` linear systems.
     delays : dict
         Residual delay (s) and 95 % half-width.
+    remarks : tuple of str
+        What was left out or assumed, because the flights lack what would tell it.
     """
 
     model: CoefficientModel
@@ -104,6 +112,7 @@ class CoefficientAnswer:
     modes: tuple[Mode, ...]
     systems: dict[str, LinearSystem]
     delays: dict[str, tuple[float, float]]
+    remarks: tuple[str, ...] = ()
 
     @property
     def template(self) -> str:
@@ -146,6 +155,7 @@ class CoefficientEstimate:
     search: SearchResult
     used: tuple[DetectedManeuver, ...]
     windows: tuple[Window, ...]
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -213,12 +223,13 @@ class CoefficientEstimator:
             modes=coefficient_modes(fit, self.airframe),
             systems=linear_systems(fit, self.airframe),
             delays=_delays(fit, self.instrument),
+            remarks=tuple(dict.fromkeys(r for one in estimate for r in one.remarks)),
         )
 
     def _of_one(self, flight: ReconstructedFlight) -> CoefficientEstimate:
         columns = flight.recorded
         if "airspeed_mps" not in columns:
-            raise IdentificationError("coefficients need the columns airspeed_mps and qbar_pa")
+            raise IdentificationError("coefficients need airspeed_mps, which the data do not have")
         # Who gives a stretch has looked: it may begin with the record.
         given = any(f.given for f in flight.maneuvers)
         flying = _airborne_samples(columns, 0.0 if given else SETTLED_S)
@@ -235,15 +246,21 @@ class CoefficientEstimator:
             and t[0] <= f.start_s - (0.0 if f.given else LEAD_S) and f.end_s <= t[-1]
         ]  # fmt: skip
         spans = [replace(w, first_s=max(w.first_s, float(t[0]))) for w in merged_windows(found)]
+        terms = flight_terms(
+            self.model, {k: v[flying] for k, v in columns.items()}, spans, self.powerplant
+        )
         search = search_coefficients(
-            {k: v[flying] for k, v in columns.items()},
-            spans,
+            terms.columns,
+            terms.windows,
             self.airframe,
             flight.instrument or self.instrument,
             self.powerplant,
-            self.model,
+            terms.model,
+            terms.assumed,
         )
-        return CoefficientEstimate(search, tuple(found), tuple(spans))
+        axes = {w.longitudinal for w in terms.windows}
+        used = tuple(f for f in found if (f.axis == "elevator_rad") in axes)
+        return CoefficientEstimate(search, used, terms.windows, terms.remarks)
 
 
 def coefficient_estimator(
@@ -257,8 +274,8 @@ def coefficient_estimator(
     airframe, data = airframe or airframe_data(aircraft), instrument or sensor_error_model(aircraft)
     try:
         plant = powerplant(aircraft)
-    except NoPropulsionError as error:
-        raise IdentificationError(str(error)) from error
+    except NoPropulsionError:
+        plant = without_propeller()
     return CoefficientEstimator(airframe, plant, data, model or standard_model())
 
 

@@ -21,6 +21,7 @@ from host.sysid.models.toml_document import read_document
 SIGNALS = ("alpha", "beta", "p", "q", "r", "de", "da", "dr", "V")
 LIFT = "CL"  # as a regressor: of the drag polar
 WIND, BODY = ("CL", "CD"), ("CZ", "CX")
+DRAG = ("CD", "CX")  # what thrust leaves
 MOMENTS_AND_SIDE = ("Cm", "CY", "Cl", "Cn")
 KIND = "coefficients"
 KEYS = ("kind", "name", "rows", "beside")
@@ -83,7 +84,7 @@ class CoefficientModel:
     @property
     def forces(self) -> tuple[str, str]:
         """Equations of normal and axial force: CL and CD, or CZ and CX."""
-        return WIND if WIND[0] in self.equations else BODY
+        return BODY if set(BODY) & set(self.equations) else WIND
 
     def named(self) -> Iterator[tuple[str, str, CoefficientTerm]]:
         """Return coefficient name, equation and term of everything fitted."""
@@ -139,11 +140,14 @@ def read_coefficient_model(path: Path) -> CoefficientModel:
                 f"{path}: unknown row {row}; a model has CL and CD or CZ and CX, and"
                 f" {', '.join(MOMENTS_AND_SIDE)}"
             )
-    absent = [row for row in expected if not reported.get(row)]
-    if absent:
-        raise IdentificationError(f"{path}: no terms for {', '.join(absent)}; [rows] needs all six")
+    fitted = [row for row in expected if reported.get(row)]
+    alone = [row for row in nuisance if row not in fitted]
+    if not fitted or alone:
+        raise IdentificationError(
+            f"{path}: no terms for {', '.join(alone or expected)}; [rows] needs one row or more"
+        )
     equations, not_reported = {}, set()
-    for row in expected:
+    for row in fitted:
         texts = [*reported[row], *nuisance.get(row, ())]
         terms = tuple(parse_term(text, row, f"{path}: {row}") for text in texts)
         for term, count in Counter(terms).items():

@@ -48,13 +48,25 @@ def coefficient_modes(fit: CoefficientFit, airframe: AirframeData) -> tuple[Mode
     """
     base, perturbed, steps = _perturbed(fit, airframe)
     found: list[Mode] = []
+    known = known_axes(fit)
     for k, named in enumerate((longitudinal_names, lateral_names)):
+        if not known[k]:
+            continue
         slopes = [(m[k][0] - base[k][0]) / step for m, step in zip(perturbed, steps, strict=True)]
         own = eigenmodes(base[k][0], slopes, fit.covariance)
         names = named([m.oscillatory for m in own])
         called = [replace(m, name=name) for m, name in zip(own, names, strict=True)]
         found += sorted(called, key=lambda m: not m.oscillatory)
     return tuple(found)
+
+
+def known_axes(fit: CoefficientFit) -> tuple[bool, bool]:
+    """Return whether the longitudinal and the lateral linear motion follow from a fit.
+
+    Lift, drag and pitch make the one, side force, roll and yaw the other.
+    """
+    rows = {d.name.split("_")[0] for d in fit.derivatives}
+    return {"CL", "CD", "Cm"} <= rows, {"CY", "Cl", "Cn"} <= rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +113,10 @@ def linear_systems(fit: CoefficientFit, airframe: AirframeData) -> dict[str, Lin
     """
     base, perturbed, steps = _perturbed(fit, airframe)
     found = {}
+    known = known_axes(fit)
     for k, (name, (states, inputs)) in enumerate(SIGNALS.items()):
+        if not known[k]:
+            continue
         halves = []
         for part in (0, 1):
             slope = np.stack(

@@ -254,21 +254,27 @@ def flight_problem(
     s = apply_sensor_errors(record, zero, sensors, float(speed[window_samples].mean()))
     axial = s["V"] * np.cos(s["alpha"])
     driving = (record.columns["throttle"], axial, density(record))
+    thrust, spin, drive = powerplant.run(*driving, record.dt_s)
+    slopes = powerplant.settled_slopes(*(float(x[window_samples].mean()) for x in driving))
+    if "thrust_n" in record.columns:  # measured: no error of airspeed or density is in it
+        thrust, slopes = record.columns["thrust_n"], (0.0, 0.0)
     history = FlightHistory(
-        *powerplant.run(*driving, record.dt_s),
+        thrust,
+        spin,
+        drive,
         *attitude(record, s),
         s["V"] / float(s["V"][window_samples].mean()) - 1.0,
         axial,
-        powerplant.settled_slopes(*(float(x[window_samples].mean()) for x in driving)),
+        slopes,
     )
-    along = np.concatenate([k for k, w in zip(samples, windows, strict=True) if w.longitudinal])
+    along = _joined([k for k, w in zip(samples, windows, strict=True) if w.longitudinal], samples)
     condition = (
         float(s["V"][window_samples].mean()),
         float(s["qbar"][window_samples].mean()),
         float(s["alpha"][along].mean()),
     )
-    across = np.concatenate(
-        [k for k, w in zip(samples, windows, strict=True) if not w.longitudinal]
+    across = _joined(
+        [k for k, w in zip(samples, windows, strict=True) if not w.longitudinal], samples
     )
     own_mps = [float(s["V"][k].mean()) for k in (along, across)]
     return FlightProblem(
@@ -281,7 +287,9 @@ def flight_problem(
         condition=condition,
         airspeed_ratio=(own_mps[0] / condition[0], own_mps[1] / condition[0]),
         windows=[
-            window_transform(inside, record.dt_s, window, model.forces, window_samples)
+            window_transform(
+                inside, record.dt_s, window, model.forces, window_samples, set(model.equations)
+            )
             for inside, window in zip(samples, windows, strict=True)
         ],
         window_samples=window_samples,
@@ -312,7 +320,8 @@ def mean_levels(problem: FlightProblem, data: EquationData) -> Array:
 
 def alpha_range(problem: FlightProblem, data: EquationData) -> tuple[float, float]:
     """Return the least and the largest angle of attack (rad) of the elevator maneuvers."""
-    own = [data.signals["alpha"][w.samples] for w in problem.windows if "u" in w.equations]
+    along = [w for w in problem.windows if "u" in w.equations]
+    own = [data.signals["alpha"][w.samples] for w in along or problem.windows]
     return float(min(x.min() for x in own)), float(max(x.max() for x in own))
 
 
@@ -339,6 +348,11 @@ def regressor_rms(problem: FlightProblem, data: EquationData) -> dict[str, float
 
 
 def _force_samples(problem: FlightProblem) -> IntArray:
-    """Return the positions of the samples of all elevator maneuvers."""
-    normal_force = problem.model.forces[0]
-    return np.concatenate([w.positions for w in problem.windows if normal_force in w.equations])
+    """Return the positions of the samples of all elevator maneuvers; of all without any."""
+    along = [w.positions for w in problem.windows if "u" in w.equations]
+    return _joined(along, [w.positions for w in problem.windows])
+
+
+def _joined(own: Sequence[IntArray], every: Sequence[IntArray]) -> IntArray:
+    """Return samples one behind the other; all where an axis has none of its own."""
+    return np.concatenate(list(own or every))

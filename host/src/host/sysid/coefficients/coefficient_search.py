@@ -44,6 +44,7 @@ from host.sysid.coefficients.equation_blocks import (
     accumulate,
     equation_blocks,
 )
+from host.sysid.coefficients.flight_terms import SIDE
 from host.sysid.coefficients.normal_equations import Prior, solve_normal_equations
 from host.sysid.coefficients.slow_gusts import gust_information, gust_regressors, gust_strength
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
@@ -77,6 +78,7 @@ def search_coefficients(
     sensors: SensorErrorModel,
     powerplant: Powerplant,
     model: CoefficientModel | None = None,
+    assumed: Mapping[str, float] | None = None,
 ) -> SearchResult:
     """Find the coefficients of lift, drag, side force and moments.
 
@@ -85,11 +87,13 @@ def search_coefficients(
     columns : mapping
         SI columns (n,) on an even grid as decoded, not moved to the CG; airborne throughout.
     windows : sequence of Window
-        Maneuvers; at least one of the elevator and one of aileron and rudder.
+        Maneuvers; of every axis that the model has equations of (`flight_terms`).
     airframe, sensors, powerplant
         Of the aircraft file.
     model : CoefficientModel, optional
         The terms of every coefficient; `standard_model` by default.
+    assumed : mapping, optional
+        Standard deviations of errors that are larger than the instrument's.
 
     Returns
     -------
@@ -104,22 +108,25 @@ def search_coefficients(
     missing = [c for c in ("t_s", *COLUMNS) if c not in columns]
     if missing:
         raise IdentificationError(f"coefficients need the columns {', '.join(missing)}")
-    if not any(w.longitudinal for w in windows) or all(w.longitudinal for w in windows):
+    model = model or standard_model()
+    flown = {w.longitudinal for w in windows}
+    if flown != {name not in SIDE for name in model.equations}:
         raise IdentificationError(
-            "coefficients need maneuvers of the elevator and of aileron and rudder"
+            "coefficients need maneuvers of the elevator for lift, drag and pitch, of aileron and"
+            " rudder for the others"
         )
     t = columns["t_s"]
     kept = usable_length(len(t))
     late = max(w.last_s for w in windows) > t[kept - 1]
     shift = len(t) - kept if late else 0
-    cut = {k: np.ascontiguousarray(columns[k][shift : shift + kept]) for k in COLUMNS}
+    taken = [*COLUMNS, *(k for k in ("thrust_n",) if k in columns)]
+    cut = {k: np.ascontiguousarray(columns[k][shift : shift + kept]) for k in taken}
     t = t[shift : shift + kept]
     record = decimate(cut, float(t[-1] - t[0]) / (kept - 1))
     t = t[0] + np.arange(record.samples) * record.dt_s
-    sd = deviations(sensors, airframe)
-    problem = flight_problem(
-        model or standard_model(), record, t, windows, airframe, sensors, powerplant, tuple(sd)
-    )
+    sd = dict(deviations(sensors, airframe))
+    sd |= {name: max(least, sd[name]) for name, least in (assumed or {}).items()}
+    problem = flight_problem(model, record, t, windows, airframe, sensors, powerplant, tuple(sd))
     return _search(problem, np.array(list(sd.values())))
 
 
@@ -215,6 +222,7 @@ def _linearise(
             problem.airframe,
             problem.sensors,
             problem.condition,
+            _whole_axes(problem.model),
         )
         noise_free_data = problem.evaluate(*noise_free, iterate.errors)
         if round_ == COEFFICIENT_ROUNDS:
@@ -238,6 +246,12 @@ def _spectra(
     """Return the spectra of the equations; slow gusts are estimated with the sensor errors."""
     gusts = gust_regressors(data.signals, problem.windows) if slopes else {}
     return EquationSpectra(data.spectra, gusts, slopes)
+
+
+def _whole_axes(model: CoefficientModel) -> tuple[bool, bool]:
+    """Return whether all equations are there that the motion of each axis is made of."""
+    along = {model.forces[0], "Cm"} <= model.equations.keys()
+    return along, set(SIDE) <= model.equations.keys()
 
 
 def _value_of(at_trim: DerivativesAtTrim) -> Callable[[str], float]:

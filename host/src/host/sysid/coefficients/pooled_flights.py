@@ -25,6 +25,7 @@ from host.sysid.coefficients.coefficient_fit import (
     ThrustEffect,
 )
 from host.sysid.coefficients.deletion_diagnostics import CrossValidation
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.numerics.maneuver_agreement import scatter_test
 
@@ -43,6 +44,12 @@ def pool_fits(fits: Sequence[CoefficientFit]) -> CoefficientFit:
         return fits[0]
     count = len(fits[0].derivatives)
     names = [d.name for d in fits[0].derivatives]
+    for number, fit in enumerate(fits, start=1):
+        if [d.name for d in fit.derivatives] != names:
+            raise IdentificationError(
+                f"flight 1 and flight {number} do not tell the same coefficients (another axis"
+                " flown, another surface moved, thrust not known in one): fit them one at a time"
+            )
     mine = [tuple(fit.errors) for fit in fits]
     errors = tuple(dict.fromkeys(name for own in mine for name in own))
     fits = [_with_all_errors(fit, errors) for fit in fits]

@@ -64,11 +64,13 @@ def gust_strength(
     Parameters
     ----------
     noise : mapping
-        Frequency (Hz) and spectra of residuals; those of ``u`` and ``w`` are of gust rates.
+        Frequency (Hz) and spectra of residuals; those of ``u`` and ``w`` are of gust rates, and
+        without elevator maneuvers that of ``v`` stands for them.
     airspeed_mps, dt_s : float
     """
+    own = {gust: noise[gust] if gust in noise else noise["v"] for gust in LENGTH_M}
     return {
-        gust: float(np.sqrt(np.median(noise[gust][1]) * dt_s * length_m / airspeed_mps / share))
+        gust: float(np.sqrt(np.median(own[gust][1]) * dt_s * length_m / airspeed_mps / share))
         for (gust, length_m), share in zip(LENGTH_M.items(), RATE_SPECTRUM.values(), strict=True)
     }
 

@@ -64,7 +64,7 @@ def derivatives_at_trim(
     unit = np.eye(len(state))
     terms: DerivativesAtTrim = {name: (float(state[k]), unit[k]) for name, k in position.items()}
     found = {name: terms[name] for name, _, _ in model.named() if name not in model.nuisance}
-    if model.forces == BODY:
+    if set(BODY) <= model.equations.keys():
         found |= _from_body_axes(terms, means)
     if POLAR in terms:
         found |= _with_drag_polar(terms, means)

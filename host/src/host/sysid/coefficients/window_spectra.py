@@ -5,7 +5,7 @@ Equation error in the frequency domain: Klein & Morelli, Aircraft System Identif
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,6 +67,7 @@ def window_transform(
     window: Window,
     forces: tuple[str, str],
     all_samples: IntArray | None = None,
+    fitted: Collection[str] | None = None,
 ) -> WindowTransform:
     """Return the transform of one window.
 
@@ -80,6 +81,8 @@ def window_transform(
         Names of the two force equations of an elevator maneuver.
     all_samples : IntArray, optional
         Samples of all windows, sorted; those of this window without.
+    fitted : collection of str, optional
+        Force and moment equations of the model; all of the axis without.
 
     Raises
     ------
@@ -98,7 +101,9 @@ def window_transform(
     cosines, sines = (f(2.0 * np.pi * phase) / np.sqrt(n) for f in (np.cos, np.sin))
     trend = np.linspace(-1.0, 1.0, n)[:, None] ** np.arange(KINEMATIC_TREND)
     trends = cosines @ trend - 1j * (sines @ trend)
-    equations = (*forces, *LONGITUDINAL) if window.longitudinal else LATERAL
+    of_axis = (*forces, *LONGITUDINAL) if window.longitudinal else LATERAL
+    known = {*of_axis} if fitted is None else {*fitted, *KINEMATIC}
+    equations = tuple(name for name in of_axis if name in known)
     positions = np.searchsorted(samples if all_samples is None else all_samples, samples)
     return WindowTransform(samples, positions, frequency_hz, cosines, sines, trends, equations)
 

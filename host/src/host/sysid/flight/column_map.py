@@ -42,6 +42,8 @@ UNITS: dict[str, dict[str, float]] = {
     },
     "kgpm3": {"kg/m3": 1.0, "slug/ft3": 515.3788},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "n": {"N": 1.0, "lbf": 4.448222, "kgf": GRAVITY_MPS2},
+    "w": {"W": 1.0, "kW": 1000.0, "hp": 745.6999},
     "throttle": {"1": 1.0, "percent": 0.01},
 }  # fmt: skip
 # What people write for them.

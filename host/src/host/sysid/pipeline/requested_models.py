@@ -21,6 +21,7 @@ from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.pipeline.arguments import listed
 
 COEFFICIENTS = "coefficients"
+THRUST = ("thrust_n", "power_w")
 DEFAULT_MODELS = ("longitudinal", "lateral")
 ModelName = str | Path | LinearModel | CoefficientModel
 
@@ -44,8 +45,9 @@ class Models:
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """Inputs and outputs of the user's own models."""
+        """Inputs and outputs of the user's own models; measured thrust of coefficients."""
         own = {s for _, m in self.linear if m is not None for s in (*m.inputs, *m.outputs)}
+        own |= set(THRUST) if self.coefficients else set()
         return tuple(sorted(own - {CONSTANT}))
 
 

@@ -1,0 +1,161 @@
+"""Which terms of a model a flight can determine: axes flown, surfaces that moved, thrust known.
+
+What is missing of an axis that was not flown counts as zero; what is missing of the air follows
+from what is there. Every such step is a remark of the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from host.aircraft.powerplant import Powerplant
+from host.arrays import Array
+from host.constants import GRAVITY_MPS2
+from host.sysid.coefficients.coefficient_model import DRAG, CoefficientModel
+from host.sysid.coefficients.measured_thrust import thrust_column
+from host.sysid.coefficients.window_spectra import Window
+from host.sysid.identification_error import IdentificationError
+
+SIDE = ("CY", "Cl", "Cn")
+STANDARD_DENSITY, DENSITY_SHARE = 1.225, 0.05  # kg/m3; up to 1000 m, 0 to 30 degrees C
+# Columns that an axis which was not flown does without.
+SIDE_COLUMNS = (
+    "beta_rad", "p_radps", "r_radps", "ay_mps2", "phi_rad", "aileron_rad", "rudder_rad",
+)  # fmt: skip
+PITCH_COLUMNS = ("q_radps", "elevator_rad")
+CONTROLS = {"da": "aileron_rad", "dr": "rudder_rad"}
+STILL_RAD = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class FlightTerms:
+    """The model that a flight determines, its windows and columns, and remarks on all of them.
+
+    `assumed` are standard deviations of what rests on an assumption, by the name of its error.
+    """
+
+    model: CoefficientModel
+    windows: tuple[Window, ...]
+    columns: dict[str, Array]
+    remarks: tuple[str, ...]
+    assumed: dict[str, float]
+
+
+def flight_terms(
+    model: CoefficientModel,
+    columns: Mapping[str, Array],
+    windows: Sequence[Window],
+    powerplant: Powerplant,
+) -> FlightTerms:
+    """Return what of a model a flight determines.
+
+    Parameters
+    ----------
+    model : CoefficientModel
+    columns : mapping of (n,) Array
+        SI, as decoded, from after the launch to the end of the flight.
+    windows : sequence of Window
+        Maneuvers to be fitted.
+    powerplant : Powerplant
+        Of the aircraft file.
+
+    Raises
+    ------
+    IdentificationError
+        If no maneuver is there, or none of the model's equations is left.
+    """
+    # Maneuvers of an axis that the model has no equations of say nothing of it.
+    has = {name not in SIDE for name in model.equations}
+    windows = tuple(w for w in windows if w.longitudinal in has)
+    if not windows:
+        raise IdentificationError(
+            "coefficients need a maneuver of the elevator, or one of aileron and rudder, for which"
+            " the model has an equation"
+        )
+    found, remarks = dict(columns), []
+    along = any(w.longitudinal for w in windows)
+    across = not all(w.longitudinal for w in windows)
+    lost = [n for n in model.equations if not (across if n in SIDE else along)]
+    if lost:
+        which = "the elevator" if across else "aileron and rudder"
+        remarks.append(f"no maneuver of {which}: {', '.join(lost)} left out")
+    zeros = np.zeros(len(columns["t_s"]))
+    unflown = [] if across else [c for c in SIDE_COLUMNS if c not in found]
+    unflown += [] if along else [c for c in PITCH_COLUMNS if c not in found]
+    if unflown:
+        remarks.append(f"taken as zero, for the data have none: {', '.join(unflown)}")
+    found |= dict.fromkeys(unflown, zeros)
+    assumed = _air_assumed(found)
+    remarks += _complete_air(found)
+    still = [] if not across else [k for k, c in CONTROLS.items() if _still(found, c, windows)]
+    if still:
+        moved = [c for k, c in CONTROLS.items() if k in still]
+        remarks.append(
+            f"{', '.join(moved)} never moved, or not in the data: its terms are left out"
+        )
+        found |= {c: zeros for c in moved if c not in found}
+    thrust = thrust_column(found, powerplant)
+    remarks += thrust.remarks
+    if not thrust.known:
+        drag = [n for n in model.equations if n in DRAG and n not in lost]
+        lost += drag
+        if along and drag:
+            remarks.append(
+                f"no thrust known: {', '.join(drag)} left out, the other coefficients hold what"
+                " thrust adds; give [propulsion] and throttle, thrust_n or power_w"
+            )
+    if thrust.thrust_n is not None:
+        found["thrust_n"] = thrust.thrust_n
+    found.setdefault("throttle", zeros)
+    equations = {
+        name: tuple(t for t in terms if not {f[0] for f in t.factors} & set(still))
+        for name, terms in model.equations.items()
+        if name not in lost
+    }
+    if not equations:
+        raise IdentificationError(f"coefficients: {'; '.join(remarks)}; no equation is left")
+    if thrust.assumed_share is not None:
+        assumed["thrust_share"] = thrust.assumed_share
+    return FlightTerms(replace(model, equations=equations), windows, found, tuple(remarks), assumed)
+
+
+def _air_assumed(columns: Mapping[str, Array]) -> dict[str, float]:
+    """Return the deviations of a density that nobody measured, and of pressure made of it."""
+    if "density_kgpm3" in columns:
+        return {}
+    known = {"density_share": DENSITY_SHARE}
+    return known if "qbar_pa" in columns else known | {"pitot_scale": DENSITY_SHARE}
+
+
+def _still(columns: Mapping[str, Array], name: str, windows: Sequence[Window]) -> bool:
+    if name not in columns:
+        return True
+    t, values = columns["t_s"], columns[name]
+    return all(
+        float(np.ptp(values[(t >= w.first_s) & (t <= w.last_s)])) < STILL_RAD for w in windows
+    )
+
+
+def _complete_air(found: dict[str, Array]) -> list[str]:
+    """Add dynamic pressure, density and static pressure where they follow from other columns."""
+    remarks = []
+    if "density_kgpm3" not in found:
+        found["density_kgpm3"] = np.full(len(found["t_s"]), STANDARD_DENSITY)
+        remarks.append(f"no density_kgpm3: {STANDARD_DENSITY} kg/m3 taken")
+    if "qbar_pa" not in found and "airspeed_mps" in found:
+        found["qbar_pa"] = 0.5 * found["density_kgpm3"] * found["airspeed_mps"] ** 2
+        remarks.append("qbar_pa made of airspeed_mps and density")
+    flown = ("theta_rad", "alpha_rad", "airspeed_mps")
+    if "static_pa" not in found and all(name in found for name in flown):
+        theta, alpha, speed = (found[name] for name in flown)
+        height_m = found.get("altitude_m")
+        if height_m is None:
+            dt_s = float(found["t_s"][1] - found["t_s"][0])
+            height_m = np.cumsum(speed * np.sin(theta - alpha)) * dt_s
+        found["static_pa"] = 101325.0 - GRAVITY_MPS2 * found["density_kgpm3"] * height_m
+        of = "altitude_m" if "altitude_m" in found else "the path's angle"
+        remarks.append(f"static_pa made of {of}")
+    return remarks
