@@ -108,7 +108,6 @@ def test_a_text_beyond_all_bounds(name: str, capsys: pytest.CaptureFixture[str])
         "a large integer": "format = 1" + "0" * 400,
         "no number": "format = nan",
         "a long text": f'name = "{"x" * 30_000}"',
-        "values": "x = [" + "1," * MOST_VALUES + "]",
     }
     for what, text in texts.items():
         Path("beyond.toml").write_text(text)
@@ -119,6 +118,14 @@ def test_a_text_beyond_all_bounds(name: str, capsys: pytest.CaptureFixture[str])
         file.truncate(3 << 30)
     code, said = ended(arguments, "beyond.toml", capsys)
     assert (code, "larger than" in said) == (2, True), said
+
+
+def test_more_values_than_any_file_has(capsys: pytest.CaptureFixture[str]) -> None:
+    """Counted where the texts above are, by the one reader of all verbs: half a second each."""
+    Path("beyond.toml").write_text("x = [" + "1," * MOST_VALUES + "]")
+    code, said = ended(READ_BY["plan"], "beyond.toml", capsys)
+    assert code == 2
+    assert "beyond" in said
 
 
 def test_names_that_are_no_utf8_or_control_the_terminal(

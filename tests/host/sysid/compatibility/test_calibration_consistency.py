@@ -22,6 +22,7 @@ from host.sysid.compatibility.reconstruction import (
 from tests.host.sysid.recorded import NAME, flown, reconstructed
 
 NAMES = tuple(name for own in OBSERVABLE_GROUPS.values() for name in own)
+PRIOR = prior(None)
 
 
 def drawn(rng: np.random.Generator, times: float, noise: Array) -> tuple[Array, Array]:
@@ -30,7 +31,7 @@ def drawn(rng: np.random.Generator, times: float, noise: Array) -> tuple[Array, 
     A direct look at every error with noise of its own, and the file for a prior: what a linear
     reconstruction does.
     """
-    stated = np.array([sd for _, sd in (prior(None)[n] for n in NAMES)])
+    stated = np.array([PRIOR[n][1] for n in NAMES])
     looked = rng.normal(0.0, times * stated) + rng.normal(0.0, noise * stated)
     posterior = 1.0 / (1.0 / stated**2 + 1.0 / (noise * stated) ** 2)
     return posterior * looked / (noise * stated) ** 2, np.diag(posterior)
@@ -40,7 +41,7 @@ def drawn(rng: np.random.Generator, times: float, noise: Array) -> tuple[Array, 
 def test_alarms_come_as_often_as_stated(times: float, least: float, most: float) -> None:
     rng = np.random.default_rng(5)
     noise = np.geomspace(0.1, 2.0, len(NAMES))
-    found = [consistency_tests(NAMES, *drawn(rng, times, noise), prior(None)) for _ in range(500)]
+    found = [consistency_tests(NAMES, *drawn(rng, times, noise), PRIOR) for _ in range(500)]
     assert least <= np.mean([f[0].rejected for f in found]) <= most
     rms = np.sqrt(np.mean([f[0].rms_ratio ** 2 for f in found]))
     assert pytest.approx(rms, abs=0.05) == 1.0 if times == 1.0 else 2.0 < rms < 3.0
@@ -48,7 +49,7 @@ def test_alarms_come_as_often_as_stated(times: float, least: float, most: float)
 
 def test_what_the_flight_does_not_tell_is_not_judged() -> None:
     rng = np.random.default_rng(5)
-    found = consistency_tests(NAMES, *drawn(rng, 1.0, np.full(len(NAMES), 30.0)), prior(None))
+    found = consistency_tests(NAMES, *drawn(rng, 1.0, np.full(len(NAMES), 30.0)), PRIOR)
     assert all(c.degrees_of_freedom == 0 and not c.rejected for c in found)
     assert calibration_lines(found) == []
 

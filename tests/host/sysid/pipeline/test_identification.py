@@ -63,12 +63,17 @@ def both(flights: tuple[Path, Path]) -> Identification:
 
 
 def test_it_says_what_the_verb_says(
-    one: Identification, flights: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+    one: Identification,
+    flights: tuple[Path, Path],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     models = [word for name in MODELS for word in ("--model", name)]
     options = ["identify", str(flights[0] / "flight.csv"), "--aircraft", NAME, *models]
     assert main([*options, "--json"]) == 0
     assert capsys.readouterr().out.rstrip("\n") == one.to_json()
+    # The same call again: what it prints is asked, not a second time what it finds.
+    monkeypatch.setattr("host.sysid.pipeline.stages.identify", lambda *_, **__: one)
     assert main(options) == 0
     assert capsys.readouterr().out.rstrip("\n") == str(one)
 
@@ -294,9 +299,10 @@ def test_pictures_are_shown_and_saved(one: Identification, tmp_path: Path) -> No
     assert isinstance(pictures, Pictures)
     assert "longitudinal_fit" in pictures
     assert "coefficients_intervals" in pictures
-    page = pictures._repr_html_()
-    assert page.count("<img ") == len(pictures) == 12
-    assert page.count("data:image/svg+xml;base64,") == len(pictures)
+    assert len(pictures) == 12
+    two = Pictures({name: pictures[name] for name in ("lateral_fit", "coefficients_intervals")})
+    page = two._repr_html_()
+    assert page.count("<img ") == page.count("data:image/svg+xml;base64,") == len(two)
     written = Pictures({"lateral_poles": pictures["lateral_poles"]}).save(tmp_path)
     assert [p.name for p in written] == ["lateral_poles.svg"]
     assert written[0].read_text().rstrip().endswith("</svg>")
