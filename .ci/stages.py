@@ -22,6 +22,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 ROOT = Path(__file__).resolve().parent.parent
 LOGS = ROOT / "build" / "logs"
@@ -59,6 +60,7 @@ class Outcome:
     duration_s: float
     passed: int
     failed: int
+    cpu_s: float = 0.0  # processor time, which other work on the machine hardly changes
 
 
 def report_path(name: str) -> Path:
@@ -110,7 +112,7 @@ def stages() -> list[Stage]:
         *pytest_stages(),
     ]
     # What others need first, then the longest: the last to end is a short one.
-    first = ("mega", "library", "chip", "host", "types", "native", "avr", "sitl")
+    first = ("mega", "library", "chip", "sysid", "host", "types", "native", "avr", "sitl")
     return sorted(found, key=lambda stage: (*first, stage.name).index(stage.name))
 
 
@@ -127,16 +129,26 @@ def unit_tests(name: str, environment: str, title: str) -> Stage:
 
 
 def pytest_stages() -> Iterator[Stage]:
-    """Describe one stage per folder of tests/ that pytest can run."""
+    """Describe one stage per folder of tests/ that pytest can run, and one for identification.
+
+    Half of all processor time of tests/host is in its sysid: as one stage it would end alone.
+    """
     needs = {"sitl": ("library",), "chip": ("mega",)}
-    after = {"host": ("mega", "library"), "chip": ("library",), "layering": ("mega",)}
+    after = {
+        "host": ("mega", "library"),
+        "sysid": ("library",),
+        "chip": ("library",),
+        "layering": ("mega",),
+    }
     folders = {path.relative_to(ROOT / "tests").parts[0] for path in _test_files()}
-    for name in sorted(folders - {"firmware"}):
-        command = (PYTHON, "-m", "pytest", f"tests/{name}", f"--junit-xml={report_path(name)}")
+    apart = {"host": ("--ignore=tests/host/sysid",)}
+    for name in sorted(folders - {"firmware"} | {"sysid"}):
+        place = "tests/host/sysid" if name == "sysid" else f"tests/{name}"
+        report = f"--junit-xml={report_path(name)}"
         yield Stage(
             name,
-            f"pytest tests/{name}",
-            (command,),
+            f"pytest {place}",
+            ((PYTHON, "-m", "pytest", place, *apart.get(name, ()), report),),
             needs=needs.get(name, ()),
             after=after.get(name, ()),
             report=True,
@@ -161,14 +173,9 @@ def run(stage: Stage, before: dict[str, Future[Outcome]]) -> Outcome:
     log = LOGS / f"{stage.name}.log"
     with log.open("w", encoding="utf-8") as out:
         # Every command of a stage runs, so that one round shows all there is to mend.
-        codes = [
-            subprocess.run(
-                command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=out, stderr=out, check=False
-            ).returncode
-            for command in stage.commands
-        ]
+        ended = [run_command(command, out) for command in stage.commands]
     duration_s = time.monotonic() - start_s
-    ok = not any(codes)
+    ok = not any(code for code, _ in ended)
     passed, failed = count_cases(report_path(stage.name)) if stage.report else (int(ok), 0)
     if stage.report and passed + failed == 0:
         ok = False  # a suite that ran nothing has shown nothing
@@ -179,7 +186,16 @@ def run(stage: Stage, before: dict[str, Future[Outcome]]) -> Outcome:
     say(f"{stage.name}: {'ok' if ok else 'FAILED'} after {duration_s:.0f} s")
     if not ok:
         show_tail(log)
-    return Outcome(stage, "ok" if ok else "FAILED", duration_s, passed, failed)
+    cpu_s = sum(used_s for _, used_s in ended)
+    return Outcome(stage, "ok" if ok else "FAILED", duration_s, passed, failed, cpu_s)
+
+
+def run_command(command: tuple[str, ...], out: TextIO) -> tuple[int, float]:
+    """Run a command; give its exit code and the processor seconds of all its processes."""
+    child = subprocess.Popen(command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=out, stderr=out)
+    _, status, used = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    return child.returncode, used.ru_utime + used.ru_stime
 
 
 def count_cases(path: Path) -> tuple[int, int]:
@@ -205,13 +221,15 @@ def show_tail(log: Path) -> None:
 
 
 def table(outcomes: Sequence[Outcome], wall_s: float) -> str:
-    """Lay out minutes, cases and state of each stage."""
-    lines = [f"{'stage':<12}{'minutes':>8}{'passed':>8}{'failed':>8}  state"]
+    """Lay out minutes by the clock and of processor time, cases and state of each stage."""
+    lines = [f"{'stage':<12}{'minutes':>8}{'cpu':>8}{'passed':>8}{'failed':>8}  state"]
     lines += [
-        f"{o.stage.name:<12}{o.duration_s / 60:>8.2f}{o.passed:>8}{o.failed:>8}  {o.state}"
+        f"{o.stage.name:<12}{o.duration_s / 60:>8.2f}{o.cpu_s / 60:>8.2f}"
+        f"{o.passed:>8}{o.failed:>8}  {o.state}"
         for o in outcomes
     ]
-    lines.append(f"{'wall clock':<12}{wall_s / 60:>8.2f}")
+    cpu_s = sum(o.cpu_s for o in outcomes)
+    lines.append(f"{'wall clock':<12}{wall_s / 60:>8.2f}{cpu_s / 60:>8.2f}")
     return "\n".join(lines)
 
 

@@ -49,6 +49,14 @@ def test_every_command_of_a_failed_stage_runs(runner: ModuleType, tmp_path: Path
     assert "second" in (tmp_path / "a.log").read_text()
 
 
+def test_processor_time_is_that_of_all_processes_of_a_stage(runner: ModuleType) -> None:
+    busy = "import time\nwhile time.process_time() < 0.3: pass"
+    child = python(f"import subprocess, sys; subprocess.run([sys.executable, '-c', {busy!r}])")
+    outcome = runner.run(runner.Stage("a", "works in a child", (child, python("pass"))), {})
+    assert 0.3 < outcome.cpu_s < 3.0
+    assert f"{outcome.cpu_s / 60:8.2f}" in runner.table([outcome], 1.0)
+
+
 def test_a_stage_without_its_report_has_failed(runner: ModuleType) -> None:
     stage = runner.Stage("a", "no cases", (python("pass"),), report=True)
     outcome = runner.run(stage, {})
