@@ -35,9 +35,25 @@ TEST_CASE("three more") { CHECK_EQ(unused_by_the_suite(4), 7); }
 """
 
 
+@pytest.fixture(scope="module")
+def main_object(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """doctest's own code, which every judge compiles for itself: 2 s each."""
+    target = tmp_path_factory.mktemp("main") / "main-check_main.o"
+    assert judge.Judge._compile(judge.SUITES / "check_main.cpp", target, judge.MAIN)
+    return target
+
+
 @pytest.fixture
-def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def tree(tmp_path: Path, main_object: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A core of one file and its suite."""
+    compile_one = judge.Judge._compile
+
+    def compiled(source: Path, target: Path, flags: tuple[str, ...]) -> bool:
+        if target.name == main_object.name:
+            return bool(shutil.copy(main_object, target))
+        return compile_one(source, target, flags)
+
+    monkeypatch.setattr(judge.Judge, "_compile", staticmethod(compiled))
     core, suites = tmp_path / "core", tmp_path / "suites"
     (suites / "test_clamp").mkdir(parents=True)
     core.mkdir()

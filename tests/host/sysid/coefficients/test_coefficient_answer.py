@@ -4,6 +4,7 @@ import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
@@ -19,6 +20,8 @@ from host.sysid.coefficients.coefficient_estimator import (
 from host.sysid.coefficients.coefficient_modes import coefficient_modes, quantities
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.maneuver_detection import DetectedManeuver
+from host.sysid.pipeline.identification import Identification
+from host.sysid.pipeline.stages import identify
 from scipy import io
 
 NAME = "ultrastick25e"
@@ -156,12 +159,25 @@ def test_delays_left_over_are_told(folder: Path, answer: CoefficientAnswer) -> N
 
 
 def test_says_what_to_trust_and_why_not(
-    folder: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
+    found: list[Identification] = []
+
+    def kept(*given: Any, **options: Any) -> Identification:
+        found.append(identify(*given, **options))
+        return found[0]
+
+    monkeypatch.setattr("host.sysid.pipeline.stages.identify", kept)
     again = tmp_path / "again.toml"
     flags = ["--aircraft", NAME, "--model", "coefficients"]
     source = str(folder / "flight.csv")
-    assert main(["identify", source, *flags, "--json"]) == 0
+    more = ["--plots", str(tmp_path / "plots"), "--save-aircraft", str(again)]
+    more += ["--save-model", str(tmp_path / "x.toml")]
+    truth = ["--truth", str(folder / "flight.truth.toml"), "--mat", str(tmp_path / "x.mat")]
+    assert main(["identify", source, *flags, *more, *truth, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)["answers"][0]
     table = document["coefficients"]
     assert table["Cn_p"]["flagged"]
@@ -176,11 +192,7 @@ def test_says_what_to_trust_and_why_not(
     assert all(r["p_value"] < 0.01 for r in scattered.values())
     named = [line for line in document["verdict"] if "do not agree on" in line]
     assert len(named) == len(scattered)
-    more = ["--plots", str(tmp_path / "plots"), "--save-aircraft", str(again)]
-    more += ["--save-model", str(tmp_path / "x.toml")]
-    truth = ["--truth", str(folder / "flight.truth.toml"), "--mat", str(tmp_path / "x.mat")]
-    assert main(["identify", source, *flags, *more, *truth]) == 0
-    text = capsys.readouterr().out
+    text = str(found[0])
     assert text.startswith("coefficients: 3 maneuvers of the elevator, 6 of aileron and rudder")
     assert "of 24 intervals hold the truth" in text
     assert {p.name for p in (tmp_path / "plots").iterdir()} == {
