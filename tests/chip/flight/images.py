@@ -32,7 +32,6 @@ def usual_compiler() -> str:
     return os.environ.get(CHOICE) or TESTED[0]
 
 
-@cache
 def build_image(environment: str, compiler: str | None = None) -> Path:
     """Build the image that `pio run` makes, once in a process.
 
@@ -53,7 +52,11 @@ def build_image(environment: str, compiler: str | None = None) -> Path:
     RuntimeError
         If the build fails; the text is its last lines.
     """
-    chosen = compiler or usual_compiler()
+    return _built(environment, compiler or usual_compiler())
+
+
+@cache
+def _built(environment: str, chosen: str) -> Path:
     done = subprocess.run(
         _command(environment),
         cwd=ROOT,
