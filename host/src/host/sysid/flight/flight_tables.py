@@ -425,7 +425,10 @@ def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
             if gaps[longest] > max(_long_s(t[seen]), 1.01 * float(np.diff(t).max())):
                 missing.append((float(gaps[longest]), float(t[seen][longest]), name))
     if slower:
-        notes.append(f"slower than the {dt_s:.3g} s of others, drawn between: {', '.join(slower)}")
+        notes.append(
+            f"slower than the {dt_s:.3g} s of others, drawn between: {', '.join(slower)}; output"
+            " error compares at their own instants, all else takes the lines for measurements"
+        )
     if missing:
         length_s, at_s, _ = max(missing)
         names = ", ".join(name for _, _, name in missing)
