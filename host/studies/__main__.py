@@ -26,6 +26,7 @@ from studies import (
     tables,
     thesis,
     turbulence,
+    windows,
 )
 from studies.inputs import SHAPES
 from studies.report import write
@@ -41,6 +42,8 @@ NONLINEAR_FLIGHTS = (2, 24)
 METHOD_RUNS = (12, 60)  # of cheap methods; dear ones a sixth
 COEFFICIENT_FLIGHTS = (2, 24)
 THESIS_FLIGHTS = (1, 10)
+WINDOW_SEEDS = (3, 50)
+CARD_SEEDS = (1, 50)
 
 
 def study_a(stem: Path, size: int) -> list[Path]:
@@ -125,6 +128,16 @@ def study_g(stem: Path, size: int) -> list[Path]:
     return write(tables.methods_table(scores), methods_figure(scores), stem)
 
 
+def study_h(stem: Path, size: int) -> list[Path]:
+    """Found windows against whole records; goes on behind the flights that are done."""
+    from studies.figures import windows_figure
+
+    seeds = range(windows.FIRST_SEED, windows.FIRST_SEED + WINDOW_SEEDS[size])
+    flights = range(windows.FIRST_FLIGHT, windows.FIRST_FLIGHT + CARD_SEEDS[size])
+    cases = list(windows.study(stem.with_suffix(".jsonl"), seeds, windows.CARDS, flights))
+    return write(tables.windows_table(cases), windows_figure(cases), stem)
+
+
 STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
     "a_thesis": study_a,
     "b_accuracy": study_b,
@@ -133,6 +146,7 @@ STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
     "e_flights": study_e,
     "f_thesis_flights": study_f,
     "g_methods": study_g,
+    "h_windows": study_h,
 }
 
 

@@ -14,6 +14,7 @@ from studies.methods import Score
 from studies.refusal import SURE, Agreement
 from studies.thesis import HopfieldRun
 from studies.turbulence import GustCase
+from studies.windows import LIMIT_BOUND, LIMIT_WHOLE, Compared
 
 GREY = "0.6"
 LARGEST = "largest stable step"  # of the printed one only the table speaks
@@ -181,3 +182,25 @@ def _badness(values: Array, best: float, worst: float) -> Array:
     else:
         ratio = (best - values) / (best - worst)
     return np.asarray(np.nan_to_num(np.clip(ratio, 0.0, 1.0), nan=1.0), dtype=np.float64)
+
+
+def windows_figure(cases: Sequence[Compared]) -> Figure:
+    """Draw errors from windows over those from the whole record, and over the bound."""
+    figure = Figure(figsize=(11, 4.6))
+    left, right = figure.subplots(1, 2)
+    place = np.arange(len(cases))
+    labels = [c.label.replace(", ", "\n", 1) for c in cases]
+    bounded = [k for k, c in enumerate(cases) if not c.label.startswith("card ")]
+    for axis, shown, limit, title in (
+        (left, place, LIMIT_WHOLE, "error from windows over error from the whole record"),
+        (right, place[bounded], LIMIT_BOUND, "error from windows over bound of the whole record"),
+    ):
+        for k in shown:
+            values = cases[k].ratio if axis is left else cases[k].found_rms
+            axis.plot(np.full(len(values), k), values, ".", color="C0", ms=4)
+        axis.axhline(limit, color="C3", lw=0.8, ls="--", label="limit")
+        axis.set_yscale("log")
+        axis.set_xticks(shown, [labels[k] for k in shown], fontsize=6, rotation=60)
+        axis.set_title(title, fontsize=9)
+        axis.legend(fontsize=7)
+    return figure

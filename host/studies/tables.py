@@ -14,6 +14,7 @@ from studies.refusal import Agreement, Repeated, agreement_text
 from studies.report import Table
 from studies.thesis import HopfieldRun
 from studies.turbulence import GustCase
+from studies.windows import LIMIT_WHOLE, Compared
 
 
 def thesis_table(
@@ -158,4 +159,28 @@ def methods_table(scores: Sequence[Score]) -> Table:
             )
             for s in scores
         ),
+    )  # fmt: skip
+
+
+def windows_table(cases: Sequence[Compared]) -> Table:
+    """Return errors from found windows and from the whole record, a row per case and parameter."""
+    return Table(
+        "Found windows against the whole record",
+        (
+            "case", "parameter", "flights", "failed", "missed", "rms from windows",
+            "rms from the whole", "windows/whole", "covered from windows %",
+            "covered from the whole %", "half-width of the whole", "holds",
+        ),
+        tuple(
+            (
+                c.label, name, c.flights, c.failed, c.missed, float(c.found_rms[k]),
+                float(c.whole_rms[k]), float(c.ratio[k]), 100.0 * float(c.found_held[k]),
+                100.0 * float(c.whole_held[k]), float(c.whole_half[k]),
+                "yes" if c.ratio[k] <= LIMIT_WHOLE else "NO",
+            )
+            for c in cases
+            for k, name in enumerate(c.names)
+        ),
+        "Errors of linear records are in Cramer-Rao bounds of the whole record, those of cards over"
+        " the truth. Missed: flights without a window.",
     )  # fmt: skip

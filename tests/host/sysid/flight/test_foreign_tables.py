@@ -214,7 +214,7 @@ def test_a_date_is_a_time(tmp_path: Path, foreign: pd.DataFrame) -> None:
 
 
 @pytest.mark.parametrize("how", ["cells", "rows"])
-def test_a_maneuver_over_a_gap_is_left_out(
+def test_a_gap_divides_a_maneuver(
     how: str,
     tmp_path: Path,
     foreign: pd.DataFrame,
@@ -235,8 +235,9 @@ def test_a_maneuver_over_a_gap_is_left_out(
         table = table[~gap]
     table.to_csv(tmp_path / "x.csv", index=False)
     columns, notes = read(tmp_path / "x.csv")
-    assert [round(f.start_s) for f in detect_maneuvers(columns)] == [10, 50]
-    assert any("maneuvers over" in n and "0.5" in n for n in notes)
+    # The doublet up to the gap, and the response behind it.
+    assert [round(f.start_s) for f in detect_maneuvers(columns)] == [10, 30, 32, 50]
+    assert any("over" in n and "is divided" in n and "0.5" in n for n in notes)
 
 
 FAULTS: dict[str, tuple[Callable[[pd.DataFrame], pd.DataFrame], str]] = {

@@ -191,6 +191,29 @@ def test_the_verb_takes_stretches_of_several_records(
         assert said["answers"][0]["parameters"][name]["value"] == answer.result.value(name)
 
 
+def test_records_in_one_file_are_parted_by_their_gap(two: tuple[Drawn, Drawn]) -> None:
+    """Two cuts of a long flight, minutes of it left out: found, and as one stretch."""
+    first, second = drawn(50.0, 1).table(), drawn(50.0, 2).table()
+    table = pd.concat([first, second.assign(t_s=second["t_s"] + 300.0)])
+    for stretches in (None, [(None, None)]):
+        found = host.identify(table, models=model_from(MODEL), stretches=stretches)
+        [answer] = found.linear
+        assert [m.samples for m in answer.maneuvers] == pytest.approx([200, 200], abs=2)
+        for name, value in TRUE.items():
+            half = answer.result.half_width()[answer.result.index(name)]
+            assert abs(answer.result.value(name) - value) < 2.0 * half, name
+
+
+@pytest.mark.parametrize("rate_hz", [20.0, 100.0])
+def test_a_record_of_a_second_and_a_half_is_fitted(rate_hz: float) -> None:
+    tables = [drawn(rate_hz, seed, duration_s=1.55, unit_s=0.15).table() for seed in range(4)]
+    found = host.identify(tables, models=model_from(MODEL), methods="output-error-white")
+    [answer] = found.linear
+    assert len(answer.maneuvers) + len(answer.held_out) == 4
+    half = answer.result.half_width()[answer.result.index("M_alpha")]
+    assert abs(answer.result.value("M_alpha") - TRUE["M_alpha"]) < 2.0 * half
+
+
 @pytest.mark.parametrize(
     ("stretches", "words"),
     [

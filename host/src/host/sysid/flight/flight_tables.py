@@ -59,10 +59,11 @@ SENSORS = tuple(name for name in FITTED if name not in SURFACES)  # a command ma
 READ = (*TEXT_KINDS, ".parquet", ".mat")
 BRIDGED = "bridged"  # column of the table: not zero where a line was drawn over a long gap
 LONGEST_GAP_S = 0.25
-FEWEST = 32
+FEWEST = 30  # 1.5 s at 20 Hz
 SLOWEST_S, FASTEST_S = 0.5, 1e-4  # between rows: beyond, the unit of time is wrong
 BACKWARD_S = 1.0  # rows may swap places; a step back over more is another recording
 MOST_JUMP_RAD = 2.0 * np.pi + 0.5
+FEW_ROWS = 500_000  # of an even grid: 80 minutes at 100 Hz, however few were recorded
 MOST_EMPTY = 20  # rows of the even grid for each row that was recorded
 
 
@@ -363,7 +364,9 @@ def _covered(t: Array, seen: BoolArray) -> float:
     gaps = np.diff(t[seen])
     if float(np.median(gaps)) > SLOWEST_S:
         return 0.0
-    return float(np.sum(gaps[gaps <= _long_s(t[seen])])) / float(t[-1] - t[0])
+    rows = np.diff(t)
+    recorded_s = float(np.sum(rows[rows <= _long_s(t)]))  # a gap of all is nobody's
+    return float(np.sum(gaps[gaps <= _long_s(t[seen])])) / max(recorded_s, 1e-9)
 
 
 def _grid(t: Array, dt_s: float, notes: list[str]) -> Array:
@@ -375,7 +378,7 @@ def _grid(t: Array, dt_s: float, notes: list[str]) -> Array:
             " of t_s right?"
         )
     count = int((t[-1] - t[0]) / dt_s) + 1
-    if count > MOST_EMPTY * len(t):
+    if count > max(MOST_EMPTY * len(t), FEW_ROWS):
         k = int(np.argmax(gaps))
         raise IdentificationError(
             f"time jumps from {t[k]:.6g} to {t[k + 1]:.6g} s: cut the file there"
@@ -384,7 +387,7 @@ def _grid(t: Array, dt_s: float, notes: list[str]) -> Array:
         many = int((gaps > _long_s(t)).sum())
         notes.append(
             f"{many} gap{'s' if many > 1 else ''}, the longest {gaps.max():.2f} s;"
-            " maneuvers over one are left out"
+            " a maneuver over one is divided"
         )
     return np.asarray(t[0] + dt_s * np.arange(count))
 
@@ -434,7 +437,7 @@ def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
         names = ", ".join(name for _, _, name in missing)
         notes.append(
             f"missing within the flight, for {length_s:.2f} s from {at_s:.2f} s: {names};"
-            " maneuvers over a gap are left out"
+            " a maneuver over a gap is divided"
         )
     if bridged.any():
         result[BRIDGED] = bridged.astype(np.float64)

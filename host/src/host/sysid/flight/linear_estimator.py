@@ -43,7 +43,7 @@ from host.sysid.flight.linear_model import (
     without_attitude,
 )
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade, detect_maneuvers, grade
-from host.sysid.flight.maneuver_selection import excited_axes, merge_overlapping
+from host.sysid.flight.maneuver_selection import HELD_OUT_FROM, excited_axes, joined_windows
 from host.sysid.flight.noise_model_limits import excess_over_noise_model
 from host.sysid.flight.prediction_limits import Prediction, predictions
 from host.sysid.flight.reconstructed_flight import (
@@ -360,10 +360,9 @@ class LinearEstimator:
         named = self.named or self.own is not None
         mine = flown_maneuvers(
             flights,
-            [
-                merge_overlapping([f for f in x.maneuvers if f.axis in axes or (f.given and named)])
-                for x in flights
-            ],
+            joined_windows(
+                [[f for f in x.maneuvers if f.axis in axes or (f.given and named)] for x in flights]
+            ),
         )
         # The order in which flights are given shall not choose the maneuver that is held out.
         mine.sort(key=lambda m: [(f.start_s, f.end_s, f.amplitude) for f in m.flight.maneuvers])
@@ -379,7 +378,9 @@ class LinearEstimator:
             if m.found.given or grade(m.flight.corrected, m.found).score >= WEAK_GRADE
         ] or mine
         held = _held_out([m for m in good if not m.found.given])
-        return [m for m in good if m not in held], held
+        return [m for m in good if m not in held], [
+            replace(m, found=m.found.response()) for m in held
+        ]
 
     def _model(
         self, used: Sequence[FlownManeuver], trim: Trim
@@ -507,6 +508,6 @@ def _held_out(found: list[FlownManeuver]) -> list[FlownManeuver]:
     held = []
     for axis in dict.fromkeys(m.found.axis for m in found):
         mine = [m for m in found if m.found.axis == axis]
-        if len(mine) >= 3:
+        if len(mine) >= HELD_OUT_FROM:
             held.append(mine[-1])
     return held

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
+from host.sysid.flight.free_response import with_free_response
+from host.sysid.flight.sustained_inputs import sustained_inputs
 
 LAG_S = 0.12  # a hand needs about this long for one edge
 LEAST_EDGE_RAD = 0.025  # 1.4 degrees: a pulse smaller than this excites nothing on a trainer
@@ -22,6 +24,14 @@ LEAST_EDGE_THROTTLE = 0.12
 ACTIVITY = 6.0  # edges stand out by this many robust deviations of the surface's activity
 JOIN_S = 1.6  # between edges of one input; wider for a throttle pulse
 JOIN_THROTTLE_S = 3.0
+HOLD_S = 6.0  # longest step of an input
+SLOW = (0.007, 0.15)  # least swing of an input without edges: surfaces, throttle
+WEAKER = 0.6  # of an input with edges: swings of the pilot beside it
+SHORT_S = 20.0  # a record no longer than this was cut to its input
+PARTING_GAP_S = 5.0
+SHORTEST_PART_S = 1.0  # of a maneuver that a gap divides
+TRIM_AFTER_GAP_S = 0.5  # fits of coefficients reach as far back from the start
+FEWEST = 8  # samples, as a maneuver needs
 SWEEP_LEAD_S = 25.0  # slow swings of a sweep are looked for this far before its first edge
 STEADY_TREND = 0.6  # rank correlation of swing length with order: a sweep's swings shorten
 SWEEP_GAP_S = 1.2  # a 0.15 Hz sine is near its trim no longer than this
@@ -44,10 +54,16 @@ class DetectedManeuver:
     amplitude: float
     edges: int
     given: bool = False  # by the user, as a stretch of time: a maneuver whatever moved in it
+    lead_s: float = LEAD_S  # before the input, in a fit
+    free_end_s: float = -np.inf  # until then the aircraft was left alone, if that is after `end_s`
 
     def fit_window(self) -> tuple[float, float]:
-        """Return from and to with a moment of trim before the input."""
-        return self.start_s - LEAD_S, self.end_s
+        """Return from and to, with trim before the input and all of the free response."""
+        return self.start_s - self.lead_s, max(self.end_s, self.free_end_s)
+
+    def response(self) -> DetectedManeuver:
+        """Return input and first response alone, as a prediction is judged by."""
+        return replace(self, lead_s=min(self.lead_s, LEAD_S), free_end_s=-np.inf)
 
 
 def detect_maneuvers(columns: Mapping[str, Array]) -> list[DetectedManeuver]:
@@ -57,56 +73,157 @@ def detect_maneuvers(columns: Mapping[str, Array]) -> list[DetectedManeuver]:
     ----------
     columns : mapping
         `t_s` and any of `elevator_rad`, `aileron_rad`, `rudder_rad`, `throttle`; `airspeed_mps`
-        keeps ground handling out; a maneuver where `bridged` is not zero (`tables`) is left out.
+        keeps ground handling out; where `bridged` is not zero (`tables`) a maneuver is divided.
     """
     t = np.asarray(columns["t_s"], dtype=np.float64)
-    if len(t) < 32:
-        return []
     flying = np.ones(len(t), dtype=bool)
     if "airspeed_mps" in columns:
         speed = np.nan_to_num(np.asarray(columns["airspeed_mps"]))
         flying = speed > FLYING_SHARE * float(np.median(speed))
     found: list[DetectedManeuver] = []
-    for axis in AXES:
-        if axis in columns:
-            series = np.nan_to_num(np.asarray(columns[axis], dtype=np.float64))
-            found += _find_axis(axis, t, series, flying)
+    for record in _records(t, columns):
+        own = {name: np.asarray(values)[record] for name, values in columns.items()}
+        found += _of_record(own, flying[record])
+    return found
+
+
+def _records(t: Array, columns: Mapping[str, Array]) -> list[slice]:
+    """Return the parts between gaps so long that what is behind one is another record."""
+    if "bridged" not in columns:
+        return [slice(0, len(t))]
+    runs = [r for r in runs_of(np.asarray(columns["bridged"]) <= 0.0) if len(r)]
+    ends = [(int(r[0]), int(r[-1]) + 1) for r in runs]
+    parted: list[tuple[int, int]] = []
+    for first, last in ends:
+        if parted and t[first] - t[parted[-1][1] - 1] < PARTING_GAP_S:
+            parted[-1] = (parted[-1][0], last)
+        else:
+            parted.append((first, last))
+    return [slice(first, last) for first, last in parted]
+
+
+def _of_record(columns: Mapping[str, Array], flying: BoolArray) -> list[DetectedManeuver]:
+    t = np.asarray(columns["t_s"], dtype=np.float64)
+    if len(t) < FEWEST:
+        return []
+    surfaces = {
+        axis: _median3(np.nan_to_num(np.asarray(columns[axis], dtype=np.float64)))
+        for axis in AXES
+        if axis in columns
+    }
+    found: list[DetectedManeuver] = []
+    for axis, series in surfaces.items():
+        found += _find_axis(axis, t, series, flying)
     found.sort(key=lambda f: f.start_s)
     found = _bounded(found, float(t[-1]))
-    if "bridged" not in columns:
-        return found
-    holes = t[np.asarray(columns["bridged"]) > 0.0]
-    return [f for f in found if not np.any((holes > f.start_s) & (holes < f.end_s))]
+    if "bridged" in columns:
+        measured = ~(np.asarray(columns["bridged"]) > 0.0)
+        found = [part for f in found for part in _parts(f, t, measured)]
+        flying = flying & measured
+    return with_free_response(found, t, surfaces, flying)
+
+
+def _parts(item: DetectedManeuver, t: Array, measured: BoolArray) -> list[DetectedManeuver]:
+    """Return the parts of a maneuver between gaps of the data; itself if there is none."""
+    inside = (t > item.start_s) & (t < item.end_s)
+    if measured[inside].all():
+        return [item]
+    inside |= (t >= item.start_s - item.lead_s) & (t <= item.end_s)
+    parts = []
+    for samples in runs_of(measured & inside):
+        first_s, last_s = float(t[samples[0]]), float(t[samples[-1]])
+        if last_s - first_s >= SHORTEST_PART_S:
+            begin_s = item.start_s if first_s <= item.start_s else first_s + TRIM_AFTER_GAP_S
+            input_end_s = float(np.clip(item.input_end_s, begin_s, last_s))
+            parts.append(replace(item, start_s=begin_s, input_end_s=input_end_s, end_s=last_s))
+    return parts
 
 
 def _find_axis(axis: str, t: Array, series: Array, flying: BoolArray) -> list[DetectedManeuver]:
     dt_s = float(np.median(np.diff(t)))
     lag = max(1, round(LAG_S / dt_s))
-    smooth = _median3(series)
+    groups = _edges(axis, t, series, flying, lag)
+    groups = _held_together(groups, t, series, lag)
+    slow = sustained_inputs(t, series, flying, SLOW[axis == "throttle"])
+    result = []
+    for first, last in _united(groups, slow, series, lag):
+        result += _describe(axis, t, series, (first, last), lag, flying)
+    return result
+
+
+def _edges(
+    axis: str, t: Array, series: Array, flying: BoolArray, lag: int
+) -> list[tuple[int, int]]:
+    """Return first and last edge of each input: changes that stand out of the activity."""
     change = np.zeros(len(t))
-    change[lag:] = smooth[lag:] - smooth[:-lag]
+    change[lag:] = series[lag:] - series[:-lag]
     change[~flying] = 0.0
     # A low quantile, because a sweep can fill most of a record; of a normal one it is 0.253 sigma.
     quiet = float(np.quantile(np.abs(change[flying]), 0.2)) / 0.253 if flying.any() else 0.0
     least = LEAST_EDGE_THROTTLE if axis == "throttle" else LEAST_EDGE_RAD
-    limit = max(least, ACTIVITY * quiet)
-    hot = np.flatnonzero(np.abs(change) > limit)
+    hot = np.flatnonzero(np.abs(change) > max(least, ACTIVITY * quiet))
     if len(hot) == 0:
         return []
     join = JOIN_THROTTLE_S if axis == "throttle" else JOIN_S
     groups = np.split(hot, np.flatnonzero(np.diff(t[hot]) > join) + 1)
-    result = []
-    for group in groups:
-        result += _describe(axis, t, smooth, group, lag)
-    return result
+    return [(int(group[0]), int(group[-1])) for group in groups]
+
+
+def _held_together(
+    groups: list[tuple[int, int]], t: Array, series: Array, lag: int
+) -> list[tuple[int, int]]:
+    """Join edges between which the surface is held away from where it was: a slow 3-2-1-1."""
+    joined: list[tuple[int, int]] = []
+    for first, last in groups:
+        if joined:
+            begin, end = joined[-1]
+            rest = float(np.median(series[max(0, begin - 3 * lag) : max(1, begin - lag)]))
+            away = np.abs(series[end : first - lag] - rest)
+            size = float(np.max(np.abs(series[begin : last + 1] - rest)))
+            held = len(away) > 0 and bool(np.mean(away > 0.3 * size) > 0.9)
+            if held and t[first] - t[end] < HOLD_S:
+                joined[-1] = (begin, last)
+                continue
+        joined.append((first, last))
+    return joined
+
+
+def _united(
+    edges: list[tuple[int, int]], slow: list[tuple[int, int]], series: Array, lag: int
+) -> list[tuple[int, int]]:
+    """Return the spans of all inputs in order; those that share samples are one."""
+    slow = [span for span in slow if not _stirs(span, edges, series, lag)]
+    united: list[tuple[int, int]] = []
+    for first, last in sorted([*edges, *slow]):
+        if united and slow and first <= united[-1][1]:
+            united[-1] = (united[-1][0], max(last, united[-1][1]))
+        else:
+            united.append((first, last))
+    return united
+
+
+def _stirs(span: tuple[int, int], edges: list[tuple[int, int]], series: Array, lag: int) -> bool:
+    """Return whether swings are but the pilot's, before or after a larger input with edges."""
+    inside = [(a, b) for a, b in edges if a <= span[1] and b >= span[0]]
+    rest = np.ones(len(series), dtype=bool)
+    rest[: span[0]] = rest[span[1] + 1 :] = False
+    for first, last in inside:
+        rest[max(0, first - 2 * lag) : last + 2 * lag] = False
+    if len(inside) != 1 or not rest.any():
+        return False
+    first, last = inside[0]
+    return float(np.ptp(series[rest])) < WEAKER * float(np.ptp(series[first : last + 1]))
 
 
 def _describe(
-    axis: str, t: Array, series: Array, group: IntArray, lag: int
+    axis: str, t: Array, series: Array, span: tuple[int, int], lag: int, flying: BoolArray
 ) -> list[DetectedManeuver]:
-    first, last = int(group[0]), int(group[-1])
+    first, last = span
+    settle = float(np.median(series[last : last + 4 * lag + 1]))
     before = series[max(0, first - lag - round(TRIM_S / float(t[1] - t[0]))) : max(1, first - lag)]
     trim = float(np.median(before))
+    if flying[0] and _begins_inside(t, series, first, settle):
+        first, trim = 0, settle
     inside = series[first : last + 1] - trim
     amplitude = float(np.max(np.abs(inside)))
     # Walk back to the departure and forward to the return, a fifth of the edge at a time.
@@ -114,14 +231,13 @@ def _describe(
     while start > 0 and first - start < 2 * lag and abs(series[start] - trim) > 0.15 * amplitude:
         start -= 1
     end = last
-    settle = float(np.median(series[last : last + 4 * lag + 1]))
     while end > first and abs(series[end] - settle) < 0.15 * amplitude:
         end -= 1
-    if abs(settle - trim) > 0.6 * amplitude:
-        return []  # a step that stays is a change of trim (a launch), not a test input
     runs = _runs(inside / max(amplitude, 1e-12), t[first : last + 1])
     if len(runs) == 0:
         return []
+    if len(runs) < 3 and abs(settle - trim) > 0.6 * amplitude:
+        return []  # a step that stays is a change of trim (a launch), not a test input
     kind = _kind(runs)
     if kind in ("sweep", "multisine"):
         start = _slow_start(t, series, start, amplitude)
@@ -136,6 +252,22 @@ def _describe(
             edges=len(runs) + 1,
         )
     ]
+
+
+def _begins_inside(t: Array, series: Array, first: int, settle: float) -> bool:
+    """Return whether the record begins in an input whose first edge seen is `first`.
+
+    It is away from where it comes to rest. A single step may be one of trim as well; in a flight it
+    is taken for that, in a record cut to a few seconds for the end of a pulse.
+    """
+    if t[first] - t[0] > HOLD_S:
+        return False
+    away = series[: first + 1] - settle
+    behind = series[first:] - settle
+    size = max(float(np.max(np.abs(away))), float(np.max(np.abs(behind))))
+    held = bool(np.mean(np.abs(away) > 0.3 * size) > 0.7)
+    both = bool(np.min(behind * np.sign(away[0])) < -0.3 * size)
+    return held and (both or float(t[-1] - t[0]) < SHORT_S)
 
 
 def _slow_start(t: Array, series: Array, start: int, amplitude: float) -> int:
@@ -217,18 +349,7 @@ def _bounded(found: list[DetectedManeuver], last_s: float) -> list[DetectedManeu
     result = []
     for k, item in enumerate(kept):
         limit = kept[k + 1].start_s if k + 1 < len(kept) else last_s
-        end = min(item.end_s, max(limit, item.input_end_s), last_s)
-        result.append(
-            DetectedManeuver(
-                item.axis,
-                item.kind,
-                item.start_s,
-                item.input_end_s,
-                end,
-                item.amplitude,
-                item.edges,
-            )
-        )
+        result.append(replace(item, end_s=min(item.end_s, max(limit, item.input_end_s), last_s)))
     return result
 
 
@@ -267,9 +388,10 @@ def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
     noise = float(np.std(np.diff(response[inside], n=2))) / np.sqrt(6.0) if inside.sum() > 8 else 0
     power = float(np.std(response[inside])) if inside.any() else 0.0
     ratio = power / max(noise, 1e-12)
-    trim = float(np.std(response[before])) / max(power, 1e-12) if before.sum() > 4 else 1.0
+    # Of a record that was cut to its input neither is known, and neither counts against it.
+    trim = float(np.std(response[before])) / max(power, 1e-12) if before.sum() > 4 else 0.0
     feedback = (
-        float(np.std(surface[after])) / max(item.amplitude, 1e-12) if after.sum() > 4 else 1.0
+        float(np.std(surface[after])) / max(item.amplitude, 1e-12) if after.sum() > 4 else 0.0
     )
     remarks = []
     if ratio < 5.0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +20,8 @@ from host.sysid.identification_error import IdentificationError
 SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad")
 FEWEST = 8  # samples, as a maneuver needs
 SHARED_S = 0.1  # windows that overlap by more are one
+TOUCHING_S = 0.1  # nothing moved between windows no further apart
+HELD_OUT_FROM = 3  # maneuvers of an axis, of which one is held out
 Stretch = tuple[float | None, float | None]  # from and to, s; None is the end of the record
 
 
@@ -105,18 +107,52 @@ def _given(columns: Mapping[str, Array], part: IntArray) -> list[DetectedManeuve
     ]
 
 
+def joined_windows(
+    each: Sequence[Sequence[DetectedManeuver]],
+) -> list[list[DetectedManeuver]]:
+    """Return the maneuvers of one model in each flight, as they are fitted.
+
+    Windows that share samples are one. Those that only touch, the aircraft left alone between them,
+    stay apart where one can be held out and predicted; else they are one too, for a window costs
+    constants of its own (yaw derivatives of a calm record were known up to 1.5 times worse).
+    """
+    joined = [merge_overlapping(found) for found in each]
+    axes = [item.axis for found in joined for item in found]
+    if any(axes.count(axis) >= HELD_OUT_FROM for axis in axes):
+        return joined
+    return [_joined(found, _touching) for found in joined]
+
+
 def merge_overlapping(found: Sequence[DetectedManeuver]) -> list[DetectedManeuver]:
     """Join windows that share samples: surfaces that moved together are one record."""
+    return _joined(found, _overlapping)
+
+
+def _joined(
+    found: Sequence[DetectedManeuver], one: Callable[[DetectedManeuver, DetectedManeuver], bool]
+) -> list[DetectedManeuver]:
     joined: list[DetectedManeuver] = []
     for item in sorted(found, key=lambda f: f.start_s):
         before = joined[-1] if joined else None
-        if before is not None and item.start_s < before.end_s - SHARED_S:
-            last_s = max(before.end_s, item.end_s)
-            input_s = max(before.input_end_s, item.input_end_s)
-            joined[-1] = replace(before, input_end_s=input_s, end_s=last_s)
+        if before is not None and one(before, item):
+            joined[-1] = replace(
+                before,
+                input_end_s=max(before.input_end_s, item.input_end_s),
+                end_s=max(before.end_s, item.end_s),
+                free_end_s=max(before.free_end_s, item.free_end_s),
+            )
         else:
             joined.append(item)
     return joined
+
+
+def _overlapping(before: DetectedManeuver, item: DetectedManeuver) -> bool:
+    return item.start_s < before.fit_window()[1] - SHARED_S
+
+
+def _touching(before: DetectedManeuver, item: DetectedManeuver) -> bool:
+    chosen = before.given or item.given  # as the user wants them
+    return not chosen and item.fit_window()[0] < before.fit_window()[1] + TOUCHING_S
 
 
 def excited_axes(inputs: Sequence[str]) -> tuple[str, ...]:

@@ -1,0 +1,81 @@
+"""Inputs without edges: multisines and sweeps whose swings go on for many seconds.
+
+A swing is the range of a surface over two seconds. In an input it stands out of what the pilot does
+in the rest of the flight; a record that was cut to its input has no rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from host.arrays import Array, BoolArray
+
+HALF_S = 1.0  # of the window of a swing
+ABOVE = 4.0  # swings of an input over those of the quiet fifth of the flight
+SMALL, LOW, LOW_SHARE = 0.2, 3.0, 0.5  # of its own swings, of quiet ones, of the least: it goes on
+CUT_S = 60.0  # a record no longer than this may have been cut to its input, and hardly have a rest
+NO_REST = 10.0  # its large swings over its quiet ones, where it has none
+SHORTEST_S = 5.0
+FEWEST_TURNS = 4  # of the surface about its middle
+
+
+def sustained_inputs(
+    t: Array, series: Array, flying: BoolArray, least: float
+) -> list[tuple[int, int]]:
+    """Return the first and last sample of each input that goes on.
+
+    Parameters
+    ----------
+    t, series : Array, shape (n,)
+        Time, s, on an even grid, and a surface, rad, or the throttle.
+    flying : Array, shape (n,)
+    least : float
+        Smallest swing of an input.
+    """
+    dt_s = float(np.median(np.diff(t)))
+    half = max(1, round(HALF_S / dt_s))
+    if not flying.any():
+        return []
+    size = 2 * half + 1
+    swing = ndimage.maximum_filter1d(series, size) - ndimage.minimum_filter1d(series, size)
+    cut = flying.sum() * dt_s <= CUT_S
+    quiet, large = np.quantile(swing[flying], (0.05 if cut else 0.2, 0.95))
+    if cut and large < NO_REST * quiet:
+        quiet = 0.0
+    active = flying & (swing > max(least, ABOVE * quiet))
+    found: list[tuple[int, int]] = []
+    for first, last in _spans(active):
+        # Slow swings at both ends belong to it: small beside its own, but no rest yet.
+        small = max(
+            SMALL * float(np.median(swing[first : last + 1])), LOW * quiet, LOW_SHARE * least
+        )
+        going = flying & (swing > small)
+        before, after = np.flatnonzero(~going[:first]), np.flatnonzero(~going[last + 1 :])
+        first = int(before[-1]) + 1 if len(before) else 0
+        last += int(after[0]) if len(after) else len(t) - 1 - last
+        if found and first <= found[-1][1]:
+            first = found.pop()[0]
+        found.append((first, last))
+    # The window of a swing reaches the input before its middle does.
+    inner = [
+        (first + half if first > 0 else first, last - half if last < len(t) - 1 else last)
+        for first, last in found
+    ]
+    return [
+        (first, last)
+        for first, last in inner
+        if (last - first) * dt_s >= SHORTEST_S and _turns(series[first : last + 1]) >= FEWEST_TURNS
+    ]
+
+
+def _spans(active: BoolArray) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(np.int8)))
+    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
+
+
+def _turns(series: Array) -> int:
+    """Return how often a surface goes from one side of its middle to the other, noise aside."""
+    about = series - np.median(series)
+    side = np.sign(about[np.abs(about) > 0.15 * np.max(np.abs(about))])
+    return int(np.sum(np.diff(side) != 0.0))
