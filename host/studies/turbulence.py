@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from host.arrays import Array, BoolArray
 from host.sysid.estimators.filter_error import information_at
-from host.sysid.estimators.filter_error_gust import ROLL_GUST, gust_model
+from host.sysid.estimators.gust_model import ROLL_GUST, gust_model
 from host.sysid.estimators.method_registry import fit
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver

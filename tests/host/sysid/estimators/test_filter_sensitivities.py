@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from host.sysid.estimators.filter_error import fit_filter_error
-from host.sysid.estimators.filter_error_gust import gust_model
+from host.sysid.estimators.gust_model import gust_model
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim, template

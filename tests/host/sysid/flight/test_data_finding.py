@@ -144,10 +144,13 @@ def test_small_inputs_are_fitted_as_one_stretch(record: pd.DataFrame) -> None:
     [finding] = [f for f in found.findings if f.check == "small-inputs"]
     assert "is fitted as one stretch" in finding.done
     assert finding.channels == ()
-    whole = host.identify(record, models="short-period", from_s=float(record["t_s"][0]))
+    given = host.identify(small, models="short-period", from_s=float(record["t_s"][0]))
+    large = host.identify(record, models="short-period", from_s=float(record["t_s"][0]))
     for name in ("M_alpha", "M_q", "M_de"):
-        small_value, value = (x.linear[0].result.value(name) for x in (found, whole))
-        assert small_value == pytest.approx(value, rel=0.15), name
+        value, same, other = (x.linear[0].result.value(name) for x in (found, given, large))
+        assert value == pytest.approx(same, rel=0.01), name
+        # What airspeed and attitude do is of second order: seven times smaller in this record.
+        assert value == pytest.approx(other, rel=0.25), name
 
 
 THOR = ROOT / "tests/data/thor75"

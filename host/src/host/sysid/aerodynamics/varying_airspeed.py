@@ -69,8 +69,8 @@ class VaryingModel:
         Which of both.
     trim : Trim
         What the parameters belong to.
-    airframe : AirframeData
-        Inertia, for what rates do to each other.
+    airframe : AirframeData or None
+        Inertia, for what rates do to each other; without, that is left out.
     spin_kgm2ps : tuple of float
         Angular momentum of the rotor along x and z.
     """
@@ -78,7 +78,7 @@ class VaryingModel:
     base: LinearModel
     axis: str
     trim: Trim
-    airframe: AirframeData
+    airframe: AirframeData | None
     spin_kgm2ps: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
@@ -279,6 +279,8 @@ class VaryingModel:
     def _inertial(self, p: Array, q: Array, r: Array) -> dict[str, Array]:
         """Return angular accelerations that rates and the rotor make."""
         a, (hx, hz) = self.airframe, self.spin_kgm2ps
+        if a is None:
+            return dict.fromkeys(RATES, np.zeros(len(p)))
         x = -(a.izz_kgm2 - a.iyy_kgm2) * q * r + a.ixz_kgm2 * p * q - q * hz
         y = (a.izz_kgm2 - a.ixx_kgm2) * p * r - a.ixz_kgm2 * (p**2 - r**2) - r * hx + p * hz
         z = -(a.iyy_kgm2 - a.ixx_kgm2) * p * q - a.ixz_kgm2 * q * r + q * hx

@@ -131,6 +131,7 @@ def fit_filter_error(
         converged=found.converged,
         warnings=tuple(warnings),
         details={
+            "last_step_bounds": float(found.step),
             "cost": point.cost,
             "hac_inflation": factor,
             "process_deviation": np.exp(theta[n_model : n_model + len(process)]),

@@ -1,4 +1,4 @@
-"""Filter error with the gust as a state, after output error has estimated the delays."""
+"""Filter error with the gust as a state, delays estimated beside it."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.estimators.filter_error import fit_filter_error
+from host.sysid.estimators.gust_delays import advance_outputs, estimate_delays, near_its_optimum
+from host.sysid.estimators.gust_model import gust_model
+from host.sysid.estimators.gust_penetration import PREFIX, with_gust_penetration
 from host.sysid.estimators.innovations import innovations_of
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.start_values import start_values_of
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+from host.sysid.models.state_space_model import LinearModel
 
-SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, sec. 3.7, low altitude)
-VANES = ("alpha_rad", "beta_rad")
 # What else disturbs: thrust and longitudinal gusts; the drift of the attitude filter.
 OTHER_PROCESS_STATES = ("airspeed_mps", "phi_rad")
-ROLL_GUST = "gust_roll_radps"
 
 
 @dataclass(frozen=True)
@@ -37,115 +37,10 @@ class GustFit:
     delays: dict[str, tuple[float, float]]
 
 
-def gust_model(
-    base: LinearModel,
-    airspeed_mps: float,
-    scale_m: float = SCALE_M,
-    *,
-    span_m: float | None = None,
-    scale_share: float = 0.0,
-) -> LinearModel:
-    """Return a model with the gust angle as an extra state.
-
-    A vertical (or side) gust is an angle of attack (sideslip) to vanes, forces and moments alike,
-    so its entries are those of the angle and only its intensity is new. Its Dryden spectrum
-    (MIL-F-8785C, sec. 3.7) is that of white noise behind 1 / (1 + T s) with T = L / V, or with
-    `span_m` behind (1 + sqrt(3) T s) / (1 + T s)^2.
-
-    Parameters
-    ----------
-    base : LinearModel
-        A template; alpha or beta must be a measured state of it.
-    airspeed_mps : float
-        Of the trim, for the gust's time scale, m/s.
-    scale_m : float
-        Scale length L of the gusts, m.
-    span_m : float, optional
-        Wing span, m. With it the gust has the second-order spectrum across the flight path, acts as
-        a pitch (yaw) rate because it reaches the tail later, and has a rolling component in the
-        lateral motion; without it the first-order spectrum of the angle alone.
-    scale_share : float
-        Relative deviation of `scale_m`; above zero the rate V / L is a parameter, ``gust_rate``,
-        after the others.
-
-    Raises
-    ------
-    IdentificationError
-        If neither alpha nor beta is a measured state of it.
-    """
-    vanes = [v for v in VANES if v in base.states and v in base.outputs]
-    if not vanes:
-        raise IdentificationError(f"model {base.name}: no vane angle a gust could act on")
-    vane, rate = vanes[0], airspeed_mps / scale_m
-    lag = 0.0 if span_m is None else np.pi * airspeed_mps / (4.0 * span_m)
-    rate_effect = {"alpha_rad": ("q_radps", -1.0), "beta_rad": ("r_radps", 1.0)}[vane]
-    # Columns of the base that each gust state acts like, with gains.
-    gust_states: dict[str, dict[str, float]] = {"gust_rad": {vane: 1.0}}
-    entries = [("gust_rad", "gust_rad", -1.0)]
-    fixed: list[tuple[str, str, float]] = []
-    if span_m is not None:
-        lead, trail = np.sqrt(3.0), 1.0 - np.sqrt(3.0)
-        entries += [("gust_lag_rad", "gust_rad", 1.0), ("gust_lag_rad", "gust_lag_rad", -1.0)]
-        gust_states = {
-            "gust_rad": {vane: lead, rate_effect[0]: rate_effect[1] * lag * lead},
-            "gust_lag_rad": {vane: trail, rate_effect[0]: rate_effect[1] * lag * trail},
-            "gust_tail_rad": {rate_effect[0]: -rate_effect[1] * lag},
-        }
-        fixed = [
-            ("gust_tail_rad", "gust_rad", lag * lead),
-            ("gust_tail_rad", "gust_lag_rad", lag * trail),
-            ("gust_tail_rad", "gust_tail_rad", -lag),
-        ]
-        if vane == "beta_rad" and "p_radps" in base.states:
-            gust_states[ROLL_GUST] = {"p_radps": 1.0}
-            fixed.append((ROLL_GUST, ROLL_GUST, -lag))
-    states = (*base.states, *gust_states)
-    n, total = len(base.states), len(base.states) + len(gust_states)
-    A, C = np.zeros((total, total)), np.zeros((len(base.outputs), total))
-    A[:n, :n], C[:, :n] = base.A, base.C
-    terms = list(base.terms)
-    for column, (_, acts) in enumerate(gust_states.items(), start=n):
-        for state, gain in acts.items():
-            source = base.states.index(state)
-            terms += [
-                Term(t.matrix, t.row, column, t.parameter, t.gain * gain)
-                for t in base.terms
-                if t.matrix in "AC" and t.column == source
-            ]
-            if state == vane:  # the vane measures the gust as well
-                C[:, column] += gain * base.C[:, source]
-    for row, source_name, value in fixed:
-        A[states.index(row), states.index(source_name)] = value
-    parameters = base.parameters
-    if scale_share > 0.0:
-        terms += [
-            Term("A", states.index(a), states.index(b), "gust_rate", g) for a, b, g in entries
-        ]
-        parameters += (
-            Parameter(
-                "gust_rate", rate, lower=0.1 * rate, upper=10.0 * rate, prior_sd=scale_share * rate
-            ),
-        )
-    else:
-        for a, b, g in entries:
-            A[states.index(a), states.index(b)] = g * rate
-    return replace(
-        base,
-        name=f"{base.name} with gust",
-        states=states,
-        A=A,
-        B=np.vstack([base.B, np.zeros((len(gust_states), len(base.inputs)))]),
-        C=C,
-        terms=tuple(terms),
-        parameters=parameters,
-        delays=(),
-    )
-
-
 def fit_with_gust(
     model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float
 ) -> GustFit:
-    """Fit a template in two stages: delays by output error, then filter error with the gust.
+    """Fit a template by filter error with the gust as a state, delays estimated beside it.
 
     Parameters
     ----------
@@ -158,48 +53,76 @@ def fit_with_gust(
     """
     if not model.delays:
         start = start_values_of(model, maneuvers)
-        result = _fit_gust_state(model, model, list(maneuvers), airspeed_mps, start)
-        return GustFit(result, model, tuple(maneuvers), {})
+        result = _fit_gust_state(model, list(maneuvers), airspeed_mps, start)
+        return GustFit(result, result.model, tuple(maneuvers), {})
     first = fit("output-error-white", model, maneuvers, multiple_starts=False)
-    half = first.half_width()
-    delays = {d.name: (first.value(d.name), float(half[first.index(d.name)])) for d in model.delays}
-    shifts = np.zeros(len(model.outputs))
-    for delay in model.delays:
-        for output in delay.outputs:
-            shifts[model.outputs.index(output)] = delays[delay.name][0]
-    shifted = [_advance_outputs(m, shifts) for m in maneuvers]
     count = len(model.parameters)
     start = np.concatenate([first.estimate[:count], first.estimate[len(model.parameter_names) :]])
-    plain = replace(model, delays=())
-    result = _fit_gust_state(model, plain, shifted, airspeed_mps, start)
+    late = estimate_delays(model, maneuvers, airspeed_mps, first, start, gust_process(model))
+    start = np.concatenate([late.estimate, start[count:]])
+    shifted = [advance_outputs(m, model, late.delays) for m in maneuvers]
+    result = _fit_gust_state(replace(model, delays=()), shifted, airspeed_mps, start)
     if result.residual_kind == "innovation":
         covariance = result.covariance.copy()
-        covariance[:count, :count] += _delay_covariance(first, model)
+        covariance[:count, :count] += late.covariance
         result = replace(result, covariance=covariance)
-    return GustFit(result=result, model=plain, maneuvers=tuple(shifted), delays=delays)
+    return GustFit(result, result.model, tuple(shifted), late.delays)
+
+
+def without_gust_parameters(result: FitResult, model: LinearModel) -> FitResult:
+    """Return the result on the model of the aircraft alone: what gusts do is no derivative."""
+    kept = [k for k, name in enumerate(result.names) if not name.startswith(PREFIX)]
+    if len(kept) == len(result.names):
+        return result
+    by_maneuver = {
+        key: value[:, kept]
+        for key, value in result.details.items()
+        if key in ("maneuver_influence", "information_share") and isinstance(value, np.ndarray)
+    }
+    return replace(
+        result,
+        model=model,
+        names=tuple(result.names[k] for k in kept),
+        estimate=result.estimate[kept],
+        covariance=result.covariance[np.ix_(kept, kept)],
+        covariance_white=result.covariance_white[np.ix_(kept, kept)],
+        degrees_of_freedom=result.degrees_of_freedom[kept],
+        details={**result.details, **by_maneuver},
+    )
+
+
+def gust_process(model: LinearModel) -> tuple[str, ...]:
+    """Return the states that process noise drives."""
+    return ("gust_rad", *(s for s in OTHER_PROCESS_STATES if s in model.states))
 
 
 def _fit_gust_state(
-    model: LinearModel,
-    plain: LinearModel,
-    maneuvers: Sequence[Maneuver],
-    airspeed_mps: float,
-    start: Array,
+    model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float, start: Array
 ) -> FitResult:
     """Return filter error with the gust as a state; output error if that does not converge."""
-    process = ("gust_rad", *(s for s in OTHER_PROCESS_STATES if s in model.states))
-    augmented = gust_model(model, airspeed_mps)
+    plain, first = model, start
+    if {"alpha_rad", "q_radps"} <= set(model.states):
+        plain, first = with_gust_penetration(model, airspeed_mps, start)
+    augmented = gust_model(plain, airspeed_mps)
     try:
         result = fit_filter_error(
-            augmented, maneuvers, process=process, start=start, compare_noise=False
+            augmented, maneuvers, process=gust_process(model), start=first, compare_noise=False
         )
-        failure = "" if result.converged else result.warnings[0]
+        failure = "" if near_its_optimum(result) else result.warnings[0]
+        if not failure:
+            result = replace(result, converged=True, warnings=())
     except IdentificationError as error:
         failure = str(error)
     if not failure:
         innovations = innovations_of(result, augmented, maneuvers)
+        details = dict(result.details)
+        if isinstance(influence := details.get("maneuver_influence"), np.ndarray):
+            # Gusts need not be the same in every maneuver: their parameters are not held to it.
+            own = [not name.startswith(PREFIX) for name in result.names]
+            details["maneuver_influence"] = influence * own
         return replace(
             result,
+            details=details,
             method="filter error with gust",
             model=plain,
             covariance=result.covariance
@@ -207,38 +130,8 @@ def _fit_gust_state(
             else innovations.coloured_covariance(),
         )
     # Output error has wider intervals, but a search that has not converged has none.
-    result = fit("output-error-white", plain, maneuvers, start=start, multiple_starts=False)
+    result = fit("output-error-white", model, maneuvers, start=start, multiple_starts=False)
     return replace(
         result,
         warnings=(*result.warnings, f"filter error: {failure}; output error stands instead"),
     )
-
-
-def _delay_covariance(first: FitResult, model: LinearModel) -> Array:
-    """Return the covariance that the uncertain delays add to that of the parameters.
-
-    The second stage takes the delays for known. By the first one the parameters depend on them as d
-    theta / d tau = C_theta_tau C_tau_tau^-1, so that C_theta_tau C_tau_tau^-1 C_tau_theta is added.
-    """
-    count, names = len(model.parameters), len(model.parameter_names)
-    own = first.covariance[count:names, count:names]
-    cross = first.covariance[:count, count:names]
-    estimated = np.flatnonzero(np.diag(own) > 0.0)
-    if len(estimated) == 0:
-        return np.zeros((count, count))
-    part = (
-        cross[:, estimated]
-        @ np.linalg.pinv(own[np.ix_(estimated, estimated)])
-        @ cross[:, estimated].T
-    )
-    return np.asarray(0.5 * (part + part.T), dtype=np.float64)
-
-
-def _advance_outputs(maneuver: Maneuver, shifts_s: Array) -> Maneuver:
-    """Return the maneuver with each output advanced by its delay (s)."""
-    t = maneuver.time_s
-    columns = [
-        np.interp(t + shift, t, column)
-        for shift, column in zip(shifts_s, maneuver.outputs.T, strict=True)
-    ]
-    return replace(maneuver, outputs=np.column_stack(columns))

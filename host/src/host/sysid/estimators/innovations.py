@@ -47,20 +47,20 @@ class Innovations:
     sensitivities: list[Array]
 
     def one_step_update(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
-        """Return the change of the estimate for another model and other data, (P,).
+        """Return the change of the estimate for another model and other data, (maneuvers, P).
 
-        It is one Gauss-Newton step, -M^-1 sum (d nu/d theta)' S^-1 (nu_changed - nu), and zero if
-        the filter fails.
+        Each maneuver has its share of one Gauss-Newton step, -M^-1 sum (d nu/d theta)' S^-1
+        (nu_changed - nu); zero if the filter fails.
         """
         point = FilterProblem(model, changed, self.process).evaluate(self.theta)
-        score = np.zeros(len(self.theta))
+        scores = np.zeros((len(self.e), len(self.theta)))
         if point is None:
-            return score
-        for e, reference, white, sensitivity in zip(
-            point.e, self.e, self.white, self.sensitivities, strict=True
+            return scores
+        for k, (e, reference, white, sensitivity) in enumerate(
+            zip(point.e, self.e, self.white, self.sensitivities, strict=True)
         ):
-            score -= np.einsum("nj,njk->k", (e - reference) @ white.T, sensitivity)
-        return np.asarray(self.inverse @ score)
+            scores[k] = -np.einsum("nj,njk->k", (e - reference) @ white.T, sensitivity)
+        return np.asarray(scores @ self.inverse)
 
     def coloured_covariance(self) -> Array:
         """Return the covariance corrected for coloured innovations; no variance becomes smaller.

@@ -24,7 +24,9 @@ from host.sysid.aerodynamics.coefficient_table import (
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import Correction, corrections
 from host.sysid.estimators.coherence_inflation import inflate_by_coherence
-from host.sysid.estimators.filter_error_gust import VANES, fit_with_gust
+from host.sysid.estimators.filter_error_gust import fit_with_gust, without_gust_parameters
+from host.sysid.estimators.gust_model import VANES
+from host.sysid.estimators.gust_penetration import without_gust_penetration
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.free_simulation import (
@@ -252,9 +254,8 @@ class LinearEstimator:
         found = replace(found, warnings=(*remarks, *found.warnings))
         cuts = [m.inside() for m in used]
         left = None
-        airframe = self.airframe if trim.known else None
-        if airframe is not None and self.own is None and found.residual_kind in FREE:
-            left = correct_trim_departure(found, data, cuts, airframe, trim, self.powerplant)
+        if trim.known and self.own is None and found.residual_kind in FREE:
+            left = correct_trim_departure(found, data, cuts, self.airframe, trim, self.powerplant)
         return LinearEstimate(
             template=self.template if self.own is None else model.name,
             method=method,
@@ -273,10 +274,16 @@ class LinearEstimator:
     def intervals(self, estimate: LinearEstimate) -> LinearIntervals:
         """Return the covariance from noise and repeats, and from every systematic error."""
         e = estimate
-        scattered = inflate_covariance(e.fit, maneuver_agreement(e.fit))
-        statistical = replace(scattered, estimate=e.estimate)
-        coherence = residual_coherence(e.model, e.estimate, e.maneuvers)
-        excess = excess_over_noise_model(e.model, statistical, e.maneuvers, e.trim.airspeed_mps)
+        fit_at_trim = e.fit if e.departure is None else e.departure.corrected(e.fit)
+        statistical = inflate_covariance(fit_at_trim, maneuver_agreement(fit_at_trim))
+        # Airspeed that varied is known: what it does is no model error.
+        at_trim = (
+            e.maneuvers
+            if e.departure is None
+            else e.departure.removed_from(e.maneuvers, e.estimate)
+        )
+        coherence = residual_coherence(e.model, e.estimate, at_trim)
+        excess = excess_over_noise_model(e.model, statistical, at_trim, e.trim.airspeed_mps)
         statistical = inflate_by_coherence(statistical, coherence, excess)
         shifts: tuple[ShiftedEstimate, ...] = (
             () if e.departure is None else (e.departure.remainder,)
@@ -317,12 +324,14 @@ class LinearEstimator:
         self, estimate: LinearEstimate, intervals: LinearIntervals, validation: LinearValidation
     ) -> Answer:
         """Return the parts of all stages as one answer, judged."""
-        e, total = estimate, intervals.total
+        e, model = estimate, without_gust_penetration(estimate.model)
+        total = without_gust_parameters(intervals.total, model)
+        statistical = without_gust_parameters(intervals.statistical, model)
         carrier = e.used[0].flight.compatibility
         return Answer(
             template=e.template,
             method=e.method,
-            model=e.model,
+            model=model,
             trim=e.trim,
             condition=e.condition,
             maneuvers=e.maneuvers,
@@ -332,7 +341,7 @@ class LinearEstimator:
             fits=validation.fits,
             validation=validation.held_out,
             identifiability_flags=assess_identifiability(total, e.maneuvers).flags,
-            collinearity=collinearity(intervals.statistical),
+            collinearity=collinearity(statistical),
             modes=modes(total),
             coefficients=intervals.coefficients,
             constant_inputs=constant_inputs(e.model, e.maneuvers),
@@ -342,7 +351,7 @@ class LinearEstimator:
             own_model=self.own is not None,
             coherence=intervals.coherence,
             predictions=validation.predictions,
-            noise_covariance=intervals.statistical.covariance,
+            noise_covariance=statistical.covariance,
         )
 
     def _maneuvers(

@@ -14,7 +14,7 @@ from scipy import linalg, special
 
 from host.arrays import Array
 from host.sysid.estimators.coherence_inflation import NoiseExcess
-from host.sysid.estimators.filter_error_gust import gust_model
+from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.innovations import PROCESS
 from host.sysid.flight.free_simulation import estimate_with_constants, weighted_fit
 from host.sysid.models.fit_result import FitResult

@@ -23,7 +23,8 @@ from host.sysid.compatibility.sensor_corrections import (
     residual_deviations,
 )
 from host.sysid.compatibility.sensor_dynamics import perturb_columns, residual_errors
-from host.sysid.estimators.filter_error_gust import gust_model
+from host.sysid.estimators.gust_model import gust_model
+from host.sysid.estimators.gust_penetration import penetration_of, without_gust_penetration
 from host.sysid.estimators.innovations import innovations_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
@@ -91,7 +92,7 @@ def systematic_error_shifts(
         )
         bent = _bent(trim, still[0], there[0]) if fresh and there[0] != still[0] else trim
         model = result.model if bent is trim else _retrimmed(result.model, bent)
-        steps.append(follow(model, bent, changed))
+        steps.append(follow(model, bent, changed).sum(axis=0))
     return tuple(
         ShiftedEstimate(error, result.estimate + step, *gain)
         for error, step, gain in zip(errors, steps, gains, strict=True)
@@ -166,7 +167,9 @@ def _changed(
 
 
 def follower(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> Follow | None:
-    """Return a function that gives the one-step change of the estimate for other data."""
+    """Return a function that gives the one-step change of the estimate for other data.
+
+    It returns the share of each maneuver in it, (maneuvers, P)."""
     if result.residual_kind == "innovation":
         wide = gust_model(result.model, trim.airspeed_mps)
         found = innovations_of(result, wide, maneuvers)
@@ -214,20 +217,23 @@ class _Outputs:
         self.inverse[held], self.inverse[:, held] = 0.0, 0.0  # not rounding: a bound stays one
 
     def step(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
-        """Return the change of the whole estimate for a new model and data, (P,)."""
+        """Return the change of the whole estimate for a new model and data, (maneuvers, P).
+
+        Each maneuver has its share of it.
+        """
         assert self.responses is not None
-        result = np.zeros(self.length)
+        result = np.zeros((len(changed), self.length))
         other = OutputProblem(model, changed).outputs(self.theta)
         if other is None:
             return result
-        pull = np.zeros(len(self.theta))
+        pull = np.zeros((len(changed), len(self.theta)))
         for k, (r, y, m) in enumerate(zip(self.responses, other, changed, strict=True)):
             rest = m.outputs.T - self.problem.measured(k) - (y - r.y)
             for w, J, d in zip(self.weight, r.sensitivities, rest, strict=True):
-                pull[self.problem.columns(k)] += w * J.T @ d
-        step = self.inverse @ pull
+                pull[k, self.problem.columns(k)] += w * J.T @ d
+        step = pull @ self.inverse
         for k, target in self.known:
-            result[target] = step[k]
+            result[:, target] = step[:, k]
         return result
 
 
@@ -235,7 +241,7 @@ def _is_template(model: LinearModel, trim: Trim) -> bool:
     """Return whether a model equals the template of its name at a trim."""
     if model.name not in TEMPLATES:
         return False
-    fresh = _about(model, trim)
+    fresh, model = _about(model, trim), without_gust_penetration(model)
     same = fresh.outputs == model.outputs and fresh.terms == model.terms
     return same and bool(np.array_equal(fresh.A, model.A) and np.array_equal(fresh.C, model.C))
 
@@ -249,4 +255,6 @@ def _about(model: LinearModel, trim: Trim) -> LinearModel:
 
 def _retrimmed(model: LinearModel, trim: Trim) -> LinearModel:
     fresh = _about(model, trim)
-    return replace(model, A=fresh.A, B=fresh.B, C=fresh.C, D=fresh.D, terms=fresh.terms)
+    own = without_gust_penetration(model)
+    bent = replace(own, A=fresh.A, B=fresh.B, C=fresh.C, D=fresh.D, terms=fresh.terms)
+    return penetration_of(bent, model)

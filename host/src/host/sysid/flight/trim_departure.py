@@ -22,7 +22,9 @@ from host.sysid.aerodynamics.varying_airspeed import MEASURED, SECOND_ORDER_TERM
 from host.sysid.flight.systematic_errors import follower
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 REMAINDER_SHARE = 0.25  # of the step: what one step and terms of second order leave open
 DEPARTURES = "departures from the linear model"
@@ -30,17 +32,76 @@ DEPARTURES = "departures from the linear model"
 
 @dataclass(frozen=True, slots=True)
 class Departure:
-    """By how much an estimate moves (P,), and what one step and second order leave open of it."""
+    """By how much an estimate moves, and what one step and second order leave open of it.
 
-    step: Array
+    Attributes
+    ----------
+    shares : Array, shape (maneuvers, P)
+        By how much each maneuver moves the joint estimate.
+    remainder : ShiftedEstimate
+    model : LinearModel
+        With what is known of the departures as further inputs.
+    maneuvers : tuple of Maneuver
+        With these inputs.
+    """
+
+    shares: Array
     remainder: ShiftedEstimate
+    model: LinearModel
+    maneuvers: tuple[Maneuver, ...]
+
+    @property
+    def step(self) -> Array:
+        """By how much the estimate moves, (P,)."""
+        return np.asarray(self.shares.sum(axis=0))
+
+    def corrected(self, result: FitResult) -> FitResult:
+        """Return the result at the estimate moved, what each maneuver says of it with it.
+
+        Maneuvers whose airspeed went different ways disagree before the step, not behind it.
+        """
+        details = dict(result.details)
+        if isinstance(influence := details.get("maneuver_influence"), np.ndarray):
+            tested = np.any(influence != 0.0, axis=0)  # what need not agree stays out of the test
+            details["maneuver_influence"] = influence + tested * self.shares
+        return replace(result, estimate=result.estimate + self.step, details=details)
+
+    def removed_from(self, maneuvers: Sequence[Maneuver], estimate: Array) -> list[Maneuver]:
+        """Return the maneuvers as if nothing had departed; as they are if the model diverges.
+
+        Parameters
+        ----------
+        maneuvers : sequence of Maneuver
+            As fitted.
+        estimate : Array
+            Common parameters first.
+        """
+        trimmed = [
+            replace(
+                wide,
+                inputs=np.hstack(
+                    [own.inputs, np.zeros_like(wide.inputs[:, own.inputs.shape[1] :])]
+                ),
+            )
+            for wide, own in zip(self.maneuvers, maneuvers, strict=True)
+        ]
+        problems = [OutputProblem(self.model, data) for data in (self.maneuvers, trimmed)]
+        theta = problems[0].first_guess()
+        theta[: problems[0].n_common] = estimate[: problems[0].n_common]
+        departed, still = (problem.outputs(theta) for problem in problems)
+        if departed is None or still is None:
+            return list(maneuvers)
+        return [
+            replace(m, outputs=m.outputs - (there - here).T)
+            for m, there, here in zip(maneuvers, departed, still, strict=True)
+        ]
 
 
 def correct_trim_departure(
     result: FitResult,
     maneuvers: Sequence[Maneuver],
     cuts: Sequence[Mapping[str, Array]],
-    airframe: AirframeData,
+    airframe: AirframeData | None,
     trim: Trim,
     powerplant: Powerplant | None = None,
 ) -> Departure | None:
@@ -53,7 +114,8 @@ def correct_trim_departure(
         As fitted.
     cuts : sequence of mapping
         All columns of each maneuver.
-    airframe : AirframeData
+    airframe : AirframeData or None
+        Inertia; without, what body rates do to each other is left out.
     trim : Trim
     powerplant : Powerplant, optional
         Tells the rotor's spin, which joins pitch and yaw; without, it is left out.
@@ -82,11 +144,15 @@ def correct_trim_departure(
         replace(m, inputs=varying.maneuver(c, m.dt_s).inputs)
         for m, c in zip(maneuvers, cuts, strict=True)
     ]
-    step = follow(wide, trim, data)
-    if not np.isfinite(step).all():
+    shares = follow(wide, trim, data)
+    if not np.isfinite(shares).all():
         return None
+    step = shares.sum(axis=0)
     return Departure(
-        step, ShiftedEstimate(DEPARTURES, result.estimate + step + REMAINDER_SHARE * step, 1.0, 1.0)
+        shares,
+        ShiftedEstimate(DEPARTURES, result.estimate + step + REMAINDER_SHARE * step, 1.0, 1.0),
+        wide,
+        tuple(data),
     )
 
 

@@ -1,0 +1,263 @@
+"""Delays of the sensors, estimated by filter error beside the gust.
+
+Output error takes the gust for noise of the sensors. What a gust does to vane, gyro and
+accelerometers then passes for delays: on simulated flights without any, gusts of 1 m/s, it found 16
+ms of the vane and 4 ms of the IMU, and M_alpha was 6 to 10 % off by that, M_q 17 %. A filter that
+has the gust tells both apart.
+
+A delay tau of output y enters as y - tau dy/dt, with dy/dt = C (A x + B u) + D du/dt of the
+estimate before: the model stays linear in its parameters. The columns are advanced by what was
+found and the filter runs again, so that tau tends to zero, where this is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from host.arrays import Array
+from host.constants import NORMAL_95
+from host.sysid.estimators.filter_error import fit_filter_error
+from host.sysid.estimators.gust_model import VANES, gust_model
+from host.sysid.estimators.gust_penetration import PREFIX, with_gust_penetration
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import DelayGroup, LinearModel, Parameter, Term
+from host.sysid.numerics.output_error_problem import OutputProblem
+
+NEAR_BOUNDS = 0.2  # of a Cramer-Rao bound: a search that still creeps so little has ended
+ROUNDS = 3
+LAGS = 2  # in a row, together a sample long: what a vane's lateness is made of
+# Lags are no delay: 2 to 3 ms were found of vanes without any, at 10 ms a sample, known to 0.2 ms.
+LAG_SHARE = 0.25
+SETTLED_SD = 0.3  # a round that moves a delay by less is the last
+# The pitot feels gusts along the path that the model has not: its delay went to 50 ms.
+GUST_BLIND = ("airspeed_mps",)
+
+
+@dataclass(frozen=True)
+class DelayEstimate:
+    """Delays of the sensors and what they leave open of the parameters.
+
+    Attributes
+    ----------
+    delays : dict
+        Value and 95 % half-width of each, s.
+    estimate : Array, shape (P,)
+        Parameters beside them.
+    covariance : Array, shape (P, P)
+        What the uncertain delays add to that of the parameters.
+    """
+
+    delays: dict[str, tuple[float, float]]
+    estimate: Array
+    covariance: Array
+
+
+def estimate_delays(
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    airspeed_mps: float,
+    first: FitResult,
+    start: Array,
+    process: tuple[str, ...],
+) -> DelayEstimate:
+    """Return the delays by filter error with the gust; none, known as output error has it, if that
+    fails.
+
+    Parameters
+    ----------
+    model : LinearModel
+        With delays.
+    maneuvers : sequence of Maneuver
+        As measured.
+    airspeed_mps : float
+    first : FitResult
+        Of output error, with the delays.
+    start : Array, shape (P + constants,)
+        Parameters and constants of every maneuver, without delays.
+    process : tuple of str
+        States that process noise drives.
+    """
+    count = len(model.parameters)
+    groups = [d for d in model.delays if not set(d.outputs) <= set(GUST_BLIND)]
+    values = {d.name: 0.0 for d in groups}
+    estimate, found = start[:count], None
+    for _ in range(ROUNDS):
+        shifted = [
+            advance_outputs(m, model, {n: (v, 0.0) for n, v in values.items()}) for m in maneuvers
+        ]
+        step = _round(model, groups, shifted, airspeed_mps, estimate, values, process)
+        if step is None:
+            break
+        found, estimate = step, step.estimate[:count]
+        moved = {d.name: step.value(d.name) for d in groups}
+        values = {
+            d.name: float(np.clip(values[d.name] + moved[d.name], -d.limit_s, d.limit_s))
+            for d in groups
+        }
+        sd = step.standard_error
+        if all(abs(moved[n]) < SETTLED_SD * sd[step.index(n)] for n in values):
+            break
+    if found is None:
+        half = first.half_width()
+        delays = {d.name: (0.0, float(half[first.index(d.name)])) for d in groups}
+        return DelayEstimate(delays, estimate, _added_covariance(first, list(values), count))
+    found = _with_lag_error(found, groups, max(m.dt_s for m in maneuvers))
+    half = NORMAL_95 * found.standard_error
+    return DelayEstimate(
+        {n: (v, float(half[found.index(n)])) for n, v in values.items()},
+        estimate,
+        _added_covariance(found, list(values), count),
+    )
+
+
+def near_its_optimum(found: FitResult) -> bool:
+    """Return whether a search has ended, or creeps by far less than its intervals."""
+    return found.converged or float(np.max(found.details["last_step_bounds"])) < NEAR_BOUNDS
+
+
+def advance_outputs(
+    maneuver: Maneuver, model: LinearModel, delays: Mapping[str, tuple[float, float]]
+) -> Maneuver:
+    """Return the maneuver with each output advanced by its delay (s)."""
+    shifts = {o: delays[d.name][0] for d in model.delays if d.name in delays for o in d.outputs}
+    t = maneuver.time_s
+    columns = [
+        np.interp(t + shifts.get(name, 0.0), t, column)
+        for name, column in zip(model.outputs, maneuver.outputs.T, strict=True)
+    ]
+    return replace(maneuver, outputs=np.column_stack(columns))
+
+
+def _round(
+    model: LinearModel,
+    groups: Sequence[DelayGroup],
+    maneuvers: Sequence[Maneuver],
+    airspeed_mps: float,
+    estimate: Array,
+    removed: Mapping[str, float],
+    process: tuple[str, ...],
+) -> FitResult | None:
+    """Fit parameters, gust and remaining delays; None if the search fails."""
+    plain, theta = replace(model, delays=()), estimate
+    if {"alpha_rad", "q_radps"} <= set(model.states):
+        plain, theta = with_gust_penetration(plain, airspeed_mps, theta)
+    dt_s = max(m.dt_s for m in maneuvers)
+    late = _with_delay_terms(gust_model(plain, airspeed_mps), groups, theta, removed, dt_s)
+    centred = [_centred(m, model, dt_s) for m in maneuvers]
+    start = OutputProblem(late, centred).first_guess()
+    start[: len(theta)] = theta
+    start[len(theta) : len(late.parameters)] = 0.0
+    try:
+        found = fit_filter_error(late, centred, process=process, start=start, compare_noise=False)
+    except IdentificationError:
+        return None
+    return found if near_its_optimum(found) else None
+
+
+def _with_delay_terms(
+    wide: LinearModel,
+    groups: Sequence[DelayGroup],
+    theta: Array,
+    removed: Mapping[str, float],
+    dt_s: float,
+) -> LinearModel:
+    """Return the model with delays as parameters, rates of the inputs as further inputs.
+
+    Vanes come a sample later than they were measured (`_centred`): a lag of that length makes their
+    slope known, for white noise drives the gust, and what it enters at once has none.
+    """
+    A, B, C, D = wide.matrices(theta)
+    n, count = len(wide.states), len(wide.inputs)
+    vanes = [name for d in groups for name in d.outputs if name in VANES and name in wide.outputs]
+    size, rate = n + LAGS * len(vanes), LAGS / dt_s
+    wider_A, wider_C = np.zeros((size, size)), np.zeros((len(wide.outputs), size))
+    wider_A[:n, :n], wider_C[:, :n] = wide.A, wide.C
+    by_state, by_input = np.zeros_like(wider_C), C @ B
+    by_state[:, :n] = C @ A
+    gust = np.array([name.startswith(PREFIX) for name in wide.states])
+    by_state[np.ix_(np.any(C[:, gust] != 0.0, axis=1), np.append(gust, [False] * (size - n)))] = 0.0
+    rates = D.copy()
+    for number, name in enumerate(vanes):
+        k, first = wide.outputs.index(name), n + LAGS * number
+        wider_A[first, :n] = rate * C[k]
+        for state in range(first, first + LAGS):
+            wider_A[state, state] = -rate
+        for state in range(first + 1, first + LAGS):
+            wider_A[state, state - 1] = rate
+        wider_C[k, :n], wider_C[k, state] = 0.0, 1.0
+        by_state[k], by_input[k], rates[k] = wider_A[state], 0.0, 0.0
+    terms = [t for t in wide.terms if not (t.matrix == "C" and wide.outputs[t.row] in vanes)]
+    for delay in groups:
+        for k in (wide.outputs.index(o) for o in delay.outputs if o in wide.outputs):
+            rows = (("C", 0, by_state[k]), ("D", 0, by_input[k]), ("D", count, rates[k]))
+            terms += [
+                Term(matrix, k, first + j, delay.name, -float(gain))
+                for matrix, first, gains in rows
+                for j, gain in enumerate(gains)
+                if gain
+            ]
+    still = np.zeros((size - n, 2 * count))
+    return replace(
+        wide,
+        states=(*wide.states, *(f"{name} late by {k}" for name in vanes for k in range(LAGS))),
+        inputs=(*wide.inputs, *(f"rate of {name}" for name in wide.inputs)),
+        A=wider_A,
+        B=np.vstack([np.hstack([wide.B, np.zeros_like(wide.B)]), still]),
+        C=wider_C,
+        D=np.hstack([wide.D, np.zeros_like(wide.D)]),
+        terms=tuple(terms),
+        # The prior is of the whole delay, part of which is removed already.
+        parameters=(
+            *wide.parameters,
+            *(Parameter(d.name, -removed[d.name], prior_sd=d.prior_sd_s) for d in groups),
+        ),
+    )
+
+
+def _centred(maneuver: Maneuver, model: LinearModel, dt_s: float) -> Maneuver:
+    """Return deviations from the means, vanes a sample later: of a trim a delay shows nothing."""
+    t = maneuver.time_s
+    outputs = np.column_stack(
+        [
+            np.interp(t - dt_s, t, column) if name in VANES else column
+            for name, column in zip(model.outputs, maneuver.outputs.T, strict=True)
+        ]
+    )
+    inputs = maneuver.inputs - maneuver.inputs.mean(axis=0)
+    rates = np.gradient(inputs, maneuver.dt_s, axis=0)
+    return replace(
+        maneuver,
+        inputs=np.hstack([inputs, rates]),
+        outputs=outputs - outputs.mean(axis=0),
+    )
+
+
+def _with_lag_error(found: FitResult, groups: Sequence[DelayGroup], dt_s: float) -> FitResult:
+    """Return the fit with the error of lags in place of a delay, parameters moving along."""
+    covariance = found.covariance.copy()
+    for delay in groups:
+        k = found.index(delay.name)
+        if set(delay.outputs) & set(VANES) and covariance[k, k] > 0.0:
+            by = covariance[:, k] / covariance[k, k]
+            covariance += (LAG_SHARE * dt_s) ** 2 * np.outer(by, by)
+    return replace(found, covariance=covariance)
+
+
+def _added_covariance(found: FitResult, names: Sequence[str], count: int) -> Array:
+    """Return the covariance that uncertain delays add to that of the first `count` parameters.
+
+    The fit behind takes the delays for known. By the one before the parameters depend on them as d
+    theta / d tau = C_theta_tau C_tau_tau^-1, so that C_theta_tau C_tau_tau^-1 C_tau_theta is added.
+    """
+    at = np.array([found.index(n) for n in names], dtype=np.int64)
+    at = at[np.diag(found.covariance)[at] > 0.0]
+    if len(at) == 0:
+        return np.zeros((count, count))
+    cross = found.covariance[:count, at]
+    part = cross @ np.linalg.pinv(found.covariance[np.ix_(at, at)]) @ cross.T
+    return np.asarray(0.5 * (part + part.T), dtype=np.float64)

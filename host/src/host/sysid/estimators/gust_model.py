@@ -1,0 +1,144 @@
+"""A linear model with the gust among its states."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from host.sysid.estimators.gust_penetration import GUST_LAG, penetration_name
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+
+SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, sec. 3.7, low altitude)
+VANES = ("alpha_rad", "beta_rad")
+ROLL_GUST = "gust_roll_radps"
+LAGGED_GUST = "gust_lagged_rad"
+
+
+def gust_model(
+    base: LinearModel,
+    airspeed_mps: float,
+    scale_m: float = SCALE_M,
+    *,
+    span_m: float | None = None,
+    scale_share: float = 0.0,
+) -> LinearModel:
+    """Return a model with the gust angle as an extra state.
+
+    A vertical (or side) gust is an angle of attack (sideslip) to vanes, forces and moments alike,
+    so its entries are those of the angle and only its intensity is new. Where the model has the
+    parameters of `gust_penetration.with_gust_penetration`, the tail meets it later. Its
+    Dryden spectrum (MIL-F-8785C, sec. 3.7) is that of white noise behind 1 / (1 + T s) with
+    T = L / V, or with `span_m` behind (1 + sqrt(3) T s) / (1 + T s)^2.
+
+    Parameters
+    ----------
+    base : LinearModel
+        A template; alpha or beta must be a measured state of it.
+    airspeed_mps : float
+        Of the trim, for the gust's time scale, m/s.
+    scale_m : float
+        Scale length L of the gusts, m.
+    span_m : float, optional
+        Wing span, m. With it the gust has the second-order spectrum across the flight path, acts as
+        a pitch (yaw) rate because it reaches the tail later, and has a rolling component in the
+        lateral motion; without it the first-order spectrum of the angle alone.
+    scale_share : float
+        Relative deviation of `scale_m`; above zero the rate V / L is a parameter, ``gust_rate``,
+        after the others.
+
+    Raises
+    ------
+    IdentificationError
+        If neither alpha nor beta is a measured state of it.
+    """
+    vanes = [v for v in VANES if v in base.states and v in base.outputs]
+    if not vanes:
+        raise IdentificationError(f"model {base.name}: no vane angle a gust could act on")
+    vane, rate = vanes[0], airspeed_mps / scale_m
+    lag = 0.0 if span_m is None else np.pi * airspeed_mps / (4.0 * span_m)
+    rate_effect = {"alpha_rad": ("q_radps", -1.0), "beta_rad": ("r_radps", 1.0)}[vane]
+    # Columns of the base that each gust state acts like, with gains.
+    gust_states: dict[str, dict[str, float]] = {"gust_rad": {vane: 1.0}}
+    entries = [("gust_rad", "gust_rad", -1.0)]
+    fixed: list[tuple[str, str, float]] = []
+    if span_m is not None:
+        lead, trail = np.sqrt(3.0), 1.0 - np.sqrt(3.0)
+        entries += [("gust_lag_rad", "gust_rad", 1.0), ("gust_lag_rad", "gust_lag_rad", -1.0)]
+        gust_states = {
+            "gust_rad": {vane: lead, rate_effect[0]: rate_effect[1] * lag * lead},
+            "gust_lag_rad": {vane: trail, rate_effect[0]: rate_effect[1] * lag * trail},
+            "gust_tail_rad": {rate_effect[0]: -rate_effect[1] * lag},
+        }
+        fixed = [
+            ("gust_tail_rad", "gust_rad", lag * lead),
+            ("gust_tail_rad", "gust_lag_rad", lag * trail),
+            ("gust_tail_rad", "gust_tail_rad", -lag),
+        ]
+        if vane == "beta_rad" and "p_radps" in base.states:
+            gust_states[ROLL_GUST] = {"p_radps": 1.0}
+            fixed.append((ROLL_GUST, ROLL_GUST, -lag))
+    penetrates = GUST_LAG in base.parameter_names
+    if penetrates:
+        gust_states[LAGGED_GUST] = {}
+    states = (*base.states, *gust_states)
+    n, total = len(base.states), len(base.states) + len(gust_states)
+    A, C = np.zeros((total, total)), np.zeros((len(base.outputs), total))
+    A[:n, :n], C[:, :n] = base.A, base.C
+    terms = list(base.terms)
+    for column, (_, acts) in enumerate(gust_states.items(), start=n):
+        for state, gain in acts.items():
+            source = base.states.index(state)
+            terms += [
+                Term(t.matrix, t.row, column, t.parameter, t.gain * gain)
+                for t in base.terms
+                if t.matrix in "AC" and t.column == source
+            ]
+            if state == vane:  # the vane measures the gust as well
+                C[:, column] += gain * base.C[:, source]
+    if penetrates:
+        terms += _penetration_terms(base, states, base.states.index(rate_effect[0]))
+    for row, source_name, value in fixed:
+        A[states.index(row), states.index(source_name)] = value
+    parameters = base.parameters
+    if scale_share > 0.0:
+        terms += [
+            Term("A", states.index(a), states.index(b), "gust_rate", g) for a, b, g in entries
+        ]
+        parameters += (
+            Parameter(
+                "gust_rate", rate, lower=0.1 * rate, upper=10.0 * rate, prior_sd=scale_share * rate
+            ),
+        )
+    else:
+        for a, b, g in entries:
+            A[states.index(a), states.index(b)] = g * rate
+    return replace(
+        base,
+        name=f"{base.name} with gust",
+        states=states,
+        A=A,
+        B=np.vstack([base.B, np.zeros((len(gust_states), len(base.inputs)))]),
+        C=C,
+        terms=tuple(terms),
+        parameters=parameters,
+        delays=(),
+    )
+
+
+def _penetration_terms(base: LinearModel, states: tuple[str, ...], rate: int) -> list[Term]:
+    """Return what the gust's growth, seen from the tail, does to moments and forces.
+
+    The air turns by lag (g - g_lagged), d g_lagged/dt = lag (g - g_lagged) (MIL-F-8785C, 3.7.5).
+    """
+    gust, lagged = states.index("gust_rad"), states.index(LAGGED_GUST)
+    terms = [Term("A", lagged, gust, GUST_LAG), Term("A", lagged, lagged, GUST_LAG, -1.0)]
+    for t in base.terms:
+        name = penetration_name(t.parameter)
+        if t.matrix in "AC" and t.column == rate and name in base.parameter_names:
+            terms += [
+                Term(t.matrix, t.row, gust, name, t.gain),
+                Term(t.matrix, t.row, lagged, name, -t.gain),
+            ]
+    return terms

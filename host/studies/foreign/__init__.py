@@ -1,0 +1,1 @@
+"""An aircraft flown by equations that share nothing with the package, and what is read of it."""

@@ -1,0 +1,199 @@
+"""A trainer of 4 kg as six equations of motion in body axes, written apart from the package.
+
+Constant coefficients, lift and drag in wind axes, a parabolic polar, thrust that falls with the
+airspeed, servos of first order with a rate limit. Nothing of the package but gravity is
+used, so that an error shared by simulator and estimator shows.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from host.constants import GRAVITY_MPS2
+from numpy.typing import NDArray
+from scipy.optimize import fsolve
+
+from studies.foreign.air import Gusts, at
+
+DENSITY_KGPM3 = 1.2
+SERVO_RADPS, SERVO_LIMIT_RADPS = 40.0, 5.0
+
+
+@dataclass(frozen=True)
+class Trainer:
+    """Mass, inertia, sizes (SI) and coefficients (per rad; rates by b/2V and c/2V)."""
+
+    mass: float = 4.0
+    area: float = 0.55
+    span: float = 1.8
+    chord: float = 0.31
+    ixx: float = 0.25
+    iyy: float = 0.28
+    izz: float = 0.48
+    ixz: float = 0.02
+    CL_0: float = 0.25
+    CL_alpha: float = 4.9
+    CL_q: float = 6.5
+    CL_de: float = 0.40
+    CD_0: float = 0.040
+    CD_CL2: float = 0.065
+    Cm_0: float = 0.03
+    Cm_alpha: float = -0.75
+    Cm_q: float = -11.0
+    Cm_de: float = -1.0
+    CY_beta: float = -0.50
+    CY_p: float = -0.05
+    CY_r: float = 0.30
+    CY_dr: float = 0.15
+    Cl_beta: float = -0.06
+    Cl_p: float = -0.50
+    Cl_r: float = 0.12
+    Cl_da: float = 0.20
+    Cl_dr: float = 0.008
+    Cn_beta: float = 0.08
+    Cn_p: float = -0.04
+    Cn_r: float = -0.12
+    Cn_da: float = -0.008
+    Cn_dr: float = -0.07
+    static_thrust: float = 22.0
+    pitch_speed: float = 34.0
+
+
+TRAINER = Trainer()
+
+
+def trimmed(speed_mps: float) -> tuple[float, float, float]:
+    """Return angle of attack, elevator and throttle of level flight."""
+    a = TRAINER
+    force = 0.5 * DENSITY_KGPM3 * speed_mps**2 * a.area
+
+    def left(x: NDArray[np.float64], /) -> list[float]:
+        alpha, de, throttle = (float(v) for v in x)
+        CL = a.CL_0 + a.CL_alpha * alpha + a.CL_de * de
+        CD = a.CD_0 + a.CD_CL2 * CL**2
+        thrust = a.static_thrust * throttle * (1.0 - speed_mps / a.pitch_speed)
+        weight = a.mass * GRAVITY_MPS2
+        return [
+            force * (CL * math.sin(alpha) - CD * math.cos(alpha))
+            + thrust
+            - weight * math.sin(alpha),
+            weight * math.cos(alpha) - force * (CD * math.sin(alpha) + CL * math.cos(alpha)),
+            a.Cm_0 + a.Cm_alpha * alpha + a.Cm_de * de,
+        ]
+
+    alpha, de, throttle = fsolve(left, np.array([0.05, 0.0, 0.4]))
+    return float(alpha), float(de), float(throttle)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Rates of all states at one instant, and what is measured."""
+
+    rates: tuple[float, ...]
+    airspeed: float
+    alpha: float
+    beta: float
+    force: tuple[float, float, float]  # specific, m/s2
+
+
+def motion(
+    x: list[float],
+    command: tuple[float, float, float],
+    throttle: float,
+    air: Gusts,
+    *,
+    turns: bool,
+    spread: bool,
+) -> Motion:
+    """Return the motion at a state.
+
+    Parameters
+    ----------
+    x : list of float
+        u v w p q r phi theta psi, way through the air, height, both gusts as the tail meets them,
+        elevator, aileron, rudder.
+    command : tuple of float
+        Of the three servos.
+    throttle : float
+    air : Gusts
+    turns : bool
+        Gusts are given in body axes, and so turn with the aircraft; else in earth axes.
+    spread : bool
+        The air pitches, yaws and rolls (MIL-F-8785C, 3.7.5); else gusts act on a point.
+    """
+    a = TRAINER
+    u, v, w, p, q, r, phi, theta, psi, way, _, w_tail, v_tail, de, da, dr = x
+    cf, sf, ct, st = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
+    gust = (at(air.u, way), at(air.v, way), at(air.w, way))
+    reach = 4.0 * a.span / math.pi
+    p_air = at(air.p, way) if spread else 0.0
+    q_air, r_air = (
+        ((gust[2] - w_tail) / reach, -(gust[1] - v_tail) / reach) if spread else (0.0, 0.0)
+    )
+    gu, gv, gw = gust if turns else _to_body(gust, phi, theta, psi)
+    ua, va, wa = u - gu, v - gv, w - gw
+    V = math.sqrt(ua * ua + va * va + wa * wa)
+    alpha, beta = math.atan2(wa, ua), math.asin(va / V)
+    pa, qa, ra = p - p_air, q + q_air, r + r_air
+    ps, qs, rs = 0.5 * a.span / V * pa, 0.5 * a.chord / V * qa, 0.5 * a.span / V * ra
+    force = 0.5 * DENSITY_KGPM3 * V * V * a.area
+    CL = a.CL_0 + a.CL_alpha * alpha + a.CL_q * qs + a.CL_de * de
+    CD = a.CD_0 + a.CD_CL2 * CL * CL
+    CY = a.CY_beta * beta + a.CY_p * ps + a.CY_r * rs + a.CY_dr * dr
+    ca, sa = math.cos(alpha), math.sin(alpha)
+    ax = (
+        force * (CL * sa - CD * ca) + a.static_thrust * throttle * (1.0 - V / a.pitch_speed)
+    ) / a.mass
+    ay = force * CY / a.mass
+    az = -force * (CD * sa + CL * ca) / a.mass
+    roll = (
+        force
+        * a.span
+        * (a.Cl_beta * beta + a.Cl_p * ps + a.Cl_r * rs + a.Cl_da * da + a.Cl_dr * dr)
+    )
+    pitch = force * a.chord * (a.Cm_0 + a.Cm_alpha * alpha + a.Cm_q * qs + a.Cm_de * de)
+    yaw = (
+        force
+        * a.span
+        * (a.Cn_beta * beta + a.Cn_p * ps + a.Cn_r * rs + a.Cn_da * da + a.Cn_dr * dr)
+    )
+    roll += a.ixz * p * q - (a.izz - a.iyy) * q * r
+    yaw += -a.ixz * q * r - (a.iyy - a.ixx) * p * q
+    pitch += -(a.ixx - a.izz) * p * r - a.ixz * (p * p - r * r)
+    det = a.ixx * a.izz - a.ixz**2
+    turning = q * sf + r * cf
+    rates = (
+        ax - GRAVITY_MPS2 * st - q * w + r * v,
+        ay + GRAVITY_MPS2 * sf * ct - r * u + p * w,
+        az + GRAVITY_MPS2 * cf * ct - p * v + q * u,
+        (a.izz * roll + a.ixz * yaw) / det,
+        pitch / a.iyy,
+        (a.ixz * roll + a.ixx * yaw) / det,
+        p + turning * st / ct,
+        q * cf - r * sf,
+        turning / ct,
+        V,
+        u * st - v * sf * ct - w * cf * ct,
+        (gust[2] - w_tail) * V / reach,
+        (gust[1] - v_tail) * V / reach,
+        *(
+            max(-SERVO_LIMIT_RADPS, min(SERVO_LIMIT_RADPS, SERVO_RADPS * (wanted - at_now)))
+            for wanted, at_now in zip(command, (de, da, dr), strict=True)
+        ),
+    )
+    return Motion(rates, V, alpha, beta, (ax, ay, az))
+
+
+def _to_body(
+    earth: tuple[float, float, float], phi: float, theta: float, psi: float
+) -> tuple[float, float, float]:
+    north, east, down = earth
+    cf, sf, ct, st = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
+    cp, sp = math.cos(psi), math.sin(psi)
+    return (
+        ct * cp * north + ct * sp * east - st * down,
+        (sf * st * cp - cf * sp) * north + (sf * st * sp + cf * cp) * east + sf * ct * down,
+        (cf * st * cp + sf * sp) * north + (cf * st * sp - sf * cp) * east + cf * ct * down,
+    )

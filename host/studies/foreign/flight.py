@@ -1,0 +1,118 @@
+"""A flight of the trainer: four test inputs of the elevator, three of aileron and rudder each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER, motion, trimmed
+from studies.foreign.air import gusts
+
+STEP_S, SUBSTEPS = 0.01, 2
+SPEED_MPS, HEIGHT_M = 18.0, 60.0
+COLUMNS = (
+    "t_s", "airspeed_mps", "alpha_rad", "beta_rad", "p_radps", "q_radps", "r_radps", "phi_rad",
+    "theta_rad", "psi_rad", "ax_mps2", "ay_mps2", "az_mps2", "elevator_rad", "aileron_rad",
+    "rudder_rad", "altitude_m",
+)  # fmt: skip
+# White noise of ideally placed sensors, one deviation.
+NOISE = {
+    "airspeed_mps": 0.15, "alpha_rad": 0.0025, "beta_rad": 0.0025,
+    "p_radps": 0.003, "q_radps": 0.003, "r_radps": 0.003,
+    "phi_rad": 0.004, "theta_rad": 0.004, "psi_rad": 0.01,
+    "ax_mps2": 0.06, "ay_mps2": 0.06, "az_mps2": 0.1,
+}  # fmt: skip
+# Surface (0 elevator, 1 aileron, 2 rudder), start, unit (s), amplitude (deg), signs of the units.
+LONG, SHORT = (1, 1, 1, -1, -1, 1, -1), (1, -1)
+INPUTS = (
+    *((0, 4.0 + 10.0 * k, 0.25, 3.0, LONG) for k in range(3)), (0, 34.0, 0.35, 3.0, SHORT),
+    *((1, 43.0 + 9.0 * k, 0.40, 4.0, SHORT) for k in range(3)),
+    *((2, 70.0 + 10.0 * k, 0.80, 6.0, SHORT) for k in range(3)),
+)  # fmt: skip
+DURATION_S = 100.0
+HANDS_OFF_S = (1.0, 6.5)  # before and after the beginning of an input; the pilot levels else
+
+
+@dataclass(frozen=True)
+class Air:
+    """One cell: form and deviation of the gusts; whether they turn, and act along the aircraft."""
+
+    form: str = "dryden"
+    intensity_mps: float = 0.0
+    turns: bool = True
+    spread: bool = False
+
+
+def fly(
+    air: Air, seed: int
+) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
+    """Return the columns as measured and as they were, each (samples,)."""
+    rng = np.random.default_rng(seed)
+    field = gusts(rng, air.intensity_mps, air.form, TRAINER.span if air.spread else None)
+    alpha, de, throttle = trimmed(SPEED_MPS)
+    x = [SPEED_MPS * np.cos(alpha), 0.0, SPEED_MPS * np.sin(alpha), *[0.0] * 4, alpha, 0.0, 0.0]
+    x = [float(value) for value in (*x, HEIGHT_M, 0.0, 0.0, de, 0.0, 0.0)]
+    step = STEP_S / SUBSTEPS
+    rows = []
+    for sample in range(round(DURATION_S / STEP_S)):
+        t = sample * STEP_S
+        command = _pilot(t, x, alpha, de)
+
+        def rates(
+            state: list[float], wanted: tuple[float, float, float] = command
+        ) -> tuple[float, ...]:
+            return motion(state, wanted, throttle, field, turns=air.turns, spread=air.spread).rates
+
+        now = motion(x, command, throttle, field, turns=air.turns, spread=air.spread)
+        rows.append((t, now.airspeed, now.alpha, now.beta, *x[3:9], *now.force, *x[13:16], x[10]))
+        for _ in range(SUBSTEPS):
+            a = rates(x)
+            b = rates([s + 0.5 * step * k for s, k in zip(x, a, strict=True)])
+            c = rates([s + 0.5 * step * k for s, k in zip(x, b, strict=True)])
+            d = rates([s + step * k for s, k in zip(x, c, strict=True)])
+            x = [
+                s + step / 6.0 * (ka + 2.0 * kb + 2.0 * kc + kd)
+                for s, ka, kb, kc, kd in zip(x, a, b, c, d, strict=True)
+            ]
+    true = dict(zip(COLUMNS, np.array(rows).T, strict=True))
+    measured = {
+        name: values + NOISE.get(name, 0.0) * rng.standard_normal(len(values))
+        for name, values in true.items()
+    }
+    return measured, true
+
+
+def derivatives(true: Mapping[str, NDArray[np.float64]]) -> dict[str, float]:
+    """Return the dimensional derivatives at the mean of some true columns."""
+    a, V = TRAINER, float(np.mean(true["airspeed_mps"]))
+    force = 0.5 * DENSITY_KGPM3 * float(np.mean(true["airspeed_mps"] ** 2)) * a.area
+    chord, span = 0.5 * a.chord / V, 0.5 * a.span / V
+    found = {
+        "Z_alpha": -force * a.CL_alpha / (a.mass * V),
+        "M_alpha": force * a.chord * a.Cm_alpha / a.iyy,
+        "M_q": force * a.chord * a.Cm_q * chord / a.iyy,
+        "M_de": force * a.chord * a.Cm_de / a.iyy,
+    }
+    det = a.ixx * a.izz - a.ixz**2
+    for label, by in (("beta", 1.0), ("p", span), ("r", span), ("da", 1.0), ("dr", 1.0)):
+        roll, yaw = (force * a.span * by * getattr(a, f"{k}_{label}") for k in ("Cl", "Cn"))
+        found[f"L_{label}"] = (a.izz * roll + a.ixz * yaw) / det
+        found[f"N_{label}"] = (a.ixz * roll + a.ixx * yaw) / det
+    return found
+
+
+def _pilot(t: float, x: list[float], theta: float, de: float) -> tuple[float, float, float]:
+    command, busy = [de, 0.0, 0.0], False
+    before, after = HANDS_OFF_S
+    for surface, start_s, unit_s, degrees, signs in INPUTS:
+        busy |= -before < t - start_s < after
+        unit = int((t - start_s) // unit_s)
+        if 0 <= unit < len(signs):
+            command[surface] += signs[unit] * float(np.deg2rad(degrees))
+    if not busy:
+        command[0] += 0.5 * (x[7] - theta) + 0.08 * x[4]
+        command[1] -= 0.5 * x[6] + 0.06 * x[3]
+    return command[0], command[1], command[2]

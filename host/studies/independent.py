@@ -1,0 +1,124 @@
+"""The default longitudinal answer on flights of a simulator with equations of its own.
+
+Eight cells of gusts and calm air, ideally placed sensors, no aircraft file. One row a flight goes
+to a file that a later run continues.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import itertools
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from host.sysid.flight.linear_estimator import identify
+from host.sysid.identification_error import IdentificationError
+
+from studies.foreign.flight import Air, derivatives, fly
+
+# 0-5 were looked at while delays and turning air were written.
+FIRST_SEED = 100
+NAMES = ("Z_alpha", "M_alpha", "M_q", "M_de")
+COLUMNS = ("cell", "seed", "name", "true", "estimate", "half_width")
+LIMIT_MEAN = 2.0  # %, plus two standard errors of the mean
+
+
+def cells() -> dict[str, Air]:
+    """Return the air of each cell by name."""
+    found = {"calm": Air()}
+    pairs = ((True, False), (False, True), (True, True), (False, False))
+    for intensity, (form, (turns, spread)) in itertools.product(
+        (0.5, 1.0), (("dryden", pairs[0]), ("dryden", pairs[1]), ("karman", pairs[2]),
+                     ("karman", pairs[3])),
+    ):  # fmt: skip
+        name = f"{form}, {'turning' if turns else 'fixed'}, {'spread' if spread else 'point'}"
+        found[f"{name}, {intensity:g} m/s"] = Air(form, intensity, turns, spread)
+    return found
+
+
+def rows_of(cell: str, air: Air, seed: int) -> list[dict[str, object]]:
+    """Fly and identify; no estimate where the answer is refused."""
+    measured, true = fly(air, seed)
+    try:
+        [answer] = identify(dict(measured), names=("longitudinal",))
+    except IdentificationError:
+        return [dict.fromkeys(COLUMNS, "") | {"cell": cell, "seed": seed, "name": "refused"}]
+    inside = np.zeros(len(true["t_s"]), dtype=bool)
+    for found in answer.used:
+        first, last = found.fit_window()
+        inside |= (true["t_s"] >= first) & (true["t_s"] <= last)
+    expected = derivatives({name: values[inside] for name, values in true.items()})
+    half, result = answer.result.half_width(), answer.result
+    return [
+        {
+            "cell": cell, "seed": seed, "name": name, "true": expected[name],
+            "estimate": result.value(name), "half_width": float(half[result.index(name)]),
+        }
+        for name in NAMES
+    ]  # fmt: skip
+
+
+def table(rows: Sequence[dict[str, str]]) -> list[str]:
+    """Return a line for each cell and derivative: mean error, rms, half-width, held of flights."""
+    lines = [
+        "cell                                derivative  mean error %   rms  half-width  holds"
+    ]
+    kept = [r for r in rows if r["name"] in NAMES]
+    held_all = total = 0
+    for cell in dict.fromkeys(r["cell"] for r in kept):
+        for name in NAMES:
+            own = [r for r in kept if r["cell"] == cell and r["name"] == name]
+            truth, value, half = (
+                np.array([float(r[k]) for r in own]) for k in ("true", "estimate", "half_width")
+            )
+            error, width = 100.0 * (value - truth) / np.abs(truth), 100.0 * half / np.abs(truth)
+            spread = float(np.std(error, ddof=1)) / np.sqrt(len(own)) if len(own) > 1 else np.nan
+            held = int(np.sum(np.abs(error) <= width))
+            held_all, total = held_all + held, total + len(own)
+            lines.append(
+                f"{cell:36s}{name:10s} {np.mean(error):+6.1f} +- {spread:3.1f}"
+                f"  {np.sqrt(np.mean(error**2)):5.1f}  {np.median(width):9.1f}"
+                f"  {held:3d} of {len(own)}"
+            )
+    refused = sum(r["name"] == "refused" for r in rows)
+    if total:
+        lines.append(f"{held_all} of {total} hold ({100.0 * held_all / total:.1f} %)")
+    lines.append(f"{refused} flights refused")
+    return lines
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Fly what is not in the file yet, then print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--flights", type=int, default=2, help="of each cell (the page: 20)")
+    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
+    parser.add_argument("--rows", type=Path, default=Path("../build/study/independent.csv"))
+    options = parser.parse_args(arguments)
+    options.rows.parent.mkdir(parents=True, exist_ok=True)
+    rows = []
+    if options.rows.exists():
+        with options.rows.open(newline="") as file:
+            rows = list(csv.DictReader(file))
+    done = {(r["cell"], int(r["seed"])) for r in rows}
+    seeds = range(options.first, options.first + options.flights)
+    with options.rows.open("a", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, restval="")
+        if not rows:
+            writer.writeheader()
+        for seed, (cell, air) in itertools.product(seeds, cells().items()):
+            if (cell, seed) not in done:
+                writer.writerows(rows_of(cell, air, seed))
+                file.flush()
+                print(f"\r{cell}, seed {seed}   ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    with options.rows.open(newline="") as file:
+        mine = [r for r in csv.DictReader(file) if int(r["seed"]) in seeds]
+    print("\n".join(table(mine)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
