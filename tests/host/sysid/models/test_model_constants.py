@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from host.sysid import Maneuver, fit
+from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.flight.free_simulation import frozen_at
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import model_from, read_model
@@ -103,6 +104,12 @@ def test_shared_constants_are_one_parameter_of_all_records(method: str) -> None:
         k = result.index(name)
         assert half[k] > 0.0
         assert abs(result.value(name) - true) < 1.5 * half[k], name
+
+
+def test_a_shared_constant_has_the_unit_of_its_equation() -> None:
+    shared = model(**SHARED)
+    assert parameter_unit(shared, "b_alpha") == "1/s"
+    assert parameter_unit(shared, "b_q") == "1/s2"
 
 
 def test_shared_constants_are_known_better_than_each_records_own() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import CONSTANT, LinearModel
 
 # Metres and seconds of a signal's unit; a radian is a number.
 POWERS = {"mps": (1, -1), "mps2": (1, -2), "radps": (0, -1), "rad": (0, 0), "m": (1, 0),
@@ -37,6 +37,8 @@ def parameter_unit(model: LinearModel, name: str) -> str:
 
 
 def _powers(signal: str) -> tuple[int, int] | None:
+    if signal == CONSTANT:
+        return 0, 0
     return POWERS.get(signal.rpartition("_")[2])
 
 
