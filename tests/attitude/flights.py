@@ -103,17 +103,16 @@ def original(flown: Flown, source: str = "gps") -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """rms, largest and mean error of phi, theta, psi, in degrees."""
+    """rms and largest error of phi, theta, psi, in degrees."""
 
     rms_deg: Array
     most_deg: Array
-    mean_deg: Array
 
 
 def errors(estimate_rad: Array, true_rad: Array) -> Errors:
     """Compare angles (n, 3)."""
     off = np.rad2deg(np.mod(estimate_rad - true_rad + np.pi, 2 * np.pi) - np.pi)
-    return Errors(np.sqrt((off**2).mean(axis=0)), np.abs(off).max(axis=0), off.mean(axis=0))
+    return Errors(np.sqrt((off**2).mean(axis=0)), np.abs(off).max(axis=0))
 
 
 def judge(flown: Flown, source: str = "gps") -> tuple[Errors, Errors]:

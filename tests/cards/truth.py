@@ -133,11 +133,6 @@ class Truth:
         run = list(range(entry.first, entry.first + wanted))
         return chain == run and int(self.fat[chain[-1]]) >= END_FROM if chain else False
 
-    def blocks_of(self, cluster: int, clusters: int) -> tuple[int, int]:
-        """Return first block and end of a run of clusters."""
-        assert self.volume is not None
-        return self.volume.lba(cluster), self.volume.lba(cluster + clusters)
-
 
 def look_at(card: Card) -> Truth:
     """Read a card."""

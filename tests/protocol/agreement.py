@@ -15,7 +15,6 @@ from tests.protocol.damage import expected, surviving
 from tests.protocol.log_writer import LogWriter, released_texts
 
 TELLING = frozenset({"complete", "truncated", "damaged"})
-BEHIND_THE_END = frozenset({"truncated", "crc", "zeroed", "overwritten"})
 
 
 @contextmanager

@@ -7,19 +7,11 @@ import struct
 import pytest
 from host.wire.packets import packet
 
-
-def crc_ccitt_false(data: bytes) -> int:
-    """CRC-16/CCITT-FALSE bit by bit: polynomial 0x1021, start 0xFFFF."""
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte << 8
-        for _ in range(8):
-            crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
-    return crc
+from tests.protocol.log_writer import crc16
 
 
 def test_check_value_of_the_crc() -> None:
-    assert crc_ccitt_false(b"123456789") == 0x29B1
+    assert crc16(b"123456789") == 0x29B1
 
 
 def test_imu_packet_is_the_vector() -> None:
@@ -31,7 +23,7 @@ def test_imu_packet_is_the_vector() -> None:
     rows["aux"] = (3150, 0x54 + 256 * 3, 1)
     body = struct.pack("<4BIH", 0xA6, 8, 0x1C, 2, 123_456_789, 225)
     body += struct.pack("<12h", -1, 0, 0, 0, 0, -8192, 0, 0, 18_000, 3150, 852, 1)
-    assert imu.sealed(rows)[1] == body + struct.pack("<H", crc_ccitt_false(body))
+    assert imu.sealed(rows)[1] == body + struct.pack("<H", crc16(body))
     assert imu.address == 43
 
 

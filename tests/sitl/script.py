@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from host.twin.recorder.sitl_library import TICKS_PER_S, Sitl
+from host.twin.sensors.ubx import packet as ubx
 from host.wire.packets import packet
 from host.wire.schema_text import packed_schema
 from numpy.typing import NDArray
@@ -210,16 +211,6 @@ class Gps:
             at.append(first + np.round(np.arange(len(message)) * 10 / 38400 * TICKS_PER_S))
             data += message
         return np.concatenate(at).astype(np.int64), np.frombuffer(bytes(data), dtype=np.uint8)
-
-
-def ubx(kind: int, payload: bytes) -> bytes:
-    """Return a NAV message with its checksum (8-bit Fletcher)."""
-    body = struct.pack("<BBH", 1, kind, len(payload)) + payload
-    a = b = 0
-    for byte in body:
-        a = (a + byte) & 0xFF
-        b = (b + a) & 0xFF
-    return b"\xb5\x62" + body + bytes((a, b))
 
 
 def gps(seconds: float, *, still_from_s: float | None = None) -> Gps:

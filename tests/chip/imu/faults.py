@@ -45,7 +45,6 @@ FRESH, UNSATURATED, ATTITUDE = (
 )
 IMU_WATCHDOG = 6
 LOAD_LIMIT = 0.60  # of the IMU's cycles, whatever happens
-IMU_DATA_READY = 1
 SPCR = 0x4C
 
 
@@ -169,7 +168,7 @@ def hold_mega(rig: PairRig) -> None:
 
 
 LOST = ("imu_lost", "imu_found")
-NONE, ALL = (0.0, 0.0), (1.0, 1.0)
+NONE = (0.0, 0.0)
 FAULTS = (
     Fault("none", "sends every sample", "logs every sample", lambda r: None, levelled=(1.0, 1.0)),
     Fault("IMU reset", "back in 0.5 s, offsets from EEPROM", "lost, found, restarted",

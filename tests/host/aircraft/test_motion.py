@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from host.aircraft import file as aircraft
 from host.aircraft.airframe import ROTOR, STATE_COUNT, Airframe, Array
-from host.aircraft.analytic_derivatives import analytic_matrices
 from host.aircraft.attitude import euler, quaternion, to_body
 from host.aircraft.file import Aircraft
 from host.aircraft.linearisation import linearise, modes
@@ -18,6 +17,8 @@ from host.aircraft.propulsion import propeller
 from host.aircraft.rigid_body import aerodynamics, run
 from host.aircraft.trim import TrimError, solve
 from host.constants import GRAVITY_MPS2
+
+from tests.host.aircraft.analytic_derivatives import analytic_matrices
 
 STILL = np.zeros(9)
 

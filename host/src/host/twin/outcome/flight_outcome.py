@@ -19,7 +19,6 @@ from host.twin.sensors.imu import Imu
 from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.testcard.cards import Card, Segment
 
-FIRMWARES = ("sitl", "avr", "none", "thesis")
 Progress = Callable[[str, float], None]
 
 
@@ -104,7 +103,7 @@ def simulate(
         Made if missing; files of an earlier flight are overwritten.
     seed : int
     firmware : str
-        One of `FIRMWARES`.
+        ``sitl``, ``avr``, ``none`` or ``thesis``.
     pictures : bool
         Draw flight.png.
     both : bool

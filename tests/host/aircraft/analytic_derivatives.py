@@ -1,15 +1,14 @@
 """Dimensional derivatives written out by hand from the coefficients: the check on the
 linearisation.
 
-Nothing is shared with `motion` or `linear`: tables are interpolated here, slopes are formulas.
-Etkin & Reid, Dynamics of Flight, chapter 4, turned from stability to body axes; CG at the
+Nothing is shared with `rigid_body` or `linearisation`: tables are interpolated here, and slopes are
+formulas. Etkin & Reid, Dynamics of Flight, chapter 4, turned from stability to body axes; CG at the
 reference point.
 """
 
 from __future__ import annotations
 
 import numpy as np
-
 from host.aircraft.airframe import Array
 from host.aircraft.file import Aircraft
 from host.constants import GRAVITY_MPS2
