@@ -104,6 +104,12 @@ def test_a_clean_record_at_rest_is_whole() -> None:
     assert "bridged" not in found.columns
 
 
+@pytest.mark.parametrize("name", tuple(NOISE))
+def test_one_clean_column_at_rest_beside_noisy_ones_is_whole(name: str) -> None:
+    clean = record(0, noise=0.0)[name]
+    assert read_flight_columns(record(0).assign(**{name: clean})).findings == []
+
+
 def stuck(name: str, first: int, end: int) -> Callable[[pd.DataFrame], pd.DataFrame]:
     def change(table: pd.DataFrame) -> pd.DataFrame:
         values = table[name].to_numpy().copy()

@@ -17,6 +17,7 @@ from host.sysid.flight.column_sampling import runs
 USUALLY, MISSED = 0.95, 1.5  # of the windows as long; times the most that they miss
 STEPS = 3.0  # of a quantised value, that motion must cross
 RESTLESS = 0.05  # of the windows: noise that moves the sensor in all others never rests
+JUMP = 2.0  # times the largest change from row to row: what a logger filled in
 SMOOTH_S = 0.2
 SLOPE_OF = {"q_radps": "theta_rad", "p_radps": "phi_rad", "r_radps": "psi_rad"}
 # Motion below this is none, by the end of a column's name.
@@ -49,10 +50,7 @@ def stuck_runs(
     for first, end in zip(starts[long], ends[long], strict=True):
         elsewhere[first:end] = False
     expected = expected_motion(columns, name)
-    # From row to row: noise that is larger than the step of the numbers.
-    noisy = (
-        float(np.median(np.abs(np.diff(values[elsewhere])))) > step if elsewhere.any() else False
-    )
+    noisy = _is_noisy(values[elsewhere], step)
     found = []
     for first, end in zip(starts[long], ends[long], strict=True):
         rows = int(end - first)
@@ -67,9 +65,29 @@ def stuck_runs(
             reach = _reach(t) if name in SLOPE_OF else 0  # a mean knows what comes
             within = expected[first + reach : end - reach]
             must = len(within) > 2 and _swing(within, detrended=len(missed) == 0) > least
-        if must or (restless and _others_move(columns, name, int(first), int(end))):
+        filled = _jumps(values, int(first), int(end), elsewhere) > JUMP
+        if must or ((restless or filled) and _others_move(columns, name, int(first), int(end))):
             found.append((int(first), int(end)))
     return found
+
+
+def _jumps(values: Array, first: int, end: int, elsewhere: BoolArray) -> float:
+    """Return how much further a sensor jumps to a value that stays, and back, than ever else."""
+    if first == 0 or end == len(values):
+        return 0.0
+    change = np.abs(np.diff(values))
+    usual = change[elsewhere[1:] & elsewhere[:-1] & np.isfinite(change)]
+    most = float(np.max(usual, initial=0.0))
+    return float(min(change[first - 1], change[end - 1])) / most if most > 0.0 else 0.0
+
+
+def _is_noisy(values: Array, step: float) -> bool:
+    """Return whether a sensor never rests: noise turns back from row to row, motion does not."""
+    values = values[np.isfinite(values)]
+    if len(values) < 3:
+        return False
+    change = float(np.median(np.abs(np.diff(values))))
+    return change > step and float(np.median(np.abs(np.diff(values, n=2)))) > change
 
 
 def _swing(values: Array, *, detrended: bool) -> float:
