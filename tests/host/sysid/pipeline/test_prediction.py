@@ -220,3 +220,12 @@ def test_an_aircraft_file_predicts_both_axes() -> None:
     assert nrmse["p_radps"] < 0.15
     assert nrmse["r_radps"] < 0.25
     assert along.windows[1].relative[along.model.outputs.index("q_radps")] < 0.2
+
+
+def test_a_slow_column_is_predicted_too(saved: Path) -> None:
+    """Every fifth value of alpha repeated: it is compared where it was measured."""
+    table = recorded(2)
+    held = table["alpha_rad"].to_numpy()[np.arange(len(table)) // 5 * 5]
+    found = figures(host.predict(saved, table.assign(alpha_rad=held)).to_json())
+    assert found["free_simulation"]["alpha_rad"]["nrmse"] < 0.1
+    assert found["windows"][1]["over_persistence"]["q_radps"] < 0.2
