@@ -24,6 +24,7 @@ MOVED_NOISE = 5.0  # deviations of its noise; a pilot who holds the attitude mov
 REST_S = 0.5  # after the input, in which surfaces come to rest
 ENDS_S = 2.0
 LONGEST_S = 120.0
+SHORTEST_LEAD_S = 1.9  # a moment of rest is chance: a pilot holds still for as long
 LEAD_S = 30.0  # of rest before the input, which tells of the constants
 
 
@@ -61,7 +62,9 @@ def with_free_response(
         taken_s = max((f.fit_window()[1] for f in result), default=-np.inf)
         first_s = _since(t, at_rest, item.start_s - own_s, max(begin_s + REST_S, taken_s))
         first_s = max(first_s, float(t[0]))
-        lead_s = max(min(item.lead_s, item.start_s - float(t[0])), item.start_s - first_s)
+        lead_s = min(item.lead_s, item.start_s - float(t[0]))
+        if item.start_s - first_s > SHORTEST_LEAD_S:
+            lead_s = item.start_s - first_s
         result.append(replace(item, lead_s=lead_s, free_end_s=free_end_s))
     return result
 
