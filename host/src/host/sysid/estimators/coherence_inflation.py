@@ -92,23 +92,21 @@ def inflate_by_coherence(
 def _lines(
     result: FitResult, found: InputCoherence, factor: Array, excess: NoiseExcess | None
 ) -> list[str]:
-    """Return what is wrong and how much wider intervals are; both reasons widen as one."""
+    """Return what is wrong and how much wider intervals are, in one line."""
     widened = ", ".join(
         f"{p.name} {times:.1f}"
         for p, times in zip(result.model.parameters, factor, strict=False)
         if times >= REPORTED_FACTOR and not p.name.startswith("imu_")
     )
     like = f", most like {found.likely_error}" if found.likely_error else ""
-    times = f"intervals widened {widened} times" if widened else "intervals hold it already"
-    lines = []
+    reasons = []
     if found.coherent:
-        lines.append(
-            f"the inputs drive what the fit leaves of {', '.join(found.coherent)}{like}: {times}"
-        )
+        reasons.append(f"the inputs drive what the fit leaves of {', '.join(found.coherent)}{like}")
     if excess:
         larger = ", ".join(f"{name} {np.sqrt(power):.1f}" for name, power in excess.power.items())
-        lines.append(
+        reasons.append(
             f"free simulation misses by more than the fit's own gusts and noise allow (rms {larger}"
-            f" times): {times}"
+            " times)"
         )
-    return lines
+    times = f"intervals widened {widened} times" if widened else "intervals hold it already"
+    return [f"{'; '.join(reasons)}: {times}"] if reasons else []

@@ -32,6 +32,7 @@ from host.sysid.numerics.output_error_problem import OutputProblem
 
 SIGNIFICANCE = 0.01
 DRAWS, DRAW_SEED = 100, 2
+AR_DRAWS = 12  # of them give the AR model of what is predicted
 
 
 def excess_over_noise_model(
@@ -69,10 +70,9 @@ def excess_over_noise_model(
         left = block_means((problem.measured(number) - response.y).T, block)
         slopes = np.stack([block_means(J[:, count:], block) for J in response.sensitivities])
         drawn = _drawn_errors(rng, wide, result, process, maneuver.dt_s, block, len(left))
-        for j, errors in enumerate(drawn):
-            moments[j] += sum(
-                lagged_moments([e], [np.zeros((len(e), 0))], HIGHEST_ORDER) for e in errors.T
-            )
+        for j, errors in enumerate(drawn[:, :, :AR_DRAWS]):
+            none = [np.zeros((len(errors), 0))] * AR_DRAWS
+            moments[j] += lagged_moments(list(errors.T), none, HIGHEST_ORDER)
         weight = 1.0 / np.maximum(np.mean(drawn**2, axis=(1, 2)), 1e-300)
         drawn -= slopes @ weighted_fit(drawn, slopes, weight)
         observed += np.sum(left**2, axis=0)
@@ -90,7 +90,7 @@ def excess_over_noise_model(
     if not power:
         return None
     fitted = [fit_ar(m, HIGHEST_ORDER) for m in moments]
-    count = DRAWS * (samples - HIGHEST_ORDER * len(maneuvers))
+    count = AR_DRAWS * (samples - HIGHEST_ORDER * len(maneuvers))
     noise = [ArNoise.from_coefficient(coefficient) for coefficient, _ in fitted]
     variance = np.array([innovation / count for _, innovation in fitted])
     return NoiseExcess(power, covariance_in_noise(problem, responses, noise, variance))

@@ -25,7 +25,7 @@ from host.sysid.numerics.input_coherence import InputCoherence, block_length, bl
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 SIGNIFICANCE = 0.01
-DRAWS, DRAW_SEED = 200, 1
+DRAWS, DRAW_SEED = 100, 1
 LONGEST_LAG = 200  # of an autocorrelation that counts, means
 SETTLING = 200  # means before a drawn AR series counts
 

@@ -395,11 +395,10 @@ def _known_directions(
     slopes += np.swapaxes(slopes, 1, 2)
     rooted = np.einsum("ab,bij->aij", noise.start_whitener, slopes)  # R^-1 = root' root
     value, vector = np.linalg.eigh(np.einsum("aij,ajk->ik", rooted, rooted) / samples)
-    known = vector[:, value + 2.0 / samples <= 2.0 / FEWEST_FREEDOM]
-    if known.shape[1] == 0:
-        return known, 2.0 / samples
-    mean = np.einsum("ij,aik,kj->a", known, rooted, known) / known.shape[1]
-    return known, 2.0 / samples + float(mean @ mean) / samples
+    kept = value + 2.0 / samples <= 2.0 / FEWEST_FREEDOM
+    # The errors of all directions are one: those of a few AR coefficients.
+    mean = float(np.mean(value[kept])) if kept.any() else 0.0
+    return vector[:, kept], 2.0 / samples + mean
 
 
 def _noise_model(
