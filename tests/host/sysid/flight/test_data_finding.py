@@ -85,9 +85,10 @@ def test_speed_against_force_is_a_finding_and_no_refusal(
     assert found["done"] == "accepted, used as it is"
 
 
-def test_the_verdict_begins_with_it(record: pd.DataFrame) -> None:
+def test_the_verdict_begins_with_it_behind_the_notes(record: pd.DataFrame) -> None:
     found = host.identify(sheared(record), models="short-period")
-    assert found.verdict[0].startswith("finding airspeed-against-ax: airspeed_mps moves 1.")
+    said = [line for line in found.verdict if not line.startswith("note: ")]
+    assert said[0].startswith("finding airspeed-against-ax: airspeed_mps moves 1.")
     assert found.findings == found.flights[0].findings
 
 

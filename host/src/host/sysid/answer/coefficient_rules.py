@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from host.sysid.answer.doubt import Doubt, doubt
 from host.sysid.answer.impossible_signs import impossible_signs
+from host.sysid.answer.trust_rules import percent
 from host.sysid.coefficients.coefficient_model import standard_model
 
 if TYPE_CHECKING:
@@ -65,9 +66,7 @@ def fit_fails(answer: CoefficientAnswer, open_channels: Channels) -> list[Doubt]
         one
         for equation, nrmse in shares.items()
         if not nrmse < FAILS
-        for one in _about(
-            answer, equation, f"the fit fails in {equation} (NRMSE {_percent(nrmse)})"
-        )
+        for one in _about(answer, equation, f"the fit fails in {equation} (NRMSE {percent(nrmse)})")
     ]
 
 
@@ -116,7 +115,3 @@ def _about(answer: CoefficientAnswer, equation: str, reason: str) -> list[Doubt]
 
 def _names(answer: CoefficientAnswer) -> list[str]:
     return [d.name for d in answer.fit.derivatives]
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f} %"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -63,7 +64,12 @@ def model_lines(answer: Answer) -> list[str]:
         ("free simulation, held-out data", answer.validation),
     ):
         if fits:
-            shares = ", ".join(f"{f.name} {100.0 * f.nrmse:.1f} %" for f in fits)
+            shares = ", ".join(
+                f"{f.name} {100.0 * f.nrmse:.1f} %"
+                if math.isfinite(f.nrmse)
+                else f"{f.name} diverges"
+                for f in fits
+            )
             lines.append(f"  NRMSE ({kind}): {shares}")
     return lines
 

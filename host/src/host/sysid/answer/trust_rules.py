@@ -7,6 +7,7 @@ lacks: on a demonstration flight D_V was -0.33 +- 0.02 where -0.61 was true.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -71,7 +72,7 @@ def fit_fails(answer: Answer, evidence: Evidence) -> list[Doubt]:
         for fit in answer.fits
         if not fit.nrmse < FAILS and not (fit.nrmse < WORSE_THAN_NONE and fit.ljung_box_p > WHITE_P)
         for one in _about(
-            answer, [fit.name], f"the fit fails in {fit.name} (NRMSE {_percent(fit.nrmse)})"
+            answer, [fit.name], f"the fit fails in {fit.name} (NRMSE {percent(fit.nrmse)})"
         )
     ]
 
@@ -196,12 +197,13 @@ def _named(answer: Answer, names: Iterable[str], reason: str) -> list[Doubt]:
 def _allowed(answer: Answer, fit: SignalFit) -> str:
     found = answer.predictions.get(fit.name)
     if found is None or found.holds:
-        return f" (NRMSE {_percent(fit.nrmse)})"
-    return f" (NRMSE {_percent(found.nrmse)}, noise and intervals allow {_percent(found.largest)})"
+        return f" (NRMSE {percent(fit.nrmse)})"
+    return f" (NRMSE {percent(found.nrmse)}, noise and intervals allow {percent(found.largest)})"
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f} %"
+def percent(share: float) -> str:
+    """Return a share for people; a simulation that diverges has none."""
+    return f"{100.0 * share:.0f} %" if math.isfinite(share) else "none, it diverges"
 
 
 def _reached(value: float, bound: float) -> bool:

@@ -89,9 +89,11 @@ class Identification:
     @property
     def verdict(self) -> tuple[str, ...]:
         """Lines on what to trust, what not and why, and what to fly again."""
+        # What the log lost is a note, and nothing that was read of it may be said before.
+        said = verdict_lines((), self.notes)
         found = (finding.line for finding in self.findings)
-        judged = verdict_lines(self.answers, self.notes, self.evidence)
-        return (*found, *judged, *removed_error_lines(self.linear))
+        judged = verdict_lines(self.answers, (), self.evidence)
+        return (*said, *found, *judged, *removed_error_lines(self.linear))
 
     @property
     def evidence(self) -> Evidence:
