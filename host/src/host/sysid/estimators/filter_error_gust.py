@@ -130,7 +130,8 @@ def _fit_gust_state(
             else innovations.coloured_covariance(),
         )
     # Output error has wider intervals, but a search that has not converged has none.
-    result = fit("output-error-white", model, maneuvers, start=start, multiple_starts=False)
+    # It starts afresh: where the filter got lost a search would too (M_alpha -13000 of -90).
+    result = fit("output-error-white", model, maneuvers, multiple_starts=False)
     return replace(
         result,
         warnings=(*result.warnings, f"filter error: {failure}; output error stands instead"),
