@@ -22,9 +22,10 @@ from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.flight import maneuver_detection, maneuver_selection
 from host.sysid.flight.linear_estimator import LinearEstimator
 from host.sysid.models.templates import Trim, template
-from host.sysid.pipeline.flight_preparation import ReadingOptions, prepare
+from host.sysid.pipeline.flight_preparation import prepare
 from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.notebook_pictures import Pictures
+from host.sysid.pipeline.reading_options import ReadingOptions
 from matplotlib.figure import Figure
 
 import host

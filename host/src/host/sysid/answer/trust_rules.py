@@ -18,7 +18,7 @@ from host.sysid.answer.doubt import Doubt, doubt
 from host.sysid.answer.impossible_signs import impossible_signs
 from host.sysid.answer.method_agreement import disagreements
 from host.sysid.answer.parameter_places import leaning_on
-from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.data_finding import Finding, open_channels
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.residual_delays import STANDARD_DELAYS
@@ -45,16 +45,6 @@ class Evidence:
 
     beside: tuple[Answer, ...] = ()
     findings: tuple[Finding, ...] = ()
-
-    @property
-    def open_channels(self) -> dict[str, str]:
-        """Columns with a finding that nothing has closed, and the check that found it."""
-        return {
-            name: finding.check
-            for finding in reversed(self.findings)
-            if not finding.closed
-            for name in finding.channels
-        }
 
 
 NO_EVIDENCE = Evidence()
@@ -148,7 +138,7 @@ def open_finding(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """The data checks found something in that channel, and nothing has closed it."""
     return [
         one
-        for channel, check in evidence.open_channels.items()
+        for channel, check in open_channels(evidence.findings).items()
         for one in _about(answer, [channel], f"{channel} has an open finding ({check})")
     ]
 

@@ -10,6 +10,7 @@ from host.sysid.answer.linear_verdict import linear_verdict
 from host.sysid.answer.marks import Verdict
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
 from host.sysid.compatibility.sensor_corrections import correction_lines
+from host.sysid.flight.data_finding import open_channels
 from host.sysid.flight.linear_estimator import Answer
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def verdict_of(answer: Answer | CoefficientAnswer, evidence: Evidence = NO_EVIDE
     """
     if isinstance(answer, Answer):
         return linear_verdict(answer, evidence)
-    return coefficient_verdict(answer, evidence.open_channels)
+    return coefficient_verdict(answer, open_channels(evidence.findings))
 
 
 def verdict_lines(

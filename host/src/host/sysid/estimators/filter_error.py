@@ -32,6 +32,7 @@ EXTEND_FROM_BOUNDS = 0.5  # bounds
 LONGEST_EXTENSION = 32.0
 VARIANCE_CHANGE = (0.01, 100.0)  # times what it was: most of one step
 MAX_ITERATIONS = 60
+NEAR_BOUNDS = 0.2  # Cramer-Rao bounds: a search that still creeps by so little has ended
 NOISE_FLOOR = 1e-3  # of an output's deviation, or of the first guess of process noise
 # First guess of the deviations: sensors share the residuals of output error with process noise.
 # With too small a guess of process noise the gain is too small, and the search ends elsewhere.
@@ -140,6 +141,12 @@ def fit_filter_error(
         },
     )
     return compare_noise_models(result, maneuvers, first) if compare_noise else result
+
+
+def near_its_optimum(result: FitResult) -> bool:
+    """Return whether a search has ended, or creeps by far less than its intervals."""
+    last = float(np.max(result.details["last_step_bounds"]))
+    return result.converged or last < NEAR_BOUNDS
 
 
 def information_at(

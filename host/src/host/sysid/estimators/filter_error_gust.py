@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.estimators.filter_error import fit_filter_error
-from host.sysid.estimators.gust_delays import advance_outputs, estimate_delays, near_its_optimum
+from host.sysid.estimators.filter_error import fit_filter_error, near_its_optimum
+from host.sysid.estimators.gust_delays import advance_outputs, estimate_delays
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.gust_penetration import PREFIX, with_gust_penetration
 from host.sysid.estimators.innovations import innovations_of
@@ -26,9 +26,10 @@ OTHER_PROCESS_STATES = ("airspeed_mps", "phi_rad")
 
 @dataclass(frozen=True)
 class GustFit:
-    """Result on the model without the gust, its maneuvers with delays removed, and the delays.
+    """Result on the model without gust states, its maneuvers with delays removed, and the delays.
 
-    `delays` has value and 95 % half-width of each, s.
+    Parameters of turning air (`gust_penetration`) are in `model` too. `delays` has value and
+    95 % half-width of each, s.
     """
 
     result: FitResult
@@ -60,7 +61,8 @@ def fit_with_gust(
     start = np.concatenate([first.estimate[:count], first.estimate[len(model.parameter_names) :]])
     late = estimate_delays(model, maneuvers, airspeed_mps, first, start, gust_process(model))
     start = np.concatenate([late.estimate, start[count:]])
-    shifted = [advance_outputs(m, model, late.delays) for m in maneuvers]
+    delays_s = {name: value for name, (value, _) in late.delays.items()}
+    shifted = [advance_outputs(m, model, delays_s) for m in maneuvers]
     result = _fit_gust_state(replace(model, delays=()), shifted, airspeed_mps, start)
     if result.residual_kind == "innovation":
         covariance = result.covariance.copy()
@@ -100,9 +102,7 @@ def _fit_gust_state(
     model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float, start: Array
 ) -> FitResult:
     """Return filter error with the gust as a state; output error if that does not converge."""
-    plain, first = model, start
-    if {"alpha_rad", "q_radps"} <= set(model.states):
-        plain, first = with_gust_penetration(model, airspeed_mps, start)
+    plain, first = with_gust_penetration(model, airspeed_mps, start)
     augmented = gust_model(plain, airspeed_mps)
     try:
         result = fit_filter_error(

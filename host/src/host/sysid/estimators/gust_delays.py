@@ -19,7 +19,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import NORMAL_95
-from host.sysid.estimators.filter_error import fit_filter_error
+from host.sysid.estimators.filter_error import fit_filter_error, near_its_optimum
 from host.sysid.estimators.gust_model import VANES, gust_model
 from host.sysid.estimators.gust_penetration import PREFIX, with_gust_penetration
 from host.sysid.identification_error import IdentificationError
@@ -28,7 +28,6 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import DelayGroup, LinearModel, Parameter, Term
 from host.sysid.numerics.output_error_problem import OutputProblem
 
-NEAR_BOUNDS = 0.2  # of a Cramer-Rao bound: a search that still creeps so little has ended
 ROUNDS = 3
 LAGS = 2  # in a row, together a sample long: what a vane's lateness is made of
 # Lags are no delay: 2 to 3 ms were found of vanes without any, at 10 ms a sample, known to 0.2 ms.
@@ -87,9 +86,7 @@ def estimate_delays(
     values = {d.name: 0.0 for d in groups}
     estimate, found = start[:count], None
     for _ in range(ROUNDS):
-        shifted = [
-            advance_outputs(m, model, {n: (v, 0.0) for n, v in values.items()}) for m in maneuvers
-        ]
+        shifted = [advance_outputs(m, model, values) for m in maneuvers]
         step = _round(model, groups, shifted, airspeed_mps, estimate, values, process)
         if step is None:
             break
@@ -115,16 +112,11 @@ def estimate_delays(
     )
 
 
-def near_its_optimum(found: FitResult) -> bool:
-    """Return whether a search has ended, or creeps by far less than its intervals."""
-    return found.converged or float(np.max(found.details["last_step_bounds"])) < NEAR_BOUNDS
-
-
 def advance_outputs(
-    maneuver: Maneuver, model: LinearModel, delays: Mapping[str, tuple[float, float]]
+    maneuver: Maneuver, model: LinearModel, delays_s: Mapping[str, float]
 ) -> Maneuver:
-    """Return the maneuver with each output advanced by its delay (s)."""
-    shifts = {o: delays[d.name][0] for d in model.delays if d.name in delays for o in d.outputs}
+    """Return the maneuver with each output advanced by its delay."""
+    shifts = {o: delays_s[d.name] for d in model.delays if d.name in delays_s for o in d.outputs}
     t = maneuver.time_s
     columns = [
         np.interp(t + shifts.get(name, 0.0), t, column)
@@ -143,9 +135,7 @@ def _round(
     process: tuple[str, ...],
 ) -> FitResult | None:
     """Fit parameters, gust and remaining delays; None if the search fails."""
-    plain, theta = replace(model, delays=()), estimate
-    if {"alpha_rad", "q_radps"} <= set(model.states):
-        plain, theta = with_gust_penetration(plain, airspeed_mps, theta)
+    plain, theta = with_gust_penetration(replace(model, delays=()), airspeed_mps, estimate)
     dt_s = max(m.dt_s for m in maneuvers)
     late = _with_delay_terms(gust_model(plain, airspeed_mps), groups, theta, removed, dt_s)
     centred = [_centred(m, model, dt_s) for m in maneuvers]

@@ -33,18 +33,22 @@ def with_gust_penetration(
 ) -> tuple[LinearModel, Array]:
     """Return the model with the effects of turning air as parameters, and the start with theirs.
 
+    A model without alpha or q feels none and stays as it is.
+
     The parameters act through the gust alone (`gust_model`): ``gust_Z`` in 1/s, ``gust_M`` in 1/s2,
     ``gust_lag_radps``.
 
     Parameters
     ----------
     model : LinearModel
-        With alpha and q among its states, without delays.
+        Without delays.
     airspeed_mps : float
         Of the trim.
     start : Array, shape (P,)
         Common parameters of the model first.
     """
+    if not {"alpha_rad", "q_radps"} <= set(model.states):
+        return model, start
     count = len(model.parameters)
     size = dict(zip((p.name for p in model.parameters), np.abs(start), strict=False))
     alpha, q = model.states.index("alpha_rad"), model.states.index("q_radps")

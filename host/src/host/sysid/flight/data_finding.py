@@ -7,14 +7,13 @@ How a verdict reads findings: `open_channels` names the columns of ours that are
 answer takes from one of them is never under "trust": the derivatives in the equation of such a
 state, those it is multiplied by, those of such an input, and those of an output only that output
 tells. Leaving the column out, estimating its scale and `--accept` do not close a finding; `closed`
-is set only where the samples themselves are in no fit. `wrong_units` are the channels of which
-kinematics proves that a unit or a sign is wrong: no later evidence brings these back under "trust".
+is set only where the samples themselves are in no fit.
 """
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -98,14 +97,9 @@ class Finding:
         return replace(self, accepted=True, closed=False, done=f"accepted, {AS_IT_IS}")
 
 
-def open_channels(findings: Iterable[Finding]) -> frozenset[str]:
-    """Return the columns in doubt, of which nothing may be under "trust"."""
-    return frozenset(name for f in findings if not f.closed for name in f.channels)
-
-
-def wrong_units(findings: Iterable[Finding]) -> frozenset[str]:
-    """Return the columns of which kinematics proves that a unit or sign is wrong."""
-    return frozenset(name for f in findings if f.wrong_unit for name in f.channels)
+def open_channels(findings: Sequence[Finding]) -> dict[str, str]:
+    """Return the columns in doubt, of which nothing may be under "trust", by the first check."""
+    return {name: f.check for f in reversed(findings) if not f.closed for name in f.channels}
 
 
 def finding_document(finding: Finding) -> dict[str, Any]:

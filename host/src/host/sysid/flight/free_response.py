@@ -25,7 +25,7 @@ REST_S = 0.5  # after the input, in which surfaces come to rest
 ENDS_S = 2.0
 LONGEST_S = 120.0
 SHORTEST_LEAD_S = 1.9  # a moment of rest is chance: a pilot holds still for as long
-LEAD_S = 30.0  # of rest before the input, which tells of the constants
+LONGEST_LEAD_S = 30.0  # of rest before the input, which tells of the constants
 
 
 def with_free_response(
@@ -93,7 +93,7 @@ def _until(t: Array, at_rest: _AtRest, from_s: float, limit_s: float) -> float:
 
 def _since(t: Array, at_rest: _AtRest, to_s: float, limit_s: float) -> float:
     """Return since when nothing moved before an input."""
-    span = np.flatnonzero((t <= to_s) & (t > max(limit_s, to_s - LEAD_S)))[::-1]
+    span = np.flatnonzero((t <= to_s) & (t > max(limit_s, to_s - LONGEST_LEAD_S)))[::-1]
     settled = np.flatnonzero((t < to_s) & (t >= to_s - REST_S))
     if len(span) == 0 or len(settled) == 0:
         return to_s

@@ -9,6 +9,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.estimators.output_error_fit import fit_output_error
+from host.sysid.flight.maneuver_detection import LEAD_S
 from host.sysid.flight.window_prediction import Biases
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import SignalFit, signal_fits
@@ -16,10 +17,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.information_inverse import covariance_from_information
-from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
-from host.sysid.numerics.output_error_problem import OutputProblem
-
-LEAD_S = 0.3  # of trim before the input, as `DetectedManeuver.fit_window` has it
+from host.sysid.numerics.output_error_problem import OutputProblem, Response
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +29,18 @@ class FreeRun:
     outputs: Array
     states: Array
     biases: Biases
+
+
+@dataclass(frozen=True, slots=True)
+class FreeResponses:
+    """A free simulation at an estimate with its sensitivities, a response of each maneuver.
+
+    `theta` is the whole vector of the problem, constants fitted.
+    """
+
+    problem: OutputProblem
+    theta: Array
+    responses: Sequence[Response]
 
 
 def free_runs(
@@ -45,7 +55,7 @@ def free_runs(
     maneuvers : sequence of Maneuver
     constants : bool
         Fit the biases and start states that the model has to each maneuver. Otherwise they are
-        those of equilibrium in the 0.3 s before the input: nothing is fitted.
+        those of equilibrium in the first 0.3 s, at rest before the input: nothing is fitted.
     """
     return [
         (_fitted_run if constants else _trimmed_run)(frozen, maneuver) for maneuver in maneuvers
@@ -105,16 +115,24 @@ def weighted_fit(errors: Array, columns: Array, weight: Array) -> Array:
     return np.asarray(covariance_from_information(information) @ right)
 
 
-def residual_coherence(
+def free_responses(
     model: LinearModel, estimate: Array, maneuvers: Sequence[Maneuver]
-) -> InputCoherence | None:
-    """Return whether inputs drive what a free simulation leaves; None where it diverges."""
+) -> FreeResponses | None:
+    """Simulate freely at an estimate, constants fitted; None where the model diverges.
+
+    Parameters
+    ----------
+    model : LinearModel
+    estimate : Array
+        Its first entries are the common parameters.
+    maneuvers : sequence of Maneuver
+    """
     problem = OutputProblem(model, maneuvers)
     theta = estimate_with_constants(problem, estimate)
     responses = None if theta is None else problem.respond(theta)
     if theta is None or responses is None:
         return None
-    return input_coherence(problem, responses, theta)
+    return FreeResponses(problem, theta, responses)
 
 
 def fits_of(
@@ -170,7 +188,7 @@ def _fitted_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
 
 
 def _trimmed_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
-    """Run from equilibrium at the mean of the time before the input."""
+    """Run from equilibrium at the mean of the first moment, at rest before the input."""
     lead = slice(0, max(1, round(LEAD_S / maneuver.dt_s)))
     y, u = maneuver.outputs[lead].mean(axis=0), maneuver.inputs[lead].mean(axis=0)
     known = dict(frozen.known_starts)

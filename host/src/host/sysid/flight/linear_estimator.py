@@ -31,9 +31,9 @@ from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.free_simulation import (
     fits_of,
+    free_responses,
     free_simulation,
     frozen_model,
-    residual_coherence,
 )
 from host.sysid.flight.linear_model import (
     AXIS_OF,
@@ -71,7 +71,7 @@ from host.sysid.models.modal_analysis import Mode, modes
 from host.sysid.models.residual_delays import STANDARD_DELAYS, without_standard_delays
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
-from host.sysid.numerics.input_coherence import InputCoherence
+from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
 
 
@@ -282,8 +282,11 @@ class LinearEstimator:
             if e.departure is None
             else e.departure.removed_from(e.maneuvers, e.estimate)
         )
-        coherence = residual_coherence(e.model, e.estimate, at_trim)
-        excess = excess_over_noise_model(e.model, statistical, at_trim, e.trim.airspeed_mps)
+        free = free_responses(e.model, e.estimate, at_trim)
+        coherence = excess = None
+        if free is not None:
+            coherence = input_coherence(free.problem, free.responses, free.theta)
+            excess = excess_over_noise_model(free, statistical, e.trim.airspeed_mps)
         statistical = inflate_by_coherence(statistical, coherence, excess)
         shifts: tuple[ShiftedEstimate, ...] = (
             () if e.departure is None else (e.departure.remainder,)

@@ -43,7 +43,7 @@ STILL_RAD = 1e-9  # a surface that moves less stands still but for rounding
 UNTIED = ("equation-error-total", "recursive", "neural-delta")
 STAGED = {
     "flight": "gust filter where alpha is a state, white output error else (default)",
-    GUST: "delays by output error, then filter error with the gust as a state",
+    GUST: "filter error with the gust as a state, delays estimated beside it",
 }
 
 

@@ -16,9 +16,8 @@ from host.arrays import Array
 from host.sysid.estimators.coherence_inflation import NoiseExcess
 from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.innovations import PROCESS
-from host.sysid.flight.free_simulation import estimate_with_constants, weighted_fit
+from host.sysid.flight.free_simulation import FreeResponses, weighted_fit
 from host.sysid.models.fit_result import FitResult
-from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
 from host.sysid.numerics.filter_problem import discrete_noise
@@ -28,7 +27,6 @@ from host.sysid.numerics.input_coherence import (
     block_means,
     covariance_in_noise,
 )
-from host.sysid.numerics.output_error_problem import OutputProblem
 
 SIGNIFICANCE = 0.01
 DRAWS, DRAW_SEED = 100, 2
@@ -36,29 +34,26 @@ AR_DRAWS = 12  # of them give the AR model of what is predicted
 
 
 def excess_over_noise_model(
-    model: LinearModel, result: FitResult, maneuvers: Sequence[Maneuver], airspeed_mps: float
+    free: FreeResponses, result: FitResult, airspeed_mps: float
 ) -> NoiseExcess | None:
     """Return the outputs whose residual is larger than predicted; None if there is none.
 
     Parameters
     ----------
-    model : LinearModel
-        As fitted, without the gust.
+    free : FreeResponses
+        Of the model as fitted, without gust states, to the maneuvers fitted.
     result : FitResult
         Of filter error; of other methods nothing is returned.
-    maneuvers : sequence of Maneuver
-        That were fitted.
     airspeed_mps : float
         Of the trim, for the gust's time scale.
 
     1 % of right models name any output.
     """
     process = [n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS)]
-    problem = OutputProblem(model, maneuvers)
-    theta = estimate_with_constants(problem, result.estimate)
-    responses = problem.respond(theta) if process and theta is not None else None
-    if responses is None:
+    if not process:
         return None
+    problem, responses = free.problem, free.responses
+    model, maneuvers = problem.model, problem.maneuvers
     wide = model if set(process) <= set(model.states) else gust_model(model, airspeed_mps)
     count, outputs = problem.n_common, len(model.outputs)
     observed, samples = np.zeros(outputs), 0

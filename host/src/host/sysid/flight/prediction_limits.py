@@ -16,13 +16,12 @@ import numpy as np
 from scipy import special
 
 from host.arrays import Array
-from host.sysid.flight.free_simulation import estimate_with_constants, weighted_fit
+from host.sysid.flight.free_simulation import free_responses, weighted_fit
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_length, block_means
-from host.sysid.numerics.output_error_problem import OutputProblem
 
 SIGNIFICANCE = 0.01
 DRAWS, DRAW_SEED = 100, 1
@@ -150,13 +149,11 @@ def drawn_noise(
 
 def _slopes(model: LinearModel, result: FitResult, maneuver: Maneuver) -> Array | None:
     """Return the sensitivities at the estimate, constants fitted, (p, means, P + constants)."""
-    problem = OutputProblem(model, [maneuver])
-    theta = estimate_with_constants(problem, result.estimate)
-    responses = None if theta is None else problem.respond(theta)
-    if responses is None:
+    free = free_responses(model, result.estimate, [maneuver])
+    if free is None:
         return None
     block = block_length(maneuver.dt_s)
-    return np.stack([block_means(J, block) for J in responses[0].sensitivities])
+    return np.stack([block_means(J, block) for J in free.responses[0].sensitivities])
 
 
 def _without_constants(errors: Array, columns: Array, power: Array) -> Array:

@@ -20,11 +20,12 @@ from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.agreement_findings import calibration_findings, disagreement
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
-from host.sysid.flight.maneuver_selection import Stretch, select_maneuvers
+from host.sysid.flight.maneuver_selection import select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.flight.small_inputs import whole_flight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData
+from host.sysid.pipeline.reading_options import ReadingOptions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,40 +33,6 @@ if TYPE_CHECKING:
     from host.log import FlightLog
 
     Source = str | Path | FlightLog | pd.DataFrame
-
-
-@dataclass(frozen=True, slots=True)
-class ReadingOptions:
-    """How flights are read.
-
-    Attributes
-    ----------
-    calibration : Path, optional
-        Counts to SI of a log.
-    mapping : Path, optional
-        Foreign names, units and signs of a table.
-    maneuvers : tuple of int
-        Only these of each flight, counted from 1; all without.
-    stretches : tuple of (from, to)
-        Spans of time, s, instead of the maneuvers.
-    corrections : bool
-        Remove sensor errors that the data determine from the columns.
-    delays : bool
-        Estimate residual delays, and places of sensors that no aircraft file gives.
-    also : tuple of str
-        Signals to read beside those that are always read.
-    accept : frozenset of str
-        Checks whose findings change nothing.
-    """
-
-    calibration: Path | None = None
-    mapping: Path | None = None
-    maneuvers: tuple[int, ...] = ()
-    stretches: tuple[Stretch, ...] = ()
-    corrections: bool = True
-    delays: bool = True
-    also: tuple[str, ...] = ()
-    accept: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,9 +30,10 @@ from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.pipeline.aircraft_data import AircraftData
 from host.sysid.pipeline.arguments import chosen_stretches, numbers_of, path_of
 from host.sysid.pipeline.estimate_table import estimate_table, mode_table
-from host.sysid.pipeline.flight_preparation import ReadingOptions, listed_flights, prepare
+from host.sysid.pipeline.flight_preparation import listed_flights, prepare
 from host.sysid.pipeline.notebook_html import answer_html
 from host.sysid.pipeline.notebook_pictures import Pictures
+from host.sysid.pipeline.reading_options import ReadingOptions
 from host.sysid.pipeline.simulation import Simulation, identified_models, simulate
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from host.sysid.answer.json_document import json_text
-from host.sysid.flight.data_finding import accepted_checks
 from host.sysid.flight.free_simulation import frozen_at
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
@@ -17,15 +16,12 @@ from host.sysid.models.toml_document import read_document
 from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.sysid.pipeline.aircraft_motion import aircraft_models
 from host.sysid.pipeline.arguments import (
-    chosen_stretches,
-    listed,
-    numbers_of,
-    of_each_flight,
     path_of,
 )
-from host.sysid.pipeline.flight_preparation import ReadingOptions, listed_flights, prepare
+from host.sysid.pipeline.flight_preparation import listed_flights, prepare
 from host.sysid.pipeline.notebook_pictures import Pictures
 from host.sysid.pipeline.prediction_text import simulation_document, simulation_lines
+from host.sysid.pipeline.reading_options import OfEach, reading_options
 from host.sysid.pipeline.simulation import Simulation, simulate
 
 if TYPE_CHECKING:
@@ -86,8 +82,8 @@ def predict(
     flights: Source | Sequence[Source],
     *,
     aircraft: str | Path | None = None,
-    calibration: str | Path | Sequence[str | Path | None] | None = None,
-    mapping: str | Path | Sequence[str | Path | None] | None = None,
+    calibration: OfEach = None,
+    mapping: OfEach = None,
     maneuvers: int | Sequence[int] = (),
     stretches: Sequence[Any] | None = None,
     from_s: float | None = None,
@@ -108,7 +104,7 @@ def predict(
         As in `host.identify`.
     constants : bool
         Fit biases and start states to each maneuver. Without they are those of equilibrium in the
-        0.3 s before the input.
+        first 0.3 s, at rest before the input.
 
     Raises
     ------
@@ -120,26 +116,20 @@ def predict(
     models = _saved_models(path)
     signals = {name for _, m in models for name in (*m.inputs, *m.outputs)} - {CONSTANT}
     sources = listed_flights(flights)
-    count = len(sources)
-    of_each = zip(
-        sources,
-        of_each_flight("calibration", calibration, count),
-        of_each_flight("mapping", mapping, count),
-        chosen_stretches(stretches, from_s, to_s, count),
-        strict=True,
+    each = reading_options(
+        len(sources),
+        calibration=calibration,
+        mapping=mapping,
+        maneuvers=maneuvers,
+        stretches=stretches,
+        ends=(from_s, to_s),
+        corrections=corrections,
+        also=tuple(sorted(signals)),
+        accept=accept,
     )
     found = []
-    for source, made_by, named_by, spans in of_each:
-        how = ReadingOptions(
-            made_by,
-            named_by,
-            numbers_of("maneuvers", maneuvers),
-            spans,
-            corrections,
-            also=tuple(sorted(signals)),
-            accept=accepted_checks(listed(accept)),
-        )
-        known = aircraft_data(aircraft, made_by) if aircraft is not None else None
+    for source, how in zip(sources, each, strict=True):
+        known = aircraft_data(aircraft, how.calibration) if aircraft is not None else None
         ready = prepare(source, how, known)
         notes = (*(finding.line for finding in ready.flight.findings), *ready.notes)
         found.append(simulate(models, ready.flight, notes, constants=constants))

@@ -12,22 +12,16 @@ from host.physical.calibration import load_calibration
 from host.sysid.answer.truth_comparison import read_truth
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
 from host.sysid.estimators.method_options import check_options, options_of
-from host.sysid.flight.data_finding import accepted_checks
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.linear_estimator import Answer, LinearEstimator
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData, aircraft_data
 from host.sysid.pipeline.arguments import (
-    chosen_stretches,
-    listed,
-    numbers_of,
-    of_each_flight,
     path_of,
     paths_of,
 )
 from host.sysid.pipeline.flight_preparation import (
-    ReadingOptions,
     collected_findings,
     collected_notes,
     distinct_flights,
@@ -35,6 +29,7 @@ from host.sysid.pipeline.flight_preparation import (
     prepare,
 )
 from host.sysid.pipeline.identification import Identification
+from host.sysid.pipeline.reading_options import OfEach, reading_options
 from host.sysid.pipeline.requested_models import (
     ModelName,
     Models,
@@ -44,8 +39,6 @@ from host.sysid.pipeline.requested_models import (
 
 if TYPE_CHECKING:
     from host.sysid.pipeline.flight_preparation import Source
-
-OfEach = str | Path | None | Sequence[str | Path | None]  # one for all flights, or one of each
 
 
 def identify(
@@ -119,23 +112,19 @@ def identify(
     options = dict(method_options or {})
     check_options(options, by)
     sources = listed_flights(flights)
-    spans = chosen_stretches(stretches, from_s, to_s, len(sources))
-    calibrations = of_each_flight("calibration", calibration, len(sources))
-    each = [
-        ReadingOptions(
-            made_by,
-            named_by,
-            numbers_of("maneuvers", maneuvers),
-            span,
-            corrections,
-            delays,
-            asked.signals,
-            accepted_checks(listed(accept)),
-        )
-        for made_by, named_by, span in zip(
-            calibrations, of_each_flight("mapping", mapping, len(sources)), spans, strict=True
-        )
-    ]
+    each = reading_options(
+        len(sources),
+        calibration=calibration,
+        mapping=mapping,
+        maneuvers=maneuvers,
+        stretches=stretches,
+        ends=(from_s, to_s),
+        corrections=corrections,
+        delays=delays,
+        also=asked.signals,
+        accept=accept,
+    )
+    calibrations = [how.calibration for how in each]
     by_calibration = {
         made_by: aircraft_data(aircraft, made_by) if aircraft is not None else None
         for made_by in calibrations

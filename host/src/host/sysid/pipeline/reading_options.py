@@ -1,0 +1,97 @@
+"""How flights are read: the options of each, of arguments that count for all or for one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from host.sysid.flight.data_finding import accepted_checks
+from host.sysid.flight.maneuver_selection import Stretch
+from host.sysid.pipeline.arguments import chosen_stretches, listed, numbers_of, of_each_flight
+
+OfEach = str | Path | Sequence[str | Path | None] | None  # one for all flights, or one of each
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingOptions:
+    """How flights are read.
+
+    Attributes
+    ----------
+    calibration : Path, optional
+        Counts to SI of a log.
+    mapping : Path, optional
+        Foreign names, units and signs of a table.
+    maneuvers : tuple of int
+        Only these of each flight, counted from 1; all without.
+    stretches : tuple of (from, to)
+        Spans of time, s, instead of the maneuvers.
+    corrections : bool
+        Remove sensor errors that the data determine from the columns.
+    delays : bool
+        Estimate residual delays, and places of sensors that no aircraft file gives.
+    also : tuple of str
+        Signals to read beside those that are always read.
+    accept : frozenset of str
+        Checks whose findings change nothing.
+    """
+
+    calibration: Path | None = None
+    mapping: Path | None = None
+    maneuvers: tuple[int, ...] = ()
+    stretches: tuple[Stretch, ...] = ()
+    corrections: bool = True
+    delays: bool = True
+    also: tuple[str, ...] = ()
+    accept: frozenset[str] = frozenset()
+
+
+def reading_options(
+    flights: int,
+    *,
+    calibration: OfEach = None,
+    mapping: OfEach = None,
+    maneuvers: int | Sequence[int] = (),
+    stretches: Sequence[Any] | None = None,
+    ends: tuple[float | None, float | None] = (None, None),
+    corrections: bool = True,
+    delays: bool = True,
+    also: tuple[str, ...] = (),
+    accept: str | Iterable[str] = (),
+) -> list[ReadingOptions]:
+    """Return the options of each flight; the arguments are those of `host.identify`.
+
+    Parameters
+    ----------
+    flights : int
+        How many there are.
+    ends : tuple
+        From and to of one stretch of every flight, s.
+    also : tuple of str
+        Signals to read beside those that are always read.
+
+    Raises
+    ------
+    IdentificationError
+        If an argument is not what it should be.
+    """
+    return [
+        ReadingOptions(
+            made_by,
+            named_by,
+            numbers_of("maneuvers", maneuvers),
+            spans,
+            corrections,
+            delays,
+            also,
+            accepted_checks(listed(accept)),
+        )
+        for made_by, named_by, spans in zip(
+            of_each_flight("calibration", calibration, flights),
+            of_each_flight("mapping", mapping, flights),
+            chosen_stretches(stretches, *ends, flights),
+            strict=True,
+        )
+    ]
