@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from host.constants import GRAVITY_MPS2
 from numpy.typing import NDArray
 
 from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER, motion, trimmed
@@ -85,12 +86,13 @@ def fly(
 
 
 def derivatives(airspeed_mps: float) -> dict[str, float]:
-    """Return the dimensional derivatives at an airspeed."""
+    """Return the dimensional derivatives at an airspeed; thrust balances drag."""
     a, V = TRAINER, airspeed_mps
     force = 0.5 * DENSITY_KGPM3 * V**2 * a.area
+    drag = a.CD_0 + a.CD_CL2 * (a.mass * GRAVITY_MPS2 / force) ** 2
     chord, span = 0.5 * a.chord / V, 0.5 * a.span / V
     found = {
-        "Z_alpha": -force * a.CL_alpha / (a.mass * V),
+        "Z_alpha": -force * (a.CL_alpha + drag) / (a.mass * V),
         "M_alpha": force * a.chord * a.Cm_alpha / a.iyy,
         "M_q": force * a.chord * a.Cm_q * chord / a.iyy,
         "M_de": force * a.chord * a.Cm_de / a.iyy,

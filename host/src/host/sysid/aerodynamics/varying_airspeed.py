@@ -294,13 +294,17 @@ class VaryingModel:
     def _nonlinear_forces(self, columns: Mapping[str, Array], ratio: Array) -> list[Array]:
         """Return, per specific force, its second order in airspeed and in the turning of lift."""
         alpha, ax, az = columns["alpha_rad"], columns["ax_mps2"], columns["az_mps2"]
-        along = _deviation(ax * np.cos(alpha) + az * np.sin(alpha))
-        normal = _deviation(az * np.cos(alpha) - ax * np.sin(alpha))
-        angle = _deviation(alpha)
+        along = ax * np.cos(alpha) + az * np.sin(alpha)
+        normal = az * np.cos(alpha) - ax * np.sin(alpha)
+        # ax = along cos - normal sin, az = along sin + normal cos, to second order; the mean lift
+        # turned by half a squared angle is 0.04 m/s2 at 5 degrees.
+        angle, f, n = _deviation(alpha), _deviation(along), _deviation(normal)
         sine, cosine = np.sin(self.trim.alpha_rad), np.cos(self.trim.alpha_rad)
+        bent = -0.5 * angle**2
+        f0, n0 = np.mean(along), np.mean(normal)
         by_rotation = {
-            "ax_mps2": -angle * (cosine * normal + sine * along),
-            "az_mps2": angle * (cosine * along - sine * normal),
+            "ax_mps2": -angle * (cosine * n + sine * f) + bent * (cosine * f0 - sine * n0),
+            "az_mps2": angle * (cosine * f - sine * n) + bent * (sine * f0 + cosine * n0),
         }
         return [
             (ratio - 1.0) ** 2 * np.mean(columns[y]) + by_rotation.get(y, 0.0) for y in self.forces

@@ -39,7 +39,10 @@ class GustFit:
 
 
 def fit_with_gust(
-    model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    airspeed_mps: float,
+    first: FitResult | None = None,
 ) -> GustFit:
     """Fit a template by filter error with the gust as a state, delays estimated beside it.
 
@@ -51,12 +54,14 @@ def fit_with_gust(
         Data as measured.
     airspeed_mps : float
         Of the trim, for the gust's time scale, m/s.
+    first : FitResult, optional
+        Of output error on this model, to start from.
     """
     if not model.delays:
         start = start_values_of(model, maneuvers)
         result = _fit_gust_state(model, list(maneuvers), airspeed_mps, start)
         return GustFit(result, result.model, tuple(maneuvers), {})
-    first = fit("output-error-white", model, maneuvers, multiple_starts=False)
+    first = first or fit("output-error-white", model, maneuvers, multiple_starts=False)
     count = len(model.parameters)
     start = np.concatenate([first.estimate[:count], first.estimate[len(model.parameter_names) :]])
     late = estimate_delays(model, maneuvers, airspeed_mps, first, start, gust_process(model))

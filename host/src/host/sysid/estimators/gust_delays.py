@@ -7,7 +7,8 @@ has the gust tells both apart.
 
 A delay tau of output y enters as y - tau dy/dt, with dy/dt = C (A x + B u) + D du/dt of the
 estimate before: the model stays linear in its parameters. The columns are advanced by what was
-found and the filter runs again, so that tau tends to zero, where this is exact.
+found and the filter runs again, so that tau tends to zero, where this is exact. A vane in gusts has
+no slope; its delay is a Pade filter (`_with_delay_terms`).
 """
 
 from __future__ import annotations
@@ -29,9 +30,8 @@ from host.sysid.models.state_space_model import DelayGroup, LinearModel, Paramet
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 ROUNDS = 3
-LAGS = 2  # in a row, together a sample long: what a vane's lateness is made of
-# Lags are no delay: 2 to 3 ms were found of vanes without any, at 10 ms a sample, known to 0.2 ms.
-LAG_SHARE = 0.25
+PADE_STATES = 2
+SHORTEST_SHARE = 0.2  # of a sample: least delay that is left of a vane's, set back by one
 SETTLED_SD = 0.3  # a round that moves a delay by less is the last
 # The pitot feels gusts along the path that the model has not: its delay went to 50 ms.
 GUST_BLIND = ("airspeed_mps",)
@@ -83,27 +83,27 @@ def estimate_delays(
     """
     count = len(model.parameters)
     groups = [d for d in model.delays if not set(d.outputs) <= set(GUST_BLIND)]
+    dt_s = max(m.dt_s for m in maneuvers)
     values = {d.name: 0.0 for d in groups}
     estimate, found = start[:count], None
     for _ in range(ROUNDS):
-        shifted = [advance_outputs(m, model, values) for m in maneuvers]
-        step = _round(model, groups, shifted, airspeed_mps, estimate, values, process)
+        removed = {d.name: _removable(d, values[d.name], dt_s) for d in groups}
+        shifted = [advance_outputs(m, model, removed) for m in maneuvers]
+        step = _round(model, groups, shifted, airspeed_mps, estimate, removed, process)
         if step is None:
             break
-        found, estimate = step, step.estimate[:count]
-        moved = {d.name: step.value(d.name) for d in groups}
+        found, estimate, before = step, step.estimate[:count], values
         values = {
-            d.name: float(np.clip(values[d.name] + moved[d.name], -d.limit_s, d.limit_s))
+            d.name: float(np.clip(removed[d.name] + step.value(d.name), -d.limit_s, d.limit_s))
             for d in groups
         }
         sd = step.standard_error
-        if all(abs(moved[n]) < SETTLED_SD * sd[step.index(n)] for n in values):
+        if all(abs(values[n] - before[n]) < SETTLED_SD * sd[step.index(n)] for n in values):
             break
     if found is None:
         half = first.half_width()
         delays = {d.name: (0.0, float(half[first.index(d.name)])) for d in groups}
         return DelayEstimate(delays, estimate, _added_covariance(first, list(values), count))
-    found = _with_lag_error(found, groups, max(m.dt_s for m in maneuvers))
     half = NORMAL_95 * found.standard_error
     return DelayEstimate(
         {n: (v, float(half[found.index(n)])) for n, v in values.items()},
@@ -141,12 +141,14 @@ def _round(
     centred = [_centred(m, model, dt_s) for m in maneuvers]
     start = OutputProblem(late, centred).first_guess()
     start[: len(theta)] = theta
-    start[len(theta) : len(late.parameters)] = 0.0
+    start[len(theta) : len(late.parameters)] = [
+        1.0 / dt_s if _late_by_pade(d) else 0.0 for d in groups
+    ]
     try:
         found = fit_filter_error(late, centred, process=process, start=start, compare_noise=False)
     except IdentificationError:
         return None
-    return found if near_its_optimum(found) else None
+    return _as_delays(found, groups, dt_s) if near_its_optimum(found) else None
 
 
 def _with_delay_terms(
@@ -158,33 +160,37 @@ def _with_delay_terms(
 ) -> LinearModel:
     """Return the model with delays as parameters, rates of the inputs as further inputs.
 
-    Vanes come a sample later than they were measured (`_centred`): a lag of that length makes their
-    slope known, for white noise drives the gust, and what it enters at once has none.
+    Of a vane in gusts there is no slope, for what it measures is driven by white noise. It comes a
+    sample later than it was measured (`_centred`), and its delay of that length is a Pade filter
+    of second order, y = u - 12 z2, dz1/dt = z2 / T, dz2/dt = (u - 12 z1 - 6 z2) / T. The parameter
+    is 1 / T, in which the model is linear (`_as_delays`).
     """
     A, B, C, D = wide.matrices(theta)
     n, count = len(wide.states), len(wide.inputs)
-    vanes = [name for d in groups for name in d.outputs if name in VANES and name in wide.outputs]
-    size, rate = n + LAGS * len(vanes), LAGS / dt_s
+    vanes = [(d, y) for d in groups for y in d.outputs if y in VANES and y in wide.outputs]
+    size = n + PADE_STATES * len(vanes)
     wider_A, wider_C = np.zeros((size, size)), np.zeros((len(wide.outputs), size))
     wider_A[:n, :n], wider_C[:, :n] = wide.A, wide.C
     by_state, by_input = np.zeros_like(wider_C), C @ B
     by_state[:, :n] = C @ A
     gust = np.array([name.startswith(PREFIX) for name in wide.states])
     by_state[np.ix_(np.any(C[:, gust] != 0.0, axis=1), np.append(gust, [False] * (size - n)))] = 0.0
-    rates = D.copy()
-    for number, name in enumerate(vanes):
-        k, first = wide.outputs.index(name), n + LAGS * number
-        wider_A[first, :n] = rate * C[k]
-        for state in range(first, first + LAGS):
-            wider_A[state, state] = -rate
-        for state in range(first + 1, first + LAGS):
-            wider_A[state, state - 1] = rate
-        wider_C[k, :n], wider_C[k, state] = 0.0, 1.0
-        by_state[k], by_input[k], rates[k] = wider_A[state], 0.0, 0.0
-    terms = [t for t in wide.terms if not (t.matrix == "C" and wide.outputs[t.row] in vanes)]
+    terms, late = list(wide.terms), {wide.outputs.index(y) for _, y in vanes}
+    for number, (delay, name) in enumerate(vanes):
+        k, first = wide.outputs.index(name), n + PADE_STATES * number
+        second = first + 1
+        wider_C[k, second] = -12.0
+        terms += [
+            Term("A", first, second, delay.name),
+            Term("A", second, first, delay.name, -12.0),
+            Term("A", second, second, delay.name, -6.0),
+            *(Term("A", second, j, delay.name, float(g)) for j, g in enumerate(C[k]) if g),
+        ]
     for delay in groups:
         for k in (wide.outputs.index(o) for o in delay.outputs if o in wide.outputs):
-            rows = (("C", 0, by_state[k]), ("D", 0, by_input[k]), ("D", count, rates[k]))
+            if k in late:
+                continue
+            rows = (("C", 0, by_state[k]), ("D", 0, by_input[k]), ("D", count, D[k]))
             terms += [
                 Term(matrix, k, first + j, delay.name, -float(gain))
                 for matrix, first, gains in rows
@@ -194,18 +200,36 @@ def _with_delay_terms(
     still = np.zeros((size - n, 2 * count))
     return replace(
         wide,
-        states=(*wide.states, *(f"{name} late by {k}" for name in vanes for k in range(LAGS))),
+        states=(*wide.states, *(f"{y} late by {k}" for _, y in vanes for k in range(PADE_STATES))),
         inputs=(*wide.inputs, *(f"rate of {name}" for name in wide.inputs)),
         A=wider_A,
         B=np.vstack([np.hstack([wide.B, np.zeros_like(wide.B)]), still]),
         C=wider_C,
         D=np.hstack([wide.D, np.zeros_like(wide.D)]),
         terms=tuple(terms),
-        # The prior is of the whole delay, part of which is removed already.
-        parameters=(
-            *wide.parameters,
-            *(Parameter(d.name, -removed[d.name], prior_sd=d.prior_sd_s) for d in groups),
-        ),
+        parameters=(*wide.parameters, *(_parameter(d, removed[d.name], dt_s) for d in groups)),
+    )
+
+
+def _late_by_pade(delay: DelayGroup) -> bool:
+    return bool(set(delay.outputs) & set(VANES))
+
+
+def _removable(delay: DelayGroup, value_s: float, dt_s: float) -> float:
+    """Return what to advance by; of vanes whole samples, for interpolation would smooth gusts."""
+    return dt_s * round(value_s / dt_s) if _late_by_pade(delay) else value_s
+
+
+def _parameter(delay: DelayGroup, removed_s: float, dt_s: float) -> Parameter:
+    """Return what stands for a delay of which a part is removed already; the prior is of all."""
+    if not _late_by_pade(delay):
+        return Parameter(delay.name, -removed_s, prior_sd=delay.prior_sd_s)
+    return Parameter(
+        delay.name,
+        1.0 / dt_s,
+        lower=1.0 / (dt_s + delay.limit_s),
+        upper=1.0 / (SHORTEST_SHARE * dt_s),
+        prior_sd=delay.prior_sd_s / dt_s**2,
     )
 
 
@@ -227,15 +251,15 @@ def _centred(maneuver: Maneuver, model: LinearModel, dt_s: float) -> Maneuver:
     )
 
 
-def _with_lag_error(found: FitResult, groups: Sequence[DelayGroup], dt_s: float) -> FitResult:
-    """Return the fit with the error of lags in place of a delay, parameters moving along."""
-    covariance = found.covariance.copy()
+def _as_delays(found: FitResult, groups: Sequence[DelayGroup], dt_s: float) -> FitResult:
+    """Return the fit with 1 / T of vanes as the delay beyond a sample, T - dt."""
+    estimate, by = found.estimate.copy(), np.ones(len(found.estimate))
     for delay in groups:
-        k = found.index(delay.name)
-        if set(delay.outputs) & set(VANES) and covariance[k, k] > 0.0:
-            by = covariance[:, k] / covariance[k, k]
-            covariance += (LAG_SHARE * dt_s) ** 2 * np.outer(by, by)
-    return replace(found, covariance=covariance)
+        if _late_by_pade(delay):
+            k = found.index(delay.name)
+            by[k] = -1.0 / estimate[k] ** 2
+            estimate[k] = 1.0 / estimate[k] - dt_s
+    return replace(found, estimate=estimate, covariance=found.covariance * np.outer(by, by))
 
 
 def _added_covariance(found: FitResult, names: Sequence[str], count: int) -> Array:

@@ -46,21 +46,13 @@ class Innovations:
     white: list[Array]
     sensitivities: list[Array]
 
-    def one_step_update(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
-        """Return the change of the estimate for another model and other data, (maneuvers, P).
+    def innovations(self, model: LinearModel, changed: Sequence[Maneuver]) -> list[Array] | None:
+        """Return those of another model and other data, noises and parameters as at the answer.
 
-        Each maneuver has its share of one Gauss-Newton step, -M^-1 sum (d nu/d theta)' S^-1
-        (nu_changed - nu); zero if the filter fails.
+        None if the filter fails.
         """
         point = FilterProblem(model, changed, self.process).evaluate(self.theta)
-        scores = np.zeros((len(self.e), len(self.theta)))
-        if point is None:
-            return scores
-        for k, (e, reference, white, sensitivity) in enumerate(
-            zip(point.e, self.e, self.white, self.sensitivities, strict=True)
-        ):
-            scores[k] = -np.einsum("nj,njk->k", (e - reference) @ white.T, sensitivity)
-        return np.asarray(scores @ self.inverse)
+        return None if point is None else point.e
 
     def coloured_covariance(self) -> Array:
         """Return the covariance corrected for coloured innovations; no variance becomes smaller.

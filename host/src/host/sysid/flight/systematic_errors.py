@@ -7,7 +7,7 @@ error or the residuals of output error. No fit is repeated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,20 +23,15 @@ from host.sysid.compatibility.sensor_corrections import (
     residual_deviations,
 )
 from host.sysid.compatibility.sensor_dynamics import perturb_columns, residual_errors
-from host.sysid.estimators.gust_model import gust_model
 from host.sysid.estimators.gust_penetration import penetration_of, without_gust_penetration
-from host.sysid.estimators.innovations import innovations_of
+from host.sysid.flight.one_step import one_step_of
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel, without_outputs
 from host.sysid.models.templates import TEMPLATES, Trim, template
-from host.sysid.numerics.output_error_problem import OutputProblem
 
 TRIMMING = ("airspeed_mps", "alpha_rad", "theta_rad", "qbar_pa", "density_kgpm3")
-SINGULAR = 1e-12  # of the largest eigenvalue of the scaled information
-
-Follow = Callable[[LinearModel, Trim, Sequence[Maneuver]], Array]
 
 
 def systematic_error_shifts(
@@ -66,8 +61,8 @@ def systematic_error_shifts(
     tuple of Moved
         Empty if the model diverges at the answer.
     """
-    follow = follower(result, maneuvers, trim)
-    if follow is None:
+    one_step = one_step_of(result, maneuvers, trim)
+    if one_step is None:
         return ()
     still = _mean_of(cuts)
     flights = {id(c): (c, cut) for c, cut in zip(reversed(known), reversed(cuts), strict=True)}
@@ -92,7 +87,7 @@ def systematic_error_shifts(
         )
         bent = _bent(trim, still[0], there[0]) if fresh and there[0] != still[0] else trim
         model = result.model if bent is trim else _retrimmed(result.model, bent)
-        steps.append(follow(model, bent, changed).sum(axis=0))
+        steps.append(one_step.change(model, bent, changed).sum(axis=0))
     return tuple(
         ShiftedEstimate(error, result.estimate + step, *gain)
         for error, step, gain in zip(errors, steps, gains, strict=True)
@@ -164,77 +159,6 @@ def _changed(
         inputs=moved(model.inputs, maneuver.inputs),
         outputs=moved(model.outputs, maneuver.outputs),
     )
-
-
-def follower(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> Follow | None:
-    """Return a function that gives the one-step change of the estimate for other data.
-
-    It returns the share of each maneuver in it, (maneuvers, P)."""
-    if result.residual_kind == "innovation":
-        wide = gust_model(result.model, trim.airspeed_mps)
-        found = innovations_of(result, wide, maneuvers)
-        if found is None:
-            return None
-        return lambda model, bent, data: found.one_step_update(
-            gust_model(model, bent.airspeed_mps), data
-        )
-    outputs = _Outputs(result, maneuvers)
-    return (lambda model, _, data: outputs.step(model, data)) if outputs.fine else None
-
-
-class _Outputs:
-    """Gauss-Newton steps of output error about an answer."""
-
-    def __init__(self, result: FitResult, maneuvers: Sequence[Maneuver]) -> None:
-        self.problem = problem = OutputProblem(result.model, maneuvers)
-        theta = problem.first_guess()
-        place = {n: k for k, n in enumerate(result.names)}
-        self.known = [(k, place[n]) for k, n in enumerate(problem.names) if n in place]
-        for k, source in self.known:
-            theta[k] = result.estimate[source]
-        self.theta, self.length = theta, len(result.names)
-        self.responses = problem.respond(theta)
-        self.fine = self.responses is not None
-        if self.responses is None:
-            return
-        rests = [
-            np.sum(problem.residual(k, r.y) ** 2, axis=1) for k, r in enumerate(self.responses)
-        ]
-        self.weight = problem.counts / np.maximum(np.sum(rests, axis=0), 1e-300)
-        H = np.diag(problem.prior_precision)
-        for k, r in enumerate(self.responses):
-            own = problem.columns(k)
-            for w, J in zip(self.weight, r.sensitivities, strict=True):
-                H[np.ix_(own, own)] += w * J.T @ J
-        if not np.isfinite(H).all():
-            self.fine = False
-            return
-        held = (theta <= problem.lower) | (theta >= problem.upper)
-        H[held], H[:, held] = 0.0, 0.0
-        size = np.where(held, 1.0, np.sqrt(np.maximum(np.diag(H), 1e-300)))
-        inverse = np.linalg.pinv(H / np.outer(size, size), rcond=SINGULAR, hermitian=True)
-        self.inverse = inverse / np.outer(size, size)
-        self.inverse[held], self.inverse[:, held] = 0.0, 0.0  # not rounding: a bound stays one
-
-    def step(self, model: LinearModel, changed: Sequence[Maneuver]) -> Array:
-        """Return the change of the whole estimate for a new model and data, (maneuvers, P).
-
-        Each maneuver has its share of it.
-        """
-        assert self.responses is not None
-        result = np.zeros((len(changed), self.length))
-        other = OutputProblem(model, changed).outputs(self.theta)
-        if other is None:
-            return result
-        pull = np.zeros((len(changed), len(self.theta)))
-        for k, (r, y, m) in enumerate(zip(self.responses, other, changed, strict=True)):
-            rest = m.outputs.T - self.problem.measured(k) - (y - r.y)
-            for w, J, d in zip(self.weight, r.sensitivities, rest, strict=True):
-                pull[k, self.problem.columns(k)] += w * J.T @ d
-        step = pull @ self.inverse
-        for k, target in self.known:
-            result[:, target] = step[:, k]
-        return result
 
 
 def _is_template(model: LinearModel, trim: Trim) -> bool:

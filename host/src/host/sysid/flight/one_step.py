@@ -1,0 +1,228 @@
+"""One Gauss-Newton step of an estimate's own method, for other data or another model.
+
+Residuals are those of the method: innovations of filter error, outputs of output error, both
+whitened. No fit is repeated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.arrays import Array, BoolArray, IntArray
+from host.sysid.estimators.gust_model import gust_model
+from host.sysid.estimators.innovations import innovations_of
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.templates import Trim
+from host.sysid.numerics.output_error_problem import OutputProblem
+
+SINGULAR = 1e-12  # of the largest eigenvalue of the scaled information
+
+Residuals = Callable[[LinearModel, Trim, Sequence[Maneuver]], "list[Array] | None"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of the estimate and of further parameters beside it.
+
+    Attributes
+    ----------
+    shares : Array, shape (maneuvers, P)
+        By how much each maneuver moves the estimate.
+    added : Array, shape (k,)
+        Values of the further parameters.
+    covariance : Array, shape (k, k)
+    by_added : Array, shape (k, P)
+        By how much the estimate moves with each.
+    """
+
+    shares: Array
+    added: Array
+    covariance: Array
+    by_added: Array
+
+
+@dataclass(frozen=True)
+class OneStep:
+    """What a step about an answer rests on.
+
+    Attributes
+    ----------
+    residuals : callable
+        Whitened residuals of each maneuver for a model about a trim, (samples p,); None if the
+        model diverges.
+    reference : list of Array
+        The same at the answer.
+    slopes : list of Array, each (samples p, own)
+        Of the residuals by the unknowns of each maneuver.
+    columns : list of IntArray, each (own,)
+        Where those stand among all unknowns.
+    inverse : Array, shape (T, T)
+        Of the information on all unknowns.
+    source, target : IntArray
+        Which unknown is which entry of the estimate.
+    length : int
+        P, entries of the estimate.
+    """
+
+    residuals: Residuals
+    reference: list[Array]
+    slopes: list[Array]
+    columns: list[IntArray]
+    inverse: Array
+    source: IntArray
+    target: IntArray
+    length: int
+
+    def change(self, model: LinearModel, trim: Trim, changed: Sequence[Maneuver]) -> Array:
+        """Return the share of each maneuver in the change of the estimate, (maneuvers, P).
+
+        Zero if the model diverges.
+        """
+        return self.joint(model, trim, changed, ()).shares
+
+    def joint(
+        self,
+        model: LinearModel,
+        trim: Trim,
+        changed: Sequence[Maneuver],
+        extended: Sequence[LinearModel],
+        prior_sd: Sequence[float] = (),
+    ) -> Step:
+        """Return the step for a new model and data, and further parameters estimated along.
+
+        Parameters
+        ----------
+        model : LinearModel
+            With the further parameters at zero.
+        trim : Trim
+        changed : sequence of Maneuver
+        extended : sequence of LinearModel
+            The model with each of them at one; the residuals must be linear in them.
+        prior_sd : sequence of float
+            Of each, about zero.
+        """
+        count = len(extended)
+        none = np.zeros((count, self.length))
+        here = self.residuals(model, trim, changed)
+        if here is None:
+            shares = np.zeros((len(changed), self.length))
+            return Step(shares, np.zeros(count), np.zeros((count, count)), none)
+        beside = [self.residuals(one, trim, changed) for one in extended]
+        pull = np.zeros((len(changed), len(self.inverse)))
+        link = np.zeros((len(changed), len(self.inverse), count))
+        normal, right = np.diag(np.asarray(prior_sd, dtype=np.float64) ** -2.0), np.zeros(count)
+        for k, (r, before) in enumerate(zip(here, self.reference, strict=True)):
+            own, J = self.columns[k], self.slopes[k]
+            pull[k, own] = -(J.T @ (r - before))
+            if count:
+                by = np.column_stack([r - r if b is None else b[k] - r for b in beside])
+                link[k, own] = J.T @ by
+                normal += by.T @ by
+                right -= by.T @ r
+        step = pull @ self.inverse
+        added, covariance = np.zeros(count), np.zeros((count, count))
+        follows = -np.einsum("kij,il->klj", link, self.inverse)
+        if count:
+            whole = link.sum(axis=0)
+            covariance = np.linalg.pinv(normal - whole.T @ self.inverse @ whole, hermitian=True)
+            added = covariance @ (right - whole.T @ step.sum(axis=0))
+            step = step + follows @ added
+        return Step(self._placed(step), added, covariance, self._placed(follows.sum(axis=0).T))
+
+    def _placed(self, unknowns: Array) -> Array:
+        """Return rows of all unknowns as rows of the estimate."""
+        result = np.zeros((len(unknowns), self.length))
+        result[:, self.target] = unknowns[:, self.source]
+        return result
+
+
+def one_step_of(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> OneStep | None:
+    """Return the step of the method that made a result; None if it fails at the answer."""
+    if result.residual_kind == "innovation":
+        return _of_innovations(result, maneuvers, trim)
+    return _of_outputs(result, maneuvers)
+
+
+def _of_innovations(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> OneStep | None:
+    found = innovations_of(result, gust_model(result.model, trim.airspeed_mps), maneuvers)
+    if found is None:
+        return None
+    every = np.arange(len(found.theta))
+
+    def residuals(model: LinearModel, bent: Trim, data: Sequence[Maneuver]) -> list[Array] | None:
+        e = found.innovations(gust_model(model, bent.airspeed_mps), data)
+        return None if e is None else _whitened(e, found.white)
+
+    return OneStep(
+        residuals=residuals,
+        reference=_whitened(found.e, found.white),
+        slopes=[s.reshape(-1, s.shape[-1]) for s in found.sensitivities],
+        columns=[every] * len(found.e),
+        inverse=found.inverse,
+        source=every,
+        target=every,
+        length=len(every),
+    )
+
+
+def _whitened(residuals: Sequence[Array], whiteners: Sequence[Array]) -> list[Array]:
+    return [(e @ W.T).ravel() for e, W in zip(residuals, whiteners, strict=True)]
+
+
+def _of_outputs(result: FitResult, maneuvers: Sequence[Maneuver]) -> OneStep | None:
+    problem = OutputProblem(result.model, maneuvers)
+    theta = problem.first_guess()
+    place = {n: k for k, n in enumerate(result.names)}
+    known = [(k, place[n]) for k, n in enumerate(problem.names) if n in place]
+    for k, source in known:
+        theta[k] = result.estimate[source]
+    responses = problem.respond(theta)
+    if responses is None:
+        return None
+    left = [problem.residual(k, r.y) for k, r in enumerate(responses)]
+    power = np.sum([np.sum(e**2, axis=1) for e in left], axis=0)
+    weight = np.sqrt(problem.counts / np.maximum(power, 1e-300))
+    slopes = [
+        np.concatenate([w * J for w, J in zip(weight, r.sensitivities, strict=True)])
+        for r in responses
+    ]
+    H = np.diag(problem.prior_precision)
+    for k, J in enumerate(slopes):
+        own = problem.columns(k)
+        H[np.ix_(own, own)] += J.T @ J
+    if not np.isfinite(H).all():
+        return None
+
+    def residuals(model: LinearModel, _: Trim, data: Sequence[Maneuver]) -> list[Array] | None:
+        other = OutputProblem(model, data)
+        simulated = other.outputs(theta)
+        if simulated is None:
+            return None
+        return [-(weight[:, None] * other.residual(k, y)).ravel() for k, y in enumerate(simulated)]
+
+    return OneStep(
+        residuals=residuals,
+        reference=[-(weight[:, None] * e).ravel() for e in left],
+        slopes=slopes,
+        columns=[problem.columns(k) for k in range(len(slopes))],
+        inverse=_inverse_within(H, (theta <= problem.lower) | (theta >= problem.upper)),
+        source=np.array([k for k, _ in known], dtype=np.int64),
+        target=np.array([k for _, k in known], dtype=np.int64),
+        length=len(result.names),
+    )
+
+
+def _inverse_within(H: Array, held: BoolArray) -> Array:
+    """Return the inverse of the information; what sits on a bound stays there."""
+    H = H.copy()
+    H[held], H[:, held] = 0.0, 0.0
+    size = np.where(held, 1.0, np.sqrt(np.maximum(np.diag(H), 1e-300)))
+    inverse = np.linalg.pinv(H / np.outer(size, size), rcond=SINGULAR, hermitian=True)
+    inverse /= np.outer(size, size)
+    inverse[held], inverse[:, held] = 0.0, 0.0  # not rounding: a bound stays one
+    return np.asarray(inverse)

@@ -1,0 +1,86 @@
+"""One step with a further parameter comes to what a fit of both comes to."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from host.sysid.estimators.method_registry import fit
+from host.sysid.flight.one_step import one_step_of
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+from host.sysid.models.templates import Trim, template
+from host.sysid.numerics.output_error_problem import OutputProblem
+
+TRIM = Trim(18.0)
+TRUE = {
+    "Z_alpha": -7.4, "Z_q": -0.08, "Z_de": -0.6, "M_alpha": -91.0, "M_q": -11.3, "M_de": -121.0,
+}  # fmt: skip
+EXTRA = 2.0
+
+
+def _models() -> tuple[LinearModel, LinearModel]:
+    """Return the short period with a known further input, without and with its parameter."""
+    base = template("short-period", TRIM, accelerometers=False)
+    n, p = len(base.states), len(base.outputs)
+    wide = replace(
+        base,
+        inputs=(*base.inputs, "disturbance"),
+        B=np.hstack([base.B, np.zeros((n, 1))]),
+        D=np.hstack([base.D, np.zeros((p, 1))]),
+    )
+    row = base.states.index("q_radps")
+    free = replace(
+        wide,
+        parameters=(*wide.parameters, Parameter("extra")),
+        terms=(*wide.terms, Term("B", row, len(base.inputs), "extra")),
+    )
+    return wide, free
+
+
+def _flown(model: LinearModel, seed: int) -> Maneuver:
+    rng, t = np.random.default_rng(seed), 0.02 * np.arange(500)
+    u = np.column_stack([0.05 * np.sign(np.sin(3.0 * t)), 0.5 * np.cos(1.7 * t) ** 2])
+    data = Maneuver(0.02, u, np.zeros((len(t), len(model.outputs))))
+    problem = OutputProblem(model, [data])
+    theta = problem.first_guess()
+    theta[: len(model.parameters)] = [TRUE.get(p.name, EXTRA) for p in model.parameters]
+    [y] = problem.outputs(theta) or []
+    return replace(data, outputs=y.T + 0.002 * rng.standard_normal(y.T.shape))
+
+
+@pytest.mark.parametrize("prior_sd", [1e3, 1e-4])
+def test_a_further_parameter_is_estimated_along(prior_sd: float) -> None:
+    still, free = _models()
+    data = [_flown(free, seed) for seed in (1, 2)]
+    free = replace(free, parameters=(*still.parameters, Parameter("extra", 0.0, prior_sd=prior_sd)))
+    both = fit("output-error-white", free, data, multiple_starts=False)
+    alone = fit("output-error-white", still, data, multiple_starts=False)
+    one_step = one_step_of(alone, data, TRIM)
+    assert one_step is not None
+    one = replace(still, B=still.B.copy())
+    one.B[still.states.index("q_radps"), -1] = 1.0
+    found = one_step.joint(still, TRIM, data, [one], [prior_sd])
+    count = len(still.parameters)
+    added = both.value("extra")
+    if prior_sd > 1.0:
+        sd = float(np.sqrt(found.covariance[0, 0]))
+        assert added == pytest.approx(EXTRA, abs=0.2)
+        # Noise is judged by the residuals of the fit before, which lacked the parameter.
+        assert found.added[0] == pytest.approx(added, abs=0.3 * sd)
+        before = np.abs(alone.estimate[:count] - both.estimate[:count])
+        after = alone.estimate + found.shares.sum(axis=0)
+        assert np.all(
+            np.abs(after[:count] - both.estimate[:count])
+            < 0.25 * before + 0.2 * both.half_width()[:count]
+        )
+    else:
+        assert abs(found.added[0]) < 0.05  # held to its prior
+
+
+def test_nothing_new_moves_nothing() -> None:
+    still, free = _models()
+    data = [_flown(free, 3)]
+    alone = fit("output-error-white", still, data, multiple_starts=False)
+    one_step = one_step_of(alone, data, TRIM)
+    assert one_step is not None
+    np.testing.assert_allclose(one_step.change(still, TRIM, data), 0.0, atol=1e-9)
