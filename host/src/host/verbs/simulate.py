@@ -41,6 +41,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         help="the thesis's logger flies along, into the same picture")  # fmt: skip
     parser.add_argument("--faults", action="store_true",
                         help="list the faults a card can name, and fly nothing")  # fmt: skip
+    parser.add_argument("--to", action="append", choices=("ulog", "dataflash", "tlog"), default=[],
+                        help="beside it the log that a PX4 or ArduPilot plane had written of the"
+                        " same flight; repeatable")  # fmt: skip
+    parser.add_argument("--outputs", choices=("conventional", "elevons", "vtail"),
+                        default="conventional", help="of that plane: how its servos move surfaces"
+                        " (default: conventional)")  # fmt: skip
     parser.add_argument("--no-picture", action="store_true", help="draw nothing")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(run=run)
@@ -73,6 +79,8 @@ def run(args: argparse.Namespace) -> int:
             firmware=args.firmware,
             pictures=not args.no_picture,
             both=args.both,
+            logs=args.to,
+            airframe=args.outputs,
             progress=draw_share,
         )
     except OSError as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from host.aircraft.file import Aircraft
 from host.log import read_log
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome import compare, ideal, picture, thesis, truth_files
+from host.twin.outcome.autopilot_logs import write_autopilot_log
 from host.twin.outcome.instrument import calibration
 from host.twin.recorder import avr, sitl, stimuli
 from host.twin.sensors.imu import Imu
@@ -92,6 +93,8 @@ def simulate(
     pictures: bool,
     both: bool,
     progress: Progress,
+    logs: Sequence[str] = (),
+    airframe: str = "conventional",
     aircraft: Aircraft | None = None,
 ) -> Outcome:
     """Fly a card and write everything it leaves.
@@ -110,6 +113,10 @@ def simulate(
         Fly the thesis's logger beside it, into the same picture.
     progress : callable
         Called with the stage and its share.
+    logs : sequence of str
+        Write these logs of other autopilots too: keys of `autopilot_logs.WRITERS`.
+    airframe : str
+        Of these, one of `autopilot_outputs.AIRFRAMES`.
     aircraft : Aircraft, optional
         In place of the card's.
 
@@ -155,6 +162,10 @@ def simulate(
     clock.mark("decode" if outcome.recording else firmware)
     outcome.files += truth_files.write(record, data, stem, first_row_s=outcome.first_row_s)
     clock.mark("truth")
+    for name in logs:
+        outcome.files.append(write_autopilot_log(name, record, data, stem, airframe=airframe))
+    if logs:
+        clock.mark("logs")
     second = None
     if both and firmware != "thesis":
         second, files = _thesis(record, data, folder)
