@@ -53,7 +53,7 @@ OURS = re.compile(r"frames\.toml|pin_map|settings\.toml|\.pio\b")
 # Rooms inside the host package, from the ground up: each may import those before it.
 HOST_FLOORS: dict[str, tuple[str, ...]] = {
     "host": (
-        *("files", "wire", "physical", "export", "original", "link", "log", "decode"),
+        *("files", "wire", "physical", "export", "original", "link", "log", "readers", "decode"),
         *("aircraft", "instrument", "twin", "sysid", "planning", "verbs"),
     ),
     "host.twin": ("faults", "testcard", "flight", "sensors", "recorder", "outcome"),

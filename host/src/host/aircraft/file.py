@@ -55,7 +55,7 @@ _OPTIONAL: Mapping[str, Mapping[str, float]] = {
 
 # What is known before the first flight: enough to identify an aircraft, not to fly it here.
 MEASURED = ("mass", "geometry", "trim", "sensors")
-MEASURED_IF_THERE = ("propulsion", "servo")
+MEASURED_IF_THERE = ("propulsion", "servo", "surfaces")
 _MEASURED_TRIM = ("airspeed_mps",)
 _LONGEST = 200  # numbers of one list
 _LENGTHS = {"alpha_rad": (2, _LONGEST), "stall_alpha_rad": (2, 2)}

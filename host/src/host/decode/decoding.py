@@ -21,6 +21,8 @@ from host.original.rows import looks_like_rows, read_rows
 from host.physical.calibration import load_calibration
 from host.physical.columns import COLUMNS, UNITS
 from host.progress import progress_bar
+from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
+from host.readers.autopilot_summary import autopilot_meta, summarise_autopilot, summary_lines
 from host.terminal import command_line
 from host.text import shown
 
@@ -55,7 +57,7 @@ class Decoded:
             found.append(f"{len(self.summary['losses']['ranges'])} lost ranges")
         if self.summary["complete"] != "complete":
             found.append(f"the log is {self.summary['complete']}")
-        for session in self.summary["sessions"]:
+        for session in self.summary.get("sessions", ()):
             for kind in ("stuck", "saturated", "absent"):
                 found += [f"{name} {kind}" for name in session[kind]]
             pairs = session["pairs"].items()
@@ -76,6 +78,8 @@ def decode(request: Request) -> Decoded:
         head = file.read(_HEAD_BYTES)
     if looks_like_rows(head):
         return decode_rows(request, path)
+    if is_autopilot_log(path):
+        return decode_autopilot(request, path)
     if request.row_rate_hz is not None:
         raise UsageError(f"{path}: a log carries its times; --row-rate is for original ASCII rows")
     kind, target = destination(request, path)
@@ -121,6 +125,35 @@ def decode_rows(request: Request, path: Path) -> Decoded:
     rate = ("--row-rate", f"{table.rate_hz:g}")
     summary["next"] = command_line("host", "decode", path, *rate, *_own(request), "--to", "parquet")
     said = [*row_lines(summary), f"{'wrote':<13}{target}", f"{'next':<13}{summary['next']}"]
+    return Decoded(summary, said)
+
+
+def decode_autopilot(request: Request, path: Path) -> Decoded:
+    """Decode a log of another autopilot and write its table: a row for each instant of a message.
+
+    Raises
+    ------
+    UsageError
+        If an option is for logs of ours.
+    """
+    asked = {
+        "session": request.session, "file-id": request.file_id, "row-rate": request.row_rate_hz,
+        "calibration": request.calibration, "frames": request.frames or None,
+    }  # fmt: skip
+    for name, value in asked.items():
+        if value is not None:
+            raise UsageError(f"{path}: a log of an autopilot has no --{name}")
+    kind, target = destination(request, path)
+    flight = read_autopilot(path, dict(request.sensors))
+    summary = finite(summarise_autopilot(flight))
+    columns = flight.columns()
+    if columns:
+        write_table([columns], kind, target, autopilot_meta(summary))
+    summary["files"] = [str(target)] if columns else []
+    verb = "info" if flight.judgement.refusal else "maneuvers"
+    summary["next"] = command_line("host", verb, path)
+    said = [*summary_lines(summary), *(f"{'wrote':<13}{name}" for name in summary["files"])]
+    said.append(f"{'next':<13}{summary['next']}")
     return Decoded(summary, said)
 
 

@@ -33,6 +33,7 @@ class Request:
     file_id: int | None = None
     calibration: Path | None = None
     row_rate_hz: float | None = None
+    sensors: tuple[tuple[str, int], ...] = ()
 
 
 def destination(request: Request, source: Path) -> tuple[str, Path]:

@@ -11,7 +11,8 @@ from typing import Any
 _DESCRIPTION = """\
 Decode a flight log: print what it holds and how good it is, write the synchronous
 table in SI at the identification rate. SOURCE is a log, a folder or a mounted card
-(the newest flight is taken), or a text file of the original ASCII rows.
+(the newest flight is taken), a log of PX4 or ArduPilot (.ulg, .bin, .log, .tlog), or a
+text file of the original ASCII rows.
 """
 _EPILOG = """\
 exit codes: 0 ok, 2 usage, 3 decoded with losses (all named), 4 not a log,
@@ -64,6 +65,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--calibration", type=Path, metavar="FILE", help="counts to SI; the default without it"
     )
+    parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
+                        help="of an autopilot's log, instance N of a message, such as IMU=1;"
+                        " repeatable")  # fmt: skip
     parser.add_argument(
         "--row-rate",
         type=float,
@@ -81,6 +85,7 @@ def run(args: argparse.Namespace) -> int:
     """Decode, print, write; return the exit code."""
     from host.decode.decoding import decode
     from host.decode.writing import Request
+    from host.readers.autopilot_flight import chosen_sensors
     from host.text import shown
 
     request = Request(
@@ -92,6 +97,7 @@ def run(args: argparse.Namespace) -> int:
         file_id=args.file_id,
         calibration=args.calibration,
         row_rate_hz=args.row_rate,
+        sensors=tuple(chosen_sensors(args.sensor).items()),
     )
     result = decode(request)
     out = sys.stderr if args.output == "-" else sys.stdout

@@ -23,8 +23,8 @@ def add_parser(subparsers: Any) -> None:
         description="Find the maneuvers of a flight, fit a model to them jointly, check it on"
         " maneuvers it has not seen, and say what of it can be trusted.",
     )
-    parser.add_files("log, CSV, Parquet, MAT; several are fitted together. --from and --to belong"
-                     " to the source before them")  # fmt: skip
+    parser.add_files("log (also of PX4, ArduPilot), CSV, Parquet, MAT; several are fitted together."
+                     " --from and --to belong to the source before them")  # fmt: skip
     parser.add_argument("--map", type=Path, metavar="TOML", action=StorePlaced, default=[],
                         help="foreign names, units and signs; once for all sources, or behind each"
                         " that needs one")  # fmt: skip
@@ -69,6 +69,9 @@ def add_parser(subparsers: Any) -> None:
                         help="leave sensor errors that the flight tells in the data")  # fmt: skip
     parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
                         " whatever this check of the data finds; repeatable")  # fmt: skip
+    parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
+                        help="of an autopilot's log, instance N of a message, such as IMU=1;"
+                        " repeatable")  # fmt: skip
     parser.add_argument("--no-delays", action="store_true",
                         help="estimate no delay of a sensor")  # fmt: skip
     _add_outputs(parser)
@@ -108,6 +111,7 @@ def run(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace) -> int:
     """Identify and print the answer: words first, then numbers."""
     from host.errors import ExitCode
+    from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import check_outputs
     from host.sysid.estimators.method_options import read_options
     from host.sysid.identification_error import IdentificationError
@@ -133,6 +137,7 @@ def _run(args: argparse.Namespace) -> int:
         stretches=stretches_of_each(args.ends, len(args.source)),
         corrections=not args.no_corrections,
         accept=args.accept or (),
+        sensors=chosen_sensors(args.sensor),
         delays=not args.no_delays,
         truth=[path for _, path in args.truth],
         prior=args.prior,

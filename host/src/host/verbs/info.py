@@ -13,7 +13,8 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "info",
         help="say what a log is, from its head",
-        description="Say what a log is, at once: only the first 256 KiB are read.",
+        description="Say what a log is, at once: only the first 256 KiB are read. Of a log of PX4"
+        " or ArduPilot all is read: what can be identified, and which setting to change.",
     )
     parser.add_argument(
         "source",
@@ -23,6 +24,9 @@ def add_parser(subparsers: Any) -> None:
         metavar="SOURCE",
         help="log, folder or mounted card; the working folder without it",
     )
+    parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
+                        help="of an autopilot's log, instance N of a message, such as IMU=1;"
+                        " repeatable")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -31,6 +35,8 @@ def run(args: argparse.Namespace) -> int:
     from host.errors import ExitCode
     from host.log.head import describe, describe_folder, head_lines
     from host.log.source import check_source
+    from host.readers.autopilot_flight import chosen_sensors, is_autopilot_log, read_autopilot
+    from host.readers.autopilot_summary import summarise_autopilot, summary_lines
     from host.text import shown
 
     source = check_source(args.source)
@@ -38,6 +44,14 @@ def run(args: argparse.Namespace) -> int:
         flights = describe_folder(source)
         print(
             json.dumps(flights, indent=2) if args.json else "\n".join(map(shown, _table(flights)))
+        )
+        return int(ExitCode.OK)
+    if is_autopilot_log(source):
+        summary = summarise_autopilot(read_autopilot(source, chosen_sensors(args.sensor)))
+        print(
+            json.dumps(summary, indent=2)
+            if args.json
+            else "\n".join(map(shown, summary_lines(summary)))
         )
         return int(ExitCode.OK)
     head = describe(source)

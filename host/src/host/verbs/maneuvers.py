@@ -16,9 +16,14 @@ def add_parser(subparsers: Any) -> None:
         description="Find the maneuvers of a flight from its control inputs, name and grade them:"
         " amplitude, trim before, noise, pilot feedback.",
     )
-    parser.add_argument("source", type=Path, help="log, CSV, Parquet or MAT file")
+    parser.add_argument(
+        "source", type=Path, help="log (also of PX4, ArduPilot), CSV, Parquet or MAT file"
+    )
     parser.add_argument("--map", type=Path, metavar="TOML", help="foreign names, units and signs")
     parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
+    parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
+                        help="of an autopilot's log, instance N of a message, such as IMU=1;"
+                        " repeatable")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -27,6 +32,7 @@ def run(args: argparse.Namespace) -> int:
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
+    from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.json_document import json_text, maneuver_document
     from host.sysid.answer.maneuver_list import maneuver_lines
     from host.sysid.flight.flight_tables import read_columns
@@ -35,7 +41,8 @@ def run(args: argparse.Namespace) -> int:
     from host.sysid.pipeline.arguments import option_words
 
     try:
-        columns, notes = read_columns(args.source, args.map, calibration=args.calibration)
+        columns, notes = read_columns(args.source, args.map, calibration=args.calibration,
+                                      sensors=chosen_sensors(args.sensor))  # fmt: skip
     except IdentificationError as error:
         raise IdentificationError(option_words(str(error))) from error
     graded = maneuvers_of(columns)

@@ -38,6 +38,9 @@ def add_parser(subparsers: Any) -> None:
                         help="leave sensor errors that the flight tells in the data")  # fmt: skip
     parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
                         " whatever this check of the data finds; repeatable")  # fmt: skip
+    parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
+                        help="of an autopilot's log, instance N of a message, such as IMU=1;"
+                        " repeatable")  # fmt: skip
     parser.add_argument("--no-constants", action="store_true",
                         help="fit nothing: start from the trim before each input")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -49,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
     """Predict and print; messages name options where the library names arguments."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.errors import ExitCode
+    from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import OutputPaths, check_outputs
     from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.arguments import option_words
@@ -69,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
             stretches=stretches_of_each(_behind(args.ends), len(records)),
             corrections=not args.no_corrections,
             accept=args.accept or (),
+            sensors=chosen_sensors(args.sensor),
             constants=not args.no_constants,
         )
         print(option_words(found.to_json() if args.json else found.to_text()))

@@ -41,6 +41,8 @@ CHECKS = {
     "airspeed-against-ax": "airspeed against forward force and weight",
     "altitude-against-climb": "altitude against vertical speed",
     "stuck-sensor": "a sensor moves where kinematics says that it must",
+    "surface-rate": "outputs are logged as often as servos take them",
+    "flow-angles": "vanes measured angle of attack and sideslip",
     "small-inputs": "a surface moves enough for a maneuver to be found",
     "calibration": "sensor errors are as small as their file says",
     "sensor-agreement": "flight-path reconstruction brings the sensors together",

@@ -16,6 +16,8 @@ from host.arrays import Array, BoolArray, IntArray
 from host.files.regular import file_or_folder
 from host.instrument.recording import Recording
 from host.physical.calibration import Calibration, load_calibration
+from host.readers.autopilot_flight import is_autopilot_log
+from host.sysid.flight.autopilot_table import autopilot_table
 from host.sysid.flight.column_map import listed, mapped, read_map
 from host.sysid.flight.column_sampling import Sampling, sampled_name
 from host.sysid.flight.data_finding import Finding
@@ -70,8 +72,8 @@ MOST_EMPTY = 20  # rows of the even grid for each row that was recorded
 @dataclass(frozen=True, slots=True)
 class FlightColumns:
     """SI columns on an even grid, notes about what was done to them, how they were recorded, of a
-    log the calibration that made them, what checks found in them, and the step of the numbers of
-    each quantised one."""
+    log the calibration that made them, what checks found in them, the step of the numbers of each
+    quantised one, and of which surfaces the columns are shares of full travel."""
 
     columns: dict[str, Array]
     notes: list[str]
@@ -79,6 +81,7 @@ class FlightColumns:
     calibration: Calibration | None
     findings: list[Finding] = field(default_factory=list)
     resolution: dict[str, float] = field(default_factory=dict)
+    shares: tuple[str, ...] = ()
 
 
 def read_columns(
@@ -87,10 +90,13 @@ def read_columns(
     *,
     calibration: Path | None = None,
     also: Collection[str] = (),
+    sensors: Mapping[str, int] | None = None,
 ) -> tuple[dict[str, Array], list[str]]:
     """Return columns and notes of `read_flight_columns`, whose arguments these are; its findings
     stand behind the notes."""
-    found = read_flight_columns(source, mapping, calibration=calibration, also=also)
+    found = read_flight_columns(
+        source, mapping, calibration=calibration, also=also, sensors=sensors
+    )
     return found.columns, [*found.notes, *(finding.line for finding in found.findings)]
 
 
@@ -101,14 +107,15 @@ def read_flight_columns(
     calibration: Path | None = None,
     also: Collection[str] = (),
     accept: Collection[str] = (),
+    sensors: Mapping[str, int] | None = None,
 ) -> FlightColumns:
     """Return the columns identification uses, notes about them, and how they were recorded.
 
     Parameters
     ----------
     source : Path, FlightLog or DataFrame
-        ``.bin`` log, ``.csv``, ``.parquet`` or ``.mat``; a folder is read as a log. What
-        `host.read_log` returns, its table, or any table of SI columns.
+        ``.bin`` log, ``.csv``, ``.parquet`` or ``.mat``, a log of PX4 or ArduPilot; a folder is
+        read as a log. What `host.read_log` returns, its table, or any table of SI columns.
     mapping : Path, optional
         TOML map of foreign names, units and signs.
     calibration : Path, optional
@@ -117,6 +124,8 @@ def read_flight_columns(
         Signals of a model of one's own, beside those that are always looked for.
     accept : collection of str
         Checks whose findings change nothing: the columns are used as they are.
+    sensors : mapping of str to int, optional
+        Of an autopilot's log, the instance to use of a message.
 
     Raises
     ------
@@ -126,12 +135,12 @@ def read_flight_columns(
     wanted = ("t_s", *USED, *(name for name in also if name not in USED))
     lines = read_map(mapping, wanted) if mapping is not None else {}
     theirs = {name: line.foreign for name, line in lines.items()}
-    found, recorded = _read(source, mapping, calibration, (*wanted, *theirs.values()))
+    found, recorded = _read(source, mapping, calibration, (*wanted, *theirs.values()), sensors)
     called = source_name(source)
     raw, notes = dict(found.columns), found.notes
     if mapping is not None:
         # A column of a log is ours; one of a table that happens to have our name need not be.
-        shown = raw if recorded else {k: v for k, v in raw.items() if k == "t_s"}
+        shown = raw if recorded or found.shares else {k: v for k, v in raw.items() if k == "t_s"}
         raw = shown | mapped(found.columns, found.unusable, lines, mapping, found.twice)
         wanted = (*wanted, *(name for name in lines if name not in wanted))
     if "t_s" not in raw:
@@ -158,8 +167,9 @@ def read_flight_columns(
         notes,
         found.recording,
         found.calibration,
-        [*seen.findings, *findings],
+        [*found.findings, *seen.findings, *findings],
         _resolutions(seen.sampling, even, columns),
+        tuple(s for s in found.shares if f"{s}_rad" not in lines),
     )
 
 
@@ -195,6 +205,7 @@ def _read(
     mapping: Path | None,
     calibration: Path | None,
     wanted: Collection[str],
+    sensors: Mapping[str, int] | None,
 ) -> tuple[Foreign, bool]:
     """Return the columns of a source, and whether our logger recorded them."""
     from host.log import FlightLog
@@ -211,6 +222,8 @@ def _read(
             return found, True
     else:
         file_or_folder(source, IdentificationError)
+        if is_autopilot_log(source):
+            return autopilot_table(source, sensors), False
         kind = source.suffix.lower()
         if kind not in READ or (kind in TEXT_KINDS[1:] and mapping is None):  # original rows
             log = _recorded(source, calibration, wanted, maybe_table=kind != ".bin")

@@ -14,6 +14,7 @@ from host.arrays import Array
 from host.extras import install_hint
 from host.instrument.recording import Recording
 from host.physical.calibration import Calibration
+from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.text_table import HEAD_BYTES, read_text
 from host.sysid.identification_error import IdentificationError
 
@@ -24,8 +25,6 @@ TEXT_KINDS = (".csv", ".tsv", ".txt", ".dat")
 MOST_UNIT_ROWS = 2
 # How files of others begin that end up here, and what to do with them.
 OTHERS = (
-    (b"\xa3\x95", "a DataFlash log of ArduPilot: mavlogdump.py --format csv makes a table of it"),
-    (b"ULog", "a log of PX4: ulog2csv makes tables of it"),
     (b"PK\x03\x04", "a spreadsheet or an archive: save it as CSV, Parquet or MAT"),
     (b"\xd0\xcf\x11\xe0", "an old spreadsheet: save it as CSV"),
     (b"\x89HDF", "HDF5: save it as CSV, Parquet or MAT up to version 7"),
@@ -38,7 +37,8 @@ class Foreign:
     """Columns of numbers, why others are none, and what was left out of a column.
 
     `twice` are names that several columns have; `recording` is what the source shows of itself,
-    `calibration` what made the columns of a log.
+    `calibration` what made the columns of a log; of an autopilot's log `shares` are the surfaces in
+    shares of full travel, `findings` what was found on reading it.
     """
 
     columns: dict[str, Array] = field(default_factory=dict)
@@ -48,6 +48,8 @@ class Foreign:
     twice: frozenset[str] = frozenset()
     recording: Recording = field(default_factory=Recording)
     calibration: Calibration | None = None
+    shares: tuple[str, ...] = ()
+    findings: list[Finding] = field(default_factory=list)
 
 
 def read_foreign(source: Path) -> Foreign:

@@ -453,7 +453,8 @@ class LinearEstimator:
         if method == DEFAULT_METHOD:
             # A filter takes the line between two values of a slow sensor for measurements.
             evenly = not any(m.cut(model).held for m in used)
-            gust = "alpha_rad" in model.states and trim.known and evenly
+            measured = "alpha_rad" in model.states and "alpha_rad" in model.outputs
+            gust = measured and trim.known and evenly
             method = GUST if gust else "output-error-white"
             if self.own is None and method != GUST and self.template == "lateral":
                 model = without_attitude(model, used)

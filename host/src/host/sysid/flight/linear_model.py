@@ -10,6 +10,7 @@ import numpy as np
 from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
 from host.sysid.compatibility.path_preparation import NO_OFFSETS
 from host.sysid.estimators.start_values import regression_estimates
+from host.sysid.flight.hidden_angles import without_vanes
 from host.sysid.flight.reconstructed_flight import FlownManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.residual_delays import STANDARD_DELAYS
@@ -76,8 +77,8 @@ def fitted_template(
 
     A flying wing has no rudder, and a surface that stood still says nothing.
     """
-    model = template_at(columns, name, trim, method, able=able)
-    remarks: tuple[str, ...] = () if trim.known else (NO_AIRSPEED,)
+    model, remarks = without_vanes(template_at(columns, name, trim, method, able=able), columns)
+    remarks += () if trim.known else (NO_AIRSPEED,)
     absent = [u for u in model.inputs if u not in columns]
     still = [
         u

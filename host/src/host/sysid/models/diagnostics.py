@@ -173,7 +173,8 @@ def regressor_rms(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:
     for source, names in (("outputs", model.states), ("inputs", model.inputs)):
         for position, name in enumerate(names):
             if source == "outputs" and name not in model.outputs:
-                columns.append(1.0)
+                # A flow angle that nobody measured is far below 1 rad: it sets no scale.
+                columns.append(0.0 if name in ("alpha_rad", "beta_rad") else 1.0)
                 continue
             index = model.outputs.index(name) if source == "outputs" else position
             power = np.concatenate(

@@ -20,12 +20,14 @@ from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.agreement_findings import calibration_findings, disagreement
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
+from host.sysid.flight.hidden_angles import no_vanes_finding
 from host.sysid.flight.maneuver_selection import select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.flight.small_inputs import whole_flight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData
 from host.sysid.pipeline.reading_options import ReadingOptions
+from host.sysid.pipeline.surface_travel import with_surface_angles
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,9 +61,15 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     """
     opened = Path(source) if isinstance(source, str) else source
     read = read_flight_columns(
-        opened, how.mapping, calibration=how.calibration, also=how.also, accept=how.accept
+        opened,
+        how.mapping,
+        calibration=how.calibration,
+        also=how.also,
+        accept=how.accept,
+        sensors=dict(how.sensors),
     )
-    columns, notes, findings = read.columns, read.notes, read.findings
+    columns, travel = with_surface_angles(read.columns, read.shares, known)
+    notes, findings = [*read.notes, *travel], [*read.findings, *no_vanes_finding(columns)]
     instrument = known.flown(read) if known else None
     if instrument is not None:
         columns = surface_positions(columns, instrument)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,6 +90,7 @@ def predict(
     to_s: float | None = None,
     corrections: bool = True,
     accept: str | Iterable[str] = (),
+    sensors: Mapping[str, int] | None = None,
     constants: bool = True,
 ) -> Prediction:
     """Run a saved model over other records: derivatives held, only constants fitted.
@@ -100,7 +101,7 @@ def predict(
         Of `host identify --save-model`, or a model file, whose start values are held; of
         coefficients the aircraft file, linearised at its trim.
     flights : path, FlightLog, DataFrame or list of them
-    aircraft, calibration, mapping, maneuvers, stretches, from_s, to_s, corrections, accept
+    aircraft, calibration, mapping, maneuvers, stretches, from_s, to_s, corrections, accept, sensors
         As in `host.identify`.
     constants : bool
         Fit biases and start states to each maneuver. Without they are those of equilibrium in the
@@ -126,6 +127,7 @@ def predict(
         corrections=corrections,
         also=tuple(sorted(signals)),
         accept=accept,
+        sensors=sensors,
     )
     found = []
     for source, how in zip(sources, each, strict=True):

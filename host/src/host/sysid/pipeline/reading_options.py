@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,8 @@ class ReadingOptions:
         Signals to read beside those that are always read.
     accept : frozenset of str
         Checks whose findings change nothing.
+    sensors : tuple of (message, instance)
+        Of an autopilot's log, which instance of a message is used.
     """
 
     calibration: Path | None = None
@@ -46,6 +48,7 @@ class ReadingOptions:
     delays: bool = True
     also: tuple[str, ...] = ()
     accept: frozenset[str] = frozenset()
+    sensors: tuple[tuple[str, int], ...] = ()
 
 
 def reading_options(
@@ -60,6 +63,7 @@ def reading_options(
     delays: bool = True,
     also: tuple[str, ...] = (),
     accept: str | Iterable[str] = (),
+    sensors: Mapping[str, int] | None = None,
 ) -> list[ReadingOptions]:
     """Return the options of each flight; the arguments are those of `host.identify`.
 
@@ -87,6 +91,7 @@ def reading_options(
             delays,
             also,
             accepted_checks(listed(accept)),
+            tuple((sensors or {}).items()),
         )
         for made_by, named_by, spans in zip(
             of_each_flight("calibration", calibration, flights),

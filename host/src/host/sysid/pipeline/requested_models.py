@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from host.sysid.coefficients.coefficient_model import (
@@ -93,6 +93,25 @@ def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
             "argument models names several models of the coefficients; give one at a time"
         )
     return Models(tuple(linear), _terms(terms[0]) if terms else None, bool(listed(given)))
+
+
+def without_vanes(asked: Models, columns: Sequence[Collection[str]]) -> tuple[Models, list[str]]:
+    """Return the models of flights, and a note where the default ones change for want of a vane.
+
+    Parameters
+    ----------
+    asked : Models
+    columns : sequence of collections of str
+        Of each flight.
+    """
+    if asked.named or any("alpha_rad" in c or "az_mps2" not in c for c in columns):
+        return asked, []
+    instead = {"longitudinal": "short-period"}
+    linear = tuple((instead.get(name, name), own) for name, own in asked.linear)
+    return replace(asked, linear=linear), [
+        "without vanes longitudinal (speed, drag and lift curve) cannot be told: short-period by q"
+        " and az in its place"
+    ]
 
 
 def _terms(given: CoefficientModel | Path | str) -> CoefficientModel:

@@ -35,6 +35,7 @@ from host.sysid.pipeline.requested_models import (
     Models,
     requested_methods,
     requested_models,
+    without_vanes,
 )
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ def identify(
     to_s: float | None = None,
     corrections: bool = True,
     accept: str | Iterable[str] = (),
+    sensors: Mapping[str, int] | None = None,
     delays: bool = True,
     truth: str | Path | Sequence[str | Path] | None = None,
     prior: str | Path | None = None,
@@ -65,9 +67,9 @@ def identify(
     Parameters
     ----------
     flights : path, FlightLog, DataFrame or list of them
-        Log, folder or card, CSV, Parquet or MAT; what `host.read_log` returns, or its table. All
-        maneuvers of several flights are fitted together, whatever their rates; each keeps its own
-        biases and initial states, each flight its own sensor errors.
+        Log (ours, PX4's, ArduPilot's), folder or card, CSV, Parquet or MAT; what `host.read_log`
+        returns, or its table. All maneuvers of several flights are fitted together, whatever their
+        rates; each keeps its own biases and initial states, each flight its own sensor errors.
     aircraft : str or Path, optional
         Name or file; gives coefficients, places of the sensors and their deviations.
     models : str, Path or several, optional
@@ -92,6 +94,8 @@ def identify(
         Remove sensor errors that the data determine from the columns.
     accept : str or several
         Checks of the data whose findings shall change nothing: columns are used as they are.
+    sensors : mapping of str to int, optional
+        Of an autopilot's log, the instance to use of a message: ``{"IMU": 1}``.
     delays : bool
         Estimate residual delays and places of sensors of linear models where nothing gives them.
     truth : path or several, optional
@@ -123,6 +127,7 @@ def identify(
         delays=delays,
         also=asked.signals,
         accept=accept,
+        sensors=sensors,
     )
     calibrations = [how.calibration for how in each]
     by_calibration = {
@@ -142,6 +147,8 @@ def identify(
     recorded = distinct_flights([one.flight for one in ready])
     true = _truth(truth, len(recorded))
     expected = _prior(prior, recorded, known)
+    asked, instead = without_vanes(asked, [flight.recorded for flight in recorded])
+    notes += instead
     direct, doubts = _coefficients(asked, known, recorded)
     linear, unfit = _linear(asked, by, options, known, recorded)
     if not linear and direct is None:

@@ -1,0 +1,1 @@
+"""Logs of other autopilots: ULog, DataFlash, tlog to columns of our names, units and signs."""

@@ -1,0 +1,158 @@
+"""ArduPilot DataFlash: its messages in our names, units and signs.
+
+Its axes are ours (x forward, y right, z down), its accelerations specific force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from host.arrays import Array
+from host.constants import RAD_PER_DEG
+from host.physical.airdata import KELVIN, density_kgpm3
+from host.readers.ardupilot_outputs import surfaces
+from host.readers.autopilot_log import AutopilotLog, Messages
+from host.readers.named_channels import (
+    STANDARD_DENSITY_KGPM3,
+    STANDARD_TEMPERATURE_DEGC,
+    Channels,
+    instance_of,
+)
+
+FIX_3D = 3
+SERVO_HZ = 50.0
+
+
+def ardupilot_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels:
+    """Return the channels of a DataFlash log; `chosen` names instances by message."""
+    found = Channels()
+    for name in chosen:
+        instance_of(log, name, chosen, [])
+    _inertial(log, chosen, found)
+    _attitude(log, found)
+    _air(log, chosen, found)
+    _gps(log, chosen, found)
+    _outputs(log, found)
+    vibration = instance_of(log, "VIBE", {}, [])
+    if vibration is not None:
+        shaken = vibration[0].fields
+        axes = [np.asarray(shaken[k], dtype=np.float64) for k in ("VibeX", "VibeY", "VibeZ")]
+        found.vibration_mps2 = float(np.max([np.median(a) for a in axes]))
+        clip = shaken.get("Clip", shaken.get("Clip0"))
+        if clip is not None and len(clip):
+            found.clipped |= {"IMU": many} if (many := int(clip[-1]) - int(clip[0])) > 0 else {}
+    return found
+
+
+def _inertial(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
+    imu = instance_of(log, "IMU", chosen, found.notes)
+    if imu is None:
+        return
+    messages, label = imu
+    cutoff = {"gyro": "INS_GYRO_FILTER", "force": "INS_ACCEL_FILTER"}
+    late = {k: _butterworth_s(log.parameters.get(name, 0.0)) for k, name in cutoff.items()}
+    for ours, theirs in (("p_radps", "GyrX"), ("q_radps", "GyrY"), ("r_radps", "GyrZ")):
+        _take(found, ours, messages, label, theirs, late_s=late["gyro"])
+    for ours, theirs in (("ax_mps2", "AccX"), ("ay_mps2", "AccY"), ("az_mps2", "AccZ")):
+        _take(found, ours, messages, label, theirs, late_s=late["force"])
+
+
+def _butterworth_s(cutoff_hz: float) -> float:
+    """Return the delay of a second-order low-pass, as ArduPilot filters its IMUs."""
+    return float(np.sqrt(2.0) / (2.0 * np.pi * cutoff_hz)) if cutoff_hz > 0.0 else 0.0
+
+
+def _attitude(log: AutopilotLog, found: Channels) -> None:
+    att = log.first("ATT")
+    if att is None:
+        return
+    for ours, theirs in (("phi_rad", "Roll"), ("theta_rad", "Pitch"), ("psi_rad", "Yaw")):
+        _take(found, ours, att, "ATT", theirs, RAD_PER_DEG)
+
+
+def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
+    baro = instance_of(log, "BARO", chosen, found.notes)
+    pitot = instance_of(log, "ARSP", chosen, found.notes)
+    rho = None
+    if baro is not None and "Press" in baro[0].fields:
+        messages, label = baro
+        warm = STANDARD_TEMPERATURE_DEGC
+        if "GndTemp" in messages.fields:
+            warm = float(np.median(messages.fields["GndTemp"]))
+        elif pitot is not None and "Temp" in pitot[0].fields:
+            warm = float(np.median(pitot[0].fields["Temp"]))
+        pressure = np.asarray(messages.fields["Press"], dtype=np.float64)
+        found.add("static_pa", messages.t_s, pressure, f"{label}.Press")
+        rho = messages.t_s, density_kgpm3(pressure, np.full(len(pressure), warm + KELVIN))
+        found.add("density_kgpm3", *rho, f"{label}.Press at {warm:.0f} degC")
+        if "Alt" in messages.fields:
+            _take(found, "altitude_m", messages, label, "Alt")
+    if pitot is None or "Airspeed" not in pitot[0].fields:
+        return
+    messages, label = pitot
+    indicated = np.asarray(messages.fields["Airspeed"], dtype=np.float64)
+    if "H" in messages.fields:
+        indicated = np.where(np.asarray(messages.fields["H"]) > 0, indicated, np.nan)
+    share = np.ones(len(indicated))
+    if rho is not None and len(rho[0]) > 1:
+        share = np.sqrt(STANDARD_DENSITY_KGPM3 / np.interp(messages.t_s, *rho))
+    else:
+        found.notes.append("no barometer: airspeed is that of standard density")
+    found.add("airspeed_mps", messages.t_s, indicated * share, f"{label}.Airspeed, true")
+    qbar = 0.5 * STANDARD_DENSITY_KGPM3 * indicated**2
+    found.add("qbar_pa", messages.t_s, qbar, f"{label}.Airspeed")
+
+
+def _gps(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
+    gps = instance_of(log, "GPS", chosen, found.notes)
+    if gps is None or not {"Spd", "GCrs"} <= gps[0].fields.keys():
+        return
+    messages, label = gps
+    fixed = np.asarray(messages.fields.get("Status", np.full(len(messages), FIX_3D))) >= FIX_3D
+    speed = np.where(fixed, messages.fields["Spd"], np.nan)
+    course = np.asarray(messages.fields["GCrs"], dtype=np.float64) * RAD_PER_DEG
+    found.add("v_north_mps", messages.t_s, speed * np.cos(course), f"{label}.Spd, GCrs")
+    found.add("v_east_mps", messages.t_s, speed * np.sin(course), f"{label}.Spd, GCrs")
+    if "VZ" in messages.fields:
+        down = np.where(fixed, messages.fields["VZ"], np.nan)
+        found.add("v_down_mps", messages.t_s, down, f"{label}.VZ")
+
+
+def _outputs(log: AutopilotLog, found: Channels) -> None:
+    out = log.first("RCOU")
+    if out is None:
+        return
+    pulses: dict[int, Array] = {
+        int(name[1:]): np.asarray(values, dtype=np.float64)
+        for name, values in out.fields.items()
+        if name.startswith("C") and name[1:].isdigit()
+    }
+    made = surfaces(pulses, log.parameters)
+    found.output_period_s = 1.0 / max(log.parameters.get("SERVO_RATE", SERVO_HZ), 1.0)
+    for name, share in made.shares.items():
+        found.add(name, out.t_s, share, made.made_of[name])
+    found.clipped |= {name: many for name, many in made.clipped.items() if many}
+    if made.made_of:
+        found.notes.append(
+            "surfaces by SERVOn_ parameters: "
+            + "; ".join(f"{name} of {how}" for name, how in made.made_of.items())
+        )
+    else:
+        found.notes.append("no SERVOn_FUNCTION in the log names a surface: outputs have no meaning")
+
+
+def _take(
+    found: Channels,
+    ours: str,
+    messages: Messages,
+    label: str,
+    theirs: str,
+    gain: float = 1.0,
+    late_s: float = 0.0,
+) -> None:
+    values = messages.fields.get(theirs)
+    if values is not None:
+        scaled = np.asarray(values, dtype=np.float64) * gain
+        found.add(ours, messages.t_s, scaled, f"{label}.{theirs}", late_s)

@@ -1,0 +1,151 @@
+"""A log of an autopilot as one thing: columns in our names, what is lost, what it is good for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from host.arrays import Array
+from host.files.regular import regular_file
+from host.readers.airborne import Airborne, airborne
+from host.readers.ardupilot_channels import ardupilot_channels
+from host.readers.autopilot_log import AutopilotLog, NothingToIdentifyError, SensorChoiceError
+from host.readers.held_outputs import held_output
+from host.readers.judgement import Judgement, judge
+from host.readers.log_formats import format_of_file, read_messages
+from host.readers.mavlink_channels import mavlink_channels
+from host.readers.named_channels import Channels
+from host.readers.px4_channels import landed_signal, px4_channels
+from host.readers.signals import Signal
+
+SURFACES = ("elevator", "aileron", "rudder")
+CLOCK_SHARE = 5e-5  # one deviation of a crystal of 50 ppm
+
+
+@dataclass(frozen=True, slots=True)
+class AutopilotFlight:
+    """One log.
+
+    Attributes
+    ----------
+    log : AutopilotLog
+    channels : Channels
+    flown : Airborne
+    judgement : Judgement
+    """
+
+    log: AutopilotLog
+    channels: Channels
+    flown: Airborne
+    judgement: Judgement
+
+    @property
+    def shares(self) -> tuple[str, ...]:
+        """Surfaces whose column is a share of full travel, not an angle."""
+        return tuple(s for s in SURFACES if s in self.channels.signals)
+
+    def undersampled(self) -> dict[str, float]:
+        """Return the rates (Hz) of surfaces whose output changes between two records."""
+        pulses_hz = 1.0 / self.channels.output_period_s
+        rates = {s: self.channels.signals[s].rate_hz for s in self.shares}
+        return {s: rate for s, rate in rates.items() if rate < 0.75 * pulses_hz}
+
+    def refuse(self) -> None:
+        """Raise NothingToIdentifyError with one sentence if nothing can be identified."""
+        if self.judgement.refusal:
+            raise NothingToIdentifyError(self.judgement.refusal)
+
+    def columns(self) -> dict[str, Array]:
+        """Return all channels on the union of their instants, NaN where one was not sampled.
+
+        Surfaces are ``elevator_share`` and so on, of full travel. No sensor's value is carried on;
+        an output stands until the next pulse (`held_output`).
+        """
+        period_s = self.channels.output_period_s
+        own = {
+            name: held_output(signal, period_s)
+            if name in (*SURFACES, "throttle")
+            else (signal.t_s, signal.values)
+            for name, signal in self.channels.signals.items()
+        }
+        if not own:
+            return {}
+        t_s = np.unique(np.concatenate([t for t, _ in own.values()]))
+        result = {"t_s": t_s}
+        for name, (t, values) in own.items():
+            column = np.full(len(t_s), np.nan)
+            column[np.searchsorted(t_s, t)] = values
+            result[f"{name}_share" if name in SURFACES else name] = column
+        return result
+
+    def notes(self) -> list[str]:
+        """Return what was chosen, how outputs became surfaces, and what is damaged."""
+        log = self.log
+        said = [f"damaged: {one}" for one in log.damage]
+        said.append("; ".join(self.judgement.lines[:1]))
+        said += self.channels.notes
+        late = sorted({s.late_s for s in self.channels.signals.values() if s.late_s > 0.0})
+        if late:
+            said.append(
+                f"the autopilot's own filters make its IMU {1e3 * late[-1]:.1f} ms late at most;"
+                " not taken out, a delay is estimated where nothing gives it"
+            )
+        return said
+
+
+def is_autopilot_log(path: Path) -> bool:
+    """Return whether a file begins like a log of an autopilot."""
+    return path.is_file() and format_of_file(path) is not None
+
+
+def read_autopilot(path: Path, sensors: Mapping[str, int] | None = None) -> AutopilotFlight:
+    """Read a log of an autopilot.
+
+    Parameters
+    ----------
+    path : Path
+    sensors : mapping of str to int, optional
+        Instance to use of a message, in place of the one with most messages.
+
+    Raises
+    ------
+    NotAutopilotLogError
+        If it is none, or holds nothing.
+    SensorChoiceError
+        If it has no such instance.
+    UsageError
+        If an extra is missing.
+    """
+    log = read_messages(regular_file(path))
+    channels, landed = _channels(log, dict(sensors or {}))
+    flown = airborne(channels, landed)
+    return AutopilotFlight(log, channels, flown, judge(log, channels, flown))
+
+
+def _channels(log: AutopilotLog, sensors: Mapping[str, int]) -> tuple[Channels, Signal | None]:
+    """Return the channels, and where the autopilot says that it stands."""
+    if log.format == "ulog":
+        return px4_channels(log, sensors), landed_signal(log)
+    if log.format == "tlog":
+        return mavlink_channels(log, sensors), None
+    return ardupilot_channels(log, sensors), None
+
+
+def chosen_sensors(given: list[str]) -> dict[str, int]:
+    """Return instances by message from words such as ``IMU=1``.
+
+    Raises
+    ------
+    SensorChoiceError
+        If one is something else.
+    """
+    found = {}
+    for word in given:
+        name, _, number = word.partition("=")
+        if not name or not number.isdigit():
+            raise SensorChoiceError(f"--sensor {word}: expected MESSAGE=N, such as IMU=1")
+        found[name] = int(number)
+    return found

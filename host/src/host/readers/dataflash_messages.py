@@ -1,0 +1,146 @@
+"""ArduPilot DataFlash, binary or text, as messages."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
+from host.readers.dataflash_binary import read_records
+from host.readers.dataflash_text import read_text_records
+from host.readers.plausible_times import plausible
+
+# What is read of a log; all other kinds are counted and left alone.
+WANTED = frozenset(
+    ("IMU", "IMU2", "IMU3", "ATT", "ARSP", "ASP2", "BARO", "BAR2", "GPS", "GPS2", "RCOU", "RCO2",
+     "PARM", "MSG", "VER", "MODE", "VIBE", "DSF", "AOA", "XKF1", "NKF1", "SIDD", "ATRP")
+)  # fmt: skip
+# The field that numbers the instances of a kind, in the releases that have one.
+INSTANCE = {"IMU": "I", "ARSP": "I", "BARO": "I", "GPS": "I", "VIBE": "IMU", "XKF1": "C"}
+NUMBERED = {"ASP2": ("ARSP", 1), "BAR2": ("BARO", 1)}  # old names of second sensors
+VEHICLES = (
+    ("plane", "plane"), ("copter", "copter"), ("rover", "rover"), ("sub", "submarine"),
+    ("antennatracker", "antenna tracker"), ("blimp", "blimp"),
+)  # fmt: skip
+
+
+def read_dataflash(path: Path, *, text: bool) -> AutopilotLog:
+    """Read a DataFlash log.
+
+    Parameters
+    ----------
+    path : Path
+    text : bool
+        Whether it is the text form (``.log``).
+
+    Raises
+    ------
+    NotAutopilotLogError
+        If it holds no record.
+    """
+    damage: list[str] = []
+    tables, lost = _text(path, damage) if text else _binary(path, damage)
+    if not any(len(next(iter(t.values()), ())) for t in tables.values()):
+        raise NotAutopilotLogError(
+            f"{path}: begins as a DataFlash log but holds no whole record; is it cut?"
+        )
+    messages: dict[str, dict[int, Messages]] = {}
+    for name, fields in tables.items():
+        _add(messages, name, fields, damage)
+    texts = _texts(tables)
+    firmware = next((line for line in texts if _vehicle(line)), "")
+    dropped = tables.get("DSF", {}).get("Dp")
+    if dropped is not None and len(dropped) and int(np.max(dropped)) > 0:
+        damage.append(f"the autopilot dropped {int(np.max(dropped))} records itself (DSF.Dp)")
+    return AutopilotLog(
+        path=path,
+        format="dataflash-text" if text else "dataflash",
+        autopilot="ardupilot",
+        vehicle=_vehicle(firmware),
+        firmware=firmware,
+        messages=messages,
+        parameters=_parameters(tables),
+        damage=tuple(damage),
+        lost=lost,
+        texts=tuple(texts),
+    )
+
+
+def _binary(path: Path, damage: list[str]) -> tuple[dict[str, dict[str, NDArray[Any]]], int]:
+    found = read_records(path)
+    tables = {
+        kind.name: found.rows(number)
+        for number, kind in found.kinds.items()
+        if kind.name in WANTED and len(found.places[number])
+    }
+    if found.lost:
+        at, size = found.lost[0]
+        total = sum(size for _, size in found.lost)
+        damage.append(
+            f"{total} bytes in {len(found.lost)} ranges are no proven record, the first {size} at"
+            f" byte {at}: the format has no checksum, a value changed elsewhere is not seen"
+        )
+    return tables, len(found.lost)
+
+
+def _text(path: Path, damage: list[str]) -> tuple[dict[str, dict[str, NDArray[Any]]], int]:
+    found = read_text_records(path, WANTED)
+    if found.bad_lines:
+        damage.append(f"{found.bad_lines} lines are no records and were left out")
+    return found.tables, found.bad_lines
+
+
+def _add(
+    messages: dict[str, dict[int, Messages]],
+    name: str,
+    fields: Mapping[str, NDArray[Any]],
+    damage: list[str],
+) -> None:
+    """Add the records of a kind, each instance of its own."""
+    if "TimeUS" not in fields and "TimeMS" not in fields:
+        return
+    t_s = fields["TimeUS"] * 1e-6 if "TimeUS" in fields else fields["TimeMS"] * 1e-3
+    base = re.fullmatch(r"([A-Z]+?)([23])", name)
+    called, number = NUMBERED.get(name, (name, 0))
+    if base and base[1] in INSTANCE:
+        called, number = base[1], int(base[2]) - 1
+    which = fields.get(INSTANCE.get(called, ""))
+    instances = [number] if which is None else sorted(set(which.tolist()))
+    for one in instances:
+        mine = np.ones(len(t_s), dtype=bool) if which is None else which == one
+        kept, wrong = plausible(np.asarray(t_s[mine], dtype=np.float64))
+        if wrong:
+            damage.append(f"{wrong} records of {called} have an impossible time and were left out")
+        rows = np.flatnonzero(mine)[kept]
+        if len(rows):
+            own = {key: values[rows] for key, values in fields.items()}
+            messages.setdefault(called, {})[int(one)] = Messages(t_s[rows], own)
+
+
+def _texts(tables: Mapping[str, Mapping[str, NDArray[Any]]]) -> list[str]:
+    said = [_word(v) for v in tables.get("MSG", {}).get("Message", ())]
+    return [_word(v) for v in tables.get("VER", {}).get("FWS", ())] + said
+
+
+def _word(value: object) -> str:
+    raw = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    return raw.strip("\0 ")
+
+
+def _vehicle(line: str) -> str:
+    first = line.lower().replace(" ", "")
+    for word, kind in VEHICLES:
+        if first.startswith(("ardu" + word, word)):
+            return kind
+    return ""
+
+
+def _parameters(tables: Mapping[str, Mapping[str, NDArray[Any]]]) -> dict[str, float]:
+    found = tables.get("PARM", {})
+    names, values = found.get("Name", ()), found.get("Value", ())
+    return {_word(n): float(v) for n, v in zip(names, values, strict=True)}

@@ -1,0 +1,180 @@
+"""What a log of an autopilot is good for, before anybody identifies: said first, and honestly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from host.readers.airborne import Airborne
+from host.readers.autopilot_log import FORMATS, AutopilotLog
+from host.readers.logging_advice import advice
+from host.readers.named_channels import Channels
+
+WINGED = ("", "plane", "vtol")
+# Rates in Hz from which a channel serves: below the first it does not, below the second poorly.
+# A short period of 3 Hz wants ten samples a period; a surface's edge is known to half its step.
+WANTED_HZ = {
+    "rates": (20.0, 40.0), "accelerations": (20.0, 40.0), "attitude": (5.0, 20.0),
+    "surfaces": (20.0, 40.0), "airspeed": (2.0, 5.0),
+}  # fmt: skip
+GROUPS = {
+    "rates": ("p_radps", "q_radps", "r_radps"),
+    "accelerations": ("ax_mps2", "ay_mps2", "az_mps2"),
+    "attitude": ("phi_rad", "theta_rad", "psi_rad"),
+    "surfaces": ("elevator", "aileron", "rudder"),
+    "airspeed": ("airspeed_mps",),
+}
+# What can be told, and the channels without which it cannot.
+ANSWERS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("roll: L_p, L_da", ("p_radps", "phi_rad", "aileron")),
+    ("short period: Z_alpha, M_alpha, M_q, M_de, by q and az",
+     ("q_radps", "az_mps2", "airspeed_mps", "elevator")),
+    ("lateral: Y_beta, L_beta, N_beta, N_r, N_dr, by r, p and ay",
+     ("p_radps", "r_radps", "ay_mps2", "airspeed_mps", "rudder")),
+    ("speed, drag and lift curve: D_*, Z_V, M_V, coefficients", ("alpha_rad", "airspeed_mps")),
+)  # fmt: skip
+VIBRATION_MPS2 = 30.0  # ArduPilot's own limit, documentation "Measuring Vibration"
+ANGLES = {"alpha_rad": "angle of attack", "beta_rad": "sideslip"}
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What a log is good for.
+
+    Attributes
+    ----------
+    refusal : str
+        One true sentence why nothing can be identified; empty if something can.
+    lines : list of str
+        For people: vehicle, time in the air, rates, what is wrong.
+    answers : list of (what, verdict)
+        What can and what cannot be identified.
+    settings : list of str
+        What to change for the next flight, by the autopilot's parameters.
+    rates_hz : dict of str to float
+        Of each channel.
+    """
+
+    refusal: str
+    lines: list[str]
+    answers: list[tuple[str, str]]
+    settings: list[str]
+    rates_hz: dict[str, float]
+
+    def document(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "refusal": self.refusal or None,
+            "rates_hz": self.rates_hz,
+            "answers": [{"what": what, "verdict": verdict} for what, verdict in self.answers],
+            "settings": self.settings,
+        }
+
+    def table(self) -> list[str]:
+        """Return what can be identified, and what to change, as lines."""
+        rows = [f"{what:<61}{verdict}" for what, verdict in self.answers]
+        rows += [f"next flight: {one}" for one in self.settings]
+        return rows
+
+
+def judge(log: AutopilotLog, found: Channels, flown: Airborne) -> Judgement:
+    """Judge a log."""
+    rates = {name: round(signal.rate_hz, 1) for name, signal in found.signals.items()}
+    missing, poor = _groups(rates)
+    lines = [_vehicle_line(log, flown)]
+    lines += [f"{group}: {_rate_words(names, rates)}" for group, names in GROUPS.items()]
+    lines += _trouble(found, log)
+    return Judgement(
+        refusal=_refusal(log, flown, missing),
+        lines=lines,
+        answers=[(what, _verdict(needs, rates, poor)) for what, needs in ANSWERS],
+        settings=advice(log, missing, poor),
+        rates_hz=rates,
+    )
+
+
+def _groups(rates: Mapping[str, float]) -> tuple[list[str], list[str]]:
+    """Return which groups are missing or useless, and which are slow."""
+    missing, poor = [], []
+    for group, names in GROUPS.items():
+        usable, good = WANTED_HZ[group]
+        best = max((rates[n] for n in names if n in rates), default=0.0)
+        if best < 0.9 * usable:
+            missing.append(group)
+        elif best < 0.9 * good:
+            poor.append(group)
+    return missing, poor
+
+
+def _rate_words(names: Sequence[str], rates: Mapping[str, float]) -> str:
+    said = [f"{n.rsplit('_', 1)[0]} {rates[n]:g} Hz" for n in names if n in rates]
+    gone = [n.rsplit("_", 1)[0] for n in names if n not in rates]
+    return ", ".join([*said, *(f"{n} not in the log" for n in gone)])
+
+
+def _vehicle_line(log: AutopilotLog, flown: Airborne) -> str:
+    kind = log.vehicle or "vehicle of unknown kind"
+    firmware = f" ({log.firmware})" if log.firmware else ""
+    if not flown.by:
+        return f"{kind}{firmware}; no airspeed and no GPS say whether it flew"
+    return (
+        f"{kind}{firmware}; {flown.time_s:.0f} s in the air, {flown.by} up to"
+        f" {flown.fastest_mps:.1f} m/s"
+    )
+
+
+def _refusal(log: AutopilotLog, flown: Airborne, missing: Sequence[str]) -> str:
+    where = f"{log.path}: {FORMATS[log.format]}"
+    if log.vehicle not in WINGED:
+        return (
+            f"{where} of a {log.vehicle}, which does not fly on a wing: nothing of it can be"
+            " identified here"
+        )
+    kind = {"vtol": "VTOL", "plane": "plane"}.get(log.vehicle, "vehicle")
+    if flown.by and flown.time_s == 0.0:
+        return (
+            f"{where} of a {kind} that never flew ({flown.by} at most {flown.fastest_mps:.1f} m/s):"
+            " nothing of it can be identified"
+        )
+    if "rates" in missing or "surfaces" in missing:
+        which = " and ".join(g for g in ("rates", "surfaces") if g in missing)
+        return (
+            f"{where} of a {kind} without body {which} fast enough (at least"
+            f" {WANTED_HZ['rates'][0]:g} Hz): nothing of it can be identified; `host info` says"
+            " which parameter to change"
+        ).replace("body surfaces", "surfaces")
+    return ""
+
+
+def _verdict(needs: Sequence[str], rates: Mapping[str, float], poor: Sequence[str]) -> str:
+    angles = [ANGLES[n] for n in needs if n in ANGLES and n not in rates]
+    if angles:
+        return f"cannot be told without vanes: no {' and no '.join(angles)} was measured"
+    gone = [n for n in needs if n not in rates]
+    if gone:
+        return f"cannot be told: {', '.join(n.rsplit('_', 1)[0] for n in gone)} not in the log"
+    slow = [g for g in poor if set(GROUPS[g]) & set(needs)]
+    told = "can be told" + (", without vanes never under trust" if _hidden(needs, rates) else "")
+    return f"poorly: {', '.join(slow)} too slow" if slow else told
+
+
+def _hidden(needs: Sequence[str], rates: Mapping[str, float]) -> bool:
+    """Return whether an answer rests on an angle that only accelerations tell."""
+    by = {"az_mps2": "alpha_rad", "ay_mps2": "beta_rad"}
+    return any(angle not in rates for force, angle in by.items() if force in needs)
+
+
+def _trouble(found: Channels, log: AutopilotLog) -> list[str]:
+    said = [
+        f"{name}: {many} samples at an end of its range" for name, many in found.clipped.items()
+    ]
+    if found.vibration_mps2 > VIBRATION_MPS2:
+        said.append(
+            f"vibration {found.vibration_mps2:.0f} m/s2, above {VIBRATION_MPS2:g}: mount the"
+            " autopilot softer"
+        )
+    late = {s.late_s for n, s in found.signals.items() if n.endswith("_radps")} - {0.0}
+    if late:
+        said.append(f"rates are {1e3 * max(late):.1f} ms late by the autopilot's own filter")
+    return said + [f"damage: {one}" for one in log.damage]

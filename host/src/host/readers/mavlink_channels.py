@@ -1,0 +1,109 @@
+"""MAVLink messages in our names, units and signs: what a ground station saw of a vehicle.
+
+common.xml gives the units; accelerations of RAW_IMU and SCALED_IMU are thousandths of g, rates
+thousandths of rad/s, as ArduPilot fills them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from host.arrays import Array
+from host.constants import GRAVITY_MPS2
+from host.physical.airdata import KELVIN, density_kgpm3
+from host.readers.ardupilot_outputs import surfaces
+from host.readers.autopilot_log import AutopilotLog, Messages
+from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of
+
+MILLI = 1e-3
+IMUS = (("RAW_IMU", MILLI), ("SCALED_IMU", MILLI), ("SCALED_IMU2", MILLI), ("HIGHRES_IMU", 1.0))
+PASCALS = 100.0  # of a hPa
+MOST_SERVOS = 16
+
+
+def mavlink_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels:
+    """Return the channels of a telemetry log; `chosen` names instances by message."""
+    found = Channels()
+    for name in chosen:
+        instance_of(log, name, chosen, [])
+    _inertial(log, found)
+    att = log.first("ATTITUDE")
+    if att is not None:
+        for ours, theirs in (("phi_rad", "roll"), ("theta_rad", "pitch"), ("psi_rad", "yaw")):
+            found.add(ours, att.t_s, _field(att, theirs), f"ATTITUDE.{theirs}")
+    _air(log, found)
+    path = log.first("GLOBAL_POSITION_INT")
+    if path is not None:
+        for ours, theirs in (("v_north_mps", "vx"), ("v_east_mps", "vy"), ("v_down_mps", "vz")):
+            found.add(ours, path.t_s, 0.01 * _field(path, theirs), f"GLOBAL_POSITION_INT.{theirs}")
+    _outputs(log, found)
+    return found
+
+
+def _field(messages: Messages, name: str, gain: float = 1.0) -> Array:
+    return np.asarray(messages.fields[name] * gain, dtype=np.float64)
+
+
+def _inertial(log: AutopilotLog, found: Channels) -> None:
+    able = [(m, n, gain) for n, gain in IMUS if (m := log.first(n)) is not None and len(m) > 1]
+    att = log.first("ATTITUDE")
+    if able:
+        # Raw before scaled; a faster one before a slower.
+        imu, name, gain = max(able, key=lambda one: round(len(one[0]) / len(able[0][0]), 1))
+        force = gain * (GRAVITY_MPS2 if gain == MILLI else 1.0)
+        for axis in "xyz":
+            found.add(
+                f"a{axis}_mps2", imu.t_s, force * _field(imu, f"{axis}acc"), f"{name}.{axis}acc"
+            )
+        if att is None or len(imu) >= 0.9 * len(att):
+            for ours, axis in zip("pqr", "xyz", strict=True):
+                values = gain * _field(imu, f"{axis}gyro")
+                found.add(f"{ours}_radps", imu.t_s, values, f"{name}.{axis}gyro")
+    if "p_radps" not in found.signals and att is not None:
+        for ours, theirs in zip("pqr", ("rollspeed", "pitchspeed", "yawspeed"), strict=True):
+            found.add(f"{ours}_radps", att.t_s, _field(att, theirs), f"ATTITUDE.{theirs}")
+
+
+def _air(log: AutopilotLog, found: Channels) -> None:
+    pressure, hud = log.first("SCALED_PRESSURE"), log.first("VFR_HUD")
+    rho = None
+    if pressure is not None:
+        static = np.multiply(_field(pressure, "press_abs"), PASCALS, dtype=np.float64)
+        found.add("static_pa", pressure.t_s, static, "SCALED_PRESSURE.press_abs")
+        warm_k = np.add(_field(pressure, "temperature", 0.01), KELVIN, dtype=np.float64)
+        rho = density_kgpm3(static, warm_k)
+        found.add("density_kgpm3", pressure.t_s, rho, "SCALED_PRESSURE")
+    differential = None if pressure is None else np.ptp(_field(pressure, "press_diff"))
+    if hud is None or (differential is not None and differential == 0.0):
+        return  # without a pitot VFR_HUD's airspeed is made of ground speed and wind
+    indicated = _field(hud, "airspeed")
+    share = np.ones(len(hud))
+    if rho is not None and pressure is not None:
+        share = np.sqrt(STANDARD_DENSITY_KGPM3 / np.interp(hud.t_s, pressure.t_s, rho))
+    found.add("airspeed_mps", hud.t_s, indicated * share, "VFR_HUD.airspeed, true")
+    found.add("qbar_pa", hud.t_s, 0.5 * STANDARD_DENSITY_KGPM3 * indicated**2, "VFR_HUD.airspeed")
+
+
+def _outputs(log: AutopilotLog, found: Channels) -> None:
+    out = log.first("SERVO_OUTPUT_RAW")
+    if out is None:
+        return
+    pulses = {
+        k: _field(out, f"servo{k}_raw")
+        for k in range(1, MOST_SERVOS + 1)
+        if f"servo{k}_raw" in out.fields
+    }
+    made = surfaces(pulses, log.parameters)
+    found.output_period_s = 1.0 / max(log.parameters.get("SERVO_RATE", 50.0), 1.0)
+    for name, share in made.shares.items():
+        found.add(name, out.t_s, share, made.made_of[name])
+    found.clipped |= {name: many for name, many in made.clipped.items() if many}
+    said = "; ".join(f"{name} of {how}" for name, how in made.made_of.items())
+    found.notes.append(
+        f"surfaces by SERVOn_ parameters: {said}"
+        if said
+        else "no SERVOn_FUNCTION came over the radio: outputs have no meaning; fetch the parameters"
+        " in the ground station while it records"
+    )

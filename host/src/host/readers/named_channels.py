@@ -1,0 +1,86 @@
+"""What a log of an autopilot says in our names: signals, which surfaces are shares, and remarks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from host.arrays import Array
+from host.readers.autopilot_log import AutopilotLog, Messages, SensorChoiceError
+from host.readers.signals import Signal
+
+STANDARD_DENSITY_KGPM3 = 1.225  # ICAO standard atmosphere at sea level: what airspeed is read at
+STANDARD_TEMPERATURE_DEGC = 15.0
+# What no aircraft of this size does; a bit changed in a record that still fits.
+RANGES = {
+    "p_radps": 40.0, "q_radps": 40.0, "r_radps": 40.0,
+    "ax_mps2": 320.0, "ay_mps2": 320.0, "az_mps2": 320.0,
+    "phi_rad": 7.0, "theta_rad": 1.6, "psi_rad": 7.0, "airspeed_mps": 150.0,
+    "qbar_pa": 2e4, "static_pa": 1.2e5, "altitude_m": 1e5, "density_kgpm3": 2.0,
+    "v_north_mps": 300.0, "v_east_mps": 300.0, "v_down_mps": 100.0,
+    "elevator": 2.0, "aileron": 2.0, "rudder": 2.0, "throttle": 2.0,
+}  # fmt: skip
+
+
+@dataclass(slots=True)
+class Channels:
+    """Channels of one log.
+
+    Attributes
+    ----------
+    signals : dict of str to Signal
+        By our name with unit; surfaces without ``_rad``: they are shares of full travel.
+    notes : list of str
+        What was chosen, and how outputs became surfaces.
+    clipped : dict of str to int
+        Of a surface or an IMU, samples at the end of its range.
+    output_period_s : float
+        Of the pulses that servos get.
+    vibration_mps2 : float
+        As the autopilot measured it; NaN if it did not.
+    """
+
+    signals: dict[str, Signal] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    clipped: dict[str, int] = field(default_factory=dict)
+    output_period_s: float = 0.02
+    vibration_mps2: float = float("nan")
+
+    def add(self, name: str, t_s: Array, values: Array, source: str, late_s: float = 0.0) -> None:
+        """Add a channel; values that cannot be are missing, and said."""
+        clean = np.asarray(values, dtype=np.float64).copy()
+        wild = np.abs(clean) > RANGES.get(name, np.inf)
+        if wild.any():
+            clean[wild] = np.nan
+            self.notes.append(
+                f"{name}: {int(wild.sum())} values that no aircraft has count as missing"
+            )
+        found = Signal(np.asarray(t_s, dtype=np.float64), clean, source, late_s)
+        if found.seen:
+            self.signals[name] = found
+
+
+def instance_of(
+    log: AutopilotLog, name: str, chosen: Mapping[str, int], notes: list[str]
+) -> tuple[Messages, str] | None:
+    """Return the messages of the instance asked for, else of the one with most, and its label.
+
+    Raises
+    ------
+    SensorChoiceError
+        If the log does not have the one asked for.
+    """
+    every = log.messages.get(name)
+    asked = chosen.get(name)
+    if asked is not None and (not every or asked not in every):
+        there = ", ".join(map(str, sorted(every))) if every else "none"
+        raise SensorChoiceError(f"{log.path}: no {name} {asked}; the log has {there}")
+    if not every:
+        return None
+    best = asked if asked is not None else min(every, key=lambda k: (-len(every[k]), k))
+    if len(every) > 1:
+        others = ", ".join(f"--sensor {name}={k}" for k in sorted(every) if k != best)
+        notes.append(f"{name} {best} of {len(every)} is used (others: {others})")
+    return every[best], f"{name}[{best}]"

@@ -1,0 +1,29 @@
+"""Which records have a time that can be: near that of their neighbours, never backwards."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from host.arrays import Array, BoolArray
+
+NEAR_S, NEAR_STEPS = 1.0, 20.0  # from the median of the five around: beyond, a bit was changed
+EARLIEST_S, LONGEST_S = -60.0, 30 * 86400.0  # of a time since boot
+
+
+def plausible(t_s: Array) -> tuple[BoolArray, int]:
+    """Return which of the times (n,) can be, and how many cannot.
+
+    A time far from the median of the five around it was changed: a pause in the log is none, for
+    the median lies on the record's own side of it. What then still steps back is left out too.
+    """
+    ok = np.isfinite(t_s) & (t_s > EARLIEST_S) & (t_s < LONGEST_S)
+    if ok.sum() >= 5:
+        kept = t_s[ok]
+        padded = np.concatenate([kept[:2], kept, kept[-2:]])
+        around = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+        far_s = max(NEAR_S, NEAR_STEPS * float(np.median(np.abs(np.diff(kept)))))
+        ok[np.flatnonzero(ok)[np.abs(kept - around) > far_s]] = False
+    order = np.flatnonzero(ok)
+    if len(order) > 1:
+        ok[order[t_s[order] < np.maximum.accumulate(t_s[order])]] = False
+    return ok, int(np.sum(~ok))

@@ -1,0 +1,252 @@
+"""PX4: its topics in our names, units and signs.
+
+Its axes are ours (x forward, y right, z down), its accelerations specific force. Time is that of
+the sample where a topic has one, else of its publication.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from host.arrays import Array
+from host.physical.airdata import KELVIN, density_kgpm3
+from host.readers.ardupilot_outputs import Outputs
+from host.readers.autopilot_log import AutopilotLog, Messages
+from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of
+from host.readers.px4_outputs import MOST_SURFACES, allocated_surfaces, axis_demands
+from host.readers.signals import Signal
+
+USABLE_HZ = 18.0  # a topic that comes slower is used only if no other has the channel
+RATES = ("p_radps", "q_radps", "r_radps")
+FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
+# Topic, field and the parameter of its low-pass; raw before filtered.
+RATE_TOPICS = (
+    ("sensor_combined", "gyro_rad", ""),
+    ("vehicle_angular_velocity", "xyz", "IMU_GYRO_CUTOFF"),
+)
+FORCE_TOPICS = (
+    ("sensor_combined", "accelerometer_m_s2", ""),
+    ("vehicle_acceleration", "xyz", "IMU_ACCEL_CUTOFF"),
+)
+
+
+def px4_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels:
+    """Return the channels of a ULog; `chosen` names instances by topic."""
+    found = Channels(output_period_s=1.0 / 50.0)
+    for name in chosen:
+        instance_of(log, name, chosen, [])
+    _inertial(log, chosen, found)
+    _attitude(log, chosen, found)
+    _air(log, chosen, found)
+    _path(log, chosen, found)
+    _outputs(log, chosen, found)
+    status = instance_of(log, "vehicle_imu_status", chosen, [])
+    if status is not None:
+        fields = status[0].fields
+        shaken = fields.get("accel_vibration_metric")
+        if shaken is not None:
+            found.vibration_mps2 = float(np.median(shaken))
+        clips = [
+            fields[f"accel_clipping[{k}]"] for k in range(3) if f"accel_clipping[{k}]" in fields
+        ]
+        many = sum(int(c[-1]) - int(c[0]) for c in clips if len(c))
+        if many > 0:
+            found.clipped["IMU"] = many
+    return found
+
+
+def landed_signal(log: AutopilotLog) -> Signal | None:
+    """Return where the autopilot says that it stands on the ground."""
+    messages = log.first("vehicle_land_detected")
+    if messages is None or "landed" not in messages.fields:
+        return None
+    values = np.asarray(messages.fields["landed"], dtype=np.float64)
+    return Signal(messages.t_s, values, "vehicle_land_detected.landed")
+
+
+def _vector(messages: Messages, field: str, size: int = 3) -> list[Array] | None:
+    names = [f"{field}[{k}]" for k in range(size)]
+    if not all(name in messages.fields for name in names):
+        return None
+    return [np.asarray(messages.fields[name], dtype=np.float64) for name in names]
+
+
+def _inertial(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
+    _first_fast(log, chosen, found, RATES, RATE_TOPICS)
+    _first_fast(log, chosen, found, FORCES, FORCE_TOPICS)
+
+
+def _first_fast(
+    log: AutopilotLog,
+    chosen: Mapping[str, int],
+    found: Channels,
+    names: tuple[str, ...],
+    topics: tuple[tuple[str, str, str], ...],
+) -> None:
+    """Add three channels from the first topic that has them often enough, else the fastest."""
+    able = []
+    for topic, field, cutoff in topics:
+        one = instance_of(log, topic, chosen, found.notes)
+        values = _vector(one[0], field) if one is not None else None
+        if one is not None and values is not None and len(one[0]) > 1:
+            able.append((_rate_hz(one[0]), *one, field, values, cutoff))
+    if not able:
+        return
+    fast = [it for it in able if it[0] >= USABLE_HZ] or [max(able, key=lambda it: it[0])]
+    _, messages, label, field, values, cutoff = fast[0]
+    cutoff_hz = log.parameters.get(cutoff, 0.0)
+    late_s = float(np.sqrt(2.0) / (2.0 * np.pi * cutoff_hz)) if cutoff_hz > 0.0 else 0.0
+    for name, axis in zip(names, values, strict=True):
+        found.add(name, messages.t_s, axis, f"{label}.{field}", late_s)
+
+
+def _attitude(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
+    att = instance_of(log, "vehicle_attitude", chosen, found.notes)
+    q = _vector(att[0], "q", 4) if att is not None else None
+    if att is None or q is None:
+        return
+    size = np.sqrt(sum(x * x for x in q))
+    whole = np.abs(size - 1.0) < 0.05  # another length is a changed bit
+    w, x, y, z = (np.where(whole, part, np.nan) for part in q)
+    angles = {
+        "phi_rad": np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        "theta_rad": np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
+        "psi_rad": np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    }
+    for name, values in angles.items():
+        found.add(name, att[0].t_s, values, f"{att[1]}.q")
+
+
+def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
+    air = instance_of(log, "vehicle_air_data", chosen, found.notes)
+    if air is not None:
+        messages, label = air
+        for ours, theirs in (
+            ("static_pa", "baro_pressure_pa"), ("density_kgpm3", "rho"),
+            ("altitude_m", "baro_alt_meter"),
+        ):  # fmt: skip
+            if theirs in messages.fields:
+                values = np.asarray(messages.fields[theirs], dtype=np.float64)
+                found.add(ours, messages.t_s, values, f"{label}.{theirs}")
+        if "density_kgpm3" not in found.signals and "static_pa" in found.signals:
+            warm = messages.fields.get("baro_temp_celcius", np.full(len(messages), 15.0))
+            rho = density_kgpm3(
+                np.asarray(messages.fields["baro_pressure_pa"], dtype=np.float64),
+                np.asarray(warm, dtype=np.float64) + KELVIN,
+            )
+            found.add("density_kgpm3", messages.t_s, rho, f"{label}.baro_pressure_pa")
+    if log.parameters.get("SYS_HAS_NUM_ASPD", 1.0) == 0.0:
+        return
+    best: tuple[float, Messages, str] | None = None
+    for topic in ("airspeed_validated", "airspeed"):
+        pitot = instance_of(log, topic, chosen, found.notes)
+        if pitot is None or "true_airspeed_m_s" not in pitot[0].fields or len(pitot[0]) < 2:
+            continue
+        rate_hz = 1.0 / float(np.median(np.diff(pitot[0].t_s)))
+        if best is None or rate_hz > 1.5 * best[0]:
+            best = (rate_hz, *pitot)
+    if best is None:
+        return
+    _, messages, label = best
+    true = np.asarray(messages.fields["true_airspeed_m_s"], dtype=np.float64)
+    measured = messages.fields.get("airspeed_sensor_measurement_valid")
+    source = messages.fields.get("airspeed_source", messages.fields.get("selected_airspeed_index"))
+    if measured is not None:
+        true = np.where(np.asarray(measured) > 0, true, np.nan)
+    elif source is not None:  # below one: from ground speed and wind, no sensor
+        true = np.where(np.asarray(source) > 0, true, np.nan)
+    found.add("airspeed_mps", messages.t_s, true, f"{label}.true_airspeed_m_s")
+    name = "calibrated_airspeed_m_s"
+    name = name if name in messages.fields else "indicated_airspeed_m_s"
+    if name in messages.fields and np.isfinite(true).any():
+        speed = np.asarray(messages.fields[name], dtype=np.float64)
+        pressure = 0.5 * STANDARD_DENSITY_KGPM3 * np.where(np.isfinite(true), speed, np.nan) ** 2
+        found.add("qbar_pa", messages.t_s, pressure, f"{label}.{name}")
+
+
+def _path(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
+    path = instance_of(log, "vehicle_local_position", chosen, found.notes)
+    if path is None:
+        return
+    messages, label = path
+    valid = np.asarray(messages.fields.get("v_xy_valid", np.ones(len(messages)))) > 0
+    for ours, theirs in (("v_north_mps", "vx"), ("v_east_mps", "vy"), ("v_down_mps", "vz")):
+        if theirs in messages.fields:
+            values = np.where(valid, messages.fields[theirs], np.nan)
+            found.add(ours, messages.t_s, values, f"{label}.{theirs}")
+
+
+def _outputs(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
+    made: tuple[Messages, Outputs] | None = None
+    servos = instance_of(log, "actuator_servos", chosen, found.notes)
+    if servos is not None:
+        controls = {
+            k: np.asarray(servos[0].fields[f"control[{k}]"], dtype=np.float64)
+            for k in range(MOST_SURFACES)
+            if f"control[{k}]" in servos[0].fields
+        }
+        out = allocated_surfaces(controls, log.parameters)
+        if out.shares:
+            made = servos[0], out
+    slow = made is None or _rate_hz(made[0]) < USABLE_HZ
+    axes = _axes(log) if slow else None
+    if axes is not None and (made is None or _rate_hz(axes[0]) > _rate_hz(made[0])):
+        made = axes
+    if made is not None:
+        messages, out = made
+        for name, share in out.shares.items():
+            found.add(name, messages.t_s, share, out.made_of[name])
+        found.clipped |= {name: many for name, many in out.clipped.items() if many}
+        found.notes.append(
+            "surfaces by the log's own parameters: "
+            + "; ".join(f"{name} of {how}" for name, how in out.made_of.items())
+            + "; what a servo's pulse adds to it (up to 20 ms) is not in the log"
+        )
+    _throttle(log, chosen, found)
+
+
+def _axes(log: AutopilotLog) -> tuple[Messages, Outputs] | None:
+    """Return the demand of roll, pitch and yaw: of a VTOL that of its wing."""
+    topics = (("vehicle_torque_setpoint", "xyz"), ("actuator_controls_1", "control"),
+              ("actuator_controls_0", "control"))  # fmt: skip
+    for topic, field in topics:
+        every = log.messages.get(topic, {})
+        if topic == "actuator_controls_1" and log.vehicle != "vtol":
+            continue
+        wing = every.get(1) if log.vehicle == "vtol" and topic.startswith("vehicle") else None
+        messages = wing or (every[min(every)] if every else None)
+        values = _vector(messages, field) if messages is not None else None
+        if messages is not None and values is not None and len(messages) > 1:
+            return messages, axis_demands(values, topic)
+    return None
+
+
+def _throttle(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
+    motors = instance_of(log, "actuator_motors", chosen, [])
+    if motors is not None:
+        every = [
+            np.asarray(v, dtype=np.float64)
+            for name, v in motors[0].fields.items()
+            if name.startswith("control[") and np.isfinite(np.asarray(v, dtype=np.float64)).any()
+        ]
+        if every:
+            found.add("throttle", motors[0].t_s, np.mean(every, axis=0), f"{motors[1]}.control")
+            if len(every) == 2:
+                difference = every[0] - every[1]
+                found.add("throttle_difference", motors[0].t_s, difference, f"{motors[1]}.control")
+        return
+    for topic, field in (
+        ("vehicle_thrust_setpoint", "xyz[0]"),
+        ("actuator_controls_0", "control[3]"),
+    ):
+        messages = log.first(topic)
+        if messages is not None and field in messages.fields:
+            values = np.asarray(messages.fields[field], dtype=np.float64)
+            found.add("throttle", messages.t_s, values, f"{topic}.{field}")
+            return
+
+
+def _rate_hz(messages: Messages) -> float:
+    return 1.0 / float(np.median(np.diff(messages.t_s))) if len(messages) > 1 else 0.0

@@ -1,0 +1,55 @@
+"""A log of another autopilot as columns to identify from, refused where nothing can be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from host.instrument.recording import SURFACES, Recording
+from host.readers.autopilot_flight import CLOCK_SHARE, AutopilotFlight, read_autopilot
+from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.foreign_tables import Foreign
+
+
+def autopilot_table(source: Path, sensors: Mapping[str, int] | None) -> Foreign:
+    """Return the columns of a log of PX4 or ArduPilot.
+
+    Surfaces are commands: shares of full travel under the names of angles, so that one is full
+    travel until an aircraft file says how far that is. They stand under ``elevator_share`` too, for
+    a map.
+
+    Raises
+    ------
+    host.errors.HostError
+        If it cannot be read, or nothing can be identified of it.
+    """
+    flight = read_autopilot(source, sensors)
+    flight.refuse()
+    columns = flight.columns()
+    shares = flight.shares
+    columns |= {f"{name}_rad": columns[f"{name}_share"] for name in shares}
+    commanded = tuple(name for name in SURFACES if name in shares)
+    return Foreign(
+        columns,
+        notes=flight.notes(),
+        recording=Recording(commanded, CLOCK_SHARE),
+        shares=shares,
+        findings=_slow_outputs(flight),
+    )
+
+
+def _slow_outputs(flight: AutopilotFlight) -> list[Finding]:
+    """Return a finding where a surface may have moved between two records of its output."""
+    slow = flight.undersampled()
+    if not slow:
+        return []
+    rates = ", ".join(f"{name} {rate:.0f} Hz" for name, rate in slow.items())
+    return [
+        Finding(
+            "surface-rate",
+            tuple(f"{name}_rad" for name in slow),
+            f"outputs are logged more slowly than servos get them ({rates}): when a surface moved"
+            " is known to a part of a step only",
+            done="what lies between two records is drawn on their line",
+        )
+    ]

@@ -1,0 +1,68 @@
+"""Models where no vane measured an angle: it stays a state, and the accelerometer across tells it.
+
+Where alpha_dot = q + a_z / V, rates and specific force hold the angle but for a constant, and with
+it the derivatives (Klein & Morelli, Aircraft System Identification, ch. 10, on kinematics). The
+accelerometer's bias is then no parameter beside the angle's: only their sum is seen. What gusts do
+to the angle is not in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from host.sysid.flight.data_finding import Finding
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.state_space_model import LinearModel, without_outputs
+
+TOLD_BY = {"alpha_rad": "az_mps2", "beta_rad": "ay_mps2"}
+WORDS = {"alpha_rad": "the angle of attack", "beta_rad": "the sideslip"}
+# These have no derivative that only the level of the angle tells, as drag is.
+MODELS = ("short-period", "dutch-roll", "lateral")
+
+
+def without_vanes(
+    model: LinearModel, columns: Collection[str]
+) -> tuple[LinearModel, tuple[str, ...]]:
+    """Return a template without the angles that nobody measured, and a remark.
+
+    Raises
+    ------
+    IdentificationError
+        If it cannot do without.
+    """
+    hidden = [y for y in model.outputs if y in TOLD_BY and y not in columns]
+    if not hidden:
+        return model, ()
+    words = " and ".join(WORDS[y] for y in hidden)
+    able = [y for y in hidden if TOLD_BY[y] in model.outputs]
+    if model.name not in MODELS or able != hidden:
+        raise IdentificationError(
+            f"without vanes {words} was not measured, and {model.name} cannot be told"
+        )
+    across = {TOLD_BY[y] for y in hidden}
+    reduced = without_outputs(model, hidden)
+    reduced = replace(
+        reduced, output_biases=tuple(y for y in reduced.output_biases if y not in across)
+    )
+    return reduced, (
+        f"no vane measured {words}: it is told by {', '.join(sorted(across))} and rates, gusts are"
+        " in it",
+    )
+
+
+def no_vanes_finding(columns: Collection[str]) -> list[Finding]:
+    """Return a finding where an angle is missing and may be told otherwise, so that nothing of it
+    is under "trust"."""
+    told = "airspeed_mps" in columns
+    missing = tuple(y for y, by in TOLD_BY.items() if told and y not in columns and by in columns)
+    if not missing:
+        return []
+    return [
+        Finding(
+            "flow-angles",
+            missing,
+            f"no vane measured {' and '.join(WORDS[y] for y in missing)}",
+            done="told by rates and accelerations where that can be, else refused",
+        )
+    ]

@@ -1,0 +1,137 @@
+"""What a log says in our names, units and signs, against the truth of its flight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from host.errors import UsageError
+from host.readers.ardupilot_outputs import surfaces
+from host.readers.autopilot_flight import chosen_sensors, read_autopilot
+from host.readers.held_outputs import held_output
+from host.readers.plausible_times import plausible
+from host.readers.px4_outputs import allocated_surfaces
+from host.readers.signals import Signal
+from host.twin.outcome.ardupilot_log import ardupilot_parameters
+from host.twin.outcome.autopilot_outputs import AIRFRAMES, ardupilot_pulses, px4_controls
+from host.twin.outcome.px4_log import px4_parameters
+
+from tests.host.readers.autopilot_flights import FORMATS, FULL_TRAVEL_RAD, truth, write
+
+# Largest standard deviation of the error in flight: noise, lag and errors of the flight's sensors.
+LIMITS = {
+    "airspeed_mps": 0.25, "p_radps": 0.03, "q_radps": 0.03, "r_radps": 0.03,
+    "ax_mps2": 0.15, "ay_mps2": 0.15, "az_mps2": 0.30, "phi_rad": 0.06, "theta_rad": 0.05,
+    "static_pa": 6.0, "density_kgpm3": 0.004,
+    "elevator_share": 0.012, "aileron_share": 0.012, "rudder_share": 0.016,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("airframe", AIRFRAMES)
+def test_columns_are_the_truth(kind: str, airframe: str, tmp_path: Path) -> None:
+    """Every channel in our unit and sign, surfaces through three airframes' mixers."""
+    flight = read_autopilot(write(kind, tmp_path, airframe))
+    columns = flight.columns()
+    true = truth()
+    missing = {"rudder_share"} if airframe == "elevons" else set()
+    for name, limit in LIMITS.items():
+        if name in missing:
+            assert name not in columns
+            continue
+        expected = true[name.replace("_share", "_rad")] / (
+            FULL_TRAVEL_RAD if name.endswith("_share") else 1.0
+        )
+        seen = np.isfinite(columns[name]) & (columns["t_s"] > 5.0)
+        seen &= columns["t_s"] < true["t_s"].iloc[-1] - 0.2
+        error = columns[name][seen] - np.interp(columns["t_s"][seen], true["t_s"], expected)
+        assert seen.sum() > 50, name
+        assert float(error.std()) < limit, (name, float(error.std()))
+        assert abs(float(error.mean())) < 0.5 * float(expected.abs().max()), name
+    assert np.nanmedian(columns["az_mps2"]) < -8.0
+    assert flight.flown.time_s == pytest.approx(true["t_s"].iloc[-1] - 3.0, abs=0.6)
+    assert flight.judgement.refusal == ""
+
+
+def _asked() -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(7)
+    return {axis: rng.uniform(-0.45, 0.45, 40) for axis in ("roll", "pitch", "yaw")} | {
+        "throttle": rng.uniform(0.0, 1.0, 40)
+    }
+
+
+@pytest.mark.parametrize("airframe", AIRFRAMES)
+def test_mixers_are_undone(airframe: str) -> None:
+    """Random demands through each airframe's mixer, reversals, trims and uneven ends."""
+    asked = _asked()
+    pulses = ardupilot_pulses(asked, airframe)
+    by_pin = {k + 1: p for k, p in enumerate(pulses)}
+    ardupilot = surfaces(by_pin, ardupilot_parameters(airframe)).shares
+    controls = dict(enumerate(px4_controls(asked, airframe)))
+    px4 = allocated_surfaces(controls, px4_parameters(airframe)).shares
+    expected = {"aileron": asked["roll"], "elevator": -asked["pitch"], "rudder": -asked["yaw"]}
+    if airframe == "elevons":
+        del expected["rudder"]
+    for name, values in expected.items():
+        np.testing.assert_allclose(ardupilot[name], values, atol=2.0 / 800.0)  # half a us
+        np.testing.assert_allclose(px4[name], values, atol=1e-12)
+    np.testing.assert_allclose(ardupilot["throttle"], asked["throttle"], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "name"),
+    [("SERVO2_REVERSED", 0, "elevator"), ("SERVO4_TRIM", 1450, "rudder"),
+     ("SERVO1_FUNCTION", 0, "aileron")],
+)  # fmt: skip
+def test_a_wrong_parameter_is_a_wrong_surface(parameter: str, value: int, name: str) -> None:
+    """The log's parameters are what counts: each of them changes the surface."""
+    pulses = dict(enumerate(ardupilot_pulses(_asked(), "conventional"), start=1))
+    parameters = ardupilot_parameters("conventional")
+    right = surfaces(pulses, parameters).shares[name]
+    wrong = surfaces(pulses, {**parameters, parameter: value}).shares.get(name)
+    assert wrong is None or float(np.max(np.abs(wrong - right))) > 0.05
+
+
+def test_flaperons_and_two_motors() -> None:
+    """Aileron is half the difference of flaperons, flap half their sum; throttle the mean."""
+    both = {"MIN": 1000.0, "MAX": 2000.0, "TRIM": 1500.0, "REVERSED": 0.0}
+    parameters = {f"SERVO{n}_{k}": v for n in range(1, 5) for k, v in both.items()}
+    parameters |= {f"SERVO{n}_FUNCTION": f for n, f in ((1, 24), (2, 25), (3, 73), (4, 74))}
+    roll, flap = np.array([0.2, -0.1]), np.array([0.1, 0.3])
+    left_us, right_us = 1500 + 500 * (roll + flap), 1500 + 500 * (roll - flap)
+    out = surfaces(
+        {1: left_us, 2: right_us, 3: np.array([1400.0, 1500.0]), 4: np.array([1600.0, 1500.0])},
+        parameters,
+    ).shares
+    np.testing.assert_allclose(out["aileron"], roll)
+    np.testing.assert_allclose(out["flap"], flap)
+    np.testing.assert_allclose(out["throttle"], [0.5, 0.5])
+    np.testing.assert_allclose(out["throttle_difference"], [-0.2, 0.0])
+
+
+def test_an_output_stands_until_the_next_pulse() -> None:
+    """Of every second pulse of 50 Hz the one between is on the line, and each one stands."""
+    t = np.arange(0.0, 1.0, 0.04)
+    rows, values = held_output(Signal(t, np.where(t < 0.5, 0.0, 1.0), "C2"), 0.02)
+    assert values[rows < 0.48 + 0.0199].max() == 0.0
+    assert values[(rows > 0.5001) & (rows < 0.5199)] == pytest.approx(0.5)
+    assert values[rows > 0.5201].min() == 1.0
+
+
+def test_times_that_cannot_be() -> None:
+    """A flipped bit in a time costs its own record, not those around it."""
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.uniform(0.01, 0.03, 400))
+    wrong = t.copy()
+    wrong[[50, 51, 200]] = [9e9, t[51] + 1e4, t[200] - 3.0]
+    kept, many = plausible(wrong)
+    assert many == 3
+    assert not kept[[50, 51, 200]].any()
+
+
+def test_another_instance_is_chosen_by_name() -> None:
+    assert chosen_sensors(["IMU=1", "ARSP=0"]) == {"IMU": 1, "ARSP": 0}
+    for word in ("IMU", "IMU=x", "=1"):
+        with pytest.raises(UsageError, match="expected MESSAGE=N"):
+            chosen_sensors([word])

@@ -1,0 +1,119 @@
+"""Our writers and readers against pyulog and pymavlink, value for value."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from pathlib import Path
+
+import numpy as np
+from host.export.dataflash_writer import Records, write_dataflash
+from host.readers.dataflash_binary import read_records
+from host.readers.dataflash_messages import WANTED
+from host.readers.dataflash_text import read_text_records
+from host.readers.log_formats import format_of_file
+from host.readers.tlog_messages import read_tlog
+from host.readers.ulog_walk import walk
+
+from tests.host.readers.autopilot_flights import write
+
+
+def test_dataflash_is_what_pymavlink_reads(tmp_path: Path) -> None:
+    from pymavlink.DFReader import DFReader_binary
+
+    path = write("dataflash", tmp_path)
+    found = read_records(path)
+    theirs: dict[str, list[object]] = {}
+    with contextlib.redirect_stderr(io.StringIO()):
+        reader = DFReader_binary(str(path))
+        while (message := reader.recv_msg()) is not None:
+            theirs.setdefault(message.get_type(), []).append(message)
+        reader.filehandle.close()
+    assert not found.lost
+    numbers = {kind.name: k for k, kind in found.kinds.items()}
+    for name in ("IMU", "ATT", "ARSP", "BARO", "GPS", "RCOU", "VIBE", "MODE"):
+        ours = found.rows(numbers[name])
+        assert len(next(iter(ours.values()))) == len(theirs[name]) > 0
+        for column, values in ours.items():
+            expected = [getattr(m, column) for m in theirs[name]]
+            np.testing.assert_allclose(values, np.array(expected, dtype=float), rtol=1e-12)
+    read = {m.Name: m.Value for m in theirs["PARM"]}  # type: ignore[attr-defined]
+    names = [n.rstrip(b"\0").decode() for n in found.rows(numbers["PARM"])["Name"]]
+    assert read == dict(zip(names, found.rows(numbers["PARM"])["Value"].tolist(), strict=True))
+
+
+def test_the_text_form_is_the_binary_one(tmp_path: Path) -> None:
+    """As mavlogdump and Mission Planner write it: a line a record."""
+    found = read_records(write("dataflash", tmp_path))
+    lines = []
+    for kind in found.kinds.values():
+        lines.append(f"FMT, 0, {kind.length}, {kind.name}, {kind.letters}, "
+                     + kind.columns.replace(",", ", "))  # fmt: skip
+    numbers = {kind.name: k for k, kind in found.kinds.items()}
+    for name in ("IMU", "ATT", "RCOU"):
+        rows = found.rows(numbers[name])
+        for row in zip(*rows.values(), strict=True):
+            lines.append(", ".join([name, *(repr(v.item()) for v in row)]))
+    path = tmp_path / "flight.log"
+    path.write_text("\n".join([*lines, "IMU, 12, 3", "", "no record"]))
+    assert format_of_file(path) == "dataflash-text"
+    text = read_text_records(path, WANTED)
+    assert text.bad_lines == 2
+    for name in ("IMU", "ATT", "RCOU"):
+        for column, values in found.rows(numbers[name]).items():
+            np.testing.assert_allclose(text.tables[name][column], values, rtol=1e-9)
+
+
+def test_ulog_is_whole_for_pyulog(tmp_path: Path) -> None:
+    from pyulog import ULog
+
+    path = write("ulog", tmp_path)
+    log = ULog(str(path))
+    assert not log.file_corruption
+    assert not log.dropouts
+    assert log.initial_parameters["CA_SV_CS_COUNT"] == 4
+    assert log.msg_info_dict["sys_name"] == "PX4"
+    servos = log.get_dataset("actuator_servos").data
+    assert np.isnan(servos["control[7]"]).all()
+    assert np.nanmax(np.abs(servos["control[2]"])) > 0.1
+    found = walk(path)
+    assert (found.strange, found.rest) == (0, 0)
+
+
+def test_ulog_of_others_is_walked_whole() -> None:
+    folder = Path(__file__).parents[2] / "data" / "px4"
+    for path in folder.glob("*.ulg"):
+        found = walk(path)
+        assert (found.strange, found.rest) == (0, 0), path
+
+
+def test_tlog_is_what_mavutil_reads(tmp_path: Path) -> None:
+    from pymavlink import mavutil
+
+    path = write("tlog", tmp_path)
+    link = mavutil.mavlink_connection(str(path))
+    theirs: dict[str, int] = {}
+    while (message := link.recv_match()) is not None:
+        theirs[message.get_type()] = theirs.get(message.get_type(), 0) + 1
+    link.close()
+    assert "BAD_DATA" not in theirs
+    ours = read_tlog(path)
+    assert not ours.damage
+    for name, messages in ours.messages.items():
+        assert len(messages[0]) == theirs[name]
+    assert len(ours.parameters) == theirs["PARAM_VALUE"]
+
+
+def test_a_head_inside_a_record_is_no_record(tmp_path: Path) -> None:
+    """A payload that looks like the start of a record splits none."""
+    inside = np.frombuffer(b"\xa3\x95\x20\xa3\x95\x21\xa3\x95", dtype="<u8")[0]
+    path = tmp_path / "trap.bin"
+    steps = np.arange(50)
+    write_dataflash(path, [
+        Records("AAA", "QQ", {"TimeUS": steps * 1000, "Trap": np.full(50, inside)}),
+        Records("BBB", "Qf", {"TimeUS": steps * 1000 + 500, "X": steps * 0.5}),
+    ])  # fmt: skip
+    found = read_records(path)
+    assert [len(found.places[k]) for k in sorted(found.kinds)] == [50, 50, 3]
+    np.testing.assert_array_equal(found.rows(33)["X"], steps * 0.5)
+    assert not found.lost

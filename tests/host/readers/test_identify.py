@@ -1,0 +1,119 @@
+"""From another autopilot's log to derivatives: the truth held, nothing claimed that no vane saw."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from host.cli import main
+from host.readers.autopilot_flight import read_autopilot
+from host.sysid.flight.flight_tables import read_flight_columns
+from host.sysid.pipeline.surface_travel import with_surface_angles
+from host.twin.outcome.truth_files import maneuvers
+
+import host
+from tests.host.readers.autopilot_flights import FORMATS, flown, write
+
+AIRCRAFT = "ultrastick25e"
+
+
+def test_a_short_period_without_vanes_holds_the_truth(tmp_path: Path) -> None:
+    true = maneuvers(*flown())[0]["derivatives"]
+    assert isinstance(true, dict)
+    found = host.identify(write("ulog", tmp_path), aircraft=AIRCRAFT)
+    table = found.table.loc["short-period"]
+    for name in ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de"):
+        row = table.loc[name]
+        assert abs(row["value"] - true[name]) < row["half_width"], name
+        assert row["half_width"] < 0.4 * abs(true[name]), name
+    for name in ("Z_alpha", "Z_de", "M_alpha"):
+        assert table.loc[name, "verdict"] == "do not rely on"
+    lateral = found.table.loc["lateral"]
+    assert set(lateral.loc[["Y_beta", "L_beta", "N_beta"], "verdict"]) == {"do not rely on"}
+    text = found.to_text()
+    assert "without vanes longitudinal" in text
+    assert "finding flow-angles" in text
+
+
+def test_coefficients_are_refused_without_vanes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write("dataflash", tmp_path)
+    code = main(["identify", str(path), "--aircraft", AIRCRAFT, "--model", "coefficients"])
+    err = capsys.readouterr().err
+    assert code == 2
+    assert "no vane measured the angle of attack" in err
+    code = main(["identify", str(path), "--model", "longitudinal"])
+    assert code == 2
+    assert "without vanes the angle of attack was not measured" in capsys.readouterr().err
+
+
+def test_surfaces_are_scaled_by_the_aircraft_file_only(tmp_path: Path) -> None:
+    read = read_flight_columns(write("dataflash", tmp_path))
+    assert read.shares == ("elevator", "aileron", "rudder")
+    assert read.recording.commanded == read.shares
+    columns, notes = with_surface_angles(read.columns, read.shares, None)
+    np.testing.assert_array_equal(columns["elevator_rad"], read.columns["elevator_rad"])
+    assert "per full deflection" in notes[0]
+    (slow,) = [f for f in read.findings if f.check == "surface-rate"]
+    assert slow.channels == ("elevator_rad", "aileron_rad", "rudder_rad")
+
+
+def test_a_map_may_say_the_travel(tmp_path: Path) -> None:
+    """A line of a map gives a surface its angle; the other columns of the log stay."""
+    path, mapping = write("ulog", tmp_path), tmp_path / "map.toml"
+    mapping.write_text('[columns]\nelevator_rad = { from = "elevator_share", scale = 0.4363 }\n')
+    read = read_flight_columns(path, mapping)
+    assert read.shares == ("aileron", "rudder")
+    plain = read_flight_columns(path).columns["elevator_rad"]
+    np.testing.assert_allclose(read.columns["elevator_rad"], 0.4363 * plain, atol=1e-9)
+    assert "q_radps" in read.columns
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_every_verb_takes_it(
+    kind: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = str(write(kind, tmp_path))
+    assert main(["info", path]) == 0
+    assert "roll: L_p, L_da" in capsys.readouterr().out
+    assert main(["decode", path, "-o", "table.csv"]) == 0
+    assert "wrote        table.csv" in capsys.readouterr().out
+    assert main(["maneuvers", path, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["maneuvers"]
+    axes = [m["axis"] for m in found]
+    assert axes.count("elevator_rad") == 3
+    assert axes.count("aileron_rad") == 2
+    model = tmp_path / "roll.toml"
+    assert main(["identify", path, "--model", "roll", "--save-model", str(model)]) == 0
+    capsys.readouterr()
+    assert main(["predict", str(model), path]) == 0
+    assert "windows" in capsys.readouterr().out
+
+
+def test_a_missing_library_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import builtins
+
+    whole = builtins.__import__
+
+    def without(name: str, *args: object, **more: object) -> object:
+        if name.split(".")[0] in ("pyulog", "pymavlink"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name.split(".")[0])
+        return whole(name, *args, **more)  # type: ignore[arg-type]
+
+    paths = [write(kind, tmp_path) for kind in ("ulog", "tlog")]
+    monkeypatch.setattr(builtins, "__import__", without)
+    for path, library in zip(paths, ("pyulog", "pymavlink"), strict=True):
+        assert main(["info", str(path)]) == 2
+        err = capsys.readouterr().err
+        assert len(err.strip().splitlines()) == 1
+        assert f"needs {library}: " in err
+    assert read_autopilot(write("dataflash", tmp_path)).log.format == "dataflash"  # needs none

@@ -1,0 +1,119 @@
+"""A log is judged first: what it is of, what it is good for, which setting to change."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from host.cli import main
+from host.readers.airborne import airborne
+from host.readers.autopilot_flight import read_autopilot
+from host.readers.autopilot_log import AutopilotLog, Messages
+from host.readers.judgement import Judgement, judge
+from host.readers.log_formats import read_messages
+from host.readers.named_channels import Channels
+from host.readers.px4_channels import landed_signal, px4_channels
+
+from tests.host.readers.autopilot_flights import write
+
+BENCH = Path(__file__).parents[2] / "data" / "px4"
+REFUSED = {
+    "sample_log_small.ulg": "PX4 ULog of a VTOL that never flew (airspeed at most 0.0 m/s)",
+    "sample_appended_multiple.ulg": "PX4 ULog of a copter, which does not fly on a wing",
+}
+
+
+@pytest.mark.parametrize("name", sorted(REFUSED))
+@pytest.mark.parametrize("verb", ["identify", "maneuvers"])
+def test_bench_logs_are_refused_in_one_sentence(
+    name: str, verb: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([verb, str(BENCH / name)]) == 6
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = err.strip().splitlines()
+    assert REFUSED[name] in line
+
+
+@pytest.mark.parametrize("name", sorted(REFUSED))
+def test_bench_logs_are_described_and_decoded(
+    name: str,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["info", str(BENCH / name), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert REFUSED[name] in told["judgement"]["refusal"]
+    assert told["airborne_s"] == 0.0
+    assert main(["decode", str(BENCH / name), "-o", "table.csv"]) in (0, 3)
+    assert (tmp_path / "table.csv").read_text().startswith("t_s,p_radps,")
+
+
+def judged(log: AutopilotLog) -> Judgement:
+    """Judge messages of PX4."""
+    found: Channels = px4_channels(log, {})
+    return judge(log, found, airborne(found, landed_signal(log)))
+
+
+def slower(messages: Messages, every: int) -> dict[int, Messages]:
+    """Return every n-th message of a topic."""
+    return {0: Messages(messages.t_s[::every], {k: v[::every] for k, v in messages.fields.items()})}
+
+
+@pytest.fixture(scope="module")
+def px4(tmp_path_factory: pytest.TempPathFactory) -> AutopilotLog:
+    return read_messages(write("ulog", tmp_path_factory.mktemp("px4")))
+
+
+def test_outputs_at_10_hz_name_the_parameter(px4: AutopilotLog) -> None:
+    messages = {**px4.messages, "actuator_servos": slower(px4.messages["actuator_servos"][0], 20)}
+    bad = judged(replace(px4, messages=messages, parameters={**px4.parameters, "SDLOG_PROFILE": 1}))
+    assert "surfaces fast enough" in bad.refusal
+    assert any("SDLOG_PROFILE = 17 (it is 1)" in one for one in bad.settings)
+    assert judged(px4).settings == []
+    assert judged(px4).refusal == ""
+
+
+def test_without_airspeed_what_needs_none_is_told(px4: AutopilotLog) -> None:
+    messages = {k: v for k, v in px4.messages.items() if k != "airspeed_validated"}
+    found = judged(replace(px4, messages=messages))
+    answers = dict(found.answers)
+    assert answers["roll: L_p, L_da"] == "can be told"
+    short = next(v for k, v in answers.items() if k.startswith("short period"))
+    assert short == "cannot be told: airspeed not in the log"
+    assert any("SYS_HAS_NUM_ASPD" in one for one in found.settings)
+
+
+def test_synthetic_airspeed_is_no_sensor(px4: AutopilotLog) -> None:
+    """What PX4 makes of ground speed and wind is not taken for a pitot."""
+    air = px4.messages["airspeed_validated"][0]
+    made = Messages(air.t_s, {**air.fields, "airspeed_source": np.zeros(len(air), dtype=np.int8)})
+    log = replace(px4, messages={**px4.messages, "airspeed_validated": {0: made}})
+    assert "airspeed_mps" not in px4_channels(log, {}).signals
+
+
+def test_an_answer_without_vanes_says_so(px4: AutopilotLog) -> None:
+    answers = dict(judged(px4).answers)
+    drag = next(v for k, v in answers.items() if k.startswith("speed, drag"))
+    assert drag == "cannot be told without vanes: no angle of attack was measured"
+    assert "never under trust" in next(v for k, v in answers.items() if k.startswith("short"))
+
+
+def test_a_plane_that_stays_on_the_ground(px4: AutopilotLog) -> None:
+    """Its own land detector says that it stands: wind on the pitot is no flight."""
+    stands = px4.messages["vehicle_land_detected"][0]
+    fields = {**stands.fields, "landed": np.ones(len(stands), dtype=bool)}
+    messages = {**px4.messages, "vehicle_land_detected": {0: Messages(stands.t_s, fields)}}
+    assert "plane that never flew" in judged(replace(px4, messages=messages)).refusal
+
+
+def test_a_sensor_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write("dataflash", tmp_path)
+    assert main(["info", str(path), "--sensor", "IMU=3"]) == 2
+    assert "no IMU 3; the log has 0" in capsys.readouterr().err
+    assert read_autopilot(path, {"IMU": 0}).channels.signals["q_radps"].source == "IMU[0].GyrY"
