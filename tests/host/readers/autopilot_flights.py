@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
+from host.readers.dataflash_binary import BinaryRecords
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.autopilot_logs import NAMES, write_autopilot_log
 from host.twin.outcome.ideal import true_table
 from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.testcard import cards
+from numpy.typing import NDArray
 
 CARD = {
     "format": 1,
@@ -45,3 +48,8 @@ def write(kind: str, folder: Path, airframe: str = "conventional") -> Path:
     """Write the flight's log of a format."""
     record, data = flown()
     return write_autopilot_log(kind, record, data, folder / "flight", airframe=airframe)
+
+
+def rows_of(found: BinaryRecords, number: int) -> dict[str, NDArray[Any]]:
+    """Return all fields of all records of a kind."""
+    return found.rows(found.kinds[number], found.places[number])

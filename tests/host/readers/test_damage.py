@@ -11,7 +11,7 @@ from host.errors import HostError
 from host.readers.autopilot_flight import read_autopilot
 from host.readers.dataflash_binary import read_records
 
-from tests.host.readers.autopilot_flights import FORMATS, write
+from tests.host.readers.autopilot_flights import FORMATS, rows_of, write
 
 CUTS, FLIPS, SECTOR = 10, 6, 512
 
@@ -71,7 +71,7 @@ def test_a_lost_sector_brings_no_wrong_row(tmp_path: Path) -> None:
     data = whole.read_bytes()
     right = read_records(whole)
     number = next(k for k, kind in right.kinds.items() if kind.name == "IMU")
-    rows = {tuple(row) for row in zip(*(v.tolist() for v in right.rows(number).values()),
+    rows = {tuple(row) for row in zip(*(v.tolist() for v in rows_of(right, number).values()),
                                       strict=True)}  # fmt: skip
     rng = np.random.default_rng(8)
     path = tmp_path / "gap.bin"
@@ -79,7 +79,7 @@ def test_a_lost_sector_brings_no_wrong_row(tmp_path: Path) -> None:
         path.write_bytes(data[:at] + data[at + SECTOR :])
         found = read_records(path)
         assert found.lost
-        own = zip(*(v.tolist() for v in found.rows(number).values()), strict=True)
+        own = zip(*(v.tolist() for v in rows_of(found, number).values()), strict=True)
         assert not {tuple(row) for row in own} - rows
         assert len(found.places[number]) > len(rows) - 20
 

@@ -15,7 +15,7 @@ from host.readers.log_formats import format_of_file
 from host.readers.tlog_messages import read_tlog
 from host.readers.ulog_walk import walk
 
-from tests.host.readers.autopilot_flights import write
+from tests.host.readers.autopilot_flights import rows_of, write
 
 
 def test_dataflash_is_what_pymavlink_reads(tmp_path: Path) -> None:
@@ -32,14 +32,14 @@ def test_dataflash_is_what_pymavlink_reads(tmp_path: Path) -> None:
     assert not found.lost
     numbers = {kind.name: k for k, kind in found.kinds.items()}
     for name in ("IMU", "ATT", "ARSP", "BARO", "GPS", "RCOU", "VIBE", "MODE"):
-        ours = found.rows(numbers[name])
+        ours = rows_of(found, numbers[name])
         assert len(next(iter(ours.values()))) == len(theirs[name]) > 0
         for column, values in ours.items():
             expected = [getattr(m, column) for m in theirs[name]]
             np.testing.assert_allclose(values, np.array(expected, dtype=float), rtol=1e-12)
     read = {m.Name: m.Value for m in theirs["PARM"]}  # type: ignore[attr-defined]
-    names = [n.rstrip(b"\0").decode() for n in found.rows(numbers["PARM"])["Name"]]
-    assert read == dict(zip(names, found.rows(numbers["PARM"])["Value"].tolist(), strict=True))
+    names = [n.rstrip(b"\0").decode() for n in rows_of(found, numbers["PARM"])["Name"]]
+    assert read == dict(zip(names, rows_of(found, numbers["PARM"])["Value"].tolist(), strict=True))
 
 
 def test_the_text_form_is_the_binary_one(tmp_path: Path) -> None:
@@ -51,7 +51,7 @@ def test_the_text_form_is_the_binary_one(tmp_path: Path) -> None:
                      + kind.columns.replace(",", ", "))  # fmt: skip
     numbers = {kind.name: k for k, kind in found.kinds.items()}
     for name in ("IMU", "ATT", "RCOU"):
-        rows = found.rows(numbers[name])
+        rows = rows_of(found, numbers[name])
         for row in zip(*rows.values(), strict=True):
             lines.append(", ".join([name, *(repr(v.item()) for v in row)]))
     path = tmp_path / "flight.log"
@@ -60,7 +60,7 @@ def test_the_text_form_is_the_binary_one(tmp_path: Path) -> None:
     text = read_text_records(path, WANTED)
     assert text.bad_lines == 2
     for name in ("IMU", "ATT", "RCOU"):
-        for column, values in found.rows(numbers[name]).items():
+        for column, values in rows_of(found, numbers[name]).items():
             np.testing.assert_allclose(text.tables[name][column], values, rtol=1e-9)
 
 
@@ -115,5 +115,5 @@ def test_a_head_inside_a_record_is_no_record(tmp_path: Path) -> None:
     ])  # fmt: skip
     found = read_records(path)
     assert [len(found.places[k]) for k in sorted(found.kinds)] == [50, 50, 3]
-    np.testing.assert_array_equal(found.rows(33)["X"], steps * 0.5)
+    np.testing.assert_array_equal(rows_of(found, 33)["X"], steps * 0.5)
     assert not found.lost

@@ -12,13 +12,14 @@ import numpy as np
 from host.arrays import Array
 from host.constants import RAD_PER_DEG
 from host.physical.airdata import KELVIN, density_kgpm3
-from host.readers.ardupilot_outputs import surfaces
+from host.readers.ardupilot_outputs import moves_a_surface, surfaces
 from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.named_channels import (
     STANDARD_DENSITY_KGPM3,
     STANDARD_TEMPERATURE_DEGC,
     Channels,
     instance_of,
+    numbers,
 )
 
 FIX_3D = 3
@@ -38,8 +39,8 @@ def ardupilot_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels
     vibration = instance_of(log, "VIBE", {}, [])
     if vibration is not None:
         shaken = vibration[0].fields
-        axes = [np.asarray(shaken[k], dtype=np.float64) for k in ("VibeX", "VibeY", "VibeZ")]
-        found.vibration_mps2 = float(np.max([np.median(a) for a in axes]))
+        axes = [numbers(shaken[k]) for k in ("VibeX", "VibeY", "VibeZ") if k in shaken]
+        found.vibration_mps2 = max((float(np.median(a)) for a in axes), default=float("nan"))
         clip = shaken.get("Clip", shaken.get("Clip0"))
         if clip is not None and len(clip):
             found.clipped |= {"IMU": many} if (many := int(clip[-1]) - int(clip[0])) > 0 else {}
@@ -75,7 +76,6 @@ def _attitude(log: AutopilotLog, found: Channels) -> None:
 def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
     baro = instance_of(log, "BARO", chosen, found.notes)
     pitot = instance_of(log, "ARSP", chosen, found.notes)
-    rho = None
     if baro is not None and "Press" in baro[0].fields:
         messages, label = baro
         warm = STANDARD_TEMPERATURE_DEGC
@@ -83,23 +83,19 @@ def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
             warm = float(np.median(messages.fields["GndTemp"]))
         elif pitot is not None and "Temp" in pitot[0].fields:
             warm = float(np.median(pitot[0].fields["Temp"]))
-        pressure = np.asarray(messages.fields["Press"], dtype=np.float64)
+        pressure = numbers(messages.fields["Press"])
         found.add("static_pa", messages.t_s, pressure, f"{label}.Press")
-        rho = messages.t_s, density_kgpm3(pressure, np.full(len(pressure), warm + KELVIN))
-        found.add("density_kgpm3", *rho, f"{label}.Press at {warm:.0f} degC")
+        rho = density_kgpm3(pressure, np.full(len(pressure), warm + KELVIN))
+        found.add("density_kgpm3", messages.t_s, rho, f"{label}.Press at {warm:.0f} degC")
         if "Alt" in messages.fields:
             _take(found, "altitude_m", messages, label, "Alt")
     if pitot is None or "Airspeed" not in pitot[0].fields:
         return
     messages, label = pitot
-    indicated = np.asarray(messages.fields["Airspeed"], dtype=np.float64)
+    indicated = numbers(messages.fields["Airspeed"])
     if "H" in messages.fields:
         indicated = np.where(np.asarray(messages.fields["H"]) > 0, indicated, np.nan)
-    share = np.ones(len(indicated))
-    if rho is not None and len(rho[0]) > 1:
-        share = np.sqrt(STANDARD_DENSITY_KGPM3 / np.interp(messages.t_s, *rho))
-    else:
-        found.notes.append("no barometer: airspeed is that of standard density")
+    share = found.true_over_indicated(messages.t_s)
     found.add("airspeed_mps", messages.t_s, indicated * share, f"{label}.Airspeed, true")
     qbar = 0.5 * STANDARD_DENSITY_KGPM3 * indicated**2
     found.add("qbar_pa", messages.t_s, qbar, f"{label}.Airspeed")
@@ -112,7 +108,7 @@ def _gps(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
     messages, label = gps
     fixed = np.asarray(messages.fields.get("Status", np.full(len(messages), FIX_3D))) >= FIX_3D
     speed = np.where(fixed, messages.fields["Spd"], np.nan)
-    course = np.asarray(messages.fields["GCrs"], dtype=np.float64) * RAD_PER_DEG
+    course = numbers(messages.fields["GCrs"]) * RAD_PER_DEG
     found.add("v_north_mps", messages.t_s, speed * np.cos(course), f"{label}.Spd, GCrs")
     found.add("v_east_mps", messages.t_s, speed * np.sin(course), f"{label}.Spd, GCrs")
     if "VZ" in messages.fields:
@@ -125,9 +121,9 @@ def _outputs(log: AutopilotLog, found: Channels) -> None:
     if out is None:
         return
     pulses: dict[int, Array] = {
-        int(name[1:]): np.asarray(values, dtype=np.float64)
+        int(name[1:]): numbers(values)
         for name, values in out.fields.items()
-        if name.startswith("C") and name[1:].isdigit()
+        if name[:1] == "C" and name[1:].isdigit() and moves_a_surface(int(name[1:]), log.parameters)
     }
     made = surfaces(pulses, log.parameters)
     found.output_period_s = 1.0 / max(log.parameters.get("SERVO_RATE", SERVO_HZ), 1.0)
@@ -154,5 +150,5 @@ def _take(
 ) -> None:
     values = messages.fields.get(theirs)
     if values is not None:
-        scaled = np.asarray(values, dtype=np.float64) * gain
+        scaled = numbers(values) * gain
         found.add(ours, messages.t_s, scaled, f"{label}.{theirs}", late_s)

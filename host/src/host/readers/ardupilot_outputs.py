@@ -44,6 +44,11 @@ class Outputs:
     clipped: dict[str, int]
 
 
+def moves_a_surface(number: int, parameters: Mapping[str, float]) -> bool:
+    """Return whether an output, counted from 1, moves a surface or a motor."""
+    return int(parameters.get(f"SERVO{number}_FUNCTION", 0.0)) in SURFACE_FUNCTIONS
+
+
 def surfaces(pulses_us: Mapping[int, Array], parameters: Mapping[str, float]) -> Outputs:
     """Return the surfaces behind the outputs.
 

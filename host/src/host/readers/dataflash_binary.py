@@ -7,6 +7,7 @@ bytes. pymavlink hands it on (tests: oracle on whole logs).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,8 @@ from host.export.dataflash_layout import (
     record_type,
 )
 
-_CHUNK_BYTES = 64 << 20  # scanned at a time; bounds what a large log needs beside its records
+_CHUNK_BYTES = 32 << 20  # read at a time: what a log needs beside the places of its records
+Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,7 @@ class BinaryRecords:
 
     Attributes
     ----------
+    path : Path
     kinds : dict of int to Kind
     places : dict of int to (m,) array
         Offsets of the proven records of each kind.
@@ -51,82 +54,110 @@ class BinaryRecords:
         Ranges that hold no proven record.
     """
 
-    data: NDArray[np.uint8]
+    path: Path
     kinds: dict[int, Kind]
     places: dict[int, IntArray]
     lost: list[tuple[int, int]]
 
-    def rows(self, number: int) -> dict[str, NDArray[Any]]:
-        """Return the fields of all records of a kind, scaled as their letters say."""
-        kind = self.kinds[number]
+    def rows(
+        self, kind: Kind, at: IntArray, wanted: Collection[str] = ()
+    ) -> dict[str, NDArray[Any]]:
+        """Return the wanted fields (all without) of the records of a kind at offsets `at` (m,),
+        scaled as their letters say."""
         layout = record_type(kind.letters, kind.columns)
-        at = self.places[number]
-        body = np.empty((len(at), layout.itemsize), dtype=np.uint8)
-        step = max(1, _CHUNK_BYTES // max(layout.itemsize, 1) // 8)
         span = np.arange(HEAD_BYTES, HEAD_BYTES + layout.itemsize)
-        for first in range(0, len(at), step):
-            body[first : first + step] = self.data[at[first : first + step, None] + span]
-        table = body.reshape(-1).view(layout)
-        found: dict[str, NDArray[Any]] = {}
-        for letter, name in zip(kind.letters, kind.columns.split(","), strict=True):
-            scale = FIELDS[letter][1]
-            values = table[name]
-            found[name] = values * scale if scale not in (0.0, 1.0) else np.array(values)
+        letters = {
+            name: letter
+            for letter, name in zip(kind.letters, kind.columns.split(","), strict=True)
+            if not wanted or name in wanted
+        }
+        found = {name: np.empty((len(at), *layout[name].shape), layout[name].base)
+                 for name in letters}  # fmt: skip
+        for first, data in _chunks(self.path, kind.length):
+            low, high = np.searchsorted(at, (first, first + _CHUNK_BYTES))
+            if low == high:
+                continue
+            body = data[(at[low:high] - first)[:, None] + span]
+            table = body.reshape(-1).view(layout)
+            for name in letters:
+                found[name][low:high] = table[name]
+        for name, letter in letters.items():
+            if (scale := FIELDS[letter][1]) not in (0.0, 1.0):
+                found[name] = found[name] * scale
         return found
 
 
-def read_records(path: Path) -> BinaryRecords:
-    """Find the records of a log."""
-    data: NDArray[np.uint8] = np.zeros(0, dtype=np.uint8)
-    if path.stat().st_size:
-        data = np.asarray(np.memmap(path, dtype=np.uint8, mode="r"))
-    starts = _sync_places(data)
-    kinds = _described(data, starts)
-    lengths = np.zeros(256, dtype=np.int64)
+def read_records(path: Path, progress: Progress | None = None) -> BinaryRecords:
+    """Find the records of a log.
+
+    Parameters
+    ----------
+    path : Path
+    progress : callable, optional
+        Called with the bytes looked at, and those of the file.
+    """
+    size = path.stat().st_size
+    starts, number = _sync_places(path, size, progress)
+    kinds = _described(path, starts[number == FMT_KIND])
+    lengths = np.zeros(256, dtype=np.uint8)
     for k, kind in kinds.items():
         lengths[k] = kind.length
-    number = data[starts + 2] if len(starts) else np.zeros(0, dtype=np.uint8)
-    known = lengths[number] > 0
-    starts, number = starts[known], number[known]
-    ends = starts + lengths[number]
-    whole = ends <= len(data)
-    starts, number, ends = starts[whole], number[whole], ends[whole]
-    kept = _chained(starts, ends, len(data))
-    starts, number, ends = starts[kept], number[kept], ends[kept]
+    length = lengths[number]
+    able = (length > 0) & (starts <= size - length.astype(np.int64))
+    starts, number, length = starts[able], number[able], length[able]
+    kept = _chained(starts, length, size)
+    starts, number, length = starts[kept], number[kept], length[kept]
     places = {k: starts[number == k] for k in kinds}
-    return BinaryRecords(data, kinds, places, _gaps(starts, ends, len(data)))
+    return BinaryRecords(path, kinds, places, _gaps(starts, length, size))
 
 
-def _sync_places(data: NDArray[np.uint8]) -> IntArray:
-    found = []
-    for first in range(0, max(len(data) - 2, 0), _CHUNK_BYTES):
-        part = data[first : first + _CHUNK_BYTES + 2]
-        two = (part[:-2] == SYNC[0]) & (part[1:-1] == SYNC[1])
-        found.append(np.flatnonzero(two) + first)
-    return np.concatenate(found) if found else np.zeros(0, dtype=np.int64)
+def _chunks(path: Path, beyond: int) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    """Yield offset and bytes of each part of a file, with so many of the next one's."""
+    with path.open("rb") as file:
+        for first in range(0, path.stat().st_size, _CHUNK_BYTES):
+            file.seek(first)
+            yield first, np.frombuffer(file.read(_CHUNK_BYTES + beyond), dtype=np.uint8)
 
 
-def _described(data: NDArray[np.uint8], starts: IntArray) -> dict[int, Kind]:
+def _sync_places(
+    path: Path, size: int, progress: Progress | None
+) -> tuple[IntArray, NDArray[np.uint8]]:
+    """Return where a record may begin, and the number of its kind."""
+    places, numbers = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.uint8)]
+    for first, part in _chunks(path, 2):
+        if len(part) > 2:
+            found = np.flatnonzero((part[:-2] == SYNC[0]) & (part[1:-1] == SYNC[1]))
+            places.append(found + first)
+            numbers.append(part[found + 2])
+        if progress is not None:
+            progress(min(first + _CHUNK_BYTES, size), size)
+    return np.concatenate(places), np.concatenate(numbers)
+
+
+def _described(path: Path, starts: IntArray) -> dict[int, Kind]:
     """Return the kinds that FMT records describe; one that nobody understands is left out."""
     layout = record_type(*FMT_FIELDS)
     found = {FMT_KIND: Kind("FMT", *FMT_FIELDS, FMT_BYTES)}
-    for at in starts[data[starts + 2] == FMT_KIND].tolist() if len(starts) else []:
-        raw = data[at + HEAD_BYTES : at + FMT_BYTES].tobytes()
-        if len(raw) < layout.itemsize:
-            continue
-        number, length, name, letters, columns = np.frombuffer(raw, dtype=layout)[0].tolist()
-        try:
-            kind = Kind(name.decode("ascii"), letters.decode("ascii"), columns.decode("ascii"),
-                        length)  # fmt: skip
-            size = record_type(kind.letters, kind.columns).itemsize
-        except (ValueError, UnicodeDecodeError):
-            continue
-        if size + HEAD_BYTES == length and kind.name.isalnum() and number not in found:
-            found[number] = kind
+    with path.open("rb") as file:
+        for at in starts.tolist():
+            file.seek(at + HEAD_BYTES)
+            raw = file.read(layout.itemsize)
+            if len(raw) < layout.itemsize:
+                continue
+            number, length, name, letters, columns = np.frombuffer(raw, dtype=layout)[0].tolist()
+            try:
+                kind = Kind(
+                    name.decode("ascii"), letters.decode("ascii"), columns.decode("ascii"), length
+                )
+                size = record_type(kind.letters, kind.columns).itemsize
+            except (ValueError, UnicodeDecodeError):
+                continue
+            if size + HEAD_BYTES == length and kind.name.isalnum() and number not in found:
+                found[number] = kind
     return found
 
 
-def _chained(starts: IntArray, ends: IntArray, size: int) -> NDArray[np.bool_]:
+def _chained(starts: IntArray, length: NDArray[np.uint8], size: int) -> NDArray[np.bool_]:
     """Return which candidates are records: each ends where another begins, or the file.
 
     A pair of bytes inside a record that looks like a head is no record, for none ends there.
@@ -135,38 +166,40 @@ def _chained(starts: IntArray, ends: IntArray, size: int) -> NDArray[np.bool_]:
     kept = np.zeros(count, dtype=bool)
     if not count:
         return kept
-    after = np.searchsorted(starts, ends)
-    joined = np.zeros(count, dtype=bool)
-    inside = after < count
-    joined[inside] = starts[after[inside]] == ends[inside]
-    joined |= ends == size
-    # Runs in which each candidate is followed by the next one are walked as one.
-    follows = joined & (after == np.arange(count) + 1)
-    follows[-1] = False
+    # Nearly all are followed by the next candidate; only where one is not, others are looked at.
+    follows = np.zeros(count, dtype=bool)
+    for first in range(0, count - 1, _CHUNK_BYTES):
+        end = min(first + _CHUNK_BYTES, count - 1)
+        follows[first:end] = np.diff(starts[first : end + 1]) == length[first:end]
     turns = np.flatnonzero(~follows)
-    again = np.flatnonzero(joined)  # where the chain may be taken up after a break
+    ends = starts[turns] + length[turns]
+    after = np.searchsorted(starts, ends)
+    joined = ends == size
+    inside = after < count
+    joined[inside] |= starts[after[inside]] == ends[inside]
     k = 0
     while k < count:
-        if not joined[k]:
-            nearest = np.searchsorted(again, k)
-            if nearest == len(again):
-                break
-            k = int(again[nearest])
-        last = int(turns[np.searchsorted(turns, k)])
+        turn = int(np.searchsorted(turns, k))
+        last = int(turns[turn])
         kept[k:last] = True
-        if joined[last]:
-            kept[last] = True
-            k = int(after[last])
-            if ends[last] == size:
-                break
-        else:
+        if not joined[turn]:
             k = last + 1
+            continue
+        kept[last] = True
+        k = int(after[turn])
     return kept
 
 
-def _gaps(starts: IntArray, ends: IntArray, size: int) -> list[tuple[int, int]]:
+def _gaps(starts: IntArray, length: NDArray[np.uint8], size: int) -> list[tuple[int, int]]:
     """Return the ranges of the file between records, and behind the last."""
-    edges = np.concatenate([[0], ends])
-    begins = np.concatenate([starts, [size]])
-    open_ = np.flatnonzero(begins > edges)
-    return [(int(edges[k]), int(begins[k] - edges[k])) for k in open_.tolist()]
+    if not len(starts):
+        return [(0, size)] if size else []
+    open_ = np.flatnonzero(np.diff(starts) != length[:-1])
+    found = [(0, int(starts[0]))] if starts[0] else []
+    found += [
+        (at, int(starts[k + 1]) - at)
+        for k in open_.tolist()
+        if (at := int(starts[k]) + int(length[k])) < int(starts[k + 1])
+    ]
+    end = int(starts[-1]) + int(length[-1])
+    return [*found, (end, size - end)] if end < size else found

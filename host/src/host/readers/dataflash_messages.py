@@ -10,16 +10,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from host.progress import progress_bar
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
 from host.readers.dataflash_binary import read_records
 from host.readers.dataflash_text import read_text_records
 from host.readers.plausible_times import plausible
 
-# What is read of a log; all other kinds are counted and left alone.
-WANTED = frozenset(
-    ("IMU", "IMU2", "IMU3", "ATT", "ARSP", "ASP2", "BARO", "BAR2", "GPS", "GPS2", "RCOU", "RCO2",
-     "PARM", "MSG", "VER", "MODE", "VIBE", "DSF", "AOA", "XKF1", "NKF1", "SIDD", "ATRP")
-)  # fmt: skip
+# What is read of a log, and which fields of it (of outputs all).
+_INERTIAL = ("TimeUS", "TimeMS", "I", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
+_AIRSPEED = ("TimeUS", "TimeMS", "I", "Airspeed", "Temp", "H")
+_BARO = ("TimeUS", "TimeMS", "I", "Alt", "Press", "GndTemp")
+_GPS = ("TimeUS", "TimeMS", "I", "Status", "Spd", "GCrs", "VZ")
+WANTED: dict[str, tuple[str, ...]] = {
+    "IMU": _INERTIAL, "IMU2": _INERTIAL, "IMU3": _INERTIAL,
+    "ATT": ("TimeUS", "TimeMS", "Roll", "Pitch", "Yaw"),
+    "ARSP": _AIRSPEED, "ASP2": _AIRSPEED, "BARO": _BARO, "BAR2": _BARO, "GPS": _GPS, "GPS2": _GPS,
+    "RCOU": (), "PARM": ("Name", "Value"), "MSG": ("Message",), "VER": ("FWS",),
+    "VIBE": (), "DSF": ("Dp",),
+}  # fmt: skip
 # The field that numbers the instances of a kind, in the releases that have one.
 INSTANCE = {"IMU": "I", "ARSP": "I", "BARO": "I", "GPS": "I", "VIBE": "IMU", "XKF1": "C"}
 NUMBERED = {"ASP2": ("ARSP", 1), "BAR2": ("BARO", 1)}  # old names of second sensors
@@ -72,12 +80,12 @@ def read_dataflash(path: Path, *, text: bool) -> AutopilotLog:
 
 
 def _binary(path: Path, damage: list[str]) -> tuple[dict[str, dict[str, NDArray[Any]]], int]:
-    found = read_records(path)
-    tables = {
-        kind.name: found.rows(number)
-        for number, kind in found.kinds.items()
-        if kind.name in WANTED and len(found.places[number])
-    }
+    found = read_records(path, progress_bar("reading", path.stat().st_size))
+    tables = {}
+    for number, kind in found.kinds.items():
+        places = found.places.pop(number)  # of a large log too large to be kept
+        if kind.name in WANTED and len(places):
+            tables[kind.name] = found.rows(kind, places, WANTED[kind.name])
     if found.lost:
         at, size = found.lost[0]
         total = sum(size for _, size in found.lost)
@@ -104,20 +112,23 @@ def _add(
     """Add the records of a kind, each instance of its own."""
     if "TimeUS" not in fields and "TimeMS" not in fields:
         return
-    t_s = fields["TimeUS"] * 1e-6 if "TimeUS" in fields else fields["TimeMS"] * 1e-3
+    stamps = fields["TimeUS"] * 1e-6 if "TimeUS" in fields else fields["TimeMS"] * 1e-3
+    t_s = np.asarray(stamps, dtype=np.float64)
     base = re.fullmatch(r"([A-Z]+?)([23])", name)
     called, number = NUMBERED.get(name, (name, 0))
     if base and base[1] in INSTANCE:
         called, number = base[1], int(base[2]) - 1
     which = fields.get(INSTANCE.get(called, ""))
-    instances = [number] if which is None else sorted(set(which.tolist()))
+    instances = [number] if which is None else sorted(set(np.unique(which).tolist()))
     for one in instances:
-        mine = np.ones(len(t_s), dtype=bool) if which is None else which == one
-        kept, wrong = plausible(np.asarray(t_s[mine], dtype=np.float64))
+        alone = which is None or len(instances) == 1
+        mine = np.arange(len(t_s)) if alone else np.flatnonzero(which == one)
+        kept, wrong = plausible(t_s if alone else t_s[mine])
         if wrong:
             damage.append(f"{wrong} records of {called} have an impossible time and were left out")
-        rows = np.flatnonzero(mine)[kept]
-        if len(rows):
+        if kept.any():
+            whole = alone and not wrong  # then nothing is copied: a log may have a gigabyte
+            rows = slice(None) if whole else mine[kept]
             own = {key: values[rows] for key, values in fields.items()}
             messages.setdefault(called, {})[int(one)] = Messages(t_s[rows], own)
 
@@ -143,4 +154,4 @@ def _vehicle(line: str) -> str:
 def _parameters(tables: Mapping[str, Mapping[str, NDArray[Any]]]) -> dict[str, float]:
     found = tables.get("PARM", {})
     names, values = found.get("Name", ()), found.get("Value", ())
-    return {_word(n): float(v) for n, v in zip(names, values, strict=True)}
+    return {_word(n): float(v) for n, v in zip(names, values, strict=False)}

@@ -15,7 +15,7 @@ from host.constants import GRAVITY_MPS2
 from host.physical.airdata import KELVIN, density_kgpm3
 from host.readers.ardupilot_outputs import surfaces
 from host.readers.autopilot_log import AutopilotLog, Messages
-from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of
+from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of, numbers
 
 MILLI = 1e-3
 IMUS = (("RAW_IMU", MILLI), ("SCALED_IMU", MILLI), ("SCALED_IMU2", MILLI), ("HIGHRES_IMU", 1.0))
@@ -43,7 +43,7 @@ def mavlink_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels:
 
 
 def _field(messages: Messages, name: str, gain: float = 1.0) -> Array:
-    return np.asarray(messages.fields[name] * gain, dtype=np.float64)
+    return numbers(messages.fields[name] * gain)
 
 
 def _inertial(log: AutopilotLog, found: Channels) -> None:
@@ -68,7 +68,6 @@ def _inertial(log: AutopilotLog, found: Channels) -> None:
 
 def _air(log: AutopilotLog, found: Channels) -> None:
     pressure, hud = log.first("SCALED_PRESSURE"), log.first("VFR_HUD")
-    rho = None
     if pressure is not None:
         static = np.multiply(_field(pressure, "press_abs"), PASCALS, dtype=np.float64)
         found.add("static_pa", pressure.t_s, static, "SCALED_PRESSURE.press_abs")
@@ -79,9 +78,7 @@ def _air(log: AutopilotLog, found: Channels) -> None:
     if hud is None or (differential is not None and differential == 0.0):
         return  # without a pitot VFR_HUD's airspeed is made of ground speed and wind
     indicated = _field(hud, "airspeed")
-    share = np.ones(len(hud))
-    if rho is not None and pressure is not None:
-        share = np.sqrt(STANDARD_DENSITY_KGPM3 / np.interp(hud.t_s, pressure.t_s, rho))
+    share = found.true_over_indicated(hud.t_s)
     found.add("airspeed_mps", hud.t_s, indicated * share, "VFR_HUD.airspeed, true")
     found.add("qbar_pa", hud.t_s, 0.5 * STANDARD_DENSITY_KGPM3 * indicated**2, "VFR_HUD.airspeed")
 

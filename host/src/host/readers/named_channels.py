@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from host.arrays import Array
 from host.readers.autopilot_log import AutopilotLog, Messages, SensorChoiceError
@@ -22,6 +24,8 @@ RANGES = {
     "v_north_mps": 300.0, "v_east_mps": 300.0, "v_down_mps": 100.0,
     "elevator": 2.0, "aileron": 2.0, "rudder": 2.0, "throttle": 2.0,
 }  # fmt: skip
+
+POSITIVE = ("static_pa", "density_kgpm3")
 
 
 @dataclass(slots=True)
@@ -48,11 +52,23 @@ class Channels:
     output_period_s: float = 0.02
     vibration_mps2: float = float("nan")
 
+    def true_over_indicated(self, t_s: Array) -> Array:
+        """Return true over indicated airspeed at instants; one, and a note, without a density."""
+        density = self.signals.get("density_kgpm3")
+        if density is None:
+            self.notes.append("no barometer: airspeed is that of standard density")
+            return np.ones(len(t_s))
+        seen = np.isfinite(density.values)
+        here = np.interp(t_s, density.t_s[seen], density.values[seen])
+        return np.asarray(np.sqrt(STANDARD_DENSITY_KGPM3 / here))
+
     def add(self, name: str, t_s: Array, values: Array, source: str, late_s: float = 0.0) -> None:
         """Add a channel; values that cannot be are missing, and said."""
-        clean = np.asarray(values, dtype=np.float64).copy()
-        wild = np.abs(clean) > RANGES.get(name, np.inf)
+        clean = numbers(values)
+        limit = RANGES.get(name, np.inf)
+        wild = (clean > limit) | (clean < (0.0 if name in POSITIVE else -limit))
         if wild.any():
+            clean = clean.copy()
             clean[wild] = np.nan
             self.notes.append(
                 f"{name}: {int(wild.sum())} values that no aircraft has count as missing"
@@ -60,6 +76,12 @@ class Channels:
         found = Signal(np.asarray(t_s, dtype=np.float64), clean, source, late_s)
         if found.seen:
             self.signals[name] = found
+
+
+def numbers(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Return values as float64; what a changed bit made of a number is no warning."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(values, dtype=np.float64)
 
 
 def instance_of(

@@ -16,6 +16,11 @@ def plausible(t_s: Array) -> tuple[BoolArray, int]:
     A time far from the median of the five around it was changed: a pause in the log is none, for
     the median lies on the record's own side of it. What then still steps back is left out too.
     """
+    steps = np.diff(t_s)
+    if len(t_s) > 1 and t_s[0] > EARLIEST_S and t_s[-1] < LONGEST_S:
+        usual_s = NEAR_STEPS * float(np.median(steps))
+        if steps.min() >= 0.0 and steps.max() <= max(NEAR_S, usual_s):
+            return np.ones(len(t_s), dtype=bool), 0
     ok = np.isfinite(t_s) & (t_s > EARLIEST_S) & (t_s < LONGEST_S)
     if ok.sum() >= 5:
         kept = t_s[ok]

@@ -14,7 +14,7 @@ from host.arrays import Array
 from host.physical.airdata import KELVIN, density_kgpm3
 from host.readers.ardupilot_outputs import Outputs
 from host.readers.autopilot_log import AutopilotLog, Messages
-from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of
+from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of, numbers
 from host.readers.px4_outputs import MOST_SURFACES, allocated_surfaces, axis_demands
 from host.readers.signals import Signal
 
@@ -62,7 +62,7 @@ def landed_signal(log: AutopilotLog) -> Signal | None:
     messages = log.first("vehicle_land_detected")
     if messages is None or "landed" not in messages.fields:
         return None
-    values = np.asarray(messages.fields["landed"], dtype=np.float64)
+    values = numbers(messages.fields["landed"])
     return Signal(messages.t_s, values, "vehicle_land_detected.landed")
 
 
@@ -70,7 +70,7 @@ def _vector(messages: Messages, field: str, size: int = 3) -> list[Array] | None
     names = [f"{field}[{k}]" for k in range(size)]
     if not all(name in messages.fields for name in names):
         return None
-    return [np.asarray(messages.fields[name], dtype=np.float64) for name in names]
+    return [numbers(messages.fields[name]) for name in names]
 
 
 def _inertial(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
@@ -128,13 +128,13 @@ def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
             ("altitude_m", "baro_alt_meter"),
         ):  # fmt: skip
             if theirs in messages.fields:
-                values = np.asarray(messages.fields[theirs], dtype=np.float64)
+                values = numbers(messages.fields[theirs])
                 found.add(ours, messages.t_s, values, f"{label}.{theirs}")
         if "density_kgpm3" not in found.signals and "static_pa" in found.signals:
             warm = messages.fields.get("baro_temp_celcius", np.full(len(messages), 15.0))
             rho = density_kgpm3(
-                np.asarray(messages.fields["baro_pressure_pa"], dtype=np.float64),
-                np.asarray(warm, dtype=np.float64) + KELVIN,
+                numbers(messages.fields["baro_pressure_pa"]),
+                numbers(warm) + KELVIN,
             )
             found.add("density_kgpm3", messages.t_s, rho, f"{label}.baro_pressure_pa")
     if log.parameters.get("SYS_HAS_NUM_ASPD", 1.0) == 0.0:
@@ -150,7 +150,7 @@ def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
     if best is None:
         return
     _, messages, label = best
-    true = np.asarray(messages.fields["true_airspeed_m_s"], dtype=np.float64)
+    true = numbers(messages.fields["true_airspeed_m_s"])
     measured = messages.fields.get("airspeed_sensor_measurement_valid")
     source = messages.fields.get("airspeed_source", messages.fields.get("selected_airspeed_index"))
     if measured is not None:
@@ -161,7 +161,7 @@ def _air(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
     name = "calibrated_airspeed_m_s"
     name = name if name in messages.fields else "indicated_airspeed_m_s"
     if name in messages.fields and np.isfinite(true).any():
-        speed = np.asarray(messages.fields[name], dtype=np.float64)
+        speed = numbers(messages.fields[name])
         pressure = 0.5 * STANDARD_DENSITY_KGPM3 * np.where(np.isfinite(true), speed, np.nan) ** 2
         found.add("qbar_pa", messages.t_s, pressure, f"{label}.{name}")
 
@@ -183,7 +183,7 @@ def _outputs(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> N
     servos = instance_of(log, "actuator_servos", chosen, found.notes)
     if servos is not None:
         controls = {
-            k: np.asarray(servos[0].fields[f"control[{k}]"], dtype=np.float64)
+            k: numbers(servos[0].fields[f"control[{k}]"])
             for k in range(MOST_SURFACES)
             if f"control[{k}]" in servos[0].fields
         }
@@ -227,9 +227,9 @@ def _throttle(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> 
     motors = instance_of(log, "actuator_motors", chosen, [])
     if motors is not None:
         every = [
-            np.asarray(v, dtype=np.float64)
+            numbers(v)
             for name, v in motors[0].fields.items()
-            if name.startswith("control[") and np.isfinite(np.asarray(v, dtype=np.float64)).any()
+            if name.startswith("control[") and np.isfinite(numbers(v)).any()
         ]
         if every:
             found.add("throttle", motors[0].t_s, np.mean(every, axis=0), f"{motors[1]}.control")
@@ -243,7 +243,7 @@ def _throttle(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> 
     ):
         messages = log.first(topic)
         if messages is not None and field in messages.fields:
-            values = np.asarray(messages.fields[field], dtype=np.float64)
+            values = numbers(messages.fields[field])
             found.add("throttle", messages.t_s, values, f"{topic}.{field}")
             return
 

@@ -42,8 +42,9 @@ def read_ulog(path: Path) -> AutopilotLog:
     from pyulog import ULog
 
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # it prints what it does not know
-            log = ULog(str(path), list(WANTED), disable_str_exceptions=True)
+        # It prints what it does not know, and leaves a file open that it cannot read.
+        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):
+            log = ULog(file, list(WANTED), disable_str_exceptions=True)
     except Exception as error:  # pyulog names no common ancestor of what damaged files raise
         raise NotAutopilotLogError(
             f"{path}: pyulog cannot read it ({type(error).__name__}: {str(error)[:80]}); is the"
