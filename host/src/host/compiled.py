@@ -14,6 +14,7 @@ import importlib.util
 import os
 import shutil
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -26,6 +27,7 @@ Result = TypeVar("Result")
 LOADING_S, S_PER_BYTE = 0.7, 0.0006  # numba's own start, and a kernel by the size of its byte code
 SLOWER = "100 to 400"  # times: the card `calm` in flight 103, the printed Hopfield iteration 410
 KEPT = "kernels"  # folder in the `__pycache__` of the source
+MOST_KEPT = 30  # generated modules of a kind: models that a user tries, about 1 MB each
 
 
 class Kernel(Generic[Arguments, Result]):
@@ -152,6 +154,48 @@ def prefer_machine_code() -> None:
 def has_compiler() -> bool:
     """Return whether numba is installed."""
     return importlib.util.find_spec("numba") is not None
+
+
+def generated_source(text: str, kind: str) -> Path:
+    """Keep a generated module as a file, because numba keeps code of files alone.
+
+    Its name holds a digest of its text: what was generated before is compiled already. The
+    `MOST_KEPT` used last stay.
+
+    Parameters
+    ----------
+    text : str
+    kind : str
+        Begins the name.
+
+    Returns
+    -------
+    Path
+        Of a file, or of none where nobody may write: it is then compiled in every process.
+    """
+    stem = f"{kind}_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    for place in _places(Path(__file__)):
+        path = place / f"{stem}.text"
+        with contextlib.suppress(OSError):
+            place.mkdir(parents=True, exist_ok=True)
+            if not path.is_file():
+                part = path.with_suffix(f".{os.getpid()}")
+                part.write_text(text, encoding="utf-8")
+                part.replace(path)
+            # Read now, not changed: numba keeps code by the date of change.
+            os.utime(path, ns=(time.time_ns(), path.stat().st_mtime_ns))
+            _forget_oldest(place, kind)
+            return path
+    return Path(f"{stem}.text")
+
+
+def _forget_oldest(place: Path, kind: str) -> None:
+    """Remove generated modules that were used longest ago, and their compiled code."""
+    kept = sorted(place.glob(f"{kind}_*.text"), key=lambda path: path.stat().st_atime)
+    for path in kept[:-MOST_KEPT]:
+        path.unlink(missing_ok=True)
+        for code in (path.parent / "__pycache__" / KEPT).glob(f"{path.stem}.*"):
+            shutil.rmtree(code, ignore_errors=True)
 
 
 def _jit(function: FunctionType, reordered: bool, folder: Path | None) -> Any:

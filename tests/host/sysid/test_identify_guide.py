@@ -18,7 +18,7 @@ from host.sysid.models.model_file import read_model
 from tests.host.logs import ROOT
 
 TEXT = (ROOT / "host/IDENTIFY.md").read_text(encoding="utf-8")
-AIRCRAFT, MAP, MODEL, CONSTANTS = re.findall(r"```toml\n(.*?)```", TEXT, re.S)
+AIRCRAFT, MAP, MODEL, CONSTANTS, EQUATIONS = re.findall(r"```toml\n(.*?)```", TEXT, re.S)
 
 
 def mine(folder: Path, text: str = AIRCRAFT) -> str:
@@ -135,3 +135,11 @@ def test_every_option_is_documented(capsys: pytest.CaptureFixture[str]) -> None:
         main(["identify", "--help"])
     helped = set(re.findall(r"--[a-z-]+", capsys.readouterr().out)) - {"--help"}
     assert helped <= set(re.findall(r"--[a-z-]+", TEXT))
+
+
+def test_the_equations_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "equations.toml"
+    path.write_text(EQUATIONS, encoding="utf-8")
+    model = read_model(path)
+    assert model.states == ("alpha_rad", "q_radps")
+    assert model.inputs == ("elevator_rad", "airspeed_mps")

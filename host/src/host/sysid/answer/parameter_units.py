@@ -18,6 +18,9 @@ def parameter_unit(model: LinearModel, name: str) -> str:
     name : str
         A parameter of the model, or of a fit of it (``initial.alpha_rad@1``).
     """
+    stated = model.stated_units().get(name.partition("@")[0], "")
+    if stated:
+        return stated
     kind, _, signal = name.partition("@")[0].partition(".")
     if signal:
         own = _powers(signal)

@@ -15,11 +15,13 @@ import numpy as np
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.output_error_problem import check_shapes
 
 KNOWN_NOISE = ("output-error", "output-error-white")
 OWN_STARTS = ("extended-kalman", "unscented-kalman")
+NONLINEAR = ("output-error", "output-error-white")
 NO_MOTION = 1e-30  # in any unit: an output that moves less holds nothing, and its square underflows
 
 
@@ -159,8 +161,14 @@ def fit(
 
 def _check(method: str, model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:
     """Raise if no method can fit: columns that do not fit the model, outputs that never move."""
-    if not model.parameter_names:
+    own = isinstance(model, NonlinearModel) and model.own_parameters
+    if not (model.parameter_names or own):
         raise IdentificationError(f"model {model.name} has no free parameter: nothing to fit")
+    if isinstance(model, NonlinearModel) and method not in NONLINEAR:
+        raise IdentificationError(
+            f"{method} takes linear models; {model.name} has equations, which"
+            f" {', '.join(NONLINEAR)} take"
+        )
     if model.known_noise and method not in KNOWN_NOISE:
         raise IdentificationError(f"{method} cannot hold known noise; {', '.join(KNOWN_NOISE)} can")
     if (model.known_starts or model.shared_starts) and method in OWN_STARTS:

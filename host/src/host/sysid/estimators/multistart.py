@@ -24,6 +24,7 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import CONDITION_LIMIT
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.nonlinear_problem import NonlinearProblem
 from host.sysid.numerics.output_error import Optimum, minimise
 from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.recursion import simulate
@@ -42,6 +43,8 @@ LEAST_SAMPLES = 50
 def multistart(problem: OutputProblem, theta: Array, *, multiple_starts: bool = True) -> Optimum:
     """Return the best optimum of white-noise output error found from `theta` and other starts.
 
+    Of equations of a user it is the one that is reached from `theta`.
+
     Parameters
     ----------
     problem : OutputProblem
@@ -56,6 +59,8 @@ def multistart(problem: OutputProblem, theta: Array, *, multiple_starts: bool = 
     IdentificationError
         If no start is finite over the maneuvers.
     """
+    if isinstance(problem, NonlinearProblem):
+        return minimise(problem, theta, max_iterations=LAST_SEARCH_ITERATIONS)
     best, failure = _try(problem, None, theta)
     if best is not None and best.converged and not multiple_starts:
         return best

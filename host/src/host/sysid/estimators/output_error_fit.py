@@ -21,6 +21,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.coloured_residuals import coloured_score_covariance
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
+from host.sysid.numerics.nonlinear_problem import output_problem
 from host.sysid.numerics.output_error import unidentifiable_covariance, whitened_sensitivities
 from host.sysid.numerics.output_error_problem import OutputProblem
 
@@ -59,7 +60,7 @@ def fit_output_error(
         If no start is finite, the information is singular, or the noise of records of several
         rates shall have a memory.
     """
-    problem = OutputProblem(model, maneuvers)
+    problem = output_problem(model, maneuvers)
     if coloured_noise:
         _check_rates(maneuvers)
     first = start_values(problem) if start is None else np.asarray(start, dtype=np.float64)
@@ -82,7 +83,7 @@ def fit_output_error(
     covariance = fit.covariance if as_modelled else coloured_output_covariance(problem, fit)
     result = FitResult(
         method="output error" if coloured_noise else "output error (white)",
-        model=model,
+        model=problem.model_at(fit.optimum.theta),
         names=problem.names,
         estimate=fit.optimum.theta,
         covariance=covariance,
@@ -162,12 +163,15 @@ def _warnings(problem: OutputProblem, fit: ArNoiseFit) -> tuple[str, ...]:
 
 
 def coloured_output_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array:
-    """Return M^-1 (sum S' R S) M^-1, the white covariance corrected for coloured residuals.
+    """Return M^-1 (sum S' R S + P) M^-1, the white covariance corrected for coloured residuals.
+
+    P is the precision of the priors.
 
     Morelli & Klein, Journal of Guidance, Control and Dynamics 20 (1997).
     """
     white = fit.covariance_white
-    score_covariance = np.zeros_like(white)
+    # What a prior tells is as uncertain as the prior: data say nothing along its direction.
+    score_covariance = np.diag(problem.prior_precision)
     # Of a clean column and of a coarse step the residuals do not show the noise that counts.
     squares = np.sum([np.sum(r**2, axis=1) for r in fit.optimum.residuals], axis=0)
     unseen = np.where(

@@ -12,6 +12,7 @@ from host.sysid.estimators.regression import regression_equations, solve_least_s
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.nonlinear_problem import NonlinearProblem, output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 
@@ -19,9 +20,12 @@ def start_values(problem: OutputProblem) -> Array:
     """Return the whole start vector of an output-error search.
 
     Equation error gives the common parameters and rate biases if every state is measured and the
-    simulation with them does not diverge; otherwise the model's start values are used.
+    simulation with them does not diverge; otherwise, and of equations of a user, the model's start
+    values are used.
     """
     theta = problem.first_guess()
+    if isinstance(problem, NonlinearProblem):
+        return np.asarray(np.clip(theta, problem.lower, problem.upper), dtype=np.float64)
     estimates = regression_estimates(problem.model, problem.maneuvers)
     better = np.array(
         [estimates.get(name, x) for name, x in zip(problem.names, theta, strict=True)]
@@ -55,4 +59,4 @@ def regression_estimates(model: LinearModel, maneuvers: Sequence[Maneuver]) -> d
 
 def start_values_of(model: LinearModel, maneuvers: Sequence[Maneuver]) -> Array:
     """Return `start_values` of a model and its maneuvers."""
-    return start_values(OutputProblem(model, maneuvers))
+    return start_values(output_problem(model, maneuvers))

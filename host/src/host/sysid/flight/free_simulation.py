@@ -15,9 +15,13 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import SignalFit, signal_fits
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.information_inverse import covariance_from_information
+from host.sysid.numerics.nonlinear_problem import NonlinearProblem, output_problem
 from host.sysid.numerics.output_error_problem import OutputProblem, Response
+
+CONSTANT_ROUNDS = 6  # steps to the constants of each record, where outputs bend in them
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +77,8 @@ def free_simulation(frozen: LinearModel, maneuvers: Sequence[Maneuver]) -> list[
 def estimate_with_constants(problem: OutputProblem, estimate: Array) -> Array | None:
     """Return an estimate with the constants of each maneuver fitted, (P,).
 
-    Outputs are linear in biases and start states: one weighted least-squares step finds them.
+    Outputs are linear in biases and start states: one weighted least-squares step finds them. Of
+    equations of a user several do.
 
     Parameters
     ----------
@@ -88,16 +93,17 @@ def estimate_with_constants(problem: OutputProblem, estimate: Array) -> Array | 
     """
     theta, count = problem.first_guess(), problem.n_common
     theta[:count] = estimate[:count]
-    responses = problem.respond(theta)
-    if responses is None:
-        return None
-    residuals = [problem.residual(k, r.y) for k, r in enumerate(responses)]
-    for number, (response, residual) in enumerate(zip(responses, residuals, strict=True)):
-        constants = response.sensitivities[:, :, count:]
-        weight = 1.0 / np.maximum(np.mean(residual**2, axis=1), 1e-300)
-        step = weighted_fit(residual[:, :, None], constants, weight)[:, 0]
-        theta[problem.columns(number)[count:]] += step
-    problem.release(responses)
+    for _ in range(CONSTANT_ROUNDS if isinstance(problem, NonlinearProblem) else 1):
+        responses = problem.respond(theta)
+        if responses is None:
+            return None
+        residuals = [problem.residual(k, r.y) for k, r in enumerate(responses)]
+        for number, (response, residual) in enumerate(zip(responses, residuals, strict=True)):
+            constants = response.sensitivities[:, :, count:]
+            weight = 1.0 / np.maximum(np.mean(residual**2, axis=1), 1e-300)
+            step = weighted_fit(residual[:, :, None], constants, weight)[:, 0]
+            theta[problem.columns(number)[count:]] += step
+        problem.release(responses)
     return theta
 
 
@@ -127,7 +133,7 @@ def free_responses(
         Its first entries are the common parameters.
     maneuvers : sequence of Maneuver
     """
-    problem = OutputProblem(model, maneuvers)
+    problem = output_problem(model, maneuvers)
     theta = estimate_with_constants(problem, estimate)
     responses = None if theta is None else problem.respond(theta)
     if theta is None or responses is None:
@@ -152,6 +158,8 @@ def frozen_model(model: LinearModel, result: FitResult) -> LinearModel:
 
 def frozen_at(model: LinearModel, theta: Array) -> LinearModel:
     """Return the model frozen at values of its parameters, biases and start states left free."""
+    if isinstance(model, NonlinearModel):
+        return model.frozen_at(theta)
     A, B, C, D = model.matrices(theta)
     value = dict(zip((p.name for p in model.parameters), theta.tolist(), strict=True))
     return replace(
@@ -171,7 +179,7 @@ def frozen_at(model: LinearModel, theta: Array) -> LinearModel:
 
 def _fitted_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
     try:
-        problem = OutputProblem(frozen, [maneuver])
+        problem = output_problem(frozen, [maneuver])
         # Nothing but constants is free here, which the door would refuse.
         best = fit_output_error(
             frozen,
@@ -188,7 +196,12 @@ def _fitted_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
 
 
 def _trimmed_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
-    """Run from equilibrium at the mean of the first moment, at rest before the input."""
+    """Run from equilibrium at the mean of the first moment, at rest before the input.
+
+    Equations of a user start from their first guess.
+    """
+    if isinstance(frozen, NonlinearModel):
+        return _run_of(frozen, maneuver, output_problem(frozen, [maneuver]).first_guess())
     lead = slice(0, max(1, round(LEAD_S / maneuver.dt_s)))
     y, u = maneuver.outputs[lead].mean(axis=0), maneuver.inputs[lead].mean(axis=0)
     known = dict(frozen.known_starts)
@@ -208,7 +221,12 @@ def _trimmed_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
             *(x[frozen.states.index(s)] for s in frozen.initial_states),
         ]
     )
-    simulated = OutputProblem(frozen, [maneuver]).outputs(theta)
+    return _run_of(frozen, maneuver, theta)
+
+
+def _run_of(frozen: LinearModel, maneuver: Maneuver, theta: Array) -> FreeRun:
+    """Run with constants `theta`."""
+    simulated = output_problem(frozen, [maneuver]).outputs(theta)
     if simulated is None:
         return _diverged(frozen, maneuver)
     return FreeRun(simulated[0].T.copy(), _states(frozen, maneuver, theta), _biases(frozen, theta))
@@ -216,6 +234,10 @@ def _trimmed_run(frozen: LinearModel, maneuver: Maneuver) -> FreeRun:
 
 def _states(frozen: LinearModel, maneuver: Maneuver, theta: Array) -> Array:
     """Return the states of the run with constants `theta`, (samples, n)."""
+    problem = output_problem(frozen, [maneuver])
+    if isinstance(problem, NonlinearProblem):
+        run = problem.simulated(theta, problem.substeps, problem.ramp)
+        return np.full((maneuver.samples, len(frozen.states)), np.nan) if run is None else run[0][1]
     n, m = len(frozen.states), len(frozen.inputs)
     bare = replace(
         frozen,
@@ -229,7 +251,7 @@ def _states(frozen: LinearModel, maneuver: Maneuver, theta: Array) -> Array:
     own = np.concatenate([theta[:first], theta[last:]])
     nothing = np.zeros((maneuver.samples, n))
     empty = Maneuver(maneuver.dt_s, maneuver.inputs, nothing, name=maneuver.name)
-    found = OutputProblem(bare, [empty]).outputs(own)
+    found = output_problem(bare, [empty]).outputs(own)
     return np.full((maneuver.samples, n), np.nan) if found is None else found[0].T.copy()
 
 

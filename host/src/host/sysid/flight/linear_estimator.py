@@ -73,6 +73,7 @@ from host.sysid.models.diagnostics import (
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.modal_analysis import Mode, modes
+from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.residual_delays import STANDARD_DELAYS, without_standard_delays
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
@@ -257,6 +258,8 @@ class LinearEstimator:
                 {"multiple_starts": False} if single.startswith("output-error") else {}
             )
             found = fit(single, model, data, **{**calm, **self.options})
+        if isinstance(model, NonlinearModel):
+            model = found.model  # with the tangent at the estimate
         found = replace(found, warnings=(*remarks, *found.warnings))
         left = None
         if trim.known and self.own is None and found.residual_kind in FREE:
@@ -450,6 +453,10 @@ class LinearEstimator:
         if self.own is None and instrument is not None and free:
             model = with_drag_arm(model, trim, instrument)
         method = self.method
+        if isinstance(model, NonlinearModel):
+            if method == GUST:
+                raise IdentificationError(f"{GUST} takes linear models; {model.name} has equations")
+            method = "output-error-white" if method == DEFAULT_METHOD else method
         if method == DEFAULT_METHOD:
             # A filter takes the line between two values of a slow sensor for measurements.
             evenly = not any(m.cut(model).held for m in used)

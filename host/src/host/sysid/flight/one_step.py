@@ -18,7 +18,7 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
-from host.sysid.numerics.output_error_problem import OutputProblem
+from host.sysid.numerics.nonlinear_problem import output_problem
 
 SINGULAR = 1e-12  # of the largest eigenvalue of the scaled information
 
@@ -175,7 +175,7 @@ def _whitened(residuals: Sequence[Array], whiteners: Sequence[Array]) -> list[Ar
 
 
 def _of_outputs(result: FitResult, maneuvers: Sequence[Maneuver]) -> OneStep | None:
-    problem = OutputProblem(result.model, maneuvers)
+    problem = output_problem(result.model, maneuvers)
     theta = problem.first_guess()
     place = {n: k for k, n in enumerate(result.names)}
     known = [(k, place[n]) for k, n in enumerate(problem.names) if n in place]
@@ -199,7 +199,7 @@ def _of_outputs(result: FitResult, maneuvers: Sequence[Maneuver]) -> OneStep | N
         return None
 
     def residuals(model: LinearModel, _: Trim, data: Sequence[Maneuver]) -> list[Array] | None:
-        other = OutputProblem(model, data)
+        other = output_problem(model, data)
         simulated = other.outputs(theta)
         if simulated is None:
             return None

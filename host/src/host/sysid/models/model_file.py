@@ -36,9 +36,8 @@ are known, or the same in all records, and known noise: `model_constants.py`.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
@@ -46,6 +45,14 @@ from host.arrays import Array
 from host.files.quantities import Quantity
 from host.files.user_text import shown
 from host.sysid.identification_error import IdentificationError
+from host.sysid.models.equation_file import KIND, read_equations
+from host.sysid.models.file_parts import (
+    delays_from,
+    names_from,
+    number_from,
+    parameter_from,
+    table_from,
+)
 from host.sysid.models.model_constants import (
     Inputs,
     ModelConstants,
@@ -57,7 +64,6 @@ from host.sysid.models.residual_delays import delays_of
 from host.sysid.models.state_space_model import (
     MATRICES,
     AccelerometerOffset,
-    DelayGroup,
     LinearModel,
     Parameter,
     Term,
@@ -74,9 +80,6 @@ KEYS = {
     "name", "states", "inputs", "outputs", "hold", "state_biases", "output_biases",
     "initial_states", "noise", "parameters", "delays", "levers", "fit", "trim", *MATRICES,
 }  # fmt: skip
-_LARGE = "M_alpha of an indoor model at 10 m/s: -1000 1/s2"
-_NUMBER = Quantity("", -1e6, 1e6, _LARGE)
-_POSITIVE = Quantity("", 0.0, 1e6, _LARGE, above=True)
 _TRIM = {
     "airspeed_mps": Quantity("m/s", 0.5, 2000.0, "indoor models to the X-15"),
     "alpha_rad": Quantity("rad", -1.6, 1.6, "a quarter turn; in degrees it would be larger"),
@@ -93,7 +96,10 @@ def read_model(path: Path) -> LinearModel:
     IdentificationError
         If the file is no TOML or no model; the line says where.
     """
-    return model_from(read_document(path), str(path))
+    document = read_document(path)
+    if document.get("kind") == KIND:
+        return read_equations(path)
+    return model_from(document, str(path))
 
 
 def read_trim(path: Path) -> Trim:
@@ -119,7 +125,9 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         raise IdentificationError(
             f"{source}: unknown key {', '.join(unknown_keys)}; known are {', '.join(sorted(KEYS))}"
         )
-    signals = {key: _names(document, key, source) for key in ("states", "inputs", "outputs")}
+    signals = {
+        key: names_from(document, key, f"{source}: ") for key in ("states", "inputs", "outputs")
+    }
     n, m, p = (len(signals[key]) for key in ("states", "inputs", "outputs"))
     if max(n, m, p) > MOST_SIGNALS:
         raise IdentificationError(
@@ -159,7 +167,7 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         output_biases=constants["output_biases"].own,
         initial_states=starts.own,
         delays=(
-            _delays(document["delays"], used, source)
+            delays_from(document["delays"], used, f"{source}: ")
             if "delays" in document
             else delays_of(signals["outputs"])
         ),
@@ -169,13 +177,6 @@ def model_from(document: Mapping[str, object], source: str = "model") -> LinearM
         shared_starts=starts.shared,
         known_noise=read_noise(document.get("noise", {}), signals["outputs"], f"{source}: noise"),
     )
-
-
-def _names(document: Mapping[str, object], key: str, source: str) -> tuple[str, ...]:
-    value = document.get(key)
-    if not isinstance(value, list) or not all(isinstance(x, str) for x in value):
-        raise IdentificationError(f"{source}: {key} must be a list of signal names")
-    return tuple(cast(list[str], value))
 
 
 def _matrix(
@@ -211,7 +212,7 @@ def parse_entry(entry: object, where: str) -> tuple[float, list[tuple[str, float
             f"{where}: {shown(entry)}, expected a number or a sum of parameters"
         )
     if not isinstance(entry, str):
-        return _number(entry, where), []
+        return number_from(entry, where), []
     constant, pieces, position = 0.0, [], 0
     while position < max(len(entry), 1):
         found = _PIECE.match(entry, position)
@@ -228,7 +229,7 @@ def parse_entry(entry: object, where: str) -> tuple[float, list[tuple[str, float
             constant += sign * float(found["gain"])
         position = found.end()
     for number in (constant, *(gain for _, gain in pieces)):
-        _number(number, where)
+        number_from(number, where)
     return constant, pieces
 
 
@@ -254,23 +255,6 @@ def _constants(
     }
 
 
-def _table(value: object, allowed: Collection[str], where: str) -> dict[str, object]:
-    if not isinstance(value, dict):
-        raise IdentificationError(
-            f"{where}: {shown(value)}, expected a table of {', '.join(allowed)}"
-        )
-    unknown_keys = sorted(set(value) - set(allowed))
-    if unknown_keys:
-        raise IdentificationError(
-            f"{where}: unknown key {', '.join(unknown_keys)}; known are {', '.join(allowed)}"
-        )
-    return value
-
-
-def _number(value: object, where: str, *, positive: bool = False) -> float:
-    return (_POSITIVE if positive else _NUMBER).check(where, value, IdentificationError)
-
-
 def _parameters(value: object, used: list[str], source: str) -> tuple[Parameter, ...]:
     if not isinstance(value, dict):
         raise IdentificationError(f"{source}: [parameters] must be a table")
@@ -280,51 +264,9 @@ def _parameters(value: object, used: list[str], source: str) -> tuple[Parameter,
             f"{source}: parameter {', '.join(unknown)} enters no matrix; those that do are"
             f" {', '.join(used)}"
         )
-    return tuple(_parameter(name, value.get(name, {}), source) for name in used)
-
-
-def _parameter(name: str, value: object, source: str) -> Parameter:
-    where = f"{source}: parameter {name}"
-    if not isinstance(value, dict):
-        return Parameter(name, _number(value, where))
-    settings = _table(value, ("start", "lower", "upper", "prior_sd"), where)
-    numbers = {
-        k: _number(v, f"{where}: {k}", positive=k == "prior_sd") for k, v in settings.items()
-    }
-    lower, upper = numbers.get("lower", -np.inf), numbers.get("upper", np.inf)
-    if not lower < upper:
-        raise IdentificationError(f"{where}: lower {lower:g} is not below upper {upper:g}")
-    start = numbers.setdefault("start", min(max(0.0, lower), upper))
-    if not lower <= start <= upper:
-        raise IdentificationError(
-            f"{where}: start {start:g} is not between lower {lower:g} and upper {upper:g}"
-        )
-    return Parameter(name, **numbers)
-
-
-def _delays(value: object, used: list[str], source: str) -> tuple[DelayGroup, ...]:
-    if not isinstance(value, list):
-        raise IdentificationError(f"{source}: [[delays]] must be a list of tables")
-    result: list[DelayGroup] = []
-    for item in value:
-        table = _table(item, ("name", "outputs", "prior_sd_s", "limit_s"), f"{source}: a delay")
-        name = table.get("name")
-        if not isinstance(name, str):
-            raise IdentificationError(f"{source}: a delay needs name and outputs")
-        where = f"{source}: delay {name}"
-        outputs = _names(table, "outputs", where)
-        if name in used or name in (d.name for d in result):
-            raise IdentificationError(f"{where}: another parameter has this name")
-        twice = [y for y in outputs if any(y in d.outputs for d in result)]
-        if twice:
-            raise IdentificationError(f"{where}: {twice[0]} has a delay already")
-        numbers = {
-            k: _number(table[k], f"{where}: {k}", positive=True)
-            for k in ("prior_sd_s", "limit_s")
-            if k in table
-        }
-        result.append(DelayGroup(name, outputs, **numbers))
-    return tuple(result)
+    return tuple(
+        parameter_from(name, value.get(name, {}), f"{source}: parameter {name}") for name in used
+    )
 
 
 def _levers(value: object, source: str) -> tuple[AccelerometerOffset, ...]:
@@ -333,10 +275,10 @@ def _levers(value: object, source: str) -> tuple[AccelerometerOffset, ...]:
         raise IdentificationError(f"{source}: [[levers]] must be a list of tables")
     result = []
     for item in value:
-        table = _table(item, (*needed, "gain"), f"{source}: a lever")
+        table = table_from(item, (*needed, "gain"), f"{source}: a lever")
         names = [str(table[k]) for k in needed if isinstance(table.get(k), str)]
         if len(names) < len(needed):
             raise IdentificationError(f"{source}: a lever needs output, state and parameter")
-        gain = _number(table.get("gain", 1.0), f"{source}: lever on {names[0]}: gain")
+        gain = number_from(table.get("gain", 1.0), f"{source}: lever on {names[0]}: gain")
         result.append(AccelerometerOffset(names[0], names[1], names[2], gain))
     return tuple(result)

@@ -7,8 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from host.sysid.models.equation_text import equation_text
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.model_constants import OWN
+from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import MATRICES, LinearModel
 from host.sysid.models.templates import Trim
 
@@ -27,6 +29,8 @@ def model_text(
     trim : Trim, optional
         Gives a [trim] table: the condition the model is linearised about, to fly it again.
     """
+    if isinstance(model, NonlinearModel):
+        return equation_text(model, result)
     lines = [f"name = {_text(model.name)}"]
     for key in ("states", "inputs", "outputs"):
         lines.append(f"{key} = {_list(getattr(model, key))}")

@@ -35,6 +35,8 @@ class Parameter:
         Bounds of the search.
     prior_sd : float
         Standard deviation of a Gaussian prior about `start`; infinite means none.
+    unit : str
+        Where a user states it; otherwise the names of signals tell it.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Parameter:
     lower: float = -np.inf
     upper: float = np.inf
     prior_sd: float = np.inf
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,6 +196,7 @@ class LinearModel:
             - {term.parameter for term in self.terms}
             - {lever.parameter for lever in self.accelerometer_offsets}
             - {parameter for _, parameter in self.shared_starts}
+            - self.names_beyond_matrices()
         )
         if unused:
             raise IdentificationError(f"model {self.name}: {', '.join(unused)} enters no matrix")
@@ -207,7 +211,7 @@ class LinearModel:
             ("lever", tuple(x.output for x in self.accelerometer_offsets), self.outputs),
             ("lever", tuple(x.state for x in self.accelerometer_offsets), self.states),
             ("lever", tuple(x.parameter for x in self.accelerometer_offsets), tuple(names)),
-            ("delay", tuple(y for d in self.delays for y in d.outputs), self.outputs),
+            ("delay", tuple(y for d in self.delays for y in d.outputs), self.delayed_signals()),
         ):
             unknown = [x for x in chosen if x not in known]
             if unknown:
@@ -222,6 +226,18 @@ class LinearModel:
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the parameters common to all maneuvers, delays last."""
         return tuple(p.name for p in self.parameters) + tuple(d.name for d in self.delays)
+
+    def names_beyond_matrices(self) -> set[str]:
+        """Return parameters that act elsewhere than in a matrix: none of a linear model."""
+        return set()
+
+    def stated_units(self) -> dict[str, str]:
+        """Return the units of parameters of which the user states them."""
+        return {p.name: p.unit for p in self.parameters if p.unit}
+
+    def delayed_signals(self) -> tuple[str, ...]:
+        """Return the signals that may be delayed."""
+        return self.outputs
 
     def local_names(self, maneuver: int) -> tuple[str, ...]:
         """Names of the constants that belong to one maneuver (counted from 1)."""

@@ -46,7 +46,7 @@ def model_error_signatures(
     theta : Array, shape (P,)
         Common parameters first.
     """
-    model, maneuver = problem.model, problem.maneuvers[number]
+    model, maneuver = problem.model_at(theta), problem.maneuvers[number]
     A, B, C, D = model.matrices(theta[: len(model.parameters)])
     y = response.y.T - response.y.T[0]
     u = maneuver.inputs - maneuver.inputs[0]

@@ -217,6 +217,10 @@ class OutputProblem:
                     theta[place[k]] = maneuver.outputs[0, self.model.outputs.index(state)]
         return theta
 
+    def model_at(self, theta: Array) -> LinearModel:
+        """Return the model that matrices are taken from at an estimate."""
+        return self.model
+
     def respond(self, theta: Array) -> list[Response] | None:
         """Simulate every maneuver with sensitivities; None if a response diverges.
 
@@ -327,6 +331,8 @@ class OutputProblem:
         for k, delay in enumerate(self.model.delays, start=len(self.model.parameters)):
             shift = local[k] / dt_s
             for output in delay.outputs:
+                if output not in self.model.outputs:
+                    continue  # an input, delayed before it drives
                 j = self.model.outputs.index(output)
                 late, by_shift = delay_columns(np.ascontiguousarray(y[j][:, None]), shift)
                 y[j] = late[:, 0]

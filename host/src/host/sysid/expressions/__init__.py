@@ -1,0 +1,1 @@
+"""Expressions of a user's model: grammar, exact slopes, machine code."""

@@ -1,0 +1,210 @@
+"""Runge-Kutta steps of a user's equations, and of the sensitivities of the states.
+
+Templates: `rates`, `rate_slopes`, `readings` and `reading_slopes` are placeholders, in whose place
+`EquationCode.loop` puts the functions of one model. The step is Runge's and Kutta's of fourth
+order; sensitivities are the exact derivatives of that step, so a search sees the slope of the cost
+that it is given (internal differentiation; Bock, in: Modelling of Chemical Reaction Systems, 1981).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from host.arrays import Array, IntArray
+
+STATE_LIMIT = 1e8  # a response beyond it has diverged
+
+
+def rates(x: Array, u: Array, p: Array, c: Array, t: Array, f: Array) -> None:
+    """Write dx/dt into `f`; of a model."""
+    raise NotImplementedError
+
+
+def rate_slopes(
+    x: Array, u: Array, p: Array, c: Array, t: Array, f: Array, fx: Array, fu: Array, fp: Array
+) -> None:
+    """Do the same, with slopes by states, inputs and parameters."""
+    raise NotImplementedError
+
+
+def readings(x: Array, u: Array, p: Array, c: Array, t: Array, y: Array) -> None:
+    """Write the outputs into `y`; of a model."""
+    raise NotImplementedError
+
+
+def reading_slopes(
+    x: Array, u: Array, p: Array, c: Array, t: Array, y: Array, yx: Array, yu: Array, yp: Array
+) -> None:
+    """Do the same, with slopes."""
+    raise NotImplementedError
+
+
+def simulate_equations(
+    start: Array,
+    inputs: Array,
+    p: Array,
+    c: Array,
+    t: Array,
+    bias: Array,
+    dt_s: float,
+    substeps: int,
+    ramp: float,
+    x: Array,
+    y: Array,
+) -> bool:
+    """Simulate states and outputs.
+
+    Parameters
+    ----------
+    start : Array, shape (n,)
+    inputs : Array, shape (samples, m)
+    p, c, t : Array
+        Parameters, constants, tables.
+    bias : Array, shape (n,)
+        Added to the rates.
+    dt_s : float
+    substeps : int
+        Steps from sample to sample.
+    ramp : float
+        Share of the way to the next sample that an input goes within a step: 1 is first-order hold,
+        0 is zero-order hold.
+    x : Array, shape (samples, n)
+        Overwritten.
+    y : Array, shape (samples, p)
+        Overwritten.
+
+    Returns
+    -------
+    bool
+        Whether every state stayed below `STATE_LIMIT`.
+    """
+    n, m = len(start), inputs.shape[1]
+    state, stage, sum_ = start.copy(), np.zeros(n), np.zeros(n)
+    u, f = np.zeros(m), np.zeros(n)
+    h = dt_s / substeps
+    for k in range(len(inputs)):
+        for i in range(n):
+            if not abs(state[i]) < STATE_LIMIT:
+                return False
+            x[k, i] = state[i]
+        readings(state, inputs[k], p, c, t, y[k])
+        if k == len(inputs) - 1:
+            break
+        for s in range(substeps):
+            for i in range(n):
+                stage[i] = state[i]
+                sum_[i] = 0.0
+            for number in range(4):
+                late = 0.0 if number == 0 else (1.0 if number == 3 else 0.5)
+                share = ramp * (s + late) / substeps
+                for j in range(m):
+                    u[j] = inputs[k, j] + share * (inputs[k + 1, j] - inputs[k, j])
+                rates(stage, u, p, c, t, f)
+                weight = 1.0 if number == 0 or number == 3 else 2.0
+                ahead = h if number == 2 else 0.5 * h
+                for i in range(n):
+                    rate = f[i] + bias[i]
+                    sum_[i] += weight * rate
+                    stage[i] = state[i] + ahead * rate
+            for i in range(n):
+                state[i] += h / 6.0 * sum_[i]
+    return True
+
+
+def simulate_with_slopes(
+    start: Array,
+    start_slopes: Array,
+    inputs: Array,
+    input_slopes: Array,
+    input_column: IntArray,
+    p: Array,
+    column: IntArray,
+    c: Array,
+    t: Array,
+    bias: Array,
+    bias_column: IntArray,
+    dt_s: float,
+    substeps: int,
+    ramp: float,
+    x: Array,
+    y: Array,
+    slopes: Array,
+) -> bool:
+    """Simulate states and outputs, and the sensitivities of the outputs.
+
+    Parameters
+    ----------
+    start, inputs, p, c, t, bias, dt_s, substeps, ramp, x, y
+        As of `simulate_equations`.
+    start_slopes : Array, shape (n, w)
+        Of the initial state by each of w unknowns.
+    input_slopes : Array, shape (samples, m)
+        Of each input by its delay.
+    input_column : IntArray, shape (m,)
+        Unknown that is this delay; -1 for none.
+    column : IntArray, shape (parameters,)
+        Unknown that each parameter is; -1 where it is known.
+    bias_column : IntArray, shape (n,)
+        The same for `bias`.
+    slopes : Array, shape (p, samples, w)
+        Overwritten.
+    """
+    n, m, w = len(start), inputs.shape[1], start_slopes.shape[1]
+    outputs, q = y.shape[1], len(column)
+    state, stage, sum_ = start.copy(), np.zeros(n), np.zeros(n)
+    S, T, sum_S, K = start_slopes.copy(), np.zeros((n, w)), np.zeros((n, w)), np.zeros((n, w))
+    u, f = np.zeros(m), np.zeros(n)
+    fx, fu, fp = np.zeros((n, n)), np.zeros((n, m)), np.zeros((n, q))
+    yx, yu, yp = np.zeros((outputs, n)), np.zeros((outputs, m)), np.zeros((outputs, q))
+    h = dt_s / substeps
+    for k in range(len(inputs)):
+        for i in range(n):
+            if not abs(state[i]) < STATE_LIMIT:
+                return False
+            x[k, i] = state[i]
+        reading_slopes(state, inputs[k], p, c, t, y[k], yx, yu, yp)
+        slopes[:, k, :] = np.dot(yx, S)
+        for j in range(q):
+            if column[j] >= 0:
+                slopes[:, k, column[j]] += yp[:, j]
+        for j in range(m):
+            if input_column[j] >= 0:
+                slopes[:, k, input_column[j]] += yu[:, j] * input_slopes[k, j]
+        if k == len(inputs) - 1:
+            break
+        for s in range(substeps):
+            for i in range(n):
+                stage[i] = state[i]
+                sum_[i] = 0.0
+            T[:, :] = S
+            sum_S[:, :] = 0.0
+            for number in range(4):
+                late = 0.0 if number == 0 else (1.0 if number == 3 else 0.5)
+                share = ramp * (s + late) / substeps
+                for j in range(m):
+                    u[j] = inputs[k, j] + share * (inputs[k + 1, j] - inputs[k, j])
+                rate_slopes(stage, u, p, c, t, f, fx, fu, fp)
+                K[:, :] = np.dot(fx, T)
+                for j in range(q):
+                    if column[j] >= 0:
+                        K[:, column[j]] += fp[:, j]
+                for j in range(m):
+                    if input_column[j] >= 0:
+                        slope = input_slopes[k, j]
+                        slope += share * (input_slopes[k + 1, j] - slope)
+                        K[:, input_column[j]] += fu[:, j] * slope
+                for i in range(n):
+                    if bias_column[i] >= 0:
+                        K[i, bias_column[i]] += 1.0
+                weight = 1.0 if number == 0 or number == 3 else 2.0
+                ahead = h if number == 2 else 0.5 * h
+                for i in range(n):
+                    rate = f[i] + bias[i]
+                    sum_[i] += weight * rate
+                    stage[i] = state[i] + ahead * rate
+                sum_S += weight * K
+                T[:, :] = S + ahead * K
+            for i in range(n):
+                state[i] += h / 6.0 * sum_[i]
+            S += h / 6.0 * sum_S
+    return True

@@ -1,0 +1,101 @@
+"""A user's own equations through the whole pipeline: fitted, said, saved, refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.sysid.answer.output_files import OutputPaths
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model_file import read_model
+from host.sysid.numerics.nonlinear_problem import output_problem
+
+import host
+
+TEXT = """\
+kind = "equations"
+name = "pitch with a bend"
+inputs = ["elevator_rad"]
+[definitions]
+lift = "Za*alpha_rad + Zaa*alpha_rad*abs(alpha_rad) + Z0"
+[rates]
+alpha_rad = "q_radps + lift"
+q_radps = "Ma*sin(alpha_rad) + Mq*q_radps + Mde*elevator_rad + M0"
+[outputs]
+alpha_rad = "alpha_rad"
+q_radps = "q_radps + q_bias_radps"
+[parameters]
+Za = { start = -3.0, unit = "1/s" }
+Zaa = 0.0
+Z0 = 0.0
+Ma = -60.0
+Mq = -4.0
+Mde = -60.0
+M0 = 0.0
+q_bias_radps = { each_record = true, prior_sd = 0.05 }
+"""
+TRUTH = {"Za": -5.0, "Zaa": 4.0, "Z0": 0.1, "Ma": -50.0, "Mq": -5.0, "Mde": -60.0, "M0": -0.5}
+BIAS = (0.02, -0.03)
+DT_S = 0.04
+
+
+@pytest.fixture(autouse=True)
+def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run the equations as Python: that takes no compiler's time."""
+    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
+
+
+def flown(model: Path) -> list[pd.DataFrame]:
+    """Return two records of 5 s with noise, each with its bias of the gyro."""
+    rng = np.random.default_rng(3)
+    t = np.arange(120) * DT_S
+    tables = []
+    for number, bias in enumerate(BIAS):
+        u = 0.08 * np.where((t > 1) & (t < 4), np.sign(np.sin((3.0 + number) * t)), 0.0)
+        noise = rng.standard_normal((120, 2)) * [0.002, 0.008]
+        problem = output_problem(read_model(model), [Maneuver(DT_S, u[:, None], noise)])
+        theta = np.array([*TRUTH.values(), 0.0, 0.0, bias])
+        found = problem.outputs(theta)
+        assert found is not None
+        y = found[0].T + noise
+        tables.append(
+            pd.DataFrame({"t_s": t, "elevator_rad": u, "alpha_rad": y[:, 0], "q_radps": y[:, 1]})
+        )
+    return tables
+
+
+def test_two_records_give_the_truth_and_each_its_own_bias(tmp_path: Path) -> None:
+    model = tmp_path / "mine.toml"
+    model.write_text(TEXT, encoding="utf-8")
+    answer = host.identify(flown(model), models=model, from_s=0.0, to_s=5.0)
+    result = answer.linear[0].result
+    half = result.half_width()
+    for name, value in TRUTH.items():
+        k = result.index(name)
+        assert abs(result.estimate[k] - value) < 1.6 * half[k], name
+    for number, value in enumerate(BIAS, start=1):
+        k = result.index(f"q_bias_radps@{number}")
+        assert abs(result.estimate[k] - value) < 2.0 * half[k]
+    assert half[result.index("Ma")] < 2.0
+    document = json.loads(answer.to_json())
+    assert document["answers"][0]["parameters"]["Za"]["unit"] == "1/s"
+    # The tangent: Za + 2 Zaa |alpha|, and the modes that belong to it.
+    assert np.array(document["answers"][0]["A"])[1, 1] == pytest.approx(result.value("Mq"))
+    assert "short period" in answer.to_text()
+    saved = tmp_path / "saved.toml"
+    answer.save(OutputPaths(save_model=saved))
+    starts = {p.name: p.start for p in read_model(saved).parameters}
+    assert starts["Ma"] == pytest.approx(result.value("Ma"))
+
+
+@pytest.mark.parametrize("method", ["equation-error", "filter-error-gust", "hopfield"])
+def test_a_method_of_linear_models_is_refused(tmp_path: Path, method: str) -> None:
+    model = tmp_path / "mine.toml"
+    model.write_text(TEXT, encoding="utf-8")
+    table = flown(model)[0].assign(airspeed_mps=17.0)
+    with pytest.raises(IdentificationError, match="takes linear models; pitch with a bend has"):
+        host.identify(table, models=model, methods=method, from_s=0.0, to_s=5.0)
