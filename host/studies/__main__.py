@@ -20,6 +20,7 @@ from host.sysid.estimators.method_registry import METHODS
 from studies import (
     accuracy,
     coverage,
+    imported_logs,
     methods,
     refusal,
     systems,
@@ -44,6 +45,7 @@ COEFFICIENT_FLIGHTS = (2, 24)
 THESIS_FLIGHTS = (1, 10)
 WINDOW_SEEDS = (3, 50)
 CARD_SEEDS = (1, 50)
+IMPORTED_FLIGHTS = (1, 6)
 
 
 def study_a(stem: Path, size: int) -> list[Path]:
@@ -138,6 +140,15 @@ def study_h(stem: Path, size: int) -> list[Path]:
     return write(tables.windows_table(cases), windows_figure(cases), stem)
 
 
+def study_i(stem: Path, size: int) -> list[Path]:
+    """The same flights as our logger, PX4 and ArduPilot had logged them."""
+    from studies.figures import imported_figure
+
+    first = imported_logs.FIRST_SEED
+    found = list(imported_logs.study(range(first, first + IMPORTED_FLIGHTS[size])))
+    return write(tables.imported_table(found), imported_figure(found), stem)
+
+
 STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
     "a_thesis": study_a,
     "b_accuracy": study_b,
@@ -147,6 +158,7 @@ STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
     "f_thesis_flights": study_f,
     "g_methods": study_g,
     "h_windows": study_h,
+    "i_imported_logs": study_i,
 }
 
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from studies.accuracy import Accuracy
 from studies.coverage import Coverage
+from studies.imported_logs import Told
 from studies.methods import Score
 from studies.refusal import SURE, Agreement
 from studies.thesis import HopfieldRun
@@ -203,4 +204,19 @@ def windows_figure(cases: Sequence[Compared]) -> Figure:
         axis.set_xticks(shown, [labels[k] for k in shown], fontsize=6, rotation=60)
         axis.set_title(title, fontsize=9)
         axis.legend(fontsize=7)
+    return figure
+
+
+def imported_figure(found: Sequence[Told]) -> Figure:
+    """Draw the error of every coefficient over its half-width, by the log it came from."""
+    figure = Figure(figsize=(9, 4.6))
+    axis = figure.subplots()
+    sources = list(dict.fromkeys(t.source for t in found))
+    for k, source in enumerate(sources):
+        over = [(t.value - t.true) / t.half_width for t in found if t.source == source]
+        axis.plot(np.full(len(over), k), over, ".", color="C0", ms=4)
+    for edge in (-1.0, 1.0):
+        axis.axhline(edge, color="C3", lw=0.8, ls="--")
+    axis.set_xticks(range(len(sources)), sources, fontsize=7, rotation=40)
+    axis.set_title("error over 95 % half-width", fontsize=9)
     return figure

@@ -9,6 +9,7 @@ from host.sysid.models.diagnostics import GRADES
 
 from studies.accuracy import Accuracy
 from studies.coverage import Coverage
+from studies.imported_logs import Told, rows
 from studies.methods import Score
 from studies.refusal import Agreement, Repeated, agreement_text
 from studies.report import Table
@@ -183,4 +184,20 @@ def windows_table(cases: Sequence[Compared]) -> Table:
         ),
         "Errors of linear records are in Cramer-Rao bounds of the whole record, those of cards over"
         " the truth. Missed: flights without a window.",
+    )  # fmt: skip
+
+
+def imported_table(found: Sequence[Told]) -> Table:
+    """Return what each log of the same flights tells, a row per format and airframe."""
+    return Table(
+        "The same flights as our logger, PX4 and ArduPilot had logged them",
+        (
+            "log", "told", "held %", "agrees with the own log %", "half-width over the own log's",
+            "median error %",
+        ),
+        tuple(rows(list(found))),
+        "Nine principal coefficients of each flight (eight with elevons). Held: the 95 % interval"
+        " holds the truth. Agrees: differs from our own log's by less than the joint interval."
+        " Imports have no vanes, and no error of an instrument in their intervals: nothing of them"
+        " is under trust.",
     )  # fmt: skip

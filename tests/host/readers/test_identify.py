@@ -30,6 +30,8 @@ def test_a_short_period_without_vanes_holds_the_truth(tmp_path: Path) -> None:
         assert row["half_width"] < 0.4 * abs(true[name]), name
     for name in ("Z_alpha", "Z_de", "M_alpha"):
         assert table.loc[name, "verdict"] == "do not rely on"
+    # No error of an instrument is in the intervals: nothing may be trusted, however narrow.
+    assert "trust" not in set(found.table["verdict"])
     lateral = found.table.loc["lateral"]
     assert set(lateral.loc[["Y_beta", "L_beta", "N_beta"], "verdict"]) == {"do not rely on"}
     text = found.to_text()

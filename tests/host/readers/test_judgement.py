@@ -83,7 +83,7 @@ def test_without_airspeed_what_needs_none_is_told(px4: AutopilotLog) -> None:
     messages = {k: v for k, v in px4.messages.items() if k != "airspeed_validated"}
     found = judged(replace(px4, messages=messages))
     answers = dict(found.answers)
-    assert answers["roll: L_p, L_da"] == "can be told"
+    assert answers["roll: L_p, L_da"] == "can be told, without vanes never under trust"
     short = next(v for k, v in answers.items() if k.startswith("short period"))
     assert short == "cannot be told: airspeed not in the log"
     assert any("SYS_HAS_NUM_ASPD" in one for one in found.settings)

@@ -155,14 +155,8 @@ def _verdict(needs: Sequence[str], rates: Mapping[str, float], poor: Sequence[st
     if gone:
         return f"cannot be told: {', '.join(n.rsplit('_', 1)[0] for n in gone)} not in the log"
     slow = [g for g in poor if set(GROUPS[g]) & set(needs)]
-    told = "can be told" + (", without vanes never under trust" if _hidden(needs, rates) else "")
+    told = "can be told" + ("" if "alpha_rad" in rates else ", without vanes never under trust")
     return f"poorly: {', '.join(slow)} too slow" if slow else told
-
-
-def _hidden(needs: Sequence[str], rates: Mapping[str, float]) -> bool:
-    """Return whether an answer rests on an angle that only accelerations tell."""
-    by = {"az_mps2": "alpha_rad", "ay_mps2": "beta_rad"}
-    return any(angle not in rates for force, angle in by.items() if force in needs)
 
 
 def _trouble(found: Channels, log: AutopilotLog) -> list[str]:

@@ -42,6 +42,7 @@ CHECKS = {
     "altitude-against-climb": "altitude against vertical speed",
     "stuck-sensor": "a sensor moves where kinematics says that it must",
     "surface-rate": "outputs are logged as often as servos take them",
+    "instrument-errors": "errors of sensors and servos are in the intervals",
     "flow-angles": "vanes measured angle of attack and sideslip",
     "small-inputs": "a surface moves enough for a maneuver to be found",
     "calibration": "sensor errors are as small as their file says",

@@ -51,6 +51,19 @@ def without_vanes(
     )
 
 
+def uncarried_finding(columns: Collection[str]) -> Finding:
+    """Return the finding that no error of an instrument is in the intervals of a flight, so that
+    nothing of it is under "trust"."""
+    names = ("p_radps", "q_radps", "r_radps", "elevator_rad", "aileron_rad", "rudder_rad")
+    return Finding(
+        "instrument-errors",
+        tuple(name for name in names if name in columns),
+        "without vanes the flight path is not reconstructed, and what sensors and servos may be"
+        " wrong by is in no interval",
+        done="intervals count noise, gusts and the model's lack only",
+    )
+
+
 def no_vanes_finding(columns: Collection[str]) -> list[Finding]:
     """Return a finding where an angle is missing and may be told otherwise, so that nothing of it
     is under "trust"."""

@@ -20,7 +20,7 @@ from host.sysid.compatibility.servo_response import surface_positions
 from host.sysid.flight.agreement_findings import calibration_findings, disagreement
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
-from host.sysid.flight.hidden_angles import no_vanes_finding
+from host.sysid.flight.hidden_angles import no_vanes_finding, uncarried_finding
 from host.sysid.flight.maneuver_selection import select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.flight.small_inputs import whole_flight
@@ -87,6 +87,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         findings.append(disagreement(error, columns))
     except IdentificationError as error:
         notes.append(str(error))
+        findings += [uncarried_finding(columns)] if read.shares else []
     findings = [f.accept() if f.check in how.accept and f.channels else f for f in findings]
     flight = reconstruct_flight(
         columns,

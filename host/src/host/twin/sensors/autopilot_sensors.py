@@ -22,6 +22,10 @@ from host.twin.sensors.sensor_delays import sensor_delays
 DLPF = 3  # 42 Hz, as autopilots filter their IMU by default: 4.8 ms
 BARO_NOISE_PA, PITOT_NOISE_PA = 3.0, 1.5  # MS5611 and MS4525DO at the rates below
 SPEED_NOISE_MPS = 0.1
+FIRST_S = 0.05
+# An autopilot logs its outputs in the loop that sets them: here when the rudder's pulse has ended,
+# 6 ms into the receiver's frame.
+FIRST_OUTPUT_S = 0.046
 EARTH_RADIUS_M = 6_371_000.0
 HOME_DEG = (30.1, 31.4)
 SEA_LEVEL_DENSITY_KGPM3 = 1.225
@@ -127,7 +131,7 @@ def autopilot_senses(record: FlightRecord, data: AirData, rates: Rates) -> Sense
         latitude_deg=HOME_DEG[0] + north[:, 0] / metres,
         longitude_deg=HOME_DEG[1] + north[:, 1] / (metres * np.cos(np.deg2rad(HOME_DEG[0]))),
         height_m=-north[:, 2],
-        outputs_s=_instants(record, rates.outputs),
+        outputs_s=_instants(record, rates.outputs, FIRST_OUTPUT_S),
     )
 
 
@@ -137,5 +141,5 @@ def pressure_height_m(static_pa: Array) -> Array:
     return np.asarray(44_330.0 * (1.0 - share**0.190263))
 
 
-def _instants(record: FlightRecord, rate_hz: float) -> Array:
-    return np.arange(0.05, record.t_s[-1] - 0.02, 1.0 / rate_hz)
+def _instants(record: FlightRecord, rate_hz: float, first_s: float = FIRST_S) -> Array:
+    return np.arange(first_s, record.t_s[-1] - 0.02, 1.0 / rate_hz)
