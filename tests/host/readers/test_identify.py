@@ -88,7 +88,9 @@ def test_every_verb_takes_it(
     assert main(["decode", path, "-o", "table.csv"]) == 0
     assert "wrote        table.csv" in capsys.readouterr().out
     assert main(["maneuvers", path, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["maneuvers"]
+    told = json.loads(capsys.readouterr().out)
+    assert "of which 57.3 deg stand for all" in told["notes"][-1]
+    found = told["maneuvers"]
     axes = [m["axis"] for m in found]
     assert axes.count("elevator_rad") == 3
     assert axes.count("aileron_rad") == 2

@@ -15,7 +15,7 @@ from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.judgement import Judgement, judge
 from host.readers.log_formats import read_messages
 from host.readers.named_channels import Channels
-from host.readers.px4_channels import landed_signal, px4_channels
+from host.readers.px4_channels import not_flying_signals, px4_channels
 
 from tests.host.readers.autopilot_flights import write
 
@@ -57,7 +57,7 @@ def test_bench_logs_are_described_and_decoded(
 def judged(log: AutopilotLog) -> Judgement:
     """Judge messages of PX4."""
     found: Channels = px4_channels(log, {})
-    return judge(log, found, airborne(found, landed_signal(log)))
+    return judge(log, found, airborne(found, not_flying_signals(log)))
 
 
 def slower(messages: Messages, every: int) -> dict[int, Messages]:
@@ -110,6 +110,15 @@ def test_a_plane_that_stays_on_the_ground(px4: AutopilotLog) -> None:
     fields = {**stands.fields, "landed": np.ones(len(stands), dtype=bool)}
     messages = {**px4.messages, "vehicle_land_detected": {0: Messages(stands.t_s, fields)}}
     assert "plane that never flew" in judged(replace(px4, messages=messages)).refusal
+
+
+def test_a_vtol_on_its_rotors_does_not_fly(px4: AutopilotLog) -> None:
+    status = px4.messages["vehicle_status"][0]
+    for kind, refused in ((1, True), (2, False)):
+        fields = {**status.fields, "vehicle_type": np.full(len(status), kind)}
+        messages = {**px4.messages, "vehicle_status": {0: Messages(status.t_s, fields)}}
+        found = judged(replace(px4, vehicle="vtol", messages=messages))
+        assert ("a VTOL that never flew" in found.refusal) is refused
 
 
 def test_a_sensor_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,14 +24,14 @@ class Airborne:
     by: str
 
 
-def airborne(found: Channels, landed: Signal | None = None) -> Airborne:
-    """Return how long an aircraft flew.
+def airborne(found: Channels, not_flying: Sequence[Signal] = ()) -> Airborne:
+    """Return how long an aircraft flew on its wing.
 
     Parameters
     ----------
     found : Channels
-    landed : Signal, optional
-        Above 0.5 where the autopilot itself says that it stands.
+    not_flying : sequence of Signal
+        Above 0.5 where the autopilot itself says that it stands, or hovers.
     """
     speeds = _speeds(found)
     if not speeds:
@@ -41,9 +42,9 @@ def airborne(found: Channels, landed: Signal | None = None) -> Airborne:
         width = max(3, round(0.5 / max(float(np.median(np.diff(t_s))), 1e-3)) | 1)
         smooth = _median(speed, width)
         flying = smooth > FLYING_MPS
-        if landed is not None:
-            at = np.clip(np.searchsorted(landed.t_s, t_s, side="right") - 1, 0, None)
-            flying &= ~(landed.values[at] > 0.5)
+        for other in not_flying:
+            at = np.clip(np.searchsorted(other.t_s, t_s, side="right") - 1, 0, None)
+            flying &= ~(other.values[at] > 0.5)
         time_s = _time_s(t_s, flying)
         one = Airborne(time_s if time_s >= LEAST_S else 0.0, float(np.max(smooth)), by)
         best = max(best, one, key=lambda a: (a.time_s, a.fastest_mps))

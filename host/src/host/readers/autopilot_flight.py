@@ -18,7 +18,7 @@ from host.readers.judgement import Judgement, judge
 from host.readers.log_formats import format_of_file, read_messages
 from host.readers.mavlink_channels import mavlink_channels
 from host.readers.named_channels import Channels
-from host.readers.px4_channels import landed_signal, px4_channels
+from host.readers.px4_channels import not_flying_signals, px4_channels
 from host.readers.signals import Signal
 
 SURFACES = ("elevator", "aileron", "rudder")
@@ -120,18 +120,18 @@ def read_autopilot(path: Path, sensors: Mapping[str, int] | None = None) -> Auto
         If an extra is missing.
     """
     log = read_messages(regular_file(path))
-    channels, landed = _channels(log, dict(sensors or {}))
-    flown = airborne(channels, landed)
+    channels, not_flying = _channels(log, dict(sensors or {}))
+    flown = airborne(channels, not_flying)
     return AutopilotFlight(log, channels, flown, judge(log, channels, flown))
 
 
-def _channels(log: AutopilotLog, sensors: Mapping[str, int]) -> tuple[Channels, Signal | None]:
-    """Return the channels, and where the autopilot says that it stands."""
+def _channels(log: AutopilotLog, sensors: Mapping[str, int]) -> tuple[Channels, list[Signal]]:
+    """Return the channels, and where the autopilot says that it does not fly on its wing."""
     if log.format == "ulog":
-        return px4_channels(log, sensors), landed_signal(log)
+        return px4_channels(log, sensors), not_flying_signals(log)
     if log.format == "tlog":
-        return mavlink_channels(log, sensors), None
-    return ardupilot_channels(log, sensors), None
+        return mavlink_channels(log, sensors), []
+    return ardupilot_channels(log, sensors), []
 
 
 def chosen_sensors(given: list[str]) -> dict[str, int]:

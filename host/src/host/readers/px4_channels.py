@@ -18,6 +18,7 @@ from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instan
 from host.readers.px4_outputs import MOST_SURFACES, allocated_surfaces, axis_demands
 from host.readers.signals import Signal
 
+FIXED_WING = 2  # vehicle_status.VEHICLE_TYPE_FIXED_WING
 USABLE_HZ = 18.0  # a topic that comes slower is used only if no other has the channel
 RATES = ("p_radps", "q_radps", "r_radps")
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
@@ -57,13 +58,18 @@ def px4_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels:
     return found
 
 
-def landed_signal(log: AutopilotLog) -> Signal | None:
-    """Return where the autopilot says that it stands on the ground."""
+def not_flying_signals(log: AutopilotLog) -> list[Signal]:
+    """Return where the autopilot says that it stands on the ground or, of a VTOL, on its rotors."""
+    found = []
     messages = log.first("vehicle_land_detected")
-    if messages is None or "landed" not in messages.fields:
-        return None
-    values = numbers(messages.fields["landed"])
-    return Signal(messages.t_s, values, "vehicle_land_detected.landed")
+    if messages is not None and "landed" in messages.fields:
+        landed = numbers(messages.fields["landed"])
+        found.append(Signal(messages.t_s, landed, "vehicle_land_detected.landed"))
+    status = log.first("vehicle_status")
+    if log.vehicle == "vtol" and status is not None and "vehicle_type" in status.fields:
+        hovers = np.asarray(status.fields["vehicle_type"]) != FIXED_WING
+        found.append(Signal(status.t_s, numbers(hovers), "vehicle_status.vehicle_type"))
+    return found
 
 
 def _vector(messages: Messages, field: str, size: int = 3) -> list[Array] | None:

@@ -97,7 +97,12 @@ def read_columns(
     found = read_flight_columns(
         source, mapping, calibration=calibration, also=also, sensors=sensors
     )
-    return found.columns, [*found.notes, *(finding.line for finding in found.findings)]
+    notes = [*found.notes, *(finding.line for finding in found.findings)]
+    if found.shares:
+        notes.append(
+            f"{', '.join(found.shares)}: shares of full travel, of which 57.3 deg stand for all"
+        )
+    return found.columns, notes
 
 
 def read_flight_columns(
