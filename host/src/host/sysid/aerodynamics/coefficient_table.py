@@ -6,7 +6,7 @@ reference sizes is added to that of the fit.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -174,12 +174,19 @@ def _perturbed_mass_properties(
 def trim_of(columns: dict[str, Array]) -> tuple[Trim, Condition]:
     """Return trim and condition as means of a cut of a flight table.
 
-    Without `airspeed_mps` the airspeed is NaN: not known.
+    Without `airspeed_mps` the airspeed is NaN: not known. Without `alpha_rad` the angle of attack
+    is the pitch over the path, which `v_down_mps` tells, or level flight.
     """
     mean = {name: float(np.mean(values)) for name, values in columns.items()}
     speed = mean.get("airspeed_mps", float("nan"))
     qbar = mean.get("qbar_pa", 0.5 * mean.get("density_kgpm3", 1.225) * speed**2)
-    return (
-        Trim(speed, mean.get("alpha_rad", 0.0), mean.get("theta_rad", mean.get("alpha_rad", 0.0))),
-        Condition(speed, qbar),
-    )
+    alpha = mean["alpha_rad"] if "alpha_rad" in mean else _pitch_over_path(mean, speed)
+    return Trim(speed, alpha, mean.get("theta_rad", alpha)), Condition(speed, qbar)
+
+
+def _pitch_over_path(mean: Mapping[str, float], airspeed_mps: float) -> float:
+    """Return the angle of attack by pitch and path; zero if nothing tells."""
+    if not airspeed_mps > 0.0 or "theta_rad" not in mean:
+        return 0.0
+    sine = -mean.get("v_down_mps", 0.0) / airspeed_mps
+    return float(mean["theta_rad"] - np.arcsin(np.clip(sine, -0.5, 0.5)))
