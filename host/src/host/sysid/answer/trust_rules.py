@@ -60,7 +60,7 @@ def fit_fails(answer: Answer, evidence: Evidence) -> list[Doubt]:
     return [
         one
         for fit in answer.fits
-        if not fit.nrmse < FAILS and not (fit.nrmse < WORSE_THAN_NONE and fit.ljung_box_p > WHITE_P)
+        if fails(fit)
         for one in _about(
             answer, [fit.name], f"the fit fails in {fit.name} (NRMSE {percent(fit.nrmse)})"
         )
@@ -153,15 +153,20 @@ RULES: tuple[Rule, ...] = (
 def unpredicted(answer: Answer) -> list[SignalFit]:
     """Return the outputs of unseen maneuvers that the model does not predict.
 
-    Half of an output's deviation is a failure whatever is allowed: noise as slow as a phugoid
-    allows anything.
+    Half of an output's deviation is a failure whatever is allowed, but for white noise: noise as
+    slow as a phugoid allows anything.
     """
     allowed = answer.predictions
     return [
         f
         for f in answer.validation
-        if not f.nrmse < FAILS or (f.name in allowed and not allowed[f.name].holds)
+        if fails(f) or (f.name in allowed and not allowed[f.name].holds)
     ]
+
+
+def fails(fit: SignalFit) -> bool:
+    """Return whether an output is not explained, and not because a sensor is noisy."""
+    return not fit.nrmse < FAILS and not (fit.nrmse < WORSE_THAN_NONE and fit.ljung_box_p > WHITE_P)
 
 
 def uncarried_states(answer: Answer) -> dict[str, str]:

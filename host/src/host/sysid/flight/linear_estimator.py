@@ -74,7 +74,11 @@ from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.modal_analysis import Mode, modes
 from host.sysid.models.nonlinear_model import NonlinearModel
-from host.sysid.models.residual_delays import STANDARD_DELAYS, without_standard_delays
+from host.sysid.models.residual_delays import (
+    STANDARD_DELAYS,
+    delays_of,
+    without_standard_delays,
+)
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
@@ -178,6 +182,12 @@ class LinearEstimate:
         """All parameters, (P,)."""
         return self.fit.estimate + (0.0 if self.departure is None else self.departure.step)
 
+    def at_trim(self, estimate: Array) -> list[Maneuver]:
+        """Return the maneuvers as if airspeed and attitude had not varied."""
+        if self.departure is None:
+            return list(self.maneuvers)
+        return self.departure.removed_from(self.maneuvers, estimate)
+
 
 @dataclass(frozen=True)
 class LinearIntervals:
@@ -196,6 +206,7 @@ class LinearIntervals:
 class LinearValidation:
     """Free simulation of the maneuvers fitted, and of those held out.
 
+    Departures from the trim are as measured: airspeed and attitude in products with what moves.
     `predictions` sets the error of each output held out beside what noise and covariance allow.
     """
 
@@ -315,12 +326,7 @@ class LinearEstimator:
         fit_at_trim = e.fit if e.departure is None else e.departure.corrected(e.fit)
         statistical = inflate_covariance(fit_at_trim, maneuver_agreement(fit_at_trim))
         # Airspeed that varied is known: what it does is no model error.
-        at_trim = (
-            e.maneuvers
-            if e.departure is None
-            else e.departure.removed_from(e.maneuvers, e.estimate)
-        )
-        free = free_responses(e.model, e.estimate, at_trim)
+        free = free_responses(e.model, e.estimate, e.at_trim(e.estimate))
         coherence = excess = None
         if free is not None:
             coherence = input_coherence(free.problem, free.responses, free.theta)
@@ -349,9 +355,20 @@ class LinearEstimator:
         )
         same = ours and not intervals.shifts
         frozen = frozen_model(e.model, total)
-        simulated = list(total.fitted) if same else free_simulation(frozen, e.maneuvers)
-        held_out = [m.cut(e.model) for m in e.held_out]
-        unseen = free_simulation(frozen, held_out)
+        simulated = (
+            list(total.fitted)
+            if same
+            else _simulated(frozen, e.maneuvers, e.at_trim(total.estimate))
+        )
+        held_out = [_without_delays(m.cut(e.model), e.model, e.delays) for m in e.held_out]
+        at_trim = (
+            held_out
+            if e.departure is None
+            else e.departure.removed_from_unseen(
+                held_out, [m.inside() for m in e.held_out], total.estimate
+            )
+        )
+        unseen = _simulated(frozen, held_out, at_trim)
         return LinearValidation(
             tuple(simulated),
             fits_of(e.model, e.maneuvers, simulated),
@@ -466,6 +483,23 @@ class LinearEstimator:
             if self.own is None and method != GUST and self.template == "lateral":
                 model = without_attitude(model, used)
         return model, method, remarks
+
+
+def _simulated(
+    frozen: LinearModel, maneuvers: Sequence[Maneuver], at_trim: Sequence[Maneuver]
+) -> list[Array]:
+    """Return a free simulation, constants fitted at the trim, with the departures from it."""
+    return [
+        y + m.outputs - still.outputs
+        for y, m, still in zip(free_simulation(frozen, at_trim), maneuvers, at_trim, strict=True)
+    ]
+
+
+def _without_delays(
+    maneuver: Maneuver, model: LinearModel, delays: Mapping[str, tuple[float, float]]
+) -> Maneuver:
+    late = replace(model, delays=delays_of(model.outputs))
+    return advance_outputs(maneuver, late, {name: value for name, (value, _) in delays.items()})
 
 
 def maneuvers_of(columns: Mapping[str, Array]) -> list[tuple[DetectedManeuver, Grade]]:

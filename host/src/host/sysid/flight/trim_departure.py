@@ -45,14 +45,17 @@ class Departure:
     shares : Array, shape (maneuvers, P)
         By how much each maneuver moves the joint estimate.
     remainders : tuple of ShiftedEstimate
+    varying : VaryingModel
+        What makes further inputs of the departures.
     model : LinearModel
-        With what is known of the departures as further inputs.
-    maneuvers : tuple of Maneuver
         With these inputs.
+    maneuvers : tuple of Maneuver
+        Those fitted, with these inputs.
     """
 
     shares: Array
     remainders: tuple[ShiftedEstimate, ...]
+    varying: VaryingModel
     model: LinearModel
     maneuvers: tuple[Maneuver, ...]
 
@@ -82,6 +85,29 @@ class Departure:
         estimate : Array
             Common parameters first.
         """
+        return self._removed(self.maneuvers, maneuvers, estimate)
+
+    def removed_from_unseen(
+        self,
+        maneuvers: Sequence[Maneuver],
+        cuts: Sequence[Mapping[str, Array]],
+        estimate: Array,
+    ) -> list[Maneuver]:
+        """Return maneuvers that were not fitted as if nothing had departed.
+
+        `cuts` holds all columns of each.
+        """
+        wide = [
+            replace(m, inputs=self.varying.maneuver(c, m.dt_s).inputs)
+            for m, c in zip(maneuvers, cuts, strict=True)
+        ]
+        return self._removed(wide, maneuvers, estimate)
+
+    def _removed(
+        self, departed: Sequence[Maneuver], maneuvers: Sequence[Maneuver], estimate: Array
+    ) -> list[Maneuver]:
+        if not maneuvers:
+            return []
         trimmed = [
             replace(
                 wide,
@@ -89,17 +115,17 @@ class Departure:
                     [own.inputs, np.zeros_like(wide.inputs[:, own.inputs.shape[1] :])]
                 ),
             )
-            for wide, own in zip(self.maneuvers, maneuvers, strict=True)
+            for wide, own in zip(departed, maneuvers, strict=True)
         ]
-        problems = [OutputProblem(self.model, data) for data in (self.maneuvers, trimmed)]
+        problems = [OutputProblem(self.model, data) for data in (departed, trimmed)]
         theta = problems[0].first_guess()
         theta[: problems[0].n_common] = estimate[: problems[0].n_common]
-        departed, still = (problem.outputs(theta) for problem in problems)
-        if departed is None or still is None:
+        there, here = (problem.outputs(theta) for problem in problems)
+        if there is None or here is None:
             return list(maneuvers)
         return [
-            replace(m, outputs=m.outputs - (there - here).T)
-            for m, there, here in zip(maneuvers, departed, still, strict=True)
+            replace(m, outputs=m.outputs - (moved - still).T)
+            for m, moved, still in zip(maneuvers, there, here, strict=True)
         ]
 
 
@@ -160,6 +186,7 @@ def correct_trim_departure(
             ShiftedEstimate(DEPARTURES, result.estimate + step + REMAINDER_SHARE * step, 1.0, 1.0),
             *(ShiftedEstimate(DRAG_POLAR, result.estimate + step + s, 1.0, 1.0) for s in unknown),
         ),
+        varying,
         _with_second_order(
             varying.model, base, dict(zip(curvature, map(float, found.added), strict=True))
         ),
