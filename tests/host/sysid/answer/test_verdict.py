@@ -63,7 +63,7 @@ def test_what_is_not_predicted_is_not_trusted(answer: Answer) -> None:
     names = answer.model.parameter_names
     sure = replace(answer.result, covariance=1e-12 * np.eye(len(answer.result.names)))
     speed = answer.model.states[0]
-    failing = SignalFit(speed, 0.0, 0.8, 0.5, 0.0, 0.5)
+    failing = SignalFit(speed, 0.0, 0.8, 0.5, 0.0, 0.0)
     lost = replace(answer, result=sure, validation=(failing,), modes=modes(sure))
     assert list(uncarried_states(lost)) == [speed]
     lines = verdict_lines([lost], [])

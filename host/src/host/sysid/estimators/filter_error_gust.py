@@ -42,7 +42,7 @@ def fit_with_gust(
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
     airspeed_mps: float,
-    first: FitResult | None = None,
+    start: Array | None = None,
 ) -> GustFit:
     """Fit a template by filter error with the gust as a state, delays estimated beside it.
 
@@ -54,16 +54,17 @@ def fit_with_gust(
         Data as measured.
     airspeed_mps : float
         Of the trim, for the gust's time scale, m/s.
-    first : FitResult, optional
-        Of output error on this model, to start from.
+    start : Array, optional
+        Parameters and constants to start from, without delays; by default of output error.
     """
     if not model.delays:
-        start = start_values_of(model, maneuvers)
+        start = start_values_of(model, maneuvers) if start is None else start
         result = _fit_gust_state(model, list(maneuvers), airspeed_mps, start)
         return GustFit(result, result.model, tuple(maneuvers), {})
-    first = first or fit("output-error-white", model, maneuvers, multiple_starts=False)
+    first = fit("output-error-white", model, maneuvers, multiple_starts=False)
     count = len(model.parameters)
-    start = np.concatenate([first.estimate[:count], first.estimate[len(model.parameter_names) :]])
+    constants = first.estimate[len(model.parameter_names) :]
+    start = np.concatenate([first.estimate[:count], constants]) if start is None else start
     late = estimate_delays(model, maneuvers, airspeed_mps, first, start, gust_process(model))
     start = np.concatenate([late.estimate, start[count:]])
     delays_s = {name: value for name, (value, _) in late.delays.items()}

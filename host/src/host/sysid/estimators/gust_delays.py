@@ -98,9 +98,11 @@ def estimate_delays(
             for d in groups
         }
         sd = step.standard_error
-        if all(abs(values[n] - before[n]) < SETTLED_SD * sd[step.index(n)] for n in values):
+        if near_its_optimum(step) and all(
+            abs(values[n] - before[n]) < SETTLED_SD * sd[step.index(n)] for n in values
+        ):
             break
-    if found is None:
+    if found is None or not near_its_optimum(found):
         half = first.half_width()
         delays = {d.name: (0.0, float(half[first.index(d.name)])) for d in groups}
         return DelayEstimate(delays, estimate, _added_covariance(first, list(values), count))
@@ -134,7 +136,7 @@ def _round(
     removed: Mapping[str, float],
     process: tuple[str, ...],
 ) -> FitResult | None:
-    """Fit parameters, gust and remaining delays; None if the search fails."""
+    """Fit parameters, gust and remaining delays; None if the filter fails."""
     plain, theta = with_gust_penetration(replace(model, delays=()), airspeed_mps, estimate)
     dt_s = max(m.dt_s for m in maneuvers)
     late = _with_delay_terms(gust_model(plain, airspeed_mps), groups, theta, removed, dt_s)
@@ -148,7 +150,7 @@ def _round(
         found = fit_filter_error(late, centred, process=process, start=start, compare_noise=False)
     except IdentificationError:
         return None
-    return _as_delays(found, groups, dt_s) if near_its_optimum(found) else None
+    return _as_delays(found, groups, dt_s)
 
 
 def _with_delay_terms(
