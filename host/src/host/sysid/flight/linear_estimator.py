@@ -506,6 +506,8 @@ def _simulated(
 def _without_delays(
     maneuver: Maneuver, model: LinearModel, delays: Mapping[str, tuple[float, float]]
 ) -> Maneuver:
+    if not delays:
+        return maneuver
     late = replace(model, delays=delays_of(model.outputs))
     return advance_outputs(maneuver, late, {name: value for name, (value, _) in delays.items()})
 
