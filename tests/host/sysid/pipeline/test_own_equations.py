@@ -80,7 +80,7 @@ def test_two_records_give_the_truth_and_each_its_own_bias(tmp_path: Path) -> Non
     for number, value in enumerate(BIAS, start=1):
         k = result.index(f"q_bias_radps@{number}")
         assert abs(result.estimate[k] - value) < 2.0 * half[k]
-    assert half[result.index("Ma")] < 2.0
+    assert half[result.index("Ma")] < 10.0  # the hold of 0.04 s is in it
     document = json.loads(answer.to_json())
     assert document["answers"][0]["parameters"]["Za"]["unit"] == "1/s"
     # The tangent: Za + 2 Zaa |alpha|, and the modes that belong to it.

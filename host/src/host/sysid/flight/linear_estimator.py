@@ -59,6 +59,7 @@ from host.sysid.flight.reconstructed_flight import (
     flown_maneuvers,
     reconstruct_flight,
 )
+from host.sysid.flight.sampling_error import hold_shift
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.flight.trim_departure import Departure, correct_trim_departure
 from host.sysid.identification_error import IdentificationError
@@ -345,6 +346,8 @@ class LinearEstimator:
         known = [c for c in carriers if c is not None]
         if len(known) == len(carriers):
             shifts += systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
+        if self.own is not None:
+            shifts += hold_shift(statistical, e.maneuvers, e.trim)
         found: tuple[Coefficient, ...] = ()
         if self.airframe is not None and e.trim.known:
             own = e.used[0].flight.instrument

@@ -17,8 +17,8 @@ from host.sysid.numerics.output_error_problem import OutputProblem, Response
 
 MOST_SUBSTEPS = 64
 # Of an output's spread: what halving the step may move it by. Noise is a thousandth at least
-# (`CLEAN_SHARE`), so integration is a hundredth of it.
-STEP_TOLERANCE = 1e-5
+# (`CLEAN_SHARE`): over 10 000 samples this is a tenth of a half-width, were it all of one sign.
+STEP_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)

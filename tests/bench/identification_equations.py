@@ -1,0 +1,140 @@
+"""A user's non-linear model beside the same model hand-written in numpy with scipy's solver.
+
+    python tests/bench/identification_equations.py
+
+The longitudinal model that is shipped, without its delay, over 6 s at 50 Hz with known noise: ours
+by `output-error-white`; the peer by `solve_ivp` and `least_squares` with finite differences, which
+is what one writes by hand. Processor time of one fit, compilation apart.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from importlib.resources import files
+
+import numpy as np
+from host.arrays import Array
+from host.files.user_text import parse_toml
+from host.sysid import Maneuver, fit
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.equation_file import equations_from
+from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.numerics.nonlinear_problem import output_problem
+from scipy import integrate, optimize
+
+MOST_BOUNDS, LEAST_RATIO = 0.01, 30.0
+DT_S, SAMPLES = 0.02, 300
+STEP = 1e-2  # of the peer's finite differences, in bounds
+NOISE = {
+    "airspeed_mps": 0.1, "alpha_rad": 0.003, "theta_rad": 0.003, "q_radps": 0.006,
+    "ax_mps2": 0.1, "az_mps2": 0.2,
+}  # fmt: skip
+TRUTH = (0.12, 4.1, 8.0, 0.5, 0.05, 0.09, 0.01, -0.8, -9.0, -1.0)
+START = (17.0, 0.1, 0.1, 0.0)
+
+
+def shipped(name: str) -> NonlinearModel:
+    """Return a model that is shipped, with known noise and without delays."""
+    text = files("host.sysid.models").joinpath("equations", name).read_text(encoding="utf-8")
+    document = parse_toml(text, name, IdentificationError)
+    return equations_from({**document, "noise": NOISE, "delays": []})
+
+
+def record(model: NonlinearModel) -> Maneuver:
+    """Return a 3-2-1-1 at varying thrust, flown by the truth, with noise."""
+    rng = np.random.default_rng(4)
+    t = np.arange(SAMPLES) * DT_S
+    u = np.zeros(SAMPLES)
+    for begin, end, sign in ((0.6, 1.5, 1), (1.5, 2.1, -1), (2.1, 2.4, 1), (2.4, 2.7, -1)):
+        u[(t >= begin) & (t < end)] = 0.05 * sign
+    inputs = np.column_stack([u, 2.5 + 0.5 * np.sin(t)])
+    noise = rng.standard_normal((SAMPLES, 6)) * list(NOISE.values())
+    blank = Maneuver(DT_S, inputs, noise)
+    outputs = output_problem(model, [blank]).outputs(np.array([*TRUTH, *START, 0.0, 0.0, 0.0]))
+    assert outputs is not None
+    return Maneuver(DT_S, inputs, outputs[0].T + noise)
+
+
+def by_hand(theta: Array, inputs: Array) -> Array:
+    """Return the outputs, (samples, 6), as numpy and scipy compute them."""
+    m, iyy, area, chord, rho, g = 1.943, 0.0722, 0.32, 0.25, 1.225, 9.80665
+    CL_0, CL_alpha, CL_q, CL_de, CD_0, induced, Cm_0, Cm_alpha, Cm_q, Cm_de = theta[:10]
+    t = np.arange(len(inputs)) * DT_S
+
+    def coefficients(V: Array, alpha: Array, q: Array, de: Array) -> tuple[Array, ...]:
+        qhat = q * chord / (2.0 * V)
+        CL = CL_0 + CL_alpha * alpha + CL_q * qhat + CL_de * de
+        Cm = Cm_0 + Cm_alpha * alpha + Cm_q * qhat + Cm_de * de
+        return CL, CD_0 + induced * CL**2, Cm, 0.5 * rho * V**2 * area
+
+    def rates(time_s: float, x: Array) -> Array:
+        V, alpha, attitude, q = x
+        de, thrust = (np.asarray(np.interp(time_s, t, u)) for u in inputs.T)
+        CL, CD, Cm, q_ms = coefficients(V, alpha, q, de)
+        climb = attitude - alpha
+        return np.array(
+            [
+                (thrust * np.cos(alpha) - q_ms * CD) / m - g * np.sin(climb),
+                q - (thrust * np.sin(alpha) + q_ms * CL) / (m * V) + g * np.cos(climb) / V,
+                q,
+                q_ms * chord * Cm / iyy,
+            ]
+        )
+
+    found = integrate.solve_ivp(
+        rates, (0.0, t[-1]), theta[10:14], t_eval=t, max_step=DT_S, rtol=1e-10, atol=1e-12
+    )
+    V, alpha, attitude, q = found.y
+    CL, CD, _, q_ms = coefficients(V, alpha, q, inputs[:, 0])
+    ax = (inputs[:, 1] - q_ms * (CD * np.cos(alpha) - CL * np.sin(alpha))) / m
+    az = -q_ms * (CD * np.sin(alpha) + CL * np.cos(alpha)) / m
+    bias_q, bias_x, bias_z = theta[14:]
+    return np.column_stack([V, alpha, attitude, q + bias_q, ax + bias_x, az + bias_z])
+
+
+def main() -> int:
+    """Print the table; return how many limits were missed."""
+    begin = time.perf_counter()
+    model = shipped("longitudinal.toml")
+    data = record(model)
+    fit("output-error-white", model, [data])
+    compiled_s = time.perf_counter() - begin
+    begin = time.process_time()
+    ours = fit("output-error-white", model, [data])
+    ours_s = time.process_time() - begin
+    problem = output_problem(model, [data])
+    told = np.flatnonzero(problem.prior_precision)
+    root = np.sqrt(problem.prior_precision[told])
+    deviation = np.array(list(NOISE.values()))
+
+    first, bound = problem.first_guess(), np.sqrt(np.diag(ours.covariance_white))
+
+    def residual(z: Array) -> Array:
+        theta = first + bound * z  # the peer is told how large a parameter's step should be
+        left = (by_hand(theta, data.inputs) - data.outputs) / deviation
+        return np.concatenate([left.ravel(), root * (theta - problem.prior_mean)[told]])
+
+    def slopes(z: Array) -> Array:
+        here = residual(z)
+        return np.column_stack([(residual(z + h) - here) / STEP for h in STEP * np.eye(len(z))])
+
+    begin = time.process_time()
+    peer = optimize.least_squares(residual, np.zeros(len(first)), jac=slopes, method="lm")
+    peer_s = time.process_time() - begin
+    away = float(np.max(np.abs((first - ours.estimate) / bound + peer.x)))
+    ratio = peer_s / ours_s
+    print(f"a user's equations, longitudinal, {len(ours.names)} unknowns, {SAMPLES} samples")
+    print(
+        f"  ours                {1e3 * ours_s:8.1f} ms   (first call, compiled: {compiled_s:.1f} s)"
+    )
+    print(
+        f"  numpy and solve_ivp {1e3 * peer_s:8.1f} ms   {ratio:.0f} times"
+        f" (limit {LEAST_RATIO:.0f})"
+    )
+    print(f"  answers differ by   {away:8.4f} Cramer-Rao bounds at most (limit {MOST_BOUNDS})")
+    return int(ratio < LEAST_RATIO) + int(away > MOST_BOUNDS)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,77 @@
+"""Records without noise: the interval holds what the input between its samples leaves open."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model_file import read_model
+from host.sysid.numerics.nonlinear_problem import output_problem
+
+import host
+
+LINEAR = """\
+name = "unstable"
+states = ["alpha_rad", "q_radps"]
+inputs = ["elevator_rad"]
+outputs = ["alpha_rad", "q_radps"]
+hold = "HOLD"
+delays = []
+state_biases = []
+A = [["Z_alpha", 1.0], ["M_alpha", "M_q"]]
+B = [["Z_de"], ["M_de"]]
+[parameters]
+Z_alpha = -2.0
+M_alpha = 5.0
+M_q = -2.0
+Z_de = -0.1
+M_de = -10.0
+"""
+EQUATIONS = """\
+kind = "equations"
+hold = "HOLD"
+inputs = ["elevator_rad"]
+[rates]
+alpha_rad = "Z_alpha*alpha_rad + q_radps + Z_de*elevator_rad"
+q_radps = "M_alpha*alpha_rad + M_q*q_radps + M_de*elevator_rad"
+[outputs]
+alpha_rad = "alpha_rad"
+q_radps = "q_radps"
+[parameters]
+Z_alpha = -2.0
+M_alpha = 5.0
+M_q = -2.0
+Z_de = -0.1
+M_de = -10.0
+"""
+TRUTH = {"Z_alpha": -1.5, "M_alpha": 7.0, "M_q": -2.5, "Z_de": -0.15, "M_de": -14.0}
+DT_S, FINE = 0.02, 20
+
+
+@pytest.mark.parametrize("text", [LINEAR, EQUATIONS], ids=["linear", "equations"])
+def test_the_truth_of_a_record_without_noise_is_held(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
+    t = np.arange(150 * FINE) * DT_S / FINE
+    u = 0.03 * np.sin(4.0 * t) * np.sin(1.1 * t)
+    flown, fitted = tmp_path / "flown.toml", tmp_path / "fitted.toml"
+    flown.write_text(LINEAR.replace("HOLD", "foh"), encoding="utf-8")
+    fitted.write_text(text.replace("HOLD", "zoh"), encoding="utf-8")
+    blank = Maneuver(DT_S / FINE, u[:, None], np.zeros((len(u), 2)))
+    found = output_problem(read_model(flown), [blank]).outputs(np.array([*TRUTH.values(), 0, 0]))
+    assert found is not None
+    table = pd.DataFrame(
+        {"t_s": t, "elevator_rad": u, "alpha_rad": found[0][0], "q_radps": found[0][1]}
+    )[::FINE]
+    answer = host.identify(
+        table, models=fitted, methods="output-error-white", from_s=0.0, to_s=3.0
+    ).linear[0]
+    half = answer.result.half_width()
+    for k, (name, value) in enumerate(TRUTH.items()):
+        assert answer.result.names[k] == name
+        assert abs(answer.result.estimate[k] - value) < half[k], name
+        assert half[k] < 0.3 * abs(value) + 0.3, name

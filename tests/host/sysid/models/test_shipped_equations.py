@@ -1,0 +1,113 @@
+"""The equations that are shipped: read, and the truth found by each."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from host.arrays import Array
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model_file import read_model
+from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.numerics.nonlinear_problem import NonlinearProblem
+
+FOLDER = Path(str(files("host.sysid.models").joinpath("equations")))
+G = 9.80665
+
+
+@pytest.fixture(autouse=True)
+def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run the equations as Python: that takes no compiler's time."""
+    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
+
+
+def shipped(name: str) -> NonlinearModel:
+    model = read_model(FOLDER / f"{name}.toml")
+    assert isinstance(model, NonlinearModel)
+    return model
+
+
+def rates(model: NonlinearModel, x: Array, u: Array) -> dict[str, float]:
+    """Return dx/dt of a model at its start values."""
+    e, found = model.source, np.zeros(len(x))
+    own = np.array([p.start for p in model.own_parameters])
+    p = model.parameter_vector(model.start, own)
+    e.code.functions["rates"](x, u, p, e.constant_values, e.table_values, found)
+    return dict(zip(model.states, found.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("name", ["longitudinal", "lateral", "six_degrees", "flight_path"])
+def test_every_file_is_read_and_its_code_is_small(name: str) -> None:
+    assert len(shipped(name).source.text()) < 100_000
+
+
+def test_six_degrees_fly_as_the_longitudinal_model_in_the_plane() -> None:
+    plane, space = shipped("longitudinal"), shipped("six_degrees")
+    V, alpha, theta, q = 16.0, 0.08, 0.2, 0.3
+    wings = rates(plane, np.array([V, alpha, theta, q]), np.array([0.05, 3.0]))
+    x = np.array([V * np.cos(alpha), 0.0, V * np.sin(alpha), 0.0, q, 0.0, 0.0, theta])
+    body = rates(space, x, np.array([0.05, 0.0, 0.0, 3.0]))
+    u, w = x[0], x[2]
+    assert (u * body["u_mps"] + w * body["w_mps"]) / V == pytest.approx(wings["airspeed_mps"])
+    turned = (u * body["w_mps"] - w * body["u_mps"]) / V**2
+    assert turned == pytest.approx(wings["alpha_rad"])
+    assert body["q_radps"] == pytest.approx(wings["q_radps"])
+    for name in ("v_mps", "p_radps", "r_radps", "phi_rad"):
+        assert body[name] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_six_degrees_roll_and_yaw_as_the_lateral_model_to_first_order() -> None:
+    side, space = shipped("lateral"), shipped("six_degrees")
+    V, alpha, theta, phi = 16.0, 0.08, 0.1, 0.02
+    beta, p, r, da, dr = 1e-5, 2e-5, -1e-5, 1e-5, 3e-5
+    own = rates(side, np.array([beta, p, r, phi]), np.array([da, dr, V, alpha, theta]))
+    x = np.array([V * np.cos(alpha), V * beta, V * np.sin(alpha), p, 0.0, r, phi, theta])
+    body = rates(space, x, np.array([0.0, da, dr, 3.0]))
+    assert body["p_radps"] == pytest.approx(own["p_radps"], rel=1e-6)
+    assert body["r_radps"] == pytest.approx(own["r_radps"], rel=1e-6)
+    assert body["v_mps"] / V == pytest.approx(own["beta_rad"], rel=1e-6)
+
+
+def test_flight_path_of_an_aircraft_at_rest_in_a_turn_stands_still() -> None:
+    V, phi, alpha = 17.0, 0.5, 0.06
+    turn = G * np.tan(phi) / V
+    x = np.array([V * np.cos(alpha), 0.0, V * np.sin(alpha), phi, alpha])
+    body = [-turn * np.sin(alpha), turn * np.sin(phi) * np.cos(alpha),
+            turn * np.cos(phi) * np.cos(alpha)]  # fmt: skip
+    p, q, r = body
+    u, w = x[0], x[2]
+    force = [
+        q * w + G * np.sin(alpha),
+        r * u - p * w - G * np.cos(alpha) * np.sin(phi),
+        -q * u - G * np.cos(alpha) * np.cos(phi),
+    ]
+    found = rates(shipped("flight_path"), x, np.array([0.0, 0.0, 0.0, *force, p, q, r]))
+    assert list(found.values()) == pytest.approx([0.0] * 5, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["lateral", "six_degrees", "flight_path"])
+def test_its_slopes_are_those_of_differences(name: str) -> None:
+    model = shipped(name)
+    rng = np.random.default_rng(2)
+    samples = 12
+    typical = {"airspeed_mps": 16.0, "thrust_n": 3.0, "az_mps2": -G}
+    mean = np.array([typical.get(u, 0.02) for u in model.inputs])
+    u = mean * (1.0 + 0.1 * rng.standard_normal((samples, len(mean))))
+    y = np.array([typical.get(n, 0.05) for n in model.outputs])
+    data = Maneuver(0.02, u, y + 0.01 * rng.standard_normal((samples, len(y))))
+    problem = NonlinearProblem(model, [data])
+    theta = problem.first_guess() + 0.003
+    responses = problem.respond(theta)
+    assert responses is not None
+    for k, unknown in enumerate(problem.names):
+        step = 1e-5
+        up, down = theta.copy(), theta.copy()
+        up[k] += step
+        down[k] -= step
+        high, low = problem.outputs(up), problem.outputs(down)
+        assert high is not None and low is not None
+        expected = (high[0] - low[0]) / (2.0 * step)
+        worst = np.max(np.abs(responses[0].sensitivities[:, :, k] - expected))
+        assert worst < 1e-5 * max(np.max(np.abs(expected)), 1.0), unknown
