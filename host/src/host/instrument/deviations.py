@@ -12,7 +12,12 @@ from dataclasses import dataclass, field, replace
 from host.aircraft import usual_servo
 from host.aircraft.file import load_measured
 from host.aircraft.mass_properties import AirframeData, Place, place
-from host.instrument.instrument_errors import InstrumentErrors, instrument_errors, standard_errors
+from host.instrument.instrument_errors import (
+    InstrumentErrors,
+    foreign_errors,
+    instrument_errors,
+    standard_errors,
+)
 from host.instrument.recording import Recording
 from host.physical.calibration import Calibration
 
@@ -64,7 +69,11 @@ class SensorErrorModel:
 
 
 def sensor_error_model(
-    source: str, calibration: Calibration | None = None, *, defaults: bool = False
+    source: str,
+    calibration: Calibration | None = None,
+    *,
+    defaults: bool = False,
+    own: bool = True,
 ) -> SensorErrorModel:
     """Return the sensors of an aircraft by name or file, and their errors.
 
@@ -76,6 +85,8 @@ def sensor_error_model(
         Of the instrument; standard errors without.
     defaults : bool
         Whether its lines that nobody measured count too, as in `instrument_errors`.
+    own : bool
+        Whether the sensors are those of our logger.
 
     Raises
     ------
@@ -97,16 +108,21 @@ def sensor_error_model(
         pitot_lag_s=number("sensors.pitot_lag_s"),
         servo_hz=number("servo.bandwidth_hz"),
         servo_rate_radps=number("servo.rate_limit_radps"),
-        errors=instrument_errors(loaded, calibration, defaults=defaults),
+        errors=instrument_errors(loaded, calibration, defaults=defaults, own=own),
     )
 
 
-def unknown_sensors() -> SensorErrorModel:
-    """Return the sensors of an aircraft without a file: typical dynamics, places at the CG."""
+def unknown_sensors(recording: Recording | None = None) -> SensorErrorModel:
+    """Return the sensors of an aircraft without a file: typical dynamics, places at the CG.
+
+    Of a recording that is not our logger's they are wrong by more.
+    """
     nowhere = (0.0, 0.0, 0.0)
+    recording = recording or Recording()
     return SensorErrorModel(
         nowhere, nowhere, upwash=0.1, vane_hz_per_mps=1.0, vane_damping=0.1,
         vane_friction_rad=0.0, friction_speed_mps=1.0, pitot_lag_s=0.010,
+        errors=standard_errors() if recording.own else foreign_errors(), recording=recording,
     )  # fmt: skip
 
 

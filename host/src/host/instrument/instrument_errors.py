@@ -19,6 +19,7 @@ from host.instrument.recording import SURFACES
 from host.physical.calibration import Calibration, Line
 
 STANDARD = Path(__file__).with_name("standard.toml")
+FOREIGN = Path(__file__).with_name("foreign.toml")
 UNIFORM_SD_PER_HALF_WIDTH = 1.0 / math.sqrt(3.0)  # "even" in the files
 DISTRIBUTIONS = ("even", "normal")
 DRAWN = ("instrument", "flight")
@@ -123,11 +124,22 @@ def standard_errors() -> InstrumentErrors:
     return InstrumentErrors(found)
 
 
+@cache
+def foreign_errors() -> InstrumentErrors:
+    """Return the errors of other people's sensors: those of `foreign.toml` in place of ours."""
+    document = tomllib.loads(FOREIGN.read_text(encoding="utf-8"))
+    found = dict(standard_errors().named)
+    for name, table in document["error"].items():
+        found[name] = _apply_table(found[name], table, f"{FOREIGN.name}: [error.{name}]")
+    return InstrumentErrors(found)
+
+
 def instrument_errors(
     aircraft: Aircraft | None = None,
     calibration: Calibration | None = None,
     *,
     defaults: bool = False,
+    own: bool = True,
 ) -> InstrumentErrors:
     """Return what an instrument may be wrong by.
 
@@ -141,13 +153,15 @@ def instrument_errors(
         Whether a line that nobody measured on this instrument counts too, because the columns
         were made with it. Its deviations are those of a sensor out of the box. Without, the
         standard holds.
+    own : bool
+        Whether the sensors are those of our logger; those of others are wrong by more.
 
     Raises
     ------
     CalibrationError
         If an error is unknown, or a key of it or its value is not what it may be.
     """
-    found = dict(standard_errors().named)
+    found = dict((standard_errors() if own else foreign_errors()).named)
     if aircraft is not None:
         for name, error in found.items():
             if error.aircraft_file:

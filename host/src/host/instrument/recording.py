@@ -22,7 +22,10 @@ class Recording:
     clock_share : float or None
         One standard deviation of the clock's scale as GPS left it; None: nothing checked the
         instrument's own clock.
+    own : bool
+        Whether our logger made it. Of a table of others no calibration of ours speaks.
     """
 
     commanded: tuple[str, ...] = ()
     clock_share: float | None = 0.0
+    own: bool = True

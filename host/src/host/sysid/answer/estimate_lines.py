@@ -11,6 +11,7 @@ import numpy as np
 from host.constants import DEG_PER_RAD
 from host.sysid.answer.constant_lines import constant_lines
 from host.sysid.answer.parameter_units import parameter_unit
+from host.sysid.answer.servo_lines import servo_estimate_lines
 from host.sysid.answer.settling_history import settling_lines
 from host.sysid.answer.trust_rules import uncarried_states
 from host.sysid.flight.linear_estimator import Answer, from_zero
@@ -44,6 +45,7 @@ def model_lines(answer: Answer) -> list[str]:
     for name, (value, width) in answer.delays.items():
         mark = "  at its bound" if name in answer.at_bound else ""
         lines.append(f"  {name:16s} {value:11.5g}  +- {width:9.3g}  s      {mark}".rstrip())
+    lines += servo_estimate_lines(answer.servo)
     if answer.coefficients:
         lines.append(
             "  coefficients (mass, inertia, pressure, places, pots and delays in the half-width)"

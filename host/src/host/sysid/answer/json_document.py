@@ -11,6 +11,7 @@ import numpy as np
 
 from host.sysid.answer.marks import Verdict
 from host.sysid.answer.parameter_units import parameter_unit
+from host.sysid.answer.servo_lines import servo_document
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, uncarried_states
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_fit import METHOD
@@ -113,6 +114,7 @@ def answer_document(
             name: {"value": value, "half_width": width}
             for name, (value, width) in answer.delays.items()
         },
+        "servo": servo_document(answer.servo),
         "at_bound": list(answer.at_bound),
         "unpredicted": list(uncarried_states(answer)),
         "corrections": correction_document(answer.corrections),

@@ -20,6 +20,7 @@ from host.sysid.answer.marks import (
     first_lines,
     names_marked,
 )
+from host.sysid.answer.servo_lines import servo_lines
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, doubts_of, unpredicted
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
@@ -45,7 +46,7 @@ def linear_verdict(answer: Answer, evidence: Evidence = NO_EVIDENCE) -> Verdict:
     lines += _width_lines(answer, marks, shares, reasons)
     lines += _doubt_lines(answer, doubts)
     lines += _identifiability_lines(answer)
-    lines += _input_lines(answer)
+    lines += [*_input_lines(answer), *servo_lines(answer.servo)]
     lines += _data_lines(answer)
     return Verdict(heading, marks, tuple(lines), _all_reasons(answer, marks, shares, reasons))
 

@@ -17,6 +17,12 @@ from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
 
 
+def commands_of(columns: Mapping[str, Array], instrument: SensorErrorModel) -> dict[str, Array]:
+    """Return the columns that are commands: of surfaces that no pot measured."""
+    names = (f"{surface}_rad" for surface in instrument.recording.commanded)
+    return {name: columns[name] for name in names if name in columns}
+
+
 def surface_positions(
     columns: Mapping[str, Array], instrument: SensorErrorModel
 ) -> dict[str, Array]:
@@ -29,13 +35,22 @@ def surface_positions(
     instrument : SensorErrorModel
         Says which surfaces are commanded, and how fast servos are.
     """
-    dt_s = float(columns["t_s"][1] - columns["t_s"][0])
-    return {
-        name: servo_response(values, dt_s, *instrument.servo)
-        if name.removesuffix("_rad") in instrument.recording.commanded
-        else values
-        for name, values in columns.items()
+    commands = commands_of(columns, instrument)
+    return {**columns, **behind_servos(commands, columns["t_s"], (0.0, *instrument.servo))}
+
+
+def behind_servos(
+    commands: Mapping[str, Array], t_s: Array, servo: tuple[float, float, float]
+) -> dict[str, Array]:
+    """Return commanded surfaces behind servos of a delay (s), bandwidth (Hz) and rate limit (rad/s)
+    on an even grid."""
+    delay_s, bandwidth_hz, rate_radps = servo
+    dt_s = float(t_s[1] - t_s[0])
+    at = {
+        name: servo_response(values, dt_s, bandwidth_hz, rate_radps)
+        for name, values in commands.items()
     }
+    return {name: np.interp(t_s - delay_s, t_s, x) if delay_s else x for name, x in at.items()}
 
 
 def servo_response(

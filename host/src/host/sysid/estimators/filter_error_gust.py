@@ -59,7 +59,7 @@ def fit_with_gust(
     """
     if not model.delays:
         start = start_values_of(model, maneuvers) if start is None else start
-        result = _fit_gust_state(model, list(maneuvers), airspeed_mps, start)
+        result = fit_gust_state(model, list(maneuvers), airspeed_mps, start)
         return GustFit(result, result.model, tuple(maneuvers), {})
     first = fit("output-error-white", model, maneuvers, multiple_starts=False)
     count = len(model.parameters)
@@ -69,7 +69,7 @@ def fit_with_gust(
     start = np.concatenate([late.estimate, start[count:]])
     delays_s = {name: value for name, (value, _) in late.delays.items()}
     shifted = [advance_outputs(m, model, delays_s) for m in maneuvers]
-    result = _fit_gust_state(replace(model, delays=()), shifted, airspeed_mps, start)
+    result = fit_gust_state(replace(model, delays=()), shifted, airspeed_mps, start)
     if result.residual_kind == "innovation":
         covariance = result.covariance.copy()
         covariance[:count, :count] += late.covariance
@@ -104,10 +104,13 @@ def gust_process(model: LinearModel) -> tuple[str, ...]:
     return ("gust_rad", *(s for s in OTHER_PROCESS_STATES if s in model.states))
 
 
-def _fit_gust_state(
+def fit_gust_state(
     model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float, start: Array
 ) -> FitResult:
-    """Return filter error with the gust as a state; output error if that does not converge."""
+    """Return filter error with the gust as a state; output error if that does not converge.
+
+    `start` has the parameters of the model, without delays, and the constants of every maneuver.
+    """
     plain, first = with_gust_penetration(model, airspeed_mps, start)
     augmented = gust_model(plain, airspeed_mps)
     try:

@@ -7,6 +7,7 @@ az_mps2 = { from = "Nz", unit = "g", sign = -1 }
 t_s = { from = "TimeUS", unit = "us" }
 density_kgpm3 = "rho"
 flap_rad = { from = "Flap", unit = "deg" }    # any name, for a model of one's own
+elevator_rad = { from = "de", commanded = true }    # a command: the surface comes later
 ```
 
 Of a table of others a map hides what it does not name, but for the time.
@@ -23,6 +24,7 @@ from host.arrays import Array
 from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.files.quantities import Quantity
 from host.files.user_text import read_toml
+from host.instrument.recording import SURFACES
 from host.sysid.identification_error import IdentificationError
 
 DEG, FOOT, POUND_PA = RAD_PER_DEG, 0.3048, 6894.757
@@ -57,17 +59,19 @@ ALIASES = {
     "kpa": "kPa", "mb": "mbar", "lb/ft2": "psf", "inhg": "inHg", "%": "percent",
     "sec": "s", "seconds": "s", "msec": "ms", "usec": "us", "µs": "us", "μs": "us",
 }  # fmt: skip
-KEYS = {"from", "unit", "sign", "scale", "offset"}
+KEYS = {"from", "unit", "sign", "scale", "offset", "commanded"}
+COMMANDABLE = tuple(f"{surface}_rad" for surface in SURFACES)
 _FACTOR = Quantity("", -1e12, 1e12, "nanoseconds to seconds: 1e-9; no unit is further from ours")
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One line of a map: ours = foreign * gain + offset."""
+    """One line of a map: ours = foreign * gain + offset; of a surface, whether it is a command."""
 
     foreign: str
     gain: float
     offset: float
+    commanded: bool = False
 
 
 def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
@@ -138,7 +142,13 @@ def _line(where: str, name: str, line: object) -> Line:
     sign, scale = line.get("sign", 1), float(line.get("scale", 1.0))
     if sign not in (1, -1) or scale == 0.0:
         raise IdentificationError(f"{where}: sign must be 1 or -1, scale not zero")
-    return Line(line["from"], units[unit] * sign * scale, float(line.get("offset", 0.0)))
+    commanded = line.get("commanded", False)
+    if not isinstance(commanded, bool) or ("commanded" in line and name not in COMMANDABLE):
+        raise IdentificationError(
+            f"{where}: commanded is true or false, of {', '.join(COMMANDABLE)} only"
+        )
+    offset = float(line.get("offset", 0.0))
+    return Line(line["from"], units[unit] * sign * scale, offset, commanded)
 
 
 def mapped(

@@ -32,7 +32,7 @@ from host.sysid.flight.foreign_tables import (
     same_length,
 )
 from host.sysid.flight.measured import Measured, measured
-from host.sysid.flight.recorded import recording_of_log, recording_of_table
+from host.sysid.flight.recorded import commanded_by_map, recording_of_log, recording_of_table
 from host.sysid.flight.unit_sign_checks import SURFACES
 from host.sysid.identification_error import IdentificationError
 from host.terminal import command_line
@@ -148,6 +148,7 @@ def read_flight_columns(
         shown = raw if recorded or found.shares else {k: v for k, v in raw.items() if k == "t_s"}
         raw = shown | mapped(found.columns, found.unusable, lines, mapping, found.twice)
         wanted = (*wanted, *(name for name in lines if name not in wanted))
+        found.recording = commanded_by_map(found.recording, lines)
     if "t_s" not in raw:
         raise IdentificationError(
             f"{called}: no column t_s; name it in a map (argument mapping); "

@@ -23,6 +23,7 @@ from host.sysid.aerodynamics.coefficient_table import (
 )
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import Correction, corrections
+from host.sysid.compatibility.sensor_dynamics import SERVO_DELAY
 from host.sysid.estimators.coherence_inflation import inflate_by_coherence
 from host.sysid.estimators.filter_error_gust import (
     GustFit,
@@ -33,6 +34,8 @@ from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.gust_penetration import without_gust_penetration
 from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.servo_parameters import ServoEstimate
+from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.free_simulation import (
     fits_of,
@@ -116,6 +119,7 @@ class Answer:
     coefficients: tuple[Coefficient, ...]
     constant_inputs: tuple[str, ...]
     delays: dict[str, tuple[float, float]]
+    servo: ServoEstimate | None = None  # of inputs that are commands
     corrections: tuple[Correction, ...] = ()
     simulated: tuple[Array, ...] = ()  # outputs of the maneuvers by free simulation
     own_model: bool = False  # of the user, not a template
@@ -164,6 +168,8 @@ class LinearEstimate:
         By how much airspeed and attitude that varied move the estimate.
     delays : dict
         Estimated before the fit: value and 95 % half-width, s.
+    servo : ServoEstimate or None
+        Of the inputs that are commands.
     """
 
     template: str
@@ -178,6 +184,7 @@ class LinearEstimate:
     fit: FitResult
     departure: Departure | None
     delays: dict[str, tuple[float, float]]
+    servo: ServoEstimate | None = None
 
     @property
     def estimate(self) -> Array:
@@ -258,11 +265,21 @@ class LinearEstimator:
         used, held = self._maneuvers(flights)
         trim, condition = trim_of(_together(used))
         model, method, remarks = self._model(used, trim)
+        gusty = (
+            method == GUST
+            and self.own is None
+            and trim.known
+            and bool(set(model.states) & set(VANES))
+        )
+        servo, remark = servo_of(model, used, trim.airspeed_mps if gusty else None)
+        if servo is not None:
+            remarks += (remark,) if remark else ()
+            used, held = brought_behind(used, servo.setting), brought_behind(held, servo.setting)
         data = [m.cut(model) for m in used]
         cuts = [m.inside() for m in used]
         delays: dict[str, tuple[float, float]] = {}
         fitted = None
-        if method == GUST and self.own is None and trim.known and set(model.states) & set(VANES):
+        if gusty:
             staged, data, fitted = self._with_gust(model, data, cuts, trim)
             found, model, delays = staged.result, staged.model, staged.delays
         else:
@@ -273,6 +290,7 @@ class LinearEstimator:
             found = fit(single, model, data, **{**calm, **self.options})
         if isinstance(model, NonlinearModel):
             model = found.model  # with the tangent at the estimate
+        found = found if servo is None else servo.added_to(found)
         found = replace(found, warnings=(*remarks, *found.warnings))
         left = None
         if trim.known and self.own is None and found.residual_kind in FREE:
@@ -292,6 +310,7 @@ class LinearEstimator:
             fit=found,
             departure=left,
             delays=delays,
+            servo=servo,
         )
 
     def _with_gust(
@@ -345,7 +364,9 @@ class LinearEstimator:
         carriers = [m.flight.compatibility for m in e.used]
         known = [c for c in carriers if c is not None]
         if len(known) == len(carriers):
-            shifts += systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
+            moved = systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
+            # Of servos that were estimated the covariance has what they leave open.
+            shifts += tuple(s for s in moved if e.servo is None or s.error != SERVO_DELAY)
         if self.own is not None:
             shifts += hold_shift(statistical, e.maneuvers, e.trim)
         found: tuple[Coefficient, ...] = ()
@@ -413,6 +434,7 @@ class LinearEstimator:
             coefficients=intervals.coefficients,
             constant_inputs=constant_inputs(e.model, e.maneuvers),
             delays=e.delays,
+            servo=e.servo,
             corrections=() if carrier is None else corrections(carrier),
             simulated=validation.simulated,
             own_model=self.own is not None,

@@ -15,6 +15,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, BoolArray
 from host.instrument.deviations import SensorErrorModel
+from host.instrument.servo_prior import ServoPrior
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import (
@@ -54,6 +55,10 @@ class ReconstructedFlight:
         What checks found in its columns.
     resolution : mapping
         Step of the numbers of each quantised column.
+    commands : mapping of (n,) Array
+        Surfaces that no pot measured, as commanded; their columns are behind usual servos.
+    servo : ServoPrior or None
+        Of these; None: not to be estimated.
     """
 
     source: str
@@ -65,6 +70,8 @@ class ReconstructedFlight:
     instrument: SensorErrorModel | None = None
     findings: tuple[Finding, ...] = ()
     resolution: Mapping[str, float] = field(default_factory=dict)
+    commands: Mapping[str, Array] = field(default_factory=dict)
+    servo: ServoPrior | None = None
 
 
 @dataclass(frozen=True, slots=True)

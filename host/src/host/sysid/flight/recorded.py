@@ -2,12 +2,14 @@
 
 A log says so itself. A table that `host decode` wrote shows it: a surface is measured where its
 column is that of its pots, and the clock is checked where GPS spoke for long enough. Of a table of
-others nothing is known: its surfaces count as measured and its clock as right.
+others nothing is known: its surfaces count as measured, unless its map calls them commands, and its
+clock as right.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from host.instrument.recording import SURFACES, Recording
 
 if TYPE_CHECKING:
     from host.log import FlightLog
+    from host.sysid.flight.column_map import Line
 
 OWN_COLUMN = "mega_drives"  # no table of others has this column
 GPS_COLUMN, GPS_SPAN_S = "v_north_mps", 20.0  # as `physical/timebase` wants it
@@ -39,13 +42,20 @@ def recording_of_table(columns: Mapping[str, Array], said: Mapping[Any, Any]) ->
         commanded = tuple(s for s in SURFACES if inputs.get(s) == "commanded")
         return Recording(commanded, None if half is None else float(half) / NORMAL_95)
     if OWN_COLUMN not in columns:
-        return Recording()
+        return Recording(own=False)
     commanded = tuple(s for s in SURFACES if f"{s}_rad" in columns and not _measured(columns, s))
     fix_times_s = (
         columns["t_s"][np.isfinite(columns[GPS_COLUMN])] if GPS_COLUMN in columns else np.empty(0)
     )
     checked = len(fix_times_s) > 0 and float(np.ptp(fix_times_s)) >= GPS_SPAN_S
     return Recording(commanded, 0.0 if checked else None)
+
+
+def commanded_by_map(recording: Recording, lines: Mapping[str, Line]) -> Recording:
+    """Return a recording with the surfaces that a map names: commands where it says so."""
+    said = {s: lines[f"{s}_rad"].commanded for s in SURFACES if f"{s}_rad" in lines}
+    every = tuple(s for s in SURFACES if said.get(s, s in recording.commanded))
+    return replace(recording, commanded=every)
 
 
 def _measured(columns: Mapping[str, Array], surface: str) -> bool:

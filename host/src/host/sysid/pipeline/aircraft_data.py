@@ -9,7 +9,7 @@ from host.aircraft.file import load_measured
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import NoPropulsionError, Powerplant, powerplant
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
-from host.physical.calibration import load_calibration
+from host.physical.calibration import Calibration, load_calibration
 from host.sysid.flight.flight_tables import FlightColumns
 
 
@@ -27,6 +27,8 @@ class AircraftData:
         None if the file does not describe a propeller.
     doubts : tuple of str
         Numbers of the file that no known aircraft has, one line each.
+    calibration : Calibration or None
+        Of the instrument, if the user gave one.
     """
 
     source: str
@@ -34,13 +36,17 @@ class AircraftData:
     instrument: SensorErrorModel
     powerplant: Powerplant | None
     doubts: tuple[str, ...]
+    calibration: Calibration | None = None
 
     def flown(self, flight: FlightColumns) -> SensorErrorModel:
         """Return the instrument as it was on a flight: its servos, its clock, and where a
-        calibration made the columns, what that says of sensors nobody measured."""
+        calibration made the columns, what that says of sensors nobody measured. Sensors that are
+        not our logger's are wrong by more, but for what a calibration says."""
         made_by, instrument = flight.calibration, self.instrument
         if made_by is not None and made_by.defaults():
             instrument = sensor_error_model(self.source, made_by, defaults=True)
+        elif not flight.recording.own:
+            instrument = sensor_error_model(self.source, self.calibration, own=False)
         return instrument.recorded(flight.recording)
 
 
@@ -60,5 +66,10 @@ def aircraft_data(source: str | Path, calibration: str | Path | None = None) -> 
     except NoPropulsionError:
         rotor = None
     return AircraftData(
-        name, airframe, sensor_error_model(name, measured), rotor, tuple(load_measured(name).doubts)
+        name,
+        airframe,
+        sensor_error_model(name, measured),
+        rotor,
+        tuple(load_measured(name).doubts),
+        measured,
     )

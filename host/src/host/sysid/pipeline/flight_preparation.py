@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from host.instrument.deviations import unknown_sensors
 from host.instrument.error_labels import recording_notes
+from host.instrument.servo_prior import servo_prior
 from host.sysid.compatibility.reconstruction import (
     Compatibility,
     NoAgreementError,
     reconstruct,
 )
 from host.sysid.compatibility.sensor_corrections import without_estimated_delays
-from host.sysid.compatibility.servo_response import surface_positions
+from host.sysid.compatibility.servo_response import commands_of, surface_positions
 from host.sysid.flight.agreement_findings import calibration_findings, disagreement
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
@@ -71,9 +73,11 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     columns, travel = with_surface_angles(read.columns, read.shares, known)
     notes, findings = [*read.notes, *travel], [*read.findings, *no_vanes_finding(columns)]
     instrument = known.flown(read) if known else None
-    if instrument is not None:
-        columns = surface_positions(columns, instrument)
-        notes += recording_notes(instrument)
+    sensors = instrument or unknown_sensors(read.recording)
+    commands = commands_of(columns, sensors)
+    columns = surface_positions(columns, sensors)
+    if instrument is not None or commands:
+        notes += recording_notes(sensors)
     found = select_maneuvers(columns, stretches=how.stretches, numbers=how.maneuvers)
     if not found:
         found, small = whole_flight(columns)
@@ -100,7 +104,12 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         findings=findings,
         resolution=read.resolution,
     )
-    flight = replace(flight, delays_open=flight.delays_open and how.delays)
+    flight = replace(
+        flight,
+        delays_open=flight.delays_open and how.delays,
+        commands=commands,
+        servo=servo_prior(sensors) if commands and how.delays else None,
+    )
     return PreparedFlight(flight, agreement, tuple(notes))
 
 

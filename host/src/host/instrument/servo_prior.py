@@ -1,0 +1,46 @@
+"""What is known of servos beforehand: a prior of delay, bandwidth and rate limit.
+
+A column that is a command is ahead of its surface by all three. How far, and how well that is
+known, comes from the aircraft file and the instrument's errors; of a table of others from
+`foreign.toml`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from host.instrument.deviations import SensorErrorModel
+
+# One deviation of the rate limit: of the aircraft file's, and of usual servos, of which data sheets
+# say 0.10 to 0.23 s for 60 deg.
+KNOWN_RATE_SHARE, USUAL_RATE_SHARE = 0.10, 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class ServoPrior:
+    """Means and standard deviations of what brings a surface behind its command.
+
+    Attributes
+    ----------
+    mean, sd : tuple of float
+        Delay (s), bandwidth (Hz), rate limit (rad/s).
+    """
+
+    mean: tuple[float, float, float]
+    sd: tuple[float, float, float]
+
+
+def servo_prior(instrument: SensorErrorModel) -> ServoPrior:
+    """Return the prior of the servos of the surfaces that were only commanded."""
+    hertz, rate = instrument.servo
+    known = instrument.servo_hz > 0.0
+    e, commanded = instrument.errors, instrument.recording.commanded
+    share = "servo_bandwidth_share" if known else "servo_unknown_share"
+    return ServoPrior(
+        (0.0, hertz, rate),
+        (
+            max(e["servo_delay_s"].sigma(s) for s in commanded),
+            hertz * max(e[share].sigma(s) for s in commanded),
+            rate * (KNOWN_RATE_SHARE if known else USUAL_RATE_SHARE),
+        ),
+    )

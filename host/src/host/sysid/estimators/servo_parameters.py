@@ -1,0 +1,274 @@
+"""Delay, bandwidth and rate limit of servos, where an input is a command.
+
+The delay is estimated jointly with a model's parameters by its profile likelihood: a fit of all
+parameters at each of some delays, the prior of the delay added, a parabola about the best. It is
+the same for every method and needs no start. Linearised about the last delay the fit took the
+input's rate for a lead and went to where the prior is.
+
+Bandwidth and rate limit are carried: 1 / (2 pi f) is a delay too, and a free bandwidth beside a
+free delay drew the filter to 3.5 Hz on thor75, where 6 Hz and 50 ms were published.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from host.arrays import Array
+from host.constants import NORMAL_95
+from host.instrument.servo_prior import ServoPrior
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.consider_covariance import consider_covariance
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
+
+DELAY = "servo_delay_s"
+SERVO = (DELAY, "servo_bandwidth_hz", "servo_rate_limit_radps")
+LEAST, MOST = (-0.15, 0.3, 0.2), (0.5, 60.0, 60.0)  # a delay, a bandwidth, a rate that can be
+WIDE_DELAY_S = 0.02  # one deviation: above it the search begins with delays far apart
+SCAN_S = np.arange(-0.08, 0.241, 0.04)
+FINE_S = 0.01  # between the delays about the best
+STILL = 1e-4  # of the motion of the surface: what moves it by less moves nothing
+TOLD = 0.7  # of the prior's deviation: below it the data say it
+ALIKE = 0.9  # correlation of a derivative with the servo: they cannot be told apart
+
+Fit = Callable[[LinearModel, Sequence[Maneuver]], FitResult]
+Behind = Callable[[tuple[float, float, float]], Sequence[Maneuver]]
+
+
+@dataclass(frozen=True, slots=True)
+class ServoNumber:
+    """One number of the servos: value, 95 % half-width, that of the prior, told by the data or
+    not."""
+
+    name: str
+    value: float
+    half_width: float
+    prior_half_width: float
+    told: bool
+
+
+@dataclass(frozen=True)
+class ServoEstimate:
+    """The servos, and what they leave open of a model's parameters.
+
+    Attributes
+    ----------
+    surfaces : tuple of str
+        Inputs that are commands.
+    numbers : tuple of ServoNumber
+        In the order of `SERVO`.
+    names : tuple of str
+        Common parameters of the model that they were estimated beside.
+    covariance : Array, shape (P, P)
+        What the uncertain servo adds to that of these.
+    correlation : dict
+        Of each parameter with the servo.
+    """
+
+    surfaces: tuple[str, ...]
+    numbers: tuple[ServoNumber, ...]
+    names: tuple[str, ...]
+    covariance: Array
+    correlation: dict[str, float]
+
+    @property
+    def setting(self) -> tuple[float, float, float]:
+        """Delay (s), bandwidth (Hz), rate limit (rad/s)."""
+        delay, bandwidth, rate = (n.value for n in self.numbers)
+        return delay, bandwidth, rate
+
+    @property
+    def alike(self) -> tuple[str, ...]:
+        """Parameters that cannot be told apart from the servo."""
+        return tuple(n for n, r in self.correlation.items() if r > ALIKE)
+
+    def added_to(self, result: FitResult) -> FitResult:
+        """Return a fit behind these servos with their uncertainty in its covariance."""
+        both = [(k, result.index(n)) for k, n in enumerate(self.names) if n in result.names]
+        own = np.array([k for k, _ in both], dtype=np.int64)
+        there = np.array([k for _, k in both], dtype=np.int64)
+        covariance = result.covariance.copy()
+        covariance[np.ix_(there, there)] += self.covariance[np.ix_(own, own)]
+        return replace(result, covariance=covariance)
+
+
+@dataclass
+class _Profile:
+    """Fits of a model behind servos of several delays, and what each costs."""
+
+    model: LinearModel
+    behind: Behind
+    prior: ServoPrior
+    fit: Fit
+
+    def __post_init__(self) -> None:
+        self.fits: dict[float, FitResult] = {}
+        self.costs: dict[float, float] = {}
+
+    def ask(self, delays_s: Sequence[float]) -> None:
+        """Fit at some delays; one at which the fit fails is left out."""
+        for delay_s in (round(float(d), 5) for d in delays_s):
+            if delay_s in self.fits or not LEAST[0] <= delay_s <= MOST[0]:
+                continue
+            try:
+                found = self.fit(self.model, self.behind((delay_s, *self.prior.mean[1:])))
+            except IdentificationError:
+                continue
+            self.fits[delay_s] = found
+            far = (delay_s - self.prior.mean[0]) / self.prior.sd[0]
+            self.costs[delay_s] = _cost(found) + 0.5 * far**2
+
+    @property
+    def best(self) -> float:
+        """The delay that costs least."""
+        if not self.costs:
+            raise IdentificationError("no delay at which the fit comes about")
+        return min(self.costs, key=self.costs.__getitem__)
+
+
+def estimate_servo(
+    model: LinearModel,
+    behind: Behind,
+    commanded: Sequence[str],
+    prior: ServoPrior,
+    fit: Fit,
+    quick: Fit,
+) -> ServoEstimate:
+    """Return the servos by a method, the delay estimated jointly with a model's parameters.
+
+    Parameters
+    ----------
+    model : LinearModel
+    behind : callable
+        Maneuvers with the surfaces behind servos of these numbers.
+    commanded : sequence of str
+        Inputs of the model that are commands.
+    prior : ServoPrior
+    fit, quick : callable
+        The method, and one that looks for where to begin: far from the best delay a filter finds
+        other optima.
+
+    Raises
+    ------
+    IdentificationError
+        If the search fails.
+    """
+    profile = _Profile(model, behind, prior, fit)
+    wide = prior.sd[0] > WIDE_DELAY_S
+    step = FINE_S if wide else prior.sd[0]
+    if wide:
+        coarse = _Profile(model, behind, prior, quick)
+        coarse.ask(SCAN_S.tolist())
+        profile.ask([coarse.best])
+    else:
+        profile.ask([prior.mean[0]])
+    for _ in range(8):
+        best = profile.best
+        profile.ask([best - step, best + step])
+        if profile.best == best:
+            break
+    below, above = round(best - step, 5), round(best + step, 5)
+    if below not in profile.costs or above not in profile.costs:
+        raise IdentificationError("the fit does not come about beside the best delay")
+    low, least, high = (profile.costs[d] for d in (below, best, above))
+    curvature = max((low - 2.0 * least + high) / step**2, prior.sd[0] ** -2)
+    delay = float(np.clip(best - 0.5 * (high - low) / step / curvature, below, above))
+    at = profile.fits[best]
+    sd = min(_colour(at) / float(np.sqrt(curvature)), prior.sd[0])
+    count = len(model.parameters)
+    apart = profile.fits[above].estimate[:count] - profile.fits[below].estimate[:count]
+    slope = apart / (2.0 * step)
+    shifts = [np.append(slope * sd, sd)]
+    for k in (1, 2):
+        shifts += _carried(profile, best, k, count)
+    return _estimate(model, tuple(commanded), delay, prior, at, np.stack(shifts))
+
+
+def _cost(found: FitResult) -> float:
+    """Return minus the logarithm of the likelihood of a fit, but for a constant."""
+    residuals = np.concatenate(found.residuals)
+    if found.residual_kind == "innovation":
+        return 0.5 * len(residuals) * float(np.linalg.slogdet(np.cov(residuals.T))[1])
+    variances = np.var(residuals, axis=0)
+    return 0.5 * len(residuals) * float(np.sum(np.log(variances + 1e-300)))
+
+
+def _colour(found: FitResult) -> float:
+    """Return by how much coloured residuals widen, in the median of the parameters."""
+    count = len(found.model.parameters)
+    white = np.diag(found.covariance_white)[:count]
+    ratio = np.diag(found.covariance)[:count][white > 0.0] / white[white > 0.0]
+    return float(np.sqrt(max(np.median(ratio), 1.0))) if len(ratio) else 1.0
+
+
+def _carried(profile: _Profile, delay_s: float, k: int, count: int) -> list[Array]:
+    """Return the shift of parameters and delay for one deviation of bandwidth or rate limit.
+
+    With the bandwidth the delay moves so that their sum stays: the data see little else.
+    """
+    prior = profile.prior
+    usual, other = np.array(prior.mean), np.array(prior.mean)
+    other[k] = np.clip(other[k] + prior.sd[k], LEAST[k], MOST[k])
+    usual[0] = other[0] = delay_s
+    if k == 1:
+        other[0] += (1.0 / usual[1] - 1.0 / other[1]) / (2.0 * np.pi)
+    there = profile.behind((float(other[0]), float(other[1]), float(other[2])))
+    here = profile.behind((float(usual[0]), float(usual[1]), float(usual[2])))
+    change = sum(
+        float(np.sum((a.inputs - b.inputs) ** 2)) for a, b in zip(there, here, strict=True)
+    )
+    motion = sum(float(np.sum(np.var(m.inputs, axis=0))) * m.samples for m in here)
+    if change < STILL**2 * motion:
+        return []  # a limit that is never reached
+    found = profile.fit(profile.model, there)
+    moved = found.estimate[:count] - profile.fits[delay_s].estimate[:count]
+    return [np.append(moved, other[0] - usual[0])]
+
+
+def carried_servo(
+    model: LinearModel, behind: Behind, commanded: Sequence[str], prior: ServoPrior, fit: Fit
+) -> ServoEstimate:
+    """Return the servos as the prior has them, what they leave open carried: consider parameters,
+    one shift of the estimate for one deviation of each."""
+    count = len(model.parameters)
+    first = fit(model, behind(prior.mean))
+    shifts = []
+    for k in range(len(SERVO)):
+        other = [float(x) for x in prior.mean]
+        other[k] = float(np.clip(other[k] + prior.sd[k], LEAST[k], MOST[k]))
+        moved = fit(model, behind((other[0], other[1], other[2]))).estimate - first.estimate
+        shifts.append(np.append(moved[:count], prior.sd[0] if k == 0 else 0.0))
+    return _estimate(model, tuple(commanded), prior.mean[0], prior, first, np.stack(shifts))
+
+
+def _estimate(
+    model: LinearModel,
+    surfaces: tuple[str, ...],
+    delay_s: float,
+    prior: ServoPrior,
+    found: FitResult,
+    shifts: Array,
+) -> ServoEstimate:
+    """Return the estimate of shifts of parameters, and of the delay behind them."""
+    count = len(model.parameters)
+    added = consider_covariance(shifts)
+    sd = (min(float(np.sqrt(added[-1, -1])), prior.sd[0]), *prior.sd[1:])
+    numbers = tuple(
+        ServoNumber(
+            name,
+            value,
+            NORMAL_95 * sd[k],
+            NORMAL_95 * prior.sd[k],
+            told=bool(sd[k] < TOLD * prior.sd[k]),
+        )
+        for k, (name, value) in enumerate(zip(SERVO, (delay_s, *prior.mean[1:]), strict=True))
+    )
+    part = added[:count, :count]
+    total = np.maximum(np.diag(part) + np.diag(found.covariance)[:count], 1e-300)
+    alike = np.sqrt(np.clip(np.diag(part) / total, 0.0, 1.0))
+    correlation = {p.name: float(r) for p, r in zip(model.parameters, alike, strict=True)}
+    return ServoEstimate(surfaces, numbers, tuple(correlation), part, correlation)

@@ -1,0 +1,97 @@
+"""Surfaces that a flight has only as commands, brought behind the servos that its data tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from host.sysid.compatibility.servo_response import behind_servos
+from host.sysid.estimators.filter_error_gust import fit_gust_state
+from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.servo_parameters import (
+    Fit,
+    ServoEstimate,
+    carried_servo,
+    estimate_servo,
+)
+from host.sysid.estimators.start_values import start_values_of
+from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
+
+
+def servo_of(
+    model: LinearModel, used: Sequence[FlownManeuver], airspeed_mps: float | None
+) -> tuple[ServoEstimate | None, str]:
+    """Return the servos of the commanded inputs of a model, and a remark; None without any.
+
+    Parameters
+    ----------
+    model : LinearModel
+        Delays and places of sensors are left out: what all sensors have in common is the servos'
+        delay.
+    used : sequence of FlownManeuver
+        Those of the fit.
+    airspeed_mps : float or None
+        Of the trim where the gust is a state; None: output error.
+    """
+    flights = {id(m.flight): m.flight for m in used}.values()
+    commands = {u for f in flights for u in f.commands if f.servo is not None}
+    commanded = [u for u in model.inputs if u in commands]
+    prior = next((f.servo for f in flights if f.servo is not None), None)
+    if not commanded or prior is None:
+        return None, ""
+    places = {x.parameter for x in model.accelerometer_offsets}
+    plain = replace(
+        model,
+        delays=(),
+        accelerometer_offsets=(),
+        parameters=tuple(p for p in model.parameters if p.name not in places),
+    )
+
+    def behind(values: tuple[float, float, float]) -> list[Maneuver]:
+        return [m.cut(plain) for m in brought_behind(used, values)]
+
+    remark = ""
+    if airspeed_mps is not None:
+        try:
+            by = _with_gust(airspeed_mps)
+            return estimate_servo(plain, behind, commanded, prior, by, _white), ""
+        except IdentificationError as error:
+            remark = f"the servos are those of output error: {error}"
+    try:
+        return estimate_servo(plain, behind, commanded, prior, _white, _white), remark
+    except IdentificationError as error:
+        carried = carried_servo(plain, behind, commanded, prior, _white)
+        return carried, f"the servos were not estimated ({error}): carried as they usually are"
+
+
+def _white(model: LinearModel, data: Sequence[Maneuver]) -> FitResult:
+    return fit("output-error-white", model, data, multiple_starts=False)
+
+
+def _with_gust(airspeed_mps: float) -> Fit:
+    """Return filter error with the gust; where it loses itself, nothing of it is used."""
+
+    def by(model: LinearModel, data: Sequence[Maneuver]) -> FitResult:
+        found = fit_gust_state(model, list(data), airspeed_mps, start_values_of(model, data))
+        if found.residual_kind != "innovation":
+            raise IdentificationError("the filter did not converge beside them")
+        return found
+
+    return by
+
+
+def brought_behind(
+    used: Sequence[FlownManeuver], servo: tuple[float, float, float]
+) -> list[FlownManeuver]:
+    """Return maneuvers with commanded surfaces where servos of these numbers had brought them."""
+    own: dict[int, ReconstructedFlight] = {}
+    for m in used:
+        f = m.flight
+        if id(f) not in own:
+            at = behind_servos(f.commands, f.corrected["t_s"], servo) if f.commands else {}
+            own[id(f)] = replace(f, corrected={**f.corrected, **at}) if at else f
+    return [replace(m, flight=own[id(m.flight)]) for m in used]

@@ -1,0 +1,147 @@
+"""Servos of commanded inputs: the delay found moves with the commands, derivatives do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.arrays import Array
+from host.instrument.deviations import unknown_sensors
+from host.instrument.recording import Recording
+from host.instrument.servo_prior import ServoPrior, servo_prior
+from host.sysid.compatibility.servo_response import behind_servos
+from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.servo_parameters import ServoEstimate, carried_servo, estimate_servo
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.templates import Trim, template
+from host.sysid.numerics.output_error_problem import OutputProblem
+
+import host
+
+THOR = Path(__file__).resolve().parents[4] / "tests/data/thor75"
+TRUE = {"Z_alpha": -5.0, "Z_de": -0.5, "Z_q": 0.1, "M_alpha": -80.0, "M_q": -8.0, "M_de": -90.0}
+DT_S = 0.02
+T = np.arange(0.0, 20.0, DT_S)
+LATE = (0.05, 8.0, 5.2)
+
+
+def _command() -> Array:
+    """A doublet and a 3-2-1-1 of 3 degrees."""
+    u = np.zeros(len(T))
+    for first, last, sign in ((1, 1.5, 1), (1.5, 2, -1), (8, 9.2, 1), (9.2, 10, -1), (10, 10.4, 1)):
+        u[(first <= T) & (last > T)] = np.radians(3.0) * sign
+    return u
+
+
+def _found(shift_s: float, prior: ServoPrior) -> tuple[ServoEstimate, FitResult]:
+    """Return servos and fit of a flight whose commands are `shift_s` earlier than they were."""
+    model = template("short-period", Trim(17.0), accelerometers=False)
+    model = replace(model, delays=())
+    still = Maneuver(DT_S, np.zeros((len(T), 1)), np.zeros((len(T), len(model.outputs))))
+    command = _command()
+    surface = behind_servos({"u": command}, T, LATE)["u"]
+    flown = replace(still, inputs=surface[:, None])
+    problem = OutputProblem(model, [flown])
+    outputs = problem.outputs(np.array([TRUE.get(n, 0.0) for n in problem.names]))
+    assert outputs is not None
+    noise = np.random.default_rng(7).normal(0.0, 0.003, (len(T), len(model.outputs)))
+    y = outputs[0].T + noise
+    early = np.interp(T + shift_s, T, command)
+
+    def behind(servo: tuple[float, float, float]) -> list[Maneuver]:
+        u = behind_servos({"u": early}, T, servo)["u"]
+        return [Maneuver(DT_S, u[:, None], y)]
+
+    def white(m: LinearModel, data: object) -> FitResult:
+        return fit("output-error-white", m, data, multiple_starts=False)  # type: ignore[arg-type]
+
+    servo = estimate_servo(model, behind, ["elevator_rad"], prior, white, white)
+    return servo, servo.added_to(white(model, behind(servo.setting)))
+
+
+WIDE = ServoPrior((0.0, 8.0, 5.2), (0.05, 2.3, 1.3))
+
+
+def test_the_delay_moves_with_the_commands_and_pitch_damping_stays() -> None:
+    """0, 20, 40, 60 ms earlier commands are 0, 20, 40, 60 ms more delay."""
+    found = [_found(shift, WIDE) for shift in (0.0, 0.02, 0.04, 0.06)]
+    first, fitted = found[0]
+    half = fitted.half_width()
+    assert abs(first.setting[0] - LATE[0]) < first.numbers[0].half_width
+    assert first.numbers[0].told
+    assert not first.numbers[1].told
+    for (servo, other), shift in zip(found, (0.0, 0.02, 0.04, 0.06), strict=True):
+        assert servo.setting[0] - first.setting[0] == pytest.approx(shift, abs=0.004)
+        k = fitted.index("M_q")
+        assert abs(other.value("M_q") - fitted.value("M_q")) < 0.5 * half[k]
+    for name in ("M_alpha", "M_q", "M_de"):
+        k = fitted.index(name)
+        assert abs(fitted.value(name) - TRUE[name]) < 1.5 * half[k]
+
+
+def test_a_prior_that_knows_the_servo_is_held_to() -> None:
+    """A delay known to 3 ms is not looked for at 50."""
+    servo, _ = _found(0.0, ServoPrior((0.05, 8.0, 5.2), (0.003, 0.4, 0.5)))
+    assert abs(servo.setting[0] - 0.05) < 0.006
+
+
+def test_a_servo_that_is_not_estimated_is_carried() -> None:
+    """Where the fit fails beside it, one deviation of each number shifts the parameters."""
+    model = replace(template("short-period", Trim(17.0), accelerometers=False), delays=())
+    seen: list[float] = []
+
+    def behind(servo: tuple[float, float, float]) -> list[Maneuver]:
+        u = behind_servos({"u": _command()}, T, servo)["u"]
+        return [Maneuver(DT_S, u[:, None], np.random.default_rng(3).normal(0, 1, (len(T), 2)))]
+
+    def fails(_: LinearModel, data: object) -> FitResult:
+        seen.append(1.0)
+        raise IdentificationError("no")
+
+    with pytest.raises(IdentificationError, match="no delay at which"):
+        estimate_servo(model, behind, ["elevator_rad"], WIDE, fails, fails)
+
+    def white(m: LinearModel, data: object) -> FitResult:
+        return fit("output-error-white", m, data, multiple_starts=False)  # type: ignore[arg-type]
+
+    carried = carried_servo(model, behind, ["elevator_rad"], WIDE, white)
+    assert seen
+    assert carried.setting == WIDE.mean
+    assert np.all(np.diag(carried.covariance) > 0.0)
+
+
+def test_the_servos_of_others_are_known_less() -> None:
+    """The prior of a table of others is wide; ours is of a servo on a bench."""
+    own = servo_prior(unknown_sensors(Recording(commanded=("elevator",))))
+    other = servo_prior(unknown_sensors(Recording(commanded=("elevator",), own=False)))
+    assert own.sd[0] < 0.005
+    assert other.sd[0] == pytest.approx(0.05)
+
+
+def test_the_commands_of_a_real_flight_have_their_lag() -> None:
+    """Thor's commands, 40 ms earlier, are 40 ms later at the surface; M_q stays within half its
+    interval."""
+    table = pd.read_csv(THOR / "flight75_240_270.csv")
+    earlier = table.copy()
+    t = table["time"].to_numpy()
+    earlier["de"] = np.interp(t + 0.04, t, table["de"])
+    answers = [
+        host.identify(
+            flight, mapping=THOR / "map.toml", aircraft="ultrastick25e", models="short-period",
+            from_s=240.0, to_s=270.0,
+        ).linear[0]
+        for flight in (table, earlier)
+    ]  # fmt: skip
+    servos = [a.servo for a in answers]
+    assert servos[0] is not None and servos[1] is not None
+    assert servos[0].numbers[0].told
+    assert servos[1].setting[0] - servos[0].setting[0] == pytest.approx(0.04, abs=0.005)
+    k = answers[0].result.index("M_q")
+    moved = answers[1].result.estimate[k] - answers[0].result.estimate[k]
+    assert abs(moved) < 0.5 * answers[0].result.half_width()[k]
