@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from host.arrays import Array
+from host.sysid.estimators.gust_penetration import PREFIX
 from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.numerics.input_coherence import InputCoherence
@@ -69,6 +70,8 @@ def inflate_by_coherence(
         alone = found.covariance() if excess is None else excess.predicted
         ratio = wide / np.maximum(np.diag(alone)[:count], 1e-300)
     factor = np.ones(len(result.covariance))
+    # What gusts do is no derivative: the model of the gust is not what the inputs drive.
+    own = np.where([n.startswith(PREFIX) for n in result.names[:count]], 0.0, own)
     factor[:count] = np.where(own > 0.0, np.sqrt(np.maximum(ratio, 1.0)), 1.0)
     covariance = result.covariance * np.outer(factor, factor)
     shift = np.where(own > 0.0, found.shift[:count], 0.0)
