@@ -1,4 +1,4 @@
-"""The default longitudinal answer on flights of a simulator with equations of its own.
+"""The default answer on flights of a simulator with equations of its own.
 
 Eight cells of gusts and calm air, ideally placed sensors, no aircraft file. One row a flight goes
 to a file that a later run continues.
@@ -21,7 +21,11 @@ from studies.foreign.flight import Air, derivatives, fly
 
 # 0-5 were looked at while delays and turning air were written.
 FIRST_SEED = 100
-NAMES = ("Z_alpha", "M_alpha", "M_q", "M_de")
+NAMES = {
+    "longitudinal": ("Z_alpha", "M_alpha", "M_q", "M_de"),
+    "lateral": ("L_p", "L_da", "N_beta", "N_r", "N_dr"),
+}
+EVERY = {name for names in NAMES.values() for name in names}
 COLUMNS = ("cell", "seed", "name", "true", "estimate", "half_width")
 LIMIT_MEAN = 2.0  # %, plus two standard errors of the mean
 
@@ -39,11 +43,11 @@ def cells() -> dict[str, Air]:
     return found
 
 
-def rows_of(cell: str, air: Air, seed: int) -> list[dict[str, object]]:
-    """Fly and identify; no estimate where the answer is refused."""
+def rows_of(cell: str, air: Air, seed: int, axis: str) -> list[dict[str, object]]:
+    """Fly and identify one axis; no estimate where the answer is refused."""
     measured, _ = fly(air, seed)
     try:
-        [answer] = identify(dict(measured), names=("longitudinal",))
+        [answer] = identify(dict(measured), names=(axis,))
     except IdentificationError:
         return [dict.fromkeys(COLUMNS, "") | {"cell": cell, "seed": seed, "name": "refused"}]
     expected = derivatives(answer.trim.airspeed_mps)  # where the answer says that it holds
@@ -53,7 +57,7 @@ def rows_of(cell: str, air: Air, seed: int) -> list[dict[str, object]]:
             "cell": cell, "seed": seed, "name": name, "true": expected[name],
             "estimate": result.value(name), "half_width": float(half[result.index(name)]),
         }
-        for name in NAMES
+        for name in NAMES[axis]
     ]  # fmt: skip
 
 
@@ -62,10 +66,10 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
     lines = [
         "cell                                derivative  mean error %   rms  half-width  holds"
     ]
-    kept = [r for r in rows if r["name"] in NAMES]
+    kept = [r for r in rows if r["name"] in EVERY]
     held_all = total = 0
     for cell in dict.fromkeys(r["cell"] for r in kept):
-        for name in NAMES:
+        for name in dict.fromkeys(r["name"] for r in kept):
             own = [r for r in kept if r["cell"] == cell and r["name"] == name]
             truth, value, half = (
                 np.array([float(r[k]) for r in own]) for k in ("true", "estimate", "half_width")
@@ -91,26 +95,28 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=2, help="of each cell (the page: 20)")
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/independent.csv"))
+    parser.add_argument("--axis", choices=tuple(NAMES), default="longitudinal")
+    parser.add_argument("--rows", type=Path, help="of a run that goes on; a file for each axis")
     options = parser.parse_args(arguments)
-    options.rows.parent.mkdir(parents=True, exist_ok=True)
+    path = options.rows or Path(f"../build/study/independent_{options.axis}.csv")
+    path.parent.mkdir(parents=True, exist_ok=True)
     rows = []
-    if options.rows.exists():
-        with options.rows.open(newline="") as file:
+    if path.exists():
+        with path.open(newline="") as file:
             rows = list(csv.DictReader(file))
     done = {(r["cell"], int(r["seed"])) for r in rows}
     seeds = range(options.first, options.first + options.flights)
-    with options.rows.open("a", newline="") as file:
+    with path.open("a", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS, restval="")
         if not rows:
             writer.writeheader()
         for seed, (cell, air) in itertools.product(seeds, cells().items()):
             if (cell, seed) not in done:
-                writer.writerows(rows_of(cell, air, seed))
+                writer.writerows(rows_of(cell, air, seed, options.axis))
                 file.flush()
                 print(f"\r{cell}, seed {seed}   ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
-    with options.rows.open(newline="") as file:
+    with path.open(newline="") as file:
         mine = [r for r in csv.DictReader(file) if int(r["seed"]) in seeds]
     print("\n".join(table(mine)))
     return 0

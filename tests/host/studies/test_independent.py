@@ -52,8 +52,8 @@ def test_turning_air_and_varying_airspeed_leave_the_answer_right() -> None:
     """Before, M_alpha was 6 % off in calm air, M_q 80 % in gusts of 1 m/s that turn it."""
     gusty = Air("karman", 1.0, turns=False, spread=True)
     for air, largest, widest in ((Air(), 0.015, 0.04), (gusty, 0.15, 0.3)):
-        rows = independent.rows_of("", air, 40)
-        assert [r["name"] for r in rows] == list(independent.NAMES)
+        rows = independent.rows_of("", air, 40, "longitudinal")
+        assert [r["name"] for r in rows] == list(independent.NAMES["longitudinal"])
         for row in rows:
             estimate, half, true = (float(str(row[k])) for k in ("estimate", "half_width", "true"))
             assert abs(estimate - true) < largest * abs(true), row
@@ -69,7 +69,7 @@ def test_in_calm_air_the_unseen_maneuver_is_predicted_and_the_answer_trusted() -
     assert answer.coherence is not None
     assert not answer.coherence.dominated(3.0)
     doubted = {name for one in doubts_of(answer) for name in one.names}
-    assert not doubted & set(independent.NAMES)
+    assert not doubted & set(independent.NAMES["longitudinal"])
 
 
 def test_study_continues_where_it_stopped(
@@ -77,12 +77,12 @@ def test_study_continues_where_it_stopped(
 ) -> None:
     flown: list[tuple[str, int]] = []
 
-    def row(cell: str, air: Air, seed: int) -> list[dict[str, object]]:
+    def row(cell: str, air: Air, seed: int, axis: str) -> list[dict[str, object]]:
         flown.append((cell, seed))
         return [
             {"cell": cell, "seed": seed, "name": name, "true": -2.0, "estimate": -2.0 + 0.01 * seed,
              "half_width": 0.105}
-            for name in independent.NAMES
+            for name in independent.NAMES[axis]
         ]  # fmt: skip
 
     monkeypatch.setattr(independent, "rows_of", row)

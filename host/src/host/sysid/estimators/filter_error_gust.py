@@ -10,8 +10,8 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.estimators.filter_error import fit_filter_error, near_its_optimum
 from host.sysid.estimators.gust_delays import advance_outputs, estimate_delays
-from host.sysid.estimators.gust_model import gust_model
-from host.sysid.estimators.gust_penetration import PREFIX, with_gust_penetration
+from host.sysid.estimators.gust_model import ROLL_GUST, gust_model
+from host.sysid.estimators.gust_penetration import PREFIX, ROLL_STATES, with_gust_penetration
 from host.sysid.estimators.innovations import innovations_of
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.start_values import start_values_of
@@ -101,7 +101,8 @@ def without_gust_parameters(result: FitResult, model: LinearModel) -> FitResult:
 
 def gust_process(model: LinearModel) -> tuple[str, ...]:
     """Return the states that process noise drives."""
-    return ("gust_rad", *(s for s in OTHER_PROCESS_STATES if s in model.states))
+    rolling = (ROLL_GUST,) if set(model.states) >= ROLL_STATES else ()
+    return ("gust_rad", *rolling, *(s for s in OTHER_PROCESS_STATES if s in model.states))
 
 
 def fit_gust_state(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.sysid.estimators.gust_penetration import GUST_LAG, penetration_name
+from host.sysid.estimators.gust_penetration import GUST_LAG, ROLL_LAG, penetration_name
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 
@@ -82,6 +82,9 @@ def gust_model(
     penetrates = GUST_LAG in base.parameter_names
     if penetrates:
         gust_states[LAGGED_GUST] = {}
+    rolls = ROLL_LAG in base.parameter_names
+    if rolls:
+        gust_states[ROLL_GUST] = {"p_radps": 1.0}
     states = (*base.states, *gust_states)
     n, total = len(base.states), len(base.states) + len(gust_states)
     A, C = np.zeros((total, total)), np.zeros((len(base.outputs), total))
@@ -99,6 +102,9 @@ def gust_model(
                 C[:, column] += gain * base.C[:, source]
     if penetrates:
         terms += _penetration_terms(base, states, base.states.index(rate_effect[0]))
+    if rolls:
+        roll = states.index(ROLL_GUST)
+        terms.append(Term("A", roll, roll, ROLL_LAG, -1.0))
     for row, source_name, value in fixed:
         A[states.index(row), states.index(source_name)] = value
     parameters = base.parameters

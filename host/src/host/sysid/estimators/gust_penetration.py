@@ -4,6 +4,8 @@ How strongly is not known beforehand: a small aircraft in long gusts feels the a
 which the tail makes most of the damping feels both, and shape and length of the gusts differ. Left
 out, M_alpha was 55 % and M_q 160 % off on simulated flights in which the air turns, taken for known
 (MIL-F-8785C, 3.7.5) they were 15 to 40 % off where it does not; free, both are within 2 %.
+Sideslip and yaw rate alike: left out, L_beta was 29 and N_r 21 % off. Lateral gusts also roll the
+air, with a lag of their own.
 """
 
 from __future__ import annotations
@@ -17,6 +19,9 @@ from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 
 PREFIX = "gust_"
 GUST_LAG = "gust_lag_radps"
+ROLL_LAG = "gust_roll_lag_radps"
+TURNED = (("alpha_rad", "q_radps"), ("beta_rad", "r_radps"))  # angles and the rates beside them
+ROLL_STATES = frozenset({"beta_rad", "p_radps"})  # of a model that air may roll
 # The air turns within the time to fly this far: tail arm or 4 b/pi of models of 1.2 to 2.5 m span.
 LENGTH_M, LENGTH_SHARE = 1.5, 0.5
 FARTHEST = 10.0  # times more or less: bounds of the search
@@ -33,7 +38,7 @@ def with_gust_penetration(
 ) -> tuple[LinearModel, Array]:
     """Return the model with the effects of turning air as parameters, and the start with theirs.
 
-    A model without alpha or q feels none and stays as it is.
+    A model with neither alpha and q nor beta and r feels none and stays as it is.
 
     The parameters act through the gust alone (`gust_model`): ``gust_Z`` in 1/s, ``gust_M`` in 1/s2,
     ``gust_lag_radps``.
@@ -47,12 +52,24 @@ def with_gust_penetration(
     start : Array, shape (P,)
         Common parameters of the model first.
     """
-    if not {"alpha_rad", "q_radps"} <= set(model.states):
-        return model, start
-    count = len(model.parameters)
-    size = dict(zip((p.name for p in model.parameters), np.abs(start), strict=False))
-    alpha, q = model.states.index("alpha_rad"), model.states.index("q_radps")
     lag = airspeed_mps / LENGTH_M
+    turns = next((pair for pair in TURNED if set(pair) <= set(model.states)), None)
+    if turns is None:
+        return model, start
+    more = (*_effects(model, *turns, lag, start), _lag(GUST_LAG, lag))
+    if set(model.states) >= ROLL_STATES:
+        more = (*more, _lag(ROLL_LAG, lag))
+    count = len(model.parameters)
+    wide = replace(model, parameters=(*model.parameters, *more), terms=(*model.terms, *_idle(more)))
+    return wide, np.concatenate([start[:count], [p.start for p in more], start[count:]])
+
+
+def _effects(
+    model: LinearModel, angle: str, rate: str, lag: float, start: Array
+) -> tuple[Parameter, ...]:
+    """Return what turning air does to each equation that the rate stands in."""
+    size = dict(zip((p.name for p in model.parameters), np.abs(start), strict=False))
+    alpha, q = model.states.index(angle), model.states.index(rate)
     effects: dict[str, float] = {}
     for term in model.terms:
         if term.matrix == "A" and term.column == q:
@@ -61,20 +78,15 @@ def with_gust_penetration(
             ]
             beside = sum(size[t.parameter] for t in own)
             effects[penetration_name(term.parameter)] = lag * size[term.parameter] + beside
-    more = (
-        *(Parameter(name, prior_sd=GENEROUS * sd) for name, sd in effects.items() if sd > 0.0),
-        Parameter(
-            GUST_LAG,
-            lag,
-            lower=lag / FARTHEST,
-            upper=lag * FARTHEST,
-            prior_sd=LENGTH_SHARE * lag,
-        ),
+    return tuple(
+        Parameter(name, prior_sd=GENEROUS * sd) for name, sd in effects.items() if sd > 0.0
     )
-    wide = replace(
-        model, parameters=(*model.parameters, *more), terms=(*model.terms, *_idle(model, more))
+
+
+def _lag(name: str, lag: float) -> Parameter:
+    return Parameter(
+        name, lag, lower=lag / FARTHEST, upper=lag * FARTHEST, prior_sd=LENGTH_SHARE * lag
     )
-    return wide, np.concatenate([start[:count], [p.start for p in more], start[count:]])
 
 
 def without_gust_penetration(model: LinearModel) -> LinearModel:
@@ -89,14 +101,9 @@ def without_gust_penetration(model: LinearModel) -> LinearModel:
 def penetration_of(model: LinearModel, other: LinearModel) -> LinearModel:
     """Return `model` with the parameters of turning air that `other` has."""
     more = tuple(p for p in other.parameters if p.name.startswith(PREFIX))
-    return replace(
-        model, parameters=(*model.parameters, *more), terms=(*model.terms, *_idle(model, more))
-    )
+    return replace(model, parameters=(*model.parameters, *more), terms=(*model.terms, *_idle(more)))
 
 
-def _idle(model: LinearModel, parameters: tuple[Parameter, ...]) -> tuple[Term, ...]:
+def _idle(parameters: tuple[Parameter, ...]) -> tuple[Term, ...]:
     """Return entries of no gain: without a gust these parameters move nothing."""
-    if not parameters:
-        return ()
-    alpha = model.states.index("alpha_rad")
-    return tuple(Term("A", alpha, alpha, p.name, 0.0) for p in parameters)
+    return tuple(Term("A", 0, 0, p.name, 0.0) for p in parameters)

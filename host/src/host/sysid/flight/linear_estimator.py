@@ -37,6 +37,7 @@ from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.servo_parameters import ServoEstimate
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
+from host.sysid.flight.filter_step import feels_roll, sensors_known, with_filter_step
 from host.sysid.flight.free_simulation import (
     fits_of,
     free_responses,
@@ -275,6 +276,8 @@ class LinearEstimator:
         if servo is not None:
             remarks += (remark,) if remark else ()
             used, held = brought_behind(used, servo.setting), brought_behind(held, servo.setting)
+        if method == GUST and self.own is None:
+            used = with_filter_step(used, model)
         data = [m.cut(model) for m in used]
         cuts = [m.inside() for m in used]
         delays: dict[str, tuple[float, float]] = {}
@@ -510,7 +513,10 @@ class LinearEstimator:
         if method == DEFAULT_METHOD:
             # A filter takes the line between two values of a slow sensor for measurements.
             evenly = not any(m.cut(model).held for m in used)
-            measured = "alpha_rad" in model.states and "alpha_rad" in model.outputs
+            # Laterally only where places and delays of the sensors are known (`filter_step`).
+            rolls = self.own is None and feels_roll(model) and sensors_known(used)
+            vane = "beta_rad" if rolls else "alpha_rad"
+            measured = vane in model.states and vane in model.outputs
             gust = measured and trim.known and evenly
             method = GUST if gust else "output-error-white"
             if self.own is None and method != GUST and self.template == "lateral":

@@ -106,17 +106,22 @@ def _drawn_errors(
     intensity = np.zeros(len(A))
     intensity[index] = np.asarray(result.details["process_deviation"]) ** 2
     F, covariance = discrete_noise(A, intensity, block * dt_s)
-    value, vector = np.linalg.eigh(covariance)
-    root = vector * np.sqrt(np.maximum(value, 0.0))
+    root = _root(covariance)
     x = np.zeros((len(A), DRAWS))
     gusts = [k for k, s in enumerate(wide.states) if s.startswith("gust")]
     if gusts:  # the air moves already when the record begins
         own = np.ix_(gusts, gusts)
         steady = linalg.solve_continuous_lyapunov(A[own], -np.diag(intensity[gusts]))
-        x[gusts] = linalg.cholesky(steady, lower=True) @ rng.standard_normal((len(gusts), DRAWS))
+        x[gusts] = _root(steady) @ rng.standard_normal((len(gusts), DRAWS))
     deviation = np.asarray(result.details["noise_deviation"]) / np.sqrt(block)
     errors = rng.standard_normal((len(C), means, DRAWS)) * deviation[:, None, None]
     for k in range(means):
         errors[:, k] += C @ x
         x = F @ x + root @ rng.standard_normal((len(A), DRAWS))
     return np.asarray(errors)
+
+
+def _root(covariance: Array) -> Array:
+    """Return a root of a covariance, which may be singular: air and air met a little later."""
+    value, vector = np.linalg.eigh(covariance)
+    return np.asarray(vector * np.sqrt(np.maximum(value, 0.0)))

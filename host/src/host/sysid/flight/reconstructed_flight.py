@@ -76,18 +76,30 @@ class ReconstructedFlight:
 
 @dataclass(frozen=True, slots=True)
 class FlownManeuver:
-    """A maneuver in its flight; `label` is what an answer calls it."""
+    """A maneuver in its flight; `label` is what an answer calls it, `block` how many samples are
+    averaged to one."""
 
     found: DetectedManeuver
     flight: ReconstructedFlight
     label: str
+    block: int = 1
+
+    @property
+    def dt_s(self) -> float:
+        """Step of the recorded samples."""
+        t = self.flight.corrected["t_s"]
+        return float(t[1] - t[0])
 
     def inside(self) -> dict[str, Array]:
         """Return all corrected columns of it, a moment of trim before the input included."""
         t = self.flight.corrected["t_s"]
         first, last = self.found.fit_window()
-        inside = (t >= first) & (t <= last)
-        return {name: values[inside] for name, values in self.flight.corrected.items()}
+        at = np.flatnonzero((t >= first) & (t <= last))
+        at = at[: len(at) // self.block * self.block]
+        return {
+            name: values[at].reshape(-1, self.block).mean(axis=1) if self.block > 1 else values[at]
+            for name, values in self.flight.corrected.items()
+        }
 
     def cut(self, model: LinearModel) -> Maneuver:
         """Return inputs and outputs of a model over it.
