@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from host.sysid.answer.doubt import Doubt, doubt
 from host.sysid.answer.impossible_signs import impossible_signs
 from host.sysid.answer.trust_rules import percent
 from host.sysid.coefficients.coefficient_model import standard_model
+from host.sysid.flight.data_finding import Feedback
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
@@ -37,7 +38,9 @@ LEANING: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 Channels = Mapping[str, str]
 
 
-def coefficient_doubts(answer: CoefficientAnswer, open_channels: Channels) -> list[Doubt]:
+def coefficient_doubts(
+    answer: CoefficientAnswer, open_channels: Channels, laws: Sequence[Feedback] = ()
+) -> list[Doubt]:
     """Return every doubt about the coefficients, in the order of the rules.
 
     Parameters
@@ -45,8 +48,24 @@ def coefficient_doubts(answer: CoefficientAnswer, open_channels: Channels) -> li
     answer : CoefficientAnswer
     open_channels : mapping
         Column with an open finding of the data checks to the check.
+    laws : sequence of Feedback
+        Of surfaces that follow states.
     """
-    return [one for rule in RULES for one in rule(answer, open_channels)]
+    return [
+        *(one for law in laws for one in follows_states(answer, law)),
+        *(one for rule in RULES for one in rule(answer, open_channels)),
+    ]
+
+
+def follows_states(answer: CoefficientAnswer, law: Feedback) -> list[Doubt]:
+    """A surface is a function of states: in one equation their coefficients are alike."""
+    own = LEANING[law.surface][1]
+    others = [label for s in law.signals for label in LEANING.get(s, ((), ()))[1]]
+    names = [n.split("_") for n in _names(answer) if "_" in n]
+    equations = {n[0] for n in names if n[-1] in own} & {n[0] for n in names if n[-1] in others}
+    alike = ["_".join(n) for n in names if n[0] in equations and n[-1] in (*own, *others)]
+    reason = f"{law.surface} follows {' and '.join(law.signals)}: they cannot be told apart"
+    return doubt(alike, _names(answer), reason)
 
 
 def open_finding(answer: CoefficientAnswer, open_channels: Channels) -> list[Doubt]:

@@ -20,13 +20,16 @@ from host.sysid.answer.marks import (
 )
 from host.sysid.coefficients.coefficient_fit import FLAG_SHARE
 from host.sysid.coefficients.coefficient_model import standard_model
+from host.sysid.flight.data_finding import Feedback
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 
 def coefficient_verdict(
-    answer: CoefficientAnswer, open_channels: Mapping[str, str] | None = None
+    answer: CoefficientAnswer,
+    open_channels: Mapping[str, str] | None = None,
+    laws: Sequence[Feedback] = (),
 ) -> Verdict:
     """Return what of the coefficients may be relied on.
 
@@ -35,6 +38,8 @@ def coefficient_verdict(
     answer : CoefficientAnswer
     open_channels : mapping, optional
         Column with an open finding of the data checks to the check.
+    laws : sequence of Feedback
+        Of surfaces that follow states.
     """
     along = sum(w.longitudinal for w in answer.windows)
     own = "" if answer.model == standard_model() else f" by the terms of '{answer.model.name}'"
@@ -42,7 +47,7 @@ def coefficient_verdict(
         f"coefficients{own}: {along} maneuvers of the elevator, {len(answer.windows) - along} of"
         " aileron and rudder fitted jointly, errors of the instrument beside them"
     )
-    doubts = coefficient_doubts(answer, open_channels or {})
+    doubts = coefficient_doubts(answer, open_channels or {}, laws)
     reasons = reasons_by_name(doubts)
     marks = {}
     for d in answer.fit.derivatives:

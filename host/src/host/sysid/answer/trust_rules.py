@@ -15,6 +15,7 @@ import numpy as np
 
 from host.sysid.answer.correlated_inputs import derivatives_of_both
 from host.sysid.answer.doubt import Doubt, doubt
+from host.sysid.answer.feedback_pairs import alike_derivatives, feedback_of
 from host.sysid.answer.impossible_signs import impossible_signs
 from host.sysid.answer.method_agreement import disagreements
 from host.sysid.answer.parameter_places import leaning_on
@@ -143,10 +144,23 @@ def open_finding(answer: Answer, evidence: Evidence) -> list[Doubt]:
     ]
 
 
+def follows_states(answer: Answer, evidence: Evidence) -> list[Doubt]:
+    """A surface is a function of states: in one equation their derivatives are alike."""
+    return [
+        one
+        for law in feedback_of(evidence.findings)
+        for one in _named(
+            answer,
+            [n for group in alike_derivatives(answer.model, law) for n in group],
+            f"{law.surface} follows {' and '.join(law.signals)}: they cannot be told apart",
+        )
+    ]
+
+
 Rule = Callable[[Answer, Evidence], list[Doubt]]
 RULES: tuple[Rule, ...] = (
-    open_finding, fit_fails, not_predicted, driven_by_inputs, delay_at_bound, on_a_bound,
-    impossible_sign, methods_disagree, one_input_for_two,
+    open_finding, follows_states, fit_fails, not_predicted, driven_by_inputs, delay_at_bound,
+    on_a_bound, impossible_sign, methods_disagree, one_input_for_two,
 )  # fmt: skip
 
 

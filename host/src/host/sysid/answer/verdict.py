@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from host.sysid.answer.coefficient_verdict import coefficient_verdict
+from host.sysid.answer.feedback_pairs import feedback_of
 from host.sysid.answer.linear_verdict import linear_verdict
 from host.sysid.answer.marks import Verdict
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
@@ -28,7 +29,8 @@ def verdict_of(answer: Answer | CoefficientAnswer, evidence: Evidence = NO_EVIDE
     """
     if isinstance(answer, Answer):
         return linear_verdict(answer, evidence)
-    return coefficient_verdict(answer, open_channels(evidence.findings))
+    findings = evidence.findings
+    return coefficient_verdict(answer, open_channels(findings), feedback_of(findings))
 
 
 def verdict_lines(

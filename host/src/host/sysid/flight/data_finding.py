@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from host.sysid.identification_error import IdentificationError
@@ -46,10 +46,31 @@ CHECKS = {
     "flow-angles": "vanes measured angle of attack and sideslip",
     "small-inputs": "a surface moves enough for a maneuver to be found",
     "calibration": "sensor errors are as small as their file says",
+    "feedback": "a surface moves by itself, and is no function of what the aircraft does",
     "sensor-agreement": "flight-path reconstruction brings the sensors together",
 }
 AS_IT_IS = "used as it is"
 HINT = "give its unit or sign in the map (argument mapping)"
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """A surface that is a function of signals: in one equation their derivatives are alike.
+
+    Attributes
+    ----------
+    surface : str
+    signals : tuple of str
+    gains : tuple of float
+        Surface over each signal.
+    filtered : bool
+        Whether a lag or a wash-out is between them.
+    """
+
+    surface: str
+    signals: tuple[str, ...]
+    gains: tuple[float, ...]
+    filtered: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +97,8 @@ class Finding:
         Whether the samples in doubt are in no fit.
     flight : str
         Its source, where there are several.
+    feedback : Feedback or None
+        Whose derivatives cannot be told apart.
     """
 
     check: str
@@ -87,6 +110,7 @@ class Finding:
     accepted: bool = False
     closed: bool = False
     flight: str = ""
+    feedback: Feedback | None = None
 
     @property
     def line(self) -> str:
@@ -117,6 +141,7 @@ def finding_document(finding: Finding) -> dict[str, Any]:
         "accepted": finding.accepted,
         "open": not finding.closed,
         "flight": finding.flight or None,
+        "feedback": asdict(finding.feedback) if finding.feedback else None,
     }
 
 

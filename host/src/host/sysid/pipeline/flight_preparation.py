@@ -21,6 +21,7 @@ from host.sysid.compatibility.sensor_corrections import without_estimated_delays
 from host.sysid.compatibility.servo_response import commands_of, surface_positions
 from host.sysid.flight.agreement_findings import calibration_findings, disagreement
 from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
 from host.sysid.flight.hidden_angles import no_vanes_finding, uncarried_finding
 from host.sysid.flight.maneuver_selection import select_maneuvers
@@ -82,6 +83,8 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     if not found:
         found, small = whole_flight(columns)
         findings += small
+    # A law is seen in commands: a servo moves the surface later and slower.
+    findings += feedback_findings({**columns, **commands}, found)
     agreement = None
     try:
         agreement = reconstruct(columns, known.airframe if known else None, instrument)
@@ -92,7 +95,9 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     except IdentificationError as error:
         notes.append(str(error))
         findings += [uncarried_finding(columns)] if read.shares else []
-    findings = [f.accept() if f.check in how.accept and f.channels else f for f in findings]
+    findings = [
+        f.accept() if f.check in how.accept and (f.channels or f.feedback) else f for f in findings
+    ]
     flight = reconstruct_flight(
         columns,
         found,

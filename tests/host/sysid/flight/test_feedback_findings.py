@@ -1,0 +1,168 @@
+"""A surface that a law moves is found and named; one that a pilot moves never is."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.cli import main
+from host.sysid.answer.feedback_pairs import alike_derivatives, told_together
+from host.sysid.answer.marks import CAREFUL, TRUSTED
+from host.sysid.answer.trust_rules import Evidence
+from host.sysid.answer.verdict import verdict_of
+from host.sysid.flight.data_finding import Feedback, Finding
+from host.sysid.flight.feedback_findings import feedback_findings
+from host.sysid.flight.flight_tables import read_flight_columns
+from host.sysid.flight.linear_estimator import Answer, identify
+from host.sysid.flight.maneuver_selection import select_maneuvers
+from studies.wrong_flights import fly
+
+from tests.host.logs import ROOT
+from tests.host.sysid.closed_loop import DT_S, Law, doublets, flown
+
+SAMPLES = 1600
+STARTS = (100, 400, 700, 1000, 1300)
+DAMPER = Law("rudder_rad", {"r_radps": 0.4})
+Columns = dict[str, np.ndarray]
+
+
+def lateral(law: Law | None, seed: int = 1, side_s: float = 0.3) -> Columns:
+    inputs = {"aileron_rad": doublets(SAMPLES, STARTS, side_s, 0.07)}
+    if law is None:
+        inputs["rudder_rad"] = doublets(SAMPLES, tuple(s + 150 for s in STARTS[:3]), side_s, 0.10)
+    return flown("lateral", inputs, law, seed)
+
+
+def found_in(columns: Columns) -> list[Finding]:
+    whole = float(columns["t_s"][0]), float(columns["t_s"][-1])
+    return feedback_findings(columns, select_maneuvers(columns, stretches=[whole]))
+
+
+def test_a_yaw_damper_is_named_with_its_delay_and_gain() -> None:
+    [found] = found_in(lateral(DAMPER))
+    assert found.check == "feedback"
+    assert found.channels == ()
+    said, late, r2 = found.text.partition(" ms, R2 ")[0], found.text, found.text.split("R2 ")[1]
+    assert said.startswith("rudder_rad follows r_radps at ")
+    assert int(said.split()[-1]) == pytest.approx(40, abs=10)
+    assert late.endswith(": N_dr and N_r cannot be told apart")
+    assert float(r2[:4]) > 0.95
+    assert found.feedback is not None
+    assert found.feedback.gains[0] == pytest.approx(0.4, abs=0.02)
+    assert found.done.startswith("only N_r + 0.")
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_wash_out_and_lag_are_named_too(seed: int) -> None:
+    [washed] = found_in(lateral(replace(DAMPER, washout_s=1.0), seed))
+    assert "through a wash-out of " in washed.text
+    time_s = float(washed.text.split("wash-out of ")[1].split()[0])
+    assert time_s == pytest.approx(1.0, rel=0.2)
+    [lagged] = found_in(lateral(replace(DAMPER, lag_s=0.1), seed))
+    assert float(lagged.text.split("a lag of ")[1].split()[0]) == pytest.approx(0.1, rel=0.2)
+    [both] = found_in(lateral(replace(DAMPER, lag_s=0.1, washout_s=2.0), seed))
+    assert float(both.text.split("a lag of ")[1].split()[0]) == pytest.approx(0.1, rel=0.2)
+    assert "a wash-out of " in both.text
+    assert both.feedback is not None
+    assert both.feedback.filtered
+    assert both.done.startswith("only what they do together is told")
+
+
+def test_two_signals_are_named() -> None:
+    [found] = found_in(lateral(replace(DAMPER, gains={"r_radps": 0.3, "p_radps": 0.06})))
+    assert found.feedback is not None
+    assert set(found.feedback.signals) == {"r_radps", "p_radps"}
+    assert "N_dr, N_r and N_p cannot be told apart" in found.text
+
+
+@pytest.mark.parametrize("side_s", [0.3, 0.8])
+@pytest.mark.parametrize("seed", [3, 4])
+def test_doublets_of_a_pilot_are_no_feedback(seed: int, side_s: float) -> None:
+    assert found_in(lateral(None, seed, side_s)) == []
+
+
+@pytest.mark.parametrize("highest_hz", [0.3, 0.5, 1.0, 3.0])
+def test_slow_inputs_that_the_aircraft_follows_are_no_feedback(highest_hz: float) -> None:
+    """Below the short period q and p follow the stick, and smooth inputs are known beforehand."""
+    rng = np.random.default_rng(5)
+    t = DT_S * np.arange(SAMPLES)
+    hz = np.arange(0.1, highest_hz, 0.1)
+
+    def sines() -> np.ndarray:
+        phase = rng.uniform(0.0, 2.0 * np.pi, len(hz))
+        waves = np.sin(2.0 * np.pi * hz * t[:, None] + phase)
+        return np.asarray(0.05 * waves.sum(axis=1) / np.sqrt(len(hz)))
+
+    assert found_in(flown("short-period", {"elevator_rad": sines()}, None, 5)) == []
+    both = {"aileron_rad": sines(), "rudder_rad": sines()}
+    assert found_in(flown("lateral", both, None, 5)) == []
+
+
+def test_a_surface_that_rests_follows_nothing() -> None:
+    columns = lateral(DAMPER)
+    still = columns | {"rudder_rad": 1e-3 * columns["rudder_rad"], "aileron_rad": np.zeros(SAMPLES)}
+    assert found_in(still) == []
+
+
+def test_the_yaw_damper_of_a_real_aircraft() -> None:
+    """Its rudder is 0.066 r behind a wash-out of 0.5 s, to four digits."""
+    folder = ROOT / "tests/data/thor75"
+    read = read_flight_columns(folder / "flight75_240_270.csv", folder / "map.toml")
+    [found] = found_in(read.columns)
+    assert found.text == (
+        "rudder_rad follows r_radps at 0 ms through a wash-out of 0.5 s, R2 1.00: N_dr and N_r"
+        " cannot be told apart"
+    )
+    assert found.feedback is not None
+    assert found.feedback.signals == ("r_radps",)
+    assert found.feedback.gains[0] == pytest.approx(0.066, abs=0.001)
+
+
+@pytest.fixture(scope="module")
+def answer() -> Answer:
+    """Rudder and ailerons by a pilot: what a law would take away is all there."""
+    flight = fly("lateral", "none", "white", 1)
+    [answer] = identify(
+        flight.columns, names=("lateral",), method="output-error-white", windows=flight.windows
+    )
+    return answer
+
+
+def test_the_pair_is_not_relied_on_and_the_rest_is(answer: Answer) -> None:
+    law = Feedback("rudder_rad", ("r_radps",), (0.4,))
+    marks, doubted = (
+        verdict_of(answer, Evidence(findings=found)).marks
+        for found in ((), (Finding("feedback", (), "", feedback=law),))
+    )
+    changed = {name for name in marks if marks[name] != doubted[name]}
+    assert {"N_r", "N_dr"} <= changed <= {"Y_r", "Y_dr", "L_r", "L_dr", "N_r", "N_dr"}
+    assert {"L_p", "L_da", "N_beta"} <= {n for n, m in doubted.items() if m in (TRUSTED, CAREFUL)}
+
+
+def test_an_attitude_that_no_force_depends_on_takes_nothing(answer: Answer) -> None:
+    """Bank turns gravity only, and heading is no state: of both the gain is known."""
+    for signal in ("phi_rad", "psi_rad"):
+        assert not alike_derivatives(answer.model, Feedback("aileron_rad", (signal,), (-0.5,)))
+
+
+def test_what_the_pair_does_together_is_told(answer: Answer) -> None:
+    law = Feedback("rudder_rad", ("r_radps",), (0.4,))
+    [line] = told_together(answer, [Finding("feedback", (), "", feedback=law)])
+    [part] = [x for x in line.split(": ")[1].split(", ") if x.startswith("N_r + 0.4 N_dr = ")]
+    value, half = (float(x) for x in part.split(" = ")[1].split(" +- "))
+    assert value == pytest.approx(-2.2 - 0.4 * 28.0, abs=1.5 * half)
+    assert half < 0.1 * abs(value)
+    filtered = replace(law, filtered=True)
+    assert told_together(answer, [Finding("feedback", (), "", feedback=filtered)]) == []
+
+
+def test_it_is_in_json_and_exits_0(tmp_path: object, capsys: pytest.CaptureFixture[str]) -> None:
+    path = f"{tmp_path}/x.csv"
+    pd.DataFrame(lateral(DAMPER)).to_csv(path, index=False)
+    how = ["--model", "dutch-roll", "--method", "equation-error", "--from", "0", "--to", "31"]
+    assert main(["identify", path, *how, "--accept", "feedback", "--json"]) == 0
+    [found] = [f for f in json.loads(capsys.readouterr().out)["findings"] if f["feedback"]]
+    assert found["accepted"]
+    assert found["feedback"]["surface"] == "rudder_rad"
+    assert found["feedback"]["signals"] == ["r_radps"]
