@@ -2,15 +2,19 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
+from host.sysid.answer.coefficient_rules import follows_states
 from host.sysid.answer.feedback_pairs import alike_derivatives, told_together
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.verdict import verdict_of
+from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.data_finding import Feedback, Finding
 from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns
@@ -166,3 +170,11 @@ def test_it_is_in_json_and_exits_0(tmp_path: object, capsys: pytest.CaptureFixtu
     assert found["accepted"]
     assert found["feedback"]["surface"] == "rudder_rad"
     assert found["feedback"]["signals"] == ["r_radps"]
+
+
+def test_coefficients_of_the_pair_are_doubted_in_equations_that_have_both() -> None:
+    names = ["CY_beta", "CY_dr", "Cl_p", "Cl_r", "Cl_dr", "Cn_beta", "Cn_r", "Cn_dr", "Cn_da"]
+    fitted = SimpleNamespace(derivatives=[SimpleNamespace(name=n) for n in names])
+    law = Feedback("rudder_rad", ("r_radps",), (0.4,))
+    [doubt] = follows_states(cast(CoefficientAnswer, SimpleNamespace(fit=fitted)), law)
+    assert doubt.names == ("Cl_r", "Cl_dr", "Cn_r", "Cn_dr")
