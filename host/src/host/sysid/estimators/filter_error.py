@@ -47,6 +47,8 @@ def fit_filter_error(
     *,
     process: tuple[str, ...] | None = None,
     start: Array | None = None,
+    noise: Array | None = None,
+    roughly: bool = False,
     compare_noise: bool = True,
     hac: bool = False,
 ) -> FitResult:
@@ -64,6 +66,10 @@ def fit_filter_error(
         States driven by white process noise; by default all whose equation has a free parameter.
     start : Array, optional
         Start of the vector without noise parameters; by default from output error.
+    noise : Array, optional
+        Start of the logarithms of process and measurement deviations; by default guessed.
+    roughly : bool
+        End the search within `NEAR_BOUNDS` of the optimum, to start another from.
     compare_noise : bool
         Ask whether coloured measurement noise explains the data better (`compare_noise_models`).
     hac : bool
@@ -83,7 +89,11 @@ def fit_filter_error(
         if start is None
         else np.asarray(start, dtype=np.float64)
     )
-    theta = _first_guess(problem, first, fit_first=start is None)
+    theta = (
+        _first_guess(problem, first, fit_first=start is None)
+        if noise is None
+        else np.concatenate([first, noise])
+    )
     output_sd = np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
     # Noise that the data do not show would decrease for ever, and the search would not end.
     # The step of the numbers is noise of step^2 / 12 in any case.
@@ -95,7 +105,8 @@ def fit_filter_error(
         [theta[problem.n_model : problem.n_model + len(process)], np.log(output_sd)]
     )
     objective = _FilterError(problem, floor)
-    found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS)
+    ends = {"step_limit": NEAR_BOUNDS} if roughly else {}
+    found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS, **ends)
     if found is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at the start")
     theta, point = found.theta, found.trial

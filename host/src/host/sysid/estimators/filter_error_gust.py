@@ -19,6 +19,7 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.output_error_problem import OutputProblem
 
 # What else disturbs: thrust and longitudinal gusts; the drift of the attitude filter.
 OTHER_PROCESS_STATES = ("airspeed_mps", "phi_rad")
@@ -42,7 +43,9 @@ def fit_with_gust(
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
     airspeed_mps: float,
-    start: Array | None = None,
+    before: FitResult | None = None,
+    *,
+    roughly: bool = False,
 ) -> GustFit:
     """Fit a template by filter error with the gust as a state, delays estimated beside it.
 
@@ -54,12 +57,18 @@ def fit_with_gust(
         Data as measured.
     airspeed_mps : float
         Of the trim, for the gust's time scale, m/s.
-    start : Array, optional
-        Parameters and constants to start from, without delays; by default of output error.
+    before : FitResult, optional
+        Of this kind, without delays, to start from; by default output error.
+    roughly : bool
+        End the search early, to start another from.
     """
+    bare = replace(model, delays=())
+    start = None
+    if before is not None:
+        start = np.array([before.value(n) for n in OutputProblem(bare, maneuvers).names])
     if not model.delays:
         start = start_values_of(model, maneuvers) if start is None else start
-        result = fit_gust_state(model, list(maneuvers), airspeed_mps, start)
+        result = fit_gust_state(model, list(maneuvers), airspeed_mps, start, before, roughly)
         return GustFit(result, result.model, tuple(maneuvers), {})
     first = fit("output-error-white", model, maneuvers, multiple_starts=False)
     count = len(model.parameters)
@@ -69,7 +78,7 @@ def fit_with_gust(
     start = np.concatenate([late.estimate, start[count:]])
     delays_s = {name: value for name, (value, _) in late.delays.items()}
     shifted = [advance_outputs(m, model, delays_s) for m in maneuvers]
-    result = fit_gust_state(replace(model, delays=()), shifted, airspeed_mps, start)
+    result = fit_gust_state(bare, shifted, airspeed_mps, start, before, roughly)
     if result.residual_kind == "innovation":
         covariance = result.covariance.copy()
         covariance[:count, :count] += late.covariance
@@ -106,17 +115,36 @@ def gust_process(model: LinearModel) -> tuple[str, ...]:
 
 
 def fit_gust_state(
-    model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float, start: Array
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    airspeed_mps: float,
+    start: Array,
+    before: FitResult | None = None,
+    roughly: bool = False,
 ) -> FitResult:
     """Return filter error with the gust as a state; output error if that does not converge.
 
+    Gust and noise start where `before` found them: 9 iterations instead of 22.
     `start` has the parameters of the model, without delays, and the constants of every maneuver.
     """
     plain, first = with_gust_penetration(model, airspeed_mps, start)
     augmented = gust_model(plain, airspeed_mps)
+    noise = None
+    if before is not None:
+        names = [n for n in before.names if n.startswith("log_")]
+        noise = np.array([before.value(n) for n in names])
+        for k, parameter in enumerate(plain.parameters):
+            if parameter.name.startswith(PREFIX):
+                first[k] = before.value(parameter.name)
     try:
         result = fit_filter_error(
-            augmented, maneuvers, process=gust_process(model), start=first, compare_noise=False
+            augmented,
+            maneuvers,
+            process=gust_process(model),
+            start=first,
+            noise=noise,
+            roughly=roughly,
+            compare_noise=False,
         )
         failure = "" if near_its_optimum(result) else result.warnings[0]
         if not failure:

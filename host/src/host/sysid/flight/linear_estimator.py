@@ -88,7 +88,6 @@ from host.sysid.models.state_space_model import LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
-from host.sysid.numerics.output_error_problem import OutputProblem
 
 
 class NoManeuverError(IdentificationError):
@@ -335,18 +334,16 @@ class LinearEstimator:
             The fit, and the maneuvers without delays: as measured, and as fitted.
         """
         bare = replace(model, delays=())
-        rough = fit_with_gust(bare, data, trim.airspeed_mps).result
-        at_trim, start = list(data), None
+        rough = fit_with_gust(bare, data, trim.airspeed_mps, roughly=True).result
+        at_trim, before = list(data), None
         if rough.residual_kind == "innovation":
             departed = correct_trim_departure(
                 rough, data, cuts, self.airframe, trim, self.powerplant
             )
-            names = OutputProblem(bare, data).names
-            start = np.array([rough.value(name) for name in names])
+            before = rough if departed is None else departed.corrected(rough)
             if departed is not None:
-                rough = departed.corrected(rough)
-                at_trim = departed.removed_from(data, rough.estimate)
-        staged = fit_with_gust(model, at_trim, trim.airspeed_mps, start)
+                at_trim = departed.removed_from(data, before.estimate)
+        staged = fit_with_gust(model, at_trim, trim.airspeed_mps, before)
         delays_s = {name: value for name, (value, _) in staged.delays.items()}
         measured = [advance_outputs(m, model, delays_s) for m in data]
         return staged, measured, list(staged.maneuvers)
