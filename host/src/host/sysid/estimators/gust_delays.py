@@ -30,7 +30,7 @@ from host.sysid.models.state_space_model import DelayGroup, LinearModel, Paramet
 from host.sysid.numerics.output_error_problem import OutputProblem
 
 ROUNDS = 3
-PADE_STATES = 2
+PADE_STATES = 3
 SHORTEST_SHARE = 0.2  # of a sample: least delay that is left of a vane's, set back by one
 SETTLED_SD = 0.3  # a round that moves a delay by less is the last
 # The pitot feels gusts along the path that the model has not: its delay went to 50 ms.
@@ -164,8 +164,9 @@ def _with_delay_terms(
 
     Of a vane in gusts there is no slope, for what it measures is driven by white noise. It comes a
     sample later than it was measured (`_centred`), and its delay of that length is a Pade filter
-    of second order, y = u - 12 z2, dz1/dt = z2 / T, dz2/dt = (u - 12 z1 - 6 z2) / T. The parameter
-    is 1 / T, in which the model is linear (`_as_delays`).
+    of third order, y = -u + 240 z1 + 24 z3 with T dz1/dt = z2, T dz2/dt = z3 and T dz3/dt = u -
+    120 z1 - 60 z2 - 12 z3. The parameter is 1 / T, in which the model is linear (`_as_delays`).
+    The filter of second order is 7 % short at half the sampling rate: a vane seemed 0.9 ms late.
     """
     A, B, C, D = wide.matrices(theta)
     n, count = len(wide.states), len(wide.inputs)
@@ -177,16 +178,23 @@ def _with_delay_terms(
     by_state[:, :n] = C @ A
     gust = np.array([name.startswith(PREFIX) for name in wide.states])
     by_state[np.ix_(np.any(C[:, gust] != 0.0, axis=1), np.append(gust, [False] * (size - n)))] = 0.0
-    terms, late = list(wide.terms), {wide.outputs.index(y) for _, y in vanes}
+    late = {wide.outputs.index(y) for _, y in vanes}
+    terms = [
+        replace(t, gain=-t.gain) if t.matrix == "C" and t.row in late else t for t in wide.terms
+    ]
     for number, (delay, name) in enumerate(vanes):
         k, first = wide.outputs.index(name), n + PADE_STATES * number
-        second = first + 1
-        wider_C[k, second] = -12.0
+        last = first + 2
+        wider_C[k, :n] *= -1.0
+        wider_C[k, first], wider_C[k, last] = 240.0, 24.0
         terms += [
-            Term("A", first, second, delay.name),
-            Term("A", second, first, delay.name, -12.0),
-            Term("A", second, second, delay.name, -6.0),
-            *(Term("A", second, j, delay.name, float(g)) for j, g in enumerate(C[k]) if g),
+            Term("A", first, first + 1, delay.name),
+            Term("A", first + 1, last, delay.name),
+            *(
+                Term("A", last, first + j, delay.name, g)
+                for j, g in enumerate((-120.0, -60.0, -12.0))
+            ),
+            *(Term("A", last, j, delay.name, float(g)) for j, g in enumerate(C[k]) if g),
         ]
     for delay in groups:
         for k in (wide.outputs.index(o) for o in delay.outputs if o in wide.outputs):
