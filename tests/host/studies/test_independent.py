@@ -68,6 +68,11 @@ def test_in_calm_air_the_unseen_maneuver_is_predicted_and_the_answer_trusted() -
     assert all(found.holds for found in answer.predictions.values())
     assert answer.coherence is not None
     assert not answer.coherence.dominated(3.0)
+    # What is drawn over the data is what the filter foretold of them, departures with it.
+    for m, y, e in zip(
+        answer.maneuvers, answer.result.fitted, answer.result.residuals, strict=True
+    ):
+        np.testing.assert_allclose(m.outputs - y, e, atol=1e-9)
     doubted = {name for one in doubts_of(answer) for name in one.names}
     assert not doubted & set(independent.NAMES["longitudinal"])
 

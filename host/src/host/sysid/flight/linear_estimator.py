@@ -346,6 +346,12 @@ class LinearEstimator:
         staged = fit_with_gust(model, at_trim, trim.airspeed_mps, before)
         delays_s = {name: value for name, (value, _) in staged.delays.items()}
         measured = [advance_outputs(m, model, delays_s) for m in data]
+        # What the fit says of the data as measured, departures with it.
+        fitted = tuple(
+            y + m.outputs - still.outputs
+            for y, m, still in zip(staged.result.fitted, measured, staged.maneuvers, strict=True)
+        )
+        staged = replace(staged, result=replace(staged.result, fitted=fitted))
         return staged, measured, list(staged.maneuvers)
 
     def intervals(self, estimate: LinearEstimate) -> LinearIntervals:
