@@ -29,13 +29,15 @@ quietly() {
 }
 
 # One line each why: compiler and Python of the PC; compiler, library and uploader of the Mega;
-# unit tests; coverage-guided fuzzing; the chip simulator and the board's bootloader for it; looking into card images as a PC would.
+# unit tests; coverage-guided fuzzing; the chip simulator and the board's bootloader for it; looking into card images as a PC would;
+# looking at pages as a user's browser would.
 packages=(git make python3 python3-venv g++
   gcc-avr avr-libc avrdude
   doctest-dev
   clang libclang-rt-dev
   simavr libsimavr-dev arduino-core-avr
-  dosfstools mtools)
+  dosfstools mtools
+  chromium)
 
 missing_packages() {
   local package
