@@ -7,11 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.errors import UsageError
+from host.readers.ardupilot_channels import ardupilot_channels
 from host.readers.ardupilot_outputs import surfaces
 from host.readers.autopilot_flight import chosen_sensors, read_autopilot
+from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.held_outputs import held_output
 from host.readers.plausible_times import plausible
+from host.readers.px4_channels import px4_channels
 from host.readers.px4_outputs import allocated_surfaces
+from host.readers.px4_pulses import controls_of_pulses
 from host.readers.signals import Signal
 from host.twin.outcome.ardupilot_log import ardupilot_parameters
 from host.twin.outcome.autopilot_outputs import AIRFRAMES, ardupilot_pulses, px4_controls
@@ -135,3 +139,76 @@ def test_another_instance_is_chosen_by_name() -> None:
     for word in ("IMU", "IMU=x", "=1"):
         with pytest.raises(UsageError, match="expected MESSAGE=N"):
             chosen_sensors([word])
+
+
+PINS = {
+    2: (201, 1000.0, 1900.0, 0.0),
+    5: (203, 1100.0, 2000.0, 1500.0),
+    6: (101, 1000.0, 2000.0, 0.0),
+}
+PWM = {
+    f"PWM_AUX_{key}{pin}": value
+    for pin, every in PINS.items()
+    for key, value in zip(("FUNC", "MIN", "MAX", "CENT"), every, strict=True)
+} | {"PWM_AUX_REV": float(1 << 4)}  # of pin 5
+
+
+def _pulses(asked: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+    """PX4's own way there (mixer_module): pin 2 linear, pin 5 turned and by way of its centre."""
+    third = np.interp(-asked[2], [-1.0, 0.0, 1.0], [1100.0, 1500.0, 2000.0])
+    return {2: np.round(1450.0 + 450.0 * asked[0]), 5: np.round(third), 6: np.full(40, 1000.0)}
+
+
+def test_px4_pulses_are_undone() -> None:
+    """FUNC names the surface; MIN, MAX, CENT and REV take the pulse back to its control."""
+    rng = np.random.default_rng(2)
+    asked = {0: rng.uniform(-1.0, 1.0, 40), 2: rng.uniform(-1.0, 1.0, 40)}
+    found = controls_of_pulses(_pulses(asked), PWM, "PWM_AUX")
+    assert found.keys() == asked.keys()
+    for surface, values in asked.items():
+        np.testing.assert_allclose(found[surface], values, atol=0.5 / 400.0)
+    assert not controls_of_pulses(_pulses(asked), PWM, "PWM_MAIN")
+    none = {2: np.zeros(40), 5: np.zeros(40)}  # pins of another board: no servo pulse at all
+    assert not controls_of_pulses(none, PWM, "PWM_AUX")
+
+
+def _log(
+    autopilot: str, messages: dict[str, Messages], parameters: dict[str, float]
+) -> AutopilotLog:
+    each = {name: {0: one} for name, one in messages.items()}
+    return AutopilotLog(Path("x"), "ulog", autopilot, "plane", "", each, parameters)
+
+
+def test_px4_pulses_stand_in_for_slow_servos() -> None:
+    """actuator_servos at 10 Hz, actuator_outputs at 50 Hz: the faster one is taken, and named."""
+    t, slow = np.arange(40) / 50.0, np.arange(8) / 10.0
+    asked = {0: np.sin(t), 2: np.cos(3.0 * t)}
+    fields = {f"output[{pin - 1}]": p for pin, p in _pulses(asked).items()}
+    servos = {f"control[{k}]": np.zeros(8) for k in range(3)}
+    messages = {"actuator_outputs": Messages(t, fields), "actuator_servos": Messages(slow, servos)}
+    parameters = {**PWM, "CA_SV_CS0_TYPE": 15.0, "CA_SV_CS2_TYPE": 3.0, "CA_SV_CS_COUNT": 3.0}
+    found = px4_channels(_log("px4", messages, parameters), {})
+    np.testing.assert_allclose(found.signals["aileron"].values, asked[0], atol=2e-3)
+    np.testing.assert_allclose(found.signals["elevator"].values, -asked[2], atol=2e-3)
+    assert "PWM_AUX of actuator_outputs[0]" in found.signals["elevator"].source
+
+
+def test_outputs_beyond_the_fourteenth() -> None:
+    """RCO2 and RCO3 carry outputs 15 to 18 and 19 to 32, a moment behind RCOU."""
+    t = np.arange(50) / 25.0
+    both = {"MIN": 1000.0, "MAX": 2000.0, "TRIM": 1500.0, "REVERSED": 0.0}
+    parameters = {f"SERVO{n}_{k}": v for n in (2, 16, 20) for k, v in both.items()}
+    parameters |= {"SERVO2_FUNCTION": 4.0, "SERVO16_FUNCTION": 19.0, "SERVO20_FUNCTION": 21.0}
+    wave = {n: 0.3 * np.sin(n * t) for n in (2, 16, 20)}
+    of = {"RCOU": 2, "RCO2": 16, "RCO3": 20}
+    messages = {
+        name: Messages(t + 1e-4 * k, {f"C{n}": 1500.0 + 500.0 * wave[n]})
+        for k, (name, n) in enumerate(of.items())
+    }
+    found = ardupilot_channels(_log("ardupilot", messages, parameters), {}).signals
+    np.testing.assert_allclose(found["aileron"].values, wave[2])
+    np.testing.assert_allclose(found["elevator"].values, -wave[16])
+    np.testing.assert_allclose(found["rudder"].values, -wave[20])
+    del messages["RCOU"]
+    alone = ardupilot_channels(_log("ardupilot", messages, parameters), {}).signals
+    np.testing.assert_allclose(alone["rudder"].values, -wave[20])

@@ -10,8 +10,11 @@ import pytest
 from host.cli import main
 from host.readers.autopilot_flight import read_autopilot
 from host.sysid.flight.flight_tables import read_flight_columns
+from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
 from host.twin.outcome.truth_files import maneuvers
+from host.twin.sensors.autopilot_sensors import DLPF
+from host.twin.sensors.sensor_delays import FILTERS
 
 import host
 from tests.host.readers.autopilot_flights import FORMATS, flown, write
@@ -56,6 +59,12 @@ def test_surfaces_are_scaled_by_the_aircraft_file_only(tmp_path: Path) -> None:
     read = read_flight_columns(write("dataflash", tmp_path))
     assert read.shares == ("elevator", "aileron", "rudder")
     assert read.recording.commanded == read.shares
+    assert read.recording.maker == "autopilot"
+    # INS_GYRO_FILTER and INS_ACCEL_FILTER of the log: two Butterworth filters, their mean.
+    instrument = aircraft_data(AIRCRAFT).flown(read)
+    lag_s = np.mean([np.sqrt(2.0) / (2.0 * np.pi * hertz[0]) for hertz in FILTERS[DLPF]])
+    assert instrument.imu_bandwidth_hz == pytest.approx(1.0 / (2.0 * np.pi * lag_s), rel=1e-3)
+    assert instrument.errors["accel_bias_mps2"].sigma("z") == pytest.approx(0.4 / np.sqrt(3.0))
     columns, notes = with_surface_angles(read.columns, read.shares, None)
     np.testing.assert_array_equal(columns["elevator_rad"], read.columns["elevator_rad"])
     assert "per full deflection" in notes[0]

@@ -14,13 +14,14 @@ from host.aircraft.file import load_measured
 from host.aircraft.mass_properties import AirframeData, Place, place
 from host.instrument.instrument_errors import (
     InstrumentErrors,
-    foreign_errors,
     instrument_errors,
     standard_errors,
+    usual_errors,
 )
-from host.instrument.recording import Recording
+from host.instrument.recording import OWN, Recording
 from host.physical.calibration import Calibration
 
+LEAST_LAG_S = 1e-5  # of an IMU that nothing filtered
 LEAST_CLOCK_SHARE = 1e-5  # GPS leaves 0.2 ppm, which no interval shows
 VANE_DELAY_S = 8e-3  # about a vane's delay at trim: the filter model's error is a share of it
 POTS = {
@@ -60,8 +61,11 @@ class SensorErrorModel:
         return usual_servo.BANDWIDTH_HZ, usual_servo.RATE_LIMIT_RADPS
 
     def recorded(self, recording: Recording) -> SensorErrorModel:
-        """Return the same for a flight recorded so."""
-        return replace(self, recording=recording)
+        """Return the same for a flight recorded so, with the low-pass that its IMU had."""
+        if recording.imu_lag_s is None:
+            return replace(self, recording=recording)
+        lag_s = max(recording.imu_lag_s, LEAST_LAG_S)
+        return replace(self, recording=recording, imu_bandwidth_hz=1.0 / (2.0 * math.pi * lag_s))
 
     def scaled(self, factor: float, *names: str) -> SensorErrorModel:
         """Return the same with some errors, or all, that many times as large."""
@@ -73,7 +77,7 @@ def sensor_error_model(
     calibration: Calibration | None = None,
     *,
     defaults: bool = False,
-    own: bool = True,
+    maker: str = OWN,
 ) -> SensorErrorModel:
     """Return the sensors of an aircraft by name or file, and their errors.
 
@@ -85,8 +89,8 @@ def sensor_error_model(
         Of the instrument; standard errors without.
     defaults : bool
         Whether its lines that nobody measured count too, as in `instrument_errors`.
-    own : bool
-        Whether the sensors are those of our logger.
+    maker : str
+        Whose sensors they are (`Recording.maker`).
 
     Raises
     ------
@@ -108,7 +112,7 @@ def sensor_error_model(
         pitot_lag_s=number("sensors.pitot_lag_s"),
         servo_hz=number("servo.bandwidth_hz"),
         servo_rate_radps=number("servo.rate_limit_radps"),
-        errors=instrument_errors(loaded, calibration, defaults=defaults, own=own),
+        errors=instrument_errors(loaded, calibration, defaults=defaults, maker=maker),
     )
 
 
@@ -122,7 +126,7 @@ def unknown_sensors(recording: Recording | None = None) -> SensorErrorModel:
     return SensorErrorModel(
         nowhere, nowhere, upwash=0.1, vane_hz_per_mps=1.0, vane_damping=0.1,
         vane_friction_rad=0.0, friction_speed_mps=1.0, pitot_lag_s=0.010,
-        errors=standard_errors() if recording.own else foreign_errors(), recording=recording,
+        errors=usual_errors(recording.maker), recording=recording,
     )  # fmt: skip
 
 

@@ -15,11 +15,10 @@ from pathlib import Path
 
 from host.aircraft.file import Aircraft
 from host.errors import CalibrationError
-from host.instrument.recording import SURFACES
+from host.instrument.recording import OWN, SURFACES
 from host.physical.calibration import Calibration, Line
 
 STANDARD = Path(__file__).with_name("standard.toml")
-FOREIGN = Path(__file__).with_name("foreign.toml")
 UNIFORM_SD_PER_HALF_WIDTH = 1.0 / math.sqrt(3.0)  # "even" in the files
 DISTRIBUTIONS = ("even", "normal")
 DRAWN = ("instrument", "flight")
@@ -125,12 +124,15 @@ def standard_errors() -> InstrumentErrors:
 
 
 @cache
-def foreign_errors() -> InstrumentErrors:
-    """Return the errors of other people's sensors: those of `foreign.toml` in place of ours."""
-    document = tomllib.loads(FOREIGN.read_text(encoding="utf-8"))
+def usual_errors(maker: str) -> InstrumentErrors:
+    """Return the errors of the sensors of a maker (`Recording.maker`) of whom no file says better:
+    those of `autopilot.toml` or `foreign.toml` in place of ours."""
     found = dict(standard_errors().named)
-    for name, table in document["error"].items():
-        found[name] = _apply_table(found[name], table, f"{FOREIGN.name}: [error.{name}]")
+    if maker == OWN:
+        return InstrumentErrors(found)
+    path = Path(__file__).with_name(f"{maker}.toml")
+    for name, table in tomllib.loads(path.read_text(encoding="utf-8"))["error"].items():
+        found[name] = _apply_table(found[name], table, f"{path.name}: [error.{name}]")
     return InstrumentErrors(found)
 
 
@@ -139,7 +141,7 @@ def instrument_errors(
     calibration: Calibration | None = None,
     *,
     defaults: bool = False,
-    own: bool = True,
+    maker: str = OWN,
 ) -> InstrumentErrors:
     """Return what an instrument may be wrong by.
 
@@ -153,15 +155,15 @@ def instrument_errors(
         Whether a line that nobody measured on this instrument counts too, because the columns
         were made with it. Its deviations are those of a sensor out of the box. Without, the
         standard holds.
-    own : bool
-        Whether the sensors are those of our logger; those of others are wrong by more.
+    maker : str
+        Whose sensors they are (`Recording.maker`); those of others are wrong by more.
 
     Raises
     ------
     CalibrationError
         If an error is unknown, or a key of it or its value is not what it may be.
     """
-    found = dict((standard_errors() if own else foreign_errors()).named)
+    found = dict(usual_errors(maker).named)
     if aircraft is not None:
         for name, error in found.items():
             if error.aircraft_file:

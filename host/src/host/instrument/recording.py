@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 SURFACES = ("elevator", "aileron", "rudder")
+OWN, AUTOPILOT, FOREIGN = "own", "autopilot", "foreign"  # who recorded a flight
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +23,14 @@ class Recording:
     clock_share : float or None
         One standard deviation of the clock's scale as GPS left it; None: nothing checked the
         instrument's own clock.
-    own : bool
-        Whether our logger made it. Of a table of others no calibration of ours speaks.
+    maker : str
+        ``own``: our logger; ``autopilot``: a log of PX4 or ArduPilot; ``foreign``: a table of
+        others, of which no calibration of ours speaks.
+    imu_lag_s : float or None
+        Delay of the IMU's low-pass as the recording says it; None: that of our own.
     """
 
     commanded: tuple[str, ...] = ()
     clock_share: float | None = 0.0
-    own: bool = True
+    maker: str = OWN
+    imu_lag_s: float | None = None

@@ -24,6 +24,8 @@ from host.readers.named_channels import (
 
 FIX_3D = 3
 SERVO_HZ = 50.0
+OUTPUTS = ("RCOU", "RCO2", "RCO3")  # outputs 1 to 14, 15 to 18, 19 to 32
+SAME_SET_S = 2e-3
 
 
 def ardupilot_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels:
@@ -117,15 +119,11 @@ def _gps(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> None:
 
 
 def _outputs(log: AutopilotLog, found: Channels) -> None:
-    out = log.first("RCOU")
+    out = next((m for n in OUTPUTS if (m := log.first(n)) is not None and _moves(m, log)), None)
+    out = out or log.first(*OUTPUTS)
     if out is None:
         return
-    pulses: dict[int, Array] = {
-        int(name[1:]): numbers(values)
-        for name, values in out.fields.items()
-        if name[:1] == "C" and name[1:].isdigit() and moves_a_surface(int(name[1:]), log.parameters)
-    }
-    made = surfaces(pulses, log.parameters)
+    made = surfaces(_pulses(log, out), log.parameters)
     found.output_period_s = 1.0 / max(log.parameters.get("SERVO_RATE", SERVO_HZ), 1.0)
     for name, share in made.shares.items():
         found.add(name, out.t_s, share, made.made_of[name])
@@ -137,6 +135,31 @@ def _outputs(log: AutopilotLog, found: Channels) -> None:
         )
     else:
         found.notes.append("no SERVOn_FUNCTION in the log names a surface: outputs have no meaning")
+
+
+def _moves(messages: Messages, log: AutopilotLog) -> list[tuple[str, int]]:
+    """Return the fields that move a surface or a motor, and the number of each output."""
+    named = [(f, int(f[1:])) for f in messages.fields if f[:1] == "C" and f[1:].isdigit()]
+    return [(field, number) for field, number in named if moves_a_surface(number, log.parameters)]
+
+
+def _pulses(log: AutopilotLog, first: Messages) -> dict[int, Array]:
+    """Return the pulses of all outputs that move something, at the instants of one message.
+
+    The autopilot writes the messages of a set one behind the other.
+    """
+    pulses: dict[int, Array] = {}
+    for name in OUTPUTS:
+        messages = log.first(name)
+        moved = _moves(messages, log) if messages is not None else []
+        if messages is None or not moved:
+            continue
+        row = np.searchsorted(messages.t_s, first.t_s + SAME_SET_S, side="right") - 1
+        before = row < 0
+        for field, number in moved:
+            values = numbers(messages.fields[field])[np.maximum(row, 0)]
+            pulses[number] = np.where(before, np.nan, values)
+    return pulses
 
 
 def _take(

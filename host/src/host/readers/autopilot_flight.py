@@ -47,6 +47,13 @@ class AutopilotFlight:
         """Surfaces whose column is a share of full travel, not an angle."""
         return tuple(s for s in SURFACES if s in self.channels.signals)
 
+    @property
+    def imu_lag_s(self) -> float:
+        """Delay of rates and specific force by the autopilot's own low-pass, nominally."""
+        names = ("p_radps", "q_radps", "r_radps", "ax_mps2", "ay_mps2", "az_mps2")
+        every = [s.late_s for n in names if (s := self.channels.signals.get(n)) is not None]
+        return float(np.mean(every)) if every else 0.0
+
     def undersampled(self) -> dict[str, float]:
         """Return the rates (Hz) of surfaces whose output changes between two records."""
         pulses_hz = 1.0 / self.channels.output_period_s

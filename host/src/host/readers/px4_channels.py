@@ -16,9 +16,11 @@ from host.readers.ardupilot_outputs import Outputs
 from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of, numbers
 from host.readers.px4_outputs import MOST_SURFACES, allocated_surfaces, axis_demands
+from host.readers.px4_pulses import GROUPS, controls_of_pulses
 from host.readers.signals import Signal
 
 FIXED_WING = 2  # vehicle_status.VEHICLE_TYPE_FIXED_WING
+MOST_PINS = 16
 USABLE_HZ = 18.0  # a topic that comes slower is used only if no other has the channel
 RATES = ("p_radps", "q_radps", "r_radps")
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
@@ -196,10 +198,11 @@ def _outputs(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> N
         out = allocated_surfaces(controls, log.parameters)
         if out.shares:
             made = servos[0], out
-    slow = made is None or _rate_hz(made[0]) < USABLE_HZ
-    axes = _axes(log) if slow else None
-    if axes is not None and (made is None or _rate_hz(axes[0]) > _rate_hz(made[0])):
-        made = axes
+    for other in (_pulses, _axes):  # the pins' pulses, then the demand in front of the mixer
+        slow = made is None or _rate_hz(made[0]) < USABLE_HZ
+        more = other(log, chosen) if slow else None
+        if more is not None and (made is None or _rate_hz(more[0]) > _rate_hz(made[0])):
+            made = more
     if made is not None:
         messages, out = made
         for name, share in out.shares.items():
@@ -213,7 +216,28 @@ def _outputs(log: AutopilotLog, chosen: Mapping[str, int], found: Channels) -> N
     _throttle(log, chosen, found)
 
 
-def _axes(log: AutopilotLog) -> tuple[Messages, Outputs] | None:
+def _pulses(log: AutopilotLog, chosen: Mapping[str, int]) -> tuple[Messages, Outputs] | None:
+    """Return the surfaces behind the pulses of the first `actuator_outputs` that has some."""
+    every = log.messages.get("actuator_outputs", {})
+    wanted = [chosen["actuator_outputs"]] if "actuator_outputs" in chosen else sorted(every)
+    for instance in wanted:
+        messages = every[instance]
+        pulses = {
+            k + 1: numbers(messages.fields[f"output[{k}]"])
+            for k in range(MOST_PINS)
+            if f"output[{k}]" in messages.fields
+        }
+        for group in GROUPS:
+            controls = controls_of_pulses(pulses, log.parameters, group)
+            out = allocated_surfaces(controls, log.parameters)
+            if len(messages) > 1 and out.shares:
+                by = f"{group} of actuator_outputs[{instance}]"
+                made_of = {name: f"{how} ({by})" for name, how in out.made_of.items()}
+                return messages, Outputs(out.shares, made_of, out.clipped)
+    return None
+
+
+def _axes(log: AutopilotLog, _chosen: Mapping[str, int]) -> tuple[Messages, Outputs] | None:
     """Return the demand of roll, pitch and yaw: of a VTOL that of its wing."""
     topics = (("vehicle_torque_setpoint", "xyz"), ("actuator_controls_1", "control"),
               ("actuator_controls_0", "control"))  # fmt: skip

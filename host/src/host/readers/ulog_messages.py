@@ -17,7 +17,8 @@ WANTED = (
     "sensor_combined", "vehicle_angular_velocity", "vehicle_acceleration", "vehicle_attitude",
     "airspeed", "airspeed_validated", "differential_pressure", "vehicle_air_data",
     "vehicle_local_position", "vehicle_gps_position", "sensor_gps", "actuator_servos",
-    "actuator_motors", "actuator_controls_0", "actuator_controls_1", "vehicle_torque_setpoint",
+    "actuator_outputs", "actuator_motors", "actuator_controls_0", "actuator_controls_1",
+    "vehicle_torque_setpoint",
     "vehicle_thrust_setpoint", "vehicle_status", "vehicle_land_detected", "vehicle_imu_status",
 )  # fmt: skip
 # vehicle_status.vehicle_type, and MAV_TYPE of MAVLink's common.xml.

@@ -117,11 +117,14 @@ def test_a_servo_that_is_not_estimated_is_carried() -> None:
 
 
 def test_the_servos_of_others_are_known_less() -> None:
-    """The prior of a table of others is wide; ours is of a servo on a bench."""
+    """The prior of a table of others is wide, an autopilot's waits for the next pulse, ours is of a
+    servo on a bench."""
     own = servo_prior(unknown_sensors(Recording(commanded=("elevator",))))
-    other = servo_prior(unknown_sensors(Recording(commanded=("elevator",), own=False)))
+    other = servo_prior(unknown_sensors(Recording(commanded=("elevator",), maker="foreign")))
     assert own.sd[0] < 0.005
     assert other.sd[0] == pytest.approx(0.05)
+    flown = servo_prior(unknown_sensors(Recording(commanded=("elevator",), maker="autopilot")))
+    assert flown.sd[0] == pytest.approx(0.0125)
 
 
 def test_the_commands_of_a_real_flight_have_their_lag() -> None:

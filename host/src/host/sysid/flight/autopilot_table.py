@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from host.instrument.recording import SURFACES, Recording
+from host.instrument.recording import AUTOPILOT, SURFACES, Recording
 from host.readers.autopilot_flight import CLOCK_SHARE, AutopilotFlight, read_autopilot
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.foreign_tables import Foreign
@@ -32,7 +32,7 @@ def autopilot_table(source: Path, sensors: Mapping[str, int] | None) -> Foreign:
     return Foreign(
         columns,
         notes=flight.notes(),
-        recording=Recording(commanded, CLOCK_SHARE),
+        recording=Recording(commanded, CLOCK_SHARE, AUTOPILOT, flight.imu_lag_s),
         shares=shares,
         findings=_slow_outputs(flight),
     )

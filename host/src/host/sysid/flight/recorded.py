@@ -16,7 +16,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import NORMAL_95
-from host.instrument.recording import SURFACES, Recording
+from host.instrument.recording import FOREIGN, SURFACES, Recording
 
 if TYPE_CHECKING:
     from host.log import FlightLog
@@ -42,7 +42,7 @@ def recording_of_table(columns: Mapping[str, Array], said: Mapping[Any, Any]) ->
         commanded = tuple(s for s in SURFACES if inputs.get(s) == "commanded")
         return Recording(commanded, None if half is None else float(half) / NORMAL_95)
     if OWN_COLUMN not in columns:
-        return Recording(own=False)
+        return Recording(maker=FOREIGN)
     commanded = tuple(s for s in SURFACES if f"{s}_rad" in columns and not _measured(columns, s))
     fix_times_s = (
         columns["t_s"][np.isfinite(columns[GPS_COLUMN])] if GPS_COLUMN in columns else np.empty(0)

@@ -9,6 +9,7 @@ from host.aircraft.file import load_measured
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import NoPropulsionError, Powerplant, powerplant
 from host.instrument.deviations import SensorErrorModel, sensor_error_model
+from host.instrument.recording import OWN
 from host.physical.calibration import Calibration, load_calibration
 from host.sysid.flight.flight_tables import FlightColumns
 
@@ -45,8 +46,9 @@ class AircraftData:
         made_by, instrument = flight.calibration, self.instrument
         if made_by is not None and made_by.defaults():
             instrument = sensor_error_model(self.source, made_by, defaults=True)
-        elif not flight.recording.own:
-            instrument = sensor_error_model(self.source, self.calibration, own=False)
+        elif flight.recording.maker != OWN:
+            maker = flight.recording.maker
+            instrument = sensor_error_model(self.source, self.calibration, maker=maker)
         return instrument.recorded(flight.recording)
 
 
