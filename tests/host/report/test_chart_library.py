@@ -1,0 +1,28 @@
+"""The chart library: found where it is installed, one clear line where it is not."""
+
+import sys
+
+import pytest
+from host.errors import UsageError
+
+from host import chart_library
+
+
+def test_script_and_style_are_found_and_nothing_of_the_package_runs() -> None:
+    assert "uPlot" in chart_library.chart_script()
+    assert ".uplot" in chart_library.chart_style()
+    assert "uplot" not in sys.modules and "IPython" not in sys.modules
+
+
+def test_neither_reaches_for_a_host() -> None:
+    text = chart_library.chart_script() + chart_library.chart_style()
+    for word in ("fetch(", "XMLHttpRequest", "@import", "url(", "WebSocket", "eval("):
+        assert word not in text
+
+
+def test_missing_library_is_one_line_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chart_library, "_PACKAGE", "uplot_that_is_not_there")
+    with pytest.raises(UsageError) as raised:
+        chart_library.chart_script()
+    said = str(raised.value)
+    assert "\n" not in said and "uplot-python" in said and "pip install" in said
