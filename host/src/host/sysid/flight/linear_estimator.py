@@ -35,6 +35,7 @@ from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.gust_penetration import without_gust_penetration
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.servo_parameters import ServoEstimate
+from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.filter_step import feels_roll, sensors_known, with_filter_step
@@ -78,13 +79,12 @@ from host.sysid.models.diagnostics import (
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.modal_analysis import Mode, modes
-from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.residual_delays import (
     STANDARD_DELAYS,
     delays_of,
     without_standard_delays,
 )
-from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.state_space_model import DelayGroup, LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
@@ -137,7 +137,7 @@ class Answer:
             for d in self.model.delays
             if d.name in self.result.names
         }
-        return tuple(n for n, v in values.items() if abs(v) >= limits[n] * (1.0 - 1e-9))
+        return tuple(n for n, v in values.items() if abs(v) >= limits.get(n, np.inf) * (1.0 - 1e-9))
 
     @property
     def table(self) -> CoefficientTable:
@@ -284,14 +284,21 @@ class LinearEstimator:
         if gusty:
             staged, data, fitted = self._with_gust(model, data, cuts, trim)
             found, model, delays = staged.result, staged.model, staged.delays
+        elif self.own is not None:
+            speed = trim.airspeed_mps if trim.known else None
+            by = (
+                fit_by_evidence(model, data, speed)
+                if method == DEFAULT_METHOD
+                else fit_users_model(method, model, data, speed, self.options)
+            )
+            found, method, delays, data = by.result, by.method, by.delays, list(by.maneuvers)
+            model, remarks = found.model, (*remarks, *by.remarks)
         else:
             single = "output-error-white" if method == GUST else method
             calm: dict[str, object] = (
                 {"multiple_starts": False} if single.startswith("output-error") else {}
             )
             found = fit(single, model, data, **{**calm, **self.options})
-        if isinstance(model, NonlinearModel):
-            model = found.model  # with the tangent at the estimate
         found = found if servo is None else servo.added_to(found)
         found = replace(found, warnings=(*remarks, *found.warnings))
         left = None
@@ -398,7 +405,8 @@ class LinearEstimator:
             if same
             else _simulated(frozen, e.maneuvers, e.at_trim(total.estimate))
         )
-        held_out = [_without_delays(m.cut(e.model), e.model, e.delays) for m in e.held_out]
+        late = delays_of(e.model.outputs) if self.own is None else self.own.delays
+        held_out = [_without_delays(m.cut(e.model), e.model, late, e.delays) for m in e.held_out]
         at_trim = (
             held_out
             if e.departure is None
@@ -490,7 +498,7 @@ class LinearEstimator:
         self, used: Sequence[FlownManeuver], trim: Trim
     ) -> tuple[LinearModel, str, tuple[str, ...]]:
         """Return the model to fit, the method that the default one comes to, and remarks."""
-        if self.method == GUST and not trim.known:
+        if self.method == GUST and self.own is None and not trim.known:
             raise IdentificationError(
                 f"{GUST} needs airspeed_mps, which tells how fast gusts pass; give another method"
             )
@@ -509,20 +517,16 @@ class LinearEstimator:
         if self.own is None and instrument is not None and free:
             model = with_drag_arm(model, trim, instrument)
         method = self.method
-        if isinstance(model, NonlinearModel):
-            if method == GUST:
-                raise IdentificationError(f"{GUST} takes linear models; {model.name} has equations")
-            method = "output-error-white" if method == DEFAULT_METHOD else method
-        if method == DEFAULT_METHOD:
+        if method == DEFAULT_METHOD and self.own is None:
             # A filter takes the line between two values of a slow sensor for measurements.
             evenly = not any(m.cut(model).held for m in used)
             # Laterally only where places and delays of the sensors are known (`filter_step`).
-            rolls = self.own is None and feels_roll(model) and sensors_known(used)
+            rolls = feels_roll(model) and sensors_known(used)
             vane = "beta_rad" if rolls else "alpha_rad"
             measured = vane in model.states and vane in model.outputs
             gust = measured and trim.known and evenly
             method = GUST if gust else "output-error-white"
-            if self.own is None and method != GUST and self.template == "lateral":
+            if method != GUST and self.template == "lateral":
                 model = without_attitude(model, used)
         return model, method, remarks
 
@@ -538,11 +542,14 @@ def _simulated(
 
 
 def _without_delays(
-    maneuver: Maneuver, model: LinearModel, delays: Mapping[str, tuple[float, float]]
+    maneuver: Maneuver,
+    model: LinearModel,
+    groups: tuple[DelayGroup, ...],
+    delays: Mapping[str, tuple[float, float]],
 ) -> Maneuver:
     if not delays:
         return maneuver
-    late = replace(model, delays=delays_of(model.outputs))
+    late = replace(model, delays=groups)
     return advance_outputs(maneuver, late, {name: value for name, (value, _) in delays.items()})
 
 

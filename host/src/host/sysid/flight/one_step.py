@@ -13,7 +13,7 @@ import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
 from host.sysid.estimators.gust_model import gust_model
-from host.sysid.estimators.innovations import innovations_of
+from host.sysid.estimators.innovations import PROCESS, innovations_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
@@ -149,13 +149,18 @@ def one_step_of(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) ->
 
 
 def _of_innovations(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> OneStep | None:
-    found = innovations_of(result, gust_model(result.model, trim.airspeed_mps), maneuvers)
+    def filtered(model: LinearModel, at: Trim) -> LinearModel:
+        # Process noise on states of the model alone is filter error without a gust.
+        own = all(n.removeprefix(PROCESS) in model.states for n in result.names if PROCESS in n)
+        return model if own else gust_model(model, at.airspeed_mps)
+
+    found = innovations_of(result, filtered(result.model, trim), maneuvers)
     if found is None:
         return None
     every = np.arange(len(found.theta))
 
     def residuals(model: LinearModel, bent: Trim, data: Sequence[Maneuver]) -> list[Array] | None:
-        e = found.innovations(gust_model(model, bent.airspeed_mps), data)
+        e = found.innovations(filtered(model, bent), data)
         return None if e is None else _whitened(e, found.white)
 
     return OneStep(

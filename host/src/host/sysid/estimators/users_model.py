@@ -1,0 +1,237 @@
+"""A user's model: the method that was asked for, or the one for the noise that the data show.
+
+Three kinds of noise are told apart by an exact likelihood on the same outputs: white noise of the
+sensors, noise with a memory, and moving air that the aircraft follows. The last is filter error,
+with the gust as a state where the model has a vane and the airspeed is known. What was asked for is
+done or refused, never replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from host.arrays import Array
+from host.sysid.estimators.filter_error import near_its_optimum
+from host.sysid.estimators.filter_error_gust import fit_with_gust
+from host.sysid.estimators.gust_delays import advance_outputs
+from host.sysid.estimators.gust_model import VANES
+from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.output_error_fit import sample_periods
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.models.state_space_model import LinearModel
+
+GUST, FILTER = "filter-error-gust", "filter-error"
+MEMORY, WHITE = "output-error", "output-error-white"
+AT_LIMIT = 1e-9
+
+
+@dataclass(frozen=True)
+class UsersFit:
+    """How a user's model was fitted.
+
+    Attributes
+    ----------
+    method : str
+    result : FitResult
+        Its model is the one that was fitted, parameters of gusts with it.
+    maneuvers : tuple of Maneuver
+        As fitted: a filter gets its outputs without delays.
+    delays : dict
+        What was taken out: value and 95 % half-width, s.
+    remarks : tuple of str
+        Why this method.
+    """
+
+    method: str
+    result: FitResult
+    maneuvers: tuple[Maneuver, ...]
+    delays: dict[str, tuple[float, float]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+
+def fit_users_model(
+    method: str,
+    model: LinearModel,
+    maneuvers: Sequence[Maneuver],
+    airspeed_mps: float | None,
+    options: Mapping[str, object],
+) -> UsersFit:
+    """Fit by a method that was asked for.
+
+    Parameters
+    ----------
+    method : str
+    model : LinearModel
+    maneuvers : sequence of Maneuver
+    airspeed_mps : float or None
+        Of the trim, for the time scale of gusts; None where nobody measured it.
+    options : mapping
+        Of the method.
+
+    Raises
+    ------
+    IdentificationError
+        If the method cannot fit this model; in one line, with what can.
+    """
+    if method == GUST:
+        return _gust_fit(model, maneuvers, airspeed_mps)
+    if method == FILTER:
+        return _filter_fit(model, maneuvers, options)
+    single = {"multiple_starts": False} if method.startswith(MEMORY) else {}
+    return UsersFit(method, fit(method, model, maneuvers, **{**single, **options}), (*maneuvers,))
+
+
+def fit_by_evidence(
+    model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float | None
+) -> UsersFit:
+    """Fit by output error, white or with a memory, or by filter error: whichever explains the data.
+
+    The Bayesian information criterion is -2 ln L + k ln N with k unknowns and N samples (Schwarz,
+    Annals of Statistics 6, 1978). Where no output's noise has a memory nothing is left for moving
+    air to explain, and no filter is tried.
+
+    Parameters
+    ----------
+    model, maneuvers, airspeed_mps
+        As for `fit_users_model`.
+
+    Raises
+    ------
+    IdentificationError
+        If output error fails.
+    """
+    memory = len(sample_periods(maneuvers)) == 1  # an autoregression is that of one sample period
+    plain = fit_users_model(MEMORY if memory else WHITE, model, maneuvers, airspeed_mps, {})
+    orders = np.asarray(plain.result.details["noise_orders"])
+    coloured = bool(np.any(orders))
+    own = "noise with a memory" if coloured else "white noise"
+    if memory and not coloured:
+        named = replace(plain.result, method="output error (white)")
+        line = "noise chosen by the data: white, it has no memory"
+        return UsersFit(WHITE, named, plain.maneuvers, remarks=(line,))
+    why = no_filter(model, maneuvers)
+    if why:
+        return replace(plain, remarks=(f"noise chosen by the data: {own}; no gust tried: {why}",))
+    try:
+        moving = (
+            _filter_fit(model, maneuvers, {})
+            if no_gust_state(model, airspeed_mps)
+            else _gust_fit(model, maneuvers, airspeed_mps)
+        )
+    except IdentificationError as error:
+        return replace(plain, remarks=(f"noise chosen by the data: {own}; gust: {error}",))
+    ahead = _criterion(plain.result, maneuvers) - _criterion(moving.result, maneuvers)
+    chosen, name, other = (moving, "gust", own) if ahead > 0.0 else (plain, own, "gust")
+    line = f"noise chosen by the data: {name} (BIC {abs(ahead):.0f} below that of {other})"
+    return replace(chosen, remarks=(line, *chosen.remarks))
+
+
+def no_filter(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
+    """Return why no Kalman filter fits this model to these data; empty where one does."""
+    if any(m.held for m in maneuvers):
+        return "a filter takes the line between two values of a slow sensor for measurements"
+    if model.known_noise:
+        return "a filter estimates the noise, and this one is known"
+    if isinstance(model, NonlinearModel):
+        return "the model has equations"
+    return ""
+
+
+def no_gust_state(model: LinearModel, airspeed_mps: float | None) -> str:
+    """Return why the gust is no state of this model; empty where it can be.
+
+    The gust acts where parameters of the vane's angle stand. A number there may be kinematics, in
+    which the angle of the path counts, or a known derivative, in which that of the air does.
+    """
+    vane = next((v for v in VANES if v in model.states and v in model.outputs), None)
+    if isinstance(model, NonlinearModel):
+        return "it has equations"
+    if vane is None:
+        return "neither alpha_rad nor beta_rad is a measured state of it"
+    if airspeed_mps is None:
+        return "airspeed_mps, which tells how fast gusts pass, is not in the data"
+    column = model.states.index(vane)
+    free = {t.row for t in model.terms if t.matrix in "AB"}
+    known = [s for i, s in enumerate(model.states) if i in free and model.A[i, column] != 0.0]
+    if known:
+        return f"the entry of {vane} in the row of {', '.join(known)} is a number"
+    return ""
+
+
+def _gust_fit(
+    model: LinearModel, maneuvers: Sequence[Maneuver], airspeed_mps: float | None
+) -> UsersFit:
+    why = no_gust_state(model, airspeed_mps) or no_filter(model, maneuvers)
+    if why or airspeed_mps is None:
+        raise IdentificationError(
+            f"{GUST} cannot fit {model.name}: {why}; {FILTER} and {MEMORY} are there"
+        )
+    bare = replace(model, delays=())
+    before = fit_with_gust(bare, maneuvers, airspeed_mps, roughly=True).result
+    known = before if before.residual_kind == "innovation" else None
+    found = fit_with_gust(model, maneuvers, airspeed_mps, known)
+    if found.result.residual_kind != "innovation":
+        raise IdentificationError(
+            f"{GUST} does not converge on {model.name}; {FILTER} and {MEMORY} are there"
+        )
+    return UsersFit(GUST, found.result, found.maneuvers, found.delays)
+
+
+def _filter_fit(
+    model: LinearModel, maneuvers: Sequence[Maneuver], options: Mapping[str, object]
+) -> UsersFit:
+    """Fit by filter error, delays of output error taken out before it."""
+    why = no_filter(model, maneuvers)
+    if why:
+        raise IdentificationError(f"{FILTER} cannot fit {model.name}: {why}; {MEMORY} is there")
+    if not model.delays:
+        found = fit(FILTER, model, maneuvers, compare_noise=False, **options)
+        return _converged(UsersFit(FILTER, found, (*maneuvers,)))
+    one_rate = len(sample_periods(maneuvers)) == 1
+    late = fit(MEMORY if one_rate else WHITE, model, maneuvers, multiple_starts=False)
+    half = late.half_width()
+    delays = {d.name: (late.value(d.name), float(half[late.index(d.name)])) for d in model.delays}
+    values = {name: value for name, (value, _) in delays.items()}
+    advanced = tuple(advance_outputs(m, model, values) for m in maneuvers)
+    bare, count = replace(model, delays=()), len(model.parameters)
+    start = np.delete(late.estimate, [late.index(name) for name in values])
+    found = fit(FILTER, bare, advanced, start=start, compare_noise=False, **options)
+    covariance = found.covariance.copy()
+    covariance[:count, :count] += _of_delays(late, list(values), count)
+    found = replace(found, covariance=covariance)
+    done = _converged(UsersFit(FILTER, found, advanced, delays))
+    ends = [d.name for d in model.delays if abs(values[d.name]) >= d.limit_s * (1.0 - AT_LIMIT)]
+    return replace(done, remarks=tuple(f"{name} is at its bound" for name in ends))
+
+
+def _of_delays(late: FitResult, names: Sequence[str], count: int) -> Array:
+    """Return the covariance that delays, known from here on, add to the first parameters."""
+    at = [late.index(name) for name in names]
+    cross = late.covariance[:count, at]
+    part = cross @ np.linalg.pinv(late.covariance[np.ix_(at, at)], hermitian=True) @ cross.T
+    return np.asarray(0.5 * (part + part.T))
+
+
+def _converged(found: UsersFit) -> UsersFit:
+    if not near_its_optimum(found.result):
+        raise IdentificationError(
+            f"{found.method} does not converge on {found.result.model.name}; {MEMORY} is there"
+        )
+    result = replace(found.result, converged=True, warnings=())
+    return replace(found, result=result)
+
+
+def _criterion(result: FitResult, maneuvers: Sequence[Maneuver]) -> float:
+    """Return the Bayesian information criterion, up to what all methods share."""
+    samples, outputs = sum(m.samples for m in maneuvers), len(result.model.outputs)
+    cost, count = float(np.asarray(result.details["cost"])), float(len(result.estimate))
+    if result.residual_kind == "output":  # its variances are concentrated out
+        cost += 0.5 * samples * outputs
+        count += outputs + float(np.sum(np.asarray(result.details["noise_orders"])))
+    return 2.0 * cost + count * float(np.log(samples))
