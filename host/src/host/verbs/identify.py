@@ -26,8 +26,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_files("log (also of PX4, ArduPilot), CSV, Parquet, MAT; several are fitted together."
                      " --from and --to belong to the source before them")  # fmt: skip
     parser.add_argument("--map", type=Path, metavar="TOML", action=StorePlaced, default=[],
-                        help="foreign names, units and signs; once for all sources, or behind each"
-                        " that needs one")  # fmt: skip
+                        help="foreign names, units and signs: a file, or the name of a shipped map"
+                        " ('list' shows them); once for all sources, or behind each that needs"
+                        " one")  # fmt: skip
     parser.add_argument("--calibration", type=Path, metavar="TOML", action=StorePlaced, default=[],
                         help="calibration of a log; as --map")  # fmt: skip
     parser.add_argument(
@@ -114,6 +115,7 @@ def _run(args: argparse.Namespace) -> int:
     from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import check_outputs
     from host.sysid.estimators.method_options import read_options
+    from host.sysid.flight.shipped_maps import LIST, map_lines
     from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.arguments import option_words
     from host.sysid.pipeline.requested_models import known_methods
@@ -121,6 +123,9 @@ def _run(args: argparse.Namespace) -> int:
 
     if "list" in (args.method or ()):
         print("\n".join(f"{name:26s} {about}" for name, about in known_methods().items()))
+        return int(ExitCode.OK)
+    if LIST in [str(path) for _, path in args.map]:
+        print("\n".join(map_lines()))
         return int(ExitCode.OK)
     if not args.source:
         raise IdentificationError("name the flight: a log, CSV, Parquet or MAT file")

@@ -16,10 +16,11 @@ def add_parser(subparsers: Any) -> None:
         description="Find the maneuvers of a flight from its control inputs, name and grade them:"
         " amplitude, trim before, noise, pilot feedback.",
     )
-    parser.add_argument(
-        "source", type=Path, help="log (also of PX4, ArduPilot), CSV, Parquet or MAT file"
-    )
-    parser.add_argument("--map", type=Path, metavar="TOML", help="foreign names, units and signs")
+    parser.add_argument("source", type=Path, nargs="?",
+                        help="log (also of PX4, ArduPilot), CSV, Parquet or MAT file")  # fmt: skip
+    parser.add_argument("--map", type=Path, metavar="TOML",
+                        help="foreign names, units and signs: a file, or the name of a shipped map"
+                        " ('list' shows them)")  # fmt: skip
     parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
     parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
                         help="of an autopilot's log, instance N of a message, such as IMU=1;"
@@ -37,10 +38,16 @@ def run(args: argparse.Namespace) -> int:
     from host.sysid.answer.maneuver_list import maneuver_lines
     from host.sysid.flight.flight_tables import read_columns
     from host.sysid.flight.linear_estimator import maneuvers_of
+    from host.sysid.flight.shipped_maps import LIST, map_lines
     from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.arguments import option_words
 
+    if str(args.map) == LIST:
+        print("\n".join(map_lines()))
+        return int(ExitCode.OK)
     try:
+        if args.source is None:
+            raise IdentificationError("name the flight: a log, CSV, Parquet or MAT file")
         columns, notes = read_columns(args.source, args.map, calibration=args.calibration,
                                       sensors=chosen_sensors(args.sensor))  # fmt: skip
     except IdentificationError as error:

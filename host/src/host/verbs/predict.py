@@ -25,7 +25,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: places of the sensors;"
                         " give it where the model was identified with it")  # fmt: skip
     parser.add_argument("--map", type=Path, metavar="TOML", action=StorePlaced, default=[],
-                        help="foreign names, units and signs")  # fmt: skip
+                        help="foreign names, units and signs: a file, or the name of a shipped map"
+                        " ('list' shows them)")  # fmt: skip
     parser.add_argument("--calibration", type=Path, metavar="TOML", action=StorePlaced, default=[],
                         help="calibration of a log")  # fmt: skip
     parser.add_argument("--from", dest="ends", type=float, metavar="S", action=StorePlaced,
@@ -54,10 +55,14 @@ def run(args: argparse.Namespace) -> int:
     from host.errors import ExitCode
     from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import OutputPaths, check_outputs
+    from host.sysid.flight.shipped_maps import LIST, map_lines
     from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.arguments import option_words
     from host.sysid.pipeline.prediction import predict
 
+    if LIST in [str(one[-1]) for one in args.map]:
+        print("\n".join(map_lines()))
+        return int(ExitCode.OK)
     try:
         if len(args.source) < 2:
             raise IdentificationError("name a saved model, and behind it the records it predicts")

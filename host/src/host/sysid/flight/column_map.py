@@ -8,16 +8,18 @@ t_s = { from = "TimeUS", unit = "us" }
 density_kgpm3 = "rho"
 flap_rad = { from = "Flap", unit = "deg" }    # any name, for a model of one's own
 elevator_rad = { from = "de", commanded = true }    # a command: the surface comes later
+aileron_rad = { from = "left", minus = "right", scale = 0.5 }
 ```
 
-Of a table of others a map hides what it does not name, but for the time.
+Of a table of others a map hides what it does not name, but for the time. `base = "inav"` above it
+all takes the lines of a shipped map (`shipped_maps.py`) that it does not have itself.
 """
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from host.arrays import Array
@@ -25,6 +27,7 @@ from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.files.quantities import Quantity
 from host.files.user_text import read_toml
 from host.instrument.recording import SURFACES
+from host.sysid.flight.shipped_maps import is_shipped, map_file
 from host.sysid.identification_error import IdentificationError
 
 DEG, FOOT, POUND_PA = RAD_PER_DEG, 0.3048, 6894.757
@@ -59,19 +62,28 @@ ALIASES = {
     "kpa": "kPa", "mb": "mbar", "lb/ft2": "psf", "inhg": "inHg", "%": "percent",
     "sec": "s", "seconds": "s", "msec": "ms", "usec": "us", "µs": "us", "μs": "us",
 }  # fmt: skip
-KEYS = {"from", "unit", "sign", "scale", "offset", "commanded"}
+KEYS = {"from", "minus", "unit", "sign", "scale", "offset", "commanded"}
+HEADS = {"columns", "about", "base"}
 COMMANDABLE = tuple(f"{surface}_rad" for surface in SURFACES)
 _FACTOR = Quantity("", -1e12, 1e12, "nanoseconds to seconds: 1e-9; no unit is further from ours")
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One line of a map: ours = foreign * gain + offset; of a surface, whether it is a command."""
+    """One line of a map: ours = (foreign - minus) * gain + offset; of a surface, whether it is a
+    command. Where a shipped map says it, the data may lack it."""
 
     foreign: str
     gain: float
     offset: float
     commanded: bool = False
+    minus: str = ""
+    shipped: bool = False
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """The foreign columns it is made of."""
+        return (self.foreign, self.minus) if self.minus else (self.foreign,)
 
 
 def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
@@ -80,6 +92,7 @@ def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
     Parameters
     ----------
     path : Path
+        File, or the name of a shipped map.
     known : sequence of str
         Columns that identification or a model asks for; others are taken too, but for one that
         looks like a misspelt one of these.
@@ -89,6 +102,8 @@ def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
     IdentificationError
         If it cannot be read or says what nobody understands.
     """
+    shipped = is_shipped(path)
+    path = map_file(path)
     document = read_toml(path, IdentificationError)
     lines = document.get("columns")
     if not isinstance(lines, dict) or not lines:
@@ -98,19 +113,27 @@ def read_map(path: Path, known: Sequence[str]) -> dict[str, Line]:
             raise IdentificationError(
                 f"{path}: unknown column {name}{like(name, known)}; ours are {', '.join(known)}"
             )
-    strangers = [key for key in document if key != "columns"]
+    strangers = [key for key in document if key not in HEADS]
     if strangers:
         raise IdentificationError(
             f"{path}: unknown key {strangers[0]}; all lines of a map stand below [columns]"
         )
-    result = {name: _line(f"{path}: {name}", name, line) for name, line in lines.items()}
-    for name, line in result.items():
-        others = [k for k, other in result.items() if other.foreign == line.foreign and k != name]
+    own = {
+        name: replace(_line(f"{path}: {name}", name, line), shipped=shipped and name != "t_s")
+        for name, line in lines.items()
+    }
+    for name, line in own.items():
+        others = [k for k, other in own.items() if other.foreign == line.foreign and k != name]
         if others:
             raise IdentificationError(
                 f"{path}: {name} and {others[0]} both come from '{line.foreign}'"
             )
-    return result
+    base = document.get("base", "")
+    if base and (shipped or not isinstance(base, str) or not is_shipped(Path(base))):
+        raise IdentificationError(
+            f"{path}: base is {base!r}, expected a shipped map; `--map list` shows them"
+        )
+    return (read_map(Path(base), known) if base else {}) | own
 
 
 def _misspelt(name: str, known: Sequence[str]) -> bool:
@@ -148,7 +171,10 @@ def _line(where: str, name: str, line: object) -> Line:
             f"{where}: commanded is true or false, of {', '.join(COMMANDABLE)} only"
         )
     offset = float(line.get("offset", 0.0))
-    return Line(line["from"], units[unit] * sign * scale, offset, commanded)
+    minus = line.get("minus", "")
+    if not isinstance(minus, str):
+        raise IdentificationError(f'{where}: minus is {minus!r}, expected "name"')
+    return Line(line["from"], units[unit] * sign * scale, offset, commanded, minus)
 
 
 def mapped(
@@ -178,21 +204,38 @@ def mapped(
     """
     result: dict[str, Array] = {}
     for name, line in lines.items():
-        if line.foreign in twice:
-            raise IdentificationError(
-                f"{path}: {name}: the data have several columns '{line.foreign}': rename them"
-            )
-        if line.foreign in unusable and line.foreign not in raw:
-            raise IdentificationError(
-                f"{path}: {name}: '{line.foreign}' is {unusable[line.foreign]}"
-            )
-        if line.foreign not in raw:
-            raise IdentificationError(
-                f"{path}: {name}: the data have no column '{line.foreign}'"
-                f"{like(line.foreign, tuple(raw))}; {listed(raw, unusable)}"
-            )
-        result[name] = raw[line.foreign] * line.gain + line.offset
+        if line.shipped and not all(column in raw for column in line.needed):
+            continue
+        for column in line.needed:
+            _usable(f"{path}: {name}", column, raw, unusable, twice)
+        values = raw[line.foreign] - raw[line.minus] if line.minus else raw[line.foreign]
+        result[name] = values * line.gain + line.offset
     return result
+
+
+def missing_lines(lines: Mapping[str, Line], raw: Collection[str]) -> list[str]:
+    """Return a note where a shipped map names columns that the data do not have."""
+    gone = [name for name, line in lines.items() if not set(line.needed) <= set(raw)]
+    return [f"the map names {', '.join(gone)}, which the data do not have"] if gone else []
+
+
+def _usable(
+    where: str,
+    column: str,
+    raw: Mapping[str, Array],
+    unusable: Mapping[str, str],
+    twice: Collection[str],
+) -> None:
+    """Refuse a foreign column that is not there, is none, or is there twice."""
+    if column in twice:
+        raise IdentificationError(f"{where}: the data have several columns '{column}': rename them")
+    if column in unusable and column not in raw:
+        raise IdentificationError(f"{where}: '{column}' is {unusable[column]}")
+    if column not in raw:
+        raise IdentificationError(
+            f"{where}: the data have no column '{column}'"
+            f"{like(column, tuple(raw))}; {listed(raw, unusable)}"
+        )
 
 
 def listed(raw: Mapping[str, Array], unusable: Mapping[str, str]) -> str:

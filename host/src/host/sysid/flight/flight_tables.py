@@ -18,7 +18,7 @@ from host.instrument.recording import Recording
 from host.physical.calibration import Calibration, load_calibration
 from host.readers.autopilot_flight import is_autopilot_log
 from host.sysid.flight.autopilot_table import autopilot_table
-from host.sysid.flight.column_map import listed, mapped, read_map
+from host.sysid.flight.column_map import listed, mapped, missing_lines, read_map
 from host.sysid.flight.column_sampling import Sampling, sampled_name
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.finding_consequences import checked
@@ -122,7 +122,7 @@ def read_flight_columns(
         ``.bin`` log, ``.csv``, ``.parquet`` or ``.mat``, a log of PX4 or ArduPilot; a folder is
         read as a log. What `host.read_log` returns, its table, or any table of SI columns.
     mapping : Path, optional
-        TOML map of foreign names, units and signs.
+        TOML map of foreign names, units and signs, or the name of a shipped one.
     calibration : Path, optional
         Calibration of a log; the default one without.
     also : collection of str
@@ -140,13 +140,20 @@ def read_flight_columns(
     wanted = ("t_s", *USED, *(name for name in also if name not in USED))
     lines = read_map(mapping, wanted) if mapping is not None else {}
     theirs = {name: line.foreign for name, line in lines.items()}
-    found, recorded = _read(source, mapping, calibration, (*wanted, *theirs.values()), sensors)
+    found, recorded = _read(
+        source,
+        mapping,
+        calibration,
+        (*wanted, *(c for line in lines.values() for c in line.needed)),
+        sensors,
+    )
     called = source_name(source)
     raw, notes = dict(found.columns), found.notes
     if mapping is not None:
         # A column of a log is ours; one of a table that happens to have our name need not be.
         shown = raw if recorded or found.shares else {k: v for k, v in raw.items() if k == "t_s"}
         raw = shown | mapped(found.columns, found.unusable, lines, mapping, found.twice)
+        notes += missing_lines(lines, found.columns)
         wanted = (*wanted, *(name for name in lines if name not in wanted))
         found.recording = commanded_by_map(found.recording, lines)
     if "t_s" not in raw:
