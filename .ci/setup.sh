@@ -120,7 +120,8 @@ if ! grep -qsx -e "test $inputs" -e "$purpose $inputs" .venv/setup-done; then
   say "installing Python packages into .venv (about a minute)"
   extras="$("$python" -c 'import tomllib, pathlib
 project = tomllib.loads(pathlib.Path("host/pyproject.toml").read_text())["project"]
-print(",".join(project.get("optional-dependencies", {})))')"
+extras = project.get("optional-dependencies", {})
+print(",".join(sorted(extras.keys() - {"simulate"})))')"  # a compiler of 100 MB, where the clone has one
   quietly pip.log "$python" -m pip install --disable-pip-version-check --progress-bar off \
     --constraint .ci/constraints.txt "${requirements[@]}" --editable "host[$extras]"
   printf '%s %s\n' "$purpose" "$inputs" >>.venv/setup-done

@@ -14,6 +14,8 @@ from email import message_from_string
 from pathlib import Path
 from zipfile import ZipFile
 
+from host.twin.recorder import recorder_build
+
 from tests.host.logs import ROOT
 from tests.protocol.flights import simple_log
 
@@ -59,6 +61,9 @@ def test_wheel_decodes_a_log_outside_the_clone(tmp_path: Path) -> None:
             ("host/data/default.toml", "hw/calibration/default.toml"),
         ):
             assert packed.read(name) == (ROOT / place).read_bytes()
+        for source in recorder_build._all_sources(ROOT):  # which a user's compiler builds
+            place = source.relative_to(ROOT).as_posix()
+            assert packed.read(f"host/data/recorder/{place}") == source.read_bytes()
     # All that an answer and its pictures need, and nothing larger: 454 MB as pip leaves it.
     core = {re.split(r"[<>=]", need)[0] for need in needs if "extra ==" not in need}
     assert core == {"numpy", "pandas", "scipy", "matplotlib", "construct", "pyserial"}

@@ -21,6 +21,7 @@ from types import CodeType, FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from host.extras import install_hint
+from host.resources import user_cache
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -254,9 +255,9 @@ def _places(source: Path) -> Iterator[Path]:
     if asked:
         yield Path(asked) / KEPT
     yield source.parent / "__pycache__" / KEPT
-    own = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    with contextlib.suppress(RuntimeError):  # nobody's home
-        yield Path(own).expanduser() / "flight-test-host" / KEPT
+    own = user_cache()
+    if own is not None:
+        yield own / KEPT
 
 
 def _digest(kernel: Kernel[..., Any]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 PACKED = Path(__file__).parent / "data"
@@ -16,6 +17,15 @@ _FILES = {
 
 # Schemas of released formats that the firmware of today no longer writes, a file each.
 _RELEASED = (PACKED / "released", CLONE / "protocol/released")
+
+
+def user_cache() -> Path | None:
+    """Return the folder for what is made once and kept; None where nobody has a home."""
+    own = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    try:
+        return Path(own).expanduser() / "flight-test-host"
+    except RuntimeError:
+        return None
 
 
 def released_schemas() -> list[Path]:

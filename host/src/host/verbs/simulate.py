@@ -54,6 +54,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Fly, and print what was written; return an exit code."""
+    from host.twin.recorder.recorder_build import check_recorder, recorder_library
+
+    flies = args.card is not None and not args.faults
+    if flies and args.firmware == "sitl":
+        check_recorder()  # before numpy: without a compiler the answer comes at once
     try:
         from host.twin.outcome import flight_outcome, outcome_summary
         from host.twin.testcard import cards
@@ -70,6 +75,8 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"seed is {args.seed}, expected 0 or more")
     from host.planning.identified_aircraft import named_aircraft
 
+    if args.firmware == "sitl":
+        recorder_library(draw_share)
     try:
         outcome = flight_outcome.simulate(
             card,
@@ -89,6 +96,9 @@ def run(args: argparse.Namespace) -> int:
         raise
     for doubt in outcome.record.aircraft.doubts:
         print(f"host: {doubt}", file=sys.stderr)
+    if outcome.missing:
+        print(f"host: no picture without {outcome.missing}: {install_hint(outcome.missing)}",
+              file=sys.stderr)  # fmt: skip
     if args.json:
         print(json.dumps(outcome_summary.document(outcome, args.firmware)))
         return ExitCode.OK

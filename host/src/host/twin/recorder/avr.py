@@ -21,6 +21,7 @@ from host.errors import UsageError
 from host.resources import CLONE
 from host.twin.faults import Fault, recorder_actions
 from host.twin.recorder import sitl
+from host.twin.recorder.recorder_build import existing_library
 from host.twin.recorder.sitl import (
     CLOSE_S,
     LET_GO_S,
@@ -30,7 +31,6 @@ from host.twin.recorder.sitl import (
     check_duration,
     file_of,
 )
-from host.twin.recorder.sitl_library import LIBRARY
 from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli
 from host.twin.sensors.mega_clock import TICKS_PER_S
 
@@ -77,7 +77,7 @@ def record(
                    str(folder / "card.img"), "--close-s", str(CLOSE_S),
                    "--seed", str(seed)]  # fmt: skip
         damaged = any(fault.kind == "settings_damaged" for fault in faults)
-        library = os.environ.get("HOST_SITL") or LIBRARY.is_file()
+        library = existing_library() is not None
         if damaged or rate_hz != DEFAULT_RATE_HZ or library:
             (folder / "eeprom.bin").write_bytes(sitl.eeprom(rate_hz, aircraft, damaged=damaged))
             command += ["--eeprom", str(folder / "eeprom.bin")]

@@ -6,10 +6,8 @@ What a flight does to it and what a card is afterwards; the C interface is `sitl
 from __future__ import annotations
 
 import mmap
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +16,8 @@ from host.errors import UsageError
 from host.twin.faults import Action, Fault, recorder_actions
 from host.twin.flight.fly import IDLE_US, NEUTRAL_US
 from host.twin.recorder.fat32 import CARD_BYTES, CardImageError, CardReader, format_card
-from host.twin.recorder.sitl_library import LIBRARY, TICKS_PER_US, CardFault, Port, Sitl
+from host.twin.recorder.recorder_build import recorder_library
+from host.twin.recorder.sitl_library import TICKS_PER_US, CardFault, Port, Sitl
 from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli
 from host.twin.sensors.mega_clock import TICKS_PER_S
 from host.wire.schema_text import packed_schema
@@ -67,24 +66,6 @@ class Recording:
     lost_gps_bytes: int
 
 
-def library_path() -> Path:
-    """Return the library: HOST_SITL if set, else the one of the clone.
-
-    Raises
-    ------
-    UsageError
-        It is not there.
-    """
-    given = os.environ.get("HOST_SITL")
-    path = Path(given) if given else LIBRARY
-    if not path.is_file():
-        raise UsageError(
-            f"no recorder library at {path}: build it with"
-            " `python firmware/toolchain/build_sitl.py`, or use --firmware none"
-        )
-    return path
-
-
 def recorder_rate_hz(wanted_hz: float) -> int:
     """Return the recorder's rate for a card: the card's if it knows it, else 100 Hz."""
     return int(wanted_hz) if wanted_hz in RATES_HZ else 100
@@ -128,7 +109,7 @@ def record(
     room_s = given.duration / TICKS_PER_S + 30.0
     blocks = round(room_s * BLOCKS_PER_S * max(rate_hz / 100.0, 0.5))
     image = card_image(faults, blocks)
-    sitl = Sitl(library_path())
+    sitl = Sitl(recorder_library())
     sitl.set_file_blocks(blocks)
     try:
         return _record(sitl, image, given, rate_hz, aircraft, faults, seed, progress)
@@ -148,7 +129,7 @@ def check_duration(given: Stimuli) -> None:
 
 def eeprom(rate_hz: int, aircraft: str, *, damaged: bool = False) -> bytes:
     """Return the EEPROM (4096 bytes) of a recorder with these settings; raises UsageError."""
-    sitl = Sitl(library_path())
+    sitl = Sitl(recorder_library())
     _configure(sitl, rate_hz, aircraft, damaged=damaged)
     return sitl.eeprom()
 
@@ -229,7 +210,7 @@ def card_image(faults: Sequence[Fault], file_blocks: int | None = None) -> mmap.
     if "card_unformatted" in kinds:
         return mmap.mmap(-1, CARD_BYTES)
     image = format_card(full="card_full" in kinds)
-    sitl = Sitl(library_path())
+    sitl = Sitl(recorder_library())
     try:
         if file_blocks is not None:
             sitl.set_file_blocks(file_blocks)

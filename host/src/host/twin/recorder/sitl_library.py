@@ -16,9 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
-from host.resources import CLONE
+from host.twin.recorder.recorder_build import CLONE_LIBRARY as LIBRARY
 
-LIBRARY = CLONE / "build" / "sitl" / "libsitl.so"
 TICKS_PER_US = 2
 TICKS_PER_S = 2_000_000
 BLOCK_BYTES = 512
