@@ -169,8 +169,9 @@ def _build(compiler: tuple[str, ...], root: Path, target: Path, progress: Progre
                         other.cancel()
                     return complaint
                 progress("build", done / (len(units) + 1))
-        # On Windows the C++ library goes in, because it is not beside every python.exe.
-        link = ("-shared", "-static") if sys.platform == "win32" else ("-shared",)
+        # MinGW's C++ library goes in, for it is not beside python.exe; ziglang's does by itself.
+        static = sys.platform == "win32" and "ziglang" not in compiler
+        link = ("-shared", "-static") if static else ("-shared",)
         part = target.with_suffix(f".{os.getpid()}{_SUFFIX}")
         complaint = _complaint((*compiler, *link, *map(str, objects), "-o", str(part)), root)
         if complaint is None:
