@@ -70,7 +70,7 @@ def _hfb(f: pd.DataFrame, path: Path) -> None:
 
 def _inav(f: pd.DataFrame, path: Path) -> None:
     """iNav: body axes forward, left, up; pitch in tenths of a degree, nose down positive."""
-    rows = {"loopIteration": np.arange(len(f)), "time (us)": np.round(f["time"] * 1e6)}
+    rows = pd.DataFrame({"time (us)": np.round(1e6 * f["time"])})
     for k, (sign, rate, force) in enumerate(((1, "p", "ax"), (-1, "q", "ay"), (-1, "r", "az"))):
         rows[f"gyroADC[{k}] (deg/s)"] = sign * np.rad2deg(f[rate])
         rows[f"accSmooth[{k}] (g)"] = sign * f[force] / GRAVITY
@@ -78,7 +78,7 @@ def _inav(f: pd.DataFrame, path: Path) -> None:
         rows[f"attitude[{k}]"] = sign * 10.0 * np.rad2deg(f[name])
     rows["AirSpeed"] = 100.0 * f["ias"]
     rows["servo[3]"] = 1500.0 + 1000.0 * f["de"]
-    pd.DataFrame(rows).to_csv(path, index=False)
+    rows.to_csv(path, index=False)
 
 
 @pytest.mark.parametrize(
