@@ -39,6 +39,7 @@ def summarise(log: FlightLog) -> Json:
     return {
         "file": str(log.path),
         "file_id": f"{log.selection.file_id:08x}",
+        "received": log.stream is not None,
         "begins_at_byte": log.selection.base,
         "schema": f"{log.schema.hash:08x}",
         "complete": log.complete,
@@ -62,7 +63,7 @@ def summarise(log: FlightLog) -> Json:
             }
             for other in log.selection.foreign
         ],
-        "duplicate_blocks": log.selection.duplicates,
+        "duplicate_blocks": log.selection.duplicates if log.stream is None else 0,
         "displaced_blocks": log.selection.displaced,
         "calibration": calibration_note(log),
         "delays_us": delays_us(log),

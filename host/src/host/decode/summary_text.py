@@ -11,7 +11,8 @@ _WIDTH = 13
 
 def lines(summary: Mapping[str, Any]) -> Iterator[str]:
     """Yield the lines of a summary made by `host.decode.log_summary.summarise`."""
-    yield _row("log", f"{summary['file']}  file id {summary['file_id']}, {summary['complete']}")
+    where = "from the radio" if summary["received"] else f"file id {summary['file_id']}"
+    yield _row("log", f"{summary['file']}  {where}, {summary['complete']}")
     if summary["begins_at_byte"]:
         yield _row("", f"it begins at byte {summary['begins_at_byte']} of this file")
     yield _row("duration", f"{summary['duration_s']:.2f} s, {summary['rows']} rows")

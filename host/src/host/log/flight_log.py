@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.errors import LogError
-from host.files.regular import file_or_folder
 from host.log.ledger import Ledger
 from host.log.losses import make_ledger
-from host.physical.calibration import Calibration, load_calibration
+from host.log.stream_losses import make_stream_ledger
+from host.physical.calibration import Calibration
 from host.physical.columns import CHANNELS, COLUMNS
 from host.physical.session import Session, surface_sources
 from host.physical.table import Columns, SessionTable
 from host.physical.timebase import ClockFit, block_times_us, fit_gps, gps_times_ms, session_slices
-from host.wire.blocks import Progress, Scan, scan
-from host.wire.frames import find_schemas
+from host.wire.blocks import Progress, Scan
 from host.wire.schema import Schema
-from host.wire.selection import Selection, select
+from host.wire.selection import Selection
 from host.wire.store import Frames, FrameStore
+from host.wire.stream import Stream, StreamStore
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,6 +48,8 @@ class FlightLog:
         Keep this session only.
     progress : callable, optional
         Called with work done and work in all.
+    stream : Stream, optional
+        Where the blocks are frames of a telemetry stream, received on the ground.
     """
 
     def __init__(
@@ -60,8 +62,10 @@ class FlightLog:
         *,
         session: int | None = None,
         progress: Progress | None = None,
+        stream: Stream | None = None,
     ) -> None:
         self.path = path
+        self.stream = stream
         self.scan = scan
         self.selection = selection
         self.schema = schema
@@ -81,7 +85,11 @@ class FlightLog:
                 f" most {most}: a session holds its schema and a second; --session N reads one"
             )
         self.blocks = blocks
-        self.store = FrameStore(path, blocks, schema, progress)
+        self.store = (
+            FrameStore(path, blocks, schema, progress)
+            if stream is None
+            else StreamStore(path, stream, blocks, schema, progress)
+        )
 
     @cached_property
     def frames(self) -> Frames:
@@ -137,6 +145,8 @@ class FlightLog:
     @cached_property
     def loss(self) -> Ledger:
         """What is missing: every lost range with its place, length, seconds, frames and cause."""
+        if self.stream is not None:
+            return make_stream_ledger(self.stream, self.store, self.sessions)
         return make_ledger(self.scan, self.selection, self.store, self.sessions, only=self._only)
 
     @property
@@ -225,85 +235,6 @@ class FlightLog:
             return None
         data = self.frames[name]
         return data[-1] if len(data) else None
-
-
-def read_log(
-    path: Path | str,
-    *,
-    session: int | None = None,
-    file_id: int | None = None,
-    calibration: Path | str | Calibration | None = None,
-    progress: Progress | None = None,
-    limit_bytes: int | None = None,
-) -> FlightLog:
-    """Read a flight log.
-
-    Parameters
-    ----------
-    path : Path or str
-        The file the logger wrote.
-    session : int, optional
-        Keep one recording session; all of the file's log without it.
-    file_id : int, optional
-        Take the blocks with this file id instead of those of the file's first block: an older
-        flight behind the end, or a second log glued on.
-    calibration : Path, str or Calibration, optional
-        Counts to SI; the default calibration without it.
-    progress : callable, optional
-        Called with bytes or blocks done and in all.
-    limit_bytes : int, optional
-        Look at the head of the file only.
-
-    Returns
-    -------
-    FlightLog
-
-    Raises
-    ------
-    NotALogError
-        If the file holds not one intact block.
-    LogError
-        If the session, the file id or the schema is not known.
-    CalibrationError
-        If the calibration file cannot be used.
-    UsageError
-        If it is a pipe or a device.
-    OSError
-        If the file cannot be read.
-
-    Examples
-    --------
-    >>> import host
-    >>> log = host.read_log("flight.bin")  # doctest: +SKIP
-    >>> log.table()[["t_s", "alpha_rad", "q_radps"]]  # doctest: +SKIP
-    """
-    path = Path(path)
-    if path.exists():
-        file_or_folder(path)
-    if not isinstance(calibration, Calibration):
-        calibration = load_calibration(calibration)
-    found = scan(path, progress, limit_bytes=limit_bytes)
-    selection = select(found, str(path), file_id)
-    schema = _main_schema(path, selection)
-    return FlightLog(
-        path, found, selection, schema, calibration, session=session, progress=progress
-    )
-
-
-def _main_schema(path: Path, selection: Selection) -> Schema:
-    """Return the schema that most blocks follow, of those that can be read."""
-    refused: LogError | None = None
-    for _, found in find_schemas(path, selection.blocks):
-        if isinstance(found, Schema):
-            return found
-        refused = refused or found
-    if refused is not None:
-        raise LogError(f"{path}: {refused}") from refused
-    values, counts = np.unique(selection.blocks.schema_hash, return_counts=True)
-    raise LogError(
-        f"{path}: schema {int(values[np.argmax(counts)]):08x} is neither whole in the log nor known"
-        " to this program: the frames cannot be read; install the host tool of that firmware"
-    )
 
 
 def _gps_pairs(session: Session) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -36,6 +36,7 @@ def describe(path: Path) -> dict[str, Any]:
         "file": str(path),
         "size_bytes": path.stat().st_size,
         "file_id": f"{log.selection.file_id:08x}",
+        "received": log.stream is not None,
         "session": log.selection.sessions[0],
         "schema": f"{log.schema.hash:08x}",
         "kinds_of_frames": len(log.schema.frames),
@@ -74,9 +75,10 @@ def head_lines(head: dict[str, Any]) -> list[str]:
             f"rows         {head['file']}, {head['size_bytes']} bytes, {head['format']}",
             f"next         {command_line('host', 'decode', Path(head['file']))}",
         ]
+    where = "radio        received" if head["received"] else f"file id      {head['file_id']}"
     lines = [
         f"log          {head['file']}, {head['size_bytes']} bytes",
-        f"file id      {head['file_id']}, first session {head['session']}",
+        f"{where}, first session {head['session']}",
         f"schema       {head['schema']}, {head['kinds_of_frames']} kinds of frames",
         f"barometer    {head['baro']}",
         f"image        {head['image']}",

@@ -16,6 +16,9 @@ CAUSES = {
     "unread": "bytes behind a frame of unknown kind",
     "ring_full": "frames dropped in flight while the card was busy",
     "unexplained": "identification frames missing, no counter says why",
+    "radio_lost": "did not arrive from the radio",
+    "radio_damaged": "bytes from the radio in no whole envelope",
+    "radio_repeated": "frames that arrived twice: used once",
     "truncated": "the file was cut: it stops without the end of its session",
 }
 
@@ -95,16 +98,21 @@ class Ledger:
     unproven_bytes : int or None
         Bytes behind the last block of a file that was never closed; None where the log says itself
         that its session ended.
+    received : bool
+        The log was received from the radio: its end says nothing of the recorder's log.
     """
 
     losses: tuple[Loss, ...]
     complete: str
     dropped_frames: int
     unproven_bytes: int | None = None
+    received: bool = False
 
     @property
     def ending(self) -> str | None:
         """What cannot be proven of the log's end, in words; None if its session's end is there."""
+        if self.received and self.complete != "complete":
+            return "received from the radio, some of the frames: the card has all of them"
         if self.unproven_bytes is None:
             return None
         return (

@@ -112,10 +112,25 @@ def load_calibration(path: Path | str | None = None) -> Calibration:
     CalibrationError
         If the file cannot be read, or a number in it is missing, of the wrong kind, or unknown.
     """
-    default = _read(resource("default.toml"))
     if path is None:
-        return default
-    own = _read(Path(path))
+        return _read(resource("default.toml"))
+    return _completed(_read(Path(path)), path)
+
+
+def calibration_of_text(text: str, path: Path) -> Calibration:
+    """Return the calibration whose text was kept in `path`, as `load_calibration` does of a file.
+
+    Raises
+    ------
+    CalibrationError
+        As `load_calibration`.
+    """
+    return _completed(_of_text(text, path), path)
+
+
+def _completed(own: Calibration, path: Path | str) -> Calibration:
+    """Return a calibration with what it does not name from the default."""
+    default = _read(resource("default.toml"))
     unknown = sorted(set(own.lines) - set(default.lines))
     if unknown:
         raise CalibrationError(
@@ -136,7 +151,10 @@ def load_calibration(path: Path | str | None = None) -> Calibration:
 
 
 def _read(path: Path) -> Calibration:
-    text = read_text(path, CalibrationError, "TOML")
+    return _of_text(read_text(path, CalibrationError, "TOML"), path)
+
+
+def _of_text(text: str, path: Path) -> Calibration:
     raw = parse_toml(text, str(path), CalibrationError)
     if raw.get("format") != FORMAT or raw.get("version") != VERSION:
         raise CalibrationError(

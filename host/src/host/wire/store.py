@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -68,7 +68,7 @@ class FrameStore:
             low, high = np.searchsorted(whole.block, (first, last))
             yield FrameSet(whole.data[low:high], whole.block[low:high])
             return
-        for piece in frame_pieces(self.path, self.blocks, self.schema, [FAST], (first, last)):
+        for piece in self._pieces([FAST], (first, last)):
             self._report(piece)
             yield piece.frames[FAST]
 
@@ -105,7 +105,7 @@ class FrameStore:
 
     def _sorted_out(self, names: list[str], slow: dict[str, list[FrameSet]]) -> Iterator[FrameSet]:
         """Read the log once; collect slower frames in `slow`, yield identification frames."""
-        for piece in frame_pieces(self.path, self.blocks, self.schema, names):
+        for piece in self._pieces(names, None):
             self.unread_bytes += piece.unread_bytes
             self._report(piece)
             for name, frames in piece.frames.items():
@@ -113,6 +113,9 @@ class FrameStore:
                     yield frames
                 else:
                     slow[name].append(frames)
+
+    def _pieces(self, names: Collection[str], span: tuple[int, int] | None) -> Iterator[Piece]:
+        return frame_pieces(self.path, self.blocks, self.schema, names, span)
 
     def _report(self, piece: Piece) -> None:
         if self._progress is not None:

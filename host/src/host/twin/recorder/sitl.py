@@ -130,7 +130,7 @@ def check_duration(given: Stimuli) -> None:
 def eeprom(rate_hz: int, aircraft: str, *, damaged: bool = False) -> bytes:
     """Return the EEPROM (4096 bytes) of a recorder with these settings; raises UsageError."""
     sitl = Sitl(recorder_library())
-    _configure(sitl, rate_hz, aircraft, damaged=damaged)
+    configure(sitl, rate_hz, aircraft, damaged=damaged)
     return sitl.eeprom()
 
 
@@ -147,14 +147,14 @@ def _record(
     kinds = {fault.kind for fault in faults}
     if "card_absent" not in kinds:
         sitl.insert_card(image, CARD_ID)
-    _configure(sitl, rate_hz, aircraft, damaged="settings_damaged" in kinds)
+    configure(sitl, rate_hz, aircraft, damaged="settings_damaged" in kinds)
     for fault in faults:
         if fault.kind == "clock_wrap":
             offset_us = (1 << 32) - round(fault.at_s * 1e6)
             sitl.set_clock_offset(offset_us & 0xFFFFFFFF)
     cuts = [round(f.at_s * TICKS_PER_S) for f in faults if f.kind == "power_cut"]
     end = min([given.duration, *cuts])
-    _give(sitl, given, end)
+    give(sitl, given, end)
     if "telemetry_flood" in kinds:
         raise UsageError("telemetry_flood: here an interrupt takes no time; use --firmware avr")
     actions = [(round(a.at_s * TICKS_PER_S), a) for a in recorder_actions(faults)]
@@ -251,7 +251,7 @@ def _act(sitl: Sitl, given: Stimuli, at: int, action: Action) -> None:
         sitl.hold_pressure_bus(action.what == "baro_bus_stuck")
 
 
-def _configure(sitl: Sitl, rate_hz: int, aircraft: str, *, damaged: bool = False) -> None:
+def configure(sitl: Sitl, rate_hz: int, aircraft: str, *, damaged: bool = False) -> None:
     """Change rate and aircraft in the default settings."""
     config = sitl.default_config()
     fields = packed_schema().by_name["config"].fields
@@ -272,7 +272,7 @@ def _configure(sitl: Sitl, rate_hz: int, aircraft: str, *, damaged: bool = False
         sitl.set_eeprom(bytes(content))
 
 
-def _give(sitl: Sitl, given: Stimuli, end: int) -> None:
+def give(sitl: Sitl, given: Stimuli, end: int) -> None:
     """Hand over what reaches the pins before `end`: the next power-on is at the bench."""
     edges, gps = given.edges[given.edges["at"] < end], given.gps[given.gps["at"] < end]
     sitl.add_edges(edges["at"], edges["levels"])
