@@ -151,11 +151,27 @@ def test_an_unfinished_table_takes_no_file_of_the_users() -> None:
     assert sorted(path.suffix for path in Path().iterdir()) == [".bin", ".csv", ".csv"]
 
 
-def test_unknown_option_and_verb_end_in_2() -> None:
-    for arguments in (["decode", "x", "y"], ["decode", "x", "--nonsense"], ["fly"]):
-        with pytest.raises(SystemExit) as caught:
-            main(arguments)
-        assert caught.value.code == 2
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["decode", "x", "y"], "unrecognized argument y"),
+        (["decode", "x", "--nonsense"], "unrecognized argument --nonsense"),
+        (["decode", "x", "--calibraton=y"], "(did you mean --calibration?)"),
+        (["fly"], "no verb 'fly'"),
+        (["decod", "x"], "(did you mean decode?)"),
+        (["simulate", "dem"], "(did you mean demo?)"),
+        (["plan", "--aircraft", "ultrastik"], "(did you mean ultrastick25e?)"),
+        (["identify", "x", "--method", "hopfeld"], "(did you mean hopfield?)"),
+        (["identify", "x", "--model", "lateal"], "(did you mean lateral?)"),
+    ],
+)
+def test_a_name_that_nobody_has_is_one_line_and_the_near_one(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
     assert main([]) == 2
 
 

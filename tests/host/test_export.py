@@ -1,11 +1,14 @@
 """Every format gives back the table, with units where it has a place for them."""
 
+import importlib.util
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
+from host.export.csv import DECIMALS
+from host.physical.calibration import load_calibration
 from host.physical.columns import COLUMNS, UNITS
 from pyarrow import parquet
 from scipy.io import loadmat
@@ -30,11 +33,30 @@ def same(found: pd.DataFrame, truth: pd.DataFrame, rtol: float = 0.0) -> None:
 
 
 def test_csv(truth: pd.DataFrame, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert main(["decode", "flight.bin", "-o", "arrow.csv"]) == 0
-    same(pd.read_csv("arrow.csv"), truth, rtol=1e-15)
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    assert main(["decode", "flight.bin", "-o", "pandas.csv"]) == 0
-    same(pd.read_csv("pandas.csv"), truth, rtol=1e-15)
+    """Each number with the decimals of its sensor: no more, and none that a count needs missing."""
+    has_spec = importlib.util.find_spec
+    for name in ("arrow", "pandas"):
+        if name == "pandas":
+            monkeypatch.setattr(
+                "importlib.util.find_spec",
+                lambda name, *more: None if name == "pyarrow" else has_spec(name, *more),
+            )
+        assert main(["decode", "flight.bin", "-o", f"{name}.csv"]) == 0
+        found = pd.read_csv(f"{name}.csv")
+        text = pd.read_csv(f"{name}.csv", dtype=str)
+        assert list(found.columns) == NAMES
+        for column in NAMES:
+            decimals = DECIMALS.get(UNITS[column], 17)
+            near = 0.5001 * 10.0**-decimals
+            np.testing.assert_allclose(found[column], truth[column], rtol=1e-15, atol=near)
+            digits = text[column].dropna().str.partition(".")[2].str.len()
+            assert digits.empty or digits.max() <= decimals
+    lines = load_calibration().lines
+    assert 0.5 * 10.0 ** -DECIMALS["rad"] < 0.01 * lines["channel.alpha_a"].slope[0]
+    for line, unit in (("gyro", "rad/s"), ("accel", "m/s2")):
+        assert 0.5 * 10.0 ** -DECIMALS[unit] < 0.01 * min(
+            map(abs, lines[f"imu_original.{line}"].slope)
+        )
 
 
 def test_parquet(truth: pd.DataFrame, monkeypatch: pytest.MonkeyPatch) -> None:

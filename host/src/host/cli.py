@@ -13,11 +13,13 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from types import FrameType
+from types import FrameType, ModuleType
 from typing import TextIO
 
-from host.errors import ExitCode, HostError
+from host.errors import ExitCode, HostError, UsageError
+from host.near_names import like
 from host.placed_arguments import PlacedParser
+from host.progress import watched
 from host.terminal import cleaned_streams
 
 # name -> one line of help. A verb is listed when its module is in the tree.
@@ -32,7 +34,10 @@ VERBS = {
     "identify": "estimate the aircraft's derivatives with their uncertainty",
     "predict": "run a saved model over another record",
     "convert": "turn derivatives into coefficients, and back",
+    "doctor": "say what is installed, plugged in, set and kept",
+    "completion": "print the script that completes these words in your shell",
 }
+_OWN_DISPLAY = ("live", "status", "completion")  # they draw themselves, or are read by a shell
 _LONGEST_LINE = 2000  # characters
 _AGAIN_S = 0.02  # until Ctrl-C comes again where Python dropped it
 _EPILOG = """\
@@ -161,6 +166,33 @@ def verbs() -> dict[str, str]:
 
 def _run(arguments: list[str]) -> int:
     known = verbs()
+    chosen = next((one for one in arguments if not one.startswith("-")), None)
+    if chosen is not None and chosen not in known:
+        raise UsageError(f"no verb '{chosen}'{like(chosen, known)}; host --help lists them")
+    parser, modules = command_parser([chosen] if chosen is not None else [])
+    parsed, strange = parser.parse_known_args(arguments)
+    if strange:
+        raise UsageError(_strange(strange[0], parser, chosen))
+    if parsed.version:
+        from host import __version__
+
+        print(f"host {__version__}")
+        return int(ExitCode.OK)
+    if not modules:
+        parser.print_help()
+        return int(ExitCode.USAGE)
+    with watched(chosen or "", shown=chosen not in _OWN_DISPLAY):
+        return int(modules[0].run(parsed))
+
+
+def command_parser(loaded: Sequence[str]) -> tuple[argparse.ArgumentParser, list[ModuleType]]:
+    """Return the parser of the command line, and the modules of the verbs that are loaded.
+
+    Parameters
+    ----------
+    loaded : sequence of str
+        Verbs whose arguments it knows; of the others it knows the name.
+    """
     parser = argparse.ArgumentParser(
         prog="host",
         description="Flight-test logs of RC aircraft: decode, look, simulate, identify.",
@@ -171,21 +203,27 @@ def _run(arguments: list[str]) -> int:
     subparsers = parser.add_subparsers(
         dest="verb", metavar="VERB", title="verbs", parser_class=PlacedParser
     )
-    chosen = next((one for one in arguments if not one.startswith("-")), None)
-    module = None
-    for name, text in known.items():
-        if name == chosen:
-            module = importlib.import_module(f"host.verbs.{name}")
-            module.add_parser(subparsers)
+    modules = []
+    for name, text in verbs().items():
+        if name in loaded:
+            modules.append(importlib.import_module(f"host.verbs.{name}"))
+            modules[-1].add_parser(subparsers)
         else:
             subparsers.add_parser(name, help=text)
-    parsed = parser.parse_args(arguments)
-    if parsed.version:
-        from host import __version__
+    return parser, modules
 
-        print(f"host {__version__}")
-        return int(ExitCode.OK)
-    if module is None:
-        parser.print_help()
-        return int(ExitCode.USAGE)
-    return int(module.run(parsed))
+
+def parser_of(parser: argparse.ArgumentParser, verb: str) -> argparse.ArgumentParser:
+    """Return the parser of a verb."""
+    (verbs_of,) = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
+    found: argparse.ArgumentParser = verbs_of.choices[verb]
+    return found
+
+
+def _strange(word: str, parser: argparse.ArgumentParser, verb: str | None) -> str:
+    """Return what to say of an argument that nobody knows."""
+    own = parser_of(parser, verb) if verb is not None else parser
+    options = [name for action in own._actions for name in action.option_strings]
+    name = word.partition("=")[0]
+    meant = like(name, options) if word.startswith("-") else ""
+    return f"unrecognized argument {word}{meant}; {own.prog} --help lists them"

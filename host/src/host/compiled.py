@@ -260,6 +260,14 @@ def _places(source: Path) -> Iterator[Path]:
         yield own / KEPT
 
 
+def generated_folders() -> list[Path]:
+    """Return the folders that hold compiled code."""
+    package = Path(__file__).parent
+    beside = [path for path in package.rglob(f"__pycache__/{KEPT}") if path.is_dir()]
+    asked = os.environ.get("NUMBA_CACHE_DIR")
+    return [*beside, *([Path(asked) / KEPT] if asked else [])]
+
+
 def _digest(kernel: Kernel[..., Any]) -> str:
     import numba
 

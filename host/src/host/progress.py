@@ -1,15 +1,68 @@
-"""A progress bar on a terminal's stderr for long work; silent everywhere else."""
+"""What a terminal shows of work that takes long; silent everywhere else."""
 
 from __future__ import annotations
 
+import contextlib
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from host.terminal import bar
 
 _WIDTH = 32
 _EVERY_S = 0.1
+_PATIENCE_S = 2.0  # what takes less is over before anybody wonders
+_TICK_S = 0.5
+
+
+class _Watch:
+    """What is being done, since when, and when a bar was drawn last."""
+
+    def __init__(self) -> None:
+        self.stage = ""
+        self.drawn_s = 0.0
+
+
+_watch = _Watch()
+
+
+def stage(text: str) -> None:
+    """Say what is being done now; shown beside the seconds where a verb takes long."""
+    _watch.stage = text
+
+
+@contextlib.contextmanager
+def watched(verb: str, *, shown: bool) -> Iterator[None]:
+    """Show on a terminal that a verb works, what at, and since when, once it takes over 2 s.
+
+    Parameters
+    ----------
+    verb : str
+    shown : bool
+        False for verbs that draw for themselves.
+    """
+    if not (shown and sys.stderr.isatty()):
+        yield
+        return
+    over = threading.Event()
+    began_s = time.monotonic()
+    _watch.stage = ""
+
+    def look() -> None:
+        while not over.wait(_TICK_S):
+            now_s = time.monotonic()
+            if now_s - began_s > _PATIENCE_S and now_s - _watch.drawn_s > _PATIENCE_S:
+                bar.draw(f"{verb}  {_watch.stage:s}  {now_s - began_s:.0f} s")
+
+    watcher = threading.Thread(target=look, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        over.set()
+        watcher.join()
+        bar.clear()
 
 
 def progress_bar(label: str, size_bytes: int) -> Callable[[int, int], None] | None:
@@ -42,5 +95,6 @@ def progress_bar(label: str, size_bytes: int) -> Callable[[int, int], None] | No
 def draw_share(label: str, share: float) -> None:
     """Draw a bar if somebody watches; the next line that is printed takes its place."""
     if sys.stderr.isatty():
+        _watch.drawn_s = time.monotonic()
         filled = round(share * _WIDTH)
         bar.draw(f"{label:8s} [{'#' * filled}{'.' * (_WIDTH - filled)}] {share:4.0%}")

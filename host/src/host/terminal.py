@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import os
 import shlex
+import shutil
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
+from host.colours import coloured, painted
 from host.text import shown
 
 
@@ -46,23 +49,26 @@ class Bar:
 
     def __init__(self) -> None:
         self._on: TextIO | None = None
+        self._lock = threading.Lock()  # a second thread draws where a verb takes long
 
     def draw(self, text: str) -> None:
-        """Draw the bar over the last one."""
-        stream = bare(sys.stderr)
-        if self._on is None:
-            sys.stdout.flush()
-        stream.write(f"\r\033[K{text}")
-        stream.flush()
-        self._on = stream
+        """Draw the bar over the last one, as much of it as fits on a line."""
+        with self._lock:
+            stream = bare(sys.stderr)
+            if self._on is None:
+                sys.stdout.flush()
+            stream.write(f"\r\033[K{cleaned(text)[: shutil.get_terminal_size().columns - 1]}")
+            stream.flush()
+            self._on = stream
 
     def clear(self) -> None:
         """Take the bar away if one is drawn."""
-        stream, self._on = self._on, None
-        if stream is not None:
-            with contextlib.suppress(OSError, ValueError):
-                stream.write("\r\033[K")
-                stream.flush()
+        with self._lock:
+            stream, self._on = self._on, None
+            if stream is not None:
+                with contextlib.suppress(OSError, ValueError):
+                    stream.write("\r\033[K")
+                    stream.flush()
 
 
 bar = Bar()
@@ -74,6 +80,7 @@ class _Cleaned:
     def __init__(self, stream: TextIO, other: TextIO) -> None:
         self.bare = stream
         self._other = other
+        self._coloured = coloured(stream)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.bare, name)
@@ -84,7 +91,7 @@ class _Cleaned:
             self._other.flush()
         encoding = self.bare.encoding or "utf-8"
         shown = cleaned(text).encode(encoding, "backslashreplace").decode(encoding)
-        self.bare.write(shown)
+        self.bare.write(painted(shown) if self._coloured else shown)
         return len(text)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from host.people_units import people_unit
+
 _SHOWN = 12
 _WIDTH = 13
 
@@ -74,11 +76,12 @@ def _session(session: Mapping[str, Any]) -> Iterator[str]:
     if session["imu_saturated_share"]:
         yield _row("  SATURATED", f"IMU says so in {session['imu_saturated_share']:.2%} of samples")
     for name, pair in session["pairs"].items():
+        unit, factor = people_unit(pair["unit"])
         label = "  DISAGREE" if pair["disagrees"] else "  pair"
         yield _row(
             label,
-            f"{name} left - right: mean {pair['mean_difference']:+.4g} {pair['unit']}, deviation"
-            f" {pair['deviation']:.4g} {pair['unit']}",
+            f"{name} left - right: mean {factor * pair['mean_difference']:+.4g} {unit}, deviation"
+            f" {factor * pair['deviation']:.4g} {unit}",
         )
     if session["absent"]:
         yield _row("  not valid", ", ".join(session["absent"]))

@@ -10,6 +10,7 @@ import importlib.util
 import io
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -20,6 +21,12 @@ from host.export.writer import Columns, Meta, TableWriter
 from host.text import shown
 
 STDOUT = Path("-")
+# Decimals by unit: a hundredth of a step of the finest sensor or less (gyro 1 mrad/s, accelerometer
+# 1.2 mm/s2, vane 1.3 mrad, clock 1 us, GPS 1e-7 deg); further digits are of the arithmetic alone.
+DECIMALS = {
+    "s": 6, "us": 2, "rad": 6, "rad/s": 6, "deg": 8, "m/s2": 5, "m/s": 5, "m": 4, "Pa": 3, "K": 4,
+    "kg/m3": 6, "": 6,
+}  # fmt: skip
 _FORMULA = ("=", "+", "-", "@")  # a spreadsheet runs a text cell that begins so
 
 
@@ -41,7 +48,7 @@ class PandasCsvWriter:
     """CSV with pandas alone."""
 
     def __init__(self, path: Path, meta: Meta) -> None:
-        del meta  # the format has no place for it
+        self._units = meta.units
         self._file = io.TextIOWrapper(open_target(path), encoding="utf-8", newline="")
         self._header = True
 
@@ -49,7 +56,7 @@ class PandasCsvWriter:
         """Append rows."""
         import pandas as pd
 
-        table = pd.DataFrame(_cells(columns))
+        table = pd.DataFrame(_cells(rounded(columns, self._units)))
         table.to_csv(self._file, index=False, header=self._header)
         self._header = False
 
@@ -62,7 +69,7 @@ class ArrowCsvWriter:
     """CSV through pyarrow; a missing value is an empty field, as pandas writes it."""
 
     def __init__(self, path: Path, meta: Meta) -> None:
-        del meta
+        self._units = meta.units
         self._file = open_target(path)
         self._header = True
 
@@ -71,7 +78,7 @@ class ArrowCsvWriter:
         import pyarrow as pa
         from pyarrow import csv as arrow_csv
 
-        cells = _cells(columns)
+        cells = _cells(rounded(columns, self._units))
         arrays = [pa.array(value, from_pandas=value.dtype.kind == "f") for value in cells.values()]
         table = pa.Table.from_arrays(arrays, names=list(cells))
         if self._header:
@@ -86,6 +93,16 @@ class ArrowCsvWriter:
     def close(self) -> None:
         """Finish the file."""
         self._file.close()
+
+
+def rounded(columns: Columns, units: Mapping[str, str]) -> Columns:
+    """Return columns with the decimals that their sensors have; others as they are."""
+    return {
+        name: np.round(value, DECIMALS[units[name]])
+        if value.dtype.kind == "f" and units.get(name) in DECIMALS
+        else value
+        for name, value in columns.items()
+    }
 
 
 def printable(columns: Columns) -> Columns:

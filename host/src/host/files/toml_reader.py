@@ -13,6 +13,7 @@ from pathlib import Path
 
 from host.errors import UsageError
 from host.files.user_text import read_toml, shown
+from host.near_names import like
 
 FORMAT = 1
 
@@ -41,7 +42,8 @@ def read(source: str | Path, folder: Path, what: str, error: type[UsageError]) -
         path = folder / f"{source}.toml"
     if not path.exists():
         known = ", ".join(names(folder))
-        raise error(f"no {what} {str(source)!r}: expected a file or one of {known}")
+        meant = like(str(source), names(folder))
+        raise error(f"no {what} {str(source)!r}{meant}: expected a file or one of {known}")
     return read_toml(path, error)
 
 

@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from host.decode.newest_flight import source_or_newest
+
 _DESCRIPTION = """\
 Decode a flight log: print what it holds and how good it is, write the synchronous
 table in SI at the identification rate. SOURCE is a log, a folder or a mounted card
@@ -33,9 +35,8 @@ def add_parser(subparsers: Any) -> None:
         "source",
         type=Path,
         nargs="?",
-        default=Path(),
         metavar="SOURCE",
-        help="log, folder or mounted card; the working folder without it",
+        help="log, folder or mounted card; the newest flight of the working folder without it",
     )
     parser.add_argument(
         "-o",
@@ -89,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     from host.text import shown
 
     request = Request(
-        source=args.source,
+        source=source_or_newest(args.source),
         output=args.output,
         format=args.to,
         frames=args.frames,

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import StorePlaced, of_each, stretches_of_each
 
 if TYPE_CHECKING:
@@ -23,8 +24,9 @@ def add_parser(subparsers: Any) -> None:
         description="Find the maneuvers of a flight, fit a model to them jointly, check it on"
         " maneuvers it has not seen, and say what of it can be trusted.",
     )
-    parser.add_files("log (also of PX4, ArduPilot), CSV, Parquet, MAT; several are fitted together."
-                     " --from and --to belong to the source before them")  # fmt: skip
+    parser.add_files("log (also of PX4, ArduPilot), CSV, Parquet, MAT; several are fitted together;"
+                     " without one the newest flight of the working folder. --from"
+                     " and --to belong to the source before them")  # fmt: skip
     parser.add_argument("--map", type=Path, metavar="TOML", action=StorePlaced, default=[],
                         help="foreign names, units and signs: a file, or the name of a shipped map"
                         " ('list' shows them); once for all sources, or behind each that needs"
@@ -116,7 +118,6 @@ def _run(args: argparse.Namespace) -> int:
     from host.sysid.answer.output_files import check_outputs
     from host.sysid.estimators.method_options import read_options
     from host.sysid.flight.shipped_maps import LIST, map_lines
-    from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.arguments import option_words
     from host.sysid.pipeline.requested_models import known_methods
     from host.sysid.pipeline.stages import identify
@@ -127,8 +128,7 @@ def _run(args: argparse.Namespace) -> int:
     if LIST in [str(path) for _, path in args.map]:
         print("\n".join(map_lines()))
         return int(ExitCode.OK)
-    if not args.source:
-        raise IdentificationError("name the flight: a log, CSV, Parquet or MAT file")
+    args.source = args.source or [source_or_newest(None)]
     places = _places(args)
     check_outputs(places)
     found = identify(

@@ -7,6 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from host.decode.newest_flight import source_or_newest
+
 
 def add_parser(subparsers: Any) -> None:
     """Add the verb to the command line."""
@@ -20,9 +22,9 @@ def add_parser(subparsers: Any) -> None:
         "source",
         type=Path,
         nargs="?",
-        default=Path(),
         metavar="SOURCE",
-        help="log, folder or mounted card; the working folder without it",
+        help="log, folder or mounted card (their flights are listed); the newest flight of the"
+        " working folder without it",
     )
     parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
                         help="of an autopilot's log, instance N of a message, such as IMU=1;"
@@ -39,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     from host.readers.autopilot_summary import summarise_autopilot, summary_lines
     from host.text import shown
 
-    source = check_source(args.source)
+    source = check_source(source_or_newest(args.source))
     if source.is_dir():
         flights = describe_folder(source)
         print(

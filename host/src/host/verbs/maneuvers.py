@@ -7,6 +7,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from host.decode.newest_flight import source_or_newest
+
 
 def add_parser(subparsers: Any) -> None:
     """Add the verb to the command line."""
@@ -17,7 +19,8 @@ def add_parser(subparsers: Any) -> None:
         " amplitude, trim before, noise, pilot feedback.",
     )
     parser.add_argument("source", type=Path, nargs="?",
-                        help="log (also of PX4, ArduPilot), CSV, Parquet or MAT file")  # fmt: skip
+                        help="log (also of PX4, ArduPilot), original rows, CSV, Parquet or MAT"
+                        " file; without it the newest flight of the working folder")  # fmt: skip
     parser.add_argument("--map", type=Path, metavar="TOML",
                         help="foreign names, units and signs: a file, or the name of a shipped map"
                         " ('list' shows them)")  # fmt: skip
@@ -46,9 +49,8 @@ def run(args: argparse.Namespace) -> int:
         print("\n".join(map_lines()))
         return int(ExitCode.OK)
     try:
-        if args.source is None:
-            raise IdentificationError("name the flight: a log, CSV, Parquet or MAT file")
-        columns, notes = read_columns(args.source, args.map, calibration=args.calibration,
+        source = source_or_newest(args.source)
+        columns, notes = read_columns(source, args.map, calibration=args.calibration,
                                       sensors=chosen_sensors(args.sensor))  # fmt: skip
     except IdentificationError as error:
         raise IdentificationError(option_words(str(error))) from error

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import StorePlaced, of_each, stretches_of_each
 
 
@@ -21,7 +22,8 @@ def add_parser(subparsers: Any) -> None:
         " simulation, one step ahead, and over windows beside that of kinematic persistence.",
     )
     parser.add_files("model of `host identify --save-model`, or yours; then records: log, CSV,"
-                     " Parquet, MAT. --from and --to belong to the record before them")  # fmt: skip
+                     " Parquet, MAT, without one the newest flight of the working folder. --from"
+                     " and --to belong to the record before them")  # fmt: skip
     parser.add_argument("--aircraft", metavar="NAME", help="aircraft file: places of the sensors;"
                         " give it where the model was identified with it")  # fmt: skip
     parser.add_argument("--map", type=Path, metavar="TOML", action=StorePlaced, default=[],
@@ -64,9 +66,10 @@ def run(args: argparse.Namespace) -> int:
         print("\n".join(map_lines()))
         return int(ExitCode.OK)
     try:
-        if len(args.source) < 2:
+        if not args.source:
             raise IdentificationError("name a saved model, and behind it the records it predicts")
         model, *records = args.source
+        records = records or [source_or_newest(None)]
         check_outputs(OutputPaths(plots=args.plots))
         found = predict(
             model,

@@ -27,6 +27,7 @@ from host.constants import GRAVITY_MPS2, RAD_PER_DEG
 from host.files.quantities import Quantity
 from host.files.user_text import read_toml
 from host.instrument.recording import SURFACES
+from host.near_names import like
 from host.sysid.flight.shipped_maps import is_shipped, map_file
 from host.sysid.identification_error import IdentificationError
 
@@ -244,10 +245,3 @@ def listed(raw: Mapping[str, Array], unusable: Mapping[str, str]) -> str:
     words = f"they have {', '.join(names[:40])}" if names else "they have no column of numbers"
     words += f" and {len(names) - 40} more" if len(names) > 40 else ""
     return words + "".join(f"; {name} is {why}" for name, why in list(unusable.items())[:5])
-
-
-def like(name: str, known: Sequence[str]) -> str:
-    """Return in brackets which of the known names may have been meant; empty if none."""
-    lower = {k.lower(): k for k in known}
-    near = difflib.get_close_matches(name.lower(), lower, n=1, cutoff=0.6)
-    return f" (did you mean {lower[near[0]]}?)" if near else ""

@@ -16,6 +16,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, BoolArray
 from host.instrument.deviations import SensorErrorModel
 from host.instrument.servo_prior import ServoPrior
+from host.near_names import like
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import (
@@ -25,7 +26,6 @@ from host.sysid.compatibility.sensor_corrections import (
     pressure_share,
 )
 from host.sysid.compatibility.sensor_dynamics import columns_at_cg
-from host.sysid.flight.column_map import like
 from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.maneuver_detection import DetectedManeuver

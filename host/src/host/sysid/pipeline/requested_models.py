@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from host.near_names import like
 from host.sysid.coefficients.coefficient_model import (
     CoefficientModel,
     is_coefficient_model,
@@ -13,7 +14,6 @@ from host.sysid.coefficients.coefficient_model import (
     standard_model,
 )
 from host.sysid.estimators.method_registry import methods as single_methods
-from host.sysid.flight.column_map import like
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
@@ -137,5 +137,8 @@ def requested_methods(given: str | Iterable[str] | None) -> tuple[str, ...]:
     known = known_methods()
     unknown = [m for m in requested if m not in known]
     if unknown:
-        raise IdentificationError(f"unknown method {', '.join(unknown)}; known: {', '.join(known)}")
+        meant = like(unknown[0], known)
+        raise IdentificationError(
+            f"unknown method {', '.join(unknown)}{meant}; known: {', '.join(known)}"
+        )
     return requested

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorTable
 from host.physical.calibration import load_calibration
+from host.progress import stage
 from host.sysid.answer.truth_comparison import read_truth
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
 from host.sysid.estimators.method_options import check_options, options_of
@@ -135,6 +136,7 @@ def identify(
         for made_by in calibrations
     }
     known = by_calibration[calibrations[0]]
+    stage("reconstructing the flight")
     ready = [
         prepare(source, how, by_calibration[how.calibration])
         for source, how in zip(sources, each, strict=True)
@@ -178,6 +180,7 @@ def _coefficients(
         raise IdentificationError(
             "argument models: coefficients need mass and sensors; give argument aircraft"
         )
+    stage("coefficients")
     try:
         by = coefficient_estimator(
             known.source, model=asked.coefficients, instrument=known.instrument
@@ -199,6 +202,7 @@ def _linear(
     failed: dict[str, list[str]] = {}  # why, and of which models
     for method in by:
         for name, own in asked.linear:
+            stage(f"{name} by {method}")
             estimator = LinearEstimator(
                 name,
                 own,

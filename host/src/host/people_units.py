@@ -1,0 +1,12 @@
+"""Units in what people read: degrees, where files and programs have radians."""
+
+from __future__ import annotations
+
+from host.constants import DEG_PER_RAD
+
+_DEGREES = {"rad": "deg", "rad/s": "deg/s", "rad/s2": "deg/s2"}
+
+
+def people_unit(unit: str) -> tuple[str, float]:
+    """Return the unit a person reads, and the factor from the other one."""
+    return (_DEGREES[unit], DEG_PER_RAD) if unit in _DEGREES else (unit, 1.0)
