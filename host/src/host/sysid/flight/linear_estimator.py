@@ -380,7 +380,8 @@ class LinearEstimator:
             moved = systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
             # Of servos that were estimated the covariance has what they leave open.
             shifts += tuple(s for s in moved if e.servo is None or s.error != SERVO_DELAY)
-        if self.own is not None:
+        # Of an instrument that is known surfaces are measured: they move between samples.
+        if self.own is not None or not sensors_known(e.used):
             shifts += hold_shift(statistical, e.maneuvers, e.trim)
         found: tuple[Coefficient, ...] = ()
         if self.airframe is not None and e.trim.known:

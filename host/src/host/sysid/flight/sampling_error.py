@@ -1,8 +1,9 @@
 """What sampling leaves open: an input between its samples.
 
 A record says what an input was at its samples. Between them it was held, or moved on; the estimate
-moves by the difference. Where that is more than a tenth of an interval it is part of it. On records
-without noise it is most of it.
+moves by the difference. How far the data go from one hold to the other they tell themselves: that
+share is one more parameter beside the estimate. Where it moves the estimate by more than a tenth of
+an interval it is part of it. On records without noise it is most of it.
 """
 
 from __future__ import annotations
@@ -14,20 +15,21 @@ import numpy as np
 
 from host.constants import NORMAL_95
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
-from host.sysid.flight.one_step import one_step_of
+from host.sysid.flight.one_step import OneStep, one_step_of
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.templates import Trim
 
 HOLD = "inputs between samples"
 NEGLIGIBLE = 0.1  # of a half-width
+ONE_STEP = 1.1  # times what one step of Gauss and Newton says: the next ones may add a tenth
 OTHER = {"foh": "zoh", "zoh": "foh"}
 
 
 def hold_shift(
     result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim
 ) -> tuple[ShiftedEstimate, ...]:
-    """Return the estimate moved by what the other hold would, as one deviation of a normal error.
+    """Return the estimate moved by what the hold leaves open, as one deviation of a normal error.
 
     Nothing where that is less than a tenth of every half-width, or the method does not simulate.
 
@@ -39,7 +41,7 @@ def hold_shift(
         That were fitted.
     trim : Trim
     """
-    if result.residual_kind != "output" or any(
+    if result.residual_kind not in ("output", "innovation") or any(
         y.shape != m.outputs.shape for y, m in zip(result.fitted, maneuvers, strict=True)
     ):
         return ()
@@ -47,7 +49,24 @@ def hold_shift(
     if found is None:
         return ()
     other = replace(result.model, hold=OTHER[result.model.hold])
-    step = found.change(other, trim, maneuvers).sum(axis=0)
+    whole = found.change(other, trim, maneuvers).sum(axis=0)
+    step = ONE_STEP * whole * _share(result, found, trim, maneuvers)
     if not np.any(np.abs(step) > NEGLIGIBLE * result.half_width()):
         return ()
     return (ShiftedEstimate(HOLD, result.estimate + step / NORMAL_95, 1.0, 1.0),)
+
+
+def _share(result: FitResult, found: OneStep, trim: Trim, maneuvers: Sequence[Maneuver]) -> float:
+    """Return how far from this hold to the other the input may have been: at most all the way.
+
+    The deviation of the share counts noise as white; where an interval of the result is wider than
+    that its own is widened alike.
+    """
+    other = replace(result.model, hold=OTHER[result.model.hold])
+    step = found.joint(result.model, trim, maneuvers, [other], [1.0])
+    bare = np.zeros(found.length)
+    bare[found.target] = np.diag(found.inverse)[found.source]
+    known = (bare > 0.0) & (result.standard_error > 0.0)
+    wider = np.max(result.standard_error[known] / np.sqrt(bare[known]), initial=1.0)
+    sd = float(np.sqrt(step.covariance[0, 0]) * wider)
+    return float(min(np.hypot(step.added[0], NORMAL_95 * sd), 1.0))

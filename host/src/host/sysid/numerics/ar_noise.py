@@ -15,6 +15,7 @@ from scipy import linalg
 from host.arrays import Array
 
 POLE_LIMIT = 0.999  # radius: nearer to one, 2000 samples cannot separate noise from drift
+SHRINKING, MOST_SHRINKINGS = 0.995, 200  # of the radius of poles
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +112,17 @@ def _start_whitener(coefficient: Array) -> Array:
     order = len(coefficient)
     if order == 0:
         return np.zeros((0, 0))
-    covariance = linalg.toeplitz(autocovariance(coefficient, order - 1))
-    lower = np.linalg.cholesky(covariance)
+    shrunk = coefficient.copy()
+    for _ in range(MOST_SHRINKINGS):
+        try:
+            covariance = linalg.toeplitz(autocovariance(shrunk, order - 1))
+            lower = np.linalg.cholesky(covariance)
+            break
+        except np.linalg.LinAlgError:
+            # Residuals of a clean record are smooth: poles so near to one that rounding rules.
+            shrunk *= SHRINKING ** np.arange(1, order + 1)
+    else:
+        return np.eye(order)
     return np.ascontiguousarray(linalg.solve_triangular(lower, np.eye(order), lower=True))
 
 

@@ -22,7 +22,9 @@ STEP_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class _Given:
+class Given:
+    """What the simulation of one maneuver is given at a parameter vector."""
+
     local: Array  # unknowns of the maneuver, a zero behind
     start: Array
     inputs: Array
@@ -58,7 +60,7 @@ class NonlinearProblem(OutputProblem):
         first_own = self.n_common + self.n_local - len(model.own_parameters)
         place |= {p.name: first_own + k for k, p in enumerate(model.own_parameters)}
         self.first_own = first_own
-        self._constants, self._tables = self.source.constant_values, self.source.table_values
+        self.constants, self.tables = self.source.constant_values, self.source.table_values
         self.column = np.array(
             [*(place.get(name, -1) for name in self.source.parameters), -1], dtype=np.int64
         )
@@ -104,16 +106,16 @@ class NonlinearProblem(OutputProblem):
 
     def respond(self, theta: Array) -> list[Response] | None:
         """Simulate every maneuver with sensitivities; None if a response diverges."""
-        self._choose_step(theta)
+        self.choose_step(theta)
         result = []
         for number, part in enumerate(self._parts):
-            g = self._given(number, theta)
+            g = self.given(number, theta)
             samples, n = len(g.inputs), len(self.model.states)
             x, y = np.empty((samples, n)), np.empty((samples, len(self.model.outputs)))
             slope = self._memory_for(number, (len(self.model.outputs), samples, self._width))
-            if not _finite(
+            if not finite(
                 self._with_slopes, g.start, self._start_slopes, g.inputs, g.input_slopes,
-                self.input_column, g.parameters, self.column, self._constants, self._tables,
+                self.input_column, g.parameters, self.column, self.constants, self.tables,
                 g.bias, self.bias_column, part.dt_s, self.substeps, self.ramp, x, y, slope,
             ):  # fmt: skip
                 return None
@@ -128,7 +130,7 @@ class NonlinearProblem(OutputProblem):
 
     def outputs(self, theta: Array) -> list[Array] | None:
         """Simulate without sensitivities: outputs (p, samples) per maneuver, None if divergent."""
-        self._choose_step(theta)
+        self.choose_step(theta)
         found = self.simulated(theta, self.substeps, self.ramp)
         return None if found is None else [y for y, _ in found]
 
@@ -152,11 +154,11 @@ class NonlinearProblem(OutputProblem):
         """
         result: list[tuple[Array, Array]] = []
         for number, part in enumerate(self._parts):
-            g = self._given(number, theta)
+            g = self.given(number, theta)
             x = np.empty((len(g.inputs), len(self.model.states)))
             y = np.empty((len(g.inputs), len(self.model.outputs)))
-            if not _finite(
-                self._simulate, g.start, g.inputs, g.parameters, self._constants, self._tables,
+            if not finite(
+                self._simulate, g.start, g.inputs, g.parameters, self.constants, self.tables,
                 g.bias, part.dt_s, substeps, ramp, x, y,
             ):  # fmt: skip
                 return None
@@ -175,7 +177,7 @@ class NonlinearProblem(OutputProblem):
         own = np.mean([theta[part.index[self.first_own :]] for part in self._parts], axis=0)
         return self.nonlinear.tangent_at(x, u, theta, own)
 
-    def _given(self, number: int, theta: Array) -> _Given:
+    def given(self, number: int, theta: Array) -> Given:
         """Return what the simulation of one maneuver is given at a parameter vector."""
         part = self._parts[number]
         local = np.append(theta[part.index], 0.0)  # an index of -1 reads the last
@@ -187,7 +189,7 @@ class NonlinearProblem(OutputProblem):
                 shift = local[self.input_column[j]] / part.dt_s
                 late, by_shift = delay_columns(inputs[:, [j]], shift)
                 inputs[:, j], slopes[:, j] = late[:, 0], by_shift[:, 0] / part.dt_s
-        return _Given(
+        return Given(
             local=local,
             start=self._known_start + local[self._start_parameter],
             inputs=np.ascontiguousarray(inputs),
@@ -196,12 +198,16 @@ class NonlinearProblem(OutputProblem):
             bias=local[self.bias_column],
         )
 
+    def output_offsets(self, local: Array) -> Array:
+        """Return the biases of the outputs among the unknowns of a maneuver, (p,)."""
+        return np.asarray(local[self._bias_parameter])
+
     def _with_biases(self, y: Array, local: Array) -> Array:
         out = np.ascontiguousarray(y.T)
-        out += local[self._bias_parameter][:, None]
+        out += self.output_offsets(local)[:, None]
         return out
 
-    def _choose_step(self, theta: Array) -> None:
+    def choose_step(self, theta: Array) -> None:
         """Halve the step until that moves no output any more; once, where the model is finite."""
         if self._stepped:
             return
@@ -223,7 +229,7 @@ class NonlinearProblem(OutputProblem):
             self.substeps = 1
 
 
-def _finite(run: Callable[..., bool], *given: object) -> bool:
+def finite(run: Callable[..., bool], *given: object) -> bool:
     """Run a kernel; as Python it raises where the machine's numbers would be infinite or NaN."""
     try:
         return bool(run(*given)) and bool(np.isfinite(given[-1]).all())  # type: ignore[call-overload]
