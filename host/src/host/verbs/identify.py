@@ -88,7 +88,9 @@ def _add_outputs(parser: argparse.ArgumentParser) -> None:
         "--save-model",
         type=Path,
         metavar="FILE",
-        help="write the model as .toml or .mat, with --aircraft as .xml for JSBSim",
+        help="write the model as .toml or .mat, .control.py for python-control; with --aircraft as"
+        " .xml for JSBSim, -set.xml for FlightGear, .sdf for Gazebo, .h for ArduPilot's SITL, .st"
+        " as AVL's table, .aerosandbox.py",
     )
     parser.add_argument(
         "--save-aircraft",

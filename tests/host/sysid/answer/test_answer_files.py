@@ -12,6 +12,7 @@ from host.cli import main
 from host.sysid.answer.atomic_files import atomic_write
 from host.sysid.answer.mat_file import labels, mat_name, write_mat
 from host.sysid.answer.output_files import OutputPaths, check_outputs
+from host.sysid.answer.simulators.forms import write_form
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_estimator import Answer, identify
 from host.sysid.identification_error import IdentificationError
@@ -30,6 +31,27 @@ def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def answers(flight: Path) -> list[Answer]:
     columns, _ = read_columns(flight)
     return identify(columns, names=("short-period",), method="equation-error")
+
+
+def test_python_control_has_the_models(answers: list[Answer], tmp_path: Path) -> None:
+    """The file runs; its transfer functions at 50 frequencies are those of the estimates."""
+    path = tmp_path / "mine.control.py"
+    assert write_form(path, [], answers, None, None) == [path]
+    text = path.read_text(encoding="utf-8")
+    assert "#   M_q " in text
+    assert "trailing edge down" in text
+    space: dict[str, object] = {}
+    exec(compile(text, str(path), "exec"), space)
+    system = space["short_period"]
+    model, estimate = answers[0].model, answers[0].result.estimate
+    A, B, C, D = model.matrices(estimate)
+    assert list(system.state_labels) == list(model.states)  # type: ignore[attr-defined]
+    for s in 1j * np.logspace(-1, 2, 50):
+        ours = C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D
+        theirs = np.asarray(system(s, squeeze=False))  # type: ignore[operator]
+        assert np.max(np.abs(theirs - ours)) < 1e-8 * np.max(np.abs(ours))
+    with pytest.raises(IdentificationError, match="python-control takes linear models"):
+        write_form(path, [], [], None, None)
 
 
 Line = Callable[[], str]

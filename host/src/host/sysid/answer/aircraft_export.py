@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
+from host.aircraft.file import Aircraft
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.atomic_files import atomic_write
@@ -156,8 +158,40 @@ def save_aircraft(
     condition: MeanCondition | None = None,
 ) -> list[str]:
     """Write ``.toml`` for `host simulate` or ``.xml`` for JSBSim; return what was replaced."""
+    made = identified_aircraft(tables, source, condition)
+    with atomic_write(path) as part:
+        text = made.jsbsim_xml() if path.suffix.lower() == ".xml" else made.text
+        part.write_text(text, encoding="utf-8")
+    return made.replaced
+
+
+@dataclass(frozen=True, slots=True)
+class IdentifiedAircraft:
+    """An answer as an aircraft: as loaded again, as TOML, and which coefficients were replaced."""
+
+    loaded: Aircraft
+    document: dict[str, Any]
+    text: str
+    replaced: list[str]
+
+    @property
+    def identified(self) -> list[str]:
+        """What was identified, with its interval, a line each."""
+        sources = self.document["aerodynamics"]["sources"]
+        return [f"{key}: {origin}" for key, origin in sources.items() if "+-" in origin]
+
+    def jsbsim_xml(self) -> str:
+        """Return it as JSBSim's XML."""
+        from host.aircraft.jsbsim_model import aircraft_xml
+
+        return _with_header(aircraft_xml(self.loaded, ROTOR_RADPS), self)
+
+
+def identified_aircraft(
+    tables: Sequence[CoefficientTable], source: str, condition: MeanCondition | None = None
+) -> IdentifiedAircraft:
+    """Return the aircraft of an answer; parameters and errors as `aircraft_document`."""
     from host.aircraft import file as aircraft
-    from host.aircraft.jsbsim_model import aircraft_xml
     from host.export import toml as tomlout
 
     document, replaced = aircraft_document(tables, source, condition)
@@ -165,24 +199,17 @@ def save_aircraft(
         file = Path(folder) / "identified.toml"
         file.write_text(tomlout.dumps(document), encoding="utf-8")
         loaded = aircraft.load(file)  # whatever is written can be read
-        text = file.read_text(encoding="utf-8")
-    if path.suffix.lower() == ".xml":
-        text = _with_header(aircraft_xml(loaded, ROTOR_RADPS), document)
-    with atomic_write(path) as part:
-        part.write_text(text, encoding="utf-8")
-    return replaced
+        return IdentifiedAircraft(loaded, document, file.read_text(encoding="utf-8"), replaced)
 
 
-def _with_header(xml: str, document: dict[str, Any]) -> str:
+def _with_header(xml: str, made: IdentifiedAircraft) -> str:
     """Return JSBSim's XML in lines, with units, signs and intervals at its head."""
     root = ElementTree.fromstring(xml)
     header = ElementTree.Element("fileheader")
     root.insert(0, header)
-    origins = {**document["aerodynamics"]["sources"]}
-    found = [f"{key}: {origin}" for key, origin in origins.items() if "+-" in origin]
     ElementTree.SubElement(header, "author").text = "host identify"
     ElementTree.SubElement(header, "description").text = "\n".join(
-        [document["title"], *CONVENTIONS, *found, ""]
+        [made.loaded.title, *CONVENTIONS, *made.identified, ""]
     )
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"

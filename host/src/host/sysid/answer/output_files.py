@@ -14,6 +14,7 @@ from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.atomic_files import atomic_write, check_destination, file_names
 from host.sysid.answer.mat_file import labels, write_mat
 from host.sysid.answer.settling_history import has_history, write_history
+from host.sysid.answer.simulators.forms import CONTROL, FORMS, files_of, form_of, write_form
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.identification_error import IdentificationError
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 ENDINGS = {
     "mat": (".mat",),
-    "save_model": (".toml", ".mat", ".xml"),
+    "save_model": (".toml", ".mat", ".xml", *FORMS),
     "save_aircraft": (".toml", ".xml"),
     "history": (".csv",),
 }
@@ -71,20 +72,21 @@ def check_outputs(places: OutputPaths) -> None:
     taken: dict[Path, str] = {}
     for name, path in places.files.items():
         known, argument = ENDINGS[name], f"argument {name}"
-        if path.suffix.lower() not in known:
+        if not path.name.lower().endswith(known):
             raise IdentificationError(
                 f"{argument} {path}: ends in '{path.suffix}', expected {' or '.join(known)}"
             )
         check_destination(argument, path, folder=False)
-        if any(path.exists() and given.exists() and path.samefile(given) for given in places.given):
-            raise IdentificationError(
-                f"{argument} {path} is what the answer is made from; name another file"
-            )
+        for own in files_of(path):
+            if any(own.exists() and g.exists() and own.samefile(g) for g in places.given):
+                raise IdentificationError(
+                    f"{argument} {own} is what the answer is made from; name another file"
+                )
         other = taken.setdefault(path.absolute(), argument)
         if other != argument:
             raise IdentificationError(f"{other} and {argument} both name {path}; name two files")
     made = [p for p in (places.save_model, places.save_aircraft) if p is not None]
-    whole_ones = [p for p in made if p is places.save_aircraft or p.suffix.lower() == ".xml"]
+    whole_ones = [p for p in made if p is places.save_aircraft or _whole(p)]
     if whole_ones:
         if not places.source:
             raise IdentificationError(
@@ -97,6 +99,12 @@ def check_outputs(places: OutputPaths) -> None:
         check_destination("argument plots", places.plots, folder=True)
         if importlib.util.find_spec("matplotlib") is None:
             raise IdentificationError(f"pictures need matplotlib: {install_hint('matplotlib')}")
+
+
+def _whole(path: Path) -> bool:
+    """Return whether a file to save a model in holds an aircraft: mass, sizes, coefficients."""
+    form = form_of(path)
+    return form != CONTROL if form else path.suffix.lower() == ".xml"
 
 
 def write_outputs(
@@ -135,6 +143,10 @@ def write_outputs(
         # Coefficients alone are an aircraft, not a linear model.
         plain = path is places.save_model and bool(answers)
         if path is None or path.suffix.lower() == ".mat":
+            continue
+        if path is places.save_model and form_of(path):
+            condition = direct.fit.condition if direct else None
+            written += write_form(path, tables, answers, places.source, condition)
             continue
         if not plain or path.suffix.lower() == ".xml":
             written.append(_write_aircraft(path, tables, places.source, direct))

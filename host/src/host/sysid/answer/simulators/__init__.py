@@ -1,0 +1,1 @@
+"""An identified aircraft in the forms of other simulators, one file each."""
