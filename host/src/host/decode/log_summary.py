@@ -16,6 +16,7 @@ from host.text import shown
 from host.wire.schema_text import packed_schema
 
 Json = dict[str, Any]
+_JUMPS = 1000  # of each servo, by their time; all are counted
 
 _ENDED = {
     "next_boot": "closed at the next boot",
@@ -138,6 +139,10 @@ def _session(log: FlightLog, session: Session) -> Json:
             }
             for name, pair in quality.pairs.items()
             if pair.rows
+        },
+        "servo_jumps": {
+            name: {"count": len(found), "t_s": found[:_JUMPS]}
+            for name, found in quality.servo_jumps.items()
         },
         "ended": _reason(log, session),
         **_identity(session),

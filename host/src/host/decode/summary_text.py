@@ -83,6 +83,12 @@ def _session(session: Mapping[str, Any]) -> Iterator[str]:
             f"{name} left - right: mean {factor * pair['mean_difference']:+.4g} {unit}, deviation"
             f" {factor * pair['deviation']:.4g} {unit}",
         )
+    for name, found in session["servo_jumps"].items():
+        yield _row(
+            "  JUMPS",
+            f"{name} servo: {found['count']} pulses left and came back within 0.15 s though the"
+            f" stick stood still, the first at t = {found['t_s'][0]:.2f} s",
+        )
     if session["absent"]:
         yield _row("  not valid", ", ".join(session["absent"]))
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from host.log.servo_jumps import servo_jumps
 from host.physical.calibration import Line
 from host.physical.channels import END_OF_RANGE as IMU_END
 from host.physical.columns import ANALOGUE, INERTIAL
@@ -19,6 +20,8 @@ Array = NDArray[np.float64]
 STUCK_S = 10.0  # an ADC sum of four that does not move one count for so long reads no sensor
 _ADC_END = 4 * 1023
 _JITTER_MOST_US = 1_000_000
+_DRIVEN = ("elevator", "aileron", "rudder", "throttle")
+_KEPT_S = 0.5  # of a piece before: a jump may begin there
 _PAIRS = {"alpha": ("alpha_a", "alpha_b"), "beta": ("beta_a", "beta_b"), "pitot": ("dp_a", "dp_b")}
 
 
@@ -104,6 +107,8 @@ class Quality:
         Share of rows the IMU itself marked as saturated.
     pairs : dict of str to PairHealth
         Left against right vane and pitot.
+    servo_jumps : dict of str to list of float
+        By servo, ``t_s`` of each pulse that left and came back though the stick stood still.
     """
 
     jitter_us: dict[str, float] = field(default_factory=dict)
@@ -113,6 +118,37 @@ class Quality:
     absent: dict[str, float] = field(default_factory=dict)
     imu_saturated: float = 0.0
     pairs: dict[str, PairHealth] = field(default_factory=dict)
+    servo_jumps: dict[str, list[float]] = field(default_factory=dict)
+
+
+class _JumpWatch:
+    """Counts jumps of servos piece by piece."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._drives = session.store.schema.bit("valid", "mega_drives")
+        self._frame = session.store.schema.by_name["ident"]
+        self._before: tuple[Array, NDArray[Any]] | None = None
+        self.found: dict[str, list[float]] = {}
+
+    def add(self, t_us: Array, data: NDArray[Any]) -> None:
+        """Take more rows into account."""
+        if self._before is not None:
+            t_us = np.r_[self._before[0], t_us]
+            data = np.concatenate([self._before[1], data])
+        t_s = self._session.seconds(t_us)
+        drives = (data["valid"] & self._drives) != 0
+        for name in _DRIVEN:
+            servo, stick = (
+                data[f"{kind}_{name}"] * self._frame.field(f"{kind}_{name}").scale
+                for kind in ("servo", "rc")
+            )
+            for at_s in servo_jumps(t_s, servo, stick, drives & (servo > 0.0)).tolist():
+                own = self.found.setdefault(name, [])
+                if not own or at_s > own[-1]:  # not the one seen with the piece before
+                    own.append(at_s)
+        keep = int(np.searchsorted(t_s, t_s[-1] - _KEPT_S))
+        self._before = t_us[keep:], data[keep:]
 
 
 @dataclass(slots=True)
@@ -157,10 +193,12 @@ def judge(session: Session) -> Quality:
     jitter = _Counts()
     clipped = fresh = 0
     before: tuple[float, int] | None = None
+    jumps = _JumpWatch(session)
     for part in session.store.fast_pieces(session.span):
         if not len(part.data):
             continue
         t_us, count = session.since_start_us(part), part.data["count"].astype(np.int64)
+        jumps.add(t_us, part.data)
         if before is not None:
             t_us, count = np.r_[before[0], t_us], np.r_[before[1], count]
         before = (float(t_us[-1]), int(count[-1]))
@@ -187,6 +225,7 @@ def judge(session: Session) -> Quality:
             ]
             quality.pairs[pair].add(sides[0] - sides[1])
     quality.imu_saturated = clipped / fresh if fresh else 0.0
+    quality.servo_jumps = jumps.found
     quality.jitter_us = jitter.percentiles()
     _find_faults(quality, session)
     return quality

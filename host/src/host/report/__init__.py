@@ -1,0 +1,1 @@
+"""What is shown of a flight after landing: a page, pictures, a report."""

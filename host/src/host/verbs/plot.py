@@ -1,0 +1,129 @@
+"""`host plot`: a flight as one page to look at, and as pictures for papers."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from host.decode.newest_flight import source_or_newest
+from host.verbs.decode import hexadecimal
+
+_DESCRIPTION = """\
+Show a flight: one HTML page that needs no network, with strips in degrees, test points
+shaded and graded, stick against servo, track, events and losses. SOURCE is whatever
+`host decode` reads: a log, a folder or a mounted card (the newest flight is taken), a log
+of PX4 or ArduPilot, original ASCII rows.
+"""
+_EPILOG = """\
+exit codes: 0 ok, 2 usage, 3 shown with losses (as gaps), 4 not a log
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "plot",
+        help="show a flight on a page, or as pictures for papers",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_source_arguments(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="HTML",
+        help="page to write; <name>.html in the working folder without it",
+    )
+    parser.add_argument("--open", action="store_true", help="open the page in the browser")
+    parser.add_argument(
+        "--full",
+        action="store_true",
+        help="put every sample into the page, whatever its size; without it the"
+        " page has those of test points and 5 s around, and an overview",
+    )
+    parser.add_argument("--png", type=Path, metavar="FILE", help="write strips as a picture")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="the same as drawing")
+    parser.add_argument(
+        "--channels",
+        metavar="NAMES",
+        default="",
+        help="of the picture, a strip each, such as alpha_deg,q_degps+p_degps",
+    )
+    parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="of the picture")
+    parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="of the picture")
+
+
+def add_source_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what says which flight is meant."""
+    parser.add_argument(
+        "source",
+        type=Path,
+        nargs="?",
+        metavar="SOURCE",
+        help="log, folder or mounted card; the newest flight of the working folder without it",
+    )
+    parser.add_argument("--session", type=int, metavar="N", help="one recording session only")
+    parser.add_argument(
+        "--file-id",
+        type=hexadecimal,
+        metavar="HEX",
+        help="blocks of this file id: older data, a second log in the file",
+    )
+    parser.add_argument(
+        "--calibration", type=Path, metavar="FILE", help="counts to SI; the default without it"
+    )
+    parser.add_argument(
+        "--sensor",
+        action="append",
+        default=[],
+        metavar="MESSAGE=N",
+        help="of an autopilot's log, instance N of a message; repeatable",
+    )
+    parser.add_argument(
+        "--row-rate",
+        type=float,
+        metavar="HZ",
+        help="rate of original ASCII rows, which carry no time",
+    )
+
+
+def wanted_source(args: argparse.Namespace) -> Any:
+    """Return what `add_source_arguments` was given as `host.report.flight_reading.Wanted`."""
+    from host.readers.autopilot_flight import chosen_sensors
+    from host.report.flight_reading import Wanted
+
+    return Wanted(
+        source=source_or_newest(args.source),
+        session=args.session,
+        file_id=args.file_id,
+        calibration=args.calibration,
+        row_rate_hz=args.row_rate,
+        sensors=tuple(chosen_sensors(args.sensor).items()),
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the page, say where; return the exit code."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from host.report.plotting import PlotRequest, plot
+    from host.text import shown
+
+    pictures = tuple(path for path in (args.png, args.svg) if path is not None)
+    strips = tuple(one for one in args.channels.split(",") if one)
+    request = PlotRequest(
+        wanted_source(args), args.output, args.full, pictures, strips, (args.from_s, args.to_s)
+    )
+    done = plot(request)
+    print("\n".join(map(shown, done.lines)))
+    pages = [path for path in done.files if path.suffix.lower() in (".html", ".htm")]
+    if args.open and pages:
+        import webbrowser
+
+        if not webbrowser.open(pages[-1].resolve().as_uri()):
+            print(f"no browser answered: open {pages[-1]} yourself", file=sys.stderr)
+    return int(done.exit_code)
