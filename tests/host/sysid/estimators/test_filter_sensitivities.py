@@ -65,7 +65,9 @@ def test_gradient_and_information_are_those_of_differences() -> None:
     problem = FilterProblem(model, flown(model, (1, 2)), ("gust_rad", "airspeed_mps"))
     theta = vector(problem)
     here = known(problem.evaluate(theta))
-    information, gradient = total_information(problem, theta, *fisher_scoring(problem, theta, here))
+    information, gradient = total_information(
+        problem.output_problem, theta, *fisher_scoring(problem, theta, here)
+    )
     size = np.sqrt(np.diag(information))
     white, spread, slope = [], [], []
     for k in range(len(theta)):

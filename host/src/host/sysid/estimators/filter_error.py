@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from host.arrays import Array, BoolArray
+from host.arrays import Array
 from host.sysid.estimators.hac_inflation import hac_inflation, inflation_lines
+from host.sysid.estimators.innovation_search import InnovationObjective, first_noise
 from host.sysid.estimators.noise_model_comparison import compare_noise_models
 from host.sysid.estimators.start_values import start_values
 from host.sysid.identification_error import IdentificationError
@@ -20,25 +21,14 @@ from host.sysid.numerics.filter_scoring import (
     total_information,
     whitened_innovation_sensitivities,
 )
-from host.sysid.numerics.gauss_newton import Objective, free_of_bounds, gauss_newton
+from host.sysid.numerics.gauss_newton import gauss_newton
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.maneuver_agreement import maneuver_influence
 from host.sysid.numerics.output_error import minimise
 
-# Where the noise of a sensor tends to zero, Fisher's information overstates the curvature and all
-# steps are too short by the same share. A longer one is tried at a fifth of the cost of new
-# sensitivities: 12 to 20 iterations instead of 22 to 60.
-EXTEND_FROM_BOUNDS = 0.5  # bounds
-LONGEST_EXTENSION = 32.0
-VARIANCE_CHANGE = (0.01, 100.0)  # times what it was: most of one step
 MAX_ITERATIONS = 60
 NEAR_BOUNDS = 0.2  # Cramer-Rao bounds: a search that still creeps by so little has ended
 NOISE_FLOOR = 1e-3  # of an output's deviation, or of the first guess of process noise
-# First guess of the deviations: sensors share the residuals of output error with process noise.
-# With too small a guess of process noise the gain is too small, and the search ends elsewhere.
-NOISE_SHARE, PROCESS_SHARE = 0.6, 2.7
-LARGEST_HIDDEN = 0.1  # rad, rad/s or m/s: largest first guess for states without an output
-SLOWEST_DECAY_RADPS = 0.1  # rad/s, of a state that process noise drives
 
 
 def fit_filter_error(
@@ -182,62 +172,26 @@ def information_at(
     if point is None:
         raise IdentificationError(f"model {model.name}: the Kalman filter fails at these values")
     parts, scores = fisher_scoring(problem, theta, point)
-    return total_information(problem, theta, parts, scores)[0]
+    return total_information(problem.output_problem, theta, parts, scores)[0]
 
 
 def _first_guess(problem: FilterProblem, first: Array, *, fit_first: bool) -> Array:
     """Return the estimate of output error, its residuals split between both kinds of noise."""
-    output_problem, model = problem.output_problem, problem.model
-    optimum = minimise(output_problem, first, max_iterations=15 if fit_first else 0)
+    optimum = minimise(problem.output_problem, first, max_iterations=15 if fit_first else 0)
     deviation = np.maximum(np.std(np.hstack(optimum.residuals), axis=1), 1e-12)
-    A, _, C, _ = model.matrices(optimum.theta)
-    process = []
-    for i in problem.process_index:
-        # The smallest motion of this state that would explain the residual of an output.
-        size = float(np.min(deviation / np.maximum(np.abs(C[:, i]), 1e-9), initial=LARGEST_HIDDEN))
-        process.append(PROCESS_SHARE * size * np.sqrt(2.0 * max(-A[i, i], SLOWEST_DECAY_RADPS)))
-    return np.concatenate([optimum.theta, np.log(process), np.log(NOISE_SHARE * deviation)])
+    A, _, C, _ = problem.model.matrices(optimum.theta)
+    return np.concatenate([optimum.theta, first_noise(A, C, problem.process_index, deviation)])
 
 
-class _FilterError(Objective[InnovationLikelihood]):
-    """Cost of the steady-state filter; deviations of the noise do not fall below `floor`."""
+class _FilterError(InnovationObjective[InnovationLikelihood]):
+    """Cost of the steady-state filter."""
 
     def __init__(self, problem: FilterProblem, floor: Array) -> None:
-        self._problem, self._noise = problem, slice(problem.n_model, None)
-        output_problem = problem.output_problem
-        self._lower = np.concatenate([output_problem.lower, floor])
-        self._upper = np.concatenate([output_problem.upper, np.full(len(floor), np.inf)])
-        self.parts: list[Array] = []  # Fisher's information by maneuver where last asked for
-        self.scores: list[Array] = []
+        super().__init__(problem.output_problem, floor)
+        self._problem = problem
 
     def evaluate(self, theta: Array) -> InnovationLikelihood | None:
         return self._problem.evaluate(theta)
 
-    def normal(self, theta: Array, trial: InnovationLikelihood) -> tuple[Array, Array]:
-        self.parts, self.scores = fisher_scoring(self._problem, theta, trial)
-        return total_information(self._problem, theta, self.parts, self.scores)
-
-    def free(self, theta: Array, gradient: Array) -> BoolArray:
-        return free_of_bounds(theta, gradient, self._lower, self._upper)
-
-    def apply_step(self, theta: Array, step: Array, length: float = 1.0) -> Array:
-        """Return the parameters after `length` steps; noise parameters move by their variance."""
-        proposal, noise = theta + length * step, self._noise
-        proposal[noise] = theta[noise] + 0.5 * np.log(
-            np.clip(1.0 + 2.0 * length * step[noise], *VARIANCE_CHANGE)
-        )
-        return np.clip(proposal, self._lower, self._upper)
-
-    def extend_step(
-        self, theta: Array, step: Array, size: float, reached: tuple[Array, InnovationLikelihood]
-    ) -> tuple[Array, InnovationLikelihood]:
-        """Return the best of a step doubled in length as long as the cost falls."""
-        best, length = reached, 2.0
-        while size > EXTEND_FROM_BOUNDS and length <= LONGEST_EXTENSION:
-            proposal = self.apply_step(theta, step, length)
-            trial = self._problem.evaluate(proposal)
-            if trial is None or trial.cost >= best[1].cost:
-                break
-            best = proposal, trial
-            length *= 2.0
-        return best
+    def score(self, theta: Array, trial: InnovationLikelihood) -> tuple[list[Array], list[Array]]:
+        return fisher_scoring(self._problem, theta, trial)

@@ -10,8 +10,10 @@ import numpy as np
 from host.arrays import Array
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.coloured_residuals import coloured_score_covariance
+from host.sysid.numerics.equation_filter_problem import EquationFilterProblem
 from host.sysid.numerics.filter_problem import FilterProblem
 from host.sysid.numerics.filter_scoring import whitened_innovation_sensitivities
 from host.sysid.numerics.information_inverse import covariance_from_information
@@ -51,6 +53,9 @@ class Innovations:
 
         None if the filter fails.
         """
+        if isinstance(model, NonlinearModel):
+            filtered = EquationFilterProblem(model, changed, self.process).evaluate(self.theta)
+            return None if filtered is None else filtered.scaled
         point = FilterProblem(model, changed, self.process).evaluate(self.theta)
         return None if point is None else point.e
 
@@ -78,6 +83,8 @@ def innovations_of(
     """Return the innovations of a filter-error result on this model; None if the filter fails."""
     theta, covariance = result.estimate, result.covariance_white
     process = tuple(n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS))
+    if isinstance(model, NonlinearModel):
+        return _of_equations(result, model, maneuvers, process)
     problem = FilterProblem(model, maneuvers, process)
     point = problem.evaluate(theta)
     if point is None:
@@ -93,3 +100,26 @@ def innovations_of(
         np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in model_sensitivities)
     )
     return Innovations(theta, covariance, inverse, process, point.e, white, sensitivities)
+
+
+def _of_equations(
+    result: FitResult,
+    model: NonlinearModel,
+    maneuvers: Sequence[Maneuver],
+    process: tuple[str, ...],
+) -> Innovations | None:
+    """Return the same of equations; they are of unit variance already."""
+    problem = EquationFilterProblem(model, maneuvers, process)
+    theta, count = result.estimate, problem.n_model
+    problem.set_steps(result.standard_error[:count])
+    point = problem.evaluate(theta)
+    if point is None:
+        return None
+    _, _, slopes = problem.scoring(theta, point)
+    inverse = np.zeros_like(result.covariance)
+    shared = [J.reshape(-1, len(theta))[:, :count] for J in slopes]
+    inverse[:count, :count] = covariance_from_information(
+        np.diag(problem.output_problem.prior_precision) + sum(J.T @ J for J in shared)
+    )
+    eye: list[Array] = [np.eye(len(model.outputs)) for _ in maneuvers]
+    return Innovations(theta, result.covariance_white, inverse, process, point.scaled, eye, slopes)

@@ -117,6 +117,17 @@ def innovation_inflation(white: Sequence[Array]) -> float:
     return float(max(total / white[0].shape[1], 1.0))
 
 
+def inflation_lines(excess: float) -> tuple[str, ...]:
+    """Return what is said of a variance that was inflated so many times."""
+    if excess <= REPORTED_INFLATION:
+        return ()
+    return (
+        f"innovations tell {excess:.0f} times less than the noise model says (gusts, coloured"
+        f" noise): intervals are {np.sqrt(excess):.1f} times wider for it, and the estimate is"
+        " not the best one",
+    )
+
+
 def _run(
     model: LinearModel,
     maneuvers: Sequence[Maneuver],
@@ -179,13 +190,6 @@ def _run(
             white.append(whitened)
     excess = innovation_inflation(white)
     covariance = excess * P[n:, n:]
-    warnings: tuple[str, ...] = ()
-    if excess > REPORTED_INFLATION:
-        warnings = (
-            f"innovations tell {excess:.0f} times less than the noise model says (gusts, coloured"
-            f" noise): intervals are {np.sqrt(excess):.1f} times wider for it, and the estimate is"
-            " not the best one",
-        )
     return FitResult(
         method="unscented Kalman filter" if unscented else "extended Kalman filter",
         model=model,
@@ -200,7 +204,7 @@ def _run(
         noise_covariance=np.atleast_2d(np.cov(np.vstack(residuals).T)),
         iterations=PASSES,
         converged=True,
-        warnings=warnings,
+        warnings=inflation_lines(excess),
         details={
             "noise_deviation": deviation,
             "process": intensity,

@@ -21,7 +21,6 @@ from host.sysid.numerics.output_error_problem import check_shapes
 
 KNOWN_NOISE = ("output-error", "output-error-white")
 OWN_STARTS = ("extended-kalman", "unscented-kalman")
-NONLINEAR = ("output-error", "output-error-white")
 NO_MOTION = 1e-30  # in any unit: an output that moves less holds nothing, and its square underflows
 
 
@@ -94,6 +93,18 @@ METHODS: dict[str, Method] = {
     ),
 }
 
+# Of a user's equations; output error takes both kinds of model.
+OF_EQUATIONS: dict[str, Method] = {
+    "output-error": METHODS["output-error"],
+    "output-error-white": METHODS["output-error-white"],
+    "filter-error": Method(
+        "filter_error_equations", "fit_equation_filter_error", "maximum likelihood, process noise"
+    ),
+    "extended-kalman": Method(
+        "kalman_equations", "fit_extended_equations", "joint states and parameters"
+    ),
+}
+
 
 def methods() -> dict[str, str]:
     """Return the known methods and what each is in a few words."""
@@ -136,7 +147,8 @@ def fit(
         raise IdentificationError(f"unknown method '{method}'; known: {', '.join(METHODS)}")
     if not maneuvers:
         raise IdentificationError("no maneuver to fit: give at least one")
-    entry = METHODS[method]
+    known = OF_EQUATIONS if isinstance(model, NonlinearModel) else METHODS
+    entry = known.get(method, METHODS[method])
     function: Callable[..., Any] = getattr(
         import_module(f"host.sysid.estimators.{entry.module}"), entry.function
     )
@@ -164,10 +176,10 @@ def _check(method: str, model: LinearModel, maneuvers: Sequence[Maneuver]) -> No
     own = isinstance(model, NonlinearModel) and model.own_parameters
     if not (model.parameter_names or own):
         raise IdentificationError(f"model {model.name} has no free parameter: nothing to fit")
-    if isinstance(model, NonlinearModel) and method not in NONLINEAR:
+    if isinstance(model, NonlinearModel) and method not in OF_EQUATIONS:
         raise IdentificationError(
             f"{method} takes linear models; {model.name} has equations, which"
-            f" {', '.join(NONLINEAR)} take"
+            f" {', '.join(OF_EQUATIONS)} take"
         )
     if model.known_noise and method not in KNOWN_NOISE:
         raise IdentificationError(f"{method} cannot hold known noise; {', '.join(KNOWN_NOISE)} can")

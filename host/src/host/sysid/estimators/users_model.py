@@ -138,8 +138,8 @@ def no_filter(model: LinearModel, maneuvers: Sequence[Maneuver]) -> str:
         return "a filter takes the line between two values of a slow sensor for measurements"
     if model.known_noise:
         return "a filter estimates the noise, and this one is known"
-    if isinstance(model, NonlinearModel):
-        return "the model has equations"
+    if isinstance(model, NonlinearModel) and not model.process_noise:
+        return "process_noise of the model is empty"
     return ""
 
 
@@ -190,7 +190,7 @@ def _filter_fit(
     why = no_filter(model, maneuvers)
     if why:
         raise IdentificationError(f"{FILTER} cannot fit {model.name}: {why}; {MEMORY} is there")
-    if not model.delays:
+    if not model.delays or isinstance(model, NonlinearModel):  # whose filter has delays
         found = fit(FILTER, model, maneuvers, compare_noise=False, **options)
         return _converged(UsersFit(FILTER, found, (*maneuvers,)))
     one_rate = len(sample_periods(maneuvers)) == 1

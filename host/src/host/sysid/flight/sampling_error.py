@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy import special
 
 from host.constants import NORMAL_95
 from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
@@ -23,6 +24,7 @@ from host.sysid.models.templates import Trim
 HOLD = "inputs between samples"
 NEGLIGIBLE = 0.1  # of a half-width
 ONE_STEP = 1.1  # times what one step of Gauss and Newton says: the next ones may add a tenth
+NORMAL_99 = 2.576
 OTHER = {"foh": "zoh", "zoh": "foh"}
 
 
@@ -59,8 +61,9 @@ def hold_shift(
 def _share(result: FitResult, found: OneStep, trim: Trim, maneuvers: Sequence[Maneuver]) -> float:
     """Return how far from this hold to the other the input may have been: at most all the way.
 
-    The deviation of the share counts noise as white; where an interval of the result is wider than
-    that its own is widened alike.
+    As far as the data say where they contradict this hold at 1 %; else by the odds of the other
+    one. The deviation of the share counts noise as white; where an interval of the result is wider
+    than that its own is widened alike.
     """
     other = replace(result.model, hold=OTHER[result.model.hold])
     step = found.joint(result.model, trim, maneuvers, [other], [1.0])
@@ -68,5 +71,8 @@ def _share(result: FitResult, found: OneStep, trim: Trim, maneuvers: Sequence[Ma
     bare[found.target] = np.diag(found.inverse)[found.source]
     known = (bare > 0.0) & (result.standard_error > 0.0)
     wider = np.max(result.standard_error[known] / np.sqrt(bare[known]), initial=1.0)
-    sd = float(np.sqrt(step.covariance[0, 0]) * wider)
-    return float(min(np.hypot(step.added[0], NORMAL_95 * sd), 1.0))
+    share, sd = float(step.added[0]), float(np.sqrt(step.covariance[0, 0]) * wider)
+    if abs(share) > NORMAL_99 * sd:
+        return float(min(np.hypot(share, NORMAL_95 * sd), 1.0))
+    odds = special.expit((share - 0.5) / max(sd, 1e-9) ** 2)
+    return float(min(NORMAL_95 * np.sqrt(odds), 1.0))

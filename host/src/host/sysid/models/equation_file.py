@@ -37,6 +37,7 @@ from pathlib import Path
 
 from host.files.quantities import Quantity
 from host.files.user_text import parse_toml, read_text, shown
+from host.sysid.expressions.equation_code import EquationNodes
 from host.sysid.expressions.grammar import NAME, RESERVED
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.file_parts import delays_from, names_from, parameter_from, table_from
@@ -161,7 +162,7 @@ def equations_from(document: Mapping[str, object], name: str = "model") -> Nonli
         known_noise=read_noise(document.get("noise", {}), outputs, "noise"),
         delays=_delays(document, [p.name for p in (*parameters, *own)]),
         hold=str(document.get("hold", "foh")),
-        process_noise=_process_noise(document, states),
+        process_noise=_process_noise(document, states, nodes, equations.parameters),
     )
 
 
@@ -251,9 +252,20 @@ def _only_own(
     return found.own
 
 
-def _process_noise(document: Mapping[str, object], states: tuple[str, ...]) -> tuple[str, ...]:
+def _process_noise(
+    document: Mapping[str, object],
+    states: tuple[str, ...],
+    nodes: EquationNodes,
+    parameters: tuple[str, ...],
+) -> tuple[str, ...]:
+    """Return the states that process noise drives: those whose rate has a parameter."""
     if "process_noise" not in document:
-        return states
+        graph = nodes.graph
+        return tuple(
+            state
+            for state, rate in zip(states, nodes.rates, strict=True)
+            if {graph.nodes[k].name for k in graph.reachable([rate])} & set(parameters)
+        )
     names = names_from(document, "process_noise", "")
     strangers = sorted(set(names) - set(states))
     if strangers:

@@ -18,6 +18,7 @@ from host.sysid.numerics.filter_sensitivities import (
     gain_sensitivities,
     matrix_sensitivities,
 )
+from host.sysid.numerics.output_error_problem import OutputProblem
 from host.sysid.numerics.recursion import propagate
 
 
@@ -177,13 +178,11 @@ def _innovation_sensitivities(
 
 
 def total_information(
-    problem: FilterProblem, theta: Array, parts: Sequence[Array], scores: Sequence[Array]
+    outputs: OutputProblem, theta: Array, parts: Sequence[Array], scores: Sequence[Array]
 ) -> tuple[Array, Array]:
     """Return information and negative gradient of the cost, all maneuvers and the prior summed."""
     information, gradient = np.sum(parts, axis=0), np.sum(scores, axis=0)
-    n = problem.n_model
-    information[:n, :n] += np.diag(problem.output_problem.prior_precision)
-    gradient[:n] -= problem.output_problem.prior_precision * (
-        theta[:n] - problem.output_problem.prior_mean
-    )
+    n = len(outputs.names)
+    information[:n, :n] += np.diag(outputs.prior_precision)
+    gradient[:n] -= outputs.prior_precision * (theta[:n] - outputs.prior_mean)
     return information, gradient

@@ -1,0 +1,229 @@
+"""Joint estimation of states and parameters of a user's equations by an extended Kalman filter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.arrays import Array, IntArray
+from host.sysid.estimators.kalman import (
+    INITIAL_RELATIVE_SD,
+    PASSES,
+    PROCESS_SHARE,
+    inflation_lines,
+    innovation_inflation,
+    noise_deviation,
+)
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.numerics.equation_filter import filter_equations
+from host.sysid.numerics.nonlinear_problem import NonlinearProblem, finite
+
+UNMEASURED_SD = 0.1  # of an initial state without an output: this and as large a share of it
+
+
+def fit_extended_equations(
+    model: NonlinearModel,
+    maneuvers: Sequence[Maneuver],
+    *,
+    process: Array | None = None,
+    noise: Array | None = None,
+) -> FitResult:
+    """Fit by an extended Kalman filter, its state augmented by all unknowns.
+
+    Common parameters and delays of outputs go on from maneuver to maneuver, what belongs to a
+    record starts anew in each. First deviations are those of the priors, else half of a start
+    value; bounds hold at every sample (Jategaonkar, Flight Vehicle System Identification, 2nd ed.,
+    ch. 7).
+
+    Parameters
+    ----------
+    model, maneuvers
+        Model and data.
+    process : Array, optional
+        Process noise of each state, per root second, (n,).
+    noise : Array, optional
+        Deviation of each output, (p,); by default from third differences.
+
+    Raises
+    ------
+    IdentificationError
+        If an input has a delay, or the filter diverges.
+    """
+    late = [u for d in model.delays for u in d.outputs if u in model.inputs]
+    if late:
+        raise IdentificationError(
+            f"extended-kalman has no delay of an input ({', '.join(late)}): estimate it by"
+            " output-error or filter-error"
+        )
+    layout = _layout(model)
+    n, common = len(model.states), layout.common
+    problem = NonlinearProblem(model, maneuvers)
+    guess = problem.first_guess()
+    if problem.outputs(guess) is None:
+        problem.substeps = 1
+    deviation = noise_deviation(maneuvers) if noise is None else np.asarray(noise)
+    spread = np.array(
+        [
+            np.std(maneuvers[0].outputs[:, model.outputs.index(s)]) if s in model.outputs else 0.0
+            for s in model.states
+        ]
+    )
+    intensity = (PROCESS_SHARE * spread if process is None else np.asarray(process)) ** 2
+    shared, known = guess[:common], np.diag(layout.sd[:common] ** 2)
+    residuals: list[Array] = []
+    white: list[Array] = []
+    z, P = np.zeros(0), np.zeros((0, 0))
+    for _ in range(PASSES):
+        known = np.diag(layout.sd[:common] ** 2)  # data must not be counted twice
+        residuals, white = [], []
+        for number in range(len(maneuvers)):
+            z = np.concatenate([np.zeros(n), shared, layout.start[common:]])
+            P = np.diag(np.concatenate([np.zeros(n), layout.sd]) ** 2)
+            P[n : n + common, n : n + common] = known
+            given = problem.given(number, guess)
+            z[:n] = given.start
+            for k, state in enumerate(model.states):
+                own = state in model.outputs
+                P[k, k] = (
+                    (3.0 * deviation[model.outputs.index(state)]) ** 2
+                    if own
+                    else (UNMEASURED_SD * (1.0 + abs(given.start[k]))) ** 2
+                )
+                if state in dict(model.known_starts):
+                    P[k, k] = 0.0
+            e, unit = _passed(problem, number, layout, z, P, intensity, deviation**2)
+            shared, known = z[n : n + common], P[n : n + common, n : n + common].copy()
+            residuals.append(e)
+            white.append(unit)
+    excess = innovation_inflation(white)
+    theta = guess.copy()
+    theta[:common] = shared
+    return FitResult(
+        method="extended Kalman filter",
+        model=problem.model_at(theta),
+        names=layout.names,
+        estimate=z[n:],
+        covariance=excess * P[n:, n:],
+        covariance_white=P[n:, n:],
+        degrees_of_freedom=np.full(len(layout.names), np.inf),
+        residuals=tuple(residuals),
+        fitted=tuple(m.outputs - e for m, e in zip(maneuvers, residuals, strict=True)),
+        residual_kind="innovation",
+        noise_covariance=np.atleast_2d(np.cov(np.vstack(residuals).T)),
+        iterations=PASSES,
+        converged=True,
+        warnings=inflation_lines(excess),
+        details={
+            "noise_deviation": deviation,
+            "process": np.sqrt(intensity),
+            "innovation_inflation": excess,
+        },
+    )
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where the unknowns stand behind the states, and what is known of them before.
+
+    `common` of them go on from maneuver to maneuver.
+    """
+
+    names: tuple[str, ...]
+    common: int
+    start: Array
+    sd: Array
+    lower: Array
+    upper: Array
+    column: IntArray
+    bias: IntArray
+    offset: IntArray
+    delay: IntArray
+
+
+def _layout(model: NonlinearModel) -> _Layout:
+    n = len(model.states)
+    parameters = (*model.parameters, *model.own_parameters)
+    usual = [
+        p.prior_sd
+        if np.isfinite(p.prior_sd)
+        else INITIAL_RELATIVE_SD * abs(p.start)
+        + 1e-3 * max((abs(q.start) for q in parameters), default=0.0)
+        for p in parameters
+    ]
+    count, delays = len(model.parameters), len(model.delays)
+    biases = len(model.state_biases) + len(model.output_biases)
+    names = (
+        *model.parameter_names,
+        *(f"bias_rate.{s}" for s in model.state_biases),
+        *(f"bias.{y}" for y in model.output_biases),
+        *(p.name for p in model.own_parameters),
+    )
+    place = {name: n + k for k, name in enumerate(names)}
+    late = {y: place[d.name] for d in model.delays for y in d.outputs}
+    limits = np.array([d.limit_s for d in model.delays])
+    own = model.own_parameters
+    free = np.full(biases, np.inf)
+
+    def at(names_: Sequence[str], prefix: str = "") -> IntArray:
+        return np.array([place.get(f"{prefix}{x}", -1) for x in names_], dtype=np.int64)
+
+    return _Layout(
+        names=names,
+        common=count + delays,
+        start=np.array(
+            [*model.start, *np.zeros(delays + biases), *(p.start for p in own)], dtype=np.float64
+        ),
+        sd=np.array(
+            [*usual[:count], *(d.prior_sd_s for d in model.delays), *np.ones(biases),
+             *usual[count:]]
+        ),
+        lower=np.array([*(p.lower for p in model.parameters), *-limits, *-free,
+                        *(p.lower for p in own)]),
+        upper=np.array([*(p.upper for p in model.parameters), *limits, *free,
+                        *(p.upper for p in own)]),
+        column=np.append(at(model.source.parameters), -1),
+        bias=at(model.states, "bias_rate."),
+        offset=at(model.outputs, "bias."),
+        delay=np.array([late.get(y, -1) for y in model.outputs], dtype=np.int64),
+    )  # fmt: skip
+
+
+def _passed(
+    problem: NonlinearProblem,
+    number: int,
+    layout: _Layout,
+    z: Array,
+    P: Array,
+    intensity: Array,
+    variance: Array,
+) -> tuple[Array, Array]:
+    """Filter one maneuver; `z` and `P` end behind its last sample."""
+    maneuver, model = problem.maneuvers[number], problem.nonlinear
+    given = problem.given(number, problem.first_guess())
+    n = len(model.states)
+    no_limit = np.full(n, np.inf)
+    seen = np.ones(maneuver.outputs.shape, dtype=bool)
+    if maneuver.held and maneuver.sampled is not None:
+        seen = np.ascontiguousarray(maneuver.sampled)
+    late = [int(k) for k in layout.delay]
+    leader = np.array([late.index(k) for k in late], dtype=np.int64)
+    e, white, power = (np.empty(maneuver.outputs.shape) for _ in range(3))
+    lower, upper = (
+        np.concatenate(x) for x in ((-no_limit, layout.lower), (no_limit, layout.upper))
+    )
+    if not finite(
+        model.source.code.loop(filter_equations), z, P, lower, upper, intensity, variance,
+        given.inputs, maneuver.outputs, seen, given.parameters, layout.column, problem.constants,
+        problem.tables, np.zeros(n), layout.bias, np.zeros(len(late)), layout.offset,
+        np.zeros(len(late)), layout.delay, leader, maneuver.dt_s, problem.substeps, problem.ramp,
+        e, white, power,
+    ) or not np.isfinite(z).all():  # fmt: skip
+        raise IdentificationError(
+            f"{maneuver.name}: the Kalman filter diverged; give better start values"
+        )
+    return e, white / np.sqrt(power)

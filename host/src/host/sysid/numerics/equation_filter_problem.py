@@ -1,0 +1,206 @@
+"""Innovations of a user's equations: the problem of filter error, and its scoring.
+
+The filter is an extended Kalman filter whose gain follows the motion; nothing is linear about a
+mean. Its likelihood is exact for that filter (Jategaonkar, Flight Vehicle System Identification,
+2nd ed., ch. 5). Slopes of states and outputs within it are exact, those of its likelihood by the
+unknowns are central differences over a hundredth of a bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.arrays import Array, IntArray
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.numerics.equation_filter import filter_equations
+from host.sysid.numerics.nonlinear_problem import NonlinearProblem, finite
+
+STEP_BOUNDS = 0.01  # of a bound: differences
+LOG_STEP = 1e-3  # of a logarithm of a deviation
+MOST_FILTER_STEPS = 2  # from sample to sample: a filter corrects what a step misses
+
+
+@dataclass(slots=True)
+class EquationLikelihood:
+    """Result of the filter at one set of unknowns, per maneuver (samples, outputs) each.
+
+    Attributes
+    ----------
+    e : list of Array
+        Measured less predicted one sample ahead.
+    white, power : list of Array
+        Independent innovations and their variances.
+    cost : float
+        Negative log likelihood and prior, up to a constant.
+    """
+
+    e: list[Array]
+    white: list[Array]
+    power: list[Array]
+    cost: float
+
+    @property
+    def scaled(self) -> list[Array]:
+        """Innovations of unit variance."""
+        return [w / np.sqrt(s) for w, s in zip(self.white, self.power, strict=True)]
+
+
+class EquationFilterProblem:
+    """Innovations as a function of the unknowns, log process and log measurement deviations.
+
+    Parameters
+    ----------
+    model : NonlinearModel
+    maneuvers : sequence of Maneuver
+    process : tuple of str
+        States that white process noise drives.
+
+    Raises
+    ------
+    IdentificationError
+        If a state of `process` is none of the model.
+    """
+
+    def __init__(
+        self, model: NonlinearModel, maneuvers: Sequence[Maneuver], process: tuple[str, ...]
+    ) -> None:
+        strangers = [s for s in process if s not in model.states]
+        if strangers:
+            raise IdentificationError(
+                f"process noise on {', '.join(strangers)}; states are {', '.join(model.states)}"
+            )
+        self.output_problem = NonlinearProblem(model, maneuvers)
+        self.model = model
+        self.maneuvers = tuple(maneuvers)
+        self.process = process
+        self.process_index = [model.states.index(s) for s in process]
+        self.n_model = len(self.output_problem.names)
+        self.names = (
+            *self.output_problem.names,
+            *(f"log_process.{s}" for s in process),
+            *(f"log_noise.{y}" for y in model.outputs),
+        )
+        self._run = model.source.code.loop(filter_equations)
+        late = {y: k for k, d in enumerate(model.delays, len(model.parameters)) for y in d.outputs}
+        self._late = [late.get(y, -1) for y in model.outputs]
+        self._leader = np.array([self._late.index(k) for k in self._late], dtype=np.int64)
+        self._steps = np.zeros(0)
+
+    def noise(self, theta: Array) -> tuple[Array, Array]:
+        """Return spectral density of every state's process noise and variance of every output."""
+        split = self.n_model + len(self.process)
+        intensity = np.zeros(len(self.model.states))
+        with np.errstate(over="ignore"):
+            intensity[self.process_index] = np.exp(2.0 * theta[self.n_model : split])
+            return intensity, np.exp(2.0 * theta[split:])
+
+    def evaluate(self, theta: Array) -> EquationLikelihood | None:
+        """Return innovations and cost; None where the filter or the model fails."""
+        found = EquationLikelihood([], [], [], 0.0)
+        cost = 0.0
+        for number in range(len(self.maneuvers)):
+            run = self._filtered(number, theta)
+            if run is None:
+                return None
+            e, white, power = run
+            found.e.append(e)
+            found.white.append(white)
+            found.power.append(power)
+            cost += 0.5 * float(np.sum(white**2 / power + np.log(power)))
+        deviation = theta[: self.n_model] - self.output_problem.prior_mean
+        found.cost = cost + 0.5 * float(np.sum(self.output_problem.prior_precision * deviation**2))
+        return found if np.isfinite(found.cost) else None
+
+    def set_steps(self, bounds: Array) -> None:
+        """Set the steps of the differences from the bounds of the unknowns of the model."""
+        own = np.where(bounds > 0.0, STEP_BOUNDS * bounds, 1e-6)
+        self._steps = np.concatenate([own, np.full(len(self.names) - self.n_model, LOG_STEP)])
+
+    def scoring(
+        self, theta: Array, point: EquationLikelihood
+    ) -> tuple[list[Array], list[Array], list[Array]]:
+        """Return Fisher information, negative gradient and slopes of the innovations by maneuver.
+
+        Of an innovation w of variance s, given those before, the information is dw dw / s + ds ds /
+        (2 s^2) (Klein & Morelli, Aircraft System Identification, ch. 6).
+
+        Returns
+        -------
+        list of Array, shape (P, P)
+        list of Array, shape (P,)
+        list of Array, shape (samples, outputs, P)
+            Of the innovations over their deviation.
+        """
+        size = len(theta)
+        parts, scores, slopes = [], [], []
+        for number, (white, power) in enumerate(zip(point.white, point.power, strict=True)):
+            active = self._active(number)
+            by_white, by_power = (np.empty((white.size, len(active))) for _ in range(2))
+            for k, unknown in enumerate(active):
+                dw, ds = self._difference(number, theta, int(unknown))
+                by_white[:, k] = (dw / np.sqrt(power)).ravel()
+                by_power[:, k] = (ds / power).ravel()
+            unit = (white / np.sqrt(power)).ravel()
+            information, gradient = np.zeros((size, size)), np.zeros(size)
+            information[np.ix_(active, active)] = (
+                by_white.T @ by_white + 0.5 * by_power.T @ by_power
+            )
+            gradient[active] = -by_white.T @ unit - 0.5 * by_power.T @ (1.0 - unit**2)
+            whole = np.zeros((white.size, size))
+            whole[:, active] = by_white
+            parts.append(information)
+            scores.append(gradient)
+            slopes.append(whole.reshape(*white.shape, size))
+        return parts, scores, slopes
+
+    def _active(self, number: int) -> IntArray:
+        noise = np.arange(self.n_model, len(self.names))
+        return np.concatenate([self.output_problem.columns(number), noise])
+
+    def _difference(self, number: int, theta: Array, unknown: int) -> tuple[Array, Array]:
+        step = self._steps[unknown]
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = theta.copy()
+            moved[unknown] += sign * step
+            ends.append((sign, self._filtered(number, moved)))
+        good = [(sign, run) for sign, run in ends if run is not None]
+        if len(good) < 2:
+            here = self._filtered(number, theta)
+            good += [(0.0, here)] if here is not None else []
+        if len(good) < 2:
+            raise IdentificationError(f"model {self.model.name}: the filter has no finite slope")
+        (a, (_, w, s)), (b, (_, v, r)) = good
+        return (w - v) / ((a - b) * step), (s - r) / ((a - b) * step)
+
+    def _filtered(self, number: int, theta: Array) -> tuple[Array, Array, Array] | None:
+        """Run the filter over a maneuver: innovations, independent ones, their variances."""
+        problem, model, maneuver = self.output_problem, self.model, self.maneuvers[number]
+        problem.choose_step(theta)
+        g = problem.given(number, theta)
+        n, outputs = len(model.states), len(model.outputs)
+        intensity, variance = self.noise(theta)
+        if not (np.isfinite(intensity).all() and np.isfinite(variance).all()):
+            return None
+        none = np.full(max(n, outputs), -1, dtype=np.int64)
+        seen = np.ones(maneuver.outputs.shape, dtype=bool)
+        if maneuver.held and maneuver.sampled is not None:
+            seen = np.ascontiguousarray(maneuver.sampled)
+        e, white, power = (np.empty(maneuver.outputs.shape) for _ in range(3))
+        delay_s = np.array([0.0 if k < 0 else theta[k] for k in self._late])
+        no_limit = np.full(n, np.inf)
+        if not finite(
+            self._run, g.start.copy(), np.zeros((n, n)), -no_limit, no_limit, intensity, variance,
+            g.inputs, maneuver.outputs, seen, g.parameters,
+            np.full(len(g.parameters), -1, dtype=np.int64), problem.constants, problem.tables,
+            g.bias, none[:n], problem.output_offsets(g.local), none[:outputs], delay_s,
+            none[:outputs], self._leader, maneuver.dt_s,
+            min(problem.substeps, MOST_FILTER_STEPS), problem.ramp, e, white, power,
+        ):  # fmt: skip
+            return None
+        return (e, white, power) if np.isfinite(e).all() and np.isfinite(white).all() else None

@@ -1,0 +1,167 @@
+"""Filters of a user's equations: the same as of the linear model where the equations are linear."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from host.arrays import Array
+from host.sysid.estimators.method_registry import fit
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.equation_file import equations_from
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.model_file import model_from
+from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.numerics.equation_filter_problem import EquationFilterProblem
+from host.sysid.numerics.filter_problem import discrete_noise
+from scipy import linalg
+
+DT_S, SAMPLES = 0.05, 50
+ROLL = {
+    "kind": "equations",
+    "inputs": ["aileron_rad"],
+    "rates": {"p_radps": "L_p*p_radps + L_da*aileron_rad"},
+    "outputs": {"p_radps": "p_radps"},
+    "parameters": {"L_p": -4.0, "L_da": 30.0},
+}
+LINEAR_ROLL = {
+    "states": ["p_radps"],
+    "inputs": ["aileron_rad"],
+    "outputs": ["p_radps"],
+    "delays": [],
+    "state_biases": [],
+    "hold": "foh",
+    "A": [["L_p"]],
+    "B": [["L_da"]],
+    "parameters": {"L_p": -4.0, "L_da": 30.0},
+}
+PITCH = {
+    "kind": "equations",
+    "inputs": ["elevator_rad"],
+    "rates": {
+        "alpha_rad": "Za*alpha_rad + q_radps",
+        "q_radps": "Ma*alpha_rad + Mq*q_radps + Md*elevator_rad",
+    },
+    "outputs": {"alpha_rad": "alpha_rad", "q_radps": "q_radps", "az_mps2": "17*Za*alpha_rad"},
+    "parameters": {"Za": -5.0, "Ma": -50.0, "Mq": -6.0, "Md": -60.0},
+}
+
+
+@pytest.fixture(autouse=True)
+def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run the equations as Python: that takes no compiler's time."""
+    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
+
+
+def rolled(late: int = 0, moved: float = 0.3) -> Maneuver:
+    """Return a record in which the air drives the roll rate, its sensor some samples late."""
+    rng = np.random.default_rng(7)
+    u = 0.1 * np.sign(np.sin(2.5 * np.arange(SAMPLES) * DT_S))
+    u[:6] = 0.0
+    F, p = np.exp(-5.0 * DT_S), np.zeros(SAMPLES)
+    for k in range(SAMPLES - 1):
+        held = 0.5 * (u[k] + u[k + 1])
+        p[k + 1] = F * p[k] + (1.0 - F) * 8.0 * held + moved * np.sqrt(DT_S) * rng.standard_normal()
+    p = np.concatenate([np.zeros(late), p[: SAMPLES - late]])
+    return Maneuver(DT_S, u[:, None], (p + 0.02 * rng.standard_normal(SAMPLES))[:, None])
+
+
+def equations(**changed: object) -> NonlinearModel:
+    return equations_from({**ROLL, **changed})
+
+
+def test_the_likelihood_is_that_of_a_kalman_filter_written_with_matrices() -> None:
+    """Two states, three outputs of one instant, one of them missing now and then."""
+    rng = np.random.default_rng(3)
+    model = equations_from(PITCH)
+    y, u = 0.1 * rng.standard_normal((40, 3)), 0.1 * rng.standard_normal((40, 1))
+    sampled = rng.random((40, 3)) < 0.7
+    problem = EquationFilterProblem(
+        model, [Maneuver(0.02, u, y, sampled=sampled)], ("alpha_rad", "q_radps")
+    )
+    theta = np.array([-5.0, -50.0, -6.0, -60.0, 0.01, 0.2, *np.log([0.2, 2.0, 0.05, 0.1, 0.5])])
+    found = problem.evaluate(theta)
+    assert found is not None
+    A, B = np.array([[-5.0, 1.0], [-50.0, -6.0]]), np.array([[0.0], [-60.0]])
+    C = np.array([[1.0, 0.0], [0.0, 1.0], [-85.0, 0.0]])
+    R = np.diag([0.05, 0.1, 0.5]) ** 2
+    F, Q = discrete_noise(A, np.array([0.2, 2.0]) ** 2, 0.02)
+    fine = 200
+    x, P, cost = np.array([0.01, 0.2]), np.zeros((2, 2)), 0.0
+    step = linalg.expm(np.block([[A, B], [np.zeros((1, 3))]]) * 0.02 / fine)
+    for k in range(40):
+        seen = sampled[k]
+        H, e = C[seen], (y[k] - C @ x)[seen]
+        if seen.any():
+            S = H @ P @ H.T + R[np.ix_(seen, seen)]
+            cost += 0.5 * float(e @ np.linalg.solve(S, e) + np.log(np.linalg.det(S)))
+            K = P @ H.T @ np.linalg.inv(S)
+            x, P = x + K @ e, P - K @ H @ P
+        if k < 39:
+            for part in range(fine):
+                held = u[k] + (part + 0.5) / fine * (u[k + 1] - u[k])
+                x = step[:2, :2] @ x + step[:2, 2:] @ held
+            P = F @ P @ F.T + Q
+    assert found.cost == pytest.approx(cost, rel=2e-4)
+
+
+def test_filter_error_of_linear_equations_is_that_of_the_linear_model() -> None:
+    data = [rolled()]
+    plain = fit("filter-error", model_from(LINEAR_ROLL), data, compare_noise=False)
+    found = fit("filter-error", equations(), data, compare_noise=False)
+    assert found.converged
+    assert found.residual_kind == "innovation"
+    for name in ("L_p", "L_da"):
+        sd = plain.standard_error[plain.index(name)]
+        assert found.value(name) == pytest.approx(plain.value(name), abs=0.1 * sd)
+        assert found.standard_error[found.index(name)] == pytest.approx(sd, rel=0.05)
+    assert abs(found.value("L_p") + 5.0) < 1.5 * found.half_width()[found.index("L_p")]
+
+
+def test_the_extended_filter_of_linear_equations_is_that_of_the_linear_model() -> None:
+    data = [rolled(moved=0.0)]
+    start = np.array([-4.0, 30.0])
+    plain = fit("extended-kalman", model_from(LINEAR_ROLL), data, start=start)
+    found = fit("extended-kalman", equations(), data)
+    for name in ("L_p", "L_da"):
+        sd = plain.standard_error[plain.index(name)]
+        assert found.value(name) == pytest.approx(plain.value(name), abs=0.2 * sd)
+    assert abs(found.value("L_p") + 5.0) < found.half_width()[0]
+
+
+def test_a_delay_and_a_prior_and_a_bound_are_taken_by_the_extended_filter() -> None:
+    delays = [{"name": "gyro_s", "outputs": ["p_radps"], "prior_sd_s": 0.05, "limit_s": 0.2}]
+    parameters = {"L_p": {"start": -4.0, "lower": -4.5}, "L_da": {"start": 30.0, "prior_sd": 1e-6}}
+    late = [rolled(late=2, moved=0.0)]
+    found = fit("extended-kalman", equations(delays=delays), late)
+    assert abs(found.value("gyro_s") - 2 * DT_S) < 0.02
+    held = fit("extended-kalman", equations(parameters=parameters), [rolled(moved=0.0)])
+    assert held.value("L_da") == pytest.approx(30.0, abs=1e-3)
+    assert held.value("L_p") >= -4.5
+
+
+def test_filter_error_takes_delays_of_outputs_and_inputs() -> None:
+    """The gyro or the servo two samples late: the filter's own delays, no data are shifted."""
+    data = rolled(late=2, moved=0.0)
+    for signal in ("p_radps", "aileron_rad"):
+        delays = [{"name": "late_s", "outputs": [signal], "prior_sd_s": 0.1, "limit_s": 0.2}]
+        problem = EquationFilterProblem(equations(delays=delays), [data], ("p_radps",))
+        cost = {}
+        for late_s in (0.0, 0.05, 0.1, 0.15):
+            theta = np.array([-5.0, 40.0, late_s, 0.0, np.log(0.02), np.log(0.02)])
+            point = problem.evaluate(theta)
+            assert point is not None
+            cost[late_s] = point.cost
+        assert min(cost, key=lambda at: cost[at]) == 0.1, signal
+
+
+def test_a_delay_of_an_input_is_refused_by_the_extended_filter() -> None:
+    delays = [{"name": "servo_s", "outputs": ["aileron_rad"]}]
+    with pytest.raises(IdentificationError, match="has no delay of an input \\(aileron_rad\\)"):
+        fit("extended-kalman", equations(delays=delays), [rolled()])
+
+
+def test_without_a_compiler_a_long_record_is_refused_in_a_line() -> None:
+    still: Array = np.tile(rolled().outputs, (11, 1))
+    long = Maneuver(DT_S, np.tile(rolled().inputs, (11, 1)), still)
+    with pytest.raises(IdentificationError, match="takes hours without numba"):
+        fit("filter-error", equations(), [long])
