@@ -137,7 +137,9 @@ class EquationFilterProblem:
             Of the innovations over their deviation.
         """
         size = len(theta)
-        parts, scores, slopes = [], [], []
+        parts: list[Array] = []
+        scores: list[Array] = []
+        slopes: list[Array] = []
         for number, (white, power) in enumerate(zip(point.white, point.power, strict=True)):
             active = self._active(number)
             by_white, by_power = (np.empty((white.size, len(active))) for _ in range(2))
