@@ -1,10 +1,13 @@
 """The original ASCII rows: as printed, damaged, overflowed."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from host.cli import main
 from host.errors import NotALogError
+from host.original.row_rate import RowRate, row_rate
 from host.original.row_table import make_table, printed_vane, undo_relative_vane, undo_vane
 from host.original.rows import VARIANTS, looks_like_rows, parse_rows, read_rows
 from host.physical.calibration import load_calibration
@@ -51,7 +54,7 @@ def test_rows_of_the_appendix() -> None:
     assert rows.variant == "23 readings"
     assert len(rows) == 20
     assert not rows.damaged.any()
-    table = make_table(rows, CALIBRATION)
+    table = make_table(rows, CALIBRATION, 10.0)
     columns = table.columns
     np.testing.assert_allclose(columns["phi_rad"], np.deg2rad(np.arange(20) / 10))
     np.testing.assert_allclose(columns["t_s"], np.arange(20) / 10.0)
@@ -69,7 +72,7 @@ def test_rows_of_the_second_flight_without_their_head() -> None:
     rows = parse_rows("".join(SECOND.format(1.25) for _ in range(10)).encode())
     assert rows.variant == "26 readings"
     assert not rows.damaged.any()
-    table = make_table(rows, CALIBRATION)
+    table = make_table(rows, CALIBRATION, 20.0)
     columns = table.columns
     np.testing.assert_allclose(columns["phi_rad"], np.deg2rad(1.25))
     np.testing.assert_allclose(columns["t_s"][-1], 9 / 20.0)
@@ -167,3 +170,62 @@ def test_a_file_of_fragments_is_no_log_of_the_original() -> None:
         parse_rows(fragments)
     whole = APPENDIX.format(1.0).encode()
     assert len(parse_rows(whole * 100 + fragments)) == 300  # a damaged part costs no other row
+
+
+def flown(rate_hz: float, seconds: float = 60.0, row: str = SECOND, speed_mps: float = 15.0) -> str:
+    """Return rows of a flight in circles, its GPS solved four times a second to 1 m."""
+    rng = np.random.default_rng(5)
+    t = np.floor(np.arange(0.0, seconds, 1.0 / rate_hz) * 4.0) / 4.0
+    course = 0.1 * t
+    north, east = speed_mps / 0.1 * np.sin(course), -speed_mps / 0.1 * np.cos(course)
+    noise = rng.normal(0.0, 0.5, (2, int(seconds * 4) + 1))[:, (t * 4).astype(int)]
+    lines = []
+    for k in range(len(t)):
+        lat = 30.0 + (north[k] + noise[0, k]) / 111_195.0
+        lon = 31.0 + (east[k] + noise[1, k]) / 111_195.0 / np.cos(np.radians(30.0))
+        text = row.format(1.0).replace("lat:30.05123,lon:31.20000", f"lat:{lat:.5f},lon:{lon:.5f}")
+        turn = np.degrees(course[k]) % 360.0
+        lines.append(text.replace("gpsgc:90.00", f"gpsgc:{turn:.2f}"))
+    return "".join(lines).replace("gpsgs:15.00", f"gpsgs:{speed_mps:.2f}")
+
+
+@pytest.mark.parametrize("row", [APPENDIX, SECOND])
+@pytest.mark.parametrize("rate_hz", [5.0, 10.0, 20.0])
+def test_the_rate_comes_from_gps_whatever_the_layout(rate_hz: float, row: str) -> None:
+    """Our recorder prints rows of the second flight at 5 Hz; the first one's came at 10 and 20."""
+    rate = row_rate(parse_rows(flown(rate_hz, row=row).encode()), None)
+    assert rate.origin == "GPS"
+    assert rate.half_width_hz < 0.05 * rate_hz
+    assert abs(rate.rate_hz - rate_hz) < rate.half_width_hz
+
+
+def test_a_rate_that_nobody_knows_is_none(tmp_path: Path) -> None:
+    for text in (
+        SECOND.format(1.0) * 400,  # 15 m/s, and no way
+        flown(20.0, seconds=2.0),
+        flown(20.0).replace("fix:1", "fix:0"),
+        flown(20.0, speed_mps=1.0),
+    ):
+        rows = parse_rows(text.encode())
+        rate = row_rate(rows, None)
+        assert not rate.known
+        assert np.isnan(make_table(rows, CALIBRATION).columns["t_s"]).all()
+        assert row_rate(rows, 20.0) == RowRate(20.0, 0.0, "given")
+
+
+def test_verbs_that_need_time_refuse_rows_of_an_unknown_rate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "rows.txt"
+    source.write_text(SECOND.format(1.0) * 400)
+    for verb in ("maneuvers", "identify"):
+        assert main([verb, str(source)]) == 2
+        assert "give --row-rate" in capsys.readouterr().err
+    assert main(["decode", str(source), "-o", str(tmp_path / "rows.csv"), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["row_rate_hz"], said["duration_s"], said["times"]) == (None, None, "unknown")
+    assert "paired" in said["layout"]
+    source.write_text(flown(5.0))
+    assert main(["maneuvers", str(source), "--json"]) == 0
+    notes = json.loads(capsys.readouterr().out)["notes"]
+    assert any("estimated from the way that GPS saw" in note for note in notes)

@@ -122,8 +122,12 @@ def decode_rows(request: Request, path: Path) -> Decoded:
     summary = finite(summarise_rows(path, rows, table, calibration))
     write_table([table.columns], kind, target, row_meta(path, summary))
     summary["files"] = [str(target)]
-    rate = ("--row-rate", f"{table.rate_hz:g}")
-    summary["next"] = command_line("host", "decode", path, *rate, *_own(request), "--to", "parquet")
+    rate = ("--row-rate", f"{request.row_rate_hz:g}" if request.row_rate_hz else "HZ")
+    summary["next"] = (
+        command_line("host", "maneuvers", path, *(rate if request.row_rate_hz else ()))
+        if table.rate.known
+        else command_line("host", "decode", path, *rate, *_own(request))
+    )
     said = [*row_lines(summary), f"{'wrote':<13}{target}", f"{'next':<13}{summary['next']}"]
     return Decoded(summary, said)
 

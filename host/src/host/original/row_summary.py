@@ -9,7 +9,7 @@ import numpy as np
 
 from host.export.writer import Meta
 from host.original.row_table import NOTES, RowTable
-from host.original.rows import OriginalRows
+from host.original.rows import LAYOUTS, OriginalRows
 from host.physical.calibration import Calibration
 from host.physical.columns import COLUMNS, UNITS
 
@@ -23,20 +23,23 @@ def summarise_rows(
 ) -> Json:
     """Return everything worth saying about original rows, ready for ``json.dumps``."""
     hurt = np.flatnonzero(rows.damaged)
-    seconds = len(rows) / table.rate_hz
+    known = table.rate.known
     return {
         "file": str(path),
         "format": f"original ASCII rows, {rows.variant}",
+        "layout": LAYOUTS[rows.variant],
         "complete": "damaged" if len(hurt) else "complete",
         "rows": len(rows),
-        "duration_s": seconds,
-        "row_rate_hz": table.rate_hz,
-        "times": "reconstructed",
+        "duration_s": len(rows) / table.rate.rate_hz if known else None,
+        "row_rate_hz": table.rate.rate_hz if known else None,
+        "row_rate_half_width_hz": table.rate.half_width_hz if known else None,
+        "row_rate_origin": table.rate.origin,
+        "times": "reconstructed" if known else "unknown",
         "sessions": [],
         "damaged_fields": int(rows.damaged.sum()),
         "overflow_undone": table.undone,
         "overflow_ambiguous": table.ambiguous,
-        "notes": [note.format(rate=table.rate_hz) for note in NOTES],
+        "notes": [note.format(rate=table.rate.text) for note in NOTES],
         "losses": {
             "ranges": [
                 {
@@ -47,7 +50,7 @@ def summarise_rows(
                     "frames": 0,
                     "seconds": 0.0,
                     "other_frames": 0,
-                    "t_s": float(table.columns["t_s"][at]),
+                    "t_s": float(table.columns["t_s"][at]) if known else None,
                     "text": f"byte {rows.offset[at]}, row {at + 1}: {rows.damaged[at]} of"
                     f" {len(rows.values)} fields missing or damaged, marked invalid",
                 }
@@ -71,9 +74,11 @@ def summarise_rows(
 def row_lines(summary: Json) -> list[str]:
     """Return the summary in words."""
     out = [
-        f"{'rows':<13}{summary['file']}  {summary['format']}, {summary['complete']}",
-        f"{'duration':<13}{summary['duration_s']:.2f} s, {summary['rows']} rows"
-        f" (reconstructed at {summary['row_rate_hz']:g} Hz)",
+        f"{'rows':<13}{summary['file']}  {summary['format']} ({summary['layout']}),"
+        f" {summary['complete']}",
+        f"{'duration':<13}"
+        + (f"{summary['duration_s']:.2f} s" if summary["duration_s"] is not None else "unknown")
+        + f", {summary['rows']} rows",
     ]
     undone = {name: count for name, count in summary["overflow_undone"].items() if count}
     if undone:
@@ -102,7 +107,7 @@ def row_meta(path: Path, summary: Json) -> Meta:
         notes={
             "source": path.name,
             "format": summary["format"],
-            "times": "reconstructed",
+            "times": summary["times"],
             "notes": "; ".join(summary["notes"]),
             "calibration_name": summary["calibration"]["name"],
             "default_columns": ", ".join(summary["calibration"]["default_columns"]),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from host.original.row_rate import RowRate, row_rate
 from host.original.rows import OriginalRows
 from host.physical.airdata import calibrated_airspeed_mps
 from host.physical.calibration import Calibration
@@ -16,10 +17,8 @@ from host.physical.columns import COLUMNS
 
 Array = NDArray[np.float64]
 
-# Rates of the two flights (thesis 5.1.2, 5.2.1); the rows themselves carry no time.
-USUAL_RATE_HZ = {"27 readings": 10.0, "23 readings": 10.0, "26 readings": 20.0}
 NOTES = (
-    "row times are reconstructed from row numbers and a rate of {rate:g} Hz: rows carry none",
+    "row times are row numbers over a rate: {rate}",
     "surfaces are commands through the original map, not positions; its rudder jumps by 2.02 deg"
     " near neutral",
     "airspeed assumes sea-level density: the rows carry no static pressure",
@@ -41,8 +40,8 @@ class RowTable:
     ----------
     columns : dict of str to NDArray, shape (n,)
         The columns of `host.physical.columns.COLUMNS`; NaN where the rows have nothing.
-    rate_hz : float
-        Rate assumed for ``t_s``.
+    rate : RowRate
+        What ``t_s`` rests on; NaN where nobody knows it.
     undone : dict of str to int
         By label, values whose int16 overflow was undone.
     ambiguous : dict of str to int
@@ -50,7 +49,7 @@ class RowTable:
     """
 
     columns: dict[str, NDArray[Any]]
-    rate_hz: float
+    rate: RowRate
     undone: dict[str, int]
     ambiguous: dict[str, int]
 
@@ -65,17 +64,18 @@ def make_table(
     rows : OriginalRows
     calibration : Calibration
     rate_hz : float, optional
-        Rows per second; 10 Hz for the first flight's rows, 20 Hz for the second's without it.
+        Rows per second; without it estimated from GPS, or unknown. The thesis flew at 10 and 20,
+        our own recorder prints such rows at 5: their text does not tell which.
 
     Returns
     -------
     RowTable
     """
-    rate_hz = rate_hz or USUAL_RATE_HZ[rows.variant]
+    rate = row_rate(rows, rate_hz)
     count = len(rows)
     nothing = np.full(count, np.nan)
     out: dict[str, NDArray[Any]] = {column.name: nothing for column in COLUMNS}
-    out["t_s"] = np.arange(count) / rate_hz
+    out["t_s"] = np.arange(count) / rate.rate_hz
     out["session"] = np.ones(count, np.int64)
     out["mega_drives"] = np.ones(count, np.int8)  # receiver -> Mega -> servo, always
     undone: dict[str, int] = {}
@@ -86,7 +86,7 @@ def make_table(
     _surfaces(rows, out)
     _gps(rows, out)
     out["altitude_m"] = rows.values["altitude"]
-    return RowTable(out, rate_hz, undone, ambiguous)
+    return RowTable(out, rate, undone, ambiguous)
 
 
 def printed_vane(count: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -37,6 +37,12 @@ VARIANTS: dict[str, tuple[str, ...]] = {
         *("lat", "lon", "gpsgc", "gpsgs", *_END, "rdrs", "throts"),
     ),
 }
+# What tells them apart for a person: sensors of the first flight, and the pairs of the second.
+LAYOUTS = {
+    "27 readings": "single sensors and surface pots, the first flight's",
+    "23 readings": "single sensors, the first flight's",
+    "26 readings": "paired sensors, the second flight's",
+}
 _LABELS = sorted({label for labels in VARIANTS.values() for label in labels}, key=len, reverse=True)
 # "gpsgc0.00" and "gpsalt:17.00 " are both as printed
 _FIELD = re.compile(rf"({'|'.join(_LABELS)})\s*(?::\s*)?(-?\d{{1,7}}(?:\.(\d{{1,7}}))?)")

@@ -73,7 +73,7 @@ def add_parser(subparsers: Any) -> None:
         "--row-rate",
         type=float,
         metavar="HZ",
-        help="rate of original ASCII rows, which carry no time (10 or 20 by variant)",
+        help="rate of original ASCII rows, which carry no time; estimated from GPS without it",
     )
 
 

@@ -72,6 +72,8 @@ def add_parser(subparsers: Any) -> None:
                         help="leave sensor errors that the flight tells in the data")  # fmt: skip
     parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
                         " whatever this check of the data finds; repeatable")  # fmt: skip
+    parser.add_argument("--row-rate", type=float, metavar="HZ", help="of original ASCII rows, which"
+                        " carry no time; estimated from GPS without it")  # fmt: skip
     parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
                         help="of an autopilot's log, instance N of a message, such as IMU=1;"
                         " repeatable")  # fmt: skip
@@ -81,6 +83,8 @@ def add_parser(subparsers: Any) -> None:
 
 
 def _add_outputs(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--full", action="store_true", help="print every number: constants,"
+                        " sensors' errors, delays, fit, causes")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--mat", type=Path, metavar="FILE", help="write a MAT file")
     parser.add_argument("--plots", type=Path, metavar="DIR", help="write pictures")
@@ -145,6 +149,7 @@ def _run(args: argparse.Namespace) -> int:
         corrections=not args.no_corrections,
         accept=args.accept or (),
         sensors=chosen_sensors(args.sensor),
+        row_rate_hz=args.row_rate,
         delays=not args.no_delays,
         truth=[path for _, path in args.truth],
         prior=args.prior,
@@ -156,7 +161,7 @@ def _run(args: argparse.Namespace) -> int:
         _say(found.save(places))
         print(text)
         return int(ExitCode.OK)
-    text = option_words(found.to_text(shutil.get_terminal_size().columns))
+    text = option_words(found.to_text(shutil.get_terminal_size().columns, full=args.full))
     try:
         written = found.save(places)
     finally:

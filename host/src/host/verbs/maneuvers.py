@@ -25,6 +25,8 @@ def add_parser(subparsers: Any) -> None:
                         help="foreign names, units and signs: a file, or the name of a shipped map"
                         " ('list' shows them)")  # fmt: skip
     parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
+    parser.add_argument("--row-rate", type=float, metavar="HZ", help="of original ASCII rows, which"
+                        " carry no time; estimated from GPS without it")  # fmt: skip
     parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
                         help="of an autopilot's log, instance N of a message, such as IMU=1;"
                         " repeatable")  # fmt: skip
@@ -51,7 +53,8 @@ def run(args: argparse.Namespace) -> int:
     try:
         source = source_or_newest(args.source)
         columns, notes = read_columns(source, args.map, calibration=args.calibration,
-                                      sensors=chosen_sensors(args.sensor))  # fmt: skip
+                                      sensors=chosen_sensors(args.sensor),
+                                      row_rate_hz=args.row_rate)  # fmt: skip
     except IdentificationError as error:
         raise IdentificationError(option_words(str(error))) from error
     graded = maneuvers_of(columns)

@@ -41,6 +41,8 @@ def add_parser(subparsers: Any) -> None:
                         help="leave sensor errors that the flight tells in the data")  # fmt: skip
     parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
                         " whatever this check of the data finds; repeatable")  # fmt: skip
+    parser.add_argument("--row-rate", type=float, metavar="HZ", help="of original ASCII rows, which"
+                        " carry no time; estimated from GPS without it")  # fmt: skip
     parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
                         help="of an autopilot's log, instance N of a message, such as IMU=1;"
                         " repeatable")  # fmt: skip
@@ -82,6 +84,7 @@ def run(args: argparse.Namespace) -> int:
             corrections=not args.no_corrections,
             accept=args.accept or (),
             sensors=chosen_sensors(args.sensor),
+            row_rate_hz=args.row_rate,
             constants=not args.no_constants,
         )
         print(option_words(found.to_json() if args.json else found.to_text()))

@@ -258,8 +258,11 @@ def test_json_has_one_document_and_no_nan(flight: Path, capsys: pytest.CaptureFi
     assert expected["Cm_alpha"]["prior"] == -1.6
 
 
-def test_methods_are_listed_without_a_flight(capsys: pytest.CaptureFixture[str]) -> None:
+def test_methods_are_listed_without_a_flight(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
     assert main(["identify", "--method", "list"]) == 0
     assert "output-error-white" in capsys.readouterr().out
-    assert main(["identify"]) == 2
-    assert capsys.readouterr().err == "host: name the flight: a log, CSV, Parquet or MAT file\n"
+    assert main(["identify"]) == 4
+    assert "no flight log in this folder" in capsys.readouterr().err

@@ -105,7 +105,7 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def identified(table: Path, method: str, *more: str) -> int:
-    words = ["identify", str(table), "--model", "short-period", "--method", method, *more]
+    words = ["identify", str(table), "--model", "short-period", "--method", method, "--full", *more]
     return main(words)
 
 

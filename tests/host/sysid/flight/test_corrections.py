@@ -313,7 +313,7 @@ def test_the_verb_says_what_it_corrected_and_can_leave_it(
     assert not any("taken out" in line for line in plain["verdict"])
     alone = pd.DataFrame({k: v for k, v in columns.items() if not k.startswith("v_")})
     alone.to_csv(source, index=False)
-    assert main(options) == 0
+    assert main([*options, "--full"]) == 0
     text = capsys.readouterr().out
     assert "unobservable without GPS" in text
     assert "pitot_scale" not in text.split("short-period")[0]

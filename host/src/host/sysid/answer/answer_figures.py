@@ -24,7 +24,7 @@ from host.sysid.answer.figure_kinds import (
 from host.sysid.answer.linear_verdict import not_relied_on
 from host.sysid.answer.mat_file import labels
 from host.sysid.answer.parameter_units import parameter_unit
-from host.sysid.answer.truth_comparison import true_coefficients
+from host.sysid.answer.truth_comparison import true_coefficients, true_poles
 from host.sysid.compatibility.inverse_sensor_model import FIT_RATE_HZ
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.diagnostics import reference_values
@@ -65,7 +65,7 @@ def draw_all(
     """
     found: dict[str, Figure] = {}
     for answer, label in zip(answers, labels(answers), strict=True):
-        found |= draw(answer, label)
+        found |= draw(answer, label, truth)
     return found | (draw_coefficients(direct, flights, truth) if direct else {})
 
 
@@ -75,8 +75,10 @@ def save_all(pictures: Mapping[str, Figure], folder: Path) -> list[Path]:
     return [save(figure, folder / f"{name}.svg") for name, figure in named]
 
 
-def draw(answer: Answer, name: str) -> dict[str, Figure]:
+def draw(answer: Answer, name: str, truth: dict[str, Any] | None = None) -> dict[str, Figure]:
     """Return all pictures of one answer, their names beginning with `name`.
+
+    `truth` of a simulated flight is marked on the map of poles.
 
     Raises
     ------
@@ -85,7 +87,7 @@ def draw(answer: Answer, name: str) -> dict[str, Figure]:
     """
     result = answer.result
     traces, kind = _linear_traces(answer)
-    title = f"{answer.template}, {answer.method}: measured (grey), {kind} (red)"
+    title = f"{answer.template}, {answer.method}: measured (grey), model (red): {kind}"
     unreliable = not_relied_on(answer)
     half = result.half_width()
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
@@ -114,7 +116,8 @@ def draw(answer: Answer, name: str) -> dict[str, Figure]:
     return {
         f"{name}_fit": histories(traces, title),
         f"{name}_poles": pole_map(
-            _clouds(answer.modes), f"{about}: poles, scatter from the covariance"
+            _clouds(answer.modes, true_poles(answer.modes, truth, (answer.template,))),
+            f"{about}: poles, scatter from the covariance",
         ),
         f"{name}_intervals": interval_bars(bars, about),
         f"{name}_input": spectra(inputs, _hertz(answer.modes), f"{answer.template}: {EXCITED}"),
@@ -161,7 +164,8 @@ def draw_coefficients(
     return {
         "coefficients_fit": histories(signals, title),
         "coefficients_poles": pole_map(
-            _clouds(answer.modes), "coefficients: poles, scatter from the covariance"
+            _clouds(answer.modes, true_poles(answer.modes, truth, ("longitudinal", "lateral"))),
+            "coefficients: poles, scatter from the covariance",
         ),
         "coefficients_intervals": interval_bars(bars, "coefficients"),
         "coefficients_input": spectra(inputs, _hertz(answer.modes), f"coefficients: {EXCITED}"),
@@ -185,10 +189,17 @@ def _linear_traces(answer: Answer) -> tuple[dict[str, list[Trace]], str]:
             signals[name].append(
                 Trace(t, maneuver.outputs[:, j], outputs[:, j], maneuver.name if j == 0 else "")
             )
-    return signals, f"{'one step' if one_step else 'free simulation'}, fitted data"
+    for maneuver, outputs in answer.unseen:
+        t = begin + maneuver.time_s
+        begin = float(t[-1]) + GAP_S
+        for j, name in enumerate(answer.model.outputs):
+            title = maneuver.name if j == 0 else ""
+            signals[name].append(Trace(t, maneuver.outputs[:, j], outputs[:, j], title, True))
+    unseen = "; shaded: unseen, free simulation" if answer.unseen else ""
+    return signals, f"{'one step' if one_step else 'free simulation'}, fitted data{unseen}"
 
 
-def _clouds(modes: Sequence[Mode]) -> list[Cloud]:
+def _clouds(modes: Sequence[Mode], truth: Mapping[str, complex]) -> list[Cloud]:
     """Draw poles from the covariance of each mode's real and imaginary part."""
     rng = np.random.default_rng(1)
     clouds = []
@@ -196,5 +207,7 @@ def _clouds(modes: Sequence[Mode]) -> list[Cloud]:
         value, vector = np.linalg.eigh(mode.covariance)
         drawn = (vector * np.sqrt(np.maximum(value, 0.0))) @ rng.standard_normal((2, SCATTER))
         pole = mode.eigenvalue
-        clouds.append(Cloud(mode.name, pole, pole.real + drawn[0], pole.imag + drawn[1]))
+        clouds.append(
+            Cloud(mode.name, pole, pole.real + drawn[0], pole.imag + drawn[1], truth.get(mode.name))
+        )
     return clouds

@@ -55,12 +55,7 @@ def model_lines(answer: Answer) -> list[str]:
             + ("" if from_zero(c) else "  not told from zero")
             for c in answer.coefficients
         ]
-    lines += [*constant_lines(answer), *settling_lines(answer)]
-    failing = uncarried_states(answer)
-    for mode in answer.modes:
-        in_it = _participating(answer, mode, list(failing))
-        mark = f"  not to be relied on: {', '.join(failing[s] for s in in_it)}" if in_it else ""
-        lines.append(_mode_line(mode) + mark)
+    lines += [*constant_lines(answer), *settling_lines(answer), *mode_lines(answer)]
     for kind, fits in (
         ("free simulation, fitted data", answer.fits),
         ("free simulation, held-out data", answer.validation),
@@ -73,6 +68,19 @@ def model_lines(answer: Answer) -> list[str]:
                 for f in fits
             )
             lines.append(f"  NRMSE ({kind}): {shares}")
+    return lines
+
+
+def mode_lines(answer: Answer | CoefficientAnswer) -> list[str]:
+    """Return the modes, and of which a state that is not predicted takes a good part."""
+    if not isinstance(answer, Answer):
+        return [_mode_line(mode) for mode in answer.modes]
+    failing = uncarried_states(answer)
+    lines = []
+    for mode in answer.modes:
+        in_it = _participating(answer, mode, list(failing))
+        mark = f"  not to be relied on: {', '.join(failing[s] for s in in_it)}" if in_it else ""
+        lines.append(_mode_line(mode) + mark)
     return lines
 
 
@@ -91,7 +99,7 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
         line += f"{small}  {cause}" + ("  flagged" if d.flagged else "")
         lines.append(line.rstrip())
     lines.append("  CD_0 is the drag at zero lift, surfaces as flown")
-    lines += [_mode_line(mode) for mode in answer.modes]
+    lines += mode_lines(answer)
     delays = ", ".join(
         f"{name.split('_')[1]} {1e3 * value:+.2f} +- {1e3 * half:.2f} ms"
         for name, (value, half) in answer.delays.items()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED, MODEL, RESIDUAL, REFUSED, TRUTH = "0.7", "C3", "C0", "C3", "black"
-INPUT = "C2"
+INPUT, UNSEEN = "C2", "#fdf3dc"
 SHOWN_UNITS = {
     "_radps": ("deg/s", DEG_PER_RAD),
     "_rad": ("deg", DEG_PER_RAD),
@@ -35,29 +35,37 @@ SHOWN_HZ = (0.05, 20.0)  # of the spectra
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """A stretch of one signal, each (n,): time, what was measured, what the model says."""
+    """A stretch of one signal, each (n,): time, what was measured, what the model says.
+
+    What the fit did not see is drawn on a shade."""
 
     t_s: Array
     measured: Array
     model: Array
     title: str = ""
+    unseen: bool = False  # held out of the fit
 
 
 @dataclass(frozen=True, slots=True)
 class Cloud:
-    """A pole and where it may be: real and imaginary parts of its draws, each (n,)."""
+    """A pole and where it may be: real and imaginary parts of its draws, each (n,).
+
+    `truth` is known of simulated flights only.
+    """
 
     name: str
     pole: complex
     real: Array
     imaginary: Array
+    truth: complex | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Bar:
     """A parameter with its 95 % half-width; `scale` is what both are drawn against.
 
-    `truth` is known of simulated flights only.
+    That is the estimate, or what would contribute 5 % of its row's largest where that is more
+    (`of_row`). `truth` is known of simulated flights only.
     """
 
     name: str
@@ -66,6 +74,11 @@ class Bar:
     scale: float
     marked: bool
     truth: float | None = None
+
+    @property
+    def of_row(self) -> bool:
+        """Whether the scale is that of the row."""
+        return self.scale > abs(self.value) * (1.0 + 1e-9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +120,9 @@ def histories(
             over.plot(trace.t_s, measured, color=MEASURED, lw=2.4)
             over.plot(trace.t_s, model, color=MODEL, lw=0.8)
             under.plot(trace.t_s, measured - model, color=RESIDUAL, lw=0.6)
+            if trace.unseen:
+                for axis in (over, under):
+                    axis.axvspan(trace.t_s[0], trace.t_s[-1], color=UNSEEN, lw=0.0, zorder=-1)
         under.axhline(0.0, color="0.8", lw=0.6, zorder=0)
         over.set_ylabel(label, fontsize=8)
         under.set_ylabel("difference", fontsize=6)
@@ -164,7 +180,9 @@ def pole_map(clouds: Sequence[Cloud], title: str) -> Figure:
     _name_poles(overview, [(c.name, c.pole) for c in clouds])
     overview.set_xlabel("real, 1/s")
     overview.set_ylabel("imaginary, rad/s")
-    overview.set_title(title, fontsize=10)
+    known = any(cloud.truth is not None for cloud in clouds)
+    mark = "; diamonds, dashed: the simulated aircraft" if known else ""
+    overview.set_title(f"{title}{mark}", fontsize=10)
     for k, cloud in enumerate(clouds):
         near = figure.add_subplot(grid[1 + k // 2, k % 2])
         if cloud.pole.imag:
@@ -173,6 +191,8 @@ def pole_map(clouds: Sequence[Cloud], title: str) -> Figure:
         else:
             near.hist(cloud.real, bins=24, color=RESIDUAL, alpha=0.5)
             near.axvline(cloud.pole.real, color=MODEL, lw=1.6)
+            if cloud.truth is not None:
+                near.axvline(cloud.truth.real, color=TRUTH, lw=1.2, ls="--")
             near.set_ylabel("draws", fontsize=7)
         near.set_title(cloud.name, fontsize=8)
         near.set_xlabel("real, 1/s", fontsize=7)
@@ -186,7 +206,8 @@ def pole_map(clouds: Sequence[Cloud], title: str) -> Figure:
 def interval_bars(bars: Sequence[Bar], title: str) -> Figure:
     """Draw each parameter's interval as a share of its scale; red where it is marked.
 
-    The scale is the estimate, or what would contribute 5 % of its row's largest.
+    A disc stands on a bar whose scale is the estimate, a hollow square on one whose scale is what
+    would contribute 5 % of its row's largest.
     """
     figure = _figure((8.5, 0.32 * len(bars) + 1.8))
     axis = figure.subplots()
@@ -196,7 +217,12 @@ def interval_bars(bars: Sequence[Bar], title: str) -> Figure:
     for position, bar in enumerate(reversed(bars)):
         share = 100.0 * bar.half_width / bar.scale
         colour = REFUSED if bar.marked else RESIDUAL
-        axis.errorbar(0.0, position, xerr=min(share, reach), color=colour, fmt="o", ms=4)
+        drawn = axis.errorbar(
+            0.0, position, xerr=min(share, reach), color=colour,
+            fmt="s" if bar.of_row else "o", mfc="white" if bar.of_row else colour, ms=4.5,
+        )  # fmt: skip
+        if bar.of_row:
+            drawn[2][0].set_linestyle("--")
         if share > reach:
             for side in (-reach, reach):
                 axis.plot(side, position, "<" if side < 0.0 else ">", color=colour, ms=5)
@@ -218,9 +244,9 @@ def interval_bars(bars: Sequence[Bar], title: str) -> Figure:
     axis.set_title(title, fontsize=10)
     known = any(bar.truth is not None for bar in bars)
     axis.set_xlabel(
-        "95 % interval about the estimate, % of it, or of what would contribute 5 % of its"
-        " row's largest\ngrey: within 10 %; red: not to be relied on; arrows: beyond the scale"
-        + ("; diamonds: the simulated aircraft" if known else ""),
+        "95 % interval about the estimate; discs: % of the estimate; squares, dashed: % of what"
+        " would contribute 5 % of its row\ngrey: within 10 %; red: not to be relied on; arrows:"
+        " beyond the scale" + ("; diamonds: the simulated aircraft" if known else ""),
         fontsize=8,
     )
     return figure
@@ -293,6 +319,9 @@ def _cloud(axis: Axes, cloud: Cloud, *, mirrored: bool = True) -> None:
     for side in (1.0, -1.0) if mirrored and cloud.pole.imag else (1.0,):
         axis.plot(cloud.real, side * cloud.imaginary, ".", color=RESIDUAL, ms=1.5, alpha=0.4)
         axis.plot(cloud.pole.real, side * cloud.pole.imag, "x", color=MODEL, ms=8, mew=1.6)
+        if cloud.truth is not None:
+            at = cloud.truth.real, side * abs(cloud.truth.imag)
+            axis.plot(*at, "D", color=TRUTH, ms=6, mfc="none")
 
 
 def _figure(size: tuple[float, float]) -> Figure:

@@ -65,6 +65,18 @@ def true_modes(document: dict[str, Any], template: str) -> dict[str, tuple[float
     }
 
 
+def true_poles(
+    modes: Sequence[Mode], document: dict[str, Any] | None, templates: Sequence[str]
+) -> dict[str, complex]:
+    """Return the true pole, of positive imaginary part, of each mode that the truth has."""
+    found: dict[str, complex] = {}
+    for template in templates if document is not None else ():
+        for name, (frequency, damping) in true_modes(document or {}, template).items():
+            turn = max(1.0 - damping**2, 0.0) ** 0.5
+            found[name] = complex(-damping * frequency, turn * frequency)
+    return {mode.name: found[mode.name] for mode in modes if mode.name in found}
+
+
 @dataclass(frozen=True, slots=True)
 class TruthComparison:
     """One figure beside the truth; the error is relative to `reference`.

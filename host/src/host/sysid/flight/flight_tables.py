@@ -21,6 +21,7 @@ from host.sysid.flight.autopilot_table import autopilot_table
 from host.sysid.flight.column_map import listed, mapped, missing_lines, read_map
 from host.sysid.flight.column_sampling import Sampling, sampled_name
 from host.sysid.flight.data_finding import Finding
+from host.sysid.flight.derived_columns import derived_columns
 from host.sysid.flight.finding_consequences import checked
 from host.sysid.flight.foreign_tables import (
     TEXT_KINDS,
@@ -32,6 +33,7 @@ from host.sysid.flight.foreign_tables import (
     same_length,
 )
 from host.sysid.flight.measured import Measured, measured
+from host.sysid.flight.original_table import is_original, original_table
 from host.sysid.flight.recorded import commanded_by_map, recording_of_log, recording_of_table
 from host.sysid.flight.unit_sign_checks import SURFACES
 from host.sysid.identification_error import IdentificationError
@@ -91,12 +93,14 @@ def read_columns(
     calibration: Path | None = None,
     also: Collection[str] = (),
     sensors: Mapping[str, int] | None = None,
+    row_rate_hz: float | None = None,
 ) -> tuple[dict[str, Array], list[str]]:
     """Return columns and notes of `read_flight_columns`, whose arguments these are; its findings
     stand behind the notes."""
     found = read_flight_columns(
-        source, mapping, calibration=calibration, also=also, sensors=sensors
-    )
+        source, mapping, calibration=calibration, also=also, sensors=sensors,
+        row_rate_hz=row_rate_hz,
+    )  # fmt: skip
     notes = [*found.notes, *(finding.line for finding in found.findings)]
     if found.shares:
         notes.append(
@@ -113,6 +117,7 @@ def read_flight_columns(
     also: Collection[str] = (),
     accept: Collection[str] = (),
     sensors: Mapping[str, int] | None = None,
+    row_rate_hz: float | None = None,
 ) -> FlightColumns:
     """Return the columns identification uses, notes about them, and how they were recorded.
 
@@ -131,6 +136,8 @@ def read_flight_columns(
         Checks whose findings change nothing: the columns are used as they are.
     sensors : mapping of str to int, optional
         Of an autopilot's log, the instance to use of a message.
+    row_rate_hz : float, optional
+        Of original rows, how many a second; estimated from GPS without it.
 
     Raises
     ------
@@ -146,6 +153,7 @@ def read_flight_columns(
         calibration,
         (*wanted, *(c for line in lines.values() for c in line.needed)),
         sensors,
+        row_rate_hz,
     )
     called = source_name(source)
     raw, notes = dict(found.columns), found.notes
@@ -171,10 +179,12 @@ def read_flight_columns(
     same_length(used, called)
     if recorded:
         columns = _even(used, notes)
+        columns |= derived_columns(columns, wanted)
         return FlightColumns(columns, notes, found.recording, found.calibration)
     seen = _measured(used, notes, accept)
     even = _even(seen.columns, notes)
     columns, findings = checked(even, accept)
+    columns = columns | derived_columns(columns, wanted)
     return FlightColumns(
         columns,
         notes,
@@ -219,6 +229,7 @@ def _read(
     calibration: Path | None,
     wanted: Collection[str],
     sensors: Mapping[str, int] | None,
+    row_rate_hz: float | None = None,
 ) -> tuple[Foreign, bool]:
     """Return the columns of a source, and whether our logger recorded them."""
     from host.log import FlightLog
@@ -237,6 +248,8 @@ def _read(
         file_or_folder(source, IdentificationError)
         if is_autopilot_log(source):
             return autopilot_table(source, sensors), False
+        if is_original(source):
+            return original_table(source, calibration, row_rate_hz), False
         kind = source.suffix.lower()
         if kind not in READ or (kind in TEXT_KINDS[1:] and mapping is None):  # original rows
             log = _recorded(source, calibration, wanted, maybe_table=kind != ".bin")

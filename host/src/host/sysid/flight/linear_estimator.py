@@ -126,6 +126,9 @@ class Answer:
     coherence: InputCoherence | None = None  # of what free simulation leaves with the inputs
     predictions: dict[str, Prediction] = field(default_factory=dict)  # of outputs held out
     noise_covariance: Array | None = None  # of the estimate, without systematic errors
+    unseen: tuple[
+        tuple[Maneuver, Array], ...
+    ] = ()  # held out, with their outputs by free simulation
 
     @property
     def at_bound(self) -> tuple[str, ...]:
@@ -216,13 +219,15 @@ class LinearValidation:
     """Free simulation of the maneuvers fitted, and of those held out.
 
     Departures from the trim are as measured: airspeed and attitude in products with what moves.
-    `predictions` sets the error of each output held out beside what noise and covariance allow.
+    `predictions` sets the error of each output held out beside what noise and covariance allow;
+    `unseen` are the maneuvers held out, with their outputs.
     """
 
     simulated: tuple[Array, ...]
     fits: tuple[SignalFit, ...]
     held_out: tuple[SignalFit, ...]
     predictions: dict[str, Prediction]
+    unseen: tuple[tuple[Maneuver, Array], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -421,6 +426,7 @@ class LinearEstimator:
             fits_of(e.model, e.maneuvers, simulated),
             fits_of(e.model, held_out, unseen),
             predictions(e.model, total, intervals.coherence, held_out, unseen),
+            tuple(zip(held_out, unseen, strict=True)),
         )
 
     def answer(
@@ -455,6 +461,7 @@ class LinearEstimator:
             own_model=self.own is not None,
             coherence=intervals.coherence,
             predictions=validation.predictions,
+            unseen=validation.unseen,
             noise_covariance=statistical.covariance,
         )
 

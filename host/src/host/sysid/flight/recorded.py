@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 OWN_COLUMN = "mega_drives"  # no table of others has this column
 GPS_COLUMN, GPS_SPAN_S = "v_north_mps", 20.0  # as `physical/timebase` wants it
-SAME_ANGLE_RAD = 1e-6  # a table of text has six digits or more
+SAME_ANGLE_RAD = 2e-6  # a table of text has six decimals, each pot and the mean rounded
 MATCHING_SHARE = 0.5  # of the samples
 
 

@@ -177,7 +177,7 @@ OPTIONS = {
     "accept": "--accept", "aircraft": "--aircraft", "calibration": "--calibration",
     "from_s": "--from", "history": "--history",
     "maneuvers": "--maneuver", "mapping": "--map", "mat": "--mat", "methods": "--method",
-    "models": "--model", "plots": "--plots", "prior": "--prior",
+    "models": "--model", "plots": "--plots", "prior": "--prior", "row_rate_hz": "--row-rate",
     "save_aircraft": "--save-aircraft", "save_model": "--save-model", "to_s": "--to",
     "truth": "--truth",
 }  # fmt: skip

@@ -70,6 +70,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         also=how.also,
         accept=how.accept,
         sensors=dict(how.sensors),
+        row_rate_hz=how.row_rate_hz,
     )
     columns, travel = with_surface_angles(read.columns, read.shares, known)
     notes, findings = [*read.notes, *travel], [*read.findings, *no_vanes_finding(columns)]

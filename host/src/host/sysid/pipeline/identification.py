@@ -15,6 +15,7 @@ from host.sysid.answer.json_document import answer_document, coefficient_documen
 from host.sysid.answer.method_comparison import method_table
 from host.sysid.answer.output_files import OutputPaths, check_outputs, write_outputs
 from host.sysid.answer.prior_comparison import prior_document, prior_lines
+from host.sysid.answer.short_answer import MOST_LINES, REST, mode_summary, short_table
 from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.truth_comparison import truth_document, truth_report_lines
 from host.sysid.answer.verdict import removed_error_lines, verdict_lines
@@ -89,12 +90,17 @@ class Identification:
 
     @property
     def verdict(self) -> tuple[str, ...]:
+        """Lines on what to trust, what not and why, what to fly again, what was corrected."""
+        return (*self.judgement, *removed_error_lines(self.linear))
+
+    @property
+    def judgement(self) -> tuple[str, ...]:
         """Lines on what to trust, what not and why, and what to fly again."""
         # What the log lost is a note, and nothing that was read of it may be said before.
         said = verdict_lines((), self.notes)
         found = (finding.line for finding in self.findings)
         judged = verdict_lines(self.answers, (), self.evidence)
-        return (*said, *found, *judged, *removed_error_lines(self.linear))
+        return (*said, *found, *judged)
 
     @property
     def evidence(self) -> Evidence:
@@ -195,15 +201,40 @@ class Identification:
         """Return the answer as JSON text; what is no finite number is null."""
         return json_text(self.document())
 
-    def to_text(self, width: int = 100) -> str:
+    def to_text(self, width: int = 100, *, full: bool = True) -> str:
         """Return the answer as people read it: words first, then numbers.
 
         Parameters
         ----------
         width : int
             Characters of a line of the table of several methods.
+        full : bool
+            Everything; without it the verdict, the modes and one table of 40 lines, and the
+            comparison with a truth or a prior that was given.
         """
-        lines = list(self.verdict)
+        lines = [*self.judgement, *(removed_error_lines(self.linear) if full else ())]
+        if not full:
+            lines += ["", *self._short(width)]
+        else:
+            lines += self._numbers(width)
+        if self.prior is not None:
+            lines += ["", *prior_lines(self.coefficient_tables, self.prior)]
+        if self.truth is not None:
+            lines += ["", *truth_report_lines(self.linear, self.coefficients, self.truth)]
+        return "\n".join(lines)
+
+    def _short(self, width: int) -> list[str]:
+        modes = mode_summary(self.linear if len(self.methods) == 1 else (), self.coefficients)
+        if len(self.methods) > 1:
+            table = method_table(self.linear, width)
+            if len(table) > MOST_LINES:
+                table = [*table[: MOST_LINES - 1], "  ... and more: --full"]
+        else:
+            table = short_table(self.linear, self.coefficients, self.evidence)
+        return [*modes, "", *table, REST]
+
+    def _numbers(self, width: int) -> list[str]:
+        lines: list[str] = []
         if len(self.methods) > 1:
             lines += ["", *method_table(self.linear, width)]
         else:
@@ -215,11 +246,7 @@ class Identification:
             if agreement:
                 named = [flight.source] if len(self.flights) > 1 else []
                 lines += ["", *named, *compatibility_lines(agreement)]
-        if self.prior is not None:
-            lines += ["", *prior_lines(self.coefficient_tables, self.prior)]
-        if self.truth is not None:
-            lines += ["", *truth_report_lines(self.linear, self.coefficients, self.truth)]
-        return "\n".join(lines)
+        return lines
 
     def save(self, places: OutputPaths) -> list[Path]:
         """Write every requested file and return them.
@@ -234,8 +261,8 @@ class Identification:
         return write_outputs(places, self.linear, self.coefficients, recorded, self.truth)
 
     def __str__(self) -> str:
-        """Return the answer as people read it."""
-        return self.to_text()
+        """Return what `host identify` prints."""
+        return self.to_text(full=False)
 
     def __repr__(self) -> str:
         """Return in a line what was identified of what."""

@@ -91,6 +91,7 @@ def predict(
     corrections: bool = True,
     accept: str | Iterable[str] = (),
     sensors: Mapping[str, int] | None = None,
+    row_rate_hz: float | None = None,
     constants: bool = True,
 ) -> Prediction:
     """Run a saved model over other records: derivatives held, only constants fitted.
@@ -128,6 +129,7 @@ def predict(
         also=tuple(sorted(signals)),
         accept=accept,
         sensors=sensors,
+        row_rate_hz=row_rate_hz,
     )
     found = []
     for source, how in zip(sources, each, strict=True):

@@ -38,6 +38,8 @@ class ReadingOptions:
         Checks whose findings change nothing.
     sensors : tuple of (message, instance)
         Of an autopilot's log, which instance of a message is used.
+    row_rate_hz : float, optional
+        Of original rows, how many a second.
     """
 
     calibration: Path | None = None
@@ -49,6 +51,7 @@ class ReadingOptions:
     also: tuple[str, ...] = ()
     accept: frozenset[str] = frozenset()
     sensors: tuple[tuple[str, int], ...] = ()
+    row_rate_hz: float | None = None
 
 
 def reading_options(
@@ -64,6 +67,7 @@ def reading_options(
     also: tuple[str, ...] = (),
     accept: str | Iterable[str] = (),
     sensors: Mapping[str, int] | None = None,
+    row_rate_hz: float | None = None,
 ) -> list[ReadingOptions]:
     """Return the options of each flight; the arguments are those of `host.identify`.
 
@@ -92,6 +96,7 @@ def reading_options(
             also,
             accepted_checks(listed(accept)),
             tuple((sensors or {}).items()),
+            row_rate_hz,
         )
         for made_by, named_by, spans in zip(
             of_each_flight("calibration", calibration, flights),

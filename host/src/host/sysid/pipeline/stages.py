@@ -58,6 +58,7 @@ def identify(
     corrections: bool = True,
     accept: str | Iterable[str] = (),
     sensors: Mapping[str, int] | None = None,
+    row_rate_hz: float | None = None,
     delays: bool = True,
     truth: str | Path | Sequence[str | Path] | None = None,
     prior: str | Path | None = None,
@@ -97,6 +98,8 @@ def identify(
         Checks of the data whose findings shall change nothing: columns are used as they are.
     sensors : mapping of str to int, optional
         Of an autopilot's log, the instance to use of a message: ``{"IMU": 1}``.
+    row_rate_hz : float, optional
+        Of original ASCII rows, which carry no time; estimated from GPS without it.
     delays : bool
         Estimate residual delays and places of sensors of linear models where nothing gives them.
     truth : path or several, optional
@@ -129,6 +132,7 @@ def identify(
         also=asked.signals,
         accept=accept,
         sensors=sensors,
+        row_rate_hz=row_rate_hz,
     )
     calibrations = [how.calibration for how in each]
     by_calibration = {

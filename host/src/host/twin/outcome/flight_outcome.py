@@ -253,5 +253,5 @@ def _thesis(record: FlightRecord, data: AirData, folder: Path) -> tuple[pd.DataF
         record = replace(record, card=slow)
     printed = thesis.rows(record, data)
     path = folder / "flight.thesis.txt"
-    thesis.write_rows(printed, path)
+    thesis.write_rows(printed, path, paired=record.card.flight.rate_hz >= thesis.PAIRED_HZ)
     return thesis.table(printed), [path]

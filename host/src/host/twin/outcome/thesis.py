@@ -9,17 +9,19 @@ maps; D12 no time in the row. Speed in km/h.
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from host.aircraft.airframe import Array
+from host.aircraft.airframe import DOWN, NORTH, Array
 from host.constants import GRAVITY_MPS2, RAD_PER_DEG
-from host.twin.flight.fly import FlightRecord
+from host.twin.flight.fly import STEP_S, FlightRecord
 from host.twin.sensors.analog import analog, convert
 from host.twin.sensors.imu import imu
 from host.twin.sensors.local_flow import AirData
+from host.twin.sensors.ubx import EARTH_RADIUS_M, POSITION_NOISE_M, VELOCITY_NOISE_MPS
 
 IMU_RATE_HZ = 50.0
 GYRO_COUNTS_PER_DEGPS = 16.4
@@ -30,6 +32,8 @@ MAXIMUM_US = (1956, 1904, 1904, 1960)
 VANE_AT_S = 0.004
 PRESSURE_AT_S = 0.006
 BOOT_READINGS = 200
+GPS_RATE_HZ, GPS_LATE_S = 4.0, 0.25  # of the ArduIMU's receiver
+PAIRED_HZ = 20.0  # the second flight had a set of air data sensors on either wing tip
 
 
 def row_times(record: FlightRecord) -> Array:
@@ -90,15 +94,8 @@ def rows(record: FlightRecord, data: AirData) -> pd.DataFrame:
     second = newest[np.maximum(row - 1 + row % 2 - 1, 0)]
     angles = np.degrees(sample.attitude_rad)
 
-    kpa = _kpa(counts[:, 4])
     reference = _boot_reference(record, data, rng)
-    filtered = np.empty_like(kpa)
-    state = reference
-    for i, value in enumerate(kpa):
-        state = 0.25 * value + 0.75 * state
-        filtered[i] = state
-    clipped = np.maximum(filtered - reference, 0.0)
-    speed_kmh = np.sqrt(clipped * 1000.0 * 1.633) * 18.0 / 5.0
+    speed_kmh = [_speed_kmh(counts[:, 4 + k], reference[k]) for k in range(2)]
 
     altitude = _altitude(record, data, at, rng)
     pulses = record.pulses_us[
@@ -112,7 +109,10 @@ def rows(record: FlightRecord, data: AirData) -> pd.DataFrame:
             "PCH": np.round(angles[first, 1], 2),
             "YAW": np.round(angles[first, 2], 2),
             "altitude": altitude,
-            "velocity": np.round(speed_kmh, 2),
+            "velocity": np.round(speed_kmh[0], 2),
+            "velocityb": np.round(speed_kmh[1], 2),
+            "alphab": overflowed_vane(counts[:, 1]) - overflowed_vane(start[1:2])[0],
+            "betab": overflowed_vane(counts[:, 3]) - overflowed_vane(start[3:4])[0],
             "alpha": overflowed_vane(counts[:, 0]) - overflowed_vane(start[:1])[0],
             "beta": overflowed_vane(counts[:, 2]) - overflowed_vane(start[2:3])[0],
             "AN0": np.round(raw_rates[first, 0], 2),
@@ -121,6 +121,7 @@ def rows(record: FlightRecord, data: AirData) -> pd.DataFrame:
             "AN3": np.round(raw_force[first, 0], 2),
             "AN4": np.round(raw_force[first, 1], 2),
             "AN5": np.round(raw_force[second, 2], 2),
+            **_gps(record, at),
             "elevs": np.round(0.0756 * elevator - 108.72, 2),
             "ails": np.round(0.0738 * aileron - 112.29, 2),
             "rdrs": np.round(
@@ -131,18 +132,50 @@ def rows(record: FlightRecord, data: AirData) -> pd.DataFrame:
     )
 
 
-def _boot_reference(record: FlightRecord, data: AirData, rng: np.random.Generator) -> float:
-    """Return the zero of the pressure (kPa): 200 readings in 4 s of boot through the same filter.
+def _gps(record: FlightRecord, at: Array) -> dict[str, Array]:
+    """Return position, course and speed of the newest solution that had come by each row."""
+    rng = np.random.default_rng([record.seed, 22])
+    solved = np.arange(0.0, record.t_s[-1], 1.0 / GPS_RATE_HZ)
+    place = record.states[:, NORTH : DOWN + 1]
+    velocity = np.gradient(place, STEP_S, axis=0)
+    velocity[np.abs(record.t_s - record.card.flight.ground_s) < 3 * STEP_S] = 0.0  # the launch
+    k = np.minimum(np.rint(solved / STEP_S).astype(int), len(place) - 1)
+    spot = place[k, :2] + rng.normal(0.0, POSITION_NOISE_M, (len(k), 2))
+    speed = velocity[k, :2] + rng.normal(0.0, VELOCITY_NOISE_MPS, (len(k), 2))
+    newest = np.maximum(np.searchsorted(solved + GPS_LATE_S, at, side="right") - 1, 0)
+    flight = record.card.flight
+    turn = EARTH_RADIUS_M * np.cos(np.radians(flight.latitude_deg))
+    return {
+        "lat": np.round(flight.latitude_deg + np.degrees(spot[:, 0] / EARTH_RADIUS_M), 5)[newest],
+        "lon": np.round(flight.longitude_deg + np.degrees(spot[:, 1] / turn), 5)[newest],
+        "gpsgc": np.round(np.degrees(np.arctan2(speed[:, 1], speed[:, 0])) % 360.0, 2)[newest],
+        "gpsgs": np.round(np.hypot(speed[:, 0], speed[:, 1]), 2)[newest],
+    }
+
+
+def _speed_kmh(count: Array, reference: float) -> Array:
+    kpa = _kpa(count)
+    filtered = np.empty_like(kpa)
+    state = reference
+    for i, value in enumerate(kpa):
+        state = 0.25 * value + 0.75 * state
+        filtered[i] = state
+    clipped = np.maximum(filtered - reference, 0.0)
+    return np.asarray(np.sqrt(clipped * 1000.0 * 1.633) * 18.0 / 5.0)
+
+
+def _boot_reference(record: FlightRecord, data: AirData, rng: np.random.Generator) -> Array:
+    """Return both zeros of pressure (kPa): 200 readings in 4 s of boot through the same filter.
 
     D3; a shorter stand leaves less time for the same 200.
     """
     last_s = max(0.05, min(4.05, record.card.flight.ground_s - 0.1))
     at = np.linspace(0.05, last_s, BOOT_READINGS)
-    counts = convert(analog(record, data), record.t_s, at, rng)[:, 4]
-    state = float(_kpa(counts)[0])
-    for value in _kpa(counts)[1:].tolist():
+    kpa = _kpa(convert(analog(record, data), record.t_s, at, rng)[:, 4:6])
+    state = kpa[0]
+    for value in kpa[1:]:
         state = 0.25 * value + 0.75 * state
-    return state
+    return np.asarray(state)
 
 
 def _kpa(count: Array) -> Array:
@@ -209,16 +242,26 @@ def table(printed: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def write_rows(printed: pd.DataFrame, path: Path) -> None:
-    """Write the rows as text, variant B of the thesis (appendix C); raises OSError."""
+def _air(row: Mapping[Hashable, float], *, paired: bool) -> str:
+    if not paired:
+        return f"velocity:{row['velocity']:.2f},alpha:{int(row['alpha'])},beta:{int(row['beta'])}"
+    return (
+        f"velocitya:{row['velocity']:.2f},velocityb:{row['velocityb']:.2f},"
+        f"alphaa:{int(row['alpha'])},alphab:{int(row['alphab'])},"
+        f"betaa:{int(row['beta'])},betab:{int(row['betab'])}"
+    )
+
+
+def write_rows(printed: pd.DataFrame, path: Path, *, paired: bool) -> None:
+    """Write the rows as text, of single sensors (appendix C) or of pairs; raises OSError."""
     with path.open("w", encoding="ascii", newline="") as out:
         for row in printed.to_dict("records"):
             out.write(
                 f"RLL:{row['RLL']:.2f},PCH:{row['PCH']:.2f},YAW:{row['YAW']:.2f},"
-                f"altitude:{int(row['altitude'])},velocity:{row['velocity']:.2f},"
-                f"alpha:{int(row['alpha'])},beta:{int(row['beta'])},"
+                f"altitude:{int(row['altitude'])},{_air(row, paired=paired)},"
                 + ",".join(f"AN{i}:{row[f'AN{i}']:.2f}" for i in range(6))
-                + ",lat:30.00000,lon:31.00000,gpsgc:0.00,gpsgs:0.00,fix:1,numsat:9,"
+                + f",lat:{row['lat']:.5f},lon:{row['lon']:.5f},gpsgc:{row['gpsgc']:.2f},"
+                f"gpsgs:{row['gpsgs']:.2f},fix:1,numsat:9,"
                 f"elevs:{row['elevs']:.2f},ails:{row['ails']:.2f},rdrs:{row['rdrs']:.2f},"
                 f"throts:{int(row['throts'])},000000000000000\r\n"
             )

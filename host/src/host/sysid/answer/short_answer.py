@@ -1,0 +1,91 @@
+"""What an answer says at first: the modes and one table; the rest is for who asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from host.constants import DEG_PER_RAD
+from host.sysid.answer.estimate_lines import mode_lines
+from host.sysid.answer.marks import SMALL
+from host.sysid.answer.parameter_units import parameter_unit
+from host.sysid.answer.trust_rules import Evidence
+from host.sysid.answer.verdict import verdict_of
+from host.sysid.flight.linear_estimator import Answer
+from host.sysid.models.diagnostics import reference_values
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
+
+MOST_LINES = 40  # of the table: a screen
+# A derivative and the coefficient that stands beside it.
+COEFFICIENT_OF = {"D": "CD", "Z": "CL", "M": "Cm", "Y": "CY", "L": "Cl", "N": "Cn"}
+REST = "--full adds the constants, sensors' errors, delays, fit and every cause"
+
+
+def mode_summary(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> list[str]:
+    """Return each model's condition and its modes."""
+    lines = []
+    for answer in linear:
+        known = answer.trim.known
+        speed = f"{answer.condition.airspeed_mps:.2f} m/s" if known else "unknown airspeed"
+        alpha = f"alpha {answer.trim.alpha_rad * DEG_PER_RAD:.1f} deg"
+        lines += [f"modes, {answer.template} at {speed}, {alpha}", *mode_lines(answer)]
+    if direct and not linear:
+        flight = direct.fit.condition
+        alpha = f"alpha {flight.alpha_rad * DEG_PER_RAD:.1f} deg"
+        lines += [f"modes at {flight.airspeed_mps:.2f} m/s, {alpha}", *mode_lines(direct)]
+    return lines
+
+
+def short_table(
+    linear: Sequence[Answer], direct: CoefficientAnswer | None, evidence: Evidence
+) -> list[str]:
+    """Return one table of at most `MOST_LINES` lines: every derivative, its coefficient beside."""
+    heading = "estimate, 95 % half-width, its share, mark" + (
+        "; its coefficient" if any(a.coefficients for a in linear) else ""
+    )
+    rows = [row for answer in linear for row in _linear_rows(answer, evidence)]
+    if direct:
+        rows += list(_direct_rows(direct, evidence))
+    room = MOST_LINES - 1
+    if len(rows) > room:
+        rows = [*rows[: room - 1], f"  ... and {len(rows) - room + 1} more: --full"]
+    return [heading, *rows]
+
+
+def _linear_rows(answer: Answer, evidence: Evidence) -> Iterator[str]:
+    result, marks = answer.result, verdict_of(answer, evidence).marks
+    half = result.half_width()
+    size = reference_values(answer.model, answer.maneuvers, result.estimate)
+    beside = {c.name: f"{c.name:9s}{c.value:9.4g} +- {c.half_width:.2g}"
+              for c in answer.coefficients}  # fmt: skip
+    left = dict(beside)
+    for k, p in enumerate(answer.model.parameters):
+        if p.name.startswith("imu_"):
+            continue
+        share = float(half[k]) / max(float(size[k]), 1e-300)
+        unit = parameter_unit(answer.model, p.name)
+        row, _, signal = p.name.partition("_")
+        name = f"{COEFFICIENT_OF.get(row, '')}_{signal}"
+        left.pop(name, None)
+        yield _row(
+            p.name, float(result.estimate[k]), float(half[k]), unit, share,
+            marks.get(p.name, ""), beside.get(name, ""),
+        )  # fmt: skip
+    yield from (f"{'':64s}{text}" for text in left.values())
+
+
+def _direct_rows(answer: CoefficientAnswer, evidence: Evidence) -> Iterator[str]:
+    marks = verdict_of(answer, evidence).marks
+    for d in answer.fit.derivatives:
+        yield _row(d.name, d.value, d.half_width, "", d.share, marks[d.name], "")
+
+
+def _row(
+    name: str, value: float, half_width: float, unit: str, share: float, mark: str, beside: str
+) -> str:
+    percent = f"{100.0 * share:.0f} %" if share < 10.0 else "> 999 %"
+    mark = "small" if mark == SMALL else mark
+    text = f"  {name:12s}{value:11.5g} +- {half_width:<8.2g} {unit:8s}{percent:>7s}  {mark:15s}"
+    return f"{text}{beside}".rstrip()
