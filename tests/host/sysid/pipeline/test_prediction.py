@@ -97,6 +97,48 @@ def test_without_constants_nothing_is_fitted(saved: Path) -> None:
     assert "nothing fitted" in text
 
 
+EQUATIONS = """\
+kind = "equations"
+inputs = ["elevator_rad"]
+state_biases = ["alpha_rad", "q_radps"]
+[rates]
+alpha_rad = "-6*alpha_rad + q_radps - 0.9*elevator_rad"
+q_radps = "-80*alpha_rad + Mq*q_radps - 90*elevator_rad"
+[outputs]
+alpha_rad = "alpha_rad"
+q_radps = "q_radps + gyro_radps"
+[parameters]
+Mq = -9.0
+gyro_radps = { each_record = true, prior_sd = 0.05 }
+[[delays]]
+name = "vane_s"
+outputs = ["alpha_rad"]
+"""
+
+
+def test_equations_that_are_linear_predict_as_the_linear_model(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("host.compiled.has_compiler", lambda: False)
+    own, plain = tmp_path / "own.toml", tmp_path / "plain.toml"
+    own.write_text(EQUATIONS, encoding="utf-8")
+    text = "\n".join(f"{k} = {json.dumps(v)}" for k, v in MODEL.items() if k != "parameters")
+    numbers = "\n".join(f"{k} = {v}" for k, v in MODEL["parameters"].items())
+    plain.write_text(f'{text}\nhold = "foh"\n[parameters]\n{numbers}\n', encoding="utf-8")
+    table = recorded(2)
+    table["q_radps"] += 0.03  # a zero of the gyro is a constant of the record
+    found, expected = (
+        figures(host.predict(path, table, from_s=1.0, to_s=4.0).to_json()) for path in (own, plain)
+    )
+    for signal in ("alpha_rad", "q_radps"):
+        one, two = (f["free_simulation"][signal] for f in (found, expected))
+        assert one["nrmse"] == pytest.approx(two["nrmse"], rel=0.03), signal
+        for a, b in zip(found["windows"], expected["windows"], strict=True):
+            assert a["over_persistence"][signal] == pytest.approx(
+                b["over_persistence"][signal], rel=0.05
+            )
+
+
 def test_theil_is_what_its_definition_says() -> None:
     rng = np.random.default_rng(3)
     z, y = rng.standard_normal((200, 1)) + 2.0, 0.5 * rng.standard_normal((200, 1)) + 1.0
@@ -191,7 +233,7 @@ def test_the_verb_prints_free_and_one_step_apart(
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ('kind = "linear"\n', "of kind 'linear', expected a linear model or an aircraft"),
+        ('kind = "linear"\n', "of kind 'linear', expected a linear model, equations or"),
         ("nothing", "not TOML|cannot be read|expected"),
     ],
 )

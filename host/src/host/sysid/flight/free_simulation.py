@@ -264,11 +264,13 @@ def _states(frozen: LinearModel, maneuver: Maneuver, theta: Array) -> Array:
 def _biases(frozen: LinearModel, theta: Array) -> Biases:
     """Return the biases of constants in the order of `LinearModel.local_names`."""
     rate, output = np.zeros(len(frozen.states)), np.zeros(len(frozen.outputs))
-    count = len(frozen.state_biases)
+    count, theta = len(frozen.state_biases), theta[len(frozen.delays) :]
     for state, value in zip(frozen.state_biases, theta, strict=False):
         rate[frozen.states.index(state)] = value
     for name, value in zip(frozen.output_biases, theta[count:], strict=False):
         output[frozen.outputs.index(name)] = value
+    if isinstance(frozen, NonlinearModel):
+        return Biases(rate, output, theta[len(theta) - len(frozen.own_parameters) :])
     return Biases(rate, output)
 
 

@@ -9,14 +9,17 @@ than that predicts nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from host.arrays import Array, IntArray
 from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.discretisation import discretise
+from host.sysid.numerics.equation_recursion import simulate_equations
+from host.sysid.numerics.nonlinear_problem import NonlinearProblem, finite
 
 WINDOWS_S = (0.1, 0.5, 1.0, 2.0)
 PARTS = 4  # a window begins every quarter of its length
@@ -49,10 +52,13 @@ class WindowErrors:
 
 @dataclass(frozen=True, slots=True)
 class Biases:
-    """Biases of the state equations, (n,), and of the outputs, (p,), in one maneuver."""
+    """Biases of the state equations, (n,), and of the outputs, (p,), in one maneuver; of equations
+    also the parameters that each record has of its own.
+    """
 
     rate: Array
     output: Array
+    own: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def window_errors(
@@ -108,6 +114,8 @@ def _restarted(
     steps: int,
 ) -> Array:
     """Return the outputs after each step from measured states, (starts, steps, p)."""
+    if isinstance(model, NonlinearModel):
+        return _restarted_equations(model, maneuver, bias, free, starts, steps)
     n, m = len(model.states), len(model.inputs)
     foh = model.hold == "foh"
     none = np.zeros(0, dtype=np.int64)
@@ -126,6 +134,50 @@ def _restarted(
     for k in range(steps):
         x = np.hstack([x, driven[starts + k]]) @ step.T
         result[:, k] = x @ model.C.T + u[starts + k + 1] @ model.D.T + bias.output
+    return result
+
+
+def _restarted_equations(
+    model: NonlinearModel,
+    maneuver: Maneuver,
+    bias: Biases,
+    free: Array,
+    starts: IntArray,
+    steps: int,
+) -> Array:
+    """Return the same of equations.
+
+    A state that is no output is that of `[starts]` from what was measured, else of the free
+    simulation. What an output of its name adds to a state is taken off the measured one.
+    """
+    e, code = model.source, model.source.code
+    simulated = code.loop(simulate_equations)
+    p = model.parameter_vector(np.zeros(0), bias.own)
+    problem = NonlinearProblem(replace(model, delays=()), [maneuver])
+    problem.choose_step(problem.first_guess())
+    ramp = 1.0 if model.hold == "foh" else 0.0
+    result = np.full((len(starts), steps, len(model.outputs)), np.nan)
+    for number, k in enumerate(starts.tolist()):
+        x, added = free[k].copy(), np.zeros(len(model.outputs))
+        code.functions["readings"](
+            x, maneuver.inputs[k], p, e.constant_values, e.table_values, added
+        )
+        measured = dict(zip(model.outputs, maneuver.outputs[k].tolist(), strict=True))
+        named = dict(zip(model.inputs, maneuver.inputs[k].tolist(), strict=True)) | measured
+        guessed = e.first_states(named)
+        for row, state in enumerate(model.states):
+            if state in model.outputs:
+                place = model.outputs.index(state)
+                x[row] += measured[state] - added[place] - bias.output[place]
+            elif state in guessed:
+                x[row] = guessed[state]
+        u = np.ascontiguousarray(maneuver.inputs[k : k + steps + 1])
+        states, y = np.empty((steps + 1, len(x))), np.empty((steps + 1, len(model.outputs)))
+        if finite(
+            simulated, x, u, p, e.constant_values, e.table_values, bias.rate, maneuver.dt_s,
+            problem.substeps, ramp, states, y,
+        ):  # fmt: skip
+            result[number] = y[1:] + bias.output
     return result
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from host.sysid.answer.json_document import json_text
 from host.sysid.flight.free_simulation import frozen_at
 from host.sysid.identification_error import IdentificationError
+from host.sysid.models.equation_file import KIND as EQUATIONS
 from host.sysid.models.model_file import read_model
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.toml_document import read_document
@@ -145,10 +146,10 @@ def _saved_models(path: Path) -> list[tuple[str, LinearModel]]:
     kind = read_document(path).get("kind")
     if kind == "nonlinear":
         return aircraft_models(path)
-    if kind is not None:
+    if kind not in (None, EQUATIONS):
         raise IdentificationError(
-            f"{path}: of kind '{kind}', expected a linear model or an aircraft, as `host identify"
-            " --save-model` writes them"
+            f"{path}: of kind '{kind}', expected a linear model, equations or an aircraft, as"
+            " `host identify --save-model` writes them"
         )
     own = read_model(path)
-    return [(own.name, frozen_at(own, own.start))]
+    return [(own.name, replace(frozen_at(own, own.start), delays=()))]
