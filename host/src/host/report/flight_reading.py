@@ -25,7 +25,7 @@ from host.progress import progress_bar
 from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
 from host.readers.autopilot_summary import autopilot_meta, summarise_autopilot, summary_lines
 from host.report.shown_flight import Happening, ServoJump, ShownFlight, with_gaps
-from host.sysid.flight.flight_tables import even_columns, read_columns
+from host.sysid.flight.flight_tables import FITTED, even_columns, read_columns
 from host.sysid.flight.linear_estimator import maneuvers_of
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
 from host.sysid.identification_error import IdentificationError
@@ -134,6 +134,8 @@ def _of_rows(wanted: Wanted, path: Path) -> ShownFlight:
     calibration = load_calibration(wanted.calibration)
     rows = read_rows(path)
     table = make_table(rows, calibration, wanted.row_rate_hz)
+    if not table.rate.known:
+        raise UsageError(f"{path}: the rate of its rows is {table.rate.text}")
     summary = finite(summarise_rows(path, rows, table, calibration))
     maneuvers, notes = _maneuvers(table.columns)
     return ShownFlight(
@@ -207,7 +209,9 @@ def _maneuvers(columns: Mapping[str, Any]) -> tuple[Maneuvers, list[str]]:
     import pandas as pd
 
     try:
-        even, _ = even_columns(pd.DataFrame(dict(columns), copy=False))
+        # What the finder looks at, and what divides a maneuver where it is missing.
+        used = {name: columns[name] for name in ("t_s", "throttle", *FITTED) if name in columns}
+        even, _ = even_columns(pd.DataFrame(used, copy=False))
         return maneuvers_of(even), []
     except IdentificationError as error:
         return [], [f"no maneuvers: {shown(str(error))}"]

@@ -17,6 +17,7 @@ from host.report.strip_list import strips_of
 
 _WIDTH_IN, _STRIP_IN = 7.0, 1.15  # a page of a journal is 7 inches wide
 _MOST_POINTS = 8000  # more than a printer draws
+_OVERVIEW_POINTS = 1600  # in a write-up, whose pages are mailed
 _TINT = {"good": "#16a34a", "fair": "#d97706", "poor": "#dc2626"}
 _COLOURS = ("#0b5cad", "#c2410c", "#15803d", "#7e22ce")
 
@@ -69,6 +70,15 @@ def write_figure(
             part.unlink(missing_ok=True)
 
 
+def overview_figure(flight: ShownFlight) -> Any:
+    """Return the first strips of a flight as a figure, few points of each: for a write-up."""
+    known = {one.name: one for one in channels_of(flight)}
+    strips = [[known[c] for c in one.channels] for one in strips_of(known) if one.on]
+    mpl = _matplotlib()
+    with mpl.rc_context({"svg.hashsalt": "host", "font.size": 8}):
+        return _drawn(flight, strips, flight.t_s >= flight.t_s[0], _OVERVIEW_POINTS)
+
+
 def _wanted(known: dict[str, Channel], names: tuple[str, ...]) -> list[list[str]]:
     if not names:
         return [list(one.channels) for one in strips_of(known) if one.on]
@@ -88,7 +98,9 @@ def _matplotlib() -> Any:
     return mpl
 
 
-def _drawn(flight: ShownFlight, strips: list[list[Channel]], inside: Any) -> Any:
+def _drawn(
+    flight: ShownFlight, strips: list[list[Channel]], inside: Any, points: int = _MOST_POINTS
+) -> Any:
     from matplotlib.figure import Figure
 
     t_s = flight.t_s[inside]
@@ -96,7 +108,7 @@ def _drawn(flight: ShownFlight, strips: list[list[Channel]], inside: Any) -> Any
     axes = figure.subplots(len(strips), 1, sharex=True, squeeze=False)[:, 0]
     for axis, strip in zip(axes, strips, strict=True):
         for colour, channel in zip(_COLOURS, strip, strict=False):
-            drawn_s, values = _thinned(t_s, channel.values[inside])
+            drawn_s, values = _thinned(t_s, channel.values[inside], points)
             axis.plot(drawn_s, values, color=colour, linewidth=0.7, label=channel.name)
         _shaded(axis, flight, (t_s[0], t_s[-1]))
         axis.set_ylabel(strip[0].unit or strip[0].name)
@@ -108,10 +120,10 @@ def _drawn(flight: ShownFlight, strips: list[list[Channel]], inside: Any) -> Any
     return figure
 
 
-def _thinned(t_s: Array, values: Array) -> tuple[Array, Array]:
-    if len(t_s) <= _MOST_POINTS:
+def _thinned(t_s: Array, values: Array, points: int) -> tuple[Array, Array]:
+    if len(t_s) <= points:
         return t_s, values
-    own = buckets(t_s, _MOST_POINTS // 2)
+    own = buckets(t_s, points // 2)
     return own.t_s, min_max(values, own)
 
 

@@ -508,8 +508,9 @@ def _long_s(t: Array) -> float:
 
 def _over(grid: Array, t: Array) -> BoolArray:
     """Return where the grid lies within a long gap between the instants t."""
+    long_s = _long_s(t)
     after = np.clip(np.searchsorted(t, grid), 1, len(t) - 1)
     inside = (grid > t[after - 1]) & (grid < t[after])
-    between = inside & (t[after] - t[after - 1] > _long_s(t))
-    before, behind = (t[0] - grid[0] > _long_s(t)), (grid[-1] - t[-1] > _long_s(t))
+    between = inside & (t[after] - t[after - 1] > long_s)
+    before, behind = (t[0] - grid[0] > long_s), (grid[-1] - t[-1] > long_s)
     return np.asarray(between | (before & (grid < t[0])) | (behind & (grid > t[-1])))

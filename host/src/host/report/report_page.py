@@ -1,0 +1,187 @@
+"""The write-up of an identification as one page to mail and to print."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from host.report.fit_section import fit_table, mode_table
+from host.report.flight_page import page_text
+from host.report.flight_sections import (
+    calibration_and_preflight,
+    data_health,
+    maneuver_cards,
+    sensor_agreement,
+)
+from host.report.html_page import HtmlPage
+from host.report.html_table import items, table
+from host.report.html_text import escaped
+from host.report.json_numbers import JsonNumbers
+from host.report.model_histories import CAPTION, model_histories
+from host.report.parameter_section import method_comparison, parameter_tables
+from host.report.picture import picture
+from host.report.shown_flight import ShownFlight
+from host.report.strip_figure import overview_figure
+from host.report.track_figure import track_figure
+from host.sysid.answer.mat_file import labels
+
+if TYPE_CHECKING:
+    from host.sysid.pipeline.identification import Identification
+
+_TRUST, _CARE, _NOT = "trust", "use with care", "do not rely on"
+_FLY = ("fly", "learn")  # words of lines that say what to do next
+
+
+@dataclass(frozen=True, slots=True)
+class ReportParts:
+    """What a report is made of.
+
+    Attributes
+    ----------
+    found : Identification
+    flights : list of ShownFlight
+        Of the sources that are logs.
+    aircraft : str
+        Name or file; empty without one.
+    versions, hashes : dict of str to str
+    command : str
+        As it can be pasted.
+    sheet : (str, list of str) or None
+        Heading and lines of the preflight sheet.
+    """
+
+    found: Identification
+    flights: list[ShownFlight]
+    aircraft: str
+    versions: dict[str, str]
+    hashes: dict[str, str]
+    command: str
+    sheet: tuple[str, list[str]] | None = None
+    calibrations: dict[str, str] = field(default_factory=dict)
+
+
+def report_page(parts: ReportParts) -> str:
+    """Return the page as text; every number of the answer is that of its ``result.json``."""
+    found = parts.found
+    text = found.to_json()
+    numbers = JsonNumbers(json.loads(text))
+    sources = numbers.document["source"]
+    sources = sources if isinstance(sources, list) else [sources]
+    called = [*labels(found.linear), *(["coefficients"] if found.coefficients else [])]
+    figures = found.plot()
+    cards = maneuver_cards(parts.flights, numbers.document["answers"])
+    body = [
+        f"<h1>Identification of {escaped(parts.aircraft or 'an aircraft without a file')}</h1>",
+        f'<p class="facts">{escaped(", ".join(sources))}</p>',
+        _verdict_box(found, numbers),
+        _section("Data health", data_health(parts.flights, sources) + _findings(found)),
+        _section("Calibration and preflight",
+                 calibration_and_preflight(parts.flights, parts.calibrations, parts.sheet)),
+        _section("Flight", _overview(parts.flights)),
+        _section("Maneuvers", cards + _pictures(figures, "_input")),
+        _section("Sensor agreement", sensor_agreement(numbers)),
+        *(_answer(found, figures, numbers, at, label) for at, label in enumerate(called)),
+        _section("Methods side by side", method_comparison(numbers)),
+        _section("Modes", mode_table(numbers, called) + _pictures(figures, "_poles")),
+        _section("What to fly again", items(_advice(found))),
+        _appendix(parts, text),
+    ]  # fmt: skip
+    return HtmlPage(
+        title=f"Identification: {parts.aircraft or sources[0]}",
+        body="\n".join(body),
+        style=page_text("report.css"),
+    ).text()
+
+
+def _section(title: str, content: str) -> str:
+    return f"<section><h2>{title}</h2>{content}</section>" if content else ""
+
+
+def _verdict_box(found: Identification, numbers: JsonNumbers) -> str:
+    rows = []
+    for answer in numbers.document["answers"]:
+        by = {mark: [] for mark in (_TRUST, _CARE, _NOT)}  # type: dict[str, list[str]]
+        for name, own in answer["marks"].items():
+            by.setdefault(own["mark"], []).append(name)
+        rows.append([
+            escaped(f"{answer['template']}, {answer['method']}"),
+            *(f'<span class="{kind}">{escaped(", ".join(by[mark]) or "none")}</span>'
+              for mark, kind in ((_TRUST, "good"), (_CARE, "fair"), (_NOT, "poor"))),
+        ])  # fmt: skip
+    heads = ["model", "trust (within 10 %)", "use with care", "do not rely on"]
+    lines = "\n".join(map(escaped, found.verdict))
+    return (
+        f'<div class="verdict"><h2>Verdict</h2>{table(heads, rows, (0, 1, 2, 3))}'
+        f"<details open><summary>in words</summary><pre>{lines}</pre></details></div>"
+    )
+
+
+def _findings(found: Identification) -> str:
+    said = [*(finding.line for finding in found.findings), *found.notes]
+    return "<h3>Findings and notes</h3>" + items(said) if said else ""
+
+
+def _overview(flights: Sequence[ShownFlight]) -> str:
+    parts = []
+    for flight in flights:
+        text = f"{flight.name}: test points shaded by their grade"
+        parts.append(picture(overview_figure(flight), text))
+        track = track_figure(flight)
+        if track is not None:
+            parts.append(picture(track, f"{flight.name}: track from above, numbered by test point"))
+    return "".join(parts)
+
+
+def _pictures(figures: Mapping[str, Any], ending: str) -> str:
+    return "".join(
+        picture(figure, name.replace("_", " "))
+        for name, figure in figures.items()
+        if name.endswith(ending)
+    )
+
+
+def _answer(
+    found: Identification, figures: Mapping[str, Any], numbers: JsonNumbers, at: int, label: str
+) -> str:
+    causes: dict[str, str] = {}
+    if label in found.table.index:
+        widest = found.table.loc[label]["widened_by"]
+        causes = {str(name): str(cause) for name, cause in widest.items()}
+    parts = []
+    if at < len(found.linear):
+        parts.append(picture(model_histories(found.linear[at]), f"{label}: {CAPTION}"))
+    else:
+        parts.append(_pictures(figures, "coefficients_fit"))
+    parts.append(fit_table(numbers, at))
+    parts.append("<h3>Parameters</h3>" + parameter_tables(numbers, at, label, causes))
+    parts.append(_pictures(figures, f"{label}_intervals"))
+    return _section(f"Measured against model: {escaped(label)}", "".join(parts))
+
+
+def _advice(found: Identification) -> list[str]:
+    """Return the lines of the verdict that say what to fly or measure."""
+    return [
+        line.strip()
+        for line in found.verdict
+        if any(word in line.split() for word in _FLY) or "measure " in line
+    ] or ["nothing: the verdict asks for no other maneuver"]
+
+
+def _appendix(parts: ReportParts, text: str) -> str:
+    body = base64.b64encode(text.encode("utf-8")).decode("ascii")
+    rows = [[escaped(name), escaped(value)] for name, value in parts.versions.items()]
+    files = [
+        [escaped(name), f"<code>{escaped(value)}</code>"] for name, value in parts.hashes.items()
+    ]
+    return _section(
+        "Appendix",
+        f"<h3>Command</h3><pre>{escaped(parts.command)}</pre>"
+        f"<h3>Versions</h3>{table(['what', 'version'], rows, (0, 1))}"
+        f"<h3>Files</h3>{table(['file', 'SHA-256'], files, (0, 1))}"
+        '<h3>Numbers</h3><p><a download="result.json" id="result"'
+        f' href="data:application/json;base64,{body}">result.json</a>: all numbers of this page,'
+        " as <code>host identify --json</code> prints them.</p>",
+    )

@@ -1,0 +1,115 @@
+"""From a request to a write-up: what `host report` does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from host.errors import HostError, UsageError
+from host.files.user_text import read_text
+from host.original.rows import looks_like_rows
+from host.readers.autopilot_flight import is_autopilot_log
+from host.report.flight_reading import Wanted, read_flight
+from host.report.plotting import page_file, write_text
+from host.report.provenance import hashes, versions
+from host.report.report_page import ReportParts, report_page
+from host.report.shown_flight import ShownFlight
+from host.sysid.flight.foreign_tables import TEXT_KINDS
+from host.sysid.pipeline.stages import identify
+
+if TYPE_CHECKING:
+    from host.sysid.pipeline.identification import Identification
+
+_HEAD_BYTES = 4096
+_TABLES = (".csv", ".parquet", ".mat")
+
+
+@dataclass(frozen=True, slots=True)
+class ReportRequest:
+    """What to write up; see ``host report --help``.
+
+    Attributes
+    ----------
+    sources : list of Path
+    calibrations : list of (Path or None)
+        One of each source.
+    options : mapping
+        Further arguments of `host.identify`.
+    files : list of Path
+        Whatever else the answer rests on, for the appendix.
+    """
+
+    sources: list[Path]
+    calibrations: list[Path | None]
+    options: Mapping[str, Any]
+    command: str
+    output: Path | None = None
+    preflight: Path | None = None
+    files: list[Path] = field(default_factory=list)
+
+
+def write_report(request: ReportRequest) -> tuple[Path, Identification]:
+    """Identify, write the page, return where and what was found.
+
+    Raises
+    ------
+    HostError
+        As `host.identify`; UsageError if the place cannot be written to.
+    """
+    first = request.sources[0]
+    target = page_file(request.output, first if first.suffix else first / "flight", ".report.html")
+    if any(target.exists() and target.samefile(one) for one in request.sources):
+        raise UsageError(f"{target} is the source itself; name another file with -o")
+    sheet = _sheet(request.preflight)
+    found = identify(request.sources, **request.options)
+    rate = request.options.get("row_rate_hz")
+    flights = [
+        flight
+        for source, calibration in zip(request.sources, request.calibrations, strict=True)
+        if (flight := _flight(source, calibration, rate)) is not None
+    ]
+    calibrations = {one for one in request.calibrations if one is not None}
+    others = [one for one in request.files if one not in calibrations]
+    parts = ReportParts(
+        found=found,
+        flights=flights,
+        aircraft=str(request.options.get("aircraft") or ""),
+        versions=versions(),
+        hashes=hashes([*request.sources, *sorted(calibrations), *others]),
+        command=request.command,
+        sheet=sheet,
+        calibrations=hashes(sorted(calibrations)),
+    )
+    write_text(target, report_page(parts))
+    return target, found
+
+
+def _flight(source: Path, calibration: Path | None, rate: float | None) -> ShownFlight | None:
+    """Return a log as it is shown; None of a table, which knows nothing of its recording."""
+    if source.suffix.lower() in _TABLES:
+        return None
+    try:
+        return read_flight(_wanted(source, calibration, rate))[0]
+    except HostError:
+        if source.suffix.lower() in TEXT_KINDS:  # a table under another name
+            return None
+        raise
+
+
+def _wanted(source: Path, calibration: Path | None, rate_hz: float | None) -> Wanted:
+    if is_autopilot_log(source):
+        return Wanted(source)
+    rows = False
+    if source.is_file():
+        with source.open("rb") as file:
+            rows = looks_like_rows(file.read(_HEAD_BYTES))
+    return Wanted(source, calibration=calibration, row_rate_hz=rate_hz if rows else None)
+
+
+def _sheet(path: Path | None) -> tuple[str, list[str]] | None:
+    if path is None:
+        return None
+    text = read_text(path, UsageError, "a preflight sheet", "replace")
+    return f"Preflight sheet {path.name}", text.splitlines()

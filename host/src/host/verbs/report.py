@@ -1,0 +1,144 @@
+"""`host report`: what a flight says of the aircraft, written up in one page to mail and print."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from host.decode.newest_flight import source_or_newest
+from host.placed_arguments import StorePlaced, of_each
+
+_DESCRIPTION = """\
+Identify the aircraft from one or several flights, as `host identify` does, and write the
+answer up: verdict, health of the data, calibration, maneuvers, sensors, measured against
+model, parameters with intervals, modes, what to fly again. One HTML file without network,
+scripts or links; print it to PDF from the browser.
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "report",
+        help="write up what a flight says of the aircraft, in one page to mail",
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_files(
+        "log (also of PX4, ArduPilot), CSV, Parquet, MAT; several are fitted together;"
+        " without one the newest flight of the working folder"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="HTML",
+        help="page to write; <name>.report.html here without it",
+    )
+    parser.add_argument(
+        "--aircraft",
+        metavar="NAME",
+        help="name or file of the aircraft: gives coefficients and what widens their intervals",
+    )
+    parser.add_argument(
+        "--calibration",
+        type=Path,
+        metavar="TOML",
+        action=StorePlaced,
+        default=[],
+        help="calibration of a log: once for all, or behind each",
+    )
+    parser.add_argument(
+        "--map",
+        type=Path,
+        metavar="TOML",
+        action=StorePlaced,
+        default=[],
+        help="foreign names, units and signs: once for all, or behind each",
+    )
+    parser.add_argument(
+        "--preflight",
+        type=Path,
+        metavar="FILE",
+        help="sheet of the preflight check, shown as it is",
+    )
+    parser.add_argument(
+        "--model", action="append", metavar="NAME", help="as of `host identify`; repeatable"
+    )
+    parser.add_argument(
+        "--method",
+        action="append",
+        metavar="NAME",
+        help="as of `host identify`; several stand side by side",
+    )
+    parser.add_argument(
+        "--prior",
+        type=Path,
+        metavar="FILE",
+        help="coefficients to set beside them: TOML, AVL, Datcom",
+    )
+    parser.add_argument(
+        "--truth",
+        type=Path,
+        metavar="TOML",
+        action=StorePlaced,
+        default=[],
+        help="truth of a simulated flight; of several flights one each",
+    )
+    parser.add_argument("--row-rate", type=float, metavar="HZ", help="of original ASCII rows")
+    parser.add_argument("--no-delays", action="store_true", help="estimate no delay of a sensor")
+    parser.add_argument("--open", action="store_true", help="open the page in the browser")
+    parser.add_argument("--json", action="store_true", help="print the numbers as JSON too")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the report, say where and the verdict; return the exit code."""
+    # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from host.errors import ExitCode
+    from host.report.reporting import ReportRequest, write_report
+    from host.sysid.identification_error import IdentificationError
+    from host.sysid.pipeline.arguments import option_words
+    from host.terminal import command_line
+    from host.text import shown
+
+    sources = args.source or [source_or_newest(None)]
+    calibration = of_each("--calibration", args.calibration, len(sources))
+    given = [args.prior, *(path for _, path in (*args.map, *args.truth))]
+    files = [path for path in given if path is not None]
+    if args.aircraft and Path(args.aircraft).is_file():
+        files.append(Path(args.aircraft))
+    request = ReportRequest(
+        sources=sources,
+        calibrations=calibration if isinstance(calibration, list) else [calibration] * len(sources),
+        options={
+            "aircraft": args.aircraft,
+            "calibration": calibration,
+            "models": args.model,
+            "methods": args.method,
+            "mapping": of_each("--map", args.map, len(sources)),
+            "truth": [path for _, path in args.truth],
+            "prior": args.prior,
+            "row_rate_hz": args.row_rate,
+            "delays": not args.no_delays,
+        },
+        command=command_line("host", *sys.argv[1:]),
+        output=args.output,
+        preflight=args.preflight,
+        files=files,
+    )
+    try:
+        target, found = write_report(request)
+    except IdentificationError as error:
+        raise IdentificationError(option_words(str(error))) from error
+    print(found.to_json() if args.json else option_words("\n".join(map(shown, found.verdict))))
+    size = target.stat().st_size / 1e6
+    print(f"wrote {shown(str(target))} ({size:.2f} MB)", file=sys.stderr)
+    if args.open:
+        import webbrowser
+
+        webbrowser.open(target.resolve().as_uri())
+    return int(ExitCode.OK)
