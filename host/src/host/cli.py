@@ -28,6 +28,7 @@ VERBS = {
     "status": "show what the logger says of itself, live over USB",
     "simulate": "fly a virtual test and write the log it would leave",
     "plan": "judge planned maneuvers before they are flown",
+    "live": "receive the radio in flight: on disk, and on a page",
     "decode": "turn a log into a table in SI and say how good it is",
     "info": "say what a log is, from its head",
     "maneuvers": "find the test points of a log",

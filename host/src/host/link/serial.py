@@ -168,7 +168,7 @@ def printable(data: bytes) -> str:
 
 
 class SerialLink:
-    """An open serial port at 115200 baud, closed by ``with``.
+    """An open serial port, closed by ``with``.
 
     Opening it resets a Mega: its DTR line is wired to reset. Windows lets us open without raising
     DTR. Linux and macOS raise it themselves; there the port is told to leave DTR up when it is
@@ -178,6 +178,8 @@ class SerialLink:
     ----------
     device : str
         ``COM5``, ``/dev/ttyACM0``.
+    baud : int
+        That of the logger's USB line unless told.
 
     Raises
     ------
@@ -186,14 +188,14 @@ class SerialLink:
         goes away.
     """
 
-    def __init__(self, device: str) -> None:
+    def __init__(self, device: str, baud: int = BAUD) -> None:
         import serial
 
         self.device = device
         self._error: type[Exception] = serial.SerialException
         self._port: Any = serial.Serial()
         self._port.port = device
-        self._port.baudrate = BAUD
+        self._port.baudrate = baud
         self._port.timeout = _READ_S
         self._port.exclusive = None if sys.platform == "win32" else True
         self._port.dtr = self._port.rts = sys.platform != "win32"

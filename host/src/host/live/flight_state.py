@@ -1,0 +1,179 @@
+"""What the page's bar and tables say: recorder, card, link, sensors, servos, events, track.
+
+A consumer of the stream. Its answer is plain data; every text in it is shown as text.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from typing import Any
+
+from host.constants import RAD_PER_DEG
+from host.live.link_budget import LinkBudget
+from host.live.live_sample import LiveUpdate, SlowFrame
+from host.live.live_stream import LiveStream
+from host.live.live_track import LiveTrack
+from host.live.servo_watch import ServoWatch
+from host.text import shown
+
+_RAIL_DIVIDER = 2.0  # 10 k over 10 k (hw/pin_map.toml, net of rail)
+_RAIL_FULL = 4096.0  # sum of four conversions
+_EVENTS = 40
+_OLD_S = 3.0  # frames `system` come every second
+
+
+class FlightState:
+    """The state of a flight as received.
+
+    Parameters
+    ----------
+    stream : LiveStream
+        Subscribed to.
+    """
+
+    def __init__(self, stream: LiveStream) -> None:
+        self.link = LinkBudget()
+        self.track = LiveTrack()
+        self.servos = ServoWatch()
+        self.events: deque[dict[str, Any]] = deque(maxlen=_EVENTS)
+        self._stream = stream
+        self._last: dict[str, SlowFrame] = {}
+        self._heard_s: dict[str, float] = {}
+        self._blocks: tuple[int, float] | None = None  # and when they last grew
+        self._row: dict[str, float] = {}
+        self._numbered = 0
+        stream.subscribe(self._take)
+
+    def received(self, size_bytes: int, update: LiveUpdate) -> None:
+        """Count a portion of the stream for the link budget."""
+        heard = len(update) > 0 or bool(update.slow)
+        self.link.add(time.monotonic(), size_bytes, len(update), update.lost, heard)
+
+    def say(self, kind: str, text: str) -> dict[str, Any]:
+        """Add an event of the ground: a mark, a line that went away."""
+        self._numbered += 1
+        row = {"number": self._numbered, "kind": kind, "t_s": self._row.get("t_s", 0.0)}
+        self.events.append(row | {"text": shown(text)})
+        return self.events[-1]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return everything but the rows themselves."""
+        link = self.link.at(time.monotonic())
+        return {
+            "t_s": self._row.get("t_s", 0.0),
+            "age_s": None if math.isinf(link.age_s) else round(link.age_s, 3),
+            "silent": link.silent,
+            "rec": self._rec(link.silent),
+            "go": None,  # said by a preflight, where there was one
+            "link": {
+                "rows_per_s": round(link.rows_per_s, 1),
+                "bytes_per_s": round(link.bytes_per_s),
+                "lost_percent": round(link.lost_percent, 1),
+                "lost": self._stream.lost,
+                "rows": self._stream.rows,
+                "repeated": self._stream.repeated,
+                "damaged_bytes": self._stream.damaged_bytes,
+            },
+            "system": self._system(),
+            "gps": self._gps(),
+            "who": self._who(),
+            "jumps": dict(self.servos.jumps),
+            "wind_mps": self.track.wind_mps,
+            "track_made": self.track.made,
+            "events": list(self.events)[-8:],
+        }
+
+    def _take(self, update: LiveUpdate) -> None:
+        for text in update.told:
+            self.say("warning", text)
+        for surface in self.servos.add(update):
+            self.say("servo", f"{surface} servo jumped, its stick did not move")
+        if len(update):
+            self._row = {name: float(column[-1]) for name, column in update.rows.items()}
+        for frame in update.slow:
+            self._last[frame.name] = frame
+            self._heard_s[frame.name] = time.monotonic()
+            if frame.name == "event":
+                self._event(frame)
+            elif frame.name == "system":
+                self._written(int(frame.row["blocks_written"]))
+            elif frame.name == "gps" and self._stream.schema is not None:
+                self.track.add(self._stream.schema, frame.row, *self._motion())
+
+    def _motion(self) -> tuple[float, float, float]:
+        pair = [self._row.get(f"airspeed_{side}_mps", math.nan) for side in "ab"]
+        known = [value for value in pair if math.isfinite(value)]
+        angles = [self._row.get(f"{name}_deg", math.nan) * RAD_PER_DEG for name in ("theta", "psi")]
+        return (sum(known) / len(known) if known else math.nan), angles[0], angles[1]
+
+    def _event(self, frame: SlowFrame) -> None:
+        schema = self._stream.schema
+        if schema is not None:
+            word = schema.word("event", int(frame.row["code"])).replace("_", " ")
+            self.say("aircraft", f"{word} ({int(frame.row['arg'])})")
+
+    def _written(self, blocks: int) -> None:
+        """Note when the number of blocks on the card last grew."""
+        before = self._blocks
+        if before is None or blocks < before[0]:
+            self._blocks = (blocks, -math.inf)
+        elif blocks > before[0]:
+            self._blocks = (blocks, time.monotonic())
+
+    def _rec(self, silent: bool) -> dict[str, Any]:
+        """Recording is proven by blocks that reach the card, by nothing else."""
+        blocks, grew_s = self._blocks or (0, -math.inf)
+        known = "system" in self._last and not silent
+        advancing = time.monotonic() - grew_s < _OLD_S
+        word = "unknown" if not known else "recording" if advancing else "not recording"
+        return {"state": word, "blocks": blocks}
+
+    def _system(self) -> dict[str, Any]:
+        frame, schema = self._last.get("system"), self._stream.schema
+        if frame is None or schema is None:
+            return {}
+        row = frame.row
+        supply_mv = int(row["avcc_mv"])
+        sensors = [
+            name
+            for at, name in enumerate(schema.bits.get("sensors", ()))
+            if int(row["sensors"]) >> at & 1
+        ]
+        rail, invalid = int(row["rail"]), schema.by_name["system"].field("rail").invalid
+        known = supply_mv and rail != invalid
+        return {
+            "age_s": round(time.monotonic() - self._heard_s["system"], 1),
+            "rail_v": rail * _RAIL_DIVIDER * supply_mv / _RAIL_FULL * 1e-3 if known else None,
+            "supply_v": supply_mv * 1e-3 if supply_mv else None,
+            "frames_dropped": int(row["frames_dropped"]),
+            "card_errors": int(row["card_errors"]),
+            "not_sent": int(row["telemetry_dropped"]),
+            "sensors": sensors,
+            "drive": schema.word("drive", int(row["drive"])).replace("_", " "),
+            "uptime_s": int(row["uptime_s"]),
+        }
+
+    def _gps(self) -> dict[str, Any]:
+        frame, schema = self._last.get("gps"), self._stream.schema
+        if frame is None or schema is None:
+            return {}
+        return {
+            "age_s": round(time.monotonic() - self._heard_s["gps"], 1),
+            "fix": schema.word("gps_fix", int(frame.row["fix"])).replace("_", " "),
+            "satellites": int(frame.row["satellites"]),
+            "speed_mps": int(frame.row["ground_speed"]) * 0.01,
+        }
+
+    def _who(self) -> dict[str, str]:
+        out = {}
+        for name, field in (
+            ("identity", "board"),
+            ("identity", "firmware"),
+            ("config", "aircraft"),
+        ):
+            frame = self._last.get(name)
+            if frame is not None:
+                out[field] = shown(bytes(frame.row[field]).rstrip(b"\0"))
+        return out

@@ -1,0 +1,290 @@
+"""What `host live` does from its first byte to Ctrl-C: session, page, lines on the terminal."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from host.errors import UsageError
+from host.extras import install_hint
+from host.link.serial import DeviceError
+from host.live.ground_capture import GroundCapture, new_capture_path, utc_now
+from host.live.live_session import Audience, LiveSession
+from host.live.live_sources import (
+    RADIO_BAUD,
+    Source,
+    is_file_like,
+    port_source,
+    udp_source,
+)
+from host.live.live_stream import LiveStream
+from host.live.mavlink_bridge import MavlinkBridge, mavlink_place
+from host.live.replay import RADIO_RATE_HZ, replay_source
+from host.log.capture_head import SUFFIX, CaptureHead
+from host.physical.calibration import Calibration, load_calibration
+from host.wire.schema_text import packed_schema
+
+if TYPE_CHECKING:
+    from aiohttp import web
+
+PORT = 8050
+_TRIES = 10
+_POLL_S = 0.1
+_SILENT_S = 8.0  # the logger sends 20 rows a second and a hash every 5 s
+
+
+@dataclass(slots=True)
+class LiveRequest:
+    """What was asked for on the command line."""
+
+    source: str | None = None
+    output: Path | None = None
+    baud: int = RADIO_BAUD
+    calibration: Path | None = None
+    rate_hz: float = RADIO_RATE_HZ
+    port: int | None = None
+    lan: bool = False
+    page: bool = True
+    json: bool = False
+    mavlink: str | None = None
+    seed: int = 0
+
+
+@dataclass(slots=True)
+class LiveSummary:
+    """What came of it."""
+
+    capture: Path | None
+    size_bytes: int
+    rows: int
+    lost: int
+    extra: dict[str, int] = field(default_factory=dict)
+
+    def lines(self) -> list[str]:
+        """Return it in words."""
+        said = f"{self.rows} rows, {self.lost} did not arrive"
+        if self.capture is None:
+            return [said]
+        return [
+            f"{self.capture}: {self.size_bytes} bytes, {said}",
+            f"next: host decode {self.capture}",
+        ]
+
+
+def open_source(request: LiveRequest, tell: Callable[[str], None]) -> Source:
+    """Return what the request names; raises HostError in one line."""
+    text = request.source
+    if text is not None and text.startswith("replay:"):
+        return replay_source(text.removeprefix("replay:"), request.rate_hz)
+    if text is not None and text.startswith("sim:"):
+        try:
+            from host.live.simulated_source import SimulatedSource
+        except ImportError as error:
+            raise UsageError(
+                f"a virtual flight needs {error.name}: {install_hint(error.name)}"
+            ) from None
+        return SimulatedSource(text.removeprefix("sim:"), request.seed).open()
+    if text is not None and text.startswith("udp:"):
+        return udp_source(text)
+    if text is not None and is_file_like(text):
+        return replay_source(text, request.rate_hz)
+    return port_source(text, request.baud, tell)
+
+
+def run_live(
+    request: LiveRequest, tell: Callable[[str], None], show: Callable[[str], None]
+) -> LiveSummary:
+    """Receive until the source ends (without a page) or Ctrl-C.
+
+    Parameters
+    ----------
+    request : LiveRequest
+    tell : callable
+        Takes what happens, one line each.
+    show : callable
+        Takes lines of the answer: the state once a second with ``--json``.
+
+    Raises
+    ------
+    HostError
+        In one line: no device, a busy port, a wrong file, a missing extra.
+    """
+    calibration = load_calibration(request.calibration)
+    source = open_source(request, tell)
+    if request.mavlink is not None:
+        mavlink_place(request.mavlink)
+    texts = [packed_schema().text]
+    capture = _capture(request, source, calibration)
+    with capture if capture is not None else contextlib.nullcontext():
+        session = LiveSession(source, LiveStream(calibration, texts), capture, tell)
+        if capture is not None:
+            tell(f"every byte goes to {capture.path}")
+        bridge = MavlinkBridge(session, request.mavlink) if request.mavlink else None
+        if bridge is not None:
+            session.audiences.append(bridge)
+        if request.json:
+            session.audiences.append(_JsonLines(show))
+        try:
+            with contextlib.suppress(KeyboardInterrupt):
+                asyncio.run(_serve(request, session, tell))
+        finally:
+            session.stop()
+            if bridge is not None:
+                bridge.close()
+    if session.error is not None:
+        raise session.error
+    stream = session.stream
+    return LiveSummary(
+        capture.path if capture else None,
+        capture.size_bytes if capture else 0,
+        stream.rows,
+        stream.lost,
+    )
+
+
+def _capture(
+    request: LiveRequest, source: Source, calibration: Calibration
+) -> GroundCapture | None:
+    """Return where the bytes go; a recording played again is written only with -o."""
+    if source.recorded and request.output is None:
+        return None
+    path = request.output or Path()
+    if path.is_dir():
+        path = new_capture_path(path)
+    head = CaptureHead(
+        source=source.name,
+        baud=source.baud,
+        started_utc=utc_now(),
+        schema=packed_schema().text.decode("ascii"),
+        calibration=calibration.text,
+        calibration_name=calibration.name,
+        host=metadata.version("flight-test-host"),
+    )
+    return GroundCapture(path if path.suffix else path.with_suffix(SUFFIX), head)
+
+
+async def _serve(request: LiveRequest, session: LiveSession, tell: Callable[[str], None]) -> None:
+    """Show the page, or only receive, until the end."""
+    runner = None
+    try:
+        if request.page:
+            runner = await _page(request, session, tell)
+        session.start()
+        await _until_ended(session, tell, forever=request.page)
+    finally:
+        if runner is not None:
+            await runner.cleanup()
+
+
+async def _until_ended(session: LiveSession, tell: Callable[[str], None], *, forever: bool) -> None:
+    """Wait; say once when nothing understood has come for a while."""
+    loop = asyncio.get_running_loop()
+    began_s, said = loop.time(), False
+    while session.error is None and (forever or not session.ended.is_set()):
+        await asyncio.sleep(_POLL_S)
+        heard = session.stream.rows or session.stream.frames
+        if (
+            not said
+            and not heard
+            and loop.time() - began_s > _SILENT_S
+            and not session.source.recorded
+        ):
+            said = True
+            tell(_silence(session))
+
+
+def _silence(session: LiveSession) -> str:
+    """Say why nothing can be shown yet."""
+    size = session.capture.size_bytes if session.capture else 0
+    if not size:
+        return (
+            f"{session.source.name}: silent for {_SILENT_S:g} s; is the aircraft's power on,"
+            " and the radio's pair?"
+        )
+    baud = f" at {session.source.baud} baud" if session.source.baud else ""
+    return (
+        f"{session.source.name}: {size} bytes{baud} and no whole frame in them; expected the"
+        " logger's telemetry: another baud rate (--baud)? They are recorded all the same"
+    )
+
+
+async def _page(
+    request: LiveRequest, session: LiveSession, tell: Callable[[str], None]
+) -> web.AppRunner:
+    try:
+        from aiohttp import web
+
+        from host.live.page_guard import PageGuard
+        from host.live.page_server import PageServer
+    except ImportError as error:
+        raise UsageError(
+            f"the page needs {error.name}: {install_hint(error.name)}; or --no-page"
+        ) from None
+    listener = _listener(request)
+    port = listener.getsockname()[1]
+    guard = PageGuard(port, tuple(own_addresses()) if request.lan else ())
+    runner = web.AppRunner(PageServer(session, guard).application(), access_log=None)
+    await runner.setup()
+    await web.SockSite(runner, listener, backlog=256).start()
+    tell(f"page: http://127.0.0.1:{port}/?token={guard.pilot_token}")
+    for address in guard.addresses:
+        tell(f"viewers: http://{address}:{port}/?token={guard.viewer_token} (they only look)")
+    tell(f"Google Earth: http://127.0.0.1:{port}/live.kml?token={guard.viewer_token}")
+    tell("Ctrl-C ends")
+    return runner
+
+
+def _listener(request: LiveRequest) -> socket.socket:
+    """Return a listening socket: of the port asked for, else of the first free one from 8050."""
+    host = "0.0.0.0" if request.lan else "127.0.0.1"
+    ports = [request.port] if request.port is not None else range(PORT, PORT + _TRIES)
+    for port in ports:
+        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        if hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows: nobody else may take it too
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+        else:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((host, port))
+        except OSError:
+            listener.close()
+            continue
+        return listener
+    raise DeviceError(
+        f"{host}: port {ports[0]} is taken, by another `host live`?; name another with --port"
+    )
+
+
+def own_addresses() -> list[str]:
+    """Return the addresses of this computer in its networks; asks nobody."""
+    found = []
+    with contextlib.suppress(OSError):
+        found += socket.gethostbyname_ex(socket.gethostname())[2]
+    with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.connect(("192.0.2.1", 9))  # sends nothing: it only picks a way out
+        found.append(str(probe.getsockname()[0]))
+    return sorted({one for one in found if not one.startswith("127.")})
+
+
+class _JsonLines(Audience):
+    """The state, one line of JSON a second."""
+
+    def __init__(self, show: Callable[[str], None]) -> None:
+        self._show = show
+        self._last = 0
+
+    def rows(self, message: bytes) -> None:
+        """Not shown."""
+
+    def state(self, message: str) -> None:
+        """Show every fifth: five come in a second."""
+        self._last += 1
+        if self._last % 5 == 1:
+            self._show(json.dumps(json.loads(message)))

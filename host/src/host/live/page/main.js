@@ -1,0 +1,114 @@
+// Puts the page together: rows into the history, thirty redraws a second, the state five times.
+
+import { connect } from "./connection.js";
+import { History } from "./history.js";
+import { showAge, showState } from "./panel.js";
+import { Plan } from "./plan.js";
+import { Plots } from "./plots.js";
+import { Sound } from "./sound.js";
+
+const REDRAW_MS = 1000 / 30;
+const OLD_S = 1;
+const GAPS = 4000; // latencies kept for the bench
+
+const byId = (id) => document.getElementById(id);
+const plan = new Plan(byId("plan"));
+const sound = new Sound(byId("sound"));
+const measured = { redraws: 0, latencies: [], rows: 0 };
+let history = null;
+let plots = null;
+let state = null;
+let stateAt = -Infinity;
+let marked = 0;
+let connected = false;
+let wasOld = false;
+
+const server = connect({
+  onHello(hello) {
+    history = new History(hello.columns, hello.window_s);
+    if (plots === null) plots = new Plots(byId("plots"));
+    byId("mark").hidden = !hello.may_mark;
+    connected = true;
+    plan.points = [];
+  },
+  onRows(numbers) {
+    history.add(numbers);
+    measured.rows += numbers[1];
+  },
+  onState(said) {
+    state = said;
+    stateAt = performance.now();
+    document.body.classList.remove("waiting");
+    plan.wind = said.wind_mps;
+    if (said.track.length) plan.add(said.track);
+    showState(said);
+    const marks = said.events.filter((event) => event.kind === "mark").length;
+    if (marks > marked) sound.play([660]);
+    marked = marks;
+  },
+  onClosed() {
+    connected = false;
+  },
+});
+
+function ageS() {
+  if (state === null || state.age_s === null) return null;
+  return state.age_s + (performance.now() - stateAt) / 1000;
+}
+
+function banner(age) {
+  if (!connected) return "host live has ended, or this page lost it: nothing here is new";
+  if (state === null) return "";
+  if (state.ended) return "the source has ended: nothing here is new";
+  if (age === null) return "nothing received yet";
+  return age > OLD_S ? `no data for ${age.toFixed(0)} s: values are old` : "";
+}
+
+function tell() {
+  if (history === null || plots === null) return;
+  const age = connected ? ageS() : null;
+  const old = age === null || age > OLD_S;
+  document.body.classList.toggle("old", old);
+  if (old && !wasOld) sound.play([440, 330]);
+  wasOld = old;
+  showAge(age, banner(age));
+  plots.say(history, state ? state.jumps : {});
+  const pair = ["airspeed_a_mps", "airspeed_b_mps"].map((one) => history.last(one)).filter((one) => one !== null);
+  byId("airspeed").textContent = pair.length ? (pair.reduce((a, b) => a + b) / pair.length).toFixed(1) : "-";
+  const points = plan.points;
+  byId("height").textContent = points.length ? points[points.length - 1][2].toFixed(0) : "-";
+  byId("plan-text").textContent = plan.text();
+  plan.draw(history.last("psi_deg"));
+}
+
+function redraw() {
+  if (history === null || plots === null || performance.now() - history.lastAt > 1500) return;
+  plots.draw(history);
+  measured.redraws += 1;
+  const now = Date.now();
+  const arrived = history.arrived.splice(0);
+  if (state !== null) measured.latencies.push(...arrived.map((at) => now - at)); // else kept ones
+  if (measured.latencies.length > GAPS) measured.latencies.splice(0, GAPS / 2);
+}
+
+let due = 0;
+
+function frame(now) {
+  if (now >= due) {
+    due = Math.max(due + REDRAW_MS, now - REDRAW_MS);
+    redraw();
+  }
+  requestAnimationFrame(frame);
+}
+
+byId("mark").addEventListener("click", () => server.mark());
+document.addEventListener("keydown", (event) => {
+  if (event.code !== "Space" || event.repeat || event.target instanceof HTMLButtonElement) return;
+  event.preventDefault();
+  server.mark();
+});
+if (location.search) window.history.replaceState(null, "", location.pathname);
+window.hostLive = measured;
+setInterval(tell, 200);
+setInterval(() => plots && plots.describe(), 1000);
+requestAnimationFrame(frame);

@@ -1,0 +1,75 @@
+// Lamps, figures, facts and events. Every text is set as text: a stranger's words stay words.
+
+const byId = (id) => document.getElementById(id);
+const figure = (value, digits) => (value === null || value === undefined ? "-" : value.toFixed(digits));
+
+function lamp(id, word, kind) {
+  byId(id).className = `lamp ${kind}`;
+  const text = byId(`${id}-text`);
+  if (text.textContent !== word) text.textContent = word;
+}
+
+function fact(list, name, value, bad = false) {
+  const term = document.createElement("dt");
+  term.textContent = name;
+  const said = document.createElement("dd");
+  said.textContent = value;
+  said.title = value;
+  if (bad) said.className = "bad";
+  list.append(term, said);
+}
+
+export function showState(state) {
+  const { rec, link, system, gps } = state;
+  const recording = rec.state === "recording";
+  lamp("rec", recording ? `${rec.blocks} blocks` : rec.state, recording ? "good" : rec.state === "unknown" ? "" : "bad");
+  const go = state.go;
+  lamp("go", go === null ? "no preflight" : go ? "GO" : "NO-GO", go === null ? "" : go ? "good" : "bad");
+  byId("link-rate").textContent = figure(link.rows_per_s, 0);
+  byId("link-lost").textContent = figure(link.lost_percent, 1);
+  byId("link-lost").parentElement.classList.toggle("bad", link.lost_percent > 5);
+  byId("gps").textContent = gps.satellites ?? "-";
+  byId("gps-fix").textContent = gps.fix ?? "satellites";
+  byId("rail").textContent = figure(system.rail_v, 2);
+  byId("supply").textContent = figure(system.supply_v, 2);
+  showFacts(state, link, system);
+  showEvents(state.events);
+}
+
+function showFacts(state, link, system) {
+  const list = document.createDocumentFragment();
+  const captured = state.captured_bytes === null ? "a replay: none" : `${(state.captured_bytes / 1000).toFixed(1)} kB`;
+  fact(list, "ground capture", captured);
+  fact(list, "rows, lost", `${link.rows}, ${link.lost}`);
+  fact(list, "bytes/s, damaged", `${link.bytes_per_s}, ${link.damaged_bytes}`, link.damaged_bytes > 0);
+  fact(list, "not sent by radio", system.not_sent ?? "-");
+  fact(list, "card: dropped, errors", `${system.frames_dropped ?? "-"}, ${system.card_errors ?? "-"}`, system.frames_dropped > 0 || system.card_errors > 0);
+  fact(list, "servos by", system.drive ?? "-");
+  fact(list, "heard of", (system.sensors ?? []).join(", ") || "-");
+  list.lastChild.className = "long";
+  fact(list, "aircraft, image", [state.who.aircraft, state.who.firmware].filter(Boolean).join(", ") || "-");
+  fact(list, "viewers", String(state.viewers));
+  fact(list, "from", state.source);
+  byId("facts").replaceChildren(list);
+}
+
+let lastEvent = 0;
+
+function showEvents(events) {
+  const newest = events.length ? events[events.length - 1].number : 0;
+  if (newest === lastEvent) return;
+  lastEvent = newest;
+  const rows = events.slice().reverse().map((event) => {
+    const row = document.createElement("li");
+    row.className = event.kind;
+    row.textContent = `${event.t_s.toFixed(1)} s  ${event.text}`;
+    return row;
+  });
+  byId("events").replaceChildren(...rows);
+}
+
+export function showAge(ageS, banner) {
+  byId("link-age").textContent = ageS === null ? "-" : ageS < 100 ? ageS.toFixed(1) : ageS.toFixed(0);
+  byId("age-figure").classList.toggle("bad", ageS === null || ageS > 1);
+  if (byId("banner").textContent !== banner) byId("banner").textContent = banner;
+}

@@ -1,0 +1,59 @@
+"""Servo jumps as they come: what the log's own rule finds in the last rows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from host.live.live_sample import LiveUpdate
+from host.log.servo_jumps import servo_jumps
+
+SURFACES = ("elevator", "aileron", "rudder", "throttle")
+_KEPT_S = 1.5  # a jump is back within 0.15 s, and 0.1 s before it is looked at
+_EVERY_S = 0.25
+
+
+class ServoWatch:
+    """Counts jumps of each surface."""
+
+    def __init__(self) -> None:
+        self.jumps = dict.fromkeys(SURFACES, 0)
+        self._counted_s = dict.fromkeys(SURFACES, -np.inf)
+        self._looked_s = -np.inf
+        self._rows: dict[str, NDArray[np.float64]] = {}
+        self._drives: NDArray[np.bool_] = np.empty(0, bool)
+
+    def add(self, update: LiveUpdate) -> list[str]:
+        """Take more rows; return the surface of each jump found."""
+        if not len(update):
+            return []
+        t_s = self._joined("t_s", update.rows["t_s"])
+        self._drives = np.r_[self._drives, update.mega_drives]
+        for surface in SURFACES:
+            for name in (f"servo_{surface}_us", f"rc_{surface}_us"):
+                self._joined(name, update.rows[name])
+        if t_s[-1] - self._looked_s < _EVERY_S and t_s[-1] >= self._looked_s:
+            return []
+        self._looked_s = float(t_s[-1])
+        found = [surface for surface in SURFACES for _ in range(self._new(surface))]
+        keep = t_s > t_s[-1] - _KEPT_S
+        self._rows = {name: column[keep] for name, column in self._rows.items()}
+        self._drives = self._drives[keep]
+        return found
+
+    def _joined(self, name: str, new: NDArray[np.float64]) -> NDArray[np.float64]:
+        self._rows[name] = np.r_[self._rows[name], new] if name in self._rows else new
+        return self._rows[name]
+
+    def _new(self, surface: str) -> int:
+        at_s = servo_jumps(
+            self._rows["t_s"],
+            self._rows[f"servo_{surface}_us"],
+            self._rows[f"rc_{surface}_us"],
+            self._drives,
+        )
+        new = at_s[at_s > self._counted_s[surface]]
+        if len(new):
+            self._counted_s[surface] = float(new[-1])
+            self.jumps[surface] += len(new)
+        return len(new)

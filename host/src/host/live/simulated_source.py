@@ -1,0 +1,60 @@
+"""A virtual flight received as it is flown: the recorder's own program in real time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Self
+
+from host.live.live_sources import Tell
+from host.twin.flight.fly import fly
+from host.twin.recorder import sitl
+from host.twin.recorder.recorder_build import recorder_library
+from host.twin.recorder.sitl_radio import radio
+from host.twin.recorder.stimuli import stimuli
+from host.twin.sensors.local_flow import air_data
+from host.twin.testcard import cards
+
+
+@dataclass(slots=True)
+class SimulatedSource:
+    """The radio of a virtual flight.
+
+    Parameters
+    ----------
+    card : str
+        Name or file, as `host simulate` takes it.
+    seed : int
+    """
+
+    card: str
+    seed: int = 0
+    baud: int = 0
+    recorded: bool = False
+
+    @property
+    def name(self) -> str:
+        """As on the command line."""
+        return f"sim:{self.card}"
+
+    def open(self) -> Self:
+        """Read the card and find the recorder, before anything is made for the flight."""
+        cards.load(self.card)
+        recorder_library()
+        return self
+
+    def portions(self, tell: Tell) -> Iterator[bytes]:
+        """Yield what the radio sends, in real time; HostError if the card cannot fly."""
+        card = cards.load(self.card)
+        tell(f"flying {self.card} (a few seconds)")
+        record = fly(card, seed=self.seed)
+        given = stimuli(record, air_data(record))
+        rate_hz = sitl.recorder_rate_hz(card.flight.rate_hz)
+        start_s = time.monotonic()
+        for sent in radio(given, rate_hz=rate_hz, aircraft=record.aircraft.name):
+            wait_s = start_s + sent.t_s - time.monotonic()
+            if wait_s > 0.0:
+                time.sleep(wait_s)
+            yield sent.data
+        tell(f"the flight of {self.card} is over")

@@ -1,0 +1,104 @@
+"""`host live`: the flight as it is received, on disk first, on a page then."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from host.terminal import bare
+
+_DESCRIPTION = """\
+Receive the logger's radio: every byte goes to disk first, then to a page in the
+browser. Listens only: nothing is ever sent to the aircraft. SOURCE is
+
+  nothing               the one port that looks like a radio's (a Mega is not tried)
+  COM5, /dev/ttyUSB0    a port; opening a Mega's port resets it: never in flight
+  udp:14600             datagrams at this UDP port (udp:HOST:PORT: at another address)
+  replay:FILE[@10x]     a log of the card or a ground capture, as the radio had sent it
+  FILE                  the same; @max as fast as it can be decoded
+  sim:CARD              a virtual flight (host simulate), flown now
+"""
+_EPILOG = """\
+Captures are read by `host decode`, `maneuvers` and `identify` like any log. Viewers of
+--lan only look. Ctrl-C ends. More: host/LIVE.md, a day at the field: host/FIELD.md.
+exit codes: 0 ok, 2 usage, 4 not a log, 5 no radio, or its port is busy or gone
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "live",
+        help="receive the radio in flight: on disk, and on a page",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("source", nargs="?", metavar="SOURCE", help="see above")
+    parser.add_argument("-o", "--output", type=Path, metavar="PATH",
+                        help="capture's file or folder; the working folder without it,"
+                        " of a replay none")  # fmt: skip
+    parser.add_argument("--calibration", type=Path, metavar="FILE",
+                        help="counts to SI; a copy goes into the capture's head")  # fmt: skip
+    parser.add_argument("--baud", type=_whole, default=57600, metavar="N",
+                        help="of the radio's port (default 57600)")  # fmt: skip
+    parser.add_argument("--rate", type=_rate, default=20.0, metavar="HZ",
+                        help="rows a second of a replay, as far as it has them (default 20, as the"
+                        " radio)")  # fmt: skip
+    parser.add_argument("--port", type=_whole, metavar="N",
+                        help="of the page; the first free one from 8050 without it")  # fmt: skip
+    parser.add_argument("--lan", action="store_true",
+                        help="let others in this network look, by the address it"
+                        " prints")  # fmt: skip
+    parser.add_argument("--no-page", action="store_true",
+                        help="capture only; ends with a replay's end")  # fmt: skip
+    parser.add_argument("--mavlink", metavar="udpout:HOST:PORT",
+                        help="tell a ground station: QGroundControl, Mission Planner,"
+                        " MAVProxy")  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print the state once a second as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Receive until Ctrl-C."""
+    from host.errors import ExitCode
+    from host.live.live_program import LiveRequest, run_live
+
+    def tell(text: str) -> None:
+        print(f"host: {text}", file=sys.stderr, flush=True)
+
+    request = LiveRequest(
+        source=args.source,
+        output=args.output,
+        baud=args.baud,
+        calibration=args.calibration,
+        rate_hz=args.rate,
+        port=args.port,
+        lan=args.lan,
+        page=not args.no_page,
+        json=args.json,
+        mavlink=args.mavlink,
+    )
+    summary = run_live(request, tell, lambda line: print(line, flush=True))
+    if sys.stderr.isatty():
+        bare(sys.stderr).write("\r")
+    for line in summary.lines():
+        tell(line)
+    return int(ExitCode.OK)
+
+
+def _whole(text: str) -> int:
+    if not text.isdecimal() or not 0 < int(text) < 10_000_000:
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number above 0")
+    return int(text)
+
+
+def _rate(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 1.0 <= value <= 1000.0:
+        raise argparse.ArgumentTypeError(f"{text} is not a rate between 1 and 1000 Hz")
+    return value

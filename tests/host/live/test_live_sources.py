@@ -1,0 +1,258 @@
+"""Where `host live` listens: lines that vanish, half frames, busy ports, and a Mega left alone."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from host.cli import main
+from host.link.serial import DeviceError, SerialPort
+from host.live import live_sources
+from host.live.live_session import LiveSession
+from host.live.live_sources import PortSource, UdpSource, choose_radio
+from host.live.live_stream import LiveStream
+from host.log import read_log
+from host.log.capture_head import read_capture_head
+from host.physical.calibration import load_calibration
+
+from tests.host.live.radio import joined, sent
+from tests.host.test_ports_status import Wire, computer, one_line
+
+STREAM = joined(sent(6.0))
+ROWS = len([part for part in sent(6.0) if part.is_ident])
+MEGA, CLONE, XBEE = (0x2341, 0x0042), (0x1A86, 0x7523), (0x0403, 0x6001)
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    one = Wire()
+    yield one
+    one.close()
+
+
+def take(portions: Iterator[bytes], size: int) -> bytes:
+    found = b""
+    end = time.monotonic() + 60
+    while len(found) < size and time.monotonic() < end:
+        found += next(portions)
+    return found
+
+
+# ------------------------------------------------------------------------------------ new users
+
+
+def test_no_device(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    computer(monkeypatch)
+    assert main(["live"]) == 5
+    assert "no radio found" in one_line(capsys)
+
+
+def test_a_mega_is_never_opened_to_search(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def opened(*_: object) -> None:
+        raise AssertionError("a port was opened")
+
+    monkeypatch.setattr(live_sources, "SerialLink", opened)
+    for ids in (MEGA, CLONE):
+        computer(monkeypatch, ("/dev/ttyACM0", *ids))
+        assert main(["live"]) == 5
+        assert "opening it resets the Mega" in one_line(capsys)
+
+
+def test_two_radios_are_named(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    computer(monkeypatch, ("COM4", *XBEE), ("COM7", *XBEE), ("COM3", *MEGA))
+    assert main(["live"]) == 2
+    assert "COM4, COM7 may each be the radio" in one_line(capsys)
+
+
+def test_the_radio_is_found_beside_a_mega() -> None:
+    ports = [
+        SerialPort("/dev/cu.usbmodem1", "", *MEGA),
+        SerialPort("/dev/cu.usbserial-A1", "", *XBEE),
+        SerialPort("/dev/cu.Bluetooth", ""),
+    ]
+    assert choose_radio(ports).device == "/dev/cu.usbserial-A1"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        (["COM77"], 5, "no such port"),
+        (["nowhere.radio"], 2, "no such file"),
+        (["replay:nowhere.bin@3x"], 2, "no such file"),
+        (["replay:x@0x"], 2, "more than 0"),
+        (["udp:99999"], 2, "up to 65535"),
+        (["udp:203.0.113.5:14600"], 5, "not this computer's"),
+        (["noise.radio"], 4, "not one intact block"),
+        (["sim:nothing"], 2, "nothing"),
+        (["flight.radio", "--rate", "0"], 2, "between 1 and 1000"),
+        (["flight.radio", "--baud", "x"], 2, "whole number"),
+        (["flight.radio", "--calibration", "noise.radio"], 2, "TOML"),
+        (["flight.radio", "-o", "flight.radio"], 2, "never writes over"),
+        (["flight.radio", "-o", "no/folder/x.radio"], 2, "cannot be made"),
+        (["flight.radio", "--mavlink", "nonsense"], 2, "udpout:HOST:PORT"),
+    ],
+)
+def test_what_goes_wrong_is_one_line(
+    arguments: list[str],
+    code: int,
+    says: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("flight.radio").write_bytes(STREAM)
+    Path("noise.radio").write_bytes(bytes(range(256)) * 8)
+    try:
+        assert main(["live", *arguments, "--no-page"]) == code
+    except SystemExit as ended:  # argparse
+        assert ended.code == code
+    err = capsys.readouterr().err
+    assert says in err
+    assert "Traceback" not in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["flight.radio", "noise.radio"]
+
+
+def test_a_busy_port_is_one_line(
+    wire: Wire, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    computer(monkeypatch)
+    first = PortSource(wire.device).open()
+    assert main(["live", wire.device, "--no-page"]) == 5
+    assert "busy: another program has it open" in one_line(capsys)
+    del first
+
+
+# ------------------------------------------------------------------------------------ the line
+
+
+def test_every_byte_is_on_disk_and_decodes(tmp_path: Path, wire: Wire) -> None:
+    """From a port, with Ctrl-C at its end, in a process of its own."""
+    command = [sys.executable, "-m", "host", "live", wire.device, "--no-page", "-o", "out.radio"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as live:
+        assert live.stderr is not None
+        assert "every byte goes to out.radio" in live.stderr.readline()
+        data = b"half a frame" + STREAM[7:]
+        for at in range(0, len(data), 1000):
+            os.write(wire.end, data[at : at + 1000])
+        end = time.monotonic() + 60
+        while (tmp_path / "out.radio").stat().st_size < len(data):
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        live.send_signal(2)
+        err = live.communicate(timeout=60)[1]
+    assert live.returncode == 0, err
+    assert f"{ROWS} rows, 0 did not arrive" in err or f"{ROWS - 1} rows" in err
+    assert (tmp_path / "out.radio").read_bytes() == data
+    assert len(read_log(tmp_path / "out.radio").frames["ident"]) >= ROWS - 1
+    head = read_capture_head(tmp_path / "out.radio")
+    assert head is not None
+    assert (head.baud, head.source, head.calibration_name) == (57600, wire.device, "default")
+
+
+def test_a_line_that_goes_away_comes_back(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+
+    class Flaky:
+        """Gives three portions, goes away, is missing twice, and is back."""
+
+        def __init__(self, device: str, baud: int) -> None:
+            opened.append(device)
+            if len(opened) in (2, 3):
+                raise DeviceError("no such port")
+            self.left = 3
+
+        def __enter__(self) -> "Flaky":
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+        def data(self) -> bytes:
+            if not self.left:
+                raise DeviceError("went away")
+            self.left -= 1
+            return b"abc"
+
+    monkeypatch.setattr(live_sources, "SerialLink", Flaky)
+    monkeypatch.setattr(live_sources, "_AGAIN_S", 0.0)
+    told: list[str] = []
+    portions = PortSource("COM5").open().portions(told.append)
+    assert take(portions, 18) == b"abc" * 6
+    assert told == [
+        "COM5 went away; waiting for it, what came is on disk",
+        "COM5 is back",
+    ]
+
+
+def test_datagrams_are_received() -> None:
+    source = UdpSource("127.0.0.1", 0).open()
+    assert source._listener is not None
+    place = source._listener.getsockname()
+    portions = source.portions(lambda _: None)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for at in range(0, 3000, 300):
+            sender.sendto(STREAM[at : at + 300], place)
+        assert take(portions, 3000) == STREAM[:3000]
+
+
+def test_a_wrong_baud_rate_is_told(tmp_path: Path) -> None:
+    from host.live.live_program import _silence
+
+    class Garbled:
+        name, baud, recorded = "COM5", 9600, False
+
+    class Capture:
+        size_bytes = 4000
+
+    session = LiveSession(Garbled(), LiveStream(load_calibration()), Capture(), print)  # type: ignore[arg-type]
+    assert "4000 bytes at 9600 baud and no whole frame" in _silence(session)
+
+
+def test_an_unknown_schema_is_recorded_and_told_once(tmp_path: Path) -> None:
+    from tests.protocol.log_writer import envelope
+
+    told = envelope(b"\0\xef\xbe\xad\xde")
+    (tmp_path / "in.radio").write_bytes(b"")
+    stream = LiveStream(load_calibration())
+    said = [text for _ in range(3) for text in stream.feed(told, 0.0).told]
+    assert len(said) == 1
+    assert "deadbeef" in said[0]
+
+
+def test_frames_before_the_first_hash_are_decoded_with_it() -> None:
+    stream = LiveStream(load_calibration())
+    rows = sum(len(stream.feed(part.data, 0.0)) for part in sent(6.0))
+    assert rows == ROWS
+
+
+def test_lost_rows_are_counted_as_in_the_file() -> None:
+    parts = sent(6.0)
+    idents = [at for at, part in enumerate(parts) if part.is_ident]
+    kept = [part for at, part in enumerate(parts) if at not in idents[60:64]]
+    stream = LiveStream(load_calibration())
+    for part in kept:
+        stream.feed(part.data, 0.0)
+    assert stream.lost == 4
+
+
+def test_json_lines_say_the_state(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("flight.radio").write_bytes(STREAM)
+    assert main(["live", "flight.radio@4x", "--no-page", "--json"]) == 0
+    captured = capsys.readouterr()
+    lines = [json.loads(line) for line in captured.out.splitlines()]
+    assert {line["type"] for line in lines} == {"state"}
+    assert lines[-1]["link"]["rows"] > 0
+    assert f"{ROWS} rows, 0 did not arrive" in captured.err

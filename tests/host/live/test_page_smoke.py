@@ -1,0 +1,86 @@
+"""`host live` as a user starts it, seen through a browser: one start for everything."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from tests.browser.chromium import PHONE, Chromium
+from tests.host.live.radio import Sent, joined, sent
+from tests.protocol.log_writer import envelope, rows
+
+HANGS_S = 300  # ends a test that hangs; none is timed
+PLANTED = b"<script>x=1"  # twelve characters of identity.board
+
+
+def planted(seconds: float) -> bytes:
+    """Return a stream whose board and aircraft names are markup."""
+    parts = sent(seconds)
+    at = parts[len(parts) // 4]
+    who = rows("identity", 1, t_us=np.array([at.t_us], np.uint32), board=PLANTED)
+    config = rows("config", 1, t_us=np.array([at.t_us], np.uint32), aircraft=b"<img src=x>")
+    more = [Sent(at.t_us, envelope(one.tobytes())) for one in (who, config)]
+    return joined(sorted([*parts, *more], key=lambda part: part.t_us))
+
+
+def test_the_page_shows_the_flight_and_asks_nobody_else(tmp_path: Path) -> None:
+    (tmp_path / "in.radio").write_bytes(planted(60.0))
+    command = ("live", "in.radio@4x", "-o", "<b>out.radio", "--json")
+    with subprocess.Popen(
+        [sys.executable, "-m", "host", *command],
+        cwd=tmp_path, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+    ) as live:  # fmt: skip
+        assert live.stderr is not None
+        url = ""
+        for line in live.stderr:
+            if found := re.search(r"page: (http://127\.0\.0\.1:\d+/\?token=\S+)", line):
+                url = found[1]
+                break
+        try:
+            look(url, tmp_path)
+        finally:
+            live.send_signal(signal.SIGINT)
+        out, err = live.communicate(timeout=HANGS_S)
+    assert live.returncode == 0, err
+    assert "Traceback" not in err
+    assert "next: host decode" in err
+    notes = (tmp_path / "<b>out.radio.jsonl").read_text().splitlines()
+    assert json.loads(notes[0])["source"] == "replay:in.radio@4x"
+    assert [json.loads(one)["kind"] for one in notes[1:]].count("mark") == 1
+    assert json.loads(out.splitlines()[-1])["link"]["damaged_bytes"] == 0
+
+
+def look(url: str, folder: Path) -> None:
+    """Do what a pilot does, and what a stranger's text would do."""
+    with Chromium() as browser:
+        page = browser.open(url)
+        page.wait_for("window.hostLive && hostLive.redraws > 20 && hostLive.rows > 100", 60)
+        assert page.evaluate("document.querySelectorAll('#plots .plot canvas').length") == 12
+        assert page.evaluate("location.search") == ""  # the token is out of sight
+        page.wait_for("document.querySelector('#facts').textContent.includes('<img src=x>')", 60)
+        assert page.evaluate("document.querySelectorAll('#facts img, #facts script').length") == 0
+        page.press(" ", "Space", " ")
+        page.wait_for("document.querySelector('#events').textContent.includes('mark 1')")
+        page.click("#sound")
+        page.wait_for("document.querySelector('#sound').getAttribute('aria-pressed') === 'true'")
+        page.screenshot(folder / "laptop.png")
+        page.resize(PHONE)
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        assert wide <= PHONE[0], "a phone must not scroll sideways"
+        # A second of silence makes every value grey.
+        page.wait_for("document.body.classList.contains('old')", 120)
+        grey = page.evaluate("getComputedStyle(document.querySelector('#airspeed')).color")
+        assert grey == "rgb(154, 154, 154)"
+        unnamed = "[...document.querySelectorAll('canvas, [role=img], button')].filter((one) =>"
+        unnamed += " !one.closest('[aria-label]') && !one.textContent).length"
+        assert page.evaluate(unnamed) == 0
+        base = url.partition("?")[0]
+        others = [one for one in page.requests if not one.startswith((base, "ws" + base[4:]))]
+        assert others == []
+        assert page.console_errors == []
