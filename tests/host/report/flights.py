@@ -13,7 +13,7 @@ NAME = "<img src=x onerror=alert(1)>\x01\x0b\"'&.bin"
 DOUBLETS_S = (8.0, 20.0, 33.0)
 JUMP_S = 15.0
 LOST_S = (27.0, 28.0)
-_COUNTS = 240  # of the elevator's potentiometer, about 5 deg
+_COUNTS = 140  # of the elevator's potentiometer, about 10 deg
 
 
 def planted_flight(seconds: float = 40.0, *, rate_hz: int = 100) -> bytes:
@@ -26,11 +26,20 @@ def planted_flight(seconds: float = 40.0, *, rate_hz: int = 100) -> bytes:
     rows = ident.rows
     rows["valid"] |= 1 << 15  # the Mega drives
     rows["pot_elevator"] = 2048 + _COUNTS * move
+    for name in ("pot_aileron_left", "pot_aileron_right", "pot_rudder"):
+        rows[name] = 2048
     rows["q"] = -2000 * np.convolve(move, np.exp(-t_s[:rate_hz] / 0.3))[: len(t_s)] / 30
     rows["dp_a"] = rows["dp_b"] = 2300
     rows["rc_elevator"] = rows["servo_elevator"] = 3000 + 100 * move
     rows["servo_elevator"][round(JUMP_S * rate_hz) : round((JUMP_S + 0.06) * rate_hz)] += 120
-    for name in ("rc_aileron", "servo_aileron", "rc_rudder", "servo_rudder"):
+    for name in (
+        "rc_aileron",
+        "servo_aileron",
+        "rc_rudder",
+        "servo_rudder",
+        "rc_throttle",
+        "servo_throttle",
+    ):
         rows[name] = 3000
     writer = LogWriter()
     writer.begin(rate_hz=rate_hz, t_us=0)

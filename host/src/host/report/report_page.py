@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from host.report.embedded_picture import picture
 from host.report.fit_section import fit_table, mode_table
 from host.report.flight_page import page_text
 from host.report.flight_sections import (
@@ -22,7 +23,6 @@ from host.report.html_text import escaped
 from host.report.json_numbers import JsonNumbers
 from host.report.model_histories import CAPTION, model_histories
 from host.report.parameter_section import method_comparison, parameter_tables
-from host.report.picture import picture
 from host.report.shown_flight import ShownFlight
 from host.report.strip_figure import overview_figure
 from host.report.track_figure import track_figure

@@ -65,6 +65,10 @@ def add_parser(subparsers: Any) -> None:
         metavar="FILE",
         help="sheet of the preflight check, shown as it is",
     )
+    _add_answer_arguments(parser)
+
+
+def _add_answer_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model", action="append", metavar="NAME", help="as of `host identify`; repeatable"
     )
