@@ -58,11 +58,11 @@ def _found(shift_s: float, prior: ServoPrior) -> tuple[ServoEstimate, FitResult]
         u = behind_servos({"u": early}, T, servo)["u"]
         return [Maneuver(DT_S, u[:, None], y)]
 
-    def white(m: LinearModel, data: object) -> FitResult:
+    def white(m: LinearModel, data: object, _: FitResult | None) -> FitResult:
         return fit("output-error-white", m, data, multiple_starts=False)  # type: ignore[arg-type]
 
     servo = estimate_servo(model, behind, ["elevator_rad"], prior, white, white)
-    return servo, servo.added_to(white(model, behind(servo.setting)))
+    return servo, servo.added_to(white(model, behind(servo.setting), None))
 
 
 WIDE = ServoPrior((0.0, 8.0, 5.2), (0.05, 2.3, 1.3))
@@ -100,14 +100,14 @@ def test_a_servo_that_is_not_estimated_is_carried() -> None:
         u = behind_servos({"u": _command()}, T, servo)["u"]
         return [Maneuver(DT_S, u[:, None], np.random.default_rng(3).normal(0, 1, (len(T), 2)))]
 
-    def fails(_: LinearModel, data: object) -> FitResult:
+    def fails(_: LinearModel, data: object, near: FitResult | None) -> FitResult:
         seen.append(1.0)
         raise IdentificationError("no")
 
     with pytest.raises(IdentificationError, match="no delay at which"):
         estimate_servo(model, behind, ["elevator_rad"], WIDE, fails, fails)
 
-    def white(m: LinearModel, data: object) -> FitResult:
+    def white(m: LinearModel, data: object, _: FitResult | None) -> FitResult:
         return fit("output-error-white", m, data, multiple_starts=False)  # type: ignore[arg-type]
 
     carried = carried_servo(model, behind, ["elevator_rad"], WIDE, white)

@@ -157,8 +157,10 @@ def test_small_inputs_are_fitted_as_one_stretch(record: pd.DataFrame) -> None:
 THOR = ROOT / "tests/data/thor75"
 
 
-@pytest.mark.parametrize("aircraft", [[], ["--aircraft", "ultrastick25e"]])
-@pytest.mark.parametrize("stretch", [[], ["--from", "245", "--to", "265"]])
+@pytest.mark.parametrize(
+    ("aircraft", "stretch"),
+    [([], []), (["--aircraft", "ultrastick25e"], ["--from", "245", "--to", "265"])],
+)
 def test_a_real_aircraft_goes_through_as_it_is(
     aircraft: list[str], stretch: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

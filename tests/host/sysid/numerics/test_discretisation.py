@@ -5,7 +5,7 @@ import pytest
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import DelayGroup, LinearModel, Parameter, Term
 from host.sysid.numerics.ar_noise import ArNoise, ar_filter, autocovariance
-from host.sysid.numerics.fractional_delay import delay_columns
+from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.output_error_problem import OutputProblem
 from scipy import signal
 
@@ -115,8 +115,8 @@ def test_slopes_agree_with_finite_differences(hold: str) -> None:
 def test_delay_of_a_cubic_is_exact_and_its_slope_too() -> None:
     time = np.arange(40.0)
     cubic = (0.1 * time**3 - time**2 + 3.0)[:, None]
-    for shift in (0.0, 0.3, 1.7, -2.4):
-        late, slope = delay_columns(cubic, shift)
+    for shift in (0.0, 0.3, 1.0, 1.7, -2.4, 60.2, -60.2):
+        late, slope = delay_columns(cubic, shift), slope_by_delay(cubic, shift)
         t = time - shift
         np.testing.assert_allclose(late[:, 0], 0.1 * t**3 - t**2 + 3.0, rtol=1e-10, atol=1e-9)
         np.testing.assert_allclose(slope[:, 0], -(0.3 * t**2 - 2.0 * t), rtol=1e-9, atol=1e-8)

@@ -40,7 +40,9 @@ LAST_SEARCH_ITERATIONS = 200  # where none of them has converged
 LEAST_SAMPLES = 50
 
 
-def multistart(problem: OutputProblem, theta: Array, *, multiple_starts: bool = True) -> Optimum:
+def multistart(
+    problem: OutputProblem, theta: Array, *, multiple_starts: bool = True, restarts: bool = True
+) -> Optimum:
     """Return the best optimum of white-noise output error found from `theta` and other starts.
 
     Of equations of a user it is the one that is reached from `theta`.
@@ -53,6 +55,8 @@ def multistart(problem: OutputProblem, theta: Array, *, multiple_starts: bool = 
     multiple_starts : bool
         Try other starts if the optimum leaves more than white noise or its information is nearly
         singular (default). In a flight gusts leave more than noise at every optimum.
+    restarts : bool
+        Try other starts if the search does not converge (default); otherwise its end stands.
 
     Raises
     ------
@@ -61,6 +65,8 @@ def multistart(problem: OutputProblem, theta: Array, *, multiple_starts: bool = 
     """
     if isinstance(problem, NonlinearProblem):
         return minimise(problem, theta, max_iterations=LAST_SEARCH_ITERATIONS)
+    if not restarts:
+        return minimise(problem, theta)
     best, failure = _try(problem, None, theta)
     if best is not None and best.converged and not multiple_starts:
         return best

@@ -60,6 +60,7 @@ def fit_with_ar_noise(
     highest_order: int = HIGHEST_ORDER,
     criterion: str = "bic",
     multiple_starts: bool = True,
+    restarts: bool = True,
 ) -> ArNoiseFit:
     """Fit output error and the AR models of its noise together.
 
@@ -73,10 +74,10 @@ def fit_with_ar_noise(
         Highest AR order considered; 0 keeps the noise white.
     criterion : str
         ``bic`` or ``aicc``.
-    multiple_starts : bool
+    multiple_starts, restarts : bool
         See `multistart`.
     """
-    optimum = multistart(problem, theta, multiple_starts=multiple_starts)
+    optimum = multistart(problem, theta, multiple_starts=multiple_starts, restarts=restarts)
     outputs = len(problem.model.outputs)
     noise = [ArNoise.white() for _ in range(outputs)]
     variance = _innovation_variances(problem, optimum, noise, optimum.variance)

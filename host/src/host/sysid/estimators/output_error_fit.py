@@ -37,6 +37,7 @@ def fit_output_error(
     highest_order: int = HIGHEST_ORDER,
     criterion: str = "bic",
     multiple_starts: bool = True,
+    restarts: bool = True,
 ) -> FitResult:
     """Fit by output error.
 
@@ -51,7 +52,7 @@ def fit_output_error(
         the residual autocorrelation (Morelli & Klein 1997), the standard that covers 87-90 %.
     start : Array, optional
         Whole start vector; by default from equation error.
-    highest_order, criterion, multiple_starts
+    highest_order, criterion, multiple_starts, restarts
         See `fit_with_ar_noise`.
 
     Raises
@@ -74,6 +75,7 @@ def fit_output_error(
         highest_order=highest_order if coloured_noise else 0,
         criterion=criterion,
         multiple_starts=multiple_starts,
+        restarts=restarts,
     )
     coherence = None
     if coloured_noise and highest_order > 0:

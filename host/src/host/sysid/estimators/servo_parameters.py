@@ -35,7 +35,8 @@ STILL = 1e-4  # of the motion of the surface: what moves it by less moves nothin
 TOLD = 0.7  # of the prior's deviation: below it the data say it
 ALIKE = 0.9  # correlation of a derivative with the servo: they cannot be told apart
 
-Fit = Callable[[LinearModel, Sequence[Maneuver]], FitResult]
+# The third argument is a fit behind servos not far from these, to start from, or None.
+Fit = Callable[[LinearModel, Sequence[Maneuver], FitResult | None], FitResult]
 Behind = Callable[[tuple[float, float, float]], Sequence[Maneuver]]
 
 
@@ -114,8 +115,10 @@ class _Profile:
         for delay_s in (round(float(d), 5) for d in delays_s):
             if delay_s in self.fits or not LEAST[0] <= delay_s <= MOST[0]:
                 continue
+            near = min(self.fits, key=lambda known: abs(known - delay_s), default=None)
+            start = None if near is None else self.fits[near]
             try:
-                found = self.fit(self.model, self.behind((delay_s, *self.prior.mean[1:])))
+                found = self.fit(self.model, self.behind((delay_s, *self.prior.mean[1:])), start)
             except IdentificationError:
                 continue
             self.fits[delay_s] = found
@@ -162,7 +165,7 @@ def estimate_servo(
     step = FINE_S if wide else prior.sd[0]
     if wide:
         coarse = _Profile(model, behind, prior, quick)
-        coarse.ask(SCAN_S.tolist())
+        coarse.ask(sorted(SCAN_S.tolist(), key=lambda d: abs(d - prior.mean[0])))  # outwards
         profile.ask([coarse.best])
     else:
         profile.ask([prior.mean[0]])
@@ -224,8 +227,8 @@ def _carried(profile: _Profile, delay_s: float, k: int, count: int) -> list[Arra
     motion = sum(float(np.sum(np.var(m.inputs, axis=0))) * m.samples for m in here)
     if change < STILL**2 * motion:
         return []  # a limit that is never reached
-    found = profile.fit(profile.model, there)
-    moved = found.estimate[:count] - profile.fits[delay_s].estimate[:count]
+    at = profile.fits[delay_s]
+    moved = profile.fit(profile.model, there, at).estimate[:count] - at.estimate[:count]
     return [np.append(moved, other[0] - usual[0])]
 
 
@@ -235,12 +238,13 @@ def carried_servo(
     """Return the servos as the prior has them, what they leave open carried: consider parameters,
     one shift of the estimate for one deviation of each."""
     count = len(model.parameters)
-    first = fit(model, behind(prior.mean))
+    first = fit(model, behind(prior.mean), None)
     shifts = []
     for k in range(len(SERVO)):
         other = [float(x) for x in prior.mean]
         other[k] = float(np.clip(other[k] + prior.sd[k], LEAST[k], MOST[k]))
-        moved = fit(model, behind((other[0], other[1], other[2]))).estimate - first.estimate
+        there = behind((other[0], other[1], other[2]))
+        moved = fit(model, there, first).estimate - first.estimate
         shifts.append(np.append(moved[:count], prior.sd[0] if k == 0 else 0.0))
     return _estimate(model, tuple(commanded), prior.mean[0], prior, first, np.stack(shifts))
 

@@ -20,7 +20,7 @@ STEP_LIMIT = 0.01  # in Cramer-Rao bounds: convergence
 MAX_DAMPING = 1e8
 INITIAL_DAMPING = 1e-4
 MIN_DAMPING = 1e-8
-HEAVY_DAMPING = 1e-2  # from here on a step may be short only because it is damped
+HEAVY_DAMPING = 1e-2  # from here on a step may be much shorter than without
 TOLERANCE = 1e-9  # of the cost: rounding of its sums
 RIDGE = 1e-14  # of a scaled information: keeps flat directions solvable
 NOT_FINITE = "the information matrix is not finite; scale or bound the parameters"
@@ -36,6 +36,30 @@ class Evaluated(Protocol):
 
 
 Trial = TypeVar("Trial", bound=Evaluated)
+
+
+@dataclass(frozen=True, slots=True)
+class StepLine:
+    """A step to be adjusted in length.
+
+    Attributes
+    ----------
+    theta : Array, shape (P,)
+        Where it starts.
+    step : Array, shape (P,)
+    size : float
+        Its length in Cramer-Rao bounds.
+    cost, decrease : float
+        Cost at `theta`, and how fast it falls there per length of the step.
+    damped : bool
+    """
+
+    theta: Array
+    step: Array
+    size: float
+    cost: float
+    decrease: float
+    damped: bool
 
 
 class Objective(ABC, Generic[Trial]):
@@ -57,10 +81,8 @@ class Objective(ABC, Generic[Trial]):
         """Return the parameters after a step."""
         return theta + step
 
-    def extend_step(
-        self, theta: Array, step: Array, size: float, reached: tuple[Array, Trial]
-    ) -> tuple[Array, Trial]:
-        """Return a better point along an undamped step of `size` Cramer-Rao bounds, if any."""
+    def adjust_step(self, line: StepLine, reached: tuple[Array, Trial]) -> tuple[Array, Trial]:
+        """Return a better point along a step that was accepted, if any."""
         return reached
 
     def release(self, trial: Trial) -> None:
@@ -152,12 +174,12 @@ def gauss_newton(
         gain_ratio = (
             (trial.cost - next_trial.cost) / predicted_decrease if predicted_decrease > 0.0 else 0.0
         )
-        if damping == 0.0:
-            proposal, next_trial = objective.extend_step(theta, step, size, (proposal, next_trial))
+        line = StepLine(theta, step, size, trial.cost, float(gradient @ step), damping > 0.0)
+        proposal, next_trial = objective.adjust_step(line, (proposal, next_trial))
         objective.release(trial)
         theta, trial, last = proposal, next_trial, size
         iterations += 1
-        if size < step_limit and damping < HEAVY_DAMPING:
+        if size < step_limit and _undamped_size(information, gradient, free, damping) < step_limit:
             converged = True
             break
         # Nielsen, report IMM-REP-1999-05 (DTU): the damping follows the ratio of actual to
@@ -168,6 +190,11 @@ def gauss_newton(
         information, gradient = objective.normal(theta, trial)
     free = objective.free(theta, gradient)
     return GaussNewtonResult(theta, trial, information, free, iterations, converged, float(last))
+
+
+def _undamped_size(information: Array, gradient: Array, free: BoolArray, damping: float) -> float:
+    """Return the length of the step without damping: a step may be short only because of it."""
+    return damped_step(information, gradient, free, 0.0)[1] if damping >= HEAVY_DAMPING else 0.0
 
 
 def free_of_bounds(theta: Array, gradient: Array, lower: Array, upper: Array) -> BoolArray:

@@ -12,7 +12,7 @@ from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.nonlinear_model import NonlinearModel
 from host.sysid.models.state_space_model import LinearModel
 from host.sysid.numerics.equation_recursion import simulate_equations, simulate_with_slopes
-from host.sysid.numerics.fractional_delay import delay_columns
+from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.output_error_problem import OutputProblem, Response
 
 MOST_SUBSTEPS = 64
@@ -187,8 +187,9 @@ class NonlinearProblem(OutputProblem):
             inputs = inputs.copy()
             for j in np.flatnonzero(self.input_column >= 0):
                 shift = local[self.input_column[j]] / part.dt_s
-                late, by_shift = delay_columns(inputs[:, [j]], shift)
-                inputs[:, j], slopes[:, j] = late[:, 0], by_shift[:, 0] / part.dt_s
+                at_once = inputs[:, [j]]
+                inputs[:, j] = delay_columns(at_once, shift)[:, 0]
+                slopes[:, j] = slope_by_delay(at_once, shift)[:, 0] / part.dt_s
         return Given(
             local=local,
             start=self._known_start + local[self._start_parameter],

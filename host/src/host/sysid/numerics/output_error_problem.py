@@ -12,7 +12,7 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import EntryTable, LinearModel
 from host.sysid.numerics.discretisation import discretise
-from host.sysid.numerics.fractional_delay import delay_columns
+from host.sysid.numerics.fractional_delay import delay_columns, slope_by_delay
 from host.sysid.numerics.recursion import propagate, simulate
 
 # Of an output's motion: no column is better than this, nor the model of it. Without noise in one
@@ -334,13 +334,13 @@ class OutputProblem:
                 if output not in self.model.outputs:
                     continue  # an input, delayed before it drives
                 j = self.model.outputs.index(output)
-                late, by_shift = delay_columns(np.ascontiguousarray(y[j][:, None]), shift)
-                y[j] = late[:, 0]
+                at_once = y[j][:, None].copy()
+                y[j] = delay_columns(at_once, shift)[:, 0]
                 if slope.shape[1] == 0:
                     continue
                 if shift != 0.0:
-                    slope[j] = delay_columns(slope[j], shift)[0]
-                slope[j][:, k] += by_shift[:, 0] / dt_s
+                    slope[j] = delay_columns(slope[j], shift)
+                slope[j][:, k] += slope_by_delay(at_once, shift)[:, 0] / dt_s
 
 
 def check_shapes(model: LinearModel, maneuver: Maneuver) -> None:
