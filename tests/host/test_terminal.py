@@ -166,7 +166,7 @@ def test_a_folder_that_cannot_be_written_to_names_the_file_asked_for(
         (["decode", source, "--to", "npz"], "flight.npz"),
         (["decode", source, "--to", "parquet"], "flight.parquet"),
         (["decode", source, "-o", "out/x.csv"], "out/x.csv"),
-        (["plan", "--save", "card.toml"], "card.toml"),
+        (["plan", "--save", "card.toml", "--flights", "0"], "card.toml"),
         (["simulate", "calm", "-o", "out", "--firmware", "none"], "out"),
     ):
         assert main(arguments) == 2

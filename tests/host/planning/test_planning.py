@@ -89,11 +89,12 @@ def test_command_prints_the_card_and_its_json(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "card.toml"
-    assert main(["plan", "--aircraft", "lowsupertrainer", "--save", str(path)]) == 0
+    quick = ["--flights", "0"]
+    assert main(["plan", "--aircraft", "lowsupertrainer", "--save", str(path), *quick]) == 0
     text = capsys.readouterr().out
     assert "3x 3211 elevator" in text
     assert "M_alpha" in text
-    assert main(["plan", str(path), "--json"]) == 0
+    assert main(["plan", str(path), "--json", "--flights", "0"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["aircraft"] == "lowsupertrainer"
     assert {"M_q", "N_beta"} <= {bound["name"] for bound in answer["bounds"]}
@@ -114,7 +115,8 @@ def test_command_hears_another_aircraft_and_keeps_unlike_inputs_apart(
     }
     path = tmp_path / "card.toml"
     path.write_text(dumps(document))
-    assert main(["plan", str(path), "--aircraft", "kadetlt40", "--airspeed", "15"]) == 0
+    options = ["--aircraft", "kadetlt40", "--airspeed", "15", "--flights", "0"]
+    assert main(["plan", str(path), *options]) == 0
     text = capsys.readouterr().out
     assert "Kadet LT-40" in text
     assert "2x doublet elevator" in text

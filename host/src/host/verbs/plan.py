@@ -14,10 +14,18 @@ from host.extras import install_hint
 from host.terminal import command_line
 
 if TYPE_CHECKING:
-    from host.planning.card_planning import Plan, Point
+    from host.planning.card_planning import Bound, Plan, Point
+    from host.planning.predicted_widths import Prediction
+    from host.twin.testcard.cards import Card
 
 # A derivative whose predicted half-width is above this is named.
 WEAK_PERCENT = 20.0
+NOT_TOLD_PERCENT = 100.0  # from here on the sign is open too
+MOST_FLIGHTS = 100
+MOST_GUSTS_MPS = 5.0
+COEFFICIENTS = (
+    "CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr",
+)  # fmt: skip
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -26,8 +34,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "plan",
         help="judge planned maneuvers before they are flown",
         description="Print a flight card for the knee board: inputs, pulse times, amplitudes,"
-        " expected excursions and the accuracy its data will allow. Without a card one is designed"
-        " for the aircraft from its prior model.",
+        " expected excursions and the intervals that identification will give. Without a card one"
+        " is designed for the aircraft from its prior model.",
     )
     parser.add_argument("card", nargs="?", help="name of a card, or a TOML file")
     parser.add_argument(
@@ -40,6 +48,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         type=float,
         metavar="MPS",
         help="for this airspeed (default: the card's, else the aircraft file's)",
+    )
+    parser.add_argument(
+        "--gusts",
+        type=float,
+        metavar="MPS",
+        help="standard deviation of the vertical gust (default: the card's, else 0.3)",
+    )
+    parser.add_argument(
+        "--flights",
+        type=int,
+        default=3,
+        metavar="N",
+        help="virtual flights that the intervals are the median of (default 3);"
+        " 0: only the bounds of white noise in calm air, at once",
     )
     parser.add_argument("--save", type=Path, metavar="FILE", help="write the designed card as TOML")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
@@ -57,6 +79,10 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"planning needs {error.name}: {install_hint(error.name)}") from None
     if args.airspeed is not None:
         AIRSPEED.check("--airspeed", args.airspeed, UsageError)
+    if not 0 <= args.flights <= MOST_FLIGHTS:
+        raise UsageError(f"--flights is {args.flights}, expected 0 to {MOST_FLIGHTS}")
+    if args.gusts is not None and not 0.0 <= args.gusts <= MOST_GUSTS_MPS:
+        raise UsageError(f"--gusts is {args.gusts:g} m/s, expected 0 to {MOST_GUSTS_MPS:g}")
     if args.card is None:
         card = planning.design(args.aircraft or "ultrastick25e", args.airspeed or 0.0)
         if args.save is not None:
@@ -69,6 +95,7 @@ def run(args: argparse.Namespace) -> int:
         speed = args.airspeed or card.flight.airspeed_mps
         card = replace(card, flight=replace(card.flight, airspeed_mps=speed))
     plan = planning.judge(card)
+    prediction = _predicted(card, args) if args.flights else None
     for doubt in plan.aircraft.doubts:
         print(f"host: {doubt}", file=sys.stderr)
     if args.json:
@@ -81,11 +108,13 @@ def run(args: argparse.Namespace) -> int:
                     "points": [asdict(point) for point in plan.points],
                     "bounds": [asdict(bound) for bound in plan.bounds],
                     "refused": plan.refused,
+                    "predicted": None if prediction is None else asdict(prediction),
                 }
             )
         )
         return ExitCode.OK
     _print(plan)
+    _print_intervals(plan, prediction)
     if args.save is not None:
         print(f"wrote {args.save}; fly it with: {command_line('host', 'simulate', args.save)}")
     return ExitCode.OK
@@ -130,11 +159,50 @@ def _print(plan: Plan) -> None:
             f"  {p.roll_rate_degps:5.0f}  {p.pitch_rate_degps:5.0f}  {p.yaw_rate_degps:5.0f}"
             f"  {p.bank_deg:5.0f}  {p.pitch_deg:5.0f}  {low:4.1f} to {high:3.1f}"
         )
-    print("\n  What the data will tell, at best (white sensor noise only, 95 % half-width):")
-    for b in plan.bounds:
-        weak = "  weak: fly more of it, or larger" if b.percent > WEAK_PERCENT else ""
+
+
+def _predicted(card: Card, args: argparse.Namespace) -> Prediction:
+    """Fly the card virtually, with a bar: one flight takes some seconds."""
+    from host.planning.predicted_widths import predict_widths
+    from host.progress import draw_share
+    from host.terminal import bar
+
+    draw_share("flying", 0.0)
+    found = predict_widths(
+        card,
+        args.gusts,
+        flights=args.flights,
+        progress=lambda share: draw_share("flying", share),
+    )
+    bar.clear()
+    return found
+
+
+def _print_intervals(plan: Plan, prediction: Prediction | None) -> None:
+    """Print what identification will state, beside the bound of white noise."""
+    least = {b.name: b for b in plan.bounds}
+    rows: list[tuple[str, float, float, float, Bound | None]]
+    if prediction is None:
+        print("\n  What the data will tell, at best (white sensor noise only, 95 % half-width):")
+        rows = [(b.name, b.value, b.half_width, b.percent, None) for b in plan.bounds]
+    else:
         print(
-            f"    {b.name:8s} {b.value:+10.4g} +- {b.half_width:8.2g}  ({b.percent:5.1f} %){weak}"
+            f"\n  What `host identify` will state: 95 % half-widths with gusts of"
+            f" {prediction.gusts_mps:g} m/s, coloured\n  residuals and every tolerance of"
+            f" instrument and aircraft (medians of virtual flights).\n  At best: white noise alone."
         )
-    for text in plan.refused:
+        shown = (*least, *COEFFICIENTS)
+        widths = {w.name: w for w in prediction.widths if w.name in shown}
+        rows = [
+            (n, widths[n].value, widths[n].half_width, widths[n].percent, least.get(n))
+            for n in shown
+            if n in widths
+        ]
+    for name, value, half, percent, best in rows:
+        bound = f"  at best {best.percent:5.1f} %" if best is not None else 17 * " "
+        weak = "  weak: fly more of it, or larger" if percent > WEAK_PERCENT else ""
+        share = f"{percent:5.1f} %" if percent < NOT_TOLD_PERCENT else "no sign"
+        line = f"    {name:8s} {value:+10.4g} +- {half:8.2g}  ({share})"
+        print(f"{line}{bound if prediction is not None else ''}{weak}".rstrip())
+    for text in (*plan.refused, *(prediction.failures if prediction is not None else ())):
         print(f"    {text}")

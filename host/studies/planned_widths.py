@@ -1,0 +1,128 @@
+"""What `host plan` promises beside what flights of that card achieve, through the recorder.
+
+One row a coefficient and flight goes to a file that a later run continues.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from host.aircraft.mass_properties import airframe_data
+from host.aircraft.powerplant import powerplant
+from host.instrument.deviations import sensor_error_model
+from host.planning.card_planning import design
+from host.planning.predicted_widths import predict_widths
+from host.sysid.answer.truth_comparison import true_coefficients
+from host.sysid.compatibility.reconstruction import reconstruct
+from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.linear_estimator import identify
+from host.twin.testcard.cards import Card, load
+from host.twin.virtual import virtual_flight
+
+from studies.demonstration import PRINCIPAL
+
+FIRST_SEED = 6000
+KEPT = 1.5  # times the promise, or one over it
+COLUMNS = ("cell", "seed", "name", "true", "estimate", "half_width", "promised")
+
+
+def cells() -> dict[str, Card]:
+    """Return what is flown: a card of ours, and designed ones for two aircraft."""
+    kadet = design("kadetlt40")
+    return {
+        "demo, 0.3 m/s": load("demo"),
+        "designed, ultrastick25e, 0.3 m/s": _in_gusts(design("ultrastick25e"), 0.3),
+        "designed, kadetlt40, 0.6 m/s": _in_gusts(kadet, 0.6),
+    }
+
+
+def _in_gusts(card: Card, gusts_mps: float) -> Card:
+    return replace(card, air=replace(card.air, turbulence_mps=gusts_mps))
+
+
+def rows_of(
+    cell: str, card: Card, seed: int, promised: dict[str, float]
+) -> list[dict[str, object]]:
+    """Fly and identify as the verbs do; the principal derivatives of both axes."""
+    flight = virtual_flight(card, seed)
+    columns, _ = even_columns(flight.table)
+    airframe = airframe_data(card.aircraft)
+    answers = identify(
+        columns,
+        airframe=airframe,
+        compatibility=reconstruct(columns, airframe, sensor_error_model(card.aircraft)),
+        powerplant=powerplant(card.aircraft),
+    )
+    rows: list[dict[str, object]] = []
+    for answer in answers:
+        truth = true_coefficients({"maneuver": list(flight.maneuvers)}, answer.template)
+        for c in answer.coefficients:
+            if c.name in PRINCIPAL:
+                values = (cell, seed, c.name, truth[c.name], c.value, c.half_width)
+                rows.append(dict(zip(COLUMNS, (*values, promised[c.name]), strict=True)))
+    return rows
+
+
+def table(rows: Sequence[dict[str, str]]) -> list[str]:
+    """Return a line a cell, then what all come to."""
+    lines = ["cell                                 promised % achieved %  kept of       holds of"]
+    groups = {cell: [r for r in rows if r["cell"] == cell] for cell in {r["cell"] for r in rows}}
+    for cell, own in (*sorted(groups.items()), ("all", list(rows))):
+        truth, value, half, promised = (
+            np.array([float(r[k]) for r in own])
+            for k in ("true", "estimate", "half_width", "promised")
+        )
+        kept = (half < KEPT * promised) & (half > promised / KEPT)
+        held = np.abs(value - truth) <= promised
+        widths = (100.0 * np.median(x / np.abs(truth)) for x in (promised, half))
+        lines.append(
+            f"{cell:35s}  {next(widths):9.1f} {next(widths):10.1f}  {np.sum(kept):4d} {len(own):4d}"
+            f" ({100.0 * np.mean(kept):4.1f} %)  {np.sum(held):4d} ({100.0 * np.mean(held):4.1f} %)"
+        )
+    return lines
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Fly what is not in the file yet, then print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--flights", type=int, default=10, help="of each cell")
+    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
+    parser.add_argument("--rows", type=Path, default=Path("../build/study/planned_widths.csv"))
+    options = parser.parse_args(arguments)
+    options.rows.parent.mkdir(parents=True, exist_ok=True)
+    rows = _read(options.rows)
+    done = {(r["cell"], int(r["seed"])) for r in rows}
+    seeds = range(options.first, options.first + options.flights)
+    with options.rows.open("a", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        if not rows:
+            writer.writeheader()
+        for cell, card in cells().items():
+            missing = [seed for seed in seeds if (cell, seed) not in done]
+            promised: dict[str, float] = {}
+            if missing:
+                promised = {w.name: w.half_width for w in predict_widths(card).widths}
+            for seed in missing:
+                writer.writerows(rows_of(cell, card, seed, promised))
+                file.flush()
+                print(f"\r{cell}, seed {seed}   ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    print("\n".join(table([r for r in _read(options.rows) if int(r["seed"]) in seeds])))
+    return 0
+
+
+def _read(path: Path) -> list[dict[str, str]]:
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

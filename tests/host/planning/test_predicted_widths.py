@@ -1,0 +1,74 @@
+"""Predicted half-widths: flights keep them, an axis that is not flown has none."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from host.cli import main
+from host.export.toml import dumps
+from host.planning.predicted_widths import Prediction, predict_widths
+from host.twin.testcard.cards import Card, parse
+
+DOCUMENT: dict[str, object] = {
+    "format": 1,
+    "aircraft": "ultrastick25e",
+    "segment": [
+        {"kind": "trim", "duration_s": 10},
+        {"kind": "3211", "axis": "elevator", "amplitude": 3.0, "width_s": 0.25, "repeat": 3},
+    ],
+}
+SHOWN = ("M_alpha", "M_q", "M_de", "CL_alpha", "Cm_q")
+
+
+@pytest.fixture(scope="module")
+def card() -> Card:
+    return parse(DOCUMENT, "card")
+
+
+@pytest.fixture(scope="module")
+def promised(card: Card) -> Prediction:
+    return predict_widths(card, 0.3, flights=1)
+
+
+def test_a_flight_of_other_gusts_and_tolerances_keeps_the_promise(
+    card: Card, promised: Prediction
+) -> None:
+    """Bounds of white noise alone were 0.0 to 0.2 %: 30 to 300 times too narrow."""
+    achieved = predict_widths(card, 0.3, flights=1, first_seed=31)
+    widths = {w.name: w.half_width for w in achieved.widths}
+    for width in promised.widths:
+        if width.name in SHOWN:
+            assert width.half_width / 2.0 < widths[width.name] < 2.0 * width.half_width, width
+            assert width.percent > 1.0
+    assert set(SHOWN) <= set(widths)
+    assert not set(widths) & {"L_p", "Cl_p"}
+
+
+def test_the_verb_prints_them_beside_the_bound(
+    promised: Prediction, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    path = tmp_path / "card.toml"
+    path.write_text(dumps(DOCUMENT))
+    asked: list[tuple[float | None, int]] = []
+
+    def known(_: Card, gusts: float | None, *, flights: int, **__: object) -> Prediction:
+        asked.append((gusts, flights))
+        return promised
+
+    monkeypatch.setattr("host.planning.predicted_widths.predict_widths", known)
+    assert main(["plan", str(path), "--gusts", "0.3", "--flights", "2"]) == 0
+    text = capsys.readouterr().out
+    assert "gusts of 0.3 m/s" in text
+    [line] = [line for line in text.splitlines() if line.startswith("    M_alpha")]
+    assert "at best   0." in line
+    assert main(["plan", str(path), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["predicted"]["gusts_mps"] == 0.3
+    assert asked == [(0.3, 2), (None, 3)]
+    assert main(["plan", str(path), "--flights", "0"]) == 0
+    assert "white sensor noise only" in capsys.readouterr().out
+    assert main(["plan", str(path), "--gusts", "9"]) == 2
+    assert "--gusts is 9 m/s, expected 0 to 5" in capsys.readouterr().err
