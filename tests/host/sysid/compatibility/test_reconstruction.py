@@ -127,7 +127,7 @@ def test_slopes_are_those_of_finite_differences() -> None:
 
 def test_errors_of_recorded_flights_are_inside_their_intervals() -> None:
     inside, told = [], set()
-    for seed in (1, 2, 3, 4):
+    for seed in (1, 2, 3):
         _, true = flown(seed)
         found = recorded.reconstructed("survey", seed)
         assert found.gps

@@ -27,7 +27,7 @@ from host.sysid.compatibility.sensor_corrections import (
     residual_deviations,
 )
 from host.sysid.flight import linear_estimator, linear_model
-from host.sysid.flight.linear_estimator import identify
+from host.sysid.flight.linear_estimator import Answer, identify
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template
@@ -42,6 +42,18 @@ def flown() -> tuple[Columns, list[dict[str, Any]], Compatibility]:
     """One recorded flight in light turbulence, its maneuvers, what its sensors are wrong by."""
     flight, columns = recorded.flown("demo", 901)
     return columns, flight.maneuvers, recorded.reconstructed("demo", 901)
+
+
+@pytest.fixture(scope="module")
+def freed(flown: tuple[Columns, list[dict[str, Any]], Compatibility]) -> Answer:
+    """The answer where what reconstruction told is taken out, and nothing is known beside it."""
+    columns, _, found = flown
+    return identify(
+        columns,
+        names=("longitudinal",),
+        airframe=airframe_data(NAME),
+        compatibility=replace(found, instrument=None),
+    )[0]
 
 
 def finding(name: str, value: float, half: float, prior: float) -> SensorErrorEstimate:
@@ -235,15 +247,11 @@ def test_equation_error_no_longer_takes_late_vanes_for_damping(
 
 
 def test_told_errors_are_not_taken_out_twice(
-    flown: tuple[Columns, list[dict[str, Any]], Compatibility],
+    flown: tuple[Columns, list[dict[str, Any]], Compatibility], freed: Answer
 ) -> None:
     """Free, the fit finds what is left of the vanes' delay; both together are as before."""
-    columns, _, found = flown
-    airframe = airframe_data(NAME)
-    before, after = (
-        identify(columns, names=("longitudinal",), airframe=airframe, compatibility=known)[0]
-        for known in (None, replace(found, instrument=None))
-    )
+    columns, after = flown[0], freed
+    [before] = identify(columns, names=("longitudinal",), airframe=airframe_data(NAME))
     taken = {c.name: c.value for c in after.corrections}
     assert not before.corrections
     assert taken["vane_delay_s"] > 0.003
@@ -255,16 +263,14 @@ def test_told_errors_are_not_taken_out_twice(
 
 
 def test_with_the_instrument_known_places_and_delays_are_carried_not_freed(
-    flown: tuple[Columns, list[dict[str, Any]], Compatibility],
+    flown: tuple[Columns, list[dict[str, Any]], Compatibility], freed: Answer
 ) -> None:
     """In gusts no fit tells the IMU's place from lift of the elevator: to free it is to err."""
     columns, maneuvers, found = flown
-    airframe = airframe_data(NAME)
-    free, answer = (
-        identify(columns, names=("longitudinal",), airframe=airframe, compatibility=known)[0]
-        for known in (replace(found, instrument=None), found)
+    [answer] = identify(
+        columns, names=("longitudinal",), airframe=airframe_data(NAME), compatibility=found
     )
-    assert "imu_x_m" in free.result.names
+    assert "imu_x_m" in freed.result.names
     assert "imu_x_m" not in answer.result.names
     assert not any(n.startswith("delay_") for n in answer.result.names)
     assert "imu_z_m" in answer.result.names  # drag tells it: a pitch rate makes none
