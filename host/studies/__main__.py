@@ -26,6 +26,7 @@ from studies import (
     systems,
     tables,
     thesis,
+    thesis_tables,
     turbulence,
     windows,
 )
@@ -149,6 +150,11 @@ def study_i(stem: Path, size: int) -> list[Path]:
     return write(tables.imported_table(found), imported_figure(found), stem)
 
 
+def study_j(stem: Path, size: int) -> list[Path]:
+    """Table 3.1 row by row, figures 3.5 to 3.8, the periods of table 3.2."""
+    return thesis_tables.study(stem, (("3-2-1-1",), tuple(SHAPES))[size])
+
+
 STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
     "a_thesis": study_a,
     "b_accuracy": study_b,
@@ -159,6 +165,7 @@ STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
     "g_methods": study_g,
     "h_windows": study_h,
     "i_imported_logs": study_i,
+    "j_thesis_tables": study_j,
 }
 
 

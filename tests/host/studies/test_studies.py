@@ -23,7 +23,8 @@ from studies.refusal import (
     standard_input,
 )
 from studies.systems import random_system
-from studies.thesis import run_hopfield, thesis_data
+from studies.thesis import run_hopfield, thesis_data, truth_31
+from studies.thesis_tables import PRINTED, obtained
 
 pytestmark = pytest.mark.usefixtures("machine_code")
 
@@ -34,6 +35,26 @@ def test_output_error_is_an_order_closer_than_the_network() -> None:
     assert case.shared_ratio > 10.0
     assert case.smoothed_ratio > 1.5
     assert np.all(np.abs(case.rms_over_bound - 1.0) < 0.5)
+
+
+def test_table_31_is_the_one_of_the_thesis() -> None:
+    """The figures that its author printed beneath it come out of the twenty numbers."""
+    truth = truth_31()
+    signed = {name: float(np.sum(truth - np.array(own))) for name, own in PRINTED.items()}
+    assert signed["noise-free"] == pytest.approx(-0.04314389, abs=1e-8)
+    assert signed["SNR 10"] == pytest.approx(1.467580966, abs=1e-8)
+    assert obtained(truth) == "both"
+    assert obtained(np.array(PRINTED["noise-free"])) == "both"
+    assert obtained(np.array(PRINTED["SNR 10"])) == "none"
+    assert obtained(np.full(20, np.nan)) == "diverged"
+
+
+def test_periods_are_told_apart() -> None:
+    poles, vectors = np.linalg.eig(TABLE_31_A)
+    fast = np.abs(poles) > 1.0
+    for moved, left in ((fast, "long"), (~fast, "short"), (fast | ~fast, "none")):
+        A = (vectors @ np.diag(np.where(moved, 1.3 * poles, poles)) @ np.linalg.inv(vectors)).real
+        assert obtained(np.concatenate([A.ravel(), TABLE_31_B.ravel()])) == left
 
 
 def test_printed_network_diverges_and_its_figure_hides_the_error() -> None:

@@ -37,7 +37,8 @@ def add_parser(subparsers: Any) -> None:
         "--model",
         action="append",
         metavar="NAME",
-        help="longitudinal, lateral, short-period, phugoid, roll, dutch-roll or a TOML file;"
+        help="longitudinal, lateral, short-period, phugoid, roll, dutch-roll, one of the thesis"
+        " ('list' shows them) or a TOML file;"
         " 'coefficients' (with --aircraft) fits lift, drag, side force and moments directly,"
         " a TOML file of kind 'coefficients' with terms of its own;"
         " repeatable (default: longitudinal and lateral)",
@@ -125,11 +126,14 @@ def _run(args: argparse.Namespace) -> int:
     from host.sysid.estimators.method_options import read_options
     from host.sysid.flight.shipped_maps import LIST, map_lines
     from host.sysid.pipeline.arguments import option_words
-    from host.sysid.pipeline.requested_models import known_methods
+    from host.sysid.pipeline.requested_models import known_methods, model_lines
     from host.sysid.pipeline.stages import identify
 
     if "list" in (args.method or ()):
         print("\n".join(f"{name:26s} {about}" for name, about in known_methods().items()))
+        return int(ExitCode.OK)
+    if "list" in (args.model or ()):
+        print("\n".join(model_lines()))
         return int(ExitCode.OK)
     if LIST in [str(path) for _, path in args.map]:
         print("\n".join(map_lines()))

@@ -12,6 +12,7 @@ from host.sysid.flight.free_simulation import frozen_at
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.equation_file import KIND as EQUATIONS
 from host.sysid.models.model_file import read_model
+from host.sysid.models.shipped_models import model_path
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.models.toml_document import read_document
 from host.sysid.pipeline.aircraft_data import aircraft_data
@@ -116,6 +117,7 @@ def predict(
     """
     path = path_of("model", model)
     assert path is not None
+    path = model_path(path)
     models = _saved_models(path)
     signals = {name for _, m in models for name in (*m.inputs, *m.outputs)} - {CONSTANT}
     sources = listed_flights(flights)

@@ -17,6 +17,7 @@ from host.sysid.estimators.method_registry import methods as single_methods
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
+from host.sysid.models.shipped_models import model_path, shipped_lines, shipped_models
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
 from host.sysid.pipeline.arguments import listed
 
@@ -81,12 +82,15 @@ def requested_models(given: ModelName | Iterable[ModelName] | None) -> Models:
             terms.append(Path(name))
         elif name in AXIS_OF:
             linear.append((str(name), None))
+        elif str(name) in shipped_models() and not Path(name).exists():
+            linear.append((str(name), read_model(model_path(name))))
         elif (str(name) and Path(name).exists()) or str(name).lower().endswith(".toml"):
             linear.append((str(name), read_model(Path(name))))
         else:
             raise IdentificationError(
-                f"no model '{name}'{like(str(name), (*AXIS_OF, COEFFICIENTS))}; there are"
-                f" {', '.join(AXIS_OF)}, coefficients, or a TOML file"
+                f"no model '{name}'{like(str(name), (*AXIS_OF, COEFFICIENTS, *shipped_models()))};"
+                f" there are {', '.join(AXIS_OF)}, coefficients, those of the thesis (`--model"
+                " list`), or a TOML file"
             )
     if len([t for t in terms if t != COEFFICIENTS]) + (COEFFICIENTS in terms) > 1:
         raise IdentificationError(
@@ -142,3 +146,10 @@ def requested_methods(given: str | Iterable[str] | None) -> tuple[str, ...]:
             f"unknown method {', '.join(unknown)}{meant}; known: {', '.join(known)}"
         )
     return requested
+
+
+def model_lines() -> list[str]:
+    """Return every model that has a name, with a line or more about it."""
+    templates = [f"{name:26s} of {', '.join(AXIS_OF[name])}" for name in AXIS_OF]
+    direct = f"{COEFFICIENTS:26s} lift, drag, side force and moments, fitted directly"
+    return [*templates, direct, *shipped_lines()]
