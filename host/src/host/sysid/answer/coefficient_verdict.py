@@ -30,6 +30,7 @@ def coefficient_verdict(
     answer: CoefficientAnswer,
     open_channels: Mapping[str, str] | None = None,
     laws: Sequence[Feedback] = (),
+    more: Sequence[Doubt] = (),
 ) -> Verdict:
     """Return what of the coefficients may be relied on.
 
@@ -40,6 +41,8 @@ def coefficient_verdict(
         Column with an open finding of the data checks to the check.
     laws : sequence of Feedback
         Of surfaces that follow states.
+    more : sequence of Doubt
+        From outside the rules: what linear models say.
     """
     along = sum(w.longitudinal for w in answer.windows)
     own = "" if answer.model == standard_model() else f" by the terms of '{answer.model.name}'"
@@ -47,7 +50,7 @@ def coefficient_verdict(
         f"coefficients{own}: {along} maneuvers of the elevator, {len(answer.windows) - along} of"
         " aileron and rudder fitted jointly, errors of the instrument beside them"
     )
-    doubts = coefficient_doubts(answer, open_channels or {}, laws)
+    doubts = [*coefficient_doubts(answer, open_channels or {}, laws), *more]
     reasons = reasons_by_name(doubts)
     marks = {}
     for d in answer.fit.derivatives:

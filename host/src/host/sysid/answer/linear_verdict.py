@@ -29,15 +29,20 @@ from host.sysid.models.diagnostics import NOT_IDENTIFIABLE, reference_values
 PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircraft
 
 
-def linear_verdict(answer: Answer, evidence: Evidence = NO_EVIDENCE) -> Verdict:
-    """Return what of a linear model may be relied on, with what stands beside it in evidence."""
+def linear_verdict(
+    answer: Answer, evidence: Evidence = NO_EVIDENCE, more: Sequence[Doubt] = ()
+) -> Verdict:
+    """Return what of a linear model may be relied on, with what stands beside it in evidence.
+
+    `more` are doubts from outside the rules: what coefficients fitted directly say.
+    """
     count = len(answer.used)
     fitted = "1 maneuver fitted" if count == 1 else f"{count} maneuvers fitted jointly"
     heading = (
         f"{answer.template}: {fitted} by {answer.result.method}, {len(answer.held_out)} held out"
     )
     shares = relative_half_widths(answer)
-    doubts = doubts_of(answer, evidence)
+    doubts = [*doubts_of(answer, evidence), *more]
     reasons = reasons_by_name(doubts)
     marks = _marks(answer, shares, reasons)
     lines = first_lines(heading, marks, FAIR)

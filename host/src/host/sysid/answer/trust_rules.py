@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from host.sysid.flight.data_finding import Finding, open_channels
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.residual_delays import STANDARD_DELAYS
+
+if TYPE_CHECKING:
+    from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 
 FAILS = 0.5  # NRMSE of an output: a quarter of its variance is not explained
 WORSE_THAN_NONE = 1.0  # NRMSE: the mean would do better
@@ -42,10 +46,13 @@ class Evidence:
         All linear answers of the same data, this one among them.
     findings : tuple of Finding
         Of the data checks.
+    coefficients : CoefficientAnswer or None
+        Fitted directly to the same data.
     """
 
     beside: tuple[Answer, ...] = ()
     findings: tuple[Finding, ...] = ()
+    coefficients: CoefficientAnswer | None = None
 
 
 NO_EVIDENCE = Evidence()

@@ -9,6 +9,7 @@ from host.sysid.answer.coefficient_verdict import coefficient_verdict
 from host.sysid.answer.feedback_pairs import feedback_of
 from host.sysid.answer.linear_verdict import linear_verdict
 from host.sysid.answer.marks import Verdict
+from host.sysid.answer.model_agreement import disagreements_of_models
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
 from host.sysid.compatibility.sensor_corrections import correction_lines
 from host.sysid.flight.data_finding import open_channels
@@ -27,10 +28,24 @@ def verdict_of(answer: Answer | CoefficientAnswer, evidence: Evidence = NO_EVIDE
     evidence : Evidence, optional
         What beside it speaks against it: other methods, findings of the data checks.
     """
+    direct, findings = evidence.coefficients, evidence.findings
     if isinstance(answer, Answer):
-        return linear_verdict(answer, evidence)
-    findings = evidence.findings
-    return coefficient_verdict(answer, open_channels(findings), feedback_of(findings))
+        alone = linear_verdict(answer, evidence)
+        if direct is None:
+            return alone
+        there = coefficient_verdict(direct, open_channels(findings), feedback_of(findings))
+        more = disagreements_of_models(answer, direct, alone.marks, there.marks)[0]
+        return linear_verdict(answer, evidence, more) if more else alone
+    checks = open_channels(findings), feedback_of(findings)
+    alone = coefficient_verdict(answer, *checks)
+    doubts = [
+        doubt
+        for one in evidence.beside
+        for doubt in disagreements_of_models(
+            one, answer, linear_verdict(one, evidence).marks, alone.marks
+        )[1]
+    ]
+    return coefficient_verdict(answer, *checks, doubts) if doubts else alone
 
 
 def verdict_lines(

@@ -105,7 +105,7 @@ class Identification:
     @property
     def evidence(self) -> Evidence:
         """What the verdict counts beside each answer: other methods, findings of the checks."""
-        return Evidence(self.linear, self.findings)
+        return Evidence(self.linear, self.findings, self.coefficients)
 
     @property
     def answers(self) -> tuple[Answer | CoefficientAnswer, ...]:
