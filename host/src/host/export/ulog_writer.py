@@ -49,6 +49,7 @@ def write_ulog(
     parameters: Mapping[str, float | int],
     information: Mapping[str, str],
     start_us: int = 0,
+    said: Sequence[tuple[int, str]] = (),
 ) -> None:
     """Write a log.
 
@@ -61,6 +62,8 @@ def write_ulog(
     information : mapping of str to str
         ``sys_name``, ``ver_sw`` and the like.
     start_us : int
+    said : sequence of (int, str)
+        Logged texts with their times, us.
 
     Raises
     ------
@@ -84,6 +87,9 @@ def write_ulog(
         head = struct.pack("<HBH", size + 2, ord("D"), number)
         bodies += [head + whole_rows[k * size : (k + 1) * size] for k in range(len(one.rows))]
         times.append(one.rows["timestamp"].astype(np.int64))
+    for at_us, text in said:
+        bodies.append(_message("L", struct.pack("<BQ", ord("6"), at_us) + text.encode()))
+    times.append(np.array([at_us for at_us, _ in said], np.int64))
     order = np.argsort(np.concatenate(times), kind="stable")
     parts += [bodies[k] for k in order.tolist()]
     path.write_bytes(b"".join(parts))

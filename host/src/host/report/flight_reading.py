@@ -24,6 +24,12 @@ from host.physical.columns import COLUMNS, UNITS
 from host.progress import progress_bar
 from host.readers.autopilot_flight import is_autopilot_log, read_autopilot
 from host.readers.autopilot_summary import autopilot_meta, summarise_autopilot, summary_lines
+from host.report.gps_position import (
+    calibration_values,
+    changed_position,
+    log_position,
+    log_utc_s,
+)
 from host.report.shown_flight import Happening, ServoJump, ShownFlight, with_gaps
 from host.sysid.flight.flight_tables import FITTED, even_columns, read_columns
 from host.sysid.flight.linear_estimator import maneuvers_of
@@ -110,6 +116,10 @@ def _of_log(wanted: Wanted, path: Path) -> ShownFlight:
         losses=_losses(summary),
         jumps=_jumps(summary),
         notes=notes,
+        position=log_position(log),
+        utc_s=log_utc_s(log),
+        calibration=calibration_values(log.calibration),
+        calibration_text=log.calibration.text,
     )
 
 
@@ -148,6 +158,9 @@ def _of_rows(wanted: Wanted, path: Path) -> ShownFlight:
         maneuvers=maneuvers,
         losses=_losses(summary),
         notes=notes,
+        position=changed_position(table.columns),
+        calibration=calibration_values(calibration),
+        calibration_text=calibration.text,
     )
 
 
@@ -178,6 +191,7 @@ def _of_autopilot(wanted: Wanted, path: Path) -> ShownFlight:
         maneuvers=maneuvers,
         shares=flight.shares,
         notes=notes + [f"said by the autopilot: {text}" for text in flight.log.texts],
+        position=changed_position(columns),
     )
 
 

@@ -63,6 +63,15 @@ class ShownFlight:
         Surfaces that are shares of full travel, not angles.
     notes : list of str
         What could not be shown, and why.
+    position : mapping of str to (fixes,) array
+        ``t_s``, ``latitude_deg``, ``longitude_deg``, ``height_m`` at GPS's own instants; empty
+        without a fix.
+    utc_s : float or None
+        Seconds since 1970 (UTC) of ``t_s`` zero, by GPS; None where no receiver said.
+    calibration : mapping of str to float
+        Zero and slope of every channel, by ``channel.zero``; empty where none was used.
+    calibration_text : str
+        The calibration's file.
     """
 
     name: str
@@ -77,6 +86,10 @@ class ShownFlight:
     jumps: list[ServoJump] = field(default_factory=list)
     shares: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
+    position: Mapping[str, Array] = field(default_factory=dict)
+    utc_s: float | None = None
+    calibration: Mapping[str, float] = field(default_factory=dict)
+    calibration_text: str = ""
 
     @property
     def t_s(self) -> Array:
