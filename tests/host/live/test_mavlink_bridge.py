@@ -100,7 +100,9 @@ def test_silence_makes_nothing_healthy(station: Station, monkeypatch: pytest.Mon
     monkeypatch.setattr(time, "monotonic", lambda: late)
     station.bridge.state("")
     (status,) = [one for one in station.heard() if one.get_type() == "SYS_STATUS"]
-    assert status.onboard_control_sensors_health == 0
+    fence = dialect.MAV_SYS_STATUS_GEOFENCE  # not there, and so never breached
+    assert status.onboard_control_sensors_health == fence
+    assert not status.onboard_control_sensors_present & fence
 
 
 def test_calibration_is_read_by_number_and_by_name(station: Station) -> None:

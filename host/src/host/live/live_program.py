@@ -28,7 +28,7 @@ from host.live.live_stream import LiveStream
 from host.live.mavlink_bridge import MavlinkBridge, mavlink_place
 from host.live.replay import RADIO_RATE_HZ, replay_source
 from host.log.capture_head import SUFFIX, CaptureHead
-from host.physical.calibration import Calibration, load_calibration
+from host.physical.calibration import Calibration, calibration_of_text, load_calibration
 from host.wire.schema_text import packed_schema
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def open_source(request: LiveRequest, tell: Callable[[str], None]) -> Source:
             raise UsageError(
                 f"a virtual flight needs {error.name}: {install_hint(error.name)}"
             ) from None
-        return SimulatedSource(text.removeprefix("sim:"), request.seed).open()
+        return SimulatedSource(text.removeprefix("sim:"), request.seed).open(tell)
     if text is not None and text.startswith("udp:"):
         return udp_source(text)
     if text is not None and is_file_like(text):
@@ -118,6 +118,9 @@ def run_live(
     """
     calibration = load_calibration(request.calibration)
     source = open_source(request, tell)
+    own = getattr(source, "calibration_text", "")  # of a virtual instrument
+    if own and request.calibration is None:
+        calibration = calibration_of_text(own, Path(source.name))
     if request.mavlink is not None:
         mavlink_place(request.mavlink)
     texts = [packed_schema().text]

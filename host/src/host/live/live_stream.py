@@ -81,6 +81,11 @@ class LiveStream:
         return 0 if self._text.rows else self._reader.skipped
 
     @property
+    def heard(self) -> bool:
+        """True once anything was understood, or waits for the hash of its schema."""
+        return bool(self.rows or self.frames or self._waiting or self._refused)
+
+    @property
     def usual_s(self) -> float:
         """Usual time between two rows; 0 before there are three."""
         return float(np.median(self._steps)) if len(self._steps) > 1 else 0.0
@@ -109,7 +114,10 @@ class LiveStream:
                 frames.append(frame)
         update = self._decoded(frames, arrived_s, told)
         if self._reader.skipped and not self.frames:
-            update = self._text.feed(data, arrived_s) or update
+            text = self._text.feed(data, arrived_s)
+            if text is not None:
+                self.rows += len(text)
+                update = text
         for consumer in self._consumers:
             consumer(update)
         return update

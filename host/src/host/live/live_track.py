@@ -12,7 +12,7 @@ _EARTH_M = 6_371_000.0
 _LEAST_SPEED_MPS = 8.0  # below it the aircraft stands, or its airspeed says nothing
 _MEMORY_S = 20.0  # of the wind's running mean: a circle of a trainer
 _GPS_S = 0.2
-_KEPT = 20_000  # positions: an hour at 5 Hz; then every second one goes
+_KEPT = 6000  # positions: 20 min at 5 Hz; then every second of the older half goes
 
 
 class LiveTrack:

@@ -200,9 +200,11 @@ class MavlinkBridge:
         pitot = dialect.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE
         present = sum(bits.values()) | pitot
         present |= dialect.MAV_SYS_STATUS_LOGGING | dialect.MAV_SYS_STATUS_PREARM_CHECK
+        # There is no fence; without its bit MAVProxy says that it was breached.
+        healthy = int(dialect.MAV_SYS_STATUS_GEOFENCE)
         if state["silent"]:
-            return present, 0
-        healthy = sum(bits[name] for name in state["system"].get("sensors", ()) if name in bits)
+            return present, healthy
+        healthy |= sum(bits[name] for name in state["system"].get("sensors", ()) if name in bits)
         if math.isfinite(_mean(self._row, "airspeed_a_mps", "airspeed_b_mps")):
             healthy |= pitot
         if state["rec"]["state"] == "recording":

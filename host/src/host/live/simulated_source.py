@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import Self
 
 from host.live.live_sources import Tell
-from host.twin.flight.fly import fly
+from host.twin.flight.fly import FlightRecord, fly
+from host.twin.outcome.instrument import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.recorder_build import recorder_library
 from host.twin.recorder.sitl_radio import radio
-from host.twin.recorder.stimuli import stimuli
+from host.twin.recorder.stimuli import Stimuli, stimuli
 from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
 
@@ -38,19 +39,32 @@ class SimulatedSource:
         """As on the command line."""
         return f"sim:{self.card}"
 
-    def open(self) -> Self:
-        """Read the card and find the recorder, before anything is made for the flight."""
-        cards.load(self.card)
+    calibration_text: str = ""
+    _flight: tuple[FlightRecord, Stimuli] | None = None
+
+    def open(self, tell: Tell) -> Self:
+        """Fly the card, before anything is made for it; its instrument's calibration is known then.
+
+        Raises
+        ------
+        HostError
+            If the card cannot be flown, or there is no recorder.
+        """
+        card = cards.load(self.card)
         recorder_library()
+        tell(f"flying {self.card} (a few seconds)")
+        record = fly(card, seed=self.seed)
+        self.calibration_text = calibration(record.aircraft, record.draws.errors)
+        self._flight = record, stimuli(record, air_data(record))
         return self
 
     def portions(self, tell: Tell) -> Iterator[bytes]:
-        """Yield what the radio sends, in real time; HostError if the card cannot fly."""
-        card = cards.load(self.card)
-        tell(f"flying {self.card} (a few seconds)")
-        record = fly(card, seed=self.seed)
-        given = stimuli(record, air_data(record))
-        rate_hz = sitl.recorder_rate_hz(card.flight.rate_hz)
+        """Yield what the radio sends, in real time."""
+        if self._flight is None:
+            self.open(tell)
+        assert self._flight is not None
+        record, given = self._flight
+        rate_hz = sitl.recorder_rate_hz(record.card.flight.rate_hz)
         start_s = time.monotonic()
         for sent in radio(given, rate_hz=rate_hz, aircraft=record.aircraft.name):
             wait_s = start_s + sent.t_s - time.monotonic()

@@ -89,7 +89,7 @@ export const PLOTS = [
   {
     id: "heading",
     times: true,
-    title: "heading, switch",
+    title: "heading",
     unit: "deg",
     span: 40,
     digits: 0,

@@ -20,8 +20,7 @@ export class History {
       const at = 2 + row * width;
       if (this.lastT !== null && numbers[at] < this.lastT - 5) this.clear();
       for (let column = 0; column < width; column += 1) {
-        const value = numbers[at + column];
-        this.values.get(this.columns[column]).push(Number.isFinite(value) ? value : null);
+        this.values.get(this.columns[column]).push(this.drawn(this.columns[column], numbers[at + column]));
       }
       this.lastT = numbers[at];
     }
@@ -29,6 +28,15 @@ export class History {
     if (this.arrived.length > 1000) this.arrived.shift();
     this.lastAt = performance.now();
     this.forget();
+  }
+
+  // What is drawn of a value: nothing where there is none, nor across north, where a turn is no step.
+  drawn(name, value) {
+    if (!Number.isFinite(value)) return null;
+    if (name !== "psi_deg") return value;
+    const before = this.heading;
+    this.heading = value;
+    return Math.abs(value - before) > 180 ? null : value;
   }
 
   clear() {

@@ -5,7 +5,6 @@ import { PLOTS } from "./channels.js";
 const AXIS = "#333";
 const GRID = { stroke: "#ddd", width: 1 };
 const FONT = "11px system-ui, sans-serif";
-const MOST_POINTS = 1200; // of a line: more than its pixels
 
 // An axis that holds all values, never less than `span` wide, and moves only when it must.
 function ranger(span) {
@@ -50,17 +49,20 @@ class Plot {
       values.append(one);
       return figure;
     });
-    if (what.difference || what.jumps) {
-      const extra = element("span", "");
-      extra.append(what.difference ? "L-R " : "jumps ");
-      this.extra = element("b", "", "-");
-      extra.append(this.extra);
+    const extra = element("span", what.jumps ? "jumps" : "");
+    this.extra = element("b", "", "-");
+    if (what.difference) {
+      extra.append("L-R ", this.extra);
       values.append(extra);
     }
     values.title = what.series.map(([column]) => column).join(", ");
     heading.append(values);
     this.canvas = element("div", "canvas");
     this.canvas.setAttribute("role", "img");
+    if (what.jumps) {
+      extra.append("jumps ", this.extra);
+      this.canvas.append(extra);
+    }
     box.append(heading, this.canvas);
     parent.append(box);
     this.chart = new uPlot(this.options(), [[], ...this.columns.map(() => [])], this.canvas);
@@ -110,11 +112,9 @@ class Plot {
     if (width > 20 && height > 20) this.chart.setSize({ width, height });
   }
 
-  draw(history, first, step, span) {
-    this.span = span;
-    let data = history.window(["t_s", ...this.columns], first);
-    if (step > 1) data = data.map((column) => column.filter((_, at) => at % step === 0));
-    this.chart.setData(data);
+  draw(history, first, span) {
+    this.span = span; // every row is drawn: uPlot itself joins those of one pixel, peaks stay
+    this.chart.setData(history.window(["t_s", ...this.columns], first));
   }
 
   say(history, jumps) {
@@ -127,7 +127,9 @@ class Plot {
       const [left, right] = difference.map((column) => history.last(column));
       this.extra.textContent = left === null || right === null ? "-" : (left - right).toFixed(digits);
     } else if (this.what.jumps) {
-      this.extra.textContent = String(jumps[this.what.jumps] ?? 0);
+      const count = jumps[this.what.jumps] ?? 0;
+      this.extra.textContent = String(count);
+      this.extra.parentElement.classList.toggle("bad", count > 0);
     }
   }
 
@@ -146,11 +148,9 @@ export class Plots {
   draw(history) {
     if (history.lastT === null) return;
     const first = history.firstInWindow();
-    const count = history.values.get("t_s").length - first;
     const now = history.now();
     const span = [now - history.windowS, now];
-    const step = Math.ceil(count / MOST_POINTS);
-    for (const plot of this.plots) plot.draw(history, first, step, span);
+    for (const plot of this.plots) plot.draw(history, first, span);
   }
 
   say(history, jumps) {
