@@ -158,7 +158,7 @@ def test_simulate_command_lists_flies_and_refuses(
     assert "expected a file or one of" in capsys.readouterr().err
     monkeypatch.setenv("HOST_SITL", str(tmp_path / "no.so"))
     assert main(["simulate", "calm", "-o", str(tmp_path)]) == 2
-    assert "build it with" in capsys.readouterr().err
+    assert "it names the recorder's library" in capsys.readouterr().err
     monkeypatch.setenv("HOST_ELF", str(tmp_path / "no.elf"))
     assert main(["simulate", "calm", "--firmware", "avr", "-o", str(tmp_path)]) == 2
     assert "--firmware avr needs `pio run`" in capsys.readouterr().err

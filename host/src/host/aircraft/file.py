@@ -12,6 +12,7 @@ import numpy as np
 
 from host.aircraft.aircraft_ranges import RANGES
 from host.aircraft.airframe import COEFFICIENTS, Airframe, Array
+from host.aircraft.dimension_file import from_dimensions, is_dimensions
 from host.aircraft.linear_dynamics import LinearDynamics
 from host.aircraft.size_ratios import doubts, impossible
 from host.constants import GRAVITY_MPS2
@@ -152,7 +153,7 @@ def names() -> list[str]:
 
 
 def read_document(source: str | Path) -> dict[str, object]:
-    """Read an aircraft file as it stands.
+    """Read an aircraft file as it stands, or as the handbook makes it of dimensions.
 
     Parameters
     ----------
@@ -165,6 +166,8 @@ def read_document(source: str | Path) -> dict[str, object]:
         No such file, not TOML, or of another format.
     """
     document = toml_reader.read(source, FOLDER, "aircraft", AircraftError)
+    if is_dimensions(document):
+        document = from_dimensions(document, source, AircraftError)
     toml_reader.check_format(document, Path(source).name, AircraftError)
     return document
 
@@ -191,7 +194,8 @@ def load(source: str | Path) -> Aircraft:
     if kind == "measured":
         raise AircraftError(
             f"{source}: a measured aircraft has no aerodynamics; expected one of kind 'nonlinear',"
-            " or fly the models that host identify LOG --save-model FILE finds"
+            " a file of its dimensions (as host/aircraft/dimensions/kadetlt40.toml), or the models"
+            " that host identify LOG --save-model FILE finds"
         )
     if kind != "nonlinear":
         raise AircraftError(f"{source}: kind is {kind!r}, expected 'nonlinear'")
@@ -230,6 +234,9 @@ def load_measured(source: str | Path) -> Aircraft:
         A number is missing, is not a number or has no source.
     """
     document = read_document(source)
+    if document.get("kind") == "linear":  # its sizes are those of another
+        base = load_measured(str(document.get("base", "")))
+        return replace(base, title=str(document.get("title", source)))
     if document.get("kind") != "measured":
         return load(source)
     there = tuple(name for name in MEASURED_IF_THERE if name in document)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TypeGuard
 
 from host.errors import UsageError
 from host.files.user_text import read_toml, shown
@@ -56,6 +57,11 @@ def check_format(document: Mapping[str, object], name: str, error: type[UsageErr
 def names(folder: Path) -> list[str]:
     """Return the names of the packaged files, sorted."""
     return sorted(path.stem for path in folder.glob("*.toml"))
+
+
+def is_mapping(value: object) -> TypeGuard[Mapping[str, object]]:
+    """Return whether a value is a table."""
+    return isinstance(value, dict)
 
 
 def number(where: str, value: object, error: type[UsageError]) -> float:

@@ -61,6 +61,11 @@ def add_parser(subparsers: Any) -> None:
                         " one each")  # fmt: skip
     parser.add_argument("--prior", type=Path, metavar="FILE",
                         help="coefficients to compare with: TOML, AVL, Datcom")  # fmt: skip
+    _add_data(parser)
+    _add_outputs(parser)
+
+
+def _add_data(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from", dest="ends", type=float, metavar="S",
                         action=StorePlaced, const=0, default=[],
                         help="start of a stretch of the source before it: fitted whatever moved"
@@ -80,7 +85,6 @@ def add_parser(subparsers: Any) -> None:
                         " repeatable")  # fmt: skip
     parser.add_argument("--no-delays", action="store_true",
                         help="estimate no delay of a sensor")  # fmt: skip
-    _add_outputs(parser)
 
 
 def _add_outputs(parser: argparse.ArgumentParser) -> None:
@@ -120,6 +124,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     """Identify and print the answer: words first, then numbers."""
+    from host.aircraft.origin import tell_aircraft
     from host.errors import ExitCode
     from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import check_outputs
@@ -159,6 +164,7 @@ def _run(args: argparse.Namespace) -> int:
         prior=args.prior,
         method_options=read_options(args.method_option or ()),
     )
+    tell_aircraft([args.aircraft])
     if args.json:
         text = option_words(found.to_json())
         # What was written is said before the answer, so that no answer follows an error.

@@ -72,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
     """Judge or design a card and print it; return an exit code."""
     try:
         from host.aircraft.aircraft_ranges import AIRSPEED
+        from host.aircraft.origin import tell_aircraft
         from host.export.toml import dumps
         from host.planning import card_planning as planning
         from host.twin.testcard import cards
@@ -95,6 +96,7 @@ def run(args: argparse.Namespace) -> int:
         speed = args.airspeed or card.flight.airspeed_mps
         card = replace(card, flight=replace(card.flight, airspeed_mps=speed))
     plan = planning.judge(card)
+    tell_aircraft([args.aircraft])
     prediction = _predicted(card, args) if args.flights else None
     for doubt in plan.aircraft.doubts:
         print(f"host: {doubt}", file=sys.stderr)

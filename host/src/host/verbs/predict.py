@@ -56,6 +56,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Predict and print; messages name options where the library names arguments."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from host.aircraft.origin import tell_aircraft
     from host.errors import ExitCode
     from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import OutputPaths, check_outputs
@@ -87,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
             row_rate_hz=args.row_rate,
             constants=not args.no_constants,
         )
+        tell_aircraft([args.aircraft])
         print(option_words(found.to_json() if args.json else found.to_text()))
         if args.plots is not None:
             written = found.plot().save(args.plots)

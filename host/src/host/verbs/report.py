@@ -102,6 +102,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the report, say where and the verdict; return the exit code."""
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from host.aircraft.origin import tell_aircraft
     from host.errors import ExitCode
     from host.report.reporting import ReportRequest, write_report
     from host.sysid.identification_error import IdentificationError
@@ -138,6 +139,7 @@ def run(args: argparse.Namespace) -> int:
         target, found = write_report(request)
     except IdentificationError as error:
         raise IdentificationError(option_words(str(error))) from error
+    tell_aircraft([args.aircraft])
     print(found.to_json() if args.json else option_words("\n".join(map(shown, found.verdict))))
     size = target.stat().st_size / 1e6
     print(f"wrote {shown(str(target))} ({size:.2f} MB)", file=sys.stderr)
