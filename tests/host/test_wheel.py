@@ -52,6 +52,8 @@ def test_wheel_decodes_a_log_outside_the_clone(tmp_path: Path) -> None:
     (wheel,) = (tmp_path / "dist").glob("*.whl")
     with ZipFile(wheel) as packed:
         names = packed.namelist()
+        pages = {name.rpartition("/")[2] for name in names if "/live/page/" in name}
+        assert pages >= {"index.html", "style.css", "main.js", "plots.js", "icon.svg"}
         (metadata,) = (name for name in names if name.endswith("METADATA"))
         needs = message_from_string(packed.read(metadata).decode()).get_all("Requires-Dist", [])
         for name, place in (

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from host.cli import main
 from host.link.serial import DeviceError, SerialPort
@@ -21,6 +22,7 @@ from host.log.capture_head import read_capture_head
 from host.physical.calibration import load_calibration
 
 from tests.host.live.radio import joined, sent
+from tests.host.test_original_rows import APPENDIX, SECOND
 from tests.host.test_ports_status import Wire, computer, one_line
 
 STREAM = joined(sent(6.0))
@@ -233,6 +235,18 @@ def test_frames_before_the_first_hash_are_decoded_with_it() -> None:
     stream = LiveStream(load_calibration())
     rows = sum(len(stream.feed(part.data, 0.0)) for part in sent(6.0))
     assert rows == ROWS
+
+
+@pytest.mark.parametrize("row", [APPENDIX, SECOND], ids=["original", "ours and the second"])
+def test_rows_of_text_are_shown_and_recorded(row: str, tmp_path: Path) -> None:
+    text = "".join(row.format(roll / 10) for roll in range(20)).encode()
+    stream = LiveStream(load_calibration())
+    shown: list[float] = []
+    for at in range(0, len(text), 50):
+        update = stream.feed(text[at : at + 50], 100.0 + at / 1345.0)
+        shown += update.rows.get("phi_deg", np.empty(0)).tolist()
+    assert shown == pytest.approx([roll / 10 for roll in range(20)], abs=1e-6)
+    assert (stream.rows, stream.damaged_bytes) == (20, 0)
 
 
 def test_lost_rows_are_counted_as_in_the_file() -> None:

@@ -1,5 +1,6 @@
 // The last seconds of every column, as arrays that uPlot draws: null where there is no value.
 
+const TURN_S = 0.25; // wider than a pixel
 const SPARE = 2; // times the window, before what is older is thrown away
 
 export class History {
@@ -20,7 +21,8 @@ export class History {
       const at = 2 + row * width;
       if (this.lastT !== null && numbers[at] < this.lastT - 5) this.clear();
       for (let column = 0; column < width; column += 1) {
-        this.values.get(this.columns[column]).push(this.drawn(this.columns[column], numbers[at + column]));
+        const name = this.columns[column];
+        this.values.get(name).push(this.drawn(name, numbers[at + column], numbers[at]));
       }
       this.lastT = numbers[at];
     }
@@ -31,12 +33,12 @@ export class History {
   }
 
   // What is drawn of a value: nothing where there is none, nor across north, where a turn is no step.
-  drawn(name, value) {
+  drawn(name, value, t) {
     if (!Number.isFinite(value)) return null;
     if (name !== "psi_deg") return value;
-    const before = this.heading;
+    if (Math.abs(value - this.heading) > 180) this.turnedAt = t;
     this.heading = value;
-    return Math.abs(value - before) > 180 ? null : value;
+    return t - this.turnedAt < TURN_S ? null : value;
   }
 
   clear() {

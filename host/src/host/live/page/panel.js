@@ -47,9 +47,10 @@ function showFacts(state, link, system) {
   fact(list, "servos by", system.drive ?? "-");
   fact(list, "heard of", (system.sensors ?? []).join(", ") || "-");
   list.lastChild.className = "long";
-  fact(list, "aircraft, image", [state.who.aircraft, state.who.firmware].filter(Boolean).join(", ") || "-");
+  fact(list, "aircraft", state.who.aircraft || "-");
+  fact(list, "firmware", [state.who.board, state.who.firmware].filter(Boolean).join(" ") || "-");
   fact(list, "viewers", String(state.viewers));
-  fact(list, "from", state.source);
+  fact(list, "from", state.source.split(/[\\/]/).pop());
   byId("facts").replaceChildren(list);
 }
 
