@@ -76,13 +76,18 @@ def write_mcap(
 
 
 def _rows(columns: Mapping[str, Array], count: int) -> list[list[bytes]]:
-    form = "{" + ",".join(f'"{name}":%.9g' for name in columns) + "}"
+    form = "{" + ",".join(f'"{name}":%.{_digits(name)}g' for name in columns) + "}"
     values = list(columns.values())
     pieces = []
     for first in range(0, count, _ROWS_AT_ONCE):
         table = np.column_stack([one[first : first + _ROWS_AT_ONCE] for one in values]).tolist()
         pieces.append([_NOTHING.sub(":null", form % tuple(row)).encode() for row in table])
     return pieces
+
+
+def _digits(name: str) -> int:
+    """Return how many digits: those of a sensor, of places 1 cm, of time 1 us over a day."""
+    return 11 if name == "t_s" or name.endswith("tude_deg") else 7
 
 
 def _schema(writer: Any, name: str, columns: Mapping[str, Array], texts: Mapping[str, str]) -> int:

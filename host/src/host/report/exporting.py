@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from host.errors import ExitCode, UsageError
@@ -22,6 +22,8 @@ from host.report.shown_flight import ShownFlight
 
 ENDINGS = {"tlog": ".tlog", "ulog": ".ulg", "kml": ".kml", "kmz": ".kmz", "gpx": ".gpx",
            "mcap": ".mcap"}  # fmt: skip
+
+_WITH_POINTS = {"kml", "kmz", "gpx"}  # formats that show test points
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +46,8 @@ def export(request: ExportRequest) -> tuple[list[Path], list[str], ExitCode]:
     """
     if request.rate_hz is not None and (request.rate_hz <= 0.0 or "tlog" not in request.kinds):
         raise UsageError(f"--rate {request.rate_hz:g}: a positive rate, of --to tlog only")
-    flight, source = read_flight(request.wanted)
+    with_points = bool(set(request.kinds) & _WITH_POINTS)
+    flight, source = read_flight(replace(request.wanted, maneuvers=with_points))
     files: list[Path] = []
     for kind in request.kinds:
         target = _target(request, kind, source)

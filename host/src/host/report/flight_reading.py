@@ -57,6 +57,7 @@ class Wanted:
     calibration: Path | None = None
     row_rate_hz: float | None = None
     sensors: tuple[tuple[str, int], ...] = ()
+    maneuvers: bool = True  # whether test points are looked for
 
 
 def read_flight(wanted: Wanted) -> tuple[ShownFlight, Path]:
@@ -103,7 +104,7 @@ def _of_log(wanted: Wanted, path: Path) -> ShownFlight:
     columns = log.columns()
     if not len(columns["t_s"]):
         raise NotALogError(f"{path}: no identification frame in this log; host info says what is")
-    maneuvers, notes = _maneuvers(columns)
+    maneuvers, notes = _maneuvers(columns) if wanted.maneuvers else ([], [])
     return ShownFlight(
         name=shown(path.name),
         columns=with_gaps(columns),
@@ -147,7 +148,7 @@ def _of_rows(wanted: Wanted, path: Path) -> ShownFlight:
     if not table.rate.known:
         raise UsageError(f"{path}: the rate of its rows is {table.rate.text}")
     summary = finite(summarise_rows(path, rows, table, calibration))
-    maneuvers, notes = _maneuvers(table.columns)
+    maneuvers, notes = _maneuvers(table.columns) if wanted.maneuvers else ([], [])
     return ShownFlight(
         name=shown(path.name),
         columns=with_gaps(table.columns),
@@ -175,7 +176,7 @@ def _of_autopilot(wanted: Wanted, path: Path) -> ShownFlight:
     maneuvers: Maneuvers = []
     if flight.judgement.refusal:
         notes.append(f"no maneuvers: {flight.judgement.refusal}")
-    else:
+    elif wanted.maneuvers:
         try:
             found, _ = read_columns(path, sensors=dict(wanted.sensors))
             maneuvers = maneuvers_of(found)
