@@ -54,17 +54,8 @@ OURS = re.compile(r"frames\.toml|pin_map|settings\.toml|\.pio\b")
 HOST_FLOORS: dict[str, tuple[str, ...]] = {
     "host": (
         *("files", "wire", "physical", "export", "original", "link", "log", "readers", "decode"),
-        *(
-            "aircraft",
-            "instrument",
-            "twin",
-            "sysid",
-            "planning",
-            "installation",
-            "live",
-            "report",
-            "verbs",
-        ),
+        *("aircraft", "instrument", "bench_calibration", "twin", "sysid", "planning"),
+        *("installation", "live", "report", "verbs"),
     ),
     "host.twin": ("faults", "testcard", "flight", "sensors", "recorder", "outcome"),
     "host.sysid": (

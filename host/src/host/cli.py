@@ -27,6 +27,7 @@ VERBS = {
     "ports": "list the serial ports with a logger plugged in",
     "status": "show what the logger says of itself, live over USB",
     "simulate": "fly a virtual test and write the log it would leave",
+    "calibrate": "measure zero and slope of every sensor on the bench",
     "plan": "judge planned maneuvers before they are flown",
     "live": "receive the radio in flight: on disk, and on a page",
     "decode": "turn a log into a table in SI and say how good it is",
@@ -41,7 +42,8 @@ VERBS = {
     "doctor": "say what is installed, plugged in, set and kept",
     "completion": "print the script that completes these words in your shell",
 }
-_OWN_DISPLAY = ("live", "status", "completion")  # they draw themselves, or are read by a shell
+# They draw themselves, ask, or are read by a shell.
+_OWN_DISPLAY = ("live", "status", "completion", "calibrate")
 _LONGEST_LINE = 2000  # characters
 _AGAIN_S = 0.02  # until Ctrl-C comes again where Python dropped it
 _EPILOG = """\

@@ -1,0 +1,240 @@
+"""One calibration from its sources to its file: read, fit, doubt, write, draw, say."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from host.bench_calibration.bench_answer import plain, spoken, spoken_iron, spoken_supply
+from host.bench_calibration.bench_log import BenchLog, FaceLog, LogSource, turns_of
+from host.bench_calibration.bench_plan import AIR_KGPM3, Subject, local_gravity_mps2
+from host.bench_calibration.calibrated_lines import Calibrated, calibrated_lines
+from host.bench_calibration.calibration_file import Made, lines_of, write_lines
+from host.bench_calibration.calibration_picture import draw_picture
+from host.bench_calibration.hard_iron import hard_iron
+from host.bench_calibration.held_position import Held, Source
+from host.bench_calibration.reading_table import TableSource, number_of, rows_of
+from host.bench_calibration.six_faces import FaceTable, crooked_deg, crooked_doubt
+from host.bench_calibration.supply_reference import NOMINAL_MV, supply_reference
+from host.bench_calibration.turned_gyro import Rest, Turn, gyro_lines, read_turns
+from host.bench_calibration.typed_readings import TypedSource
+from host.errors import ExitCode, UsageError
+
+TYPED = Path("-")
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """What a user wants calibrated.
+
+    Attributes
+    ----------
+    sources : tuple of Path
+        Tables, logs, captured radio; ``-``: typed. A further source is a further repeat.
+    positions : tuple of float
+        Of one round; empty: those of the subject.
+    into, picture : Path or None
+        None: named by instrument and date; beside the file.
+    turn_deg : float
+        Of the gyros' turntable, in a recording.
+    """
+
+    subject: Subject
+    channel: str
+    sources: tuple[Path, ...]
+    positions: tuple[float, ...] = ()
+    instrument: str = "instrument"
+    day: str = ""
+    by: str = ""
+    serials: Mapping[str, str] = field(default_factory=dict)
+    temperature_degc: float | None = None
+    latitude_deg: float | None = None
+    density_kgpm3: float = AIR_KGPM3
+    turn_deg: float = 3600.0
+    was_mv: float = NOMINAL_MV
+    into: Path | None = None
+    picture: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What came of it: lines to read, plain data, files, the exit code."""
+
+    lines: tuple[str, ...]
+    data: dict[str, Any]
+    files: tuple[Path, ...]
+    exit_code: ExitCode
+
+
+def calibrate(
+    bench: Bench, ask: Callable[[str], str] = input, say: Callable[[str], None] = print
+) -> Result:
+    """Calibrate one subject; lines that nobody doubts go into the file.
+
+    Raises
+    ------
+    UsageError
+        If a source is none, or too little is in it.
+    """
+    if bench.picture is not None and bench.picture.suffix.lower() != ".svg":
+        raise UsageError(f"{bench.picture}: a picture's name ends in .svg")
+    if bench.subject.name == "magnetometer":
+        return _magnetometer(bench)
+    if bench.subject.name == "supply":
+        return _supply(bench)
+    temperature, lines, extra = _lines(bench, ask, say)
+    made = Made(
+        bench.instrument,
+        bench.day or date.today().isoformat(),
+        bench.by,
+        bench.serials,
+        bench.temperature_degc if bench.temperature_degc is not None else temperature,
+    )
+    said = [*spoken(bench.subject, lines), *extra]
+    tables = lines_of(bench.subject, lines, made)
+    files = []
+    into = bench.into or Path(f"{_file_name(made.instrument)}-{made.date}.toml")
+    if tables:
+        write_lines(into, bench.subject, tables, made)
+        files.append(into)
+        said.append(f"wrote {', '.join(f'{bench.subject.table}.{t}' for t in tables)} to {into}")
+    else:
+        said.append("nothing was written: no line without doubt")
+    picture = bench.picture or into.with_name(f"{into.stem}-{bench.subject.name}.svg")
+    if any(c.fit is not None for c in lines):
+        draw_picture(bench.subject, lines, picture)
+        files.append(picture)
+        said.append(f"drew {picture}")
+    doubted = bool(extra) or any(c.doubt for c in lines)
+    code = ExitCode.CHECK if doubted else ExitCode.OK
+    data = plain(bench.subject, lines) | {"files": [str(f) for f in files]}
+    return Result(tuple(said), data, tuple(files), code)
+
+
+def _lines(
+    bench: Bench, ask: Callable[[str], str], say: Callable[[str], None]
+) -> tuple[float | None, list[Calibrated], list[str]]:
+    """Return temperature, lines and what is wrong beside them."""
+    logs = {p: BenchLog.read(p) for p in bench.sources if _is_log(p)}
+    warm = [t for log in logs.values() if (t := log.temperature_degc()) is not None]
+    temperature = float(np.mean(warm)) if warm else None
+    if bench.subject.name == "gyros":
+        return temperature, _gyros(bench, logs), []
+    held: list[Held] = []
+    for path in bench.sources:
+        first = max((p.repeat for p in held), default=0) + 1
+        held += _source(bench, path, logs, first, ask, say).held()
+    lines = calibrated_lines(bench.subject, held, density_kgpm3=bench.density_kgpm3)
+    if not lines:
+        wanted = bench.channel or ", ".join(bench.subject.channels)
+        raise UsageError(f"no reading of {wanted} in {', '.join(map(str, bench.sources))}")
+    extra = []
+    if bench.subject.name == "accelerometers":
+        crooked = crooked_doubt(bench.subject, crooked_deg(held, lines))
+        extra = [f"  {crooked}"] if crooked else []
+    return temperature, lines, extra
+
+
+def _source(
+    bench: Bench,
+    path: Path,
+    logs: Mapping[Path, BenchLog],
+    first: int,
+    ask: Callable[[str], str],
+    say: Callable[[str], None],
+) -> Source:
+    subject, channel = bench.subject, bench.channel
+    if subject.name == "accelerometers":
+        gravity = local_gravity_mps2(bench.latitude_deg)
+        return (
+            FaceLog(logs[path], gravity, first) if path in logs else FaceTable(path, gravity, first)
+        )
+    if path not in logs and path != TYPED:
+        return TableSource(path, subject, channel, first)
+    if not channel:
+        raise UsageError(
+            f"which channel was moved? name one of {', '.join(subject.channels)} in place of"
+            f" {subject.name}"
+        )
+    positions = bench.positions or subject.positions
+    if path == TYPED:
+        return TypedSource(subject, channel, positions, ask, say)
+    return LogSource(logs[path], subject, channel, positions, first)
+
+
+def _gyros(bench: Bench, logs: Mapping[Path, BenchLog]) -> list[Calibrated]:
+    rests: list[Rest] = []
+    turns: list[Turn] = []
+    for path in bench.sources:
+        first = max((r.repeat for r in rests), default=0) + 1
+        more = (
+            turns_of(logs[path], bench.turn_deg, first) if path in logs else read_turns(path, first)
+        )
+        rests += more[0]
+        turns += more[1]
+    return gyro_lines(bench.subject, rests, turns)
+
+
+def _magnetometer(bench: Bench) -> Result:
+    parts = []
+    for path in bench.sources:
+        if _is_log(path):
+            parts.append(BenchLog.read(path).magnetic_counts())
+            continue
+        rows = rows_of(path, bench.subject.channels)
+        parts.append(
+            np.array([[number_of(path, row, c, k) for c in bench.subject.channels]
+                      for k, row in enumerate(rows, start=2)])
+        )  # fmt: skip
+    counts = np.concatenate(parts)
+    found = hard_iron(bench.subject, counts[np.isfinite(counts).all(axis=1)])
+    data = {
+        "subject": "magnetometer",
+        "hard_iron": found.centre.tolist(),
+        "hard_iron_sigma": found.centre_sigma.tolist(),
+        "radius": found.radius.tolist(),
+        "residual": found.residual,
+        "doubt": found.doubt,
+    }
+    code = ExitCode.CHECK if found.doubt else ExitCode.OK
+    return Result(tuple(spoken_iron(found)), data, (), code)
+
+
+def _supply(bench: Bench) -> Result:
+    shown: list[float] = []
+    meter: list[float] = []
+    for path in bench.sources:
+        for index, row in enumerate(rows_of(path, ("shown_v", "meter_v")), start=2):
+            shown.append(number_of(path, row, "shown_v", index))
+            meter.append(number_of(path, row, "meter_v", index))
+    found = supply_reference(bench.subject, shown, meter, bench.was_mv)
+    data = {
+        "subject": "supply",
+        "reference_mv": found.reference_mv,
+        "sigma_mv": found.sigma_mv,
+        "doubt": found.doubt,
+    }
+    code = ExitCode.CHECK if found.doubt else ExitCode.OK
+    return Result(tuple(spoken_supply(found)), data, (), code)
+
+
+def _is_log(path: Path) -> bool:
+    """Return whether a source is a recording: a table is text and has a comma in its first line."""
+    if path == TYPED:
+        return False
+    if not path.is_file():
+        raise UsageError(f"{path}: no such file; a table, a log of the bench, or - to type")
+    with path.open("rb") as file:
+        head = file.read(512)
+    first = head.partition(b"\n")[0]
+    return not (b"\0" not in head and (b"," in first or first.startswith(b"#")))
+
+
+def _file_name(instrument: str) -> str:
+    return re.sub(r"[^\w.+-]", "_", instrument)[:100].lstrip(".") or "instrument"

@@ -1,0 +1,85 @@
+"""Readings typed one after another, each asked for in words: the guide at the bench."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from host.bench_calibration.bench_plan import Subject
+from host.bench_calibration.held_position import Held
+from host.errors import UsageError
+
+ENDS = ("q", "quit", "end")
+_BACK = "b"
+
+
+class TypedSource:
+    """Held positions that somebody reads aloud at the bench.
+
+    Parameters
+    ----------
+    subject : Subject
+    channel : str
+    positions : sequence of float
+        Of one repeat.
+    ask : callable
+        Given what to do and read, returns the line that was typed; empty at the end of the input.
+    say : callable
+        Given a line that needs no answer.
+    """
+
+    def __init__(
+        self,
+        subject: Subject,
+        channel: str,
+        positions: Sequence[float],
+        ask: Callable[[str], str],
+        say: Callable[[str], None],
+    ) -> None:
+        self._subject, self._channel, self._positions = subject, channel, positions
+        self._ask, self._say = ask, say
+
+    def held(self) -> list[Held]:
+        """Ask for every position of every repeat; `b` takes the last one back, `q` ends.
+
+        Raises
+        ------
+        UsageError
+            If nothing was typed.
+        """
+        wanted = [
+            (repeat, float(p))
+            for repeat in range(1, self._subject.repeats + 1)
+            for p in self._positions
+        ]
+        found: list[Held] = []
+        while len(found) < len(wanted):
+            repeat, position = wanted[len(found)]
+            line = self._ask(self._question(repeat, position, found)).strip().lower()
+            if line in ENDS or not line:
+                break
+            if line == _BACK:
+                found[-1:] = []
+                continue
+            try:
+                value = float(line)
+            except ValueError:
+                self._say(f"{line!r} is no number; type the counts, b for back, q to end")
+                continue
+            found.append(Held(self._channel, repeat, position, {self._channel: value}))
+        if not found:
+            raise UsageError(f"{self._channel}: nothing was typed; nothing is written")
+        return found
+
+    def _question(self, repeat: int, position: float, found: Sequence[Held]) -> str:
+        unit = self._subject.tool.setting if self._subject.tool is not None else ""
+        last = found[-1] if found else None
+        if last is None or last.repeat != repeat:
+            side = "tool on anew" if last is not None else "tool on"
+        elif last.position == position:
+            side = "as before"
+        else:
+            side = "from below" if position > last.position else "from above"
+        return (
+            f"{self._channel} repeat {repeat}/{self._subject.repeats}: set {position:+g} {unit}"
+            f" ({side}), hold, counts? "
+        )
