@@ -74,9 +74,9 @@ def look(url: str, folder: Path) -> None:
         wide = page.evaluate("document.documentElement.scrollWidth")
         assert wide <= PHONE[0], "a phone must not scroll sideways"
         # A second of silence makes every value grey.
-        page.wait_for("document.body.classList.contains('old')", 120)
-        grey = page.evaluate("getComputedStyle(document.querySelector('#airspeed')).color")
-        assert grey == "rgb(154, 154, 154)"
+        for value in ("#airspeed", "#link-rate", "#plots .values span", "#facts dd"):
+            colour = f"getComputedStyle(document.querySelector('{value}')).color"
+            page.wait_for(f"{colour} === 'rgb(154, 154, 154)'", 120)
         unnamed = "[...document.querySelectorAll('canvas, [role=img], button')].filter((one) =>"
         unnamed += " !one.closest('[aria-label]') && !one.textContent).length"
         assert page.evaluate(unnamed) == 0
