@@ -63,10 +63,10 @@ def study(seeds: range) -> Iterator[Told]:
     for seed in seeds:
         record = fly(load("demo"), seed=seed)
         data = air_data(record)
-        true = _truth(record, data)
+        true = truth(record, data)
         with tempfile.TemporaryDirectory() as folder:
             stem = Path(folder) / "flight"
-            own, by = _own_log(record, data, stem)
+            own, by = own_log(record, data, stem)
             yield from _told(OWN, seed, own, true, by)
             for kind in NAMES:
                 for airframe in AIRFRAMES:
@@ -74,7 +74,7 @@ def study(seeds: range) -> Iterator[Told]:
                     yield from _told(f"{kind}, {airframe}", seed, path, true, None)
 
 
-def _own_log(record: FlightRecord, data: AirData, stem: Path) -> tuple[Path, Path]:
+def own_log(record: FlightRecord, data: AirData, stem: Path) -> tuple[Path, Path]:
     recording = sitl.record(
         stimuli(record, data),
         rate_hz=sitl.recorder_rate_hz(record.card.flight.rate_hz),
@@ -87,7 +87,7 @@ def _own_log(record: FlightRecord, data: AirData, stem: Path) -> tuple[Path, Pat
     return log, text
 
 
-def _truth(record: FlightRecord, data: AirData) -> dict[str, float]:
+def truth(record: FlightRecord, data: AirData) -> dict[str, float]:
     """Return each coefficient as the mean over the maneuvers of its axis."""
     every = maneuvers(record, data)
     found = {}

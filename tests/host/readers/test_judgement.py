@@ -83,7 +83,7 @@ def test_without_airspeed_what_needs_none_is_told(px4: AutopilotLog) -> None:
     messages = {k: v for k, v in px4.messages.items() if k != "airspeed_validated"}
     found = judged(replace(px4, messages=messages))
     answers = dict(found.answers)
-    assert answers["roll: L_p, L_da"] == "can be told, without vanes never under trust"
+    assert answers["roll: L_p, L_da"] == "can be told, no vanes: without GPS never under trust"
     short = next(v for k, v in answers.items() if k.startswith("short period"))
     assert short == "cannot be told: airspeed not in the log"
     assert any("SYS_HAS_NUM_ASPD" in one for one in found.settings)
@@ -101,7 +101,8 @@ def test_an_answer_without_vanes_says_so(px4: AutopilotLog) -> None:
     answers = dict(judged(px4).answers)
     drag = next(v for k, v in answers.items() if k.startswith("speed, drag"))
     assert drag == "cannot be told without vanes: no angle of attack was measured"
-    assert "never under trust" in next(v for k, v in answers.items() if k.startswith("short"))
+    short = next(v for k, v in answers.items() if k.startswith("short"))
+    assert short == "can be told, no vanes: by the path that GPS tells"
 
 
 def test_a_plane_that_stays_on_the_ground(px4: AutopilotLog) -> None:

@@ -7,9 +7,10 @@ known, comes from the aircraft file and the instrument's errors; of a table of o
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from host.instrument.deviations import SensorErrorModel
+from host.instrument.deviations import SensorErrorModel, imu_delay_s
 
 # One deviation of the rate limit: of the aircraft file's, and of usual servos, of which data sheets
 # say 0.10 to 0.23 s for 60 deg.
@@ -31,7 +32,10 @@ class ServoPrior:
 
 
 def servo_prior(instrument: SensorErrorModel) -> ServoPrior:
-    """Return the prior of the servos of the surfaces that were only commanded."""
+    """Return the prior of the servos of the surfaces that were only commanded.
+
+    The delay is that behind the IMU's stamps: what a fit sees of both is one.
+    """
     hertz, rate = instrument.servo
     known = instrument.servo_hz > 0.0
     e, commanded = instrument.errors, instrument.recording.commanded
@@ -39,7 +43,9 @@ def servo_prior(instrument: SensorErrorModel) -> ServoPrior:
     return ServoPrior(
         (0.0, hertz, rate),
         (
-            max(e["servo_delay_s"].sigma(s) for s in commanded),
+            math.hypot(
+                max(e["servo_delay_s"].sigma(s) for s in commanded), imu_delay_s(instrument)
+            ),
             hertz * max(e[share].sigma(s) for s in commanded),
             rate * (KNOWN_RATE_SHARE if known else USUAL_RATE_SHARE),
         ),

@@ -155,7 +155,9 @@ def _verdict(needs: Sequence[str], rates: Mapping[str, float], poor: Sequence[st
     if gone:
         return f"cannot be told: {', '.join(n.rsplit('_', 1)[0] for n in gone)} not in the log"
     slow = [g for g in poor if set(GROUPS[g]) & set(needs)]
-    told = "can be told" + ("" if "alpha_rad" in rates else ", without vanes never under trust")
+    path = {"v_north_mps", "airspeed_mps"} <= rates.keys()
+    how = "by the path that GPS tells" if path else "without GPS never under trust"
+    told = "can be told" + ("" if "alpha_rad" in rates else f", no vanes: {how}")
     return f"poorly: {', '.join(slow)} too slow" if slow else told
 
 

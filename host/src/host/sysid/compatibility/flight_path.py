@@ -256,6 +256,8 @@ class PathProblem:
             (2, alpha_scale, alpha_zero, "alpha"),
             (1, beta_scale, beta_zero, "beta"),
         ):
+            if f"{name}_rad" not in self.model.outputs:
+                continue
             along = by_x[:, 2 - across]
             angle = np.arctan2(flow[:, across], u) + arm_x * along
             if across == 1:

@@ -25,6 +25,7 @@ from host.sysid.compatibility.flight_path import (
     PathProblem,
     Segment,
 )
+from host.sysid.compatibility.gps_fixes import gps_fixes
 from host.sysid.compatibility.inverse_sensor_model import SLIDING_RADPS
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.strapdown import rotation
@@ -45,7 +46,6 @@ SURFACES = ("elevator_rad", "aileron_rad", "rudder_rad", "throttle")
 SMOOTH_S = 0.03  # half a window for derivatives: 9 Hz at 100 Hz
 SPEED_SMOOTH_S = 0.25  # half a window: one count of the pitot is 1.4 % of trim speed
 SMOOTHED = "airspeed_mps smoothed"
-FIX_BEND_MPS = 1e-6
 NO_OFFSETS = AirframeData("nothing but places", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
 FLYING_SHARE = 0.5  # of the median airspeed
 # Not in any calibration: deviation of the steady wind, mean and deviation of delays.
@@ -67,23 +67,27 @@ def prepare_path_problem(
         If inertial sensors or all air data are missing, or no part of the flight is long enough.
     """
     inertial = [*(f"{a}_radps" for a in "pqr"), *(f"a{a}_mps2" for a in "xyz")]
-    missing = [c for c in (*inertial, *AIR, "t_s") if c not in columns]
+    gps = all(name in columns for name in GPS)
+    vanes = all(name in columns for name in AIR[1:])
+    # Without vanes GPS tells the path, and airspeed the wind.
+    needed = (*inertial, AIR[0], "t_s") if gps else (*inertial, *AIR, "t_s")
+    missing = [c for c in needed if c not in columns]
     if missing:
         raise IdentificationError(f"data compatibility needs {', '.join(missing)}")
-    gps = all(name in columns for name in GPS)
-    outputs = AIR + ((HEIGHT,) if HEIGHT in columns else ()) + (GPS if gps else ())
+    air = AIR if vanes else AIR[:1]
+    outputs = air + ((HEIGHT,) if HEIGHT in columns else ()) + (GPS if gps else ())
     wanted = {*inertial, *outputs, "t_s", "phi_rad", "theta_rad", "psi_rad", "density_kgpm3"}
     data = {k: v for k, v in columns.items() if k in wanted}
     dt_s = float(data["t_s"][1] - data["t_s"][0])
     if instrument is not None:
-        data |= {name: compensate_friction(data, name, instrument, dt_s) for name in AIR[1:]}
+        data |= {name: compensate_friction(data, name, instrument, dt_s) for name in air[1:]}
         data |= {name: compensate_lowpass(data[name], instrument, dt_s) for name in inertial}
     if airframe is not None:
         data = _at_cg(data, airframe, dt_s)
     block = max(1, round(BLOCK_S / dt_s))
     half = max(2, round(SPEED_SMOOTH_S / dt_s))
     data[SMOOTHED] = local_polynomial(data[AIR[0]][:, None], 2 * half + 1, 2)[:, 0]
-    fixes = _fixes(data) if gps else np.zeros(len(data["t_s"]), dtype=bool)
+    fixes = gps_fixes(data) if gps else np.zeros(len(data["t_s"]), dtype=bool)
     cuts = _select_segments(data, dt_s, block, SEGMENT_S if gps else SHORT_SEGMENT_S)
     vane = 0.0 if instrument is None else 1.0 / (2.0 * np.pi * instrument.vane_hz_per_mps)
     place = np.zeros(3)
@@ -97,7 +101,7 @@ def prepare_path_problem(
         for cut in cuts
     ]
     start_sd = START_SD if gps else np.where(np.arange(len(START)) == 5, 1e-6, START_SD)
-    priors = prior(instrument)
+    priors = prior(instrument, vanes=vanes)
     if not gps:
         priors = {k: v for k, v in priors.items() if k in WITHOUT_GPS}
     problem = PathProblem(segments, outputs, priors, start_sd, block)
@@ -106,7 +110,9 @@ def prepare_path_problem(
     return problem, [_lagged_inputs(columns, cut, block) for cut in cuts], when
 
 
-def prior(instrument: SensorErrorModel | None) -> dict[str, tuple[float, float]]:
+def prior(
+    instrument: SensorErrorModel | None, *, vanes: bool = True
+) -> dict[str, tuple[float, float]]:
     """Return mean and standard deviation of every unknown before the flight."""
     i = instrument or unknown_sensors()
     e, sd = i.errors, deviations(i, NO_OFFSETS)
@@ -131,7 +137,8 @@ def prior(instrument: SensorErrorModel | None) -> dict[str, tuple[float, float]]
     result |= dict.fromkeys(PLACES, (0.0, place))
     wind = (0.0, WIND_SD_MPS)
     result |= dict(zip(WITH_GPS, (GPS_DELAY_S, wind, wind), strict=True))
-    return {name: (float(mean), float(own)) for name, (mean, own) in result.items()}
+    of_vanes = () if vanes else (*FLOW, DELAYS[0], *PLACES)
+    return {n: (float(mean), float(own)) for n, (mean, own) in result.items() if n not in of_vanes}
 
 
 def density_share(instrument: SensorErrorModel | None) -> float:
@@ -170,8 +177,10 @@ def _at_cg(data: dict[str, Array], airframe: AirframeData, dt_s: float) -> dict[
         name = f"{axis}_radps"
         smooth[name] = local_polynomial(data[name][:, None], window, 2)[:, 0]
     at_cg = transfer_to_cg(smooth, replace(airframe, vanes_m=()))
-    without_upwash = np.arctan(np.tan(data["alpha_rad"]) / (1.0 + airframe.upwash))
     rates = {f"{axis}_radps": data[f"{axis}_radps"] for axis in "pqr"}
+    if "alpha_rad" not in data:
+        return {**at_cg, **rates}
+    without_upwash = np.arctan(np.tan(data["alpha_rad"]) / (1.0 + airframe.upwash))
     return {**at_cg, **rates, "alpha_rad": without_upwash}
 
 
@@ -218,15 +227,6 @@ def _select_segments(
     return sorted(selected, key=lambda c: c.start)
 
 
-def _fixes(data: Mapping[str, Array]) -> BoolArray:
-    """Return which samples are GPS fixes: between them a decoded table is linear."""
-    bend = sum(np.abs(np.diff(data[name], n=2)) for name in GPS)
-    bend = np.concatenate([[0.0], bend, [0.0]])
-    known = bend > FIX_BEND_MPS
-    peak = (bend >= np.roll(bend, 1)) & (bend > np.roll(bend, -1))
-    return np.asarray(known & peak)
-
-
 def _lagged_inputs(columns: Mapping[str, Array], cut: slice, block: int) -> Array:
     """Return the control inputs at lags of whole blocks, (blocks, surfaces x lags)."""
     at = np.arange(cut.start, cut.stop)
@@ -265,7 +265,9 @@ def _segment(
     if not gps:
         angles[2] = 0.0
     attitude = rotation(*angles)
-    speed, alpha, beta = (float(np.median(data[name][cut][:block])) for name in AIR)
+    speed, alpha, beta = (
+        float(np.median(data[name][cut][:block])) if name in data else 0.0 for name in AIR
+    )
     air_velocity = speed * np.array(
         [np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)]
     )

@@ -23,7 +23,7 @@ from host.sysid.compatibility.calibration_consistency import (
     calibration_lines,
     consistency_tests,
 )
-from host.sysid.compatibility.flight_path import FLOW, GPS, INERTIAL
+from host.sysid.compatibility.flight_path import AIR, FLOW, GPS, INERTIAL
 from host.sysid.compatibility.path_fit import fit_path
 from host.sysid.compatibility.path_preparation import prepare_path_problem, prior
 from host.sysid.identification_error import IdentificationError
@@ -87,7 +87,8 @@ class Compatibility:
         Root mean square of the residual of each output, in its unit.
     segments : tuple of (from, to), s
         Begin and end of the segments it used.
-    gps : bool
+    gps, vanes : bool
+        Whether they took part.
     instrument : SensorErrorModel, optional
         Errors that the calibration leaves open, if given.
     calibration_tests : tuple of ConsistencyTest
@@ -100,6 +101,7 @@ class Compatibility:
     gps: bool
     instrument: SensorErrorModel | None = None
     calibration_tests: tuple[ConsistencyTest, ...] = ()
+    vanes: bool = True
 
     def __getitem__(self, name: str) -> SensorErrorEstimate:
         """Return a finding by name."""
@@ -139,9 +141,10 @@ def reconstruct(
     gps = GPS[0] in problem.model.outputs
     count = len(problem.common)
     covariance = fit.covariance[:count, :count]
-    scales = [problem.common.index(name) for name in FLOW[::2]]
+    vanes = AIR[1] in problem.model.outputs
+    scales = [problem.common.index(name) for name in FLOW[::2]] if vanes else []
     covariance[scales, scales] += VANE_MODEL_SD**2
-    priors = prior(instrument)
+    priors = prior(instrument, vanes=vanes)
     inflated = covariance if gps else NO_GPS_INFLATION**2 * covariance
     tests = consistency_tests(problem.common, fit.theta[:count], inflated, priors)
     findings = []
@@ -166,7 +169,7 @@ def reconstruct(
         name: float(np.sqrt(q / problem.counted(name)))
         for name, q in zip(problem.model.outputs, squares, strict=True)
     }
-    return Compatibility(tuple(findings), rms, when, gps, instrument, tests)
+    return Compatibility(tuple(findings), rms, when, gps, instrument, tests, vanes)
 
 
 def _reason(name: str, *, gps: bool) -> str:
@@ -179,7 +182,7 @@ def compatibility_lines(found: Compatibility) -> list[str]:
     """Return the verdict's paragraph: errors found, then those not informed and why."""
     lines = [
         f"data compatibility over {len(found.segments)} stretches,"
-        f" {'with' if found.gps else 'without'} GPS:"
+        f" {'with' if found.gps else 'without'} GPS{'' if found.vanes else ', without vanes'}:"
     ]
     significant = [f for f in found.findings if f.significant]
     lines += [f"  {f.name:20s} {f.value:11.4g}  +- {f.half_width:8.2g}" for f in significant]

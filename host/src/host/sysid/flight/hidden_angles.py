@@ -64,9 +64,9 @@ def uncarried_finding(columns: Collection[str]) -> Finding:
     )
 
 
-def no_vanes_finding(columns: Collection[str]) -> list[Finding]:
+def no_vanes_finding(columns: Collection[str], *, reconstructed: bool = False) -> list[Finding]:
     """Return a finding where an angle is missing and may be told otherwise, so that nothing of it
-    is under "trust"."""
+    is under "trust": not where the path is reconstructed, its errors in every interval."""
     told = "airspeed_mps" in columns
     missing = tuple(y for y, by in TOLD_BY.items() if told and y not in columns and by in columns)
     if not missing:
@@ -74,8 +74,9 @@ def no_vanes_finding(columns: Collection[str]) -> list[Finding]:
     return [
         Finding(
             "flow-angles",
-            missing,
+            () if reconstructed else missing,
             f"no vane measured {' and '.join(WORDS[y] for y in missing)}",
-            done="told by rates and accelerations where that can be, else refused",
+            done="told by rates and accelerations where that can be, else refused"
+            + ("; errors of IMU, places and servos are in the intervals" if reconstructed else ""),
         )
     ]

@@ -23,7 +23,7 @@ from host.sysid.aerodynamics.coefficient_table import (
 )
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import Correction, corrections
-from host.sysid.compatibility.sensor_dynamics import SERVO_DELAY
+from host.sysid.compatibility.sensor_dynamics import IMU_DELAY, SERVO_DELAY
 from host.sysid.estimators.coherence_inflation import inflate_by_coherence
 from host.sysid.estimators.filter_error_gust import (
     GustFit,
@@ -383,8 +383,10 @@ class LinearEstimator:
         known = [c for c in carriers if c is not None]
         if len(known) == len(carriers):
             moved = systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
-            # Of servos that were estimated the covariance has what they leave open.
-            shifts += tuple(s for s in moved if e.servo is None or s.error != SERVO_DELAY)
+            # Of servos that were estimated the covariance has what they leave open, and the IMU's
+            # delay with it: all outputs later are all inputs earlier.
+            told = () if e.servo is None else (SERVO_DELAY, IMU_DELAY)
+            shifts += tuple(s for s in moved if s.error not in told)
         # Of an instrument that is known surfaces are measured: they move between samples.
         if self.own is not None or not sensors_known(e.used):
             shifts += hold_shift(statistical, e.maneuvers, e.trim)

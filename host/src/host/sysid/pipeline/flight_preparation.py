@@ -12,6 +12,7 @@ import numpy as np
 from host.instrument.deviations import unknown_sensors
 from host.instrument.error_labels import recording_notes
 from host.instrument.servo_prior import servo_prior
+from host.sysid.compatibility.flow_angles import FlowAngles, reconstruct_flow_angles
 from host.sysid.compatibility.reconstruction import (
     Compatibility,
     NoAgreementError,
@@ -42,11 +43,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PreparedFlight:
-    """A flight ready for estimation, its data-compatibility check, and notes."""
+    """A flight ready for estimation, its data-compatibility check, notes, and without vanes the
+    angles that were reconstructed."""
 
     flight: ReconstructedFlight
     agreement: Compatibility | None
     notes: tuple[str, ...]
+    angles: FlowAngles | None = None
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -73,7 +76,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         row_rate_hz=how.row_rate_hz,
     )
     columns, travel = with_surface_angles(read.columns, read.shares, known)
-    notes, findings = [*read.notes, *travel], [*read.findings, *no_vanes_finding(columns)]
+    notes, findings = [*read.notes, *travel], [*read.findings]
     instrument = known.flown(read) if known else None
     sensors = instrument or unknown_sensors(read.recording)
     commands = commands_of(columns, sensors)
@@ -96,6 +99,8 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     except IdentificationError as error:
         notes.append(str(error))
         findings += [uncarried_finding(columns)] if read.shares else []
+    told = agreement is not None and known is not None
+    findings += no_vanes_finding(columns, reconstructed=told)
     findings = [
         f.accept() if f.check in how.accept and (f.channels or f.feedback) else f for f in findings
     ]
@@ -110,13 +115,20 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         findings=findings,
         resolution=read.resolution,
     )
+    angles = None
+    if agreement is not None and not agreement.vanes and known is not None:
+        try:
+            angles = reconstruct_flow_angles(flight.corrected, agreement, known.airframe)
+            notes.append(angles.line())
+        except IdentificationError as error:
+            notes.append(str(error))
     flight = replace(
         flight,
         delays_open=flight.delays_open and how.delays,
         commands=commands,
         servo=servo_prior(sensors) if commands and how.delays else None,
     )
-    return PreparedFlight(flight, agreement, tuple(notes))
+    return PreparedFlight(flight, agreement, tuple(notes), angles)
 
 
 def listed_flights(flights: Source | Sequence[Source]) -> list[Source]:
