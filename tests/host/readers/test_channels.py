@@ -11,6 +11,7 @@ from host.readers.ardupilot_channels import ardupilot_channels
 from host.readers.ardupilot_outputs import surfaces
 from host.readers.autopilot_flight import chosen_sensors, read_autopilot
 from host.readers.autopilot_log import AutopilotLog, Messages
+from host.readers.flown_tests import flown_tests
 from host.readers.held_outputs import held_output
 from host.readers.plausible_times import plausible
 from host.readers.px4_channels import px4_channels
@@ -212,3 +213,24 @@ def test_outputs_beyond_the_fourteenth() -> None:
     del messages["RCOU"]
     alone = ardupilot_channels(_log("ardupilot", messages, parameters), {}).signals
     np.testing.assert_allclose(alone["rudder"].values, -wave[20])
+
+
+def test_tests_of_the_autopilot_are_named() -> None:
+    """A chirp's messages, autotune's, a mode, a script's text: each with its time."""
+    t = np.r_[np.arange(10.0, 20.0, 0.1), np.arange(40.0, 45.0, 0.1)]
+    messages = {
+        "SIDD": Messages(t, {}),
+        "ATRP": Messages(np.arange(60.0, 70.0, 0.5), {}),
+        "MODE": Messages(np.array([0.0, 58.0, 80.0]), {"ModeNum": np.array([0, 8, 0])}),
+        "MSG": Messages(np.array([90.0, 95.0]), {"Message": np.array([b"STARTING DOUBLET", b"x"])}),
+    }
+    found = flown_tests(_log("ardupilot", messages, {}))
+    said = [(one.name, round(one.from_s), round(one.to_s)) for one in found]
+    assert said == [
+        ("system-identification chirp", 10, 20), ("system-identification chirp", 40, 45),
+        ("mode AUTOTUNE", 58, 80), ("autotune", 60, 70), ("doublet of a script", 90, 95),
+    ]  # fmt: skip
+    state = np.where((t > 12.0) & (t < 15.0), 4, 0)
+    px4 = {"autotune_attitude_control_status": Messages(t, {"state": state})}
+    (one,) = flown_tests(_log("px4", px4, {}))
+    assert (one.name, round(one.from_s), round(one.to_s)) == ("autotune", 12, 15)

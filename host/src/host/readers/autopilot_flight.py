@@ -13,6 +13,7 @@ from host.files.regular import regular_file
 from host.readers.airborne import Airborne, airborne
 from host.readers.ardupilot_channels import ardupilot_channels
 from host.readers.autopilot_log import AutopilotLog, NothingToIdentifyError, SensorChoiceError
+from host.readers.flown_tests import flown_tests
 from host.readers.held_outputs import held_output
 from host.readers.judgement import Judgement, judge
 from host.readers.log_formats import format_of_file, read_messages
@@ -94,6 +95,7 @@ class AutopilotFlight:
         said = [f"damaged: {one}" for one in log.damage]
         said.append("; ".join(self.judgement.lines[:1]))
         said += self.channels.notes
+        said += [f"the autopilot's own test: {test.line}" for test in flown_tests(log)]
         late = sorted({s.late_s for s in self.channels.signals.values() if s.late_s > 0.0})
         if late:
             said.append(

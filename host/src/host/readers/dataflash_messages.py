@@ -25,8 +25,9 @@ WANTED: dict[str, tuple[str, ...]] = {
     "IMU": _INERTIAL, "IMU2": _INERTIAL, "IMU3": _INERTIAL,
     "ATT": ("TimeUS", "TimeMS", "Roll", "Pitch", "Yaw"),
     "ARSP": _AIRSPEED, "ASP2": _AIRSPEED, "BARO": _BARO, "BAR2": _BARO, "GPS": _GPS, "GPS2": _GPS,
-    "RCOU": (), "RCO2": (), "RCO3": (), "PARM": ("Name", "Value"), "MSG": ("Message",),
-    "VER": ("FWS",), "VIBE": (), "DSF": ("Dp",),
+    "RCOU": (), "RCO2": (), "RCO3": (), "PARM": ("Name", "Value"),
+    "MSG": ("TimeUS", "TimeMS", "Message"), "VER": ("FWS",), "VIBE": (), "DSF": ("Dp",),
+    "MODE": ("TimeUS", "TimeMS", "ModeNum"), "SIDD": ("TimeUS",), "ATRP": ("TimeUS",),
 }  # fmt: skip
 # The field that numbers the instances of a kind, in the releases that have one.
 INSTANCE = {"IMU": "I", "ARSP": "I", "BARO": "I", "GPS": "I", "VIBE": "IMU", "XKF1": "C"}

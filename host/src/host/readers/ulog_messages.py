@@ -18,8 +18,8 @@ WANTED = (
     "airspeed", "airspeed_validated", "differential_pressure", "vehicle_air_data",
     "vehicle_local_position", "vehicle_gps_position", "sensor_gps", "actuator_servos",
     "actuator_outputs", "actuator_motors", "actuator_controls_0", "actuator_controls_1",
-    "vehicle_torque_setpoint",
-    "vehicle_thrust_setpoint", "vehicle_status", "vehicle_land_detected", "vehicle_imu_status",
+    "vehicle_torque_setpoint", "vehicle_thrust_setpoint", "autotune_attitude_control_status",
+    "vehicle_status", "vehicle_land_detected", "vehicle_imu_status",
 )  # fmt: skip
 # vehicle_status.vehicle_type, and MAV_TYPE of MAVLink's common.xml.
 BY_STATUS = {1: "copter", 2: "plane", 3: "rover", 4: "airship"}
