@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from host.people_units import people_name
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.flight.linear_estimator import Answer
 from host.sysid.models.model_constants import known_constants
@@ -15,24 +16,26 @@ NOT_TOLD = 1e3
 def constant_lines(answer: Answer) -> list[str]:
     """Return every constant with its 95 % half-width, maneuver by maneuver; known ones last."""
     result, half = answer.result, answer.result.half_width()
-    found: dict[str, list[str]] = {}
+    found: dict[str, tuple[str, list[str]]] = {}
     for k, name in enumerate(result.names):
         constant, at, _ = name.partition("@")
         if at:
             value = float(result.estimate[k])
             told = half[k] < NOT_TOLD * max(abs(value), 1e-3)
-            words = f"{value:.4g} +- {half[k]:.2g}" if told else "not told"
-            found.setdefault(constant, []).append(words)
+            shown, factor = people_name(constant)
+            words = f"{factor * value:.4g} +- {factor * half[k]:.2g}" if told else "not told"
+            found.setdefault(constant, (shown, []))[1].append(words)
     lines = []
     if found:
         lines.append(
             "  constants of each maneuver (bias_rate of a state's equation, bias of an output,"
             " initial state)"
         )
-    for constant, values in found.items():
+    for constant, (shown, values) in found.items():
         unit = parameter_unit(answer.model, f"{constant}@1")
+        unit = unit.replace("1", "deg", 1) if shown != constant else unit
         for first in range(0, len(values), IN_A_LINE):
-            label = f"{constant} {unit}".rstrip() if first == 0 else ""
+            label = f"{shown} {unit}".rstrip() if first == 0 else ""
             row = "".join(f"{x:>22s}" for x in values[first : first + IN_A_LINE])
             lines.append(f"    {label:30s}{row}")
     known = [f"{name} {value:g}" for name, value in known_constants(answer.model).items()]

@@ -18,6 +18,7 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel
+from host.people_units import people_name
 from host.sysid.compatibility.calibration_consistency import (
     ConsistencyTest,
     calibration_lines,
@@ -187,7 +188,9 @@ def compatibility_lines(found: Compatibility) -> list[str]:
         f" {'with' if found.gps else 'without'} GPS{'' if found.vanes else ', without vanes'}:"
     ]
     significant = [f for f in found.findings if f.significant]
-    lines += [f"  {f.name:20s} {f.value:11.4g}  +- {f.half_width:8.2g}" for f in significant]
+    for f in significant:
+        name, factor = people_name(f.name)
+        lines.append(f"  {name:20s} {factor * f.value:11.4g}  +- {factor * f.half_width:8.2g}")
     if not significant:
         lines.append("  no sensor error stands out of its interval")
     lines += [f"  {line}" for line in calibration_lines(found.calibration_tests)]

@@ -13,6 +13,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import NORMAL_95
+from host.people_units import people_name
 from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, INERTIAL, PITOT
 from host.sysid.compatibility.path_preparation import density_share
 from host.sysid.compatibility.reconstruction import Compatibility
@@ -144,7 +145,10 @@ def correction_lines(taken: Sequence[Correction]) -> list[str]:
     """Return the verdict's lines on the corrections."""
     if not taken:
         return []
-    parts = ", ".join(f"{c.name} {c.value:.3g} +- {c.half_width:.2g}" for c in taken)
+    parts = ", ".join(
+        f"{name} {factor * c.value:.3g} +- {factor * c.half_width:.2g}"
+        for c, (name, factor) in ((c, people_name(c.name)) for c in taken)
+    )
     return textwrap.wrap(
         f"taken out of the columns before the linear fits: {parts}",
         100,
