@@ -21,6 +21,7 @@ from types import CodeType, FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from host.extras import install_hint
+from host.progress import stage
 from host.resources import user_cache
 
 Arguments = ParamSpec("Arguments")
@@ -105,7 +106,7 @@ class Kernel(Generic[Arguments, Result]):
             if said and fresh:
                 left = [k.function.__code__ for k in _all_of(self) if k._machine is None]
                 size = sum(len(code.co_code) for code in left)
-                _say(f"compiling {self.name}, once, about {LOADING_S + S_PER_BYTE * size:.0f} s")
+                _say_compiling(f"{self.name}, about {LOADING_S + S_PER_BYTE * size:.0f} s")
             self._machine = _jit(self._linked(), self._reordered, self._kept)
         return self._machine
 
@@ -143,6 +144,7 @@ def compiled_part(function: Callable[Arguments, Result]) -> Kernel[Arguments, Re
 
 
 _preferred = False
+_told = False  # that kernels are being compiled
 
 
 def prefer_machine_code() -> None:
@@ -312,6 +314,15 @@ def _all_of(kernel: Kernel[..., Any]) -> set[Kernel[..., Any]]:
 @functools.cache
 def _say_slow() -> None:
     _say(f"without numba this takes {SLOWER} times as long: {install_hint('numba')}")
+
+
+def _say_compiling(what: str) -> None:
+    """Say it once in a process; what comes behind is a stage of the work."""
+    global _told
+    stage(f"compiling {what}")
+    if not _told:
+        _told = True
+        _say(f"a first run compiles its kernels and keeps them for the next ({what}, comes first)")
 
 
 def _say(text: str) -> None:
