@@ -1,6 +1,7 @@
 """What a ground station received from the radio is a log: the same values, every loss named."""
 
 import json
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from host.errors import LogError
 from host.log import FlightLog, read_log
 from host.log.capture_head import CaptureHead, notes_path
 from host.resources import resource
+from host.wire.stream import read_stream
 
 from tests.host.live.radio import Sent, joined, sent
 from tests.host.logs import flight, written
@@ -23,6 +25,12 @@ def received(folder: Path, data: bytes) -> FlightLog:
     path = folder / "flight.radio"
     path.write_bytes(data)
     return read_log(path)
+
+
+def read_stream_of(folder: Path, data: bytes) -> None:
+    path = folder / "stream.radio"
+    path.write_bytes(data)
+    read_stream(path)
 
 
 def idents(parts: list[Sent]) -> list[int]:
@@ -133,6 +141,24 @@ def test_calibration_of_the_head_is_used(tmp_path: Path) -> None:
 def test_damaged_head_is_no_head(tmp_path: Path, head: str) -> None:
     notes_path(tmp_path / "flight.radio").write_text(head + "\n")
     assert received(tmp_path, joined(SENT)).calibration.name
+
+
+@pytest.mark.parametrize("size", [1, 9])
+def test_a_forged_stream_takes_at_most_eight_times_its_size(
+    tmp_path: Path, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the shortest envelopes, and of the shortest frames that are used."""
+    monkeypatch.setattr("host.wire.stream._WINDOW_BYTES", 1 << 13)
+    monkeypatch.setattr("host.wire.stream._AT_ONCE", 1 << 9)
+    read_stream_of(tmp_path, joined(SENT))  # what is loaded once
+    short = b"\xf0" if size == 1 else bytes(rows("image", 1).tobytes())
+    assert len(short) == size
+    data = joined([part for part in SENT if part.data[3] == 0]) + envelope(short) * 20_000
+    tracemalloc.start()
+    read_stream_of(tmp_path, data)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8 * len(data)
 
 
 def test_verbs_read_it_like_any_log(

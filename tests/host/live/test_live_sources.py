@@ -220,6 +220,25 @@ def test_a_wrong_baud_rate_is_told(tmp_path: Path) -> None:
     assert "4000 bytes at 9600 baud and no whole frame" in _silence(session)
 
 
+def test_a_full_disk_is_told_and_the_flight_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("flight.radio").write_bytes(STREAM)
+    write = os.write
+
+    def full(file: int, data: bytes) -> int:
+        if data[:1] == b"\xa5" and write(file, data[:5000]) > 4000:
+            raise OSError(28, "No space left on device")
+        return len(data)
+
+    monkeypatch.setattr("host.live.ground_capture.os.write", full)
+    assert main(["live", "flight.radio@max", "-o", "out.radio", "--no-page"]) == 2
+    err = capsys.readouterr().err
+    assert "NOT RECORDED from here on" in err
+    assert "what is there can be decoded" in err
+
+
 def test_an_unknown_schema_is_recorded_and_told_once(tmp_path: Path) -> None:
     from tests.protocol.log_writer import envelope
 

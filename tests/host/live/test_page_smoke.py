@@ -29,7 +29,7 @@ def planted(seconds: float) -> bytes:
 
 
 def test_the_page_shows_the_flight_and_asks_nobody_else(tmp_path: Path) -> None:
-    (tmp_path / "in.radio").write_bytes(planted(60.0))
+    (tmp_path / "in.radio").write_bytes(planted(48.0))
     command = ("live", "in.radio@4x", "-o", "<b>out.radio", "--json")
     with subprocess.Popen(
         [sys.executable, "-m", "host", *command],

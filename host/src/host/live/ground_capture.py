@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import time
@@ -54,7 +55,8 @@ class GroundCapture:
         trace: TracebackType | None,
     ) -> None:
         for file in (self._bytes, self._notes):
-            os.fsync(file)
+            with contextlib.suppress(OSError):  # a disk that is gone was told of when it went
+                os.fsync(file)
             os.close(file)
 
     def write(self, data: bytes) -> None:

@@ -143,6 +143,11 @@ def run_live(
                 bridge.close()
     if session.error is not None:
         raise session.error
+    if session.disk_error is not None and capture is not None:
+        raise UsageError(
+            f"{capture.path}: the disk took {capture.size_bytes} bytes and no more"
+            f" ({session.disk_error.strerror}); what is there can be decoded"
+        )
     stream = session.stream
     return LiveSummary(
         capture.path if capture else None,

@@ -66,6 +66,7 @@ class LiveSession:
         self.audiences: list[Audience] = []
         self.ended = threading.Event()
         self.error: BaseException | None = None
+        self.disk_error: OSError | None = None  # from then on nothing is recorded
         self._asked: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self._stop = threading.Event()
         self._tell = tell
@@ -89,9 +90,7 @@ class LiveSession:
     def _run(self) -> None:
         try:
             self._receive()
-        except HostError as error:
-            self.error = error
-        except OSError as error:  # the disk is full: what was written stays
+        except (HostError, OSError) as error:
             self.error = error
         finally:
             self.ended.set()
@@ -104,7 +103,7 @@ class LiveSession:
         fed_s = self._shown_s = 0.0
         for data in self.source.portions(self._said):
             if data and self.capture is not None:
-                self.capture.write(data)
+                self._written(self.capture, data)
             held += data
             now_s = time.monotonic()
             if held and (now_s - fed_s >= _BATCH_S or len(held) >= _BIG):
@@ -117,6 +116,17 @@ class LiveSession:
                 break
         if held:
             self._feed(bytes(held))
+
+    def _written(self, capture: GroundCapture, data: bytes) -> None:
+        """Write to disk; if it takes no more, say so and go on showing the flight."""
+        try:
+            capture.write(data)
+        except OSError as error:
+            self.capture = None
+            self.disk_error = error
+            self._said(
+                f"{capture.path} takes no more ({error.strerror}): NOT RECORDED from here on"
+            )
 
     def _feed(self, data: bytes) -> None:
         update = self.stream.feed(data, time.time())
@@ -158,6 +168,7 @@ class LiveSession:
             "source": self.source.name,
             "captured_bytes": capture.size_bytes if capture else None,
             "capture": capture.path.name if capture else None,
+            "not_recorded": self.disk_error is not None,
         }
         message = json.dumps(what, allow_nan=False)
         for audience in self.audiences:

@@ -65,7 +65,11 @@ class MavlinkBridge:
     """
 
     def __init__(self, session: LiveSession, place: str) -> None:
-        self._place = mavlink_place(place)
+        host, port = mavlink_place(place)
+        try:
+            self._place = socket.gethostbyname(host), port
+        except OSError:
+            raise UsageError(f"--mavlink {place}: {host} is not known") from None
         try:
             from pymavlink.dialects.v20 import ardupilotmega
         except ModuleNotFoundError:
@@ -220,7 +224,7 @@ class MavlinkBridge:
                 data, who = self._socket.recvfrom(2048)
             except OSError:
                 return
-            if who[0] != socket.gethostbyname(self._place[0]):
+            if who[0] != self._place[0]:
                 continue
             try:
                 messages = self._link.parse_buffer(data) or ()

@@ -9,14 +9,15 @@ from __future__ import annotations
 import zlib
 from collections import deque
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from host.errors import LogError
-from host.wire.blocks import HEADER, MAGIC, Blocks, Progress
+from host.wire.blocks import MAGIC, Blocks, Progress
 from host.wire.frames import FrameSet, Piece
 from host.wire.framing import HEAD_BYTES, LONGEST_FRAME, SCHEMA_HASH_ID, TAIL_BYTES, find_envelopes
 from host.wire.schema import Schema
@@ -29,6 +30,8 @@ _FEWEST = 3  # envelopes: noise makes one in 65536 syncs, never three in a row
 _REMEMBERED = 8  # frames of a kind among which a repeated one is looked for
 _ASTRAY_US = 60_000_000  # a clock that jumps so far for one frame is a wrong frame
 _BACK_US = -1_000_000  # a clock that steps back further was reset; frames finish 5 ms out of order
+_WINDOW_BYTES = 1 << 20
+_AT_ONCE = 1 << 15
 LARGEST_BYTES = 1 << 30  # 4 days of the fastest radio; held in memory, eight times over
 
 
@@ -97,10 +100,9 @@ def read_stream(path: Path, *, texts: Collection[bytes] = (), limit_bytes: int =
         )
     with path.open("rb") as file:
         data = file.read(limit_bytes)
-    found = find_envelopes(data, ended=limit_bytes < 0)
-    place = np.array(found.places, np.int64)
+    place, failed = _envelopes(data, ended=limit_bytes < 0)
     octets = np.frombuffer(data, np.uint8)
-    length = octets[place + 2].astype(np.int64)
+    length = octets[place + 2]
     kind = octets[place + HEAD_BYTES]
     hashes = _hashes(data, place, length, kind)
     # Cut off before its first hash, which comes every 5 s: the head of the capture knows.
@@ -114,26 +116,58 @@ def read_stream(path: Path, *, texts: Collection[bytes] = (), limit_bytes: int =
             size_of[frame.id] = frame.size_bytes
         fits |= (which == number) & (size_of[kind] == length) & (length >= _HASH_BYTES)
     again = _repeated(data, place, length, kind, fits)
-    t_us = _u32(octets, place + HEAD_BYTES + 1, fits)
+    t_us = _u32(data, place + HEAD_BYTES + 1, fits)
     use = fits & ~again
     astray = _astray(t_us, use)
     use &= ~astray
     at = np.flatnonzero(use)
-    header = np.zeros(len(at), HEADER)
-    header["schema_hash"], header["used"] = which[at], length[at]
-    header["first_id"], header["first_t_us"] = kind[at], t_us[at]
-    header["sequence"] = np.arange(len(at))
-    blocks = Blocks(place[at], *(header[field.name] for field in fields(Blocks)[1:]))
-    header["session"] = _sessions(data, blocks, known)
+    blocks = _blocks(place[at], which[at], length[at], kind[at], t_us[at])
+    blocks = replace(blocks, session=_sessions(data, blocks, known))
     numbers, counts = np.unique(which, return_counts=True)
     return Stream(
         data=data,
         blocks=blocks,
         bad=_bad(place, length, len(data)),
-        failed=found.failed,
+        failed=failed,
         repeated=place[again],
         unfit=place[(~fits & (kind != SCHEMA_HASH_ID)) | astray],
         schemas=dict(zip(numbers.tolist(), counts.tolist(), strict=True)),
+    )
+
+
+def _envelopes(data: bytes, *, ended: bool) -> tuple[NDArray[np.int64], int]:
+    """Return where good envelopes begin, and how many failed; a window of the stream at a time."""
+    places, failed, start = [], 0, 0
+    while True:
+        last = start + _WINDOW_BYTES >= len(data)
+        found = find_envelopes(data[start : start + _WINDOW_BYTES], ended=ended and last)
+        places.append(np.array(found.places, np.int64) + start)
+        failed += found.failed
+        if last:
+            return np.concatenate(places), failed
+        start += found.pending_from
+
+
+def _blocks(
+    place: NDArray[np.int64],
+    which: NDArray[np.uint32],
+    length: NDArray[np.uint8],
+    kind: NDArray[np.uint8],
+    t_us: NDArray[np.uint32],
+) -> Blocks:
+    """Return a block for each frame; what a stream does not have is zero."""
+    none = np.zeros(len(place), np.uint32)
+    return Blocks(
+        position=place,
+        file_id=none,
+        session=none,
+        sequence=np.arange(len(place), dtype=np.uint32),
+        schema_hash=which,
+        dropped=none,
+        used=length.astype(np.uint16),
+        kind=np.zeros(len(place), np.uint8),
+        first_id=kind,
+        first_t_us=t_us,
     )
 
 
@@ -160,7 +194,7 @@ class StreamStore(FrameStore):
         progress: Progress | None = None,
     ) -> None:
         super().__init__(path, blocks, schema, progress)
-        self._octets = np.frombuffer(stream.data, np.uint8)
+        self._data = stream.data
 
     @property
     def kept(self) -> bool:
@@ -176,9 +210,8 @@ class StreamStore(FrameStore):
             frame = self.schema.by_name[name]
             which = first + np.flatnonzero(ids == frame.id)
             places = self.blocks.position[which] + HEAD_BYTES
-            raw = self._octets[places[:, None] + np.arange(frame.size_bytes)]
-            data = np.ascontiguousarray(raw).reshape(-1).view(frame.dtype)
-            frames[name] = FrameSet(data, which.astype(np.int32))
+            raw = _anywhere(self._data, f"V{frame.size_bytes}")[places]
+            frames[name] = FrameSet(raw.view(frame.dtype), which.astype(np.int32))
         yield Piece(frames, last, 0)
 
 
@@ -189,7 +222,7 @@ def stream_schemas(path: Path, stream: Stream, texts: Collection[bytes] = ()) ->
 
 
 def _hashes(
-    data: bytes, place: NDArray[np.int64], length: NDArray[np.int64], kind: NDArray[np.uint8]
+    data: bytes, place: NDArray[np.int64], length: NDArray[np.uint8], kind: NDArray[np.uint8]
 ) -> list[tuple[int, int]]:
     """Return envelope number and value of each hash of a schema."""
     told = np.flatnonzero((kind == SCHEMA_HASH_ID) & (length == _HASH_BYTES)).tolist()
@@ -227,36 +260,43 @@ def _known(path: Path, which: NDArray[np.uint32], texts: Collection[bytes]) -> d
     return found
 
 
-def _u32(
-    octets: NDArray[np.uint8], start: NDArray[np.int64], fits: NDArray[np.bool_]
-) -> NDArray[np.uint32]:
+def _anywhere(data: bytes, kind: str) -> NDArray[Any]:
+    """Return every byte of the stream seen as the start of a value: one copy of what is taken."""
+    room = max(0, len(data) - np.dtype(kind).itemsize + 1)
+    return np.ndarray((room,), np.dtype(kind), data, strides=(1,))
+
+
+def _u32(data: bytes, start: NDArray[np.int64], fits: NDArray[np.bool_]) -> NDArray[np.uint32]:
     """Return the little-endian number at each start; 0 where there is no frame."""
     out = np.zeros(len(start), np.uint32)
-    four = octets[start[fits][:, None] + np.arange(4)]
-    out[fits] = np.ascontiguousarray(four).reshape(-1).view("<u4")
+    out[fits] = _anywhere(data, "<u4")[start[fits]]
     return out
 
 
 def _repeated(
     data: bytes,
     place: NDArray[np.int64],
-    length: NDArray[np.int64],
+    length: NDArray[np.uint8],
     kind: NDArray[np.uint8],
     fits: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     """Return which frames arrived before: every frame carries its time, so none comes twice."""
     again = np.zeros(len(place), bool)
     last: dict[int, deque[bytes]] = {}
-    rows = zip(place.tolist(), length.tolist(), kind.tolist(), fits.tolist(), strict=True)
-    for number, (at, size, which, fit) in enumerate(rows):
-        if not fit:
-            continue
-        frame = data[at + HEAD_BYTES : at + HEAD_BYTES + size]
-        recent = last.setdefault(which, deque(maxlen=_REMEMBERED))
-        if frame in recent:
-            again[number] = True
-        else:
-            recent.append(frame)
+    used = np.flatnonzero(fits)
+    for first in range(0, len(used), _AT_ONCE):
+        part = used[first : first + _AT_ONCE]
+        rows = zip(
+            part.tolist(), place[part].tolist(), length[part].tolist(), kind[part].tolist(),
+            strict=True,
+        )  # fmt: skip
+        for number, at, size, which in rows:
+            frame = data[at + HEAD_BYTES : at + HEAD_BYTES + size]
+            recent = last.setdefault(which, deque(maxlen=_REMEMBERED))
+            if frame in recent:
+                again[number] = True
+            else:
+                recent.append(frame)
     return again
 
 
@@ -301,16 +341,17 @@ def _sessions(data: bytes, blocks: Blocks, known: dict[int, Schema]) -> NDArray[
     return numbers[run]
 
 
-def _bad(place: NDArray[np.int64], length: NDArray[np.int64], size: int) -> list[tuple[int, int]]:
+def _bad(place: NDArray[np.int64], length: NDArray[np.uint8], size: int) -> list[tuple[int, int]]:
     """Return the ranges between envelopes; what is cut at either end is none."""
     if not len(place):
         return []
-    end = place + length + _ENVELOPE
-    starts, stops = np.r_[0, end], np.r_[place, size]
-    room = stops - starts
     # Whoever begins to listen hears the rest of an envelope first, and whoever ends, half of one.
-    keep = room > 0
     longest = _ENVELOPE + LONGEST_FRAME
-    keep[0] &= room[0] >= longest
-    keep[-1] &= room[-1] >= longest
-    return list(zip(starts[keep].tolist(), stops[keep].tolist(), strict=True))
+    bad = [(0, int(place[0]))] if place[0] >= longest else []
+    room = np.diff(place)
+    room -= length[:-1]
+    for at in np.flatnonzero(room > _ENVELOPE).tolist():
+        end = int(place[at]) + int(length[at]) + _ENVELOPE
+        bad.append((end, int(place[at + 1])))
+    end = int(place[-1]) + int(length[-1]) + _ENVELOPE
+    return [*bad, (end, size)] if size - end >= longest else bad

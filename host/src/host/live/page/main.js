@@ -59,6 +59,7 @@ function ageS() {
 function banner(age) {
   if (!connected) return "host live has ended, or this page lost it: nothing here is new";
   if (state === null) return "";
+  if (state.not_recorded) return "the disk takes no more: NOT RECORDED on the ground (the card goes on)";
   if (state.ended) return "the source has ended: nothing here is new";
   if (age === null) return "nothing received yet";
   return age > OLD_S ? `no data for ${age.toFixed(0)} s: values are old` : "";
