@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, clock_share
+from host.instrument.recording import FOREIGN
 
 ERROR_LABELS = {
     "mass_share": "mass", "ixx_share": "Ixx", "iyy_share": "Iyy", "izz_share": "Izz",
@@ -50,6 +53,14 @@ def recording_notes(instrument: SensorErrorModel) -> list[str]:
     hertz, rate = instrument.servo
     whose = "the aircraft file's servos" if instrument.servo_hz > 0.0 else "usual servos"
     lines = []
+    if instrument.recording.maker == FOREIGN:
+        e = instrument.errors
+        vanes, pitot = (100.0 * NORMAL_95 * e[n].of_mean() for n in ("vane_scale", "pitot_scale"))
+        zero = math.degrees(NORMAL_95 * e["vane_zero_rad"].of_mean("alpha_a", "alpha_b"))
+        lines.append(
+            f"sensors of others: vanes may be wrong by {vanes:.0f} % and {zero:.1f} deg, dynamic"
+            f" pressure by {pitot:.0f} % (95 %); [error.NAME] of a calibration says better"
+        )
     if instrument.recording.commanded:
         lines.append(
             f"{', '.join(instrument.recording.commanded)}: the command through {whose}"

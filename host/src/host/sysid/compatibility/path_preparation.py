@@ -58,8 +58,11 @@ def prepare_path_problem(
     columns: Mapping[str, Array],
     airframe: AirframeData | None,
     instrument: SensorErrorModel | None,
+    usual: SensorErrorModel | None = None,
 ) -> tuple[PathProblem, list[Array], tuple[tuple[float, float], ...]]:
     """Return the problem, the lagged inputs of every segment, and begin and end of each (s).
+
+    `usual` gives the priors of sensors of which no file speaks.
 
     Raises
     ------
@@ -101,7 +104,7 @@ def prepare_path_problem(
         for cut in cuts
     ]
     start_sd = START_SD if gps else np.where(np.arange(len(START)) == 5, 1e-6, START_SD)
-    priors = prior(instrument, vanes=vanes)
+    priors = prior(instrument or usual, vanes=vanes)
     if not gps:
         priors = {k: v for k, v in priors.items() if k in WITHOUT_GPS}
     problem = PathProblem(segments, outputs, priors, start_sd, block)

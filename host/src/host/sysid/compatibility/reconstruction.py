@@ -113,6 +113,7 @@ def reconstruct(
     columns: Mapping[str, Array],
     airframe: AirframeData | None = None,
     instrument: SensorErrorModel | None = None,
+    usual: SensorErrorModel | None = None,
 ) -> Compatibility:
     """Reconstruct the flight path and estimate the errors of the sensors.
 
@@ -124,6 +125,8 @@ def reconstruct(
         Places of the sensors and upwash; by default vanes and IMU are at the CG.
     instrument : SensorErrorModel, optional
         Errors that the calibration leaves open; standard ones by default.
+    usual : SensorErrorModel, optional
+        In place of the standard, where no aircraft file describes the sensors: of another maker.
 
     Raises
     ------
@@ -132,7 +135,7 @@ def reconstruct(
     NoAgreementError
         If the iteration does not converge.
     """
-    problem, lagged_inputs, when = prepare_path_problem(columns, airframe, instrument)
+    problem, lagged_inputs, when = prepare_path_problem(columns, airframe, instrument, usual)
     vanes = AIR[1] in problem.model.outputs
     # Vanes see the gusts that the aircraft rides with; without them least squares do, and settle
     # where instruments lose themselves (four of six flights in calm air).
@@ -147,7 +150,7 @@ def reconstruct(
     covariance = fit.covariance[:count, :count]
     scales = [problem.common.index(name) for name in FLOW[::2]] if vanes else []
     covariance[scales, scales] += VANE_MODEL_SD**2
-    priors = prior(instrument, vanes=vanes)
+    priors = prior(instrument or usual, vanes=vanes)
     inflated = covariance if gps else NO_GPS_INFLATION**2 * covariance
     tests = consistency_tests(problem.common, fit.theta[:count], inflated, priors)
     findings = []

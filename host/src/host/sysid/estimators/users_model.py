@@ -29,6 +29,8 @@ from host.sysid.models.state_space_model import LinearModel
 GUST, FILTER = "filter-error-gust", "filter-error"
 MEMORY, WHITE = "output-error", "output-error-white"
 AT_LIMIT = 1e-9
+# Samples times unknowns of equations: 100 000 take half a minute by filter error.
+MOST_WORK = 300_000
 
 
 @dataclass(frozen=True)
@@ -116,6 +118,9 @@ def fit_by_evidence(
         line = "noise chosen by the data: white, it has no memory"
         return UsersFit(WHITE, named, plain.maneuvers, remarks=(line,))
     why = no_filter(model, maneuvers)
+    work = sum(m.samples for m in maneuvers) * len(plain.result.estimate)
+    if not why and isinstance(model, NonlinearModel) and work > MOST_WORK:
+        why = f"that would take many minutes; --method {FILTER} does it"
     if why:
         return replace(plain, remarks=(f"noise chosen by the data: {own}; no gust tried: {why}",))
     try:

@@ -91,7 +91,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     findings += feedback_findings({**columns, **commands}, found)
     agreement = None
     try:
-        agreement = reconstruct(columns, known.airframe if known else None, instrument)
+        agreement = reconstruct(columns, known.airframe if known else None, instrument, sensors)
         agreement = agreement if how.delays else without_estimated_delays(agreement)
         findings += calibration_findings(agreement)
     except NoAgreementError as error:
