@@ -1,7 +1,8 @@
 """A UART of the chip as a pseudo-terminal, for programs that want a serial port.
 
 The one place where the simulator meets the clock on the wall: programs such as avrdude time out in
-real seconds, so the chip may run ahead of them only while bytes are flowing.
+real seconds, so the chip may run ahead of them only while bytes are flowing. A busy computer stops
+them for seconds; a bootloader that waits must not have gone meanwhile.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ class PtyBridge:
     baud : float
         What the program outside speaks; a pseudo-terminal does not tell.
     reset_on_open : bool
-        Reset the chip on the first byte after half a second of silence, in place of the DTR line a
-        pseudo-terminal lacks.
+        Reset the chip when a program opens the terminal, in place of the DTR line that it lacks,
+        and let the chip wait for that program: `WAITING` of its time passes while no byte flows.
 
     Attributes
     ----------
@@ -38,7 +39,7 @@ class PtyBridge:
     """
 
     SLICE_S = 0.001
-    SILENCE_S = 0.5
+    WAITING = 0.1
 
     def __init__(
         self, chip: Chip, port: int = 0, *, baud: float = 115200.0, reset_on_open: bool = False
@@ -52,13 +53,15 @@ class PtyBridge:
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
         self._out = bytearray()
-        self._heard_s = -1.0
+        self._opened = False
+        os.close(self._slave)  # from now on the master tells whether somebody has it open
+        self._poll = select.poll()
+        self._poll.register(self._master, select.POLLIN | select.POLLHUP)
         chip.on_uart(port, lambda byte, cycle: self._out.append(byte))
 
     def close(self) -> None:
-        """Close both ends."""
+        """Close our end."""
         os.close(self._master)
-        os.close(self._slave)
 
     def __enter__(self) -> PtyBridge:
         """Give the bridge itself."""
@@ -70,26 +73,30 @@ class PtyBridge:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close both ends."""
+        """Close our end."""
         self.close()
 
     def _exchange(self) -> bool:
+        """Carry bytes both ways; return whether the program outside sent any."""
+        [(_, ready)] = self._poll.poll(0) or [(self._master, 0)]
+        opened = not ready & select.POLLHUP
+        if opened and not self._opened and self._reset:
+            self._out.clear()
+            self._chip.reset(ResetCause.EXTERNAL)
+            self._chip.run_s(0.1)  # start-up delay and the bootloader's first instructions
+        self._opened = opened
+        if not opened:
+            self._out.clear()  # nobody listens
+            return False
         if self._out:
             try:
                 sent = os.write(self._master, self._out)
             except BlockingIOError:
                 sent = 0
             del self._out[:sent]
-        readable, _, _ = select.select([self._master], [], [], 0.0)
-        if not readable:
+        if not ready & select.POLLIN:
             return False
-        data = os.read(self._master, 4096)
-        now_s = time.monotonic()
-        if self._reset and now_s - self._heard_s > self.SILENCE_S:
-            self._chip.reset(ResetCause.EXTERNAL)
-            self._chip.run_s(0.1)  # start-up delay and the bootloader's first instructions
-        self._heard_s = now_s
-        self._chip.uart_send(self._port, data, baud=self._baud)
+        self._chip.uart_send(self._port, os.read(self._master, 4096), baud=self._baud)
         return True
 
     def serve(self, done: Callable[[], bool], *, limit_s: float = 60.0) -> None:
@@ -108,12 +115,14 @@ class PtyBridge:
             If ``done()`` stays false.
         """
         began_s, from_s = time.monotonic(), self._chip.time_s
+        pace = self.WAITING if self._reset else 1.0
         while not done():
             flowing = self._exchange() or bool(self._out)
             self._chip.run_s(self.SLICE_S)
-            passed_s = time.monotonic() - began_s
-            if passed_s > limit_s:
+            waited_s = time.monotonic() - began_s
+            if waited_s > limit_s:
                 raise TimeoutError(f"nothing came of it in {limit_s} s")
+            passed_s = pace * waited_s
             ahead_s = self._chip.time_s - from_s - passed_s
             if flowing:
                 from_s = self._chip.time_s - passed_s  # time spent in bytes is no lead
