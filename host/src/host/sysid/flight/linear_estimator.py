@@ -387,8 +387,9 @@ class LinearEstimator:
             # delay with it: all outputs later are all inputs earlier.
             told = () if e.servo is None else (SERVO_DELAY, IMU_DELAY)
             shifts += tuple(s for s in moved if s.error not in told)
-        # Of an instrument that is known surfaces are measured: they move between samples.
-        if self.own is not None or not sensors_known(e.used):
+        # Of an instrument that is known surfaces are measured: they move between samples. Delays
+        # that were estimated have taken up half a sample, and their intervals count it.
+        if self.own is not None or not (e.delays or sensors_known(e.used)):
             shifts += hold_shift(statistical, e.maneuvers, e.trim)
         found: tuple[Coefficient, ...] = ()
         if self.airframe is not None and e.trim.known:
