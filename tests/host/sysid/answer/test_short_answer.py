@@ -68,7 +68,8 @@ def test_a_bar_shows_which_scale_it_has() -> None:
     axis = interval_bars(bars, "two").axes[0]
     points = {line.get_marker() for line in axis.get_lines()}
     assert {"o", "s"} <= points
-    styles = {str(c.get_linestyle()[0][1]) for c in axis.collections}
+    drawn: list[Any] = list(axis.collections)
+    styles = {str(c.get_linestyle()[0][1]) for c in drawn}
     assert len(styles) == 2  # a line and dashes
     assert "squares, dashed" in axis.get_xlabel()
 
@@ -83,7 +84,7 @@ def test_true_poles_stand_on_the_map() -> None:
                   poles["short period"])  # fmt: skip
     overview = pole_map([cloud], "map").axes[0]
     marks = [line for line in overview.get_lines() if line.get_marker() == "D"]
-    places = {(float(m.get_xdata()[0]), float(m.get_ydata()[0])) for m in marks}
+    places = {tuple(np.ravel(m.get_xydata())) for m in marks}
     assert places == {(-6.0, 8.0), (-6.0, -8.0)}
     assert "simulated aircraft" in overview.get_title()
 
@@ -93,7 +94,7 @@ def test_what_the_fit_did_not_see_is_shaded(found: host.Identification) -> None:
     traces = [Trace(t, t, t), Trace(t + 6.0, t, t, unseen=True)]
     over, under = histories({"q_radps": traces}, "two").axes
     for axis in (over, under):
-        (shade,) = axis.patches
+        shade: Any = axis.patches[0]
         assert shade.get_facecolor() == to_rgba("#fdf3dc")
         assert shade.get_x() == 6.0
     (answer,) = found.linear
