@@ -1,0 +1,201 @@
+"""The equations that are shipped, on flights of the twin: do their intervals hold?
+
+3-2-1-1s and doublets on three axes in calm air and in turbulence of 0.5 m/s, the truth at the CG
+with white noise of usual sensors; density is the flight's. Each file is fitted as a user fits it,
+by the default or a method that is named. Flight-path reconstruction gets sensors with errors that
+are drawn from its priors. One row a model, air, flight and parameter goes to a file that a later
+run continues.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+import tomllib
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from host.aircraft.mass_properties import airframe_data
+from host.sysid.answer.verdict import verdict_of
+from host.sysid.identification_error import IdentificationError
+from host.sysid.models.equation_file import equations_from
+from host.sysid.models.nonlinear_model import NonlinearModel
+from host.twin.testcard.cards import Card, load
+from host.twin.virtual import virtual_flight
+
+import host
+
+FIRST_SEED = 8000
+AIRCRAFT = "ultrastick25e"
+MODELS = ("longitudinal", "lateral", "six_degrees", "flight_path")
+AIRS_MPS = (0.0, 0.5)
+COLUMNS = (
+    "model", "air_mps", "seed", "method", "name", "true", "estimate", "half_width", "mark",
+)  # fmt: skip
+PRINCIPAL = (
+    "CL_alpha", "Cm_alpha", "Cm_q", "Cm_de", "Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr",
+)  # fmt: skip
+NOISE = {
+    "airspeed_mps": 0.15, "alpha_rad": 0.004, "beta_rad": 0.004, "p_radps": 0.008,
+    "q_radps": 0.008, "r_radps": 0.008, "phi_rad": 0.005, "theta_rad": 0.005, "ax_mps2": 0.08,
+    "ay_mps2": 0.08, "az_mps2": 0.15,
+}  # fmt: skip
+AXES = {"longitudinal": ("elevator",), "lateral": ("aileron", "rudder")}
+# Errors of flight-path reconstruction that these maneuvers tell, and what they are drawn with.
+DRAWN = {
+    "p_bias_radps": 0.01, "q_bias_radps": 0.01, "r_bias_radps": 0.01, "alpha_scale": 0.1,
+    "beta_scale": 0.1,
+}  # fmt: skip
+
+
+def card(air_mps: float) -> Card:
+    """Return what is flown: each input twice, by the aircraft as its file says."""
+    calm = load("calm")
+    first, *inputs, last = calm.segments
+    return replace(
+        calm,
+        segments=(first, *inputs, *inputs, last),
+        air=replace(calm.air, turbulence_mps=air_mps),
+        sensors=replace(calm.sensors, tolerances=False),
+    )
+
+
+def shipped(name: str, density_kgpm3: float) -> NonlinearModel:
+    """Return a model of the package with the constants of the aircraft and the flight."""
+    path = files("host.sysid.models").joinpath("equations", f"{name}.toml")
+    document = tomllib.loads(path.read_text(encoding="utf-8"))
+    known = asdict(airframe_data(AIRCRAFT)) | {"density_kgpm3": density_kgpm3}
+    constants = document["constants"]
+    document["constants"] = {k: known.get(k, value) for k, value in constants.items()}
+    return equations_from(document, name)
+
+
+def flown(
+    air_mps: float, seed: int, errors: dict[str, float]
+) -> tuple[pd.DataFrame, list[dict[str, Any]]]:
+    """Return the measured table of one flight, and its maneuvers with their truth."""
+    flight = virtual_flight(card(air_mps), seed, chain="true")
+    rng = np.random.default_rng([seed, 17])
+    table = flight.table[flight.table["t_s"] > flight.record.card.flight.ground_s + 1.0]
+    changed = {}
+    for name, sd in NOISE.items():
+        stem = name.rsplit("_", 1)[0]
+        scaled = table[name].to_numpy() * (1.0 + errors.get(f"{stem}_scale", 0.0))
+        off = next((v for k, v in errors.items() if k.startswith(f"{stem}_bias")), 0.0)
+        changed[name] = scaled + off + sd * rng.standard_normal(len(table))
+    kept = ["t_s", "thrust_n", "elevator_rad", "aileron_rad", "rudder_rad"]
+    return table[kept].assign(**changed), list(flight.maneuvers)
+
+
+def rows_of(model: str, air_mps: float, seed: int, method: str | None) -> list[dict[str, object]]:
+    """Fly and fit once; a fit without an answer leaves a row that says why."""
+    rng = np.random.default_rng([seed, 18])
+    path = model == "flight_path"
+    errors = {n: sd * rng.standard_normal() for n, sd in DRAWN.items()} if path else {}
+    table, maneuvers = flown(air_mps, seed, errors)
+    cell: dict[str, object] = {"model": model, "air_mps": air_mps, "seed": seed}
+    density = float(np.mean([m["condition"]["density_kgpm3"] for m in maneuvers]))
+    own = shipped(model, density)
+    try:
+        found = host.identify(table, models=own, methods=method)
+    except IdentificationError as error:
+        return [cell | dict.fromkeys(COLUMNS[3:], "") | {"mark": str(error)}]
+    answer = found.linear[0]
+    marks = verdict_of(answer, found.evidence).marks
+    half = answer.result.half_width()
+    rows = []
+    for name in [p.name for p in own.parameters]:
+        truth = errors.get(name) if path else true_value(name, maneuvers)
+        if truth is None or name not in answer.result.names:
+            continue
+        k = answer.result.index(name)
+        values = (answer.method, name, truth, float(answer.result.estimate[k]), float(half[k]))
+        rows.append(cell | dict(zip(COLUMNS[3:], (*values, marks.get(name, "")), strict=True)))
+    return rows
+
+
+def true_value(name: str, maneuvers: Sequence[dict[str, Any]]) -> float | None:
+    """Return the local derivative, mean over the maneuvers of its axis; None where it has none."""
+    axes = AXES["longitudinal" if name[:2] in ("CL", "CD", "Cm") else "lateral"]
+    tables = [m["derivatives"] for m in maneuvers if m["axes"][0] in axes]
+    found = [float(t[name]) for t in tables if name in t]
+    return float(np.mean(found)) if found else None
+
+
+def table_of(rows: Sequence[dict[str, str]]) -> list[str]:
+    """Return a line for each model, air and parameter, and what each cell comes to."""
+    lines = ["model         air  parameter     mean error %   rms   half  over rms  holds"]
+    for model in MODELS:
+        for air in AIRS_MPS:
+            own = [
+                r for r in rows
+                if r["model"] == model and float(r["air_mps"]) == air and r["name"]
+            ]  # fmt: skip
+            good = 0
+            for name in dict.fromkeys(r["name"] for r in own):
+                one = [r for r in own if r["name"] == name]
+                truth, value, half = (
+                    np.array([float(r[k]) for r in one]) for k in ("true", "estimate", "half_width")
+                )
+                held = int(np.sum(np.abs(value - truth) <= half))
+                if model != "flight_path" and name not in PRINCIPAL:
+                    continue
+                good += held
+                size = 1.0 if model == "flight_path" else np.abs(truth) / 100.0
+                off, wide = (value - truth) / size, np.median(half / size)
+                rms = float(np.sqrt(np.mean(off**2)))
+                lines.append(
+                    f"{model:12s}  {air:3.1f}  {name:12s}  {np.mean(off):+11.3g}  {rms:6.3g}"
+                    f"  {wide:6.3g}  {wide / rms:7.1f}  {held} of {len(one)}"
+                )
+            judged = [r for r in own if model == "flight_path" or r["name"] in PRINCIPAL]
+            if judged:
+                came = dict.fromkeys(r["method"] for r in own)
+                lines.append(f"{model}, {air} m/s: {good} of {len(judged)} hold, by {[*came]}")
+    lines.append(f"fits without an answer: {sum(not r['name'] for r in rows)}")
+    return lines
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Fly what is not in the file yet, then print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--flights", type=int, default=50, help="of each model and air")
+    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
+    parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
+    parser.add_argument("--method", help="in place of the default")
+    parser.add_argument("--rows", type=Path, default=Path("../build/study/shipped_models.csv"))
+    options = parser.parse_args(arguments)
+    options.rows.parent.mkdir(parents=True, exist_ok=True)
+    done = {(r["model"], float(r["air_mps"]), int(r["seed"])) for r in read_rows(options.rows)}
+    seeds = range(options.first, options.first + options.flights)
+    with options.rows.open("a", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        if not done:
+            writer.writeheader()
+        for seed in seeds:
+            for model in options.models:
+                for air in AIRS_MPS:
+                    if (model, air, seed) not in done:
+                        writer.writerows(rows_of(model, air, seed, options.method))
+                        file.flush()
+    found = [r for r in read_rows(options.rows) if int(r["seed"]) in seeds]
+    sys.stdout.write("\n".join(table_of(found)) + "\n")
+    return 0
+
+
+def read_rows(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a file; none where there is no file."""
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
