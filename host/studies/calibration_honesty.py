@@ -30,7 +30,7 @@ from studies.bench_instruments import (
     broken,
 )
 
-FIRST_SEED = 5000  # 1-400 were looked at while this was written
+FIRST_SEED = 6000  # 1-400 were looked at while this was written, 5000-5199 before curves
 INSTRUMENTS = 200
 # Words that name a fault; the sentence must also name the channel.
 NAMED = {

@@ -9,7 +9,7 @@ from host.errors import CalibrationError
 from host.physical.calibration import load_calibration
 from host.physical.columns import ANALOGUE, INERTIAL
 
-from tests.host.logs import flight, read, written
+from tests.host.logs import ROOT, flight, read, written
 
 HEAD = 'format = "flight-test-calibration"\nversion = 1\nname = "bench 7"\ndate = "2026-11-01"\n'
 ALPHA = """
@@ -73,6 +73,8 @@ def test_own_numbers_replace_the_default_and_the_rest_is_named(tmp_path: Path) -
         (HEAD + ALPHA.replace("5.0e-3", '"x"'), "slope is 'x', expected a number"),
         (HEAD + ALPHA.replace("5.0e-3", "[1.0, 2.0]"), "as many zeros as slopes"),
         (HEAD + "[channel]\nalpha_a = 3\n", "expected a table"),
+        (HEAD + ALPHA + "curve = [1.0]\n", "expected two numbers beside one zero"),
+        (HEAD + ALPHA + "curve = [1.0, 1e3]\n", "expected -100 to 100"),
     ],
 )
 def test_wrong_files_are_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
@@ -83,6 +85,22 @@ def test_wrong_files_are_refused_in_one_line(tmp_path: Path, text: str, said: st
     assert said in str(caught.value)
     assert str(file) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_curve_bends_what_is_decoded(tmp_path: Path) -> None:
+    log = read(tmp_path, written(*flight(1.0)))
+    straight = log.table(aligned=False)
+    path = tmp_path / "own.toml"
+    text = (ROOT / "hw/calibration/default.toml").read_text().replace("default = true", "")
+    for name in ("[channel.alpha_a]", "[pulse.throttle]"):
+        text = text.replace(f"{name}\n", f"{name}\ncurve = [0.2, -0.3]\n")
+    path.write_text(text)
+    data = (tmp_path / "flight.bin").read_bytes()
+    bent = read(tmp_path, data, calibration=path).table(aligned=False)
+    for column in ("alpha_a_rad", "throttle"):
+        v = straight[column].to_numpy()
+        assert bent[column].to_numpy() == pytest.approx(v + 0.2 * v**2 - 0.3 * v**3)
+    assert np.abs(bent["alpha_a_rad"] - straight["alpha_a_rad"]).max() > 1e-3
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:

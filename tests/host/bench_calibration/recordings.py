@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.host.live.radio import as_sent, joined
 from tests.host.logs import START_US, even, flight, written
 from tests.protocol.flights import wrapped
 from tests.protocol.log_writer import Timed, rows
@@ -29,9 +30,14 @@ def held_counts(
 
 
 def recording(
-    path: Path, channels: dict[str, NDArray[np.float64]], marks_s: Sequence[float] = ()
+    path: Path,
+    channels: dict[str, NDArray[np.float64]],
+    marks_s: Sequence[float] = (),
+    *,
+    radio: bool = False,
 ) -> Path:
-    """Write a log whose channels have these values, in the raw unit of frames.toml, IMU in SI."""
+    """Write a log whose channels have these values, in the raw unit of frames.toml, IMU in SI;
+    or what the radio carries of it, every fifth frame."""
     count = len(next(iter(channels.values())))
     streams = flight(count / RATE_HZ)
     ident = streams[0].rows
@@ -54,5 +60,5 @@ def recording(
     if len(marks_us):
         events = rows("event", len(marks_us), t_us=wrapped(marks_us), code=24)
         streams.append(Timed(events, marks_us + 5000))
-    path.write_bytes(written(*streams))
+    path.write_bytes(joined(as_sent(streams, count / RATE_HZ)) if radio else written(*streams))
     return path

@@ -64,6 +64,17 @@ def test_marks_say_where(tmp_path: Path) -> None:
     assert line["readings"] == len(levels)
 
 
+def test_what_the_radio_carried_is_a_recording_too(tmp_path: Path) -> None:
+    """20 rows a second; one envelope in ten lost in bursts."""
+    log = recording(tmp_path / "radio.bin", {"alpha_a": held_counts(_levels(1))}, radio=True)
+    data = log.read_bytes()
+    pieces = [data[k : k + 1500] for k in range(0, len(data), 1500)]
+    log.write_bytes(b"".join(p[:-150] for p in pieces))
+    (line,) = calibrate(_bench("alpha_a", log)).data["lines"]
+    assert line["readings"] == 17
+    assert line["zero"] == pytest.approx(505.0, abs=0.1)
+
+
 def test_a_round_that_lacks_a_position_is_told_with_its_times(tmp_path: Path) -> None:
     log = recording(tmp_path / "bench.bin", {"alpha_a": held_counts(_levels(1)[:-2])})
     with pytest.raises(UsageError, match="15 held positions found, expected 17") as caught:

@@ -10,10 +10,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from host.bench_calibration.bench_plan import find_subject, hand_worth, subjects, tools
+from host.bench_calibration.channel_doubts import doubt
 from host.bench_calibration.held_position import Held, directions
 from host.bench_calibration.line_fit import LineFit, fit_line
 from host.constants import NORMAL_95, RAD_PER_DEG
 from host.errors import UsageError
+from host.physical.calibration import Line
 
 VANES = subjects()["vanes"]
 PER_DEG = 2.9  # counts
@@ -58,6 +60,38 @@ def test_a_bend_is_told() -> None:
     fit = _fit(_held(lambda deg, _: 500.0 + PER_DEG * deg + 5.0 * (deg / 40.0) ** 2))
     assert 1.0 < fit.bend < 5.0
     assert fit.bend > fit.residual
+
+
+def test_an_arm_that_is_not_square_becomes_a_curve_that_decoding_follows() -> None:
+    """The line through it is 3.1 deg wrong at the end, the curve that is written 0.15 deg at most;
+    a pot with a dead spot is no curve."""
+    servos, rng = subjects()["servos"], np.random.default_rng(6)
+    positions = np.array(servos.positions, dtype=float)
+
+    def pulse_us(deg: np.ndarray) -> np.ndarray:
+        return np.asarray(1500.0 + 10.0 * deg + 0.05 * deg**2 + 0.002 * deg**3)
+
+    points = [
+        Held("elevator", r, p, {"elevator": x + rng.normal(0.0, 2.0)})
+        for r in (1, 2, 3)
+        for p, x in zip(positions, pulse_us(positions), strict=True)
+    ]
+    fit = fit_line(servos, "elevator", points)
+    assert len(fit.curve) == 2
+    every = np.linspace(-20.0, 20.0, 81)
+    line = Line((fit.zero,), (fit.slope,), 0.0, 0.0, "rad", "", False, fit.curve)
+    decoded = (pulse_us(every) - line.zero[0]) * line.slope[0]
+    straight = np.abs(decoded / RAD_PER_DEG - every).max()
+    line.bend(decoded)
+    assert np.abs(decoded / RAD_PER_DEG - every).max() < 0.15 < 3.0 < straight
+    assert doubt(servos, fit, points) is None
+    pots = subjects()["pots"]
+    spot = [
+        Held("pot_rudder", r, float(p), {"pot_rudder": 512.0 + 3.4 * p + 40.0 * (p == 15)})
+        for r in (1, 2, 3)
+        for p in pots.positions
+    ]
+    assert fit_line(pots, "pot_rudder", spot).curve == ()
 
 
 def test_placing_of_the_tool_counts_once_for_each_repeat() -> None:

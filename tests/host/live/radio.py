@@ -26,7 +26,13 @@ class Sent:
 
 def sent(seconds: float = 12.0, *, session: int = 7, every: int = EVERY) -> list[Sent]:
     """Return the envelopes of a stretch of flight in their order."""
-    streams = flight(seconds)
+    return as_sent(flight(seconds), seconds, session=session, every=every)
+
+
+def as_sent(
+    streams: list[Timed], seconds: float, *, session: int = 7, every: int = EVERY
+) -> list[Sent]:
+    """Return the envelopes of frames that were made elsewhere, identification first."""
     ident = streams[0]
     streams[0] = Timed(ident.rows[::every], ident.finished_us[::every])
     parts = [

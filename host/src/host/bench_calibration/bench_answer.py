@@ -44,7 +44,8 @@ def _line(subject: Subject, fit: LineFit) -> list[str]:
     bend = "" if math.isnan(fit.bend) else f", bend {fit.bend * scale:.2g}"
     return [
         f"{fit.channel}: zero {zero:.5g} +- {NORMAL_95 * fit.zero_sigma * scale:.2g} {unit},"
-        f" slope {slope:.5g} +- {abs(NORMAL_95 * fit.slope_sigma * slope):.2g}{ratio}",
+        f" slope {slope:.5g} +- {abs(NORMAL_95 * fit.slope_sigma * slope):.2g}{ratio}"
+        + (" there, and a curve" if fit.curve else ""),
         f"  residual {fit.residual * scale:.2g}, hysteresis {fit.hysteresis * scale:.2g}{bend}"
         f" {unit}; {len(fit.raw)} readings in {repeats} repeat{'s' if repeats > 1 else ''}",
     ]
@@ -77,6 +78,7 @@ def _numbers(fit: LineFit) -> dict[str, Any]:
         "bend": None if math.isnan(fit.bend) else fit.bend,
         "repeat_zeros": fit.repeat_zeros.tolist(),
         "readings": len(fit.raw),
+        "curve": list(fit.curve),
     }
 
 

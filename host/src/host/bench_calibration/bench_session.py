@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import date
@@ -14,6 +15,7 @@ import numpy as np
 from host.bench_calibration.bench_answer import plain, spoken, spoken_iron, spoken_supply
 from host.bench_calibration.bench_log import BenchLog, FaceLog, LogSource, turns_of
 from host.bench_calibration.bench_plan import AIR_KGPM3, Subject, local_gravity_mps2
+from host.bench_calibration.bifilar_pendulum import mass_section, read_swings
 from host.bench_calibration.calibrated_lines import Calibrated, calibrated_lines
 from host.bench_calibration.calibration_file import Made, lines_of, write_lines
 from host.bench_calibration.calibration_picture import draw_picture
@@ -58,6 +60,8 @@ class Bench:
     density_kgpm3: float = AIR_KGPM3
     turn_deg: float = 3600.0
     was_mv: float = NOMINAL_MV
+    mass_kg: tuple[float, float] | None = None
+    cg_tolerance_m: float = 0.010
     into: Path | None = None
     picture: Path | None = None
 
@@ -88,6 +92,8 @@ def calibrate(
         return _magnetometer(bench)
     if bench.subject.name == "supply":
         return _supply(bench)
+    if bench.subject.name == "inertia":
+        return _inertia(bench)
     temperature, lines, extra = _lines(bench, ask, say)
     made = Made(
         bench.instrument,
@@ -222,6 +228,25 @@ def _supply(bench: Bench) -> Result:
     }
     code = ExitCode.CHECK if found.doubt else ExitCode.OK
     return Result(tuple(spoken_supply(found)), data, (), code)
+
+
+def _inertia(bench: Bench) -> Result:
+    if bench.mass_kg is None or not all(0.0 <= m < np.inf for m in bench.mass_kg):
+        raise UsageError("inertia needs --mass KG SIGMA: what hangs, and the scale's deviation")
+    if not bench.mass_kg[0] > 0.0:
+        raise UsageError(f"--mass {bench.mass_kg[0]:g}: mass, distance, length must be above zero")
+    (path, *more) = bench.sources
+    if more:
+        raise UsageError("inertia takes one table with all three axes")
+    swings = read_swings(path, bench.subject, *bench.mass_kg)
+    day = bench.day or date.today().isoformat()
+    source = ", ".join(["bifilar pendulum", *([bench.by] if bench.by else []), day])
+    text = mass_section(
+        bench.subject, bench.mass_kg, swings, cg_tolerance_m=bench.cg_tolerance_m, source=source
+    )
+    data = {"subject": "inertia", "mass": tomllib.loads(text)["mass"]}
+    said = ["# for the aircraft file (host/IDENTIFY.md)", *text.splitlines()]
+    return Result(tuple(said), data, (), ExitCode.OK)
 
 
 def _is_log(path: Path) -> bool:

@@ -88,6 +88,8 @@ def _entry(subject: Subject, fit: LineFit, made: Made) -> dict[str, Any]:
         "residual": _short(fit.residual),
         "hysteresis": _short(fit.hysteresis),
     }
+    if fit.curve:
+        entry["curve"] = [_short(c) for c in fit.curve]
     if serial:
         entry["serial"] = serial
     if made.temperature_degc is not None:

@@ -75,7 +75,7 @@ def _draw(subject: Subject, fit: LineFit, doubt: str | None, above: Any, below: 
     unit = _RAW[subject.table] or (subject.tool.setting if subject.tool else "")
     at = fit.position
     order = np.argsort(at)
-    line = fit.zero + fit.value / fit.slope
+    line = fit.fitted
     above.plot(at[order], line[order], color="#94a3b8", linewidth=1.0, zorder=1)
     for repeat in np.unique(fit.repeat):
         colour = _COLOURS[(int(repeat) - 1) % len(_COLOURS)]
@@ -91,7 +91,9 @@ def _draw(subject: Subject, fit: LineFit, doubt: str | None, above: Any, below: 
     if doubt:
         for edge in (-limit, limit):
             below.axhline(edge, color="#dc2626", linewidth=0.8, linestyle="--")
-    above.set_title(fit.channel + (" (doubted)" if doubt else ""), fontsize=10)
+    above.set_title(
+        fit.channel + (" (doubted)" if doubt else " (curve)" if fit.curve else ""), fontsize=10
+    )
     above.set_ylabel(unit)
     below.set_ylabel(f"beside the line, {unit}" if unit else "beside the line")
     below.set_xlabel(subject.tool.setting if subject.tool else "")

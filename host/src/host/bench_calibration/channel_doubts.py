@@ -134,7 +134,7 @@ def _spot(subject: Subject, fit: LineFit, points: Sequence[Held]) -> str | None:
     for place in places:
         here = fit.position == place
         rest = ~here
-        beside = fit.raw - _line_through(fit.value, fit.raw, rest)
+        beside = fit.straightened - _line_through(fit.value, fit.straightened, rest)
         # Of a repeat's placing nothing is left in the mean over all repeats.
         middle = float(np.median(beside[rest]))
         scatter = _MAD_TO_SIGMA * float(np.median(np.abs(beside[rest] - middle)))

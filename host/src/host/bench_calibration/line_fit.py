@@ -1,4 +1,4 @@
-"""The line through held positions, and one standard deviation of its zero and of its slope.
+"""The line or curve through held positions, and one standard deviation of its zero and its slope.
 
 In each repeat the tool is put on anew, so that each has its own zero; slope and hysteresis are
 common. Scatter is what the readings show together with what the tool's file says of it. What a
@@ -22,11 +22,12 @@ from host.errors import UsageError
 
 Array = NDArray[np.float64]
 _CUBIC_FROM = 7  # positions; fewer tell nothing of a bend
+_BEYOND_DOUBT = 20.0  # Fisher's F of a curve against a line: chance gives it once in a million
 
 
 @dataclass(frozen=True, slots=True)
 class LineFit:
-    """value = (raw - zero) * slope, with what its points say of it.
+    """v = (raw - zero) * slope, value = v or its curve, with what the points say of it.
 
     Attributes
     ----------
@@ -45,6 +46,10 @@ class LineFit:
         Of one of them as the tool's file has it, raw unit.
     value, raw, residuals : (n,) array
     repeat, direction : (n,) array of int
+    fitted : (n,) array
+        Of the line or curve, without a repeat's placing and without hysteresis, raw unit.
+    curve : tuple of float
+        As in `host.physical.calibration.Line`; empty: a line.
     scatter : float
         One reading's standard deviation, raw unit, by its own and the tool's word.
     """
@@ -66,6 +71,13 @@ class LineFit:
     direction: NDArray[np.int64]
     scatter: float
     position: Array
+    fitted: Array
+    curve: tuple[float, ...] = ()
+
+    @property
+    def straightened(self) -> Array:
+        """What was read, without the curve's bow."""
+        return np.asarray(self.raw - self.fitted + self.zero + self.value / self.slope)
 
 
 def fit_line(
@@ -105,16 +117,21 @@ def fit_line(
             f" {len(subject.positions)} positions, {subject.repeats} times"
         )
     relative = weight / weight.max()
-    x = design / relative[:, None]
-    inverse = np.linalg.pinv(x.T @ x)
-    answer = inverse @ (x.T @ (raw / relative))
     many = len(repeats)
+    answer, inverse = _solved(design, raw, relative)
+    gradient, of_gradient = float(answer[many]), float(inverse[many, many])
+    bend, bowed = _bowed(value, raw, design, many)
+    curved = bowed is not None and _is_curve(subject, bend, raw, design, bowed)
+    if curved and bowed is not None:
+        design, count_of = bowed, bowed.shape[1]
+        answer, inverse = _solved(design, raw, relative)
+    else:
+        count_of = unknowns
     residuals = raw - design @ answer
-    gradient = float(answer[many])
-    expected = _Expected(tool, gradient, float(weight.max()), count - unknowns)
+    expected = _Expected(tool, gradient, float(weight.max()), count - count_of)
     variance, freedom = expected.scatter(float(np.sum((residuals / relative) ** 2)))
     zeros = answer[:many]
-    mean = np.zeros(unknowns)
+    mean = np.zeros(count_of)
     mean[:many] = 1.0 / many
     placing, placing_freedom = expected.placing(
         zeros, variance * float(np.mean(np.diag(inverse)[:many]))
@@ -128,18 +145,24 @@ def fit_line(
         (hysteresis**2 / 12.0, math.inf),
     )
     slope_sigma = sigma95(
-        (variance * inverse[many, many] / gradient**2 if gradient else math.inf, freedom),
+        (variance * of_gradient / gradient**2 if gradient else math.inf, freedom),
         (tool.scale**2, math.inf),
     )
+    slope = 1.0 / gradient if gradient else math.inf
+    curve: tuple[float, ...] = ()
+    fitted = zeros.mean() + value * gradient
+    if curved:
+        fitted = zeros.mean() + design[:, many] * answer[many] + design[:, -2:] @ answer[-2:]
+        slope, curve = _turned_over(value, fitted - zeros.mean())
     return LineFit(
         channel=channel,
         zero=float(zeros.mean()),
-        slope=1.0 / gradient if gradient else math.inf,
+        slope=slope,
         zero_sigma=zero_sigma,
         slope_sigma=slope_sigma,
         residual=math.sqrt(float(np.mean(residuals**2))),
         hysteresis=abs(hysteresis),
-        bend=_bend(value, raw, design, many),
+        bend=bend,
         repeat_zeros=zeros,
         repeat_zero_sigma=math.sqrt(
             expected.word_placing + expected.word_scatter * float(np.mean(np.diag(inverse)[:many]))
@@ -151,6 +174,8 @@ def fit_line(
         direction=direction,
         scatter=math.sqrt(variance),
         position=position,
+        fitted=fitted,
+        curve=curve,
     )
 
 
@@ -202,14 +227,44 @@ def sigma95(*parts: tuple[float, float]) -> float:
     return math.sqrt(total) * widen
 
 
-def _bend(value: Array, raw: Array, design: Array, many: int) -> float:
-    """Return the largest distance of the cubic from the line."""
+def _solved(design: Array, raw: Array, relative: Array) -> tuple[Array, Array]:
+    """Return weighted least squares and the inverse of its normal matrix."""
+    x = design / relative[:, None]
+    inverse = np.linalg.pinv(x.T @ x)
+    return np.asarray(inverse @ (x.T @ (raw / relative))), np.asarray(inverse, dtype=np.float64)
+
+
+def _bowed(value: Array, raw: Array, design: Array, many: int) -> tuple[float, Array | None]:
+    """Return the largest distance of the cubic from the line, and the cubic's columns."""
     if len(np.unique(value)) < _CUBIC_FROM:
-        return math.nan
+        return math.nan, None
     x = value / np.abs(value).max()
     more = np.column_stack([design, x**2, x**3])
     answer = np.linalg.lstsq(more, raw, rcond=None)[0]
     plain = np.linalg.lstsq(design, raw, rcond=None)[0]
     lines = answer[many] * value + answer[-2] * x**2 + answer[-1] * x**3
     distance = lines + answer[:many].mean() - plain[many] * value - plain[:many].mean()
-    return float(np.abs(distance).max())
+    return float(np.abs(distance).max()), more
+
+
+def _is_curve(subject: Subject, bend: float, raw: Array, design: Array, bowed: Array) -> bool:
+    """Return whether a bend is large, beyond doubt, and all that is wrong with the line."""
+    straight, curved = (_squares(d, raw) for d in (design, bowed))
+    free = len(raw) - bowed.shape[1]
+    if free <= 0 or not bend > subject.limits.get("bend", math.inf):
+        return False
+    smooth = math.sqrt(curved / len(raw)) <= float(subject.limits["residual"])
+    return smooth and (straight - curved) * free > 2.0 * _BEYOND_DOUBT * curved
+
+
+def _squares(design: Array, raw: Array) -> float:
+    left = raw - design @ np.linalg.lstsq(design, raw, rcond=None)[0]
+    return float(left @ left)
+
+
+def _turned_over(value: Array, raw: Array) -> tuple[float, tuple[float, ...]]:
+    """Return slope and curve of value over raw (less its zero)."""
+    scale = float(np.abs(raw).max())
+    x = raw / scale
+    a, b, c = np.linalg.lstsq(np.column_stack([x, x**2, x**3]), value, rcond=None)[0]
+    return float(a / scale), (float(b / a**2), float(c / a**3))

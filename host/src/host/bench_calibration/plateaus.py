@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 BLOCK_S = 0.1  # its median passes over a single jump
 LOOKED_S = 0.3  # a channel that is as far as before this much ago stands still
 LEAST_S = 1.0  # the procedures hold for 2 s
+GAP_S = 0.5  # rows lost for this long break no position that goes on behind them
 EDGE_S = 0.2  # at both ends somebody still settles
 _BEYOND = 6.0  # standard deviations of a block's median
 _MAD_TO_SIGMA = 1.4826
@@ -54,10 +55,14 @@ def plateaus(t_s: Array, raw: Array, least: Sequence[float]) -> list[Plateau]:
         return []
     still = np.ones(len(edges) - 1, dtype=bool)
     middles = np.full((len(edges) - 1, raw.shape[1]), np.nan)
+    known_at = -1
     for k, (a, b) in enumerate(itertools.pairwise(edges)):
         part = raw[a:b]
         if b > a and np.isfinite(part).any(axis=0).all():
             middles[k] = np.nanmedian(part, axis=0)
+            known_at = k
+        elif 0 <= known_at >= k - round(GAP_S / BLOCK_S):
+            middles[k] = middles[k - 1]
     steps = max(round(LOOKED_S / BLOCK_S), 1)
     for channel, floor in enumerate(least):
         x = middles[:, channel]

@@ -153,5 +153,7 @@ _EMPTY = {
         for axis in "xyz"
     ),
     "magnetometer": "mx,my,mz\n",
+    "inertia": "axis,distance_m,length_m,period_s\n"
+    + "".join(f"{axis},,,\n" for axis in ("xx", "yy", "zz") for _ in range(3)),
     "supply": "shown_v,meter_v\n,\n,\n,\n",
 }

@@ -141,6 +141,7 @@ def _line(subject: Subject, axis: int, rests: Sequence[Rest], turns: Sequence[Tu
         direction=np.zeros(len(still) + len(own), dtype=np.int64),
         scatter=float(np.std(still)),
         position=np.r_[np.zeros(len(still)), rate * DEG_PER_RAD],
+        fitted=np.r_[np.full(len(still), zero), zero + followed * rate],
     )
     return Calibrated(channel, fit, _limits(subject, fit), _short(subject, numbers, angle))
 

@@ -223,6 +223,8 @@ def judge(session: Session) -> Quality:
                 * lines[name].slope[0]
                 for name in (a, b)
             ]
+            for name, side in zip((a, b), sides, strict=True):
+                lines[name].bend(side)
             quality.pairs[pair].add(sides[0] - sides[1])
     quality.imu_saturated = clipped / fresh if fresh else 0.0
     quality.servo_jumps = jumps.found

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from host.errors import CalibrationError
 from host.files.quantities import Quantity
 from host.files.user_text import parse_toml, read_text, shown
@@ -23,7 +26,9 @@ _RANGES = {
     "slope": Quantity("", -1e6, 1e6, "the span of a converter in at most 1e6 steps of the unit"),
     "zero_sigma": Quantity("", 0.0, 2e7, _CONVERTER),
     "slope_sigma": Quantity("", 0.0, 10.0, "a share: 0.03 is 3 %, 10 is nothing known"),
+    "curve": Quantity("", -100.0, 100.0, "a bend of a line, not another one"),
 }
+_CURVE = 2
 _SLOPES = {
     "rad": Quantity("rad per raw unit", -0.1, 0.1, "an encoder of 64 steps a turn"),
     "Pa": Quantity("Pa per raw unit", -1000.0, 1000.0, "8 bits of 2 bar"),
@@ -35,7 +40,7 @@ _SLOPES = {
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """value = (raw - zero) * slope.
+    """value = v + curve[0] v^2 + curve[1] v^3, with v = (raw - zero) * slope.
 
     Parameters
     ----------
@@ -53,6 +58,8 @@ class Line:
         Where the numbers come from.
     default : bool
         True if nobody measured them on this instrument.
+    curve : tuple of float
+        Per unit of the value, per its square; empty: a line.
     """
 
     zero: tuple[float, ...]
@@ -62,6 +69,12 @@ class Line:
     unit: str
     source: str
     default: bool
+    curve: tuple[float, ...] = ()
+
+    def bend(self, value: NDArray[np.float64]) -> None:
+        """Bend values of the straight line in place."""
+        if self.curve:
+            value *= 1.0 + value * (self.curve[0] + value * self.curve[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,4 +219,17 @@ def _line(path: Path, name: str, entry: Any, default: bool) -> Line:
         unit=unit,
         source=str(entry["source"]),
         default=bool(entry.get("default", default)),
+        curve=_curve(path, name, entry.get("curve", []), len(numbers["zero"])),
     )
+
+
+def _curve(path: Path, name: str, value: Any, axes: int) -> tuple[float, ...]:
+    """Return the two numbers of a curve, or none."""
+    if value == []:
+        return ()
+    if not isinstance(value, list) or len(value) != _CURVE or axes != 1:
+        raise CalibrationError(
+            f"{path}: [{name}] curve is {shown(value)}, expected two numbers beside one zero"
+        )
+    where = f"{path}: [{name}] curve"
+    return tuple(_RANGES["curve"].check(where, one, CalibrationError) for one in value)

@@ -239,6 +239,7 @@ def _calibrate(value: Array, scale: float, line: Line) -> None:
     slope = line.slope[0]
     value *= scale * slope
     value -= line.zero[0] * slope
+    line.bend(value)
 
 
 def _axis(value: Array, line: Line, axis: int) -> None:

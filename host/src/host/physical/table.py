@@ -157,6 +157,7 @@ class SessionTable:
         pulse = np.where(drives, out[f"servo_{name}_us"], out[f"rc_{name}_us"])
         pulse -= line.zero[0]
         pulse *= line.slope[0]
+        line.bend(pulse)
         return np.asarray(pulse)
 
     def _continued(self, name: str, angle: Array) -> Array:

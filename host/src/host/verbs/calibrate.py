@@ -38,7 +38,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "subject", nargs="?", metavar="SUBJECT",
         help="vanes, pots, servos, throttle, pitots, speed, accelerometers, gyros, magnetometer,"
-        " supply, or one channel such as alpha_a; with --check: the newer file",
+        " supply, inertia, or one channel such as alpha_a; with --check: the newer file",
     )  # fmt: skip
     parser.add_argument("sources", nargs="*", type=Path, metavar="SOURCE", help="see above")
     parser.add_argument("--template", type=Path, metavar="CSV", help="write the table to fill in")
@@ -66,6 +66,12 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument(
         "--was", type=float, metavar="MV", help="reference that the status line was made with"
+    )
+    parser.add_argument(
+        "--mass", type=float, nargs=2, metavar=("KG", "SIGMA"), help="what hangs on the threads"
+    )
+    parser.add_argument(
+        "--cg-tolerance", type=float, default=0.010, metavar="M", help="of its file (default 0.010)"
     )
     parser.add_argument("--picture", type=Path, metavar="SVG", help="beside the file without it")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
@@ -97,8 +103,8 @@ def _list(args: argparse.Namespace) -> int:
         return ExitCode.OK
     print("What is calibrated, in this order:\n")
     for name, subject in subjects().items():
-        tool = subject.tool.name.replace("_", " ") if subject.tool else ""
-        print(f"  {name:15s} {', '.join(subject.channels):52s} {tool}")
+        tools = [t.name.replace("_", " ") for t in (subject.tool, subject.turntable) if t]
+        print(f"  {name:15s} {', '.join(subject.channels):61s} {', '.join(tools)}".rstrip())
     print(f"\nWhat to do for one of them: {command_line('host', 'calibrate', 'vanes')}")
     return ExitCode.OK
 
@@ -153,6 +159,8 @@ def _calibrate(args: argparse.Namespace, subject: Subject, channel: str) -> int:
         density_kgpm3=_finite("--density", args.density) or AIR_KGPM3,
         turn_deg=abs(_finite("--turn", args.turn) or 3600.0),
         was_mv=_finite("--was", args.was) or NOMINAL_MV,
+        mass_kg=tuple(args.mass) if args.mass else None,
+        cg_tolerance_m=_finite("--cg-tolerance", args.cg_tolerance) or 0.010,
         into=args.into,
         picture=args.picture,
     )
