@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
+from host.people_units import people_name
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.identification_error import IdentificationError
 from host.twin.virtual import virtual_flight
@@ -144,7 +145,8 @@ def test_constants_of_each_maneuver_are_printed(pitching: pd.DataFrame) -> None:
     found = host.identify(pitching, models="short-period", delays=False)
     text = found.to_text()
     for name in ("bias_rate.alpha_rad", "bias_rate.q_radps", "initial.alpha_rad"):
-        [line] = [x for x in text.splitlines() if x.strip().startswith(name)]
+        shown, _ = people_name(name)
+        [line] = [x for x in text.splitlines() if x.strip().startswith(shown)]
         assert line.count("+-") == len(found.linear[0].used)
         assert f'"{name}@1"' in found.to_json()
 
