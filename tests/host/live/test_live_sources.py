@@ -239,6 +239,20 @@ def test_a_full_disk_is_told_and_the_flight_goes_on(
     assert "what is there can be decoded" in err
 
 
+def test_a_mistake_of_ours_does_not_end_the_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def mistaken(*_: object) -> None:
+        raise ZeroDivisionError("planted")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(LiveStream, "_air", mistaken)
+    Path("flight.radio").write_bytes(STREAM)
+    assert main(["live", "flight.radio@max", "-o", "out.radio", "--no-page"]) == 0
+    assert capsys.readouterr().err.count("ZeroDivisionError: planted; the page may be wrong") == 1
+    assert len(read_log(tmp_path / "out.radio").frames["ident"]) == ROWS
+
+
 def test_an_unknown_schema_is_recorded_and_told_once(tmp_path: Path) -> None:
     from tests.protocol.log_writer import envelope
 

@@ -71,6 +71,7 @@ class LiveSession:
         self._stop = threading.Event()
         self._tell = tell
         self._marks = 0
+        self._mistake: Exception | None = None
         self._thread = threading.Thread(target=self._run, name="host live", daemon=True)
 
     def start(self) -> None:
@@ -96,7 +97,7 @@ class LiveSession:
             self.ended.set()
         while self.error is None and not self._stop.wait(_REST_S):
             self._answer()
-            self._show_state()
+            self._safely(self._show_state)
 
     def _receive(self) -> None:
         held = bytearray()
@@ -107,15 +108,27 @@ class LiveSession:
             held += data
             now_s = time.monotonic()
             if held and (now_s - fed_s >= _BATCH_S or len(held) >= _BIG):
-                self._feed(bytes(held))
+                self._safely(self._feed, bytes(held))
                 held.clear()
                 fed_s = now_s
             self._answer()
-            self._show_state()
+            self._safely(self._show_state)
             if self._stop.is_set():
                 break
         if held:
-            self._feed(bytes(held))
+            self._safely(self._feed, bytes(held))
+
+    def _safely(self, show: Callable[..., None], *given: Any) -> None:
+        """Show something; a mistake of ours in it is told once and never ends the recording."""
+        try:
+            show(*given)
+        except Exception as error:
+            if self._mistake is None:
+                self._mistake = error
+                self._said(
+                    f"internal error: {type(error).__name__}: {error}; the page may be wrong, the"
+                    " recording goes on (please report it)"
+                )
 
     def _written(self, capture: GroundCapture, data: bytes) -> None:
         """Write to disk; if it takes no more, say so and go on showing the flight."""
