@@ -11,6 +11,7 @@ from host.readers.ardupilot_channels import ardupilot_channels
 from host.readers.ardupilot_outputs import surfaces
 from host.readers.autopilot_flight import chosen_sensors, read_autopilot
 from host.readers.autopilot_log import AutopilotLog, Messages
+from host.readers.dataflash_binary import read_records
 from host.readers.flown_tests import flown_tests
 from host.readers.held_outputs import held_output
 from host.readers.plausible_times import plausible
@@ -234,3 +235,15 @@ def test_tests_of_the_autopilot_are_named() -> None:
     px4 = {"autotune_attitude_control_status": Messages(t, {"state": state})}
     (one,) = flown_tests(_log("px4", px4, {}))
     assert (one.name, round(one.from_s), round(one.to_s)) == ("autotune", 12, 15)
+
+
+def test_a_log_is_in_memory_once(tmp_path: Path) -> None:
+    """A gigabyte: single precision stays, offsets take four bytes, stamps and idle outputs go."""
+    path = write("dataflash", tmp_path)
+    flight = read_autopilot(path)
+    imu = flight.log.messages["IMU"][0]
+    assert np.shares_memory(flight.channels.signals["q_radps"].values, imu.fields["GyrY"])
+    assert "TimeUS" not in imu.fields
+    assert "C14" not in flight.log.messages["RCOU"][0].fields
+    places = read_records(path).places
+    assert {at.dtype for at in places.values()} == {np.dtype(np.uint32)}

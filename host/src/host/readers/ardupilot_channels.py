@@ -173,5 +173,5 @@ def _take(
 ) -> None:
     values = messages.fields.get(theirs)
     if values is not None:
-        scaled = numbers(values) * gain
+        scaled = values if gain == 1.0 else numbers(values) * gain
         found.add(ours, messages.t_s, scaled, f"{label}.{theirs}", late_s)

@@ -26,6 +26,7 @@ from host.export.dataflash_layout import (
     record_type,
 )
 
+LARGEST_UINT32 = 1 << 32
 _CHUNK_BYTES = 32 << 20  # read at a time: what a log needs beside the places of its records
 Progress = Callable[[int, int], None]
 
@@ -74,7 +75,10 @@ class BinaryRecords:
         found = {name: np.empty((len(at), *layout[name].shape), layout[name].base)
                  for name in letters}  # fmt: skip
         for first, data in _chunks(self.path, kind.length):
-            low, high = np.searchsorted(at, (first, first + _CHUNK_BYTES))
+            ends = np.array(
+                [first, min(first + _CHUNK_BYTES, np.iinfo(at.dtype).max)], dtype=at.dtype
+            )
+            low, high = np.searchsorted(at, ends)
             if low == high:
                 continue
             body = data[(at[low:high] - first)[:, None] + span]
@@ -103,12 +107,22 @@ def read_records(path: Path, progress: Progress | None = None) -> BinaryRecords:
     for k, kind in kinds.items():
         lengths[k] = kind.length
     length = lengths[number]
-    able = (length > 0) & (starts <= size - length.astype(np.int64))
-    starts, number, length = starts[able], number[able], length[able]
-    kept = _chained(starts, length, size)
-    starts, number, length = starts[kept], number[kept], length[kept]
+    starts, number, length = _those(length > 0, starts, number, length)
+    starts, number, length = _those(starts + length <= size, starts, number, length)
+    starts, number, length = _those(_chained(starts, length, size), starts, number, length)
+    lost = _gaps(starts, length, size)
+    del length
     places = {k: starts[number == k] for k in kinds}
-    return BinaryRecords(path, kinds, places, _gaps(starts, length, size))
+    return BinaryRecords(path, kinds, places, lost)
+
+
+def _those(
+    kept: NDArray[np.bool_], starts: IntArray, number: NDArray[np.uint8], length: NDArray[np.uint8]
+) -> tuple[IntArray, NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return what is kept of three arrays, themselves where that is all: a log has a gigabyte."""
+    if kept.all():
+        return starts, number, length
+    return starts[kept], number[kept], length[kept]
 
 
 def _chunks(path: Path, beyond: int) -> Iterator[tuple[int, NDArray[np.uint8]]]:
@@ -123,11 +137,13 @@ def _sync_places(
     path: Path, size: int, progress: Progress | None
 ) -> tuple[IntArray, NDArray[np.uint8]]:
     """Return where a record may begin, and the number of its kind."""
-    places, numbers = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.uint8)]
+    # Half the memory where the file is shorter than the numbers reach.
+    kind: Any = np.uint32 if size < LARGEST_UINT32 - 256 else np.int64
+    places, numbers = [np.zeros(0, dtype=kind)], [np.zeros(0, dtype=np.uint8)]
     for first, part in _chunks(path, 2):
         if len(part) > 2:
             found = np.flatnonzero((part[:-2] == SYNC[0]) & (part[1:-1] == SYNC[1]))
-            places.append(found + first)
+            places.append((found + first).astype(kind))
             numbers.append(part[found + 2])
         if progress is not None:
             progress(min(first + _CHUNK_BYTES, size), size)

@@ -29,6 +29,7 @@ WANTED: dict[str, tuple[str, ...]] = {
     "MSG": ("TimeUS", "TimeMS", "Message"), "VER": ("FWS",), "VIBE": (), "DSF": ("Dp",),
     "MODE": ("TimeUS", "TimeMS", "ModeNum"), "SIDD": ("TimeUS",), "ATRP": ("TimeUS",),
 }  # fmt: skip
+STAMPS = ("TimeUS", "TimeMS")
 # The field that numbers the instances of a kind, in the releases that have one.
 INSTANCE = {"IMU": "I", "ARSP": "I", "BARO": "I", "GPS": "I", "VIBE": "IMU", "XKF1": "C"}
 NUMBERED = {"ASP2": ("ARSP", 1), "BAR2": ("BARO", 1)}  # old names of second sensors
@@ -130,7 +131,12 @@ def _add(
         if kept.any():
             whole = alone and not wrong  # then nothing is copied: a log may have a gigabyte
             rows = slice(None) if whole else mine[kept]
-            own = {key: values[rows] for key, values in fields.items()}
+            # Outputs without a pulse are most of RCOU.
+            own = {
+                key: values[rows]
+                for key, values in fields.items()
+                if key not in STAMPS and (not called.startswith("RCO") or values.any())
+            }
             messages.setdefault(called, {})[int(one)] = Messages(t_s[rows], own)
 
 
