@@ -36,7 +36,8 @@ GENERATED = ("frames.h", "schema_blob.h")
 CLONE_LIBRARY = CLONE / "build" / "sitl" / "libsitl.so"
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 _COMPILERS = ("c++", "g++", "clang++")
-_ABOUT_S = 15  # of both cores of a small machine; ziglang takes a minute more for its C++ library
+_ABOUT_S = 15  # of both cores of a small machine
+_RUNTIME_S = 100  # ziglang compiles its C++ library first
 
 
 def recorder_library(progress: Progress = lambda *_: None) -> Path:
@@ -137,7 +138,8 @@ def _built(progress: Progress) -> Path:
     complaints = []
     for compiler in compilers():
         name = "ziglang" if "ziglang" in compiler else compiler[0]
-        print(f"host: building the recorder with {name}, once, about {_ABOUT_S} s", file=sys.stderr)
+        about_s = _ABOUT_S + (_RUNTIME_S if name == "ziglang" else 0)
+        print(f"host: building the recorder with {name}, once, about {about_s} s", file=sys.stderr)
         complaint = _build(compiler, root, target, progress)
         if complaint is None:
             _forget_others(target)
