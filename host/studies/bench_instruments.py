@@ -55,10 +55,11 @@ class BenchChannel:
     held: tuple[Held, ...]
 
 
-def bench_channels(rng: np.random.Generator) -> list[BenchChannel]:
-    """Return every line channel of one instrument, calibrated by one person."""
+def bench_channels(rng: np.random.Generator, careless: float = 1.0) -> list[BenchChannel]:
+    """Return every line channel of one instrument, calibrated by one person, whose hand scatters
+    `careless` times as much as the tools' file says."""
     known, defaults = subjects(), load_calibration().lines
-    care = float(np.sqrt(hand_worth() / rng.chisquare(hand_worth())))
+    care = careless * float(np.sqrt(hand_worth() / rng.chisquare(hand_worth())))
     found = []
     for name in LINES:
         subject = known[name]
@@ -126,9 +127,9 @@ class BenchImu:
     turns: tuple[Turn, ...]
 
 
-def bench_imu(rng: np.random.Generator) -> BenchImu:
+def bench_imu(rng: np.random.Generator, careless: float = 1.0) -> BenchImu:
     """Return one IMU, calibrated by one person on a cube and on a table that turns by hand."""
-    care = float(np.sqrt(hand_worth() / rng.chisquare(hand_worth())))
+    care = careless * float(np.sqrt(hand_worth() / rng.chisquare(hand_worth())))
     known = subjects()
     cube, rest = known["accelerometers"].tool, known["gyros"].tool
     table = known["gyros"].turntable

@@ -59,12 +59,12 @@ class Tally:
         return sum(abs(e) <= NORMAL_95 for e in every), len(every)
 
 
-def study(seeds: Iterable[int]) -> Tally:
+def study(seeds: Iterable[int], careless: float = 1.0) -> Tally:
     """Calibrate an instrument for each seed, healthy and with each fault."""
     tally = Tally()
     for seed in seeds:
         rng = np.random.default_rng(seed)
-        channels, imu = bench_channels(rng), bench_imu(rng)
+        channels, imu = bench_channels(rng, careless), bench_imu(rng, careless)
         healthy = [_count_line(tally, one) for one in channels] + _count_imu(tally, imu)
         doubts = [text for text in healthy if text]
         tally.instruments += 1
@@ -148,9 +148,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--first", type=int, default=FIRST_SEED)
     parser.add_argument("--instruments", type=int, default=INSTRUMENTS)
+    parser.add_argument("--careless", type=float, default=1.0, help="times the tools' word")
     options = parser.parse_args(arguments)
     seeds = range(options.first, options.first + options.instruments)
-    sys.stdout.write("\n".join(report(study(seeds))) + "\n")
+    sys.stdout.write("\n".join(report(study(seeds, options.careless))) + "\n")
     return 0
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.bench_calibration.bench_log import BenchLog
 from host.bench_calibration.bench_plan import find_subject, subjects
 from host.bench_calibration.bench_session import Bench, calibrate
 from host.constants import GRAVITY_MPS2, RAD_PER_DEG
@@ -13,6 +14,7 @@ from host.errors import ExitCode, UsageError
 from host.physical.calibration import load_calibration
 
 from tests.host.bench_calibration.recordings import MOVE_S, RATE_HZ, held_counts, recording
+from tests.host.logs import ROOT
 
 VANES = subjects()["vanes"]
 SLOPE = 1024 / 360  # counts per deg
@@ -149,6 +151,13 @@ def test_gyros_are_turned_by_a_known_angle(tmp_path: Path) -> None:
     read = load_calibration(tmp_path / "own.toml").lines["imu.gyro"]
     assert read.zero == pytest.approx(zero.tolist(), abs=2e-4)
     assert read.slope == pytest.approx(slope.tolist(), rel=2e-3)
+
+
+def test_a_clock_that_starts_anew_never_goes_back() -> None:
+    """A log of two sessions: the second one's clock began at its reset."""
+    bench = BenchLog.read(ROOT / "tests/data/format-1-sitl-causes.bin")
+    assert (np.diff(bench.t_s) > 0.0).all()
+    assert bench.t_s[-1] < 100.0
 
 
 def test_a_folder_or_a_missing_file_is_one_line(tmp_path: Path) -> None:

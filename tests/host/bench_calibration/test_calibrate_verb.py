@@ -164,6 +164,7 @@ def test_every_template_is_read_once_it_is_filled(
     [
         (["alpha"], "nothing to calibrate is called 'alpha'"),
         (["vanes", "none.csv"], "no such file"),
+        (["vanes", "."], "a folder; name a file in it"),
         (["vanes", "bad.csv"], "no column position"),
         (["vanes", "-"], "which channel was moved?"),
         (["alpha_a", "words.csv"], "expected a number with a point"),

@@ -22,6 +22,7 @@ from host.log import FlightLog, read_log
 from host.physical.timebase import WRAP_US
 
 Array = NDArray[np.float64]
+_ANEW_US = 1_000_000
 _LEAK_S = 45.0  # the procedure holds 60 s
 _MOVES = 0.1  # of the smallest step of the positions: less in 0.3 s is no motion
 _FACE = 0.9  # of free fall
@@ -58,9 +59,10 @@ class BenchLog:
 
     @cached_property
     def t_s(self) -> Array:
-        """Time since the first row, s."""
+        """Time since the first row, s; a clock that starts anew goes on a second later."""
         raw = self.log.frames["ident"]["t_us"].astype(np.int64)
-        step = np.diff(raw, prepend=raw[:1]) % WRAP_US
+        step = (np.diff(raw, prepend=raw[:1]) + WRAP_US // 2) % WRAP_US - WRAP_US // 2
+        step[step < 0] = _ANEW_US
         return np.asarray(np.cumsum(step) * 1e-6)
 
     @cached_property

@@ -27,6 +27,7 @@ from host.bench_calibration.supply_reference import NOMINAL_MV, supply_reference
 from host.bench_calibration.turned_gyro import Rest, Turn, gyro_lines, read_turns
 from host.bench_calibration.typed_readings import TypedSource
 from host.errors import ExitCode, UsageError
+from host.files.regular import regular_file
 
 TYPED = Path("-")
 
@@ -253,8 +254,9 @@ def _is_log(path: Path) -> bool:
     """Return whether a source is a recording: a table is text and has a comma in its first line."""
     if path == TYPED:
         return False
-    if not path.is_file():
+    if not path.exists():
         raise UsageError(f"{path}: no such file; a table, a log of the bench, or - to type")
+    regular_file(path)
     with path.open("rb") as file:
         head = file.read(512)
     first = head.partition(b"\n")[0]
