@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from host.original.rows import OriginalRows
 
@@ -84,6 +83,8 @@ def row_rate(rows: OriginalRows, given_hz: float | None) -> RowRate:
     weight = np.sum(sums_mps**2, axis=1)
     row_s = float(along.sum() / weight.sum())
     count = len(along)
+    from scipy import stats  # here: it takes a second to load, and most logs have no rows
+
     left = along - row_s * weight
     error_s = float(np.sqrt(np.sum(left**2) * count / (count - 1.0)) / weight.sum())
     half = float(stats.t.ppf(0.975, count - 1)) * error_s

@@ -31,9 +31,13 @@ from host.report.gps_position import (
     log_utc_s,
 )
 from host.report.shown_flight import Happening, ServoJump, ShownFlight, with_gaps
-from host.sysid.flight.flight_tables import FITTED, even_columns, read_columns
-from host.sysid.flight.linear_estimator import maneuvers_of
-from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
+from host.sysid.flight.flight_tables import FITTED, even_arrays, read_columns
+from host.sysid.flight.maneuver_detection import (
+    DetectedManeuver,
+    Grade,
+    detect_maneuvers,
+    grade,
+)
 from host.sysid.identification_error import IdentificationError
 from host.text import shown
 
@@ -179,7 +183,7 @@ def _of_autopilot(wanted: Wanted, path: Path) -> ShownFlight:
     elif wanted.maneuvers:
         try:
             found, _ = read_columns(path, sensors=dict(wanted.sensors))
-            maneuvers = maneuvers_of(found)
+            maneuvers = [(item, grade(found, item)) for item in detect_maneuvers(found)]
         except HostError as error:
             notes.append(f"no maneuvers: {error}")
     return ShownFlight(
@@ -221,13 +225,12 @@ def _common_rows(columns: Mapping[str, Array]) -> dict[str, Array]:
 
 def _maneuvers(columns: Mapping[str, Any]) -> tuple[Maneuvers, list[str]]:
     """Return the test points as `host maneuvers` finds them, or why there are none."""
-    import pandas as pd
-
     try:
         # What the finder looks at, and what divides a maneuver where it is missing.
-        used = {name: columns[name] for name in ("t_s", "throttle", *FITTED) if name in columns}
-        even, _ = even_columns(pd.DataFrame(used, copy=False))
-        return maneuvers_of(even), []
+        names = [name for name in ("t_s", "throttle", *FITTED) if name in columns]
+        used = {name: np.asarray(columns[name], np.float64) for name in names}
+        even, _ = even_arrays(used)
+        return [(item, grade(even, item)) for item in detect_maneuvers(even)], []
     except IdentificationError as error:
         return [], [f"no maneuvers: {shown(str(error))}"]
 

@@ -18,7 +18,7 @@ from host.arrays import Array
 
 _NONE = 65535
 _STEPS = 65534
-_LEVEL = 6
+_LEVEL = 3  # 6 takes a fifth longer for 3 % less
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,12 +65,12 @@ def page_data(flight: ShownFlight, channels: list[Channel], *, full: bool = Fals
         return PageData(overview, [_cut(t_s, values, one) for one in spans], True, [])
     spans = _spans(flight)
     stretches: list[Packed] = []
-    left_out: list[float] = []
+    left_out: list[tuple[float, float]] = []
     room = PAGE_BYTES - len(overview)
     for first, last in spans:
         packed = _cut(t_s, values, (first, last))
         if len(packed) > room:
-            left_out.append(float(t_s[last - 1] - t_s[first]))
+            left_out.append((float(t_s[first]), float(t_s[last - 1])))
         else:
             room -= len(packed)
             stretches.append(packed)
@@ -92,17 +92,16 @@ def _overview(t_s: Any, values: list[Any]) -> tuple[Packed, Any]:
 
 
 def _spans(flight: ShownFlight) -> list[tuple[int, int]]:
-    """Return rows of the test points and what is around them, joined where they touch."""
+    """Return rows of each test point and what is around it, without those of the one before."""
     t_s = flight.t_s
-    joined: list[list[float]] = []
+    found: list[tuple[int, int]] = []
     for item, _ in sorted(flight.maneuvers, key=lambda pair: pair[0].start_s):
-        first_s, last_s = item.start_s - AROUND_S, max(item.end_s, item.free_end_s) + AROUND_S
-        if joined and first_s <= joined[-1][1]:
-            joined[-1][1] = max(joined[-1][1], last_s)
-        else:
-            joined.append([first_s, last_s])
-    rows = [np.searchsorted(t_s, span) for span in joined]
-    return [(int(first), int(last)) for first, last in rows if last > first]
+        span = (item.start_s - AROUND_S, item.end_s + AROUND_S)
+        first, last = (int(one) for one in np.searchsorted(t_s, span))
+        first = max(first, found[-1][1]) if found else first
+        if last > first:
+            found.append((first, last))
+    return found
 
 
 def _cut(t_s: Any, values: list[Any], span: tuple[int, int]) -> Packed:
@@ -110,7 +109,9 @@ def _cut(t_s: Any, values: list[Any], span: tuple[int, int]) -> Packed:
     return pack(t_s[first:last], [one[first:last] for one in values])
 
 
-def _remarks(flight: ShownFlight, kept: list[Packed], left_out: list[float]) -> list[str]:
+def _remarks(
+    flight: ShownFlight, kept: list[Packed], left_out: list[tuple[float, float]]
+) -> list[str]:
     t_s = flight.t_s
     rows = sum(one.head["rows"] for one in kept)
     share = rows / max(1, len(t_s))
@@ -128,7 +129,9 @@ def _remarks(flight: ShownFlight, kept: list[Packed], left_out: list[float]) -> 
         ]
     if left_out:
         said.append(
-            f"LEFT OUT for the page's size of 10 MB: the samples of {len(left_out)} more stretches,"
-            f" {sum(left_out):.0f} s; only their smallest and largest values are shown."
+            f"LEFT OUT for the page's size of 10 MB: samples of {len(left_out)} more test points"
+            f" ({', '.join(f'{first:.0f} to {last:.0f} s' for first, last in left_out[:12])}"
+            f"{', ...' if len(left_out) > 12 else ''}); only their smallest and largest values are"
+            " shown."
         )
     return said

@@ -346,7 +346,18 @@ def even_columns(table: pd.DataFrame) -> tuple[dict[str, Array], list[str]]:
     IdentificationError
         If there is no time in it, or too little of it.
     """
-    raw = {k: v for k, v in from_frame(table).columns.items() if k in WANTED}
+    return even_arrays(from_frame(table).columns)
+
+
+def even_arrays(columns: Mapping[str, Array]) -> tuple[dict[str, Array], list[str]]:
+    """Return the same of columns that are arrays already.
+
+    Raises
+    ------
+    IdentificationError
+        If there is no time in them, or too little of it.
+    """
+    raw = {k: v for k, v in columns.items() if k in WANTED}
     if "t_s" not in raw:
         raise IdentificationError("no column t_s in the table")
     notes: list[str] = []
@@ -396,16 +407,18 @@ def _step_s(t: Array) -> float:
     return float(np.median(np.diff(t))) if len(t) >= FEWEST else 0.0
 
 
-def _covered(t: Array, seen: BoolArray) -> float:
-    """Return the share of the time that the instants seen follow each other as they usually do."""
-    if seen.sum() < FEWEST:
-        return 0.0
-    gaps = np.diff(t[seen])
-    if float(np.median(gaps)) > SLOWEST_S:
-        return 0.0
+def _recorded_s(t: Array, long_s: float) -> float:
+    """Return the time of all rows without their gaps."""
     rows = np.diff(t)
-    recorded_s = float(np.sum(rows[rows <= _long_s(t)]))  # a gap of all is nobody's
-    return float(np.sum(gaps[gaps <= _long_s(t[seen])])) / max(recorded_s, 1e-9)
+    return float(np.sum(rows[rows <= long_s]))  # a gap of all is nobody's
+
+
+def _covered(own: Array, long_s: float, recorded_s: float) -> float:
+    """Return the share of the time that the instants seen follow each other as they usually do."""
+    if len(own) < FEWEST or long_s > max(LONGEST_GAP_S, 3.0 * SLOWEST_S):
+        return 0.0
+    gaps = np.diff(own)
+    return float(np.sum(gaps[gaps <= long_s])) / max(recorded_s, 1e-9)
 
 
 def _grid(t: Array, dt_s: float, notes: list[str]) -> Array:
@@ -440,7 +453,9 @@ def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     dt_s = min((step for step in steps.values() if step > 0.0), default=_step_s(t))
     grid = _grid(t, dt_s, notes)
     result: dict[str, Array] = {"t_s": grid}
-    bridged = _over(grid, t)
+    long_s = _long_s(t)
+    bridged, recorded_s = _over(grid, t, long_s), _recorded_s(t, long_s)
+    longest_step_s = float(np.diff(t).max())
     missing: list[tuple[float, float, str]] = []
     slower: list[str] = []
     for name, values in columns.items():
@@ -448,7 +463,9 @@ def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
             continue
         series = values
         seen = np.isfinite(series)
-        covered = _covered(t, seen)
+        own = t[seen]
+        own_long_s = _long_s(own) if len(own) > 1 else 0.0
+        covered = _covered(own, own_long_s, recorded_s)
         if covered < 0.5:
             notes.append(f"{name}: {100.0 * (1.0 - covered):.0f} % missing, not used")
             continue
@@ -457,15 +474,15 @@ def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
         series = series[seen]
         if name in ANGLES:
             series = _unwrapped(name, series, notes)
-        result[name] = np.interp(grid, t[seen], series)
+        result[name] = np.interp(grid, own, series)
         if steps.get(name, 0.0) > 1.5 * dt_s:
-            result[sampled_name(name)] = _at_instants(grid, t[seen])
+            result[sampled_name(name)] = _at_instants(grid, own)
         if name in FITTED and not seen.all():
-            bridged |= _over(grid, t[seen])
-            gaps = np.diff(t[seen])
+            bridged |= _over(grid, own, own_long_s)
+            gaps = np.diff(own)
             longest = int(np.argmax(gaps))
-            if gaps[longest] > max(_long_s(t[seen]), 1.01 * float(np.diff(t).max())):
-                missing.append((float(gaps[longest]), float(t[seen][longest]), name))
+            if gaps[longest] > max(own_long_s, 1.01 * longest_step_s):
+                missing.append((float(gaps[longest]), float(own[longest]), name))
     if slower:
         notes.append(
             f"slower than the {dt_s:.3g} s of others, drawn between: {', '.join(slower)}; output"
@@ -506,9 +523,8 @@ def _long_s(t: Array) -> float:
     return max(LONGEST_GAP_S, 3.0 * float(np.median(np.diff(t))))
 
 
-def _over(grid: Array, t: Array) -> BoolArray:
+def _over(grid: Array, t: Array, long_s: float) -> BoolArray:
     """Return where the grid lies within a long gap between the instants t."""
-    long_s = _long_s(t)
     after = np.clip(np.searchsorted(t, grid), 1, len(t) - 1)
     inside = (grid > t[after - 1]) & (grid < t[after])
     between = inside & (t[after] - t[after - 1] > long_s)

@@ -380,8 +380,11 @@ def grade(columns: Mapping[str, Array], item: DetectedManeuver) -> Grade:
     if RESPONSE_OF[item.axis] not in columns:
         return Grade(0.0, 0.0, 0.0, 0.0, (f"no {RESPONSE_OF[item.axis]}: cannot be graded",))
     t = np.asarray(columns["t_s"], dtype=np.float64)
-    response = np.nan_to_num(np.asarray(columns[RESPONSE_OF[item.axis]], dtype=np.float64))
-    surface = np.nan_to_num(np.asarray(columns[item.axis], dtype=np.float64))
+    # Of a flight of an hour only this part is looked at.
+    near = slice(*np.searchsorted(t, (item.start_s - 2.0 * TRIM_S, item.end_s + TRIM_S)))
+    t = t[near]
+    response = np.nan_to_num(np.asarray(columns[RESPONSE_OF[item.axis]][near], dtype=np.float64))
+    surface = np.nan_to_num(np.asarray(columns[item.axis][near], dtype=np.float64))
     inside = (t >= item.start_s) & (t <= item.end_s)
     before = (t >= item.start_s - TRIM_S) & (t < item.start_s)
     after = (t > item.input_end_s + 0.3) & (t <= item.end_s)
