@@ -114,7 +114,8 @@ def _body(flight: ShownFlight, data: PageData, *, track: bool) -> str:
 def _facts(summary: Mapping[str, Any]) -> list[str]:
     rate = f", {summary['rows']} rows" if "rows" in summary else ""
     kind = summary.get("format") or "flight log"
-    first = f"{kind}, {summary['complete']}: {summary['duration_s']:.1f} s{rate}"
+    end = summary["complete"].replace("not proven", "its end is not proven")
+    first = f"{kind}, {end}: {summary['duration_s']:.1f} s{rate}"
     aircraft = {one["aircraft"] for one in summary.get("sessions", ()) if one.get("aircraft")}
     return [first + (f"; aircraft {', '.join(sorted(aircraft))}" if aircraft else "")]
 
