@@ -1,7 +1,28 @@
 // The last seconds of every column, as arrays that uPlot draws: null where there is no value.
 
+const MOST_POINTS = 1500; // of a line: five for each pixel
 const TURN_S = 0.25; // wider than a pixel
 const SPARE = 2; // times the window, before what is older is thrown away
+
+function thinned(column, start, few, isTime) {
+  const out = [];
+  for (let at = start; at < column.length; at += few) {
+    const end = Math.min(at + few, column.length);
+    if (isTime) {
+      out.push(column[at], column[(at + end) >> 1]);
+      continue;
+    }
+    let [least, most] = [at, at];
+    for (let one = at; one < end; one += 1) {
+      if (column[one] === null || column[least] === null || column[most] === null) {
+        if (column[one] !== null) least = most = one;
+      } else if (column[one] < column[least]) least = one;
+      else if (column[one] > column[most]) most = one;
+    }
+    out.push(column[Math.min(least, most)], column[Math.max(least, most)]);
+  }
+  return out;
+}
 
 export class History {
   constructor(columns, windowS) {
@@ -9,6 +30,7 @@ export class History {
     this.windowS = windowS;
     this.values = new Map(columns.map((name) => [name, []]));
     this.arrived = []; // of rows not drawn yet: when the computer read them, ms
+    this.forgotten = 0; // rows thrown away
     this.lastT = null;
     this.lastAt = -Infinity; // performance.now() of the last row
   }
@@ -49,6 +71,7 @@ export class History {
     const t = this.values.get("t_s");
     if (t.length < 64 || t[t.length - 1] - t[0] < SPARE * this.windowS) return;
     const cut = this.firstInWindow();
+    this.forgotten += cut;
     for (const column of this.values.values()) column.splice(0, cut);
   }
 
@@ -65,8 +88,14 @@ export class History {
     return low;
   }
 
+  // Columns of the window; of more rows than pixels the least and the greatest of each few, so that
+  // no peak is lost. The few are the same from redraw to redraw: nothing shimmers.
   window(names, first) {
-    return names.map((name) => this.values.get(name).slice(first));
+    const count = this.values.get("t_s").length - first;
+    const few = Math.ceil(count / MOST_POINTS) * 2;
+    if (few <= 2) return names.map((name) => this.values.get(name).slice(first));
+    const start = first + ((few - ((this.forgotten + first) % few)) % few);
+    return names.map((name) => thinned(this.values.get(name), start, few, name === "t_s"));
   }
 
   last(name) {

@@ -113,7 +113,7 @@ class Plot {
   }
 
   draw(history, first, span) {
-    this.span = span; // every row is drawn: uPlot itself joins those of one pixel, peaks stay
+    this.span = span;
     this.chart.setData(history.window(["t_s", ...this.columns], first));
   }
 
