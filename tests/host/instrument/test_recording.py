@@ -257,7 +257,9 @@ def test_a_table_of_ours_shows_what_was_commanded_and_who_checked_the_clock(
     assert recording_of_table(pot, {}) == Recording(("elevator", "aileron"), 0.0)
     checked = recording_of_table(columns, said | {"clock_half_width": 1e-4 * NORMAL_95})
     assert checked.clock_share == pytest.approx(1e-4)
-    assert recording_of_table(numbers(flown.table), {}) == Recording(maker="foreign")  # of others
+    assert recording_of_table(numbers(flown.table), {}) == Recording(clock_share=None)  # no GPS
+    others = numbers(flown.table.drop(columns="mega_drives"))
+    assert recording_of_table(others, {}) == Recording(maker="foreign")
 
 
 def numbers(table: pd.DataFrame) -> dict[str, Array]:

@@ -193,7 +193,8 @@ def test_says_what_to_trust_and_why_not(
     named = [line for line in document["verdict"] if "do not agree on" in line]
     assert len(named) == len(scattered)
     text = str(found[0])
-    assert text.startswith("coefficients: 3 maneuvers of the elevator, 6 of aileron and rudder")
+    assert text.startswith("note: no GPS checked the clock")
+    assert "\ncoefficients: 3 maneuvers of the elevator, 6 of aileron and rudder" in text
     assert "of 24 intervals hold the truth" in text
     assert {p.name for p in (tmp_path / "plots").iterdir()} == {
         f"coefficients_{k}.svg" for k in ("fit", "poles", "intervals", "input")

@@ -10,6 +10,7 @@ import pytest
 from host.aircraft.file import load_measured
 from host.aircraft.powerplant import powerplant
 from host.aircraft.propulsion import propeller
+from host.instrument.recording import SURFACES
 from host.sysid.coefficients.coefficient_model import read_coefficient_model
 from host.sysid.flight.flight_tables import even_columns
 from host.sysid.identification_error import IdentificationError
@@ -28,11 +29,13 @@ ROLL_AND_YAW = ("Cl_beta", "Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr")
 
 @pytest.fixture(scope="module")
 def table() -> pd.DataFrame:
-    """A multisine on each axis, nothing drawn, as a table of another logger."""
+    """A multisine on each axis, nothing drawn, by our logger, whose clock GPS checked."""
     card = load("multisine")
     nominal = replace(card, sensors=replace(card.sensors, tolerances=False))
     columns, _ = even_columns(virtual_flight(nominal, 7, chain="none").table)
-    return pd.DataFrame(columns)
+    found = pd.DataFrame(columns)
+    found.attrs = {"inputs": dict.fromkeys(SURFACES, "measured"), "clock_half_width": 0.0}
+    return found
 
 
 @pytest.fixture(scope="module")

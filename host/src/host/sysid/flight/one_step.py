@@ -142,9 +142,11 @@ class OneStep:
 
 
 def one_step_of(result: FitResult, maneuvers: Sequence[Maneuver], trim: Trim) -> OneStep | None:
-    """Return the step of the method that made a result; None if it fails at the answer."""
+    """Return the step of the method that made a result; None if it has none, or fails there."""
     if result.residual_kind == "innovation":
-        return _of_innovations(result, maneuvers, trim)
+        noise = any(n.startswith(PROCESS) for n in result.names)
+        # A filter whose noise is no parameter of it, as Kalman filters with joint states, has none.
+        return _of_innovations(result, maneuvers, trim) if noise else None
     return _of_outputs(result, maneuvers)
 
 

@@ -99,7 +99,7 @@ def measured_table(record: FlightRecord, data: AirData | None = None) -> pd.Data
     -------
     DataFrame
         As `true_table`, without thrust and rotor; vanes and pitots per side (``alpha_a_rad``
-        ...) and their mean. Rates and specific forces at the IMU; time is true, as after a
+        ...) and their mean, pots. Rates and specific forces at the IMU; time is true, as after a
         correction by GPS.
     """
     data = data or air_data(record)
@@ -147,4 +147,12 @@ def measured_table(record: FlightRecord, data: AirData | None = None) -> pd.Data
     for name in CHANNELS[:6]:
         unit = "pa" if name.startswith("dp") else "rad"
         columns[f"{name}_{unit}"] = on(vane_at, si[name])
+    # What makes a table one of our logger (`sysid/flight/recorded.py`): pots, and who drives.
+    columns |= {
+        "elevator_pot_rad": columns["elevator_rad"],
+        "aileron_left_rad": on(vane_at, si["pot_aileron_left"]),
+        "aileron_right_rad": on(vane_at, si["pot_aileron_right"]),
+        "rudder_pot_rad": columns["rudder_rad"],
+        "mega_drives": np.ones(len(at)),
+    }
     return pd.DataFrame(columns)
