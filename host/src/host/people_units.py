@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
+from host.arrays import Array
 from host.constants import DEG_PER_RAD
 
 _ENDINGS = {"_radps": "_degps", "_rad": "_deg"}
@@ -19,3 +24,12 @@ def people_name(name: str) -> tuple[str, float]:
         if name.endswith(ending):
             return f"{name.removesuffix(ending)}{degrees}", DEG_PER_RAD
     return name, 1.0
+
+
+def people_columns(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Return columns as a person reads them, by name and by value."""
+    found = {}
+    for name, values in columns.items():
+        called, factor = people_name(name)
+        found[called] = values if factor == 1.0 else np.asarray(values, np.float64) * factor
+    return found

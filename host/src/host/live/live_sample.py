@@ -15,7 +15,7 @@ LIVE_UNITS = {
     "t_s": "s",
     **dict.fromkeys(("alpha_a_deg", "alpha_b_deg", "beta_a_deg", "beta_b_deg"), "deg"),
     **dict.fromkeys(("airspeed_a_mps", "airspeed_b_mps"), "m/s"),
-    **dict.fromkeys(("p_dps", "q_dps", "r_dps"), "deg/s"),
+    **dict.fromkeys(("p_degps", "q_degps", "r_degps"), "deg/s"),
     **dict.fromkeys(("phi_deg", "theta_deg", "psi_deg"), "deg"),
     **dict.fromkeys(("ax_mps2", "ay_mps2", "az_mps2"), "m/s2"),
     **dict.fromkeys(

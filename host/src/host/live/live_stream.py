@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from host.constants import DEG_PER_RAD
 from host.live.live_sample import LIVE_UNITS, Array, LiveUpdate, SlowFrame
 from host.live.text_rows import TextRows
+from host.people_units import people_columns
 from host.physical.airdata import calibrated_airspeed_mps, pressure_altitude_m
 from host.physical.calibration import Calibration
 from host.physical.channels import ChannelMaker, Rows
@@ -32,14 +32,6 @@ _LATE = 1.5  # of the usual time between two rows
 _USUAL_OF = 51
 _RESET_S = -1.0
 _DLPF = 3
-_COLUMN_OF = {
-    "alpha_a_deg": "alpha_a_rad", "alpha_b_deg": "alpha_b_rad",
-    "beta_a_deg": "beta_a_rad", "beta_b_deg": "beta_b_rad",
-    "p_dps": "p_radps", "q_dps": "q_radps", "r_dps": "r_radps",
-    "phi_deg": "phi_rad", "theta_deg": "theta_rad", "psi_deg": "psi_rad",
-    "elevator_pot_deg": "elevator_pot_rad", "rudder_pot_deg": "rudder_pot_rad",
-    "aileron_left_deg": "aileron_left_rad", "aileron_right_deg": "aileron_right_rad",
-}  # fmt: skip
 
 
 class LiveStream:
@@ -220,9 +212,7 @@ class LiveStream:
         data = np.concatenate(idents)
         t_s = np.array(times)
         made = self._maker.columns(Rows(data, t_s * 1e6))
-        out = {name: made[name] for name in made if name in LIVE_UNITS}
-        for name, source in _COLUMN_OF.items():
-            out[name] = made[source] * DEG_PER_RAD
+        out = people_columns(made)
         out["t_s"] = t_s
         out["airspeed_a_mps"] = calibrated_airspeed_mps(made["differential_a_pa"])
         out["airspeed_b_mps"] = calibrated_airspeed_mps(made["differential_b_pa"])

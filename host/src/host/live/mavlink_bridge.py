@@ -128,7 +128,7 @@ class MavlinkBridge:
         row, boot_ms = self._row, self._boot_ms()
         angles = [_or_zero(row[f"{name}_deg"]) * RAD_PER_DEG for name in ("phi", "theta", "psi")]
         angles[2] = math.remainder(angles[2], 2.0 * math.pi)
-        rates = [_or_zero(row[f"{name}_dps"]) * RAD_PER_DEG for name in "pqr"]
+        rates = [_or_zero(row[f"{name}_degps"]) * RAD_PER_DEG for name in "pqr"]
         self._send("attitude", boot_ms, *angles, *rates)
         alpha, beta = (_mean(row, f"{name}_a_deg", f"{name}_b_deg") for name in ("alpha", "beta"))
         if math.isfinite(alpha) and math.isfinite(beta):

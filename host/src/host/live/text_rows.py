@@ -7,20 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from host.constants import DEG_PER_RAD
 from host.errors import HostError
 from host.live.live_sample import LIVE_UNITS, LiveUpdate
 from host.original.row_table import make_table
 from host.original.rows import looks_like_rows, parse_rows
+from host.people_units import people_columns
 from host.physical.calibration import Calibration
 
 _LONGEST = 4096
-_RADIANS = {
-    "alpha_a_deg": "alpha_a_rad", "alpha_b_deg": "alpha_b_rad",
-    "beta_a_deg": "beta_a_rad", "beta_b_deg": "beta_b_rad",
-    "p_dps": "p_radps", "q_dps": "q_radps", "r_dps": "r_radps",
-    "phi_deg": "phi_rad", "theta_deg": "theta_rad", "psi_deg": "psi_rad",
-}  # fmt: skip
 
 
 class TextRows:
@@ -55,9 +49,8 @@ class TextRows:
         if self._first_s is None:
             self._first_s = arrived_s
         nothing = np.full(count, np.nan)
-        rows = {name: np.asarray(table.get(name, nothing), float) for name in LIVE_UNITS}
-        for name, source in _RADIANS.items():
-            rows[name] = np.asarray(table[source], float) * DEG_PER_RAD
+        read = people_columns(table)
+        rows = {name: np.asarray(read.get(name, nothing), float) for name in LIVE_UNITS}
         rows["airspeed_a_mps"] = np.asarray(table["airspeed_mps"], float)
         rows["t_s"] = np.full(count, arrived_s - self._first_s)
         return LiveUpdate(rows, np.ones(count, bool), 0, [], arrived_s)

@@ -8,9 +8,9 @@ import numpy as np
 
 from host.arrays import Array
 from host.constants import DEG_PER_RAD
+from host.people_units import people_name, people_unit
 from host.report.shown_flight import ShownFlight
 
-_IN_DEGREES = {"_radps": ("_degps", "deg/s"), "_rad": ("_deg", "deg")}
 _GROUPS = {
     "air data": ("airspeed", "cas", "alpha_", "beta_", "qbar", "differential", "static",
                  "temperature", "density", "altitude"),
@@ -53,23 +53,17 @@ def channels_of(flight: ShownFlight) -> list[Channel]:
     for name, values in flight.columns.items():
         if name == "t_s" or not len(values):
             continue
-        unit, text = flight.units.get(name, ""), flight.texts.get(name, "")
-        called, values = _in_degrees(name, np.asarray(values, np.float64))
-        unit = {"rad": "deg", "rad/s": "deg/s"}.get(unit, unit)
+        called, factor = people_name(name)
+        unit, _ = people_unit(flight.units.get(name, ""))
+        text, values = flight.texts.get(name, ""), np.asarray(values, np.float64)
+        values = values if factor == 1.0 else values * factor
         found.append(Channel(called, unit, text, _group(name), values))
     return found + _differences(flight)
 
 
 def shown_name(column: str) -> str:
     """Return the name under which a column is shown."""
-    return _in_degrees(column, np.empty(0))[0]
-
-
-def _in_degrees(name: str, values: Array) -> tuple[str, Array]:
-    for ending, (other, _) in _IN_DEGREES.items():
-        if name.endswith(ending):
-            return name.removesuffix(ending) + other, values * DEG_PER_RAD
-    return name, values
+    return people_name(column)[0]
 
 
 def _group(name: str) -> str:

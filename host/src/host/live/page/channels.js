@@ -38,7 +38,7 @@ export const PLOTS = [
     unit: "deg/s",
     span: 40,
     digits: 0,
-    series: [["p_dps", "p", LEFT], ["q_dps", "q", RIGHT], ["r_dps", "r", THIRD]],
+    series: [["p_degps", "p", LEFT], ["q_degps", "q", RIGHT], ["r_degps", "r", THIRD]],
   },
   surface("aileron", [["aileron_left_deg", "L"], ["aileron_right_deg", "R"]]),
   {
