@@ -7,7 +7,6 @@ while the gust filter was taken for lateral motion; the study starts behind them
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +20,8 @@ from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.flight_tables import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.twin.virtual import virtual_flight
+
+from studies.stored_rows import flown_rows
 
 FIRST_SEED = 5000
 CARD, AIRCRAFT = "demo", "ultrastick25e"
@@ -87,31 +88,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
     parser.add_argument("--rows", type=Path, default=Path("../build/study/demonstration.csv"))
     options = parser.parse_args(arguments)
-    options.rows.parent.mkdir(parents=True, exist_ok=True)
-    rows = _read(options.rows)
-    done, seeds = (
-        {int(r["seed"]) for r in rows},
-        range(options.first, options.first + options.flights),
-    )
-    with options.rows.open("a", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        if not rows:
-            writer.writeheader()
-        for seed in seeds:
-            if seed not in done:
-                writer.writerows(rows_of(seed))
-                file.flush()
-                print(f"\rseed {seed}   ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    print("\n".join(table([r for r in _read(options.rows) if int(r["seed"]) in seeds])))
+    seeds = range(options.first, options.first + options.flights)
+    rows = flown_rows(options.rows, COLUMNS, ((seed,) for seed in seeds), rows_of)
+    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
     return 0
-
-
-def _read(path: Path) -> list[dict[str, str]]:
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ to a file that a later run continues.
 from __future__ import annotations
 
 import argparse
-import csv
 import itertools
 import sys
 from collections.abc import Sequence
@@ -18,6 +17,7 @@ from host.sysid.flight.linear_estimator import identify
 from host.sysid.identification_error import IdentificationError
 
 from studies.foreign.flight import Air, derivatives, fly
+from studies.stored_rows import flown_rows
 
 # 0-5 were looked at while delays and turning air were written.
 FIRST_SEED = 100
@@ -99,26 +99,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--rows", type=Path, help="of a run that goes on; a file for each axis")
     options = parser.parse_args(arguments)
     path = options.rows or Path(f"../build/study/independent_{options.axis}.csv")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    rows = []
-    if path.exists():
-        with path.open(newline="") as file:
-            rows = list(csv.DictReader(file))
-    done = {(r["cell"], int(r["seed"])) for r in rows}
     seeds = range(options.first, options.first + options.flights)
-    with path.open("a", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, restval="")
-        if not rows:
-            writer.writeheader()
-        for seed, (cell, air) in itertools.product(seeds, cells().items()):
-            if (cell, seed) not in done:
-                writer.writerows(rows_of(cell, air, seed, options.axis))
-                file.flush()
-                print(f"\r{cell}, seed {seed}   ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    with path.open(newline="") as file:
-        mine = [r for r in csv.DictReader(file) if int(r["seed"]) in seeds]
-    print("\n".join(table(mine)))
+    airs = cells()
+
+    def fly(cell: str, seed: int) -> list[dict[str, object]]:
+        return rows_of(cell, airs[cell], seed, options.axis)
+
+    keys = ((cell, seed) for seed in seeds for cell in airs)
+    rows = flown_rows(path, COLUMNS, keys, fly)
+    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
     return 0
 
 

@@ -6,7 +6,8 @@ One row a coefficient and flight goes to a file that a later run continues.
 from __future__ import annotations
 
 import argparse
-import csv
+import functools
+import itertools
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,6 +27,7 @@ from host.twin.testcard.cards import Card, load
 from host.twin.virtual import virtual_flight
 
 from studies.demonstration import PRINCIPAL
+from studies.stored_rows import flown_rows
 
 FIRST_SEED = 6000
 KEPT = 1.5  # times the promise, or one over it
@@ -95,33 +97,19 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
     parser.add_argument("--rows", type=Path, default=Path("../build/study/planned_widths.csv"))
     options = parser.parse_args(arguments)
-    options.rows.parent.mkdir(parents=True, exist_ok=True)
-    rows = _read(options.rows)
-    done = {(r["cell"], int(r["seed"])) for r in rows}
     seeds = range(options.first, options.first + options.flights)
-    with options.rows.open("a", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        if not rows:
-            writer.writeheader()
-        for cell, card in cells().items():
-            missing = [seed for seed in seeds if (cell, seed) not in done]
-            promised: dict[str, float] = {}
-            if missing:
-                promised = {w.name: w.half_width for w in predict_widths(card).widths}
-            for seed in missing:
-                writer.writerows(rows_of(cell, card, seed, promised))
-                file.flush()
-                print(f"\r{cell}, seed {seed}   ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    print("\n".join(table([r for r in _read(options.rows) if int(r["seed"]) in seeds])))
+    cards = cells()
+
+    @functools.cache
+    def promised(cell: str) -> dict[str, float]:
+        return {w.name: w.half_width for w in predict_widths(cards[cell]).widths}
+
+    def fly(cell: str, seed: int) -> list[dict[str, object]]:
+        return rows_of(cell, cards[cell], seed, promised(cell))
+
+    rows = flown_rows(options.rows, COLUMNS, itertools.product(cards, seeds), fly)
+    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
     return 0
-
-
-def _read(path: Path) -> list[dict[str, str]]:
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ run continues.
 from __future__ import annotations
 
 import argparse
-import csv
+import functools
 import sys
 import tomllib
 from collections.abc import Sequence
@@ -30,6 +30,7 @@ from host.twin.testcard.cards import Card, load
 from host.twin.virtual import virtual_flight
 
 import host
+from studies.stored_rows import flown_rows
 
 FIRST_SEED = 8000
 AIRCRAFT = "ultrastick25e"
@@ -171,30 +172,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--method", help="in place of the default")
     parser.add_argument("--rows", type=Path, default=Path("../build/study/shipped_models.csv"))
     options = parser.parse_args(arguments)
-    options.rows.parent.mkdir(parents=True, exist_ok=True)
-    done = {(r["model"], float(r["air_mps"]), int(r["seed"])) for r in read_rows(options.rows)}
     seeds = range(options.first, options.first + options.flights)
-    with options.rows.open("a", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        if not done:
-            writer.writeheader()
-        for seed in seeds:
-            for model in options.models:
-                for air in AIRS_MPS:
-                    if (model, air, seed) not in done:
-                        writer.writerows(rows_of(model, air, seed, options.method))
-                        file.flush()
-    found = [r for r in read_rows(options.rows) if int(r["seed"]) in seeds]
-    sys.stdout.write("\n".join(table_of(found)) + "\n")
+    keys = ((m, air, seed) for seed in seeds for m in options.models for air in AIRS_MPS)
+    fly = functools.partial(rows_of, method=options.method)
+    rows = flown_rows(options.rows, COLUMNS, keys, fly)
+    sys.stdout.write("\n".join(table_of([r for r in rows if int(r["seed"]) in seeds])) + "\n")
     return 0
-
-
-def read_rows(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a file; none where there is no file."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 if __name__ == "__main__":

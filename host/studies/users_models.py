@@ -8,7 +8,6 @@ flight, method and derivative goes to a file that a later run continues.
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,6 +22,7 @@ from host.sysid.models.model_file import model_from
 from scipy import signal
 
 from studies.inputs import multistep_3211
+from studies.stored_rows import flown_rows
 
 FIRST_SEED = 7200  # those below were looked at
 NOISES = ("white", "coloured", "gust")
@@ -146,29 +146,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
     parser.add_argument("--rows", type=Path, default=Path("../build/study/users_models.csv"))
     options = parser.parse_args(arguments)
-    options.rows.parent.mkdir(parents=True, exist_ok=True)
-    done = {(r["noise"], int(r["seed"])) for r in read_rows(options.rows)}
     seeds = range(options.first, options.first + options.flights)
-    with options.rows.open("a", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        if not done:
-            writer.writeheader()
-        for seed in seeds:
-            for noise in NOISES:
-                if (noise, seed) not in done:
-                    writer.writerows(rows_of(noise, seed))
-                    file.flush()
-    found = [r for r in read_rows(options.rows) if int(r["seed"]) in seeds]
-    sys.stdout.write("\n".join(table(found)) + "\n")
+    keys = ((noise, seed) for seed in seeds for noise in NOISES)
+    rows = flown_rows(options.rows, COLUMNS, keys, rows_of)
+    sys.stdout.write("\n".join(table([r for r in rows if int(r["seed"]) in seeds])) + "\n")
     return 0
-
-
-def read_rows(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a file; none where there is no file."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 if __name__ == "__main__":

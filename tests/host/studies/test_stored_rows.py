@@ -1,0 +1,27 @@
+"""Rows in a file: what is there is not flown again, what is missing is, whatever the order."""
+
+from pathlib import Path
+
+import pytest
+from studies.stored_rows import flown_rows
+
+COLUMNS = ("air_mps", "seed", "name", "estimate")
+
+
+def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    flown: list[tuple[float, int]] = []
+
+    def fly(air_mps: float, seed: int) -> list[dict[str, object]]:
+        if seed == 3:
+            raise KeyboardInterrupt
+        flown.append((air_mps, seed))
+        rows = ("M_q", "M_de") if seed else ("refused",)
+        return [{"air_mps": air_mps, "seed": seed, "name": name} for name in rows]
+
+    path = tmp_path / "new" / "rows.csv"
+    with pytest.raises(KeyboardInterrupt):
+        flown_rows(path, COLUMNS, [(0.5, 1), (0.5, 3)], fly)
+    rows = flown_rows(path, COLUMNS, [(0.0, 0), (0.5, 0), (0.5, 1)], fly)
+    assert flown == [(0.5, 1), (0.0, 0), (0.5, 0)]
+    assert [r["name"] for r in rows] == ["M_q", "M_de", "refused", "refused"]
+    assert flown_rows(path, COLUMNS, [], fly) == rows
