@@ -218,4 +218,4 @@ class LiveStream:
         out["airspeed_b_mps"] = calibrated_airspeed_mps(made["differential_b_pa"])
         out["altitude_m"] = pressure_altitude_m(np.full(len(t_s), self._static_pa))
         drives = (data["valid"] & self.schema.bit("valid", "mega_drives")) != 0
-        return {name: out[name] for name in LIVE_UNITS}, np.asarray(drives)
+        return {name: np.asarray(out[name], np.float64) for name in LIVE_UNITS}, np.asarray(drives)

@@ -64,11 +64,10 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
         raise UsageError(f"{target} is the source itself; name another file with -o")
     sheet = _sheet(request.preflight)
     found = identify(request.sources, **request.options)
-    rate = request.options.get("row_rate_hz")
     flights = [
         flight
         for source, calibration in zip(request.sources, request.calibrations, strict=True)
-        if (flight := _flight(source, calibration, rate)) is not None
+        if (flight := _flight(source, calibration, request.options)) is not None
     ]
     calibrations = {one for one in request.calibrations if one is not None}
     others = [one for one in request.files if one not in calibrations]
@@ -86,26 +85,29 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     return target, found
 
 
-def _flight(source: Path, calibration: Path | None, rate: float | None) -> ShownFlight | None:
+def _flight(
+    source: Path, calibration: Path | None, options: Mapping[str, Any]
+) -> ShownFlight | None:
     """Return a log as it is shown; None of a table, which knows nothing of its recording."""
     if source.suffix.lower() in _TABLES:
         return None
     try:
-        return read_flight(_wanted(source, calibration, rate))[0]
+        return read_flight(_wanted(source, calibration, options))[0]
     except HostError:
         if source.suffix.lower() in TEXT_KINDS:  # a table under another name
             return None
         raise
 
 
-def _wanted(source: Path, calibration: Path | None, rate_hz: float | None) -> Wanted:
+def _wanted(source: Path, calibration: Path | None, options: Mapping[str, Any]) -> Wanted:
     if is_autopilot_log(source):
-        return Wanted(source)
+        return Wanted(source, sensors=tuple(options.get("sensors", {}).items()))
     rows = False
     if source.is_file():
         with source.open("rb") as file:
             rows = looks_like_rows(file.read(_HEAD_BYTES))
-    return Wanted(source, calibration=calibration, row_rate_hz=rate_hz if rows else None)
+    rate_hz = options.get("row_rate_hz") if rows else None
+    return Wanted(source, calibration=calibration, row_rate_hz=rate_hz)
 
 
 def _sheet(path: Path | None) -> tuple[str, list[str]] | None:

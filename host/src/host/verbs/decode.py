@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
+from host.source_arguments import add_log_arguments
 
 _DESCRIPTION = """\
 Decode a flight log: print what it holds and how good it is, write the synchronous
@@ -31,13 +31,7 @@ def add_parser(subparsers: Any) -> None:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument(
-        "source",
-        type=Path,
-        nargs="?",
-        metavar="SOURCE",
-        help="log, folder or mounted card; the newest flight of the working folder without it",
-    )
+    add_log_arguments(parser)
     parser.add_argument(
         "-o",
         "--output",
@@ -56,30 +50,6 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--strict", action="store_true", help="end with code 6 unless the log is without fault"
     )
-    parser.add_argument("--session", type=int, metavar="N", help="one recording session only")
-    parser.add_argument(
-        "--file-id",
-        type=hexadecimal,
-        metavar="HEX",
-        help="blocks of this file id: older data, a second log in the file",
-    )
-    parser.add_argument(
-        "--calibration", type=Path, metavar="FILE", help="counts to SI; the default without it"
-    )
-    parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
-                        help="of an autopilot's log, instance N of a message, such as IMU=1;"
-                        " repeatable")  # fmt: skip
-    parser.add_argument(
-        "--row-rate",
-        type=float,
-        metavar="HZ",
-        help="rate of original ASCII rows, which carry no time; estimated from GPS without it",
-    )
-
-
-def hexadecimal(text: str) -> int:
-    """Return the number behind hexadecimal digits; argparse names this function in its error."""
-    return int(text, 16)
 
 
 def run(args: argparse.Namespace) -> int:

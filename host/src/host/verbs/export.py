@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from host.verbs.plot import add_source_arguments, wanted_source
+from host.source_arguments import add_log_arguments
+from host.verbs.plot import wanted_source
 
 _KINDS = ("tlog", "ulog", "kml", "kmz", "gpx", "mcap")
 _DESCRIPTION = """\
@@ -28,7 +29,7 @@ def add_parser(subparsers: Any) -> None:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add_source_arguments(parser)
+    add_log_arguments(parser)
     parser.add_argument("--to", choices=_KINDS, action="append", required=True,
                         help="format; repeatable")  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, metavar="PATH",

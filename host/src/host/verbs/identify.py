@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import StorePlaced, of_each, stretches_of_each
+from host.source_arguments import add_row_rate, add_sensor
 
 if TYPE_CHECKING:
     from host.sysid.answer.output_files import OutputPaths
@@ -78,11 +79,8 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
                         help="leave sensor errors that the flight tells in the data")  # fmt: skip
     parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
                         " whatever this check of the data finds; repeatable")  # fmt: skip
-    parser.add_argument("--row-rate", type=float, metavar="HZ", help="of original ASCII rows, which"
-                        " carry no time; estimated from GPS without it")  # fmt: skip
-    parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
-                        help="of an autopilot's log, instance N of a message, such as IMU=1;"
-                        " repeatable")  # fmt: skip
+    add_row_rate(parser)
+    add_sensor(parser)
     parser.add_argument("--no-delays", action="store_true",
                         help="estimate no delay of a sensor")  # fmt: skip
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
+from host.source_arguments import add_sensor
 
 
 def add_parser(subparsers: Any) -> None:
@@ -26,9 +27,7 @@ def add_parser(subparsers: Any) -> None:
         help="log, folder or mounted card (their flights are listed); the newest flight of the"
         " working folder without it",
     )
-    parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
-                        help="of an autopilot's log, instance N of a message, such as IMU=1;"
-                        " repeatable")  # fmt: skip
+    add_sensor(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 

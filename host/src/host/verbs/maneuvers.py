@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
+from host.source_arguments import add_row_rate, add_sensor
 
 
 def add_parser(subparsers: Any) -> None:
@@ -25,11 +26,8 @@ def add_parser(subparsers: Any) -> None:
                         help="foreign names, units and signs: a file, or the name of a shipped map"
                         " ('list' shows them)")  # fmt: skip
     parser.add_argument("--calibration", type=Path, metavar="TOML", help="calibration of a log")
-    parser.add_argument("--row-rate", type=float, metavar="HZ", help="of original ASCII rows, which"
-                        " carry no time; estimated from GPS without it")  # fmt: skip
-    parser.add_argument("--sensor", action="append", default=[], metavar="MESSAGE=N",
-                        help="of an autopilot's log, instance N of a message, such as IMU=1;"
-                        " repeatable")  # fmt: skip
+    add_row_rate(parser)
+    add_sensor(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 

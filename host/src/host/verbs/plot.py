@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from host.decode.newest_flight import source_or_newest
-from host.verbs.decode import hexadecimal
+from host.source_arguments import add_log_arguments
 
 _DESCRIPTION = """\
 Show a flight: one HTML page that needs no network, with strips in degrees, test points
@@ -31,7 +31,7 @@ def add_parser(subparsers: Any) -> None:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add_source_arguments(parser)
+    add_log_arguments(parser)
     parser.add_argument(
         "-o",
         "--output",
@@ -58,42 +58,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--to", dest="to_s", type=float, metavar="S", help="of the picture")
 
 
-def add_source_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what says which flight is meant."""
-    parser.add_argument(
-        "source",
-        type=Path,
-        nargs="?",
-        metavar="SOURCE",
-        help="log, folder or mounted card; the newest flight of the working folder without it",
-    )
-    parser.add_argument("--session", type=int, metavar="N", help="one recording session only")
-    parser.add_argument(
-        "--file-id",
-        type=hexadecimal,
-        metavar="HEX",
-        help="blocks of this file id: older data, a second log in the file",
-    )
-    parser.add_argument(
-        "--calibration", type=Path, metavar="FILE", help="counts to SI; the default without it"
-    )
-    parser.add_argument(
-        "--sensor",
-        action="append",
-        default=[],
-        metavar="MESSAGE=N",
-        help="of an autopilot's log, instance N of a message; repeatable",
-    )
-    parser.add_argument(
-        "--row-rate",
-        type=float,
-        metavar="HZ",
-        help="rate of original ASCII rows, which carry no time",
-    )
-
-
 def wanted_source(args: argparse.Namespace) -> Any:
-    """Return what `add_source_arguments` was given as `host.report.flight_reading.Wanted`."""
+    """Return what `add_log_arguments` was given as `host.report.flight_reading.Wanted`."""
     from host.readers.autopilot_flight import chosen_sensors
     from host.report.flight_reading import Wanted
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import StorePlaced, of_each
+from host.source_arguments import add_row_rate, add_sensor
 
 _DESCRIPTION = """\
 Identify the aircraft from one or several flights, as `host identify` does, and write the
@@ -92,7 +93,8 @@ def _add_answer_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="truth of a simulated flight; of several flights one each",
     )
-    parser.add_argument("--row-rate", type=float, metavar="HZ", help="of original ASCII rows")
+    add_row_rate(parser)
+    add_sensor(parser)
     parser.add_argument("--no-delays", action="store_true", help="estimate no delay of a sensor")
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
     parser.add_argument("--json", action="store_true", help="print the numbers as JSON too")
@@ -104,6 +106,7 @@ def run(args: argparse.Namespace) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from host.aircraft.origin import tell_aircraft
     from host.errors import ExitCode
+    from host.readers.autopilot_flight import chosen_sensors
     from host.report.reporting import ReportRequest, write_report
     from host.sysid.identification_error import IdentificationError
     from host.sysid.pipeline.arguments import option_words
@@ -128,6 +131,7 @@ def run(args: argparse.Namespace) -> int:
             "truth": [path for _, path in args.truth],
             "prior": args.prior,
             "row_rate_hz": args.row_rate,
+            "sensors": chosen_sensors(args.sensor),
             "delays": not args.no_delays,
         },
         command=command_line("host", *sys.argv[1:]),

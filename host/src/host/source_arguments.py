@@ -1,0 +1,55 @@
+"""Arguments that say which flight is meant and how its source is read, alike in every verb."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add_log_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the one SOURCE of a verb that decodes, and what chooses within it."""
+    parser.add_argument(
+        "source",
+        type=Path,
+        nargs="?",
+        metavar="SOURCE",
+        help="log, folder or mounted card; the newest flight of the working folder without it",
+    )
+    parser.add_argument("--session", type=int, metavar="N", help="one recording session only")
+    parser.add_argument(
+        "--file-id",
+        type=hexadecimal,
+        metavar="HEX",
+        help="blocks of this file id: older data, a second log in the file",
+    )
+    parser.add_argument(
+        "--calibration", type=Path, metavar="FILE", help="counts to SI; the default without it"
+    )
+    add_sensor(parser)
+    add_row_rate(parser)
+
+
+def add_sensor(parser: argparse.ArgumentParser) -> None:
+    """Add the choice among the sensors of an autopilot."""
+    parser.add_argument(
+        "--sensor",
+        action="append",
+        default=[],
+        metavar="MESSAGE=N",
+        help="of an autopilot's log, instance N of a message, such as IMU=1; repeatable",
+    )
+
+
+def add_row_rate(parser: argparse.ArgumentParser) -> None:
+    """Add the rate of rows without time."""
+    parser.add_argument(
+        "--row-rate",
+        type=float,
+        metavar="HZ",
+        help="rate of original ASCII rows, which carry no time; estimated from GPS without it",
+    )
+
+
+def hexadecimal(text: str) -> int:
+    """Return the number behind hexadecimal digits; argparse names this function in its error."""
+    return int(text, 16)
