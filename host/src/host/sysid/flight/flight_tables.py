@@ -402,28 +402,45 @@ def _rows(t: Array, notes: list[str]) -> IntArray:
     return kept
 
 
-def _step_s(t: Array) -> float:
-    """Return the usual time between instants; zero of too few."""
-    return float(np.median(np.diff(t))) if len(t) >= FEWEST else 0.0
+class _Instants:
+    """The instants at which some column was measured; columns of one sensor share them."""
+
+    def __init__(self, t: Array) -> None:
+        self.t = t
+        self.gaps = np.diff(t)
+        usual_s = float(np.median(self.gaps)) if len(t) > 1 else 0.0
+        self.step_s = usual_s if len(t) >= FEWEST else 0.0
+        self.long_s = max(LONGEST_GAP_S, 3.0 * usual_s) if len(t) > 1 else 0.0
 
 
-def _recorded_s(t: Array, long_s: float) -> float:
+def _instants(t: Array, columns: Mapping[str, Array]) -> dict[str, _Instants]:
+    """Return the instants of each column; medians over an hour are taken once a sensor."""
+    by_pattern: dict[bytes, _Instants] = {}
+    found: dict[str, _Instants] = {}
+    for name, values in columns.items():
+        seen = np.isfinite(values)
+        pattern = np.packbits(seen).tobytes()
+        if pattern not in by_pattern:
+            by_pattern[pattern] = _Instants(t[seen])
+        found[name] = by_pattern[pattern]
+    return found
+
+
+def _recorded_s(rows: _Instants) -> float:
     """Return the time of all rows without their gaps."""
-    rows = np.diff(t)
-    return float(np.sum(rows[rows <= long_s]))  # a gap of all is nobody's
+    return float(np.sum(rows.gaps[rows.gaps <= rows.long_s]))  # a gap of all is nobody's
 
 
-def _covered(own: Array, long_s: float, recorded_s: float) -> float:
+def _covered(own: _Instants, recorded_s: float) -> float:
     """Return the share of the time that the instants seen follow each other as they usually do."""
-    if len(own) < FEWEST or long_s > max(LONGEST_GAP_S, 3.0 * SLOWEST_S):
+    if len(own.t) < FEWEST or own.long_s > max(LONGEST_GAP_S, 3.0 * SLOWEST_S):
         return 0.0
-    gaps = np.diff(own)
-    return float(np.sum(gaps[gaps <= long_s])) / max(recorded_s, 1e-9)
+    return float(np.sum(own.gaps[own.gaps <= own.long_s])) / max(recorded_s, 1e-9)
 
 
-def _grid(t: Array, dt_s: float, notes: list[str]) -> Array:
+def _grid(rows: _Instants, dt_s: float, notes: list[str]) -> Array:
     """Return even instants at the rate of the fastest sensor."""
-    gaps = np.diff(t)
+    t, gaps = rows.t, rows.gaps
     if not FASTEST_S <= dt_s <= SLOWEST_S:
         raise IdentificationError(
             f"a row every {dt_s:.3g} s: {FASTEST_S:g} to {SLOWEST_S:g} s can be used; is the unit"
@@ -435,8 +452,8 @@ def _grid(t: Array, dt_s: float, notes: list[str]) -> Array:
         raise IdentificationError(
             f"time jumps from {t[k]:.6g} to {t[k + 1]:.6g} s: cut the file there"
         )
-    if float(gaps.max()) > _long_s(t):
-        many = int((gaps > _long_s(t)).sum())
+    if float(gaps.max()) > rows.long_s:
+        many = int((gaps > rows.long_s).sum())
         notes.append(
             f"{many} gap{'s' if many > 1 else ''}, the longest {gaps.max():.2f} s;"
             " a maneuver over one is divided"
@@ -447,42 +464,39 @@ def _grid(t: Array, dt_s: float, notes: list[str]) -> Array:
 def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     """Bring the table to an even grid, unwrap angles once, draw lines over gaps."""
     index = _rows(columns["t_s"], notes)
-    columns = {name: values[index] for name, values in columns.items()}
-    t = columns["t_s"]
-    steps = {name: _step_s(t[np.isfinite(columns[name])]) for name in FITTED if name in columns}
-    dt_s = min((step for step in steps.values() if step > 0.0), default=_step_s(t))
-    grid = _grid(t, dt_s, notes)
+    if not np.array_equal(index, np.arange(len(columns["t_s"]))):
+        columns = {name: values[index] for name, values in columns.items()}
+    instants = _instants(columns["t_s"], columns)
+    rows = instants["t_s"]
+    steps = {name: own.step_s for name, own in instants.items() if name in FITTED}
+    dt_s = min((step for step in steps.values() if step > 0.0), default=rows.step_s)
+    grid = _grid(rows, dt_s, notes)
     result: dict[str, Array] = {"t_s": grid}
-    long_s = _long_s(t)
-    bridged, recorded_s = _over(grid, t, long_s), _recorded_s(t, long_s)
-    longest_step_s = float(np.diff(t).max())
+    bridged, recorded_s = _over(grid, rows), _recorded_s(rows)
+    longest_step_s = float(rows.gaps.max())
     missing: list[tuple[float, float, str]] = []
     slower: list[str] = []
     for name, values in columns.items():
         if name == "t_s":
             continue
-        series = values
-        seen = np.isfinite(series)
-        own = t[seen]
-        own_long_s = _long_s(own) if len(own) > 1 else 0.0
-        covered = _covered(own, own_long_s, recorded_s)
+        own = instants[name]
+        covered = _covered(own, recorded_s)
         if covered < 0.5:
             notes.append(f"{name}: {100.0 * (1.0 - covered):.0f} % missing, not used")
             continue
         if steps.get(name, 0.0) > 1.5 * dt_s:
             slower.append(f"{name} {steps[name]:.3g} s")
-        series = series[seen]
+        series = values[np.isfinite(values)]
         if name in ANGLES:
             series = _unwrapped(name, series, notes)
-        result[name] = np.interp(grid, own, series)
+        result[name] = np.interp(grid, own.t, series)
         if steps.get(name, 0.0) > 1.5 * dt_s:
-            result[sampled_name(name)] = _at_instants(grid, own)
-        if name in FITTED and not seen.all():
-            bridged |= _over(grid, own, own_long_s)
-            gaps = np.diff(own)
-            longest = int(np.argmax(gaps))
-            if gaps[longest] > max(own_long_s, 1.01 * longest_step_s):
-                missing.append((float(gaps[longest]), float(own[longest]), name))
+            result[sampled_name(name)] = _at_instants(grid, own.t)
+        if name in FITTED and len(own.t) < len(rows.t):
+            bridged |= _over(grid, own)
+            longest = int(np.argmax(own.gaps))
+            if own.gaps[longest] > max(own.long_s, 1.01 * longest_step_s):
+                missing.append((float(own.gaps[longest]), float(own.t[longest]), name))
     if slower:
         notes.append(
             f"slower than the {dt_s:.3g} s of others, drawn between: {', '.join(slower)}; output"
@@ -518,15 +532,14 @@ def _at_instants(grid: Array, t: Array) -> Array:
     return found
 
 
-def _long_s(t: Array) -> float:
-    """Return from which length a gap between the instants t is no longer the way they come."""
-    return max(LONGEST_GAP_S, 3.0 * float(np.median(np.diff(t))))
-
-
-def _over(grid: Array, t: Array, long_s: float) -> BoolArray:
-    """Return where the grid lies within a long gap between the instants t."""
-    after = np.clip(np.searchsorted(t, grid), 1, len(t) - 1)
-    inside = (grid > t[after - 1]) & (grid < t[after])
-    between = inside & (t[after] - t[after - 1] > long_s)
-    before, behind = (t[0] - grid[0] > long_s), (grid[-1] - t[-1] > long_s)
-    return np.asarray(between | (before & (grid < t[0])) | (behind & (grid > t[-1])))
+def _over(grid: Array, own: _Instants) -> BoolArray:
+    """Return where the grid lies within a long gap between instants."""
+    t, long_s = own.t, own.long_s
+    over = np.zeros(len(grid), dtype=bool)
+    for last in np.flatnonzero(own.gaps > long_s):
+        over[np.searchsorted(grid, t[last], "right") : np.searchsorted(grid, t[last + 1])] = True
+    if t[0] - grid[0] > long_s:
+        over[: np.searchsorted(grid, t[0])] = True
+    if grid[-1] - t[-1] > long_s:
+        over[np.searchsorted(grid, t[-1], "right") :] = True
+    return over

@@ -86,15 +86,17 @@ class _AtRest:
 
 def _until(t: Array, at_rest: _AtRest, from_s: float, limit_s: float) -> float:
     """Return until when nothing moves after an input."""
-    span = np.flatnonzero((t >= from_s) & (t <= min(limit_s, from_s + LONGEST_S)))
-    settling = np.flatnonzero((t >= from_s) & (t <= from_s + REST_S))
+    first = np.searchsorted(t, from_s)
+    last, settled = np.searchsorted(t, (min(limit_s, from_s + LONGEST_S), from_s + REST_S), "right")
+    span, settling = np.arange(first, last), np.arange(first, settled)
     return float(t[span[at_rest.samples(span, settling) - 1]]) if len(span) else -np.inf
 
 
 def _since(t: Array, at_rest: _AtRest, to_s: float, limit_s: float) -> float:
     """Return since when nothing moved before an input."""
-    span = np.flatnonzero((t <= to_s) & (t > max(limit_s, to_s - LONGEST_LEAD_S)))[::-1]
-    settled = np.flatnonzero((t < to_s) & (t >= to_s - REST_S))
+    first, last = np.searchsorted(t, (max(limit_s, to_s - LONGEST_LEAD_S), to_s), "right")
+    span = np.arange(first, last)[::-1]
+    settled = np.arange(*np.searchsorted(t, (to_s - REST_S, to_s)))
     if len(span) == 0 or len(settled) == 0:
         return to_s
     return float(t[span[at_rest.samples(span[1:], settled)]]) if len(span) > 1 else to_s

@@ -324,7 +324,8 @@ def runs_of(chosen: BoolArray) -> list[IntArray]:
 
 def _median3(series: Array) -> Array:
     padded = np.concatenate([series[:1], series, series[-1:]])
-    return np.asarray(np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0))
+    low, high = np.minimum(padded[:-2], padded[2:]), np.maximum(padded[:-2], padded[2:])
+    return np.asarray(np.clip(series, low, high))
 
 
 def _bounded(found: list[DetectedManeuver], last_s: float) -> list[DetectedManeuver]:
