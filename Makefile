@@ -43,6 +43,7 @@ bench: setup ## damage, speed and identification beside their peers
 	@$(PYTHON) tests/bench/identification.py
 	@$(PYTHON) tests/bench/identification_equations.py
 	@$(PYTHON) tests/bench/identification_imported.py
+	@$(PYTHON) tests/bench/after_landing.py
 
 study: setup sitl ## tables and pictures of identification in build/study (SIZE=full: half an hour)
 	@cd host && ../$(PYTHON) -m studies ../build/study --size $(or $(SIZE),small)
