@@ -436,6 +436,11 @@ def test_the_package_stays_cheap_to_import() -> None:
     heavy = "{'numpy', 'pandas', 'scipy', 'numba', 'matplotlib'}"
     code = f"import host, sys; assert not {heavy} & set(sys.modules), 'heavy'"
     subprocess.run([sys.executable, "-c", code], check=True)
+    # Each takes half a second to a second of an answer that takes four.
+    heavy = "{'scipy.signal', 'scipy.stats', 'pandas', 'numba', 'matplotlib'}"
+    code = "import sys, host.verbs.identify, host.sysid.pipeline.stages\n"
+    code += f"assert not {heavy} & set(sys.modules), {heavy} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
     for name in host.__all__:
         assert getattr(host, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'identity'"):

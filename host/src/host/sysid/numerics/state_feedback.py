@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, signal
+from scipy import linalg, optimize
 
 from host.arrays import Array, IntArray
 
@@ -34,6 +34,7 @@ BETTER = 0.6  # of what later signals leave unexplained: earlier ones must leave
 LEAST_DECAY = 1e-3  # of a filter's state at the start of a record
 RIDGE = 1e-10  # of a signal's power
 Shape = tuple[float, float]  # lag and wash-out, s
+NO_FILTER: Shape = (0.0, np.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +68,7 @@ class _Found:
 
     r2: float = 0.0
     signals: tuple[int, ...] = ()
-    shape: Shape = (0.0, np.inf)
+    shape: Shape = NO_FILTER
     delay_s: float = 0.0
 
 
@@ -94,7 +95,7 @@ def feedback_law(
         return None
     steps = STEP_S * np.arange(round(LONGEST_S / STEP_S) + 1)
     everything = tuple(range(len(signals)))
-    if np.max(_r2(record.products((0.0, np.inf), steps), everything)) < HOPELESS:
+    if np.max(_r2(record.products(NO_FILTER, steps), everything)) < HOPELESS:
         return None
     shapes = [(lag, wash) for lag in LAGS_S for wash in WASHOUTS_S]
     before = _simplest(record, dict.fromkeys(shapes, steps), FOLLOWS)
@@ -132,7 +133,7 @@ class _Record:
         """Return products of the input and all signals, (delays, 1 + signals, 1 + signals)."""
         values = self.values
         for b, a in _sections(*shape, self.dt_s):
-            values = signal.lfilter(b, a, values, axis=0)
+            values = _filtered(b, a, values)
         whole = np.floor(delays / self.dt_s + 1e-9).astype(np.int64)
         part = (delays / self.dt_s - whole)[:, None, None]
         at = self.rows[None, :] - whole[:, None]
@@ -236,6 +237,17 @@ def _r2(grams: Array, columns: Sequence[int]) -> Array:
     cross = cross / scale
     solved = np.linalg.solve(own, cross[:, :, None])[:, :, 0]
     return np.asarray(np.sum(solved * cross, axis=1) / np.maximum(grams[:, 0, 0], 1e-300))
+
+
+def _filtered(b: Array, a: Array, values: Array) -> Array:
+    """Return y[k] = b_0 x[k] + b_1 x[k-1] - a_1 y[k-1] of columns, from rest.
+
+    `scipy.signal.lfilter` is the same; loading it takes 0.9 s, a fifth of an answer's time.
+    """
+    driven = b[0] * values
+    driven[1:] += b[1] * values[:-1]
+    bands = np.broadcast_to(a[:, None], (2, len(values)))
+    return np.asarray(linalg.solve_banded((1, 0), bands, driven, check_finite=False))
 
 
 def _sections(lag_s: float, washout_s: float, dt_s: float) -> Iterator[tuple[Array, Array]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -139,20 +140,24 @@ def listed_flights(flights: Source | Sequence[Source]) -> list[Source]:
     IdentificationError
         If there is none, or one is something else.
     """
-    import pandas as pd
-
     from host.log import FlightLog
 
     listed: list[Any] = list(flights) if isinstance(flights, list | tuple) else [flights]
     if not listed:
         raise IdentificationError("no flight given; name a log, a table, or several")
     for number, one in enumerate(listed, start=1):
-        if not isinstance(one, str | Path | FlightLog | pd.DataFrame):
+        if not isinstance(one, str | Path | FlightLog) and not _is_table(one):
             raise IdentificationError(
                 f"flight {number} is of type {type(one).__name__}, expected a path, what"
                 " host.read_log returns, or a table (DataFrame)"
             )
     return listed
+
+
+def _is_table(one: object) -> bool:
+    """Return whether it is a DataFrame: who has one has loaded pandas, a log needs none (0.5 s)."""
+    pandas = sys.modules.get("pandas")
+    return pandas is not None and isinstance(one, pandas.DataFrame)
 
 
 def distinct_flights(flights: Sequence[ReconstructedFlight]) -> list[ReconstructedFlight]:
