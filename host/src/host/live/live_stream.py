@@ -9,6 +9,7 @@ from __future__ import annotations
 import zlib
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,7 @@ class LiveStream:
     @property
     def usual_s(self) -> float:
         """Usual time between two rows; 0 before there are three."""
-        return float(np.median(self._steps)) if len(self._steps) > 1 else 0.0
+        return median(self._steps) if len(self._steps) > 1 else 0.0
 
     def subscribe(self, consumer: Consumer) -> None:
         """Call `consumer` with every update from now on, in the thread that feeds."""
@@ -148,7 +149,7 @@ class LiveStream:
     def _decoded(self, frames: Sequence[bytes], arrived_s: float, told: list[str]) -> LiveUpdate:
         schema = self.schema
         slow: list[SlowFrame] = []
-        idents: list[Any] = []
+        idents: list[bytes] = []
         times: list[float] = []
         lost = 0
         by_id = {frame.id: frame for frame in schema.frames} if schema else {}
@@ -161,7 +162,7 @@ class LiveStream:
             row = np.frombuffer(data, layout.dtype)
             t_s = self._seconds(int(row["t_us"][0]))
             if layout.name == "ident":
-                idents.append(row)
+                idents.append(data)
                 times.append(t_s)
                 lost += self._missing(t_s)
             else:
@@ -205,11 +206,11 @@ class LiveStream:
             self._static_pa = raw * field.scale if raw != field.invalid else np.nan
 
     def _rows(
-        self, idents: list[Any], times: list[float]
+        self, idents: list[bytes], times: list[float]
     ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
         if not idents or self._maker is None or self.schema is None:
             return {}, np.empty(0, bool)
-        data = np.concatenate(idents)
+        data = np.frombuffer(b"".join(idents), self.schema.by_name["ident"].dtype)
         t_s = np.array(times)
         made = self._maker.columns(Rows(data, t_s * 1e6))
         out = people_columns(made)
