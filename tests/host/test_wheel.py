@@ -61,6 +61,7 @@ def test_wheel_decodes_a_log_outside_the_clone(tmp_path: Path) -> None:
             ("host/data/packets.json", "protocol/generated/packets.json"),
             ("host/data/released/ed9c9547.json", "protocol/released/ed9c9547.json"),
             ("host/data/default.toml", "hw/calibration/default.toml"),
+            ("host/data/settings.toml", "firmware/settings.toml"),
         ):
             assert packed.read(name) == (ROOT / place).read_bytes()
         for source in recorder_build._all_sources(ROOT):  # which a user's compiler builds

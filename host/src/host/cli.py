@@ -29,6 +29,7 @@ VERBS = {
     "simulate": "fly a virtual test and write the log it would leave",
     "calibrate": "measure zero and slope of every sensor on the bench",
     "plan": "judge planned maneuvers before they are flown",
+    "preflight": "walk round the aircraft: each check turns green by itself",
     "live": "receive the radio in flight: on disk, and on a page",
     "decode": "turn a log into a table in SI and say how good it is",
     "info": "say what a log is, from its head",
@@ -43,7 +44,7 @@ VERBS = {
     "completion": "print the script that completes these words in your shell",
 }
 # They draw themselves, ask, or are read by a shell.
-_OWN_DISPLAY = ("live", "status", "completion", "calibrate")
+_OWN_DISPLAY = ("live", "preflight", "status", "completion", "calibrate")
 _LONGEST_LINE = 2000  # characters
 _AGAIN_S = 0.02  # until Ctrl-C comes again where Python dropped it
 _EPILOG = """\

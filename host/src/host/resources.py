@@ -13,6 +13,7 @@ _FILES = {
     "schema.json": Path("protocol/generated/schema.json"),
     "packets.json": Path("protocol/generated/packets.json"),
     "default.toml": Path("hw/calibration/default.toml"),
+    "settings.toml": Path("firmware/settings.toml"),
 }
 
 # Schemas of released formats that the firmware of today no longer writes, a file each.
@@ -39,7 +40,7 @@ def resource(name: str) -> Path:
     Parameters
     ----------
     name : str
-        ``schema.json``, ``packets.json`` or ``default.toml``.
+        ``schema.json``, ``packets.json``, ``default.toml`` or ``settings.toml``.
 
     Raises
     ------

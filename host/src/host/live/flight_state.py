@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 from host.constants import RAD_PER_DEG
@@ -16,10 +17,9 @@ from host.live.live_sample import LiveUpdate, SlowFrame
 from host.live.live_stream import LiveStream
 from host.live.live_track import LiveTrack
 from host.live.servo_watch import ServoWatch
+from host.live.slow_readings import slow_reading
 from host.text import shown
 
-_RAIL_DIVIDER = 2.0  # 10 k over 10 k (hw/pin_map.toml, net of rail)
-_RAIL_FULL = 4096.0  # sum of four conversions
 _EVENTS = 40
 _OLD_S = 3.0  # frames `system` come every second
 
@@ -37,6 +37,7 @@ class FlightState:
         self.link = LinkBudget()
         self.track = LiveTrack()
         self.servos = ServoWatch()
+        self.preflight: Callable[[], dict[str, Any]] | None = None  # what one says, where there is
         self.events: deque[dict[str, Any]] = deque(maxlen=_EVENTS)
         self._stream = stream
         self._last: dict[str, SlowFrame] = {}
@@ -61,12 +62,14 @@ class FlightState:
     def as_json(self) -> dict[str, Any]:
         """Return everything but the rows themselves."""
         link = self.link.at(time.monotonic())
+        preflight = None if self.preflight is None else self.preflight()
         return {
             "t_s": self._row.get("t_s", 0.0),
             "age_s": None if math.isinf(link.age_s) else round(link.age_s, 3),
             "silent": link.silent,
             "rec": self._rec(link.silent),
-            "go": None,  # said by a preflight, where there was one
+            "go": None if preflight is None else preflight["go"],  # None: not ended, or none
+            "preflight": preflight,
             "link": {
                 "rows_per_s": round(link.rows_per_s, 1),
                 "bytes_per_s": round(link.bytes_per_s),
@@ -134,25 +137,17 @@ class FlightState:
         frame, schema = self._last.get("system"), self._stream.schema
         if frame is None or schema is None:
             return {}
-        row = frame.row
-        supply_mv = int(row["avcc_mv"])
-        sensors = [
-            name
-            for at, name in enumerate(schema.bits.get("sensors", ()))
-            if int(row["sensors"]) >> at & 1
-        ]
-        rail, invalid = int(row["rail"]), schema.by_name["system"].field("rail").invalid
-        known = supply_mv and rail != invalid
+        said = slow_reading(schema, frame)
         return {
             "age_s": round(time.monotonic() - self._heard_s["system"], 1),
-            "rail_v": rail * _RAIL_DIVIDER * supply_mv / _RAIL_FULL * 1e-3 if known else None,
-            "supply_v": supply_mv * 1e-3 if supply_mv else None,
-            "frames_dropped": int(row["frames_dropped"]),
-            "card_errors": int(row["card_errors"]),
-            "not_sent": int(row["telemetry_dropped"]),
-            "sensors": sensors,
-            "drive": schema.word("drive", int(row["drive"])).replace("_", " "),
-            "uptime_s": int(row["uptime_s"]),
+            "rail_v": said["rail_v"],
+            "supply_v": said["supply_v"],
+            "frames_dropped": said["frames_dropped"],
+            "card_errors": said["card_errors"],
+            "not_sent": said["telemetry_dropped"],
+            "sensors": said["sensors"],
+            "drive": said["drive"],
+            "uptime_s": said["uptime_s"],
         }
 
     def _gps(self) -> dict[str, Any]:

@@ -40,6 +40,10 @@ _POLL_S = 0.1
 _SILENT_S = 8.0  # the logger sends 20 rows a second and a hash every 5 s
 
 
+# Who works on the session too, and what to do before its capture is closed.
+Join = Callable[[LiveSession, Calibration], Callable[[], None]]
+
+
 @dataclass(slots=True)
 class LiveRequest:
     """What was asked for on the command line."""
@@ -55,6 +59,8 @@ class LiveRequest:
     json: bool = False
     mavlink: str | None = None
     seed: int = 0
+    opened: Source | None = None  # in place of what `source` names
+    joins: list[Join] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -117,7 +123,7 @@ def run_live(
         In one line: no device, a busy port, a wrong file, a missing extra.
     """
     calibration = load_calibration(request.calibration)
-    source = open_source(request, tell)
+    source = request.opened or open_source(request, tell)
     own = getattr(source, "calibration_text", "")  # of a virtual instrument
     if own and request.calibration is None:
         calibration = calibration_of_text(own, Path(source.name))
@@ -129,6 +135,7 @@ def run_live(
         session = LiveSession(source, LiveStream(calibration, texts), capture, tell)
         if capture is not None:
             tell(f"every byte goes to {capture.path}")
+        leave = [join(session, calibration) for join in request.joins]
         bridge = MavlinkBridge(session, request.mavlink) if request.mavlink else None
         if bridge is not None:
             session.audiences.append(bridge)
@@ -139,6 +146,8 @@ def run_live(
                 asyncio.run(_serve(request, session, tell))
         finally:
             session.stop()
+            for last in leave:
+                last()
             if bridge is not None:
                 bridge.close()
     if session.error is not None:
@@ -196,6 +205,8 @@ async def _until_ended(session: LiveSession, tell: Callable[[str], None], *, for
     loop = asyncio.get_running_loop()
     began_s, said = loop.time(), False
     while session.error is None and (forever or not session.ended.is_set()):
+        if session.enough.is_set():
+            return
         await asyncio.sleep(_POLL_S)
         heard = session.stream.rows or session.stream.frames
         if (

@@ -65,6 +65,8 @@ class LiveSession:
         self.state = FlightState(stream)
         self.audiences: list[Audience] = []
         self.ended = threading.Event()
+        self.enough = threading.Event()  # set by who has what it wanted: the program may end
+        self.asked: dict[str, Callable[[dict[str, Any]], None]] = {}  # by type; who answers
         self.error: BaseException | None = None
         self.disk_error: OSError | None = None  # from then on nothing is recorded
         self._asked: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
@@ -86,7 +88,16 @@ class LiveSession:
 
     def mark(self, who: str) -> None:
         """Note an event of the ground; it stands in the capture, never on the card."""
-        self._asked.put({"kind": "mark", "who": who})
+        self.ask({"type": "mark", "who": who})
+
+    def ask(self, what: dict[str, Any]) -> None:
+        """Ask for something; it is answered in the session's thread."""
+        self._asked.put(what)
+
+    def note(self, kind: str, **what: Any) -> None:
+        """Write a note into the capture, where there is one; in the session's thread."""
+        if self.capture is not None:
+            self.capture.note(kind, **what)
 
     def _run(self) -> None:
         try:
@@ -164,6 +175,9 @@ class LiveSession:
     def _answer(self) -> None:
         while not self._asked.empty():
             asked = self._asked.get()
+            if asked["type"] in self.asked:
+                self._safely(self.asked[asked["type"]], asked)
+                continue
             self._marks += 1
             row = self.state.say("mark", f"mark {self._marks}")
             if self.capture is not None:

@@ -25,7 +25,7 @@ MOST_VIEWERS = 20
 _QUEUE = 64  # messages: two seconds
 _KEPT = 1200  # of rows: more than 30 s at 30 messages a second
 _TRACK = 3000  # points that a new viewer gets
-_LONGEST_MESSAGE = 256  # bytes; a viewer only ever says {"type":"mark"}
+_LONGEST_MESSAGE = 256  # bytes; {"type":"mark"} and three words to a preflight
 _MARK_S = 0.2
 _PING_S = 10.0
 _TYPES = {
@@ -193,13 +193,26 @@ class PageServer:
         }
 
     def _asked(self, viewer: Viewer, text: str) -> None:
-        """Do what a viewer asks, if it is the one thing that can be asked and it may."""
+        """Do what a viewer asks, if it is one of the things that can be asked and it may."""
         try:
             asked = json.loads(text)
         except (ValueError, RecursionError):
             return
         if asked == {"type": "mark"} and viewer.may_mark(self._loop.time()):
             self._session.mark(viewer.role)
+        elif _is_preflight(asked) and viewer.may_mark(self._loop.time()):
+            self._session.ask(asked)
+
+
+def _is_preflight(asked: Any) -> bool:
+    """Tell whether a viewer asks a preflight to go on, to look again, or to end."""
+    return (
+        isinstance(asked, dict)
+        and asked.get("type") == "preflight"
+        and set(asked) <= {"type", "do", "item"}
+        and asked.get("do") in ("next", "again", "end")
+        and isinstance(asked.get("item", ""), str)
+    )
 
 
 def _page_files() -> dict[str, bytes]:

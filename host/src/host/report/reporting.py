@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from host.errors import HostError, UsageError
 from host.files.user_text import read_text
 from host.original.rows import looks_like_rows
+from host.preflight.preflight_sheet import sheet_lines
 from host.readers.autopilot_flight import is_autopilot_log
 from host.report.flight_reading import Wanted, read_flight
 from host.report.plotting import page_file, write_text
@@ -114,4 +115,4 @@ def _sheet(path: Path | None) -> tuple[str, list[str]] | None:
     if path is None:
         return None
     text = read_text(path, UsageError, "a preflight sheet", "replace")
-    return f"Preflight sheet {path.name}", text.splitlines()
+    return f"Preflight sheet {path.name}", sheet_lines(text) or text.splitlines()

@@ -57,6 +57,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--mavlink", metavar="udpout:HOST:PORT",
                         help="tell a ground station: QGroundControl, Mission Planner,"
                         " MAVProxy")  # fmt: skip
+    parser.add_argument("--preflight", type=Path, metavar="SHEET",
+                        help="what `host preflight` wrote: its GO or NO-GO on top")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the state once a second as JSON")
 
 
@@ -80,6 +82,10 @@ def run(args: argparse.Namespace) -> int:
         json=args.json,
         mavlink=args.mavlink,
     )
+    if args.preflight is not None:
+        from host.preflight.preflight_sheet import shown_sheet
+
+        request.joins.append(shown_sheet(args.preflight))
     summary = run_live(request, tell, lambda line: print(line, flush=True))
     if sys.stderr.isatty():
         bare(sys.stderr).write("\r")

@@ -29,7 +29,10 @@ export function connect({ onHello, onRows, onState, onClosed }) {
   open();
   return {
     mark() {
-      if (socket.readyState === WebSocket.OPEN) socket.send('{"type":"mark"}');
+      this.ask({ type: "mark" });
+    },
+    ask(what) {
+      if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(what));
     },
   };
 }

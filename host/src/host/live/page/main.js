@@ -5,6 +5,7 @@ import { History } from "./history.js";
 import { showAge, showState } from "./panel.js";
 import { Plan } from "./plan.js";
 import { Plots } from "./plots.js";
+import { Preflight } from "./preflight.js";
 import { Sound } from "./sound.js";
 
 const REDRAW_MS = 1000 / 30;
@@ -28,6 +29,7 @@ const server = connect({
     history = new History(hello.columns, hello.window_s);
     if (plots === null) plots = new Plots(byId("plots"));
     byId("mark").hidden = !hello.may_mark;
+    preflight.allow(hello.may_mark);
     connected = true;
     plan.points = [];
   },
@@ -42,6 +44,7 @@ const server = connect({
     plan.wind = said.wind_mps;
     if (said.track.length) plan.add(said.track);
     showState(said);
+    preflight.show(said.preflight);
     const marks = said.events.filter((event) => event.kind === "mark").length;
     if (marks > marked) sound.play([660]);
     marked = marks;
@@ -50,6 +53,8 @@ const server = connect({
     connected = false;
   },
 });
+
+const preflight = new Preflight((what) => server.ask({ type: "preflight", ...what }));
 
 function ageS() {
   if (state === null || state.age_s === null) return null;

@@ -23,8 +23,9 @@ export function showState(state) {
   const { rec, link, system, gps } = state;
   const recording = rec.state === "recording";
   lamp("rec", recording ? `${rec.blocks} blocks` : rec.state, recording ? "good" : rec.state === "unknown" ? "" : "bad");
-  const go = state.go;
-  lamp("go", go === null ? "no preflight" : go ? "GO" : "NO-GO", go === null ? "" : go ? "good" : "bad");
+  const { go, preflight } = state;
+  const sofar = preflight === null ? "no preflight" : `${preflight.seen} of ${preflight.items.length}`;
+  lamp("go", go === null ? sofar : go ? "GO" : "NO-GO", go === null ? "" : go ? "good" : "bad");
   byId("link-rate").textContent = figure(link.rows_per_s, 0);
   byId("link-lost").textContent = figure(link.lost_percent, 1);
   byId("link-lost").parentElement.classList.toggle("bad", link.lost_percent > 5);

@@ -16,7 +16,6 @@ from host.arrays import Array, BoolArray, IntArray
 from host.files.regular import file_or_folder
 from host.instrument.recording import Recording
 from host.physical.calibration import Calibration, load_calibration
-from host.physical.sampling import GAP_FACTOR, SLOW_US, bend
 from host.readers.autopilot_flight import is_autopilot_log
 from host.sysid.flight.autopilot_table import autopilot_table
 from host.sysid.flight.column_map import listed, mapped, missing_lines, read_map
@@ -491,8 +490,6 @@ def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
         if name in ANGLES:
             series = _unwrapped(name, series, notes)
         result[name] = np.interp(grid, own.t, series)
-        if dt_s * 1e6 > SLOW_US and name in FITTED and own.step_s <= 1.5 * dt_s:
-            result[name] += _bent(grid, own, series)
         if steps.get(name, 0.0) > 1.5 * dt_s:
             result[sampled_name(name)] = _at_instants(grid, own.t)
         if name in FITTED and len(own.t) < len(rows.t):
@@ -515,15 +512,6 @@ def _even(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     if bridged.any():
         result[BRIDGED] = bridged.astype(np.float64)
     return result
-
-
-def _bent(grid: Array, own: _Instants, series: Array) -> Array:
-    """Return what a curve through slow samples adds to the lines between them."""
-    t = np.asarray(own.t, np.float64)
-    index = np.clip(np.searchsorted(t, grid, side="right") - 1, 0, len(t) - 2)
-    weight = np.clip((grid - t[index]) / own.gaps[index], 0.0, 1.0)
-    more = bend(t, np.asarray(series, np.float64), index, weight)
-    return np.where(own.gaps[index] < GAP_FACTOR * own.step_s, more, 0.0)
 
 
 def _unwrapped(name: str, series: Array, notes: list[str]) -> Array:

@@ -1,0 +1,176 @@
+"""What comes from outside: GPS, static pressure."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Any
+
+from host.preflight.check import Check
+from host.preflight.pilot_settings import PilotSettings
+from host.preflight.sample import Heard, Sample
+
+
+class GpsCheck(Check):
+    """A fresh three-dimensional fix of an aircraft that stands.
+
+    Parameters
+    ----------
+    settings : PilotSettings
+    """
+
+    def __init__(self, settings: PilotSettings) -> None:
+        super().__init__("gps", "GPS fix", "nothing: open sky, up to a minute after power-on")
+        self._settings = settings
+        self._since_s: float | None = None
+        self._heard_s: float | None = None
+        self._first_s: float | None = None
+        self._last_itow: int | None = None
+        self._new_s = 0.0
+        self._lead = ""
+        self._errors: tuple[float, int] | None = None
+
+    def take(self, sample: Sample) -> None:
+        """Look at its age."""
+        if not self._settings.gps:
+            self.seen()  # the settings expect none
+            return
+        if self._first_s is None:
+            self._first_s = sample.t_s
+        since_s = self._first_s if self._heard_s is None else self._new_s
+        age_s = sample.t_s - since_s
+        if age_s <= self.limit["stale_s"]:
+            return
+        self._since_s = None
+        if self._heard_s is None:
+            self.failed(f"nothing heard of it for {age_s:.0f} s: antenna, plug, TX and RX")
+        elif sample.t_s - self._heard_s > self.limit["stale_s"]:
+            self.failed(f"stale: it went silent {sample.t_s - self._heard_s:.0f} s ago")
+        else:
+            self.failed(f"stale: the same solution for {age_s:.0f} s")
+
+    def hear(self, heard: Heard) -> None:
+        """Take a solution, or its count of wrong messages."""
+        if heard.name == "gps":
+            self._solution(heard)
+        elif heard.name == "system":
+            self._garbled(heard)
+
+    def missing(self) -> str:
+        """Return what it has seen."""
+        return self.reason or "no solution came"
+
+    def _garbled(self, heard: Heard) -> None:
+        count = heard.said["gps_errors"]
+        if self._errors is not None:
+            span_s = heard.t_s - self._errors[0]
+            rate = ((count - self._errors[1]) % 65536) / max(span_s, 1.0)
+            self._lead = ""
+            if span_s > 2.5 and rate > self.limit["garbled_per_s"]:
+                self._since_s = None
+                self._lead = f"{rate:.0f} of its messages a second are damaged: its lead, its baud"
+                self.failed(self._lead)
+        else:
+            self._errors = heard.t_s, count
+
+    def _solution(self, heard: Heard) -> None:
+        said = heard.said
+        self._heard_s = heard.t_s
+        if said["itow_ms"] == self._last_itow:
+            return
+        self._last_itow, self._new_s = said["itow_ms"], heard.t_s
+        wrong = self._wrong(said)
+        if wrong:
+            self._since_s = None
+            self.failed(wrong)
+            return
+        if self._lead:
+            return
+        if self._since_s is None:
+            self._since_s = heard.t_s
+        self.values = {
+            "satellites": float(said["satellites"]),
+            "h_accuracy_m": said["h_accuracy"] or math.nan,
+        }
+        if heard.t_s - self._since_s >= self.limit["hold_s"]:
+            self.seen()
+        elif self.state != "seen":
+            self.waits("a fix, watched for a moment")
+
+    def _wrong(self, said: dict[str, Any]) -> str:
+        if said["fix"] != "fix 3d":
+            return f"no fix ({said['fix']}, {said['satellites']} satellites): open sky, wait"
+        latitude, longitude = said["latitude"], said["longitude"]
+        if latitude is None or longitude is None or abs(latitude) > 90.0 or abs(longitude) > 180.0:
+            return f"a place that cannot be: {latitude} deg north, {longitude} deg east"
+        if said["satellites"] < self.limit["satellites"]:
+            return f"{said['satellites']} satellites only: wait, open sky"
+        accuracy, speed = said["h_accuracy"], said["ground_speed"]
+        if accuracy is not None and accuracy > self.limit["accuracy_m"]:
+            return f"known to {accuracy:.0f} m only: wait"
+        if speed is not None and speed > self.limit["speed_mps"]:
+            return f"says {speed:.1f} m/s while the aircraft stands"
+        return ""
+
+
+class BaroCheck(Check):
+    """Static pressure is fresh, possible, and has its noise."""
+
+    def __init__(self) -> None:
+        super().__init__("baro", "barometer", "nothing")
+        self._first_s: float | None = None
+        self._heard_s: float | None = None
+        self._since_s: float | None = None
+        self._bus = ""
+        self._recent: deque[int] = deque(maxlen=int(self.limit["same"]))
+        self._errors: tuple[float, int] | None = None
+
+    def take(self, sample: Sample) -> None:
+        """Look at its age."""
+        if self._first_s is None:
+            self._first_s = sample.t_s
+        age_s = sample.t_s - (self._first_s if self._heard_s is None else self._heard_s)
+        if age_s > self.limit["stale_s"]:
+            self._since_s = None
+            known = "nothing heard of it" if self._heard_s is None else "stale: it went silent"
+            self.failed(f"{known} for {age_s:.0f} s: its bus, its plug")
+
+    def hear(self, heard: Heard) -> None:
+        """Take a pressure, or its count of errors."""
+        said = heard.said
+        if heard.name == "system":
+            if self._errors is None:
+                self._errors = heard.t_s, said["baro_errors"]
+            span_s = heard.t_s - self._errors[0]
+            rate = ((said["baro_errors"] - self._errors[1]) % 65536) / max(span_s, 1.0)
+            self._bus = ""
+            if span_s > 2.5 and rate > self.limit["errors_per_s"]:
+                self._bus = f"{rate:.0f} errors a second on its bus"
+                self.failed(self._bus)
+        if heard.name != "baro":
+            return
+        self._heard_s = heard.t_s
+        self._recent.append(said["raw_pressure"])
+        pressure = said["static_pressure"]
+        if pressure is None or not self.limit["least_pa"] < pressure < self.limit["most_pa"]:
+            self._since_s = None
+            what = "no pressure" if pressure is None else f"{pressure / 100.0:.0f} hPa"
+            self.failed(f"says {what}, which cannot be: the sensor, or its memory is blank")
+        elif len(self._recent) == self._recent.maxlen and len(set(self._recent)) == 1:
+            self._since_s = None
+            self.failed("stale: its reading repeats to the last digit")
+        elif not self._bus:
+            self._fine(heard.t_s, pressure)
+
+    def missing(self) -> str:
+        """Return what it has seen."""
+        return self.reason or "no pressure came"
+
+    def _fine(self, t_s: float, pressure_pa: float) -> None:
+        if self._since_s is None:
+            self._since_s = t_s
+        self.values = {"static_pa": pressure_pa}
+        if t_s - self._since_s >= self.limit["hold_s"]:
+            self.seen()
+        elif self.state != "seen":
+            self.waits("fresh, watched for a moment")
