@@ -94,6 +94,22 @@ def test_it_looks_like_an_aircraft(station: Station) -> None:
     assert 900 < stick < 2100
 
 
+@pytest.mark.parametrize("go", [True, False, None])
+def test_the_pre_arm_check_is_the_preflights_go(station: Station, go: bool | None) -> None:
+    station.heard()
+    station.session.state.preflight = lambda: {"go": go, "items": []}
+    later = time.monotonic() + 2.0
+    while time.monotonic() < later and not (found := _health(station)):
+        time.sleep(0.05)
+    assert bool(found[-1] & dialect.MAV_SYS_STATUS_PREARM_CHECK) is (go is True)
+
+
+def _health(station: Station) -> list[int]:
+    station.fly()
+    said = [one for one in station.heard() if one.get_type() == "SYS_STATUS"]
+    return [one.onboard_control_sensors_health for one in said]
+
+
 def test_silence_makes_nothing_healthy(station: Station, monkeypatch: pytest.MonkeyPatch) -> None:
     station.heard()
     late = time.monotonic() + 5.0

@@ -190,6 +190,25 @@ def test_two_hundred_sockets_do_not_hold_it_up(tmp_path: Path) -> None:
     visited(tmp_path, do)
 
 
+def test_the_pilot_may_ask_a_preflight_and_a_viewer_may_not(tmp_path: Path) -> None:
+    asked: list[dict[str, Any]] = []
+
+    async def do(visit: Visit) -> None:
+        visit.session.asked["preflight"] = asked.append
+        pilot = await visit.socket()
+        viewer = await visit.socket(visit.guard.viewer_token)
+        await viewer.send_str('{"type":"preflight","do":"end"}')
+        await pilot.send_str('{"type":"preflight","do":"go"}')
+        await pilot.send_str('{"type":"preflight","do":"again","item":"rudder"}')
+        while not asked:
+            await asyncio.sleep(0.01)
+        await pilot.close()
+        await viewer.close()
+
+    visited(tmp_path, do, lan=True)
+    assert asked == [{"type": "preflight", "do": "again", "item": "rudder"}]
+
+
 def test_the_pilot_marks_and_a_viewer_does_not(tmp_path: Path) -> None:
     async def do(visit: Visit) -> None:
         pilot = await visit.socket()

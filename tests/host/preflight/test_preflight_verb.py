@@ -31,7 +31,7 @@ def test_a_healthy_walk_is_go_and_its_sheet_stands_beside_the_capture_and_in_it(
     notes = notes_of(tmp_path)
     kinds = [note["kind"] for note in notes[1:]]
     assert kinds.count("preflight_begin") == kinds.count("preflight_sheet") == 1
-    seen = [note["item"] for note in notes if note.get("state") == "seen"]
+    seen = [str(note["item"]) for note in notes if note.get("state") == "seen"]
     assert sorted(seen) == sorted(document["item"])
     (told,) = [note for note in notes if note.get("kind") == "preflight_sheet"]
     assert tomllib.loads(str(told["sheet"])) == document

@@ -58,7 +58,6 @@ class PreflightSummary:
 
     go: bool
     sheet: Path
-    reasons: dict[str, str]
     live: LiveSummary
 
 
@@ -99,8 +98,7 @@ def run_preflight(
     live.joins.append(join)
     summary = run_live(live, screen.told, lambda line: None)
     walk = done[0]
-    states = {c.key: c.reason for c in walk.preflight.checks if c.state != State.SEEN}
-    return PreflightSummary(walk.preflight.go, walk.sheet, states, summary)
+    return PreflightSummary(walk.preflight.go, walk.sheet, summary)
 
 
 def _wanted(request: PreflightRequest, aircraft: Aircraft, calibration: Calibration) -> Wanted:

@@ -5,39 +5,50 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import textwrap
 from collections.abc import Callable
 from typing import Any
 
 from host.live.live_session import Audience
 from host.terminal import bare
 
+_IN = " " * 5
+_NOW_ROWS = 6
 _MARKS = {"seen": "ok", "failed": "NO", "waiting": ".."}
 
 
-def list_lines(said: dict[str, Any], width: int = 100) -> list[str]:
+def list_lines(said: dict[str, Any], width: int = 100, rows: int = 60) -> list[str]:
     """Return a preflight's list in words.
 
     Parameters
     ----------
     said : dict
         As `Preflight.as_json` gives it.
-    width : int
-        Characters of a line.
+    width, rows : int
+        Of the terminal; where it is too low what is green is one line.
     """
-    lines = []
-    for item in said["items"]:
-        mark = ">>" if item["asked"] and item["state"] == "waiting" else _MARKS[item["state"]]
-        reason = f"  {item['reason']}" if item["reason"] and item["state"] == "failed" else ""
-        lines.append(f"{mark} {item['title']}{reason}"[:width])
+    green = [f"ok {item['title']}"[:width] for item in said["items"] if item["state"] == "seen"]
+    lines = [line for item in said["items"] for line in _item_lines(item, width)]
+    if len(lines) > rows - _NOW_ROWS:
+        others = [one for one in said["items"] if one["state"] == "failed"]
+        lines = [f"ok {len(green)} of {len(said['items'])}"]
+        lines += [line for item in others for line in _item_lines(item, width)]
+        lines = lines[: max(1, rows - _NOW_ROWS)]
     asked = next((item for item in said["items"] if item["asked"]), None)
     if said["ended"]:
-        lines.append("GO" if said["go"] else "NO-GO")
-    elif asked is not None:
-        lines.append(f"now: {asked['title']}: {asked['step']}"[:width])
-        if asked["reason"]:
-            lines.append(f"     {asked['reason']}"[:width])
-    else:
-        lines += _watched(said, width)
+        return [*lines, "GO" if said["go"] else "NO-GO"]
+    if asked is None:
+        return lines + _watched(said, width)
+    lines += textwrap.wrap(f"now: {asked['title']}: {asked['step']}", width, subsequent_indent=_IN)
+    return lines + textwrap.wrap(asked["reason"], width, initial_indent=_IN, subsequent_indent=_IN)
+
+
+def _item_lines(item: dict[str, Any], width: int) -> list[str]:
+    """Return an item, and beneath it why it is red."""
+    mark = ">>" if item["asked"] and item["state"] == "waiting" else _MARKS[item["state"]]
+    lines = [f"{mark} {item['title']}"[:width]]
+    if item["state"] == "failed":
+        lines += textwrap.wrap(item["reason"], width, initial_indent=_IN, subsequent_indent=_IN)
     return lines
 
 
@@ -80,7 +91,8 @@ class PreflightScreen(Audience):
     def take(self, said: dict[str, Any]) -> None:
         """Show a list."""
         if self._redraw:
-            self._draw(list_lines(said, shutil.get_terminal_size().columns - 1))
+            size = shutil.get_terminal_size()
+            self._draw(list_lines(said, size.columns - 1, size.lines))
             return
         for item in said["items"]:
             now = f"{item['state']}{item['asked']}"
@@ -104,16 +116,23 @@ class PreflightScreen(Audience):
             self._show(f"{_MARKS[item['state']]} {item['title']}{reason}")
 
     def told(self, text: str) -> None:
-        """Leave the list as it is: another line comes below it."""
-        self._rows = 0
-        self._last = []
+        """Say something above the list."""
+        lines = self._last
+        self._erase()
         print(f"host: {text}", file=sys.stderr, flush=True)
+        if self._redraw and lines:
+            self._draw(lines)
+
+    def _erase(self) -> None:
+        if self._rows:
+            bare(sys.stdout).write(f"\033[{self._rows}A\033[J")
+            sys.stdout.flush()
+        self._rows, self._last = 0, []
 
     def _draw(self, lines: list[str]) -> None:
         if lines == self._last:
             return
-        if self._rows:
-            bare(sys.stdout).write(f"\033[{self._rows}A\033[J")
+        self._erase()
         sys.stdout.write("\n".join(lines) + "\n")
         sys.stdout.flush()
         self._rows, self._last = len(lines), lines

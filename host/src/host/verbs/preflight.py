@@ -78,9 +78,8 @@ def run(args: argparse.Namespace) -> int:
     summary = run_preflight(request, screen, typed_line if sys.stdin.isatty() else None)
     if sys.stderr.isatty():
         bare(sys.stderr).write("\r")
-    for item, reason in summary.reasons.items():
-        print(f"host: {item}: {reason}", file=sys.stderr)
-    print(f"host: {'GO' if summary.go else 'NO-GO'}: {summary.sheet}", file=sys.stderr)
+    for line in summary.live.lines():
+        print(f"host: {line}", file=sys.stderr)
     return int(ExitCode.OK if summary.go else ExitCode.CHECK)
 
 
