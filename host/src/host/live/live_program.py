@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from host.errors import UsageError
 from host.extras import install_hint
 from host.link.serial import DeviceError
+from host.live.estimates.live_estimates import LiveEstimates, live_estimates
 from host.live.ground_capture import GroundCapture, new_capture_path, utc_now
 from host.live.live_session import Audience, LiveSession
 from host.live.live_sources import (
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 PORT = 8050
 _TRIES = 10
 _POLL_S = 0.1
+_LAST_S = 60.0  # for the last estimates, where nothing else is waited for
+_STATE_S = 0.2  # between two states
 _SILENT_S = 8.0  # the logger sends 20 rows a second and a hash every 5 s
 
 
@@ -58,6 +61,8 @@ class LiveRequest:
     page: bool = True
     json: bool = False
     mavlink: str | None = None
+    aircraft: str | None = None
+    wanted: str | None = None
     seed: int = 0
     opened: Source | None = None  # in place of what `source` names
     joins: list[Join] = field(default_factory=list)
@@ -141,6 +146,8 @@ def run_live(
             session.audiences.append(bridge)
         if request.json:
             session.audiences.append(_JsonLines(show))
+        known = own or request.calibration is not None
+        estimates = _estimates(request, session, calibration.text if known else "")
         try:
             with contextlib.suppress(KeyboardInterrupt):
                 asyncio.run(_serve(request, session, tell))
@@ -148,6 +155,8 @@ def run_live(
             session.stop()
             for last in leave:
                 last()
+            if estimates is not None:
+                estimates.close()
             if bridge is not None:
                 bridge.close()
     if session.error is not None:
@@ -164,6 +173,22 @@ def run_live(
         stream.rows,
         stream.lost,
     )
+
+
+def _estimates(
+    request: LiveRequest, session: LiveSession, calibration: str
+) -> LiveEstimates | None:
+    """Let the session identify while it receives, where the aircraft is known."""
+    virtual = "" if request.opened else getattr(session.source, "aircraft", "")
+    aircraft = request.aircraft or virtual
+    if not aircraft:
+        if request.wanted is not None:
+            raise UsageError("--wanted needs --aircraft: nothing is estimated without its file")
+        return None
+    capture = session.capture.path if session.capture else None
+    found = live_estimates(aircraft, request.wanted, capture, calibration)
+    session.listeners["estimates"] = found
+    return found
 
 
 def _capture(
@@ -195,6 +220,7 @@ async def _serve(request: LiveRequest, session: LiveSession, tell: Callable[[str
             runner = await _page(request, session, tell)
         session.start()
         await _until_ended(session, tell, forever=request.page)
+        await _until_told(session)
     finally:
         if runner is not None:
             await runner.cleanup()
@@ -217,6 +243,17 @@ async def _until_ended(session: LiveSession, tell: Callable[[str], None], *, for
         ):
             said = True
             tell(_silence(session))
+
+
+async def _until_told(session: LiveSession) -> None:
+    """Wait for the last estimates of a source that has ended: a recording played fast."""
+    loop = asyncio.get_running_loop()
+    end_s = loop.time() + _LAST_S
+    estimates = session.listeners.get("estimates")
+    if isinstance(estimates, LiveEstimates) and session.audiences and session.error is None:
+        while not estimates.idle and loop.time() < end_s:
+            await asyncio.sleep(_POLL_S)
+        await asyncio.sleep(2.0 * _STATE_S)
 
 
 def _silence(session: LiveSession) -> str:

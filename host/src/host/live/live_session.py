@@ -39,6 +39,22 @@ class Audience(Protocol):
         ...
 
 
+class Listener(Protocol):
+    """Who works on the flight and adds to its state; all in the session's thread, none waits."""
+
+    def take(self, data: bytes) -> None:
+        """Take bytes of the stream that are on disk and decoded."""
+        ...
+
+    def tick(self) -> None:
+        """Go on; called five times a second."""
+        ...
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what the state says under this listener's name."""
+        ...
+
+
 class LiveSession:
     """Receives a source until it ends or is told to.
 
@@ -64,6 +80,7 @@ class LiveSession:
         self.capture = capture
         self.state = FlightState(stream)
         self.audiences: list[Audience] = []
+        self.listeners: dict[str, Listener] = {}
         self.ended = threading.Event()
         self.enough = threading.Event()  # set by who has what it wanted: the program may end
         self.asked: dict[str, Callable[[dict[str, Any]], None]] = {}  # by type; who answers
@@ -155,6 +172,8 @@ class LiveSession:
     def _feed(self, data: bytes) -> None:
         update = self.stream.feed(data, time.time())
         self.state.received(len(data), update)
+        for listener in self.listeners.values():
+            listener.take(data)
         for text in update.told:
             self._noted("warning", text)
             self._tell(text)
@@ -188,6 +207,8 @@ class LiveSession:
         if now_s - self._shown_s < _STATE_S or not self.audiences:
             return
         self._shown_s = now_s
+        for listener in self.listeners.values():
+            listener.tick()
         capture = self.capture
         what = self.state.as_json() | {
             "type": "state",
@@ -197,6 +218,7 @@ class LiveSession:
             "capture": capture.path.name if capture else None,
             "not_recorded": self.disk_error is not None,
         }
+        what |= {name: listener.as_json() for name, listener in self.listeners.items()}
         message = json.dumps(what, allow_nan=False)
         for audience in self.audiences:
             audience.state(message)

@@ -40,6 +40,7 @@ class SimulatedSource:
         return f"sim:{self.card}"
 
     calibration_text: str = ""
+    aircraft: str = ""
     _flight: tuple[FlightRecord, Stimuli] | None = None
 
     def open(self, tell: Tell) -> Self:
@@ -55,6 +56,7 @@ class SimulatedSource:
         tell(f"flying {self.card} (a few seconds)")
         record = fly(card, seed=self.seed)
         self.calibration_text = calibration(record.aircraft, record.draws.errors)
+        self.aircraft = record.aircraft.name
         self._flight = record, stimuli(record, air_data(record))
         return self
 

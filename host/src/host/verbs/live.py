@@ -42,6 +42,12 @@ def add_parser(subparsers: Any) -> None:
                         " of a replay none")  # fmt: skip
     parser.add_argument("--calibration", type=Path, metavar="FILE",
                         help="counts to SI; a copy goes into the capture's head")  # fmt: skip
+    parser.add_argument("--aircraft", metavar="NAME",
+                        help="name or file of the aircraft: its derivatives are estimated while it"
+                        " flies")  # fmt: skip
+    parser.add_argument("--wanted", metavar="PERCENT",
+                        help="half-widths that are enough, per cent of each value: 8, or"
+                        " Cm_q=15,Cn_r=25 (default 10 to 20)")  # fmt: skip
     parser.add_argument("--baud", type=_whole, default=57600, metavar="N",
                         help="of the radio's port (default 57600)")  # fmt: skip
     parser.add_argument("--rate", type=_rate, default=20.0, metavar="HZ",
@@ -81,6 +87,8 @@ def run(args: argparse.Namespace) -> int:
         page=not args.no_page,
         json=args.json,
         mavlink=args.mavlink,
+        aircraft=args.aircraft,
+        wanted=args.wanted,
     )
     if args.preflight is not None:
         from host.preflight.preflight_sheet import shown_sheet

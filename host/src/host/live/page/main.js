@@ -1,6 +1,7 @@
 // Puts the page together: rows into the history, thirty redraws a second, the state five times.
 
 import { connect } from "./connection.js";
+import { showEstimates } from "./estimates.js";
 import { History } from "./history.js";
 import { showAge, showState } from "./panel.js";
 import { Plan } from "./plan.js";
@@ -45,6 +46,7 @@ const server = connect({
     if (said.track.length) plan.add(said.track);
     showState(said);
     preflight.show(said.preflight);
+    if (showEstimates(said.estimates)) sound.play([660, 880]);
     const marks = said.events.filter((event) => event.kind === "mark").length;
     if (marks > marked) sound.play([660]);
     marked = marks;

@@ -1,0 +1,141 @@
+"""A process that estimates: the loop that receives never waits for it.
+
+It is asked with the place of the recording and answers with plain data. It dies with its parent,
+and a mistake in it costs an answer, not the recording.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import time
+from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from host.errors import HostError
+
+_ONE_THREAD = "OPENBLAS_NUM_THREADS"  # the matrices are small: threads only wait for each other
+_NICER = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """What the worker found.
+
+    Attributes
+    ----------
+    until_s : float
+        Last row that it knew, s.
+    points : tuple of str
+        Completed test points.
+    under_way : str
+    values : dict of str to (float, float)
+        Estimate and half-width.
+    why_not : str
+        Why there is no estimate.
+    used_s : float
+        Processor time.
+    """
+
+    until_s: float
+    points: tuple[str, ...]
+    under_way: str
+    values: dict[str, tuple[float, float]]
+    why_not: str
+    used_s: float
+
+
+class EstimateWorker:
+    """Starts the process, asks it, and takes its answers without waiting.
+
+    Parameters
+    ----------
+    aircraft : str
+        Name or file.
+    calibration : Path, optional
+    """
+
+    def __init__(self, aircraft: str, calibration: Path | None) -> None:
+        self._given = (aircraft, calibration)
+        self._process: Any = None
+        self._ours: Connection | None = None
+        self.busy = False
+
+    def start(self) -> None:
+        """Start the process; it takes some seconds to know everything that it needs."""
+        os.environ.setdefault(_ONE_THREAD, "1")
+        context = get_context("spawn")
+        self._ours, theirs = context.Pipe()
+        self._process = context.Process(
+            target=_estimate_for_ever, args=(theirs, *self._given), daemon=True, name="estimates"
+        )
+        self._process.start()
+        theirs.close()
+
+    def ask(self, recording: Path) -> None:
+        """Ask for an estimate from all that is in a file now."""
+        if self._ours is None or not self._process.is_alive():
+            self.start()
+        assert self._ours is not None
+        self._ours.send(recording)
+        self.busy = True
+
+    def answer(self) -> Answered | None:
+        """Return an answer if there is one; a process that died answers with that."""
+        if not self.busy or self._ours is None:
+            return None
+        try:
+            if not self._ours.poll():
+                return None
+            found: Answered = self._ours.recv()
+        except (EOFError, OSError):
+            self._ours = None
+            found = Answered(0.0, (), "", {}, "the estimating process ended; started again", 0.0)
+        self.busy = False
+        return found
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process is not None and self._process.is_alive():
+            self._process.terminate()
+            self._process.join(timeout=2.0)
+        self._ours = None
+
+
+def _estimate_for_ever(asked: Connection, aircraft: str, calibration: Path | None) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's
+    if hasattr(os, "nice"):
+        os.nice(_NICER)
+    from host.live.estimates.flight_estimate import FlightEstimator
+
+    by = None
+    with contextlib.suppress(EOFError, OSError):  # the parent has gone
+        while True:
+            recording = asked.recv()
+            began = time.process_time()
+            try:
+                by = by or FlightEstimator(aircraft, calibration)
+                found = by.at(recording)
+            except HostError as error:
+                asked.send(_nothing(str(error), began))
+            except Exception as error:  # of ours: told, and the next portion is tried
+                asked.send(_nothing(f"internal error: {type(error).__name__}: {error}", began))
+            else:
+                asked.send(
+                    Answered(
+                        found.until_s,
+                        found.points,
+                        found.under_way,
+                        found.values,
+                        found.why_not,
+                        time.process_time() - began,
+                    )
+                )
+
+
+def _nothing(why: str, began: float) -> Answered:
+    return Answered(0.0, (), "", {}, why, time.process_time() - began)

@@ -1,0 +1,106 @@
+"""Estimates from the radio while flying are those that `host identify` gives of the same data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from host.live.estimates import flight_estimate
+from host.live.estimates.flight_estimate import FlightEstimator
+from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
+from host.sysid.identification_error import IdentificationError
+from host.twin.testcard.cards import load
+from studies.radio_flights import RadioFlight, after_each_point, lost_in_bursts, radio_flight
+
+import host
+
+AIRCRAFT = "ultrastick25e"
+SEED = 9000
+
+
+@pytest.fixture(scope="module")
+def flight() -> RadioFlight:
+    demo = load("demo")  # trim and two 3-2-1-1s
+    return radio_flight(replace(demo, segments=(*demo.segments[:3], demo.segments[-1])), SEED)
+
+
+def test_the_page_says_what_identify_says_later(flight: RadioFlight, tmp_path: Path) -> None:
+    recording, calibration = tmp_path / "live.radio", tmp_path / "calibration.toml"
+    calibration.write_text(flight.calibration, encoding="utf-8")
+    by = FlightEstimator(AIRCRAFT, calibration)
+    recording.write_bytes(b"".join(s.data for s in flight.sent if s.t_s < 11.0))
+    before = by.at(recording)
+    assert (before.values, before.why_not) == ({}, "no test point yet")
+    first, second = after_each_point(flight.sent, flight.truth, 3.8)
+    recording.write_bytes(first)
+    one = by.at(recording)
+    assert [name[:19] for name in one.points] == ["3-2-1-1 on elevator"]
+    recording.write_bytes(second)
+    both = by.at(recording)
+    assert len(both.points) == 2
+    assert both.values["Cm_alpha"][1] < one.values["Cm_alpha"][1]
+    found = host.identify(
+        recording, aircraft=AIRCRAFT, calibration=calibration, models="coefficients"
+    )
+    later = [c for t in found.coefficient_tables for c in t.coefficients]
+    assert list(both.values) == [c.name for c in later]
+    for c in later:
+        assert both.values[c.name] == pytest.approx((c.value, c.half_width))
+
+
+def test_a_test_point_under_way_is_in_the_estimate_and_named(
+    flight: RadioFlight, tmp_path: Path
+) -> None:
+    recording, calibration = tmp_path / "live.radio", tmp_path / "calibration.toml"
+    calibration.write_text(flight.calibration, encoding="utf-8")
+    end_s = flight.truth[1]["input_end_s"]
+    recording.write_bytes(b"".join(s.data for s in flight.sent if s.t_s < end_s))
+    found = FlightEstimator(AIRCRAFT, calibration).at(recording)
+    assert len(found.points) == 1
+    assert "on elevator" in found.under_way
+    assert found.values
+
+
+def test_a_share_of_the_envelopes_is_lost_in_bursts(flight: RadioFlight) -> None:
+    whole = sum(len(s.data) for s in flight.sent)
+    lost = [
+        1.0 - sum(len(s.data) for s in lost_in_bursts(flight.sent, 0.05, seed)) / whole
+        for seed in range(20)
+    ]
+    assert 0.03 < sum(lost) / len(lost) < 0.07
+
+
+def test_pieces_of_one_axis_do_not_take_the_other_with_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flight: RadioFlight
+) -> None:
+    recording, calibration = tmp_path / "live.radio", tmp_path / "calibration.toml"
+    calibration.write_text(flight.calibration, encoding="utf-8")
+    recording.write_bytes(b"".join(s.data for s in flight.sent))
+    by = FlightEstimator(AIRCRAFT, calibration)
+    whole, estimate = by.at(recording), by._by.estimate
+
+    def found(columns: object) -> list[DetectedManeuver]:
+        one, two = detect_maneuvers(columns)  # type: ignore[arg-type]
+        return [one, replace(two, axis="aileron_rad")]
+
+    def refused(flights: list[ReconstructedFlight]) -> object:
+        if any(m.axis == "aileron_rad" for m in flights[0].maneuvers):
+            raise IdentificationError("the coefficients found so far make an unstable aircraft")
+        return estimate(flights)
+
+    monkeypatch.setattr(flight_estimate, "detect_maneuvers", found)
+    monkeypatch.setattr(type(by._by), "estimate", lambda _, flights: refused(flights))
+    some = by.at(recording)
+    assert set(some.values) == set(whole.values)
+    assert "unstable" in some.why_not
+
+
+def test_a_test_point_divided_by_a_gap_is_one(flight: RadioFlight, tmp_path: Path) -> None:
+    recording, calibration = tmp_path / "live.radio", tmp_path / "calibration.toml"
+    calibration.write_text(flight.calibration, encoding="utf-8")
+    cut_s = flight.truth[0]["input_end_s"] + 0.2
+    kept = [s for s in flight.sent if not cut_s < s.t_s < cut_s + 0.6]
+    recording.write_bytes(b"".join(s.data for s in kept))
+    assert len(FlightEstimator(AIRCRAFT, calibration).at(recording).points) == 2
