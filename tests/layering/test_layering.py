@@ -55,8 +55,9 @@ HOST_FLOORS: dict[str, tuple[str, ...]] = {
     "host": (
         *("files", "wire", "physical", "export", "original", "link", "log", "readers", "decode"),
         *("aircraft", "instrument", "bench_calibration", "twin", "sysid", "planning"),
-        *("installation", "live", "preflight", "report", "verbs"),
+        *("installation", "live", "preflight", "report", "fleet", "verbs"),
     ),
+    "host.fleet": ("statistics", "sources", "tasks", "dataset", "pages", "runs"),
     "host.twin": ("faults", "testcard", "flight", "sensors", "ground", "recorder", "outcome"),
     "host.sysid": (
         *("models", "numerics", "estimators", "aerodynamics", "compatibility"),

@@ -38,6 +38,7 @@ VERBS = {
     "plot": "show a flight on a page, or as pictures for papers",
     "report": "write up what a flight says of the aircraft, in one page to mail",
     "export": "write a flight for other programs",
+    "fleet": "say what a type of aircraft is, from all flights of its fleet",
     "predict": "run a saved model over another record",
     "convert": "turn derivatives into coefficients, and back",
     "doctor": "say what is installed, plugged in, set and kept",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -128,6 +128,8 @@ class CoefficientFit:
         Of single maneuvers by all others, in the last step.
     maneuver_agreement : ManeuverAgreement
         Scatter of the maneuvers about the joint estimate, in the last step.
+    error_deviations : dict
+        Standard deviation of each sensor error before the flight; empty of several flights.
     """
 
     derivatives: tuple[Derivative, ...]
@@ -137,6 +139,7 @@ class CoefficientFit:
     histories: dict[str, CoefficientHistory]
     prediction: CrossValidation | None
     maneuver_agreement: ManeuverAgreement
+    error_deviations: dict[str, float] = field(default_factory=dict)
 
 
 def derivatives_with_intervals(

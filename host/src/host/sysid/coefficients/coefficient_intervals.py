@@ -56,6 +56,8 @@ class SearchResult:
     level_slopes : Array, shape (3, errors)
         Derivatives of `mean_levels` by the sensor errors.
     final : FinalStep
+    error_deviations : Array, shape (errors,)
+        Standard deviations of the sensor errors before the flight.
     """
 
     problem: FlightProblem
@@ -63,6 +65,7 @@ class SearchResult:
     errors: Array
     level_slopes: Array
     final: FinalStep
+    error_deviations: Array
 
     @cached_property
     def data(self) -> EquationData:
@@ -182,6 +185,9 @@ def coefficient_fit(
         histories=_histories(problem, data, widths.state),
         prediction=predicted,
         maneuver_agreement=widths.maneuver_agreement,
+        error_deviations=dict(
+            zip(problem.error_names, search.error_deviations.tolist(), strict=True)
+        ),
     )
 
 

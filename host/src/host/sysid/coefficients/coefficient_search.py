@@ -203,7 +203,7 @@ def _search(problem: FlightProblem, sd: Array) -> SearchResult:
             for block in blocks
         )
         iterate.noise = residual_spectra(problem.windows, residuals, iterate.noise)
-    return SearchResult(problem, iterate.theta, iterate.errors, iterate.level_slopes, final)
+    return SearchResult(problem, iterate.theta, iterate.errors, iterate.level_slopes, final, sd)
 
 
 def _linearise(

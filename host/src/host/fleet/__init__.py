@@ -1,0 +1,1 @@
+"""The model of a type from the flights of its fleet."""

@@ -1,0 +1,1 @@
+"""What a fleet says, on a page."""

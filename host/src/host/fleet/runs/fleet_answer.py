@@ -1,0 +1,68 @@
+"""Rows of flights -> models of their types, on disk and in words."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from host.fleet.dataset.row_flights import reference_cg, type_flights
+from host.fleet.flight_task import IDENTIFIED
+from host.fleet.pages.type_prior import type_prior
+from host.fleet.pages.type_text import type_document, type_lines
+from host.fleet.statistics.type_model import TypeModel, type_model
+from host.sysid.answer.atomic_files import atomic_write, file_names
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(slots=True)
+class FleetAnswer:
+    """What a fleet says.
+
+    Attributes
+    ----------
+    models : list of TypeModel
+    written : list of Path
+    """
+
+    models: list[TypeModel] = field(default_factory=list)
+    written: list[Path] = field(default_factory=list)
+
+    def lines(self) -> list[str]:
+        """Return the answer in words."""
+        found: list[str] = []
+        for model in self.models:
+            found += ["", *type_lines(model)]
+        return found[1:]
+
+    def document(self) -> dict[str, Any]:
+        """Return the answer as plain values."""
+        return {"types": [type_document(model) for model in self.models]}
+
+
+def fleet_answer(rows: pd.DataFrame, output: Path) -> FleetAnswer:
+    """Return the model of every type, and write it as JSON, and as a prior, to `output`.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Of `FlightStore.rows`.
+    output : Path
+    """
+    answer = FleetAnswer()
+    for name, own in rows[rows["state"] == IDENTIFIED].groupby("type", sort=True):
+        answer.models.append(type_model(str(name), type_flights(own)))
+    for model, stem in zip(answer.models, file_names(m.name for m in answer.models), strict=True):
+        own = rows[rows["type"] == model.name]
+        document = {**type_document(model), "cg_m": list(reference_cg(own))}
+        texts = {output / f"{stem}.json": json.dumps(document, indent=2, allow_nan=False)}
+        if model.effects:
+            texts[output / f"{stem}.prior.toml"] = type_prior(model)
+        for path, text in texts.items():
+            with atomic_write(path) as part:
+                part.write_text(text, encoding="utf-8")
+            answer.written.append(path)
+    return answer

@@ -1,0 +1,1 @@
+"""What many flights of many aircraft say of their type: numbers in, numbers out."""

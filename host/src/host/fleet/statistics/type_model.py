@@ -1,0 +1,72 @@
+"""A type from its flights: every derivative with its spreads, and what a further aircraft is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.fleet.statistics.loaded_flight import LoadedFlight, fleet_estimates
+from host.fleet.statistics.spread_intervals import TypeEffect, type_effect
+from host.fleet.statistics.variance_components import FEWEST_AIRCRAFT, FleetEstimates
+
+DIFFERS = 0.05  # probability below which aircraft are said to differ
+
+
+@dataclass(frozen=True)
+class TypeModel:
+    """The model of a type.
+
+    Attributes
+    ----------
+    name : str
+    effects : dict of str to TypeEffect
+        By derivative.
+    estimates : dict of str to FleetEstimates
+        What each was made from.
+    flights : tuple of LoadedFlight
+        About the reference CG.
+    alone : tuple of str
+        Derivatives that fewer than two aircraft tell.
+    """
+
+    name: str
+    effects: dict[str, TypeEffect]
+    estimates: dict[str, FleetEstimates]
+    flights: tuple[LoadedFlight, ...]
+    alone: tuple[str, ...]
+
+    @property
+    def aircraft(self) -> list[str]:
+        """Names of the aircraft, sorted."""
+        return sorted({flight.aircraft for flight in self.flights})
+
+    def alpha_rad(self) -> float:
+        """Return the median angle of attack of the flights, rad."""
+        return float(np.median([f.conditions["alpha_rad"] for f in self.flights]))
+
+    def differing(self) -> list[str]:
+        """Return the derivatives that differ between aircraft, the surest first."""
+        found = {n: e.differs for n, e in self.effects.items() if e.differs < DIFFERS}
+        return sorted(found, key=found.__getitem__)
+
+
+def type_model(name: str, flights: Sequence[LoadedFlight]) -> TypeModel:
+    """Return the model of a type from flights about one CG.
+
+    Parameters
+    ----------
+    name : str
+    flights : sequence of LoadedFlight
+    """
+    names = list(dict.fromkeys(n for flight in flights for n in flight.names))
+    effects, estimates, alone = {}, {}, []
+    for derivative in names:
+        told = {f.aircraft for f in flights if f.tells(derivative)}
+        if len(told) < FEWEST_AIRCRAFT:
+            alone.append(derivative)
+            continue
+        estimates[derivative] = fleet_estimates(flights, derivative)
+        effects[derivative] = type_effect(estimates[derivative])
+    return TypeModel(name, effects, estimates, tuple(flights), tuple(alone))

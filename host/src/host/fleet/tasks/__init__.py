@@ -1,0 +1,1 @@
+"""Each flight by itself: what is asked of it, who runs it, and what becomes of one that fails."""

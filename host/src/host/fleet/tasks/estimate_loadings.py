@@ -1,0 +1,115 @@
+"""An answer's covariance in two parts: the flight's own, and a loading of each named error.
+
+A loading is the shift of all estimates by one standard deviation of an error. Its flights share an
+error of a calibration or of an aircraft file, so that neither part may be averaged like the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.arrays import Array
+from host.instrument.error_sources import error_source
+from host.instrument.instrument_errors import InstrumentErrors
+from host.sysid.coefficients.coefficient_fit import CoefficientFit
+
+_SMALL_SHARE = 1e-4  # of every variance: a loading below it counts as the flight's own
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedEstimates:
+    """Estimates of a flight and what they may be wrong by.
+
+    Attributes
+    ----------
+    names : tuple of str
+    values : Array, shape (P,)
+    own : Array, shape (P, P)
+        Covariance that no other flight shares.
+    errors, sources : tuple of str, length E
+        Names of shared errors, and whose they are (`host.instrument.error_sources`).
+    loadings : Array, shape (E, P)
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    own: Array
+    errors: tuple[str, ...]
+    sources: tuple[str, ...]
+    loadings: Array
+
+    @property
+    def total(self) -> Array:
+        """The covariance of this flight alone, (P, P)."""
+        return np.asarray(self.own + self.loadings.T @ self.loadings)
+
+
+def coefficient_loadings(fit: CoefficientFit, errors: InstrumentErrors) -> LoadedEstimates:
+    """Return the parts of a direct fit of coefficients.
+
+    The fit takes each error for zero with its standard deviation s. If it is b instead, the
+    estimate is wrong by -P_xe b / s^2: P_xe is the covariance of estimate and error.
+
+    Parameters
+    ----------
+    fit : CoefficientFit
+        Of one flight.
+    errors : InstrumentErrors
+    """
+    count = len(fit.derivatives)
+    cross = fit.covariance[:count, count:]
+    deviations = np.array([fit.error_deviations[name] for name in fit.errors])
+    known = deviations > 0.0
+    shifts = np.zeros((len(deviations), count))
+    shifts[known] = -(cross[:, known] / deviations[known]).T
+    return parted(
+        tuple(d.name for d in fit.derivatives),
+        np.array([d.value for d in fit.derivatives]),
+        fit.covariance[:count, :count],
+        {name: shifts[k] for k, name in enumerate(fit.errors)},
+        errors,
+    )
+
+
+def parted(
+    names: tuple[str, ...],
+    values: Array,
+    total: Array,
+    shifts: dict[str, Array],
+    errors: InstrumentErrors,
+) -> LoadedEstimates:
+    """Return a total covariance, (P, P), in its parts.
+
+    Parameters
+    ----------
+    names, values
+        Of the estimates.
+    total : Array, shape (P, P)
+    shifts : dict of str to (P,) Array
+        By one standard deviation of each error.
+    errors : InstrumentErrors
+    """
+    variances = np.maximum(np.diag(total), 1e-300)
+    kept = [
+        (name, source, shift)
+        for name, shift in shifts.items()
+        if (source := error_source(name, errors)) != "flight"
+        and bool(np.any(shift**2 > _SMALL_SHARE * variances))
+    ]
+    loadings = np.array([shift for _, _, shift in kept]).reshape(-1, len(names))
+    return LoadedEstimates(
+        names,
+        values,
+        _positive(total - loadings.T @ loadings),
+        tuple(name for name, _, _ in kept),
+        tuple(source for _, source, _ in kept),
+        loadings,
+    )
+
+
+def _positive(matrix: Array) -> Array:
+    """Return the nearest covariance: rounding leaves small negative variances."""
+    size, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray((vectors * np.maximum(size, 0.0)) @ vectors.T)

@@ -1,0 +1,139 @@
+"""One flight identified, as one row: what a child process does."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from host.aircraft.file import load_measured
+from host.fleet.flight_task import IDENTIFIED, described
+from host.fleet.sources.flight_files import is_address, opened
+from host.fleet.tasks.estimate_loadings import LoadedEstimates, coefficient_loadings
+from host.instrument.error_sources import AIRCRAFT_FILE
+from host.sysid.answer.coefficient_rules import open_finding
+from host.sysid.flight.data_finding import finding_document, open_channels
+from host.sysid.identification_error import IdentificationError
+from host.sysid.pipeline.identification import Identification
+from host.sysid.pipeline.stages import identify
+
+_GPS_EPOCH = datetime(1980, 1, 6, tzinfo=UTC)
+_LEAST_WEEK = 1024  # below, a receiver without almanac counts from its own beginning
+
+
+def flight_row(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the row of a flight, from the values of its `FlightTask`.
+
+    Raises
+    ------
+    host.errors.HostError
+        If nothing can be identified of it.
+    """
+    began_s = time.process_time()
+    with _local(values["source"]) as path:
+        found = identify(
+            path,
+            aircraft=values["aircraft_file"],
+            models=list(values["models"]),
+            calibration=values["calibration"] or None,
+            mapping=values["mapping"] or None,
+            accept=list(values["accept"]),
+        )
+        date = values["date"] or _recorded_on(path)
+    if found.coefficients is None:
+        raise IdentificationError("; ".join(found.notes) or "no coefficients")
+    instrument = found.flights[0].instrument
+    if instrument is None:
+        raise IdentificationError("the aircraft file does not describe its sensors")
+    parts = coefficient_loadings(found.coefficients.fit, instrument.errors)
+    row = described({**values, "date": date}) | _estimate_columns(parts, values)
+    return (
+        row
+        | _answer_columns(found)
+        | _aircraft_columns(values["aircraft_file"])
+        | {
+            "state": IDENTIFIED,
+            "reason": "",
+            "processor_s": time.process_time() - began_s,
+        }
+    )
+
+
+def _estimate_columns(parts: LoadedEstimates, values: dict[str, Any]) -> dict[str, Any]:
+    # Who never was calibrated is wrong in a way of its own.
+    instrument = values["calibration_id"] or f"uncalibrated, {values['aircraft']}"
+    whose = {AIRCRAFT_FILE: f"aircraft file {values['aircraft_id']}"}
+    return {
+        "parameters": list(parts.names),
+        "estimates": parts.values.tolist(),
+        "own_covariance": parts.own.ravel().tolist(),
+        "errors": list(parts.errors),
+        "error_sources": [whose.get(s, f"instrument {instrument}") for s in parts.sources],
+        "loadings": parts.loadings.ravel().tolist(),
+    }
+
+
+def _answer_columns(found: Identification) -> dict[str, Any]:
+    answer = found.coefficients
+    if answer is None:  # told by the caller already
+        return {}
+    doubts = open_finding(answer, open_channels(found.findings))
+    at = answer.fit.condition
+    return {
+        "doubted": sorted({name for doubt in doubts for name in doubt.names}),
+        "verdict": list(found.verdict),
+        "findings": json.dumps([finding_document(f) for f in found.findings]),
+        "maneuvers": len(answer.used),
+        "airspeed_mps": at.airspeed_mps,
+        "alpha_rad": at.alpha_rad,
+        "lift": at.lift,
+        "drag": at.drag,
+        "delays": json.dumps({name: list(pair) for name, pair in answer.delays.items()}),
+    }
+
+
+def _aircraft_columns(source: str) -> dict[str, Any]:
+    loaded = load_measured(source)
+    return {
+        "cg_m": [float(x) for x in loaded.vector("mass.cg_m")],
+        "mass_kg": loaded.scalar("mass.mass_kg"),
+        "chord_m": loaded.scalar("geometry.chord_m"),
+        "span_m": loaded.scalar("geometry.span_m"),
+    }
+
+
+@contextmanager
+def _local(source: str) -> Iterator[Path]:
+    """Give a path of a source, downloaded where it is an address."""
+    if not is_address(source):
+        yield Path(source)
+        return
+    with tempfile.TemporaryDirectory(prefix="host-fleet-") as folder:
+        path = Path(folder) / source.rstrip("/").rpartition("/")[2]
+        with opened(source) as far, path.open("wb") as near:
+            while piece := far.read(1 << 20):
+                near.write(piece)
+        yield path
+
+
+def _recorded_on(path: Path) -> str:
+    """Return the day of a log of ours as its GPS said; empty where nothing says it."""
+    from host.errors import HostError
+    from host.log import read_log
+
+    try:
+        data = read_log(path).frames["gps"]
+    except (HostError, KeyError, OSError):
+        return ""
+    good = data[(data["week"] >= _LEAST_WEEK) & (data["itow_ms"] != 0xFFFFFFFF)]
+    if not len(good):
+        return ""
+    week, second = int(np.median(good["week"])), float(np.median(good["itow_ms"])) * 1e-3
+    return (_GPS_EPOCH + timedelta(weeks=week, seconds=second)).date().isoformat()

@@ -1,0 +1,45 @@
+"""Whose each error is: a file of the aircraft, an instrument, or one flight alone.
+
+An error that a file has is the same in every flight that was read with it. So flights of one
+calibration share its errors, and those of one aircraft file its tolerances, however many they are.
+"""
+
+from __future__ import annotations
+
+from host.instrument.instrument_errors import InstrumentErrors
+
+AIRCRAFT_FILE, INSTRUMENT, FLIGHT = "aircraft file", "instrument", "flight"
+# A quantity of `deviations` to the error of `standard.toml` that it is made of.
+_MADE_OF = {
+    "mass_share": "mass_share",
+    **{f"i{axis}{axis}_share": "inertia_share" for axis in "xyz"},
+    **{f"cg_{axis}_m": "cg_m" for axis in "xyz"},
+    **{f"imu_{axis}_m": "place_m" for axis in "xyz"},
+    **{f"gyro_{axis}_scale": "gyro_scale" for axis in "xyz"},
+    **{f"gyro_{axis}_bias_radps": "gyro_bias_radps" for axis in "xyz"},
+    **{f"accel_{axis}_scale": "accel_scale" for axis in "xyz"},
+    **{f"accel_{axis}_bias_mps2": "accel_bias_mps2" for axis in "xyz"},
+    **{f"tilt_{axis}_rad": "misalignment_rad" for axis in "xyz"},
+    "vane_x_m": "place_m", "vane_z_m": "place_m", "upwash_share": "upwash_share",
+    "alpha_zero_rad": "vane_zero_rad", "pitot_drift_pa": "pitot_zero_pa",
+    "density_share": "density_share",
+}  # fmt: skip
+
+
+def error_source(name: str, errors: InstrumentErrors) -> str:
+    """Return who has an error: `AIRCRAFT_FILE`, `INSTRUMENT` or `FLIGHT`.
+
+    Parameters
+    ----------
+    name : str
+        Of `host.instrument.deviations.deviations`.
+    errors : InstrumentErrors
+        Of the flight. What they do not know by name is the instrument's.
+    """
+    made_of = _MADE_OF.get(name, name)
+    if made_of not in errors.named:
+        return INSTRUMENT
+    error = errors[made_of]
+    if error.aircraft_file:
+        return AIRCRAFT_FILE
+    return FLIGHT if error.drawn == "flight" else INSTRUMENT
