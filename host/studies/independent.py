@@ -95,19 +95,20 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=2, help="of each cell (the page: 20)")
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
+    parser.add_argument("--only", default="", help="cells whose name holds this")
     parser.add_argument("--axis", choices=tuple(NAMES), default="longitudinal")
     parser.add_argument("--rows", type=Path, help="of a run that goes on; a file for each axis")
     options = parser.parse_args(arguments)
     path = options.rows or Path(f"../build/study/independent_{options.axis}.csv")
     seeds = range(options.first, options.first + options.flights)
-    airs = cells()
+    airs = {cell: air for cell, air in cells().items() if options.only in cell}
 
     def fly(cell: str, seed: int) -> list[dict[str, object]]:
         return rows_of(cell, airs[cell], seed, options.axis)
 
     keys = ((cell, seed) for seed in seeds for cell in airs)
     rows = flown_rows(path, COLUMNS, keys, fly)
-    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
+    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds and r["cell"] in airs])))
     return 0
 
 

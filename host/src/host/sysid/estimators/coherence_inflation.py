@@ -28,12 +28,12 @@ class NoiseExcess:
     ----------
     power : dict
         Output to the power of the residual over what is predicted.
-    predicted : Array, shape (P, P)
-        Covariance of output error in the noise that is predicted.
+    variance_ratio : Array, shape (P,)
+        Variance of each parameter in that residual over that in what is predicted.
     """
 
     power: dict[str, float]
-    predicted: Array
+    variance_ratio: Array
 
 
 def inflate_by_coherence(
@@ -47,9 +47,9 @@ def inflate_by_coherence(
     that the residual looks most like is a consider covariance.
 
     Output error is widened to the covariance of that residual, other methods by its ratio to the
-    covariance in noise alone, or in the noise that they predict: slow gusts beyond it widen what
-    rests on slow motion. No interval becomes narrower. The degrees of freedom are those of the
-    columns that showed it.
+    covariance in noise alone, or by what a residual larger than they predict makes of each
+    parameter's variance: slow gusts widen what rests on slow motion. No interval becomes narrower.
+    The degrees of freedom are those of the columns that showed it.
 
     Parameters
     ----------
@@ -67,8 +67,9 @@ def inflate_by_coherence(
     if result.residual_kind == "output":
         ratio = wide / np.maximum(own, 1e-300)
     else:
-        alone = found.covariance() if excess is None else excess.predicted
-        ratio = wide / np.maximum(np.diag(alone)[:count], 1e-300)
+        ratio = wide / np.maximum(np.diag(found.covariance())[:count], 1e-300)
+        if excess is not None:
+            ratio = np.maximum(ratio, excess.variance_ratio[:count])
     factor = np.ones(len(result.covariance))
     # What gusts do is no derivative: the model of the gust is not what the inputs drive.
     own = np.where([n.startswith(PREFIX) for n in result.names[:count]], 0.0, own)

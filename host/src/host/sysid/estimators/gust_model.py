@@ -8,6 +8,7 @@ import numpy as np
 
 from host.sysid.estimators.gust_penetration import GUST_LAG, ROLL_LAG, penetration_name
 from host.sysid.identification_error import IdentificationError
+from host.sysid.models.fit_result import FitResult
 from host.sysid.models.state_space_model import LinearModel, Parameter, Term
 
 SCALE_M = 30.0  # of vertical gusts: about the height flown (MIL-F-8785C, sec. 3.7, low altitude)
@@ -131,6 +132,14 @@ def gust_model(
         parameters=parameters,
         delays=(),
     )
+
+
+def gust_deviation_mps(result: FitResult, airspeed_mps: float) -> float:
+    """Return the deviation of the gusts that `gust_model` found, m/s; 0 of other methods."""
+    name = "log_process.gust_rad"
+    if name not in result.names:
+        return 0.0
+    return float(np.exp(result.value(name)) * np.sqrt(0.5 * SCALE_M * airspeed_mps))
 
 
 def _penetration_terms(base: LinearModel, states: tuple[str, ...], rate: int) -> list[Term]:

@@ -25,8 +25,8 @@ from host.sysid.numerics.input_coherence import (
     HIGHEST_ORDER,
     block_length,
     block_means,
-    covariance_in_noise,
 )
+from host.sysid.numerics.score_variance import variance_ratio
 
 SIGNIFICANCE = 0.01
 DRAWS, DRAW_SEED = 100, 2
@@ -88,7 +88,7 @@ def excess_over_noise_model(
     count = AR_DRAWS * (samples - HIGHEST_ORDER * len(maneuvers))
     noise = [ArNoise.from_coefficient(coefficient) for coefficient, _ in fitted]
     variance = np.array([innovation / count for _, innovation in fitted])
-    return NoiseExcess(power, covariance_in_noise(problem, responses, noise, variance))
+    return NoiseExcess(power, variance_ratio(problem, responses, noise, variance, power))
 
 
 def _drawn_errors(

@@ -271,32 +271,6 @@ def _data(problem: OutputProblem, responses: Sequence[Response], block_s: float)
     return found
 
 
-def covariance_in_noise(
-    problem: OutputProblem,
-    responses: Sequence[Response],
-    noise: Sequence[ArNoise],
-    variance: Array,
-) -> Array:
-    """Return the covariance of output error in AR noise of block means, (P, P).
-
-    Parameters
-    ----------
-    problem : OutputProblem
-    responses : sequence of Response
-    noise : sequence of ArNoise
-        Of the means of each output.
-    variance : Array, shape (p,)
-        Of their innovations.
-    """
-    total = np.diag(problem.prior_precision)
-    for number, (response, m) in enumerate(zip(responses, problem.maneuvers, strict=True)):
-        own = np.ix_(problem.columns(number), problem.columns(number))
-        for j, memory in enumerate(noise):
-            J = memory.whiten(block_means(response.sensitivities[j], block_length(m.dt_s)))
-            total[own] += J.T @ J / variance[j]
-    return covariance_from_information(total)
-
-
 def block_length(dt_s: float, block_s: float = BLOCK_S) -> int:
     """Return how many samples a mean is taken over."""
     return max(1, round(block_s / dt_s))
