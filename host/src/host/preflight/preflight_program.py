@@ -22,8 +22,9 @@ from host.preflight.check_list import Wanted, left_out
 from host.preflight.guided_list import Preflight
 from host.preflight.preflight_screen import PreflightScreen
 from host.preflight.preflight_sheet import sheet_document, write_sheet
+from host.terminal import command_line
 
-SIM = "sim:"
+WALK = "sim:walk"
 PRACTISED = "ultrastick25e"  # of a virtual walk where no aircraft is named
 
 
@@ -60,6 +61,13 @@ class PreflightSummary:
     sheet: Path
     live: LiveSummary
 
+    def lines(self, *, page: bool) -> list[str]:
+        """Return what is on disk and what comes next; behind the page a flight may be in it."""
+        lines = self.live.lines()
+        if page or not self.go:
+            return lines if page else lines[:1]
+        return [lines[0], f"next: {command_line('host', 'live', '--preflight', self.sheet)}"]
+
 
 def run_preflight(
     request: PreflightRequest, screen: PreflightScreen, keys: Callable[[], str] | None
@@ -81,7 +89,7 @@ def run_preflight(
     left_out(request.without)
     aircraft = load(request.aircraft)
     live = request.live
-    if live.source is not None and live.source.startswith(SIM):
+    if live.source is not None and live.source.startswith(WALK):
         from host.preflight.walk_source import walk_source
 
         live.opened = walk_source(live.source, aircraft, live.seed)

@@ -161,6 +161,7 @@ def shown_sheet(path: Path) -> Join:
     def join(session: LiveSession, calibration: Calibration) -> Callable[[], None]:
         del calibration
         session.state.preflight = sheet.as_json
+        session.state.say("preflight", f"{'GO' if sheet.go else 'NO-GO'}: {path.name}")
         session.note("preflight_sheet", go=sheet.go, sheet=read_text(path, UsageError))
         return lambda: None
 

@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     summary = run_preflight(request, screen, typed_line if sys.stdin.isatty() else None)
     if sys.stderr.isatty():
         bare(sys.stderr).write("\r")
-    for line in summary.live.lines():
+    for line in summary.lines(page=not args.no_page):
         print(f"host: {line}", file=sys.stderr)
     return int(ExitCode.OK if summary.go else ExitCode.CHECK)
 
@@ -86,11 +86,11 @@ def run(args: argparse.Namespace) -> int:
 def _aircraft(args: argparse.Namespace) -> str:
     """Return the aircraft's name or file; a virtual walk has one of its own."""
     from host.errors import UsageError
-    from host.preflight.preflight_program import PRACTISED, SIM
+    from host.preflight.preflight_program import PRACTISED, WALK
 
     if args.aircraft:
         return str(args.aircraft)
-    if (args.source or "").startswith(SIM) or args.list:
+    if (args.source or "").startswith(WALK) or args.list:
         return PRACTISED
     raise UsageError(
         "which aircraft? --aircraft mine.toml: its travels are looked at; or practise with"
