@@ -1,4 +1,4 @@
-"""What the recorder's own program says, at rest before a virtual flight: what is watched is green."""
+"""The recorder's own program, at rest before a virtual flight: what is watched turns green."""
 
 from pathlib import Path
 
