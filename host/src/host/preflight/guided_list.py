@@ -78,7 +78,7 @@ class Preflight:
     def _hear(self, heard: Heard) -> None:
         """Hand a slower frame to all that watch, and to the motion asked for."""
         self.wanted.settings.hear(heard)
-        if heard.name == "identity":
+        if heard.name in ("identity", "status"):
             self.logger = heard.said
         for check in self._watching:
             check.hear(heard)

@@ -53,6 +53,8 @@ class LoggerCheck(Check):
             self._broken = "its program crashed and began anew: do not fly, send the log"
         elif heard.name == "event" and said["code"] == "settings default":
             self._broken = "its stored settings are damaged or of another version: default ones act"
+        elif heard.name == "status" and not self._broken:
+            self.seen()  # over USB its settings are not said
         elif heard.name == "config" and said["aircraft"] != self._aircraft:
             self._broken = (
                 f"it is set for {said['aircraft'] or 'no aircraft'}, the aircraft file is"

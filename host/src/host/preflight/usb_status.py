@@ -24,7 +24,7 @@ def status_readings(line: StatusLine, t_s: float) -> dict[str, dict[str, Any]]:
     ready = card in _READY
     rail_mv, supply_mv = known["rail_mv"], known["supply_mv"]
     found: dict[str, dict[str, Any]] = {
-        "status": {"card": _card(line)},
+        "status": {"card": _card(line), "board": line.board, "firmware": line.version},
         "system": {
             "uptime_s": None,
             "sensors": ["card"] if ready else [],

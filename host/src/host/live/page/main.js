@@ -56,7 +56,7 @@ const server = connect({
   },
 });
 
-const preflight = new Preflight((what) => server.ask({ type: "preflight", ...what }));
+const preflight = new Preflight((what) => server.ask({ type: "preflight", ...what }), sound);
 
 function ageS() {
   if (state === null || state.age_s === null) return null;

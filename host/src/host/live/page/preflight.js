@@ -5,8 +5,10 @@ const MARKS = { seen: "\u2713", failed: "\u2717", waiting: "" };
 const WORDS = { seen: "ok", failed: "not ok", waiting: "waits" };
 
 export class Preflight {
-  constructor(ask) {
+  constructor(ask, sound) {
     this.ask = ask;
+    this.sound = sound;
+    this.states = new Map();
     this.shown = "";
     this.mayAsk = false;
     byId("preflight-next").addEventListener("click", () => ask({ do: "next" }));
@@ -25,6 +27,7 @@ export class Preflight {
     const text = JSON.stringify(said);
     if (!open || text === this.shown) return;
     this.shown = text;
+    this.#sound(said.items);
     this.#asked(said);
     const focused = document.activeElement?.dataset?.item;
     const rows = said.items.map((item) => this.#row(item));
@@ -32,6 +35,14 @@ export class Preflight {
     if (focused) document.querySelector(`[data-item="${CSS.escape(focused)}"]`)?.focus();
     const now = rows.find((row) => row.classList.contains("asked"));
     if (now) now.scrollIntoView({ block: "nearest" });
+  }
+
+  // The pilot stands at the aircraft: high is seen, low is not.
+  #sound(items) {
+    const news = items.filter((item) => this.states.get(item.key) === "waiting" && item.state !== "waiting");
+    if (news.some((item) => item.state === "failed")) this.sound.play([330, 330]);
+    else if (news.length) this.sound.play([880]);
+    this.states = new Map(items.map((item) => [item.key, item.state]));
   }
 
   #asked(said) {
