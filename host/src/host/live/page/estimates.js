@@ -24,7 +24,7 @@ function bar(row, derivative) {
   meter.low = meter.high = wanted;
   meter.optimum = 0;
   meter.value = percent === null ? meter.max : Math.min(percent, meter.max);
-  const word = percent === null ? "unknown" : `${percent.toFixed(percent < 10 ? 1 : 0)} %`;
+  const word = percent === null ? "unknown" : `${percent.toFixed(percent < 30 ? 1 : 0)} %`;
   meter.title = `half-width ${word}, wanted ${wanted} %`;
   meter.setAttribute("aria-label", `${derivative.name}: ${meter.title}`);
   meter.classList.toggle("unknown", percent === null);
