@@ -131,7 +131,7 @@ class RadioCheck(AskedCheck):
 
     def missing(self) -> str:
         """Return what it has seen."""
-        return self.reason or "nothing came"
+        return f"{self.reason}; then nothing came" if self.reason else "nothing came"
 
     def _share(self) -> float:
         return self._lost / (self._rows + self._lost) if self._rows + self._lost else 0.0

@@ -6,6 +6,7 @@ import math
 from collections import deque
 
 from host.preflight.check import Check
+from host.preflight.preflight_limits import limits
 from host.preflight.sample import Heard, Sample
 
 RECEIVER = ("aileron", "elevator", "rudder", "throttle", "switch")
@@ -78,6 +79,7 @@ class ReceiverCheck(Check):
         self._since_s: float | None = None
         self._glitches: deque[tuple[float, int]] = deque(maxlen=4)
         self._odd = ""
+        self._preset_us = limits("failsafe")["switch_us"]
 
     def begin(self) -> None:
         """Forget what was seen."""
@@ -96,6 +98,10 @@ class ReceiverCheck(Check):
                 "transmitter on, receiver powered?" if len(missing) > 1 else "its lead in A8-A12?"
             )
             self.waits(f"no pulses on {what}: {hint}")
+            return
+        if sample["rc_switch_us"] < self._preset_us:
+            self._since_s = None
+            self.waits("it sends its preset pulses: is the transmitter on?")
             return
         if self._since_s is None:
             self._since_s = sample.t_s

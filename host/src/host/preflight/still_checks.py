@@ -29,8 +29,14 @@ class ImuCheck(Check):
         self._last: tuple[float, ...] | None = None
         self._changed_s = self._valid_s = -1.0
         self._first_s: float | None = None
+        self._odd = ""  # what no later value heals
         self._link = ""  # what is wrong with its packets
         self._packets: deque[tuple[float, int, int]] = deque(maxlen=10)
+
+    def begin(self) -> None:
+        """Forget what was seen."""
+        super().begin()
+        self._odd = ""
 
     def take(self, sample: Sample) -> None:
         """Judge a row."""
@@ -45,7 +51,7 @@ class ImuCheck(Check):
         if sample.t_s - self._changed_s > self.limit["frozen_s"]:
             self.failed("frozen: every rate and acceleration repeats to the last digit")
             return
-        if self.state == "seen" or self._link:
+        if self.state == "seen" or self._link or self._odd:
             return
         self._window.add(sample.t_s, row)
         if self._window.full:
@@ -53,7 +59,12 @@ class ImuCheck(Check):
 
     def hear(self, heard: Heard) -> None:
         """Take the counts of the IMU's packets."""
-        if heard.name != "system":
+        if heard.name == "event" and heard.said["code"] in ("imu restarted", "imu lost"):
+            self._odd = (
+                f"{heard.said['code'].replace('imu ', 'it ')} meanwhile: its supply, its plug"
+            )
+            self.failed(self._odd)
+        if heard.name != "system" or self._odd:
             return
         said = heard.said
         bad = said["imu_bad_packets"] + said["imu_lost"]

@@ -223,6 +223,13 @@ def _imu_damaged(walk: GroundWalk, frames: GroundFrames) -> str:
     return "imu"
 
 
+def _imu_restarts(walk: GroundWalk, frames: GroundFrames) -> str:
+    first = _later(walk)
+    for name in ("p", "q", "r", "ax", "ay", "az"):
+        frames.ident[name][first : first + 6] = -32768
+    return _event(walk, frames, "imu_restarted", 0, "imu", at_s=first * STEP_S)
+
+
 def _imu_slow(walk: GroundWalk, frames: GroundFrames) -> str:
     frames.slow["system"]["imu_packets"] //= 2
     return "imu"
@@ -277,6 +284,18 @@ def _gyros_swapped(walk: GroundWalk, frames: GroundFrames) -> str:
 # ---------------------------------------- receiver, relay, fail-safe, supply
 def _channel_lost(walk: GroundWalk, frames: GroundFrames) -> str:
     frames.ident[f"rc_{_one(walk, RECEIVER)}"] = 0
+    return "receiver"
+
+
+def _receiver_lost(walk: GroundWalk, frames: GroundFrames) -> str:
+    for name in RECEIVER:
+        frames.ident[f"rc_{name}"] = 0
+    return "receiver"
+
+
+def _transmitter_left_off(walk: GroundWalk) -> str:
+    walk.preset = True
+    walk.transmitter = np.zeros_like(walk.transmitter)
     return "receiver"
 
 
@@ -455,6 +474,11 @@ def _radio_weak(walk: GroundWalk, frames: GroundFrames) -> str:
     return "radio"
 
 
+def _radio_dead(walk: GroundWalk, frames: GroundFrames) -> str:
+    frames.kept[walk.rows("radio").start :] = False
+    return "radio"
+
+
 def _radio_bursts(walk: GroundWalk, frames: GroundFrames) -> str:
     rows, rng = walk.rows("radio"), walk.rng
     for begin in np.arange(rows.start + 20, rows.stop - 40, rng.uniform(60.0, 100.0)):
@@ -510,6 +534,7 @@ GROUND_FAULTS: dict[str, GroundFault] = {
     "imu_stuck": F("frozen", after=_imu_frozen),
     "imu_off": F("stale", after=_imu_off),
     "imu_damaged": F("damaged or lost", after=_imu_damaged),
+    "imu_reset": F("restarted", after=_imu_restarts),
     "imu_slow": F("packets a second", after=_imu_slow),
     "accelerometer": F("accelerometer", after=_accelerometer_weak),
     "gyro_zero": F("at rest", after=_gyro_zero),
@@ -519,6 +544,8 @@ GROUND_FAULTS: dict[str, GroundFault] = {
     "gyro_reversed": F("wrong direction", after=_gyro_reversed),
     "imu_mounted_turned": F("", after=_gyros_swapped),
     "receiver_channel_lost": F("no pulses", after=_channel_lost),
+    "receiver_lost": F("no pulses", after=_receiver_lost),
+    "receiver_failsafe": F("preset", before=_transmitter_left_off),
     "receiver_glitch": F("wrong pulses", after=_glitches),
     "receiver_storm": F("storm", after=_storm),
     "failsafe_keeps_throttle": F("throttle stays", before=_failsafe_keeps),
@@ -550,6 +577,7 @@ GROUND_FAULTS: dict[str, GroundFault] = {
     "reset": F("reset during", after=_reset),
     "settings_damaged": F("settings are damaged", after=_settings_default),
     "radio_weak": F("rows lost", after=_radio_weak),
+    "radio_dead": F("nothing came", after=_radio_dead),
     "radio_bursts": F("rows lost", after=_radio_bursts),
 }
 

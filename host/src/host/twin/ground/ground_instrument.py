@@ -51,10 +51,10 @@ class GroundFrames:
     def timed(self) -> list[tuple[int, bytes]]:
         """Return time (us) and envelope of everything the radio brings, in order."""
         told = envelope(bytes([SCHEMA_HASH_ID]) + self.schema.hash.to_bytes(4, "little"))
-        every = range(START_US, int(self.ident["t_us"][-1]), HASH_EVERY_US)
-        parts = [(at_us, told) for at_us in every]
+        parts = [(START_US + at, told) for at in range(0, len(self.ident) * 50_000, HASH_EVERY_US)]
+        offset = int(self.ident["t_us"][0]) - START_US  # a clock that wraps in the walk
         for rows in (self.ident[self.kept], *self.slow.values()):
-            times = rows["t_us"].tolist()
+            times = ((rows["t_us"].astype(np.int64) - offset) % (1 << 32)).tolist()
             parts += [(at, envelope(row.tobytes())) for at, row in zip(times, rows, strict=True)]
         return sorted(parts, key=lambda part: part[0])
 
