@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from host.cli import main
 from host.log.capture_head import notes_path
-from host.preflight.preflight_sheet import read_sheet, sheet_lines
+from host.preflight.preflight_sheet import read_sheet, sheet_beside, sheet_lines
 
 
 def notes_of(folder: Path) -> list[dict[str, object]]:
@@ -91,5 +91,11 @@ def test_a_sheet_is_shown_by_host_live_and_only_a_sheet(
     live = ["live", "in.radio@max", "--no-page", "--json"]
     assert main([*live, "--preflight", "sheet.toml"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["go"] is True
+    assert sheet_beside(tmp_path / "in.radio") is None  # a replay writes nothing
+    assert main([*live, "-o", "out.radio", "--preflight", "sheet.toml"]) == 0
+    beside = sheet_beside(tmp_path / "out.radio")
+    assert beside is not None
+    assert beside.read_text() == Path("sheet.toml").read_text()
+    capsys.readouterr()
     assert main([*live, "--preflight", "in.radio.jsonl"]) == 2
     assert "in.radio.jsonl" in capsys.readouterr().err

@@ -21,7 +21,7 @@ from host.preflight.check import Check, State
 from host.preflight.check_list import Wanted, left_out
 from host.preflight.guided_list import Preflight
 from host.preflight.preflight_screen import PreflightScreen
-from host.preflight.preflight_sheet import sheet_document, write_sheet
+from host.preflight.preflight_sheet import SUFFIX, sheet_document, write_sheet
 from host.terminal import command_line
 
 WALK = "sim:walk"
@@ -199,7 +199,7 @@ class _Walk:
 def _sheet_path(session: LiveSession) -> Path:
     """Return the sheet's place: beside the capture, else in the working folder."""
     if session.capture is not None:
-        return session.capture.path.with_suffix(".preflight.toml")
+        return session.capture.path.with_suffix(SUFFIX)
     return Path(datetime.now().strftime("PREFLIGHT-%Y%m%d-%H%M%S.toml"))
 
 

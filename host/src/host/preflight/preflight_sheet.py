@@ -20,6 +20,7 @@ from host.text import shown
 
 FORMAT = "flight-test-preflight"
 VERSION = 1
+SUFFIX = ".preflight.toml"
 _DIGITS = 4
 
 
@@ -96,6 +97,12 @@ def write_sheet(path: Path, document: dict[str, Any]) -> None:
         raise UsageError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
+def sheet_beside(log: Path) -> Path | None:
+    """Return the sheet beside a log or capture, None if there is none."""
+    path = log.with_suffix(SUFFIX)
+    return path if log.suffix and path.is_file() else None
+
+
 def sheet_lines(text: str) -> list[str]:
     """Return a sheet for people: GO or not, who and when, an item a line; empty if it is none.
 
@@ -162,7 +169,11 @@ def shown_sheet(path: Path) -> Join:
         del calibration
         session.state.preflight = sheet.as_json
         session.state.say("preflight", f"{'GO' if sheet.go else 'NO-GO'}: {path.name}")
-        session.note("preflight_sheet", go=sheet.go, sheet=read_text(path, UsageError))
+        text = read_text(path, UsageError)
+        session.note("preflight_sheet", go=sheet.go, sheet=text)
+        beside = session.capture.path.with_suffix(SUFFIX) if session.capture else path
+        if not beside.exists():  # the flight's log has its own
+            beside.write_text(text, encoding="utf-8")
         return lambda: None
 
     return join

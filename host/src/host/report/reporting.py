@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from host.errors import HostError, UsageError
 from host.files.user_text import read_text
 from host.original.rows import looks_like_rows
-from host.preflight.preflight_sheet import sheet_lines
+from host.preflight.preflight_sheet import sheet_beside, sheet_lines
 from host.readers.autopilot_flight import is_autopilot_log
 from host.report.flight_reading import Wanted, read_flight
 from host.report.plotting import page_file, write_text
@@ -63,7 +63,7 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     target = page_file(request.output, first if first.suffix else first / "flight", ".report.html")
     if any(target.exists() and target.samefile(one) for one in request.sources):
         raise UsageError(f"{target} is the source itself; name another file with -o")
-    sheet = _sheet(request.preflight)
+    sheet = _sheet(request.preflight or sheet_beside(first))
     found = identify(request.sources, **request.options)
     flights = [
         flight

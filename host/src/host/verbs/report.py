@@ -64,7 +64,7 @@ def add_parser(subparsers: Any) -> None:
         "--preflight",
         type=Path,
         metavar="FILE",
-        help="sheet of the preflight check, shown as it is",
+        help="sheet of `host preflight`; the one beside the log (NAME.preflight.toml) without it",
     )
     _add_answer_arguments(parser)
 
