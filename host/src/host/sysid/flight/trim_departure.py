@@ -191,10 +191,13 @@ def correct_trim_departure(
         return None
     step = found.shares.sum(axis=0)
     unknown = np.sqrt(np.diag(found.covariance))[:, None] * found.by_added
-    turned = TURNING_SHARE * gust_deviation_mps(result, trim.airspeed_mps) * (
-        one_step.change(_with_turning_gust(straight), trim, data)
-        - one_step.change(straight, trim, data)
-    )  # fmt: skip
+    # Only the fit that stands has intervals: the rough one before it is measured as it is.
+    along_mps = 0.0 if fitted is None else gust_deviation_mps(result, trim.airspeed_mps)
+    turned = np.zeros((0, len(step)))
+    if along_mps > 0.0:
+        still = one_step.change(straight, trim, data)
+        moved = one_step.change(_with_turning_gust(straight), trim, data)
+        turned = TURNING_SHARE * along_mps * (moved - still)
     return Departure(
         found.shares,
         (
