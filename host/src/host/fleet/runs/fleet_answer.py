@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from host.fleet.dataset.row_flights import reference_cg, type_flights
 from host.fleet.flight_task import IDENTIFIED
+from host.fleet.pages.aircraft_changes import AircraftHistory, change_lines, histories
+from host.fleet.pages.fleet_page import fleet_page
 from host.fleet.pages.type_prior import type_prior
 from host.fleet.pages.type_text import type_document, type_lines
 from host.fleet.statistics.type_model import TypeModel, type_model
@@ -25,22 +27,30 @@ class FleetAnswer:
     Attributes
     ----------
     models : list of TypeModel
+    changes : list of list of AircraftHistory
+        Of each type.
     written : list of Path
     """
 
     models: list[TypeModel] = field(default_factory=list)
+    changes: list[list[AircraftHistory]] = field(default_factory=list)
     written: list[Path] = field(default_factory=list)
 
     def lines(self) -> list[str]:
         """Return the answer in words."""
         found: list[str] = []
-        for model in self.models:
-            found += ["", *type_lines(model)]
+        for model, each in zip(self.models, self.changes, strict=True):
+            found += ["", *type_lines(model), *change_lines(each)]
         return found[1:]
 
     def document(self) -> dict[str, Any]:
         """Return the answer as plain values."""
-        return {"types": [type_document(model) for model in self.models]}
+        return {
+            "types": [
+                {**type_document(model), "changes": change_lines(each)}
+                for model, each in zip(self.models, self.changes, strict=True)
+            ]
+        }
 
 
 def fleet_answer(rows: pd.DataFrame, output: Path) -> FleetAnswer:
@@ -55,10 +65,13 @@ def fleet_answer(rows: pd.DataFrame, output: Path) -> FleetAnswer:
     answer = FleetAnswer()
     for name, own in rows[rows["state"] == IDENTIFIED].groupby("type", sort=True):
         answer.models.append(type_model(str(name), type_flights(own)))
-    for model, stem in zip(answer.models, file_names(m.name for m in answer.models), strict=True):
+        answer.changes.append(histories(answer.models[-1]))
+    stems = file_names(m.name for m in answer.models)
+    for model, each, stem in zip(answer.models, answer.changes, stems, strict=True):
         own = rows[rows["type"] == model.name]
         document = {**type_document(model), "cg_m": list(reference_cg(own))}
         texts = {output / f"{stem}.json": json.dumps(document, indent=2, allow_nan=False)}
+        texts[output / f"{stem}.html"] = fleet_page(model, each, own)
         if model.effects:
             texts[output / f"{stem}.prior.toml"] = type_prior(model)
         for path, text in texts.items():

@@ -65,7 +65,7 @@ def type_model(name: str, flights: Sequence[LoadedFlight]) -> TypeModel:
     for derivative in names:
         told = {f.aircraft for f in flights if f.tells(derivative)}
         if len(told) < FEWEST_AIRCRAFT:
-            alone.append(derivative)
+            alone += [derivative] if told else []
             continue
         estimates[derivative] = fleet_estimates(flights, derivative)
         effects[derivative] = type_effect(estimates[derivative])

@@ -1,0 +1,101 @@
+"""A fleet drawn at the level of estimates: who changed, why, and the page that says so."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from host.aircraft.prior.prior_file import read_prior
+from host.fleet.flight_task import IDENTIFIED, SET_ASIDE
+from host.fleet.pages.aircraft_changes import AircraftHistory, change_lines, histories
+from host.fleet.pages.fleet_page import fleet_page
+from host.fleet.pages.type_prior import type_prior
+from host.fleet.statistics.loaded_flight import LoadedFlight
+from host.fleet.statistics.type_model import TypeModel, type_model
+from studies.fleet_changes import USUAL, covariance, false_alarms, patterns, power
+
+HOSTILE = "<script>alert(1)</script>"
+
+
+def drawn(aircraft: int = 4, flights: int = 12) -> list[LoadedFlight]:
+    """Return a fleet whose third aircraft's elevator is thrown 30 % further from flight 10 on."""
+    rng, own, usual = np.random.default_rng(8), covariance(), np.array(list(USUAL.values()))
+    root, found = np.linalg.cholesky(own), []
+    for number in range(aircraft):
+        mine = usual * (1.0 + 0.05 * rng.standard_normal(len(usual)))
+        for flight in range(flights):
+            values = mine + root @ rng.standard_normal(len(usual))
+            if number == 2 and flight >= 9:
+                values = values + 0.30 * patterns()["throw of the elevator"]
+            found.append(
+                LoadedFlight(
+                    aircraft=f"N{number}" if number else HOSTILE,
+                    names=tuple(USUAL),
+                    values=values,
+                    own=own,
+                    sources=(("aircraft file 1", "mass_share"),),
+                    loadings=0.01 * mine[None],
+                    date=f"2026-0{1 + flight // 10}-{10 + flight % 10}",
+                    conditions={"alpha_rad": 0.1, "chord_m": 0.25, "span_m": 1.25},
+                )
+            )
+    return found
+
+
+@pytest.fixture(scope="module")
+def fleet() -> tuple[TypeModel, list[AircraftHistory]]:
+    kept = ("CL_alpha", "CL_de", "Cm_alpha", "Cm_q", "Cm_de", "Cn_beta")  # a picture each
+    flights = [replace(f, left_out=frozenset(set(USUAL) - set(kept))) for f in drawn()]
+    model = type_model("trainer", flights)
+    return model, histories(model)
+
+
+def test_the_changed_aircraft_and_its_cause_are_named(
+    fleet: tuple[TypeModel, list[AircraftHistory]],
+) -> None:
+    _, found = fleet
+    assert [one.aircraft for one in found if one.alarms] == ["N2"]
+    (line,) = change_lines(found)
+    assert line.startswith("changed: N2 from flight 10 (2026-01-19) on: throw of the elevator")
+    size = next(one for one in found if one.alarms).alarms[-1].size
+    assert size == pytest.approx(0.30, abs=0.08)
+
+
+def test_a_shift_is_noticed_and_nothing_else_is() -> None:
+    for cause in ("place of the CG", "throw of the elevator"):
+        found = power(cause, 5.0, 4, 3)
+        assert found.alarmed == 1.0
+        assert found.named >= 0.75
+    assert false_alarms(4, 20, 4) <= 2.5
+
+
+def test_the_page_shows_everything_and_runs_nothing(
+    fleet: tuple[TypeModel, list[AircraftHistory]], tmp_path: Path
+) -> None:
+    model, found = fleet
+    rows = pd.DataFrame(
+        [
+            {"state": IDENTIFIED, "aircraft": "N1", "source": "a.bin", "reason": ""},
+            {"state": SET_ASIDE, "aircraft": "N1", "source": HOSTILE, "reason": "hangs"},
+        ]
+    )
+    page = fleet_page(model, found, rows)
+    assert page.count("<img ") == len(model.effects) + len(model.aircraft)
+    assert "script-src &#x27;none&#x27;" in page or "script-src 'none'" in page
+    assert HOSTILE not in page
+    for word in ("throw of the elevator", "hangs", "new aircraft", "fly more aircraft: 4 are few"):
+        assert word in page
+    (tmp_path / "trainer.html").write_text(page)
+
+
+def test_the_prior_is_what_identify_reads(
+    fleet: tuple[TypeModel, list[AircraftHistory]], tmp_path: Path
+) -> None:
+    model, _ = fleet
+    path = tmp_path / "trainer.prior.toml"
+    path.write_text(type_prior(model))
+    table = read_prior(path).at(0.0)
+    for name, effect in model.effects.items():
+        assert math.isclose(table[name], effect.new_aircraft.value)
