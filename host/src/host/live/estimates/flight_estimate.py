@@ -30,6 +30,7 @@ from host.sysid.pipeline.surface_travel import with_surface_angles
 # What a surface does is told once it was flown: from a stick that was only held its interval held
 # the truth in 3 of 11.
 _AXIS_OF = {"de": "elevator_rad", "da": "aileron_rad", "dr": "rudder_rad"}
+_INPUT_S = 0.3  # shorter: a rest of one that a gap cut off
 _SETTLED_S = 0.2  # behind the end of a test point: its last rows have arrived
 
 
@@ -109,12 +110,11 @@ class FlightEstimator:
         found = [m for m in detect_maneuvers(columns) if m.axis != "throttle"]
         points, under_way = _points(found, until_s - _SETTLED_S)
         answers, why_not = self._answers(columns, found, read, instrument)
-        flown = {m.axis for m in found}
         values = {
             c.name: (float(c.value), float(c.half_width))
             for answer in answers
             for c in answer.coefficients
-            if _AXIS_OF.get(c.name.rpartition("_")[2], "") in {"", *flown}
+            if _AXIS_OF.get(c.name.rpartition("_")[2], "") in _moved(answer)
         }
         best = answers[0] if answers else None
         return FlightEstimate(until_s, points, under_way, values, best, why_not)
@@ -164,6 +164,14 @@ class FlightEstimator:
         estimate = self._by.estimate([flight])
         widths = self._by.intervals(estimate)
         return self._by.answer(estimate, widths, tuple(None for _ in estimate))
+
+
+def _moved(answer: CoefficientAnswer) -> set[str]:
+    """Return the surfaces whose input is in the estimate, and the empty word for what needs none.
+
+    Of an input that a gap took the response alone may be left.
+    """
+    return {"", *(m.axis for m in answer.used if m.input_end_s - m.start_s > _INPUT_S)}
 
 
 def _points(found: list[DetectedManeuver], until_s: float) -> tuple[tuple[str, ...], str]:
