@@ -37,6 +37,7 @@ class Instrument {
 
  private:
   void step_slow(uint32_t now_us);
+  bool write_status(uint32_t now_us);
   void decide_recording(uint32_t now_us);
   uint32_t idle_us();
   void pass_self_test();
@@ -67,6 +68,7 @@ class Instrument {
   uint16_t loop_max_us_ = 0;
   uint8_t counted_turn_ = 0;
   uint8_t slot_ = 0;          // of step_slow()
+  uint8_t put_off_ = 0;       // turns for which the frame `system` waits; 0: it is not due
   core::SupplyWatch supply_;  // the self-test
 };
 

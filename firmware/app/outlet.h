@@ -1,9 +1,11 @@
-// Where every frame goes: into the log while a session runs, and to the radio as its budget allows.
+// Where every frame goes: into the log while a session runs, to the radio as its budget allows, and
+// the channels to USB while nothing is recorded.
 #pragma once
 
 #include <stdint.h>
 
 #include "app/telemetry.h"
+#include "app/usb_channels.h"
 #include "core/byte_ring.h"
 #include "generated/frames.h"
 
@@ -18,16 +20,26 @@ class Outlet {
   void put(const Frame& frame) {
     ++frames_;
     if (logging_) (void)ring_.push(frame);
-    telemetry_.offer(Frame::id(), &frame, sizeof frame, frame.t_us);
+    (void)telemetry_.offer(Frame::id(), &frame, sizeof frame, frame.t_us);
+  }
+
+  // One envelope at most: the receiver must not wait for two.
+  void put(const frames::IdentFrame& frame) {
+    ++frames_;
+    if (logging_) (void)ring_.push(frame);
+    const uint8_t id = frames::IdentFrame::id();
+    if (telemetry_.offer(id, &frame, sizeof frame, frame.t_us)) return;
+    if (!logging_) usb_.offer(frame);
   }
 
   // Into the log before all others: open() is to come.
   template <typename Frame>
   void put_head(const Frame& frame) {
     (void)ring_.push(frame);
-    telemetry_.offer(Frame::id(), &frame, sizeof frame, frame.t_us);
+    (void)telemetry_.offer(Frame::id(), &frame, sizeof frame, frame.t_us);
   }
 
+  UsbChannels& usb() { return usb_; }
   uint8_t frames() const { return frames_; }  // put so far, and round again
 
   // Events of the time before a session wait for it. Of more than eight the first two stay, which
@@ -51,7 +63,7 @@ class Outlet {
     frame.t_us = t_us;
     frame.code = static_cast<uint8_t>(code);
     frame.arg = arg;
-    telemetry_.offer(frames::EventFrame::id(), &frame, sizeof frame, t_us);
+    (void)telemetry_.offer(frames::EventFrame::id(), &frame, sizeof frame, t_us);
     return frame;
   }
 
@@ -71,6 +83,7 @@ class Outlet {
 
   core::ByteRing& ring_;
   Telemetry& telemetry_;
+  UsbChannels usb_;
   frames::EventFrame waiting_[kWaiting] = {};
   uint8_t waiting_count_ = 0;
   uint8_t frames_ = 0;

@@ -137,16 +137,29 @@ void Status::start(uint32_t now_us) {
   turn_.start(now_us);
 }
 
-void Status::step(const Recorder& recorder,
+void Status::poll(bool recording, UsbChannels& channels, uint32_t now_us) {
+  if (part_ < Part::kIdle) return;
+  channels.allow(!recording);
+  if (recording) {
+    part_ = Part::kIdle;
+  } else if (turn_.due(now_us, kLineUs)) {
+    part_ = Part::kAskedFor;
+  }
+}
+
+bool Status::step(const Recorder& recorder,
                   const Sensors& sensors,
                   const PilotLink& pilot,
                   uint16_t reference_mv,
+                  UsbChannels& channels,
                   uint32_t now_us) {
-  if (part_ == Part::kIdle) {
-    if (recorder.recording() || !turn_.due(now_us, kLineUs)) return;
+  if (out_.room() < kLongestPart) return false;
+  if (part_ == Part::kAskedFor) {
+    if (!channels.begin_line(now_us)) return false;
     part_ = Part::kName;
+    channels.allow(false);
+    return true;
   }
-  if (out_.room() < kLongestPart) return;
   switch (part_) {
     case Part::kName:
       name(&out_);
@@ -195,11 +208,14 @@ void Status::step(const Recorder& recorder,
       out_.number(core::supply_mv(hal::avcc_mv(), reference_mv));
       out_.flash(kMillivolt);
       out_.flash(kLineEnd);
+      channels.allow(true);
       break;
     case Part::kIdle:
-      return;
+    case Part::kAskedFor:
+      return false;
   }
   part_ = static_cast<Part>(static_cast<uint8_t>(part_) + 1U);
+  return true;
 }
 
 bool Status::found(const Sensors& sensors, uint8_t bits) {

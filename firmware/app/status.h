@@ -5,6 +5,7 @@
 
 #include "app/recorder.h"
 #include "app/text_out.h"
+#include "app/usb_channels.h"
 #include "core/every.h"
 
 namespace app {
@@ -14,11 +15,16 @@ class Status {
   // Board, version and hash of the image: the boot line, and the head of every other.
   static void name(TextOut* out);
   void start(uint32_t now_us);
-  // One part of the line per call, as the port has room.
-  void step(const Recorder& recorder,
+  // Every 10 ms or so: asks for the next line.
+  void poll(bool recording, UsbChannels& channels, uint32_t now_us);
+
+  bool has_line() const { return part_ != Part::kIdle; }
+  // One part of the line per call, as the port has room; false if nothing was written.
+  bool step(const Recorder& recorder,
             const Sensors& sensors,
             const PilotLink& pilot,
             uint16_t reference_mv,
+            UsbChannels& channels,
             uint32_t now_us);
 
  private:
@@ -35,7 +41,8 @@ class Status {
     kCard,
     kRail,
     kSupply,
-    kIdle
+    kIdle,
+    kAskedFor
   };
 
   // Writes " missing", or " stale" if it was there; true if there is a value to write.

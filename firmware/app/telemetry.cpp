@@ -13,7 +13,7 @@ constexpr uint8_t kKinds = frames::kBaroCoefficientsId + 1;
 
 // Least time between two frames of a kind, by id, in steps of 1.024 ms: 50, 500, 200 and 200 ms
 // less 5, because a trigger has jitter. 20 Hz of ident and the rest make 2.1 kB/s.
-constexpr uint16_t kLeastMs[kKinds] CORE_FLASH = {0, 44, 484, 191, 191, 0, 0, 0, 0, 0, 0};
+constexpr uint16_t kLeastMs[] CORE_FLASH = {0, 44, 484, 191, 191};
 
 uint16_t to_ms(uint32_t now_us) {
   return static_cast<uint16_t>(now_us >> 10);
@@ -31,16 +31,21 @@ void Telemetry::start(const frames::ConfigFrame& config, uint32_t now_us) {
   }
 }
 
-void Telemetry::offer(uint8_t id, const void* fields, uint8_t size, uint32_t now_us) {
-  if (mode_ != frames::Telemetry::kFrames || id >= kKinds) return;
+bool Telemetry::offer(uint8_t id, const void* fields, uint8_t size, uint32_t now_us) {
+  if (mode_ != frames::Telemetry::kFrames || id >= kKinds) return false;
   const uint16_t now_ms = to_ms(now_us);
-  const uint16_t since_ms = static_cast<uint16_t>(now_ms - last_ms_[id]);
-  if (since_ms < core::flash_u16(&kLeastMs[id])) return;
-  if (send(id, fields, size, now_us)) {
-    last_ms_[id] = now_ms;
-  } else if (dropped_ != 0xFFFFU) {
-    ++dropped_;
+  static_assert(sizeof kLeastMs == sizeof last_ms_, "a time for each kind with a rate");
+  const bool paced = id < kPaced;
+  if (paced) {
+    const uint16_t since_ms = static_cast<uint16_t>(now_ms - last_ms_[id]);
+    if (since_ms < core::flash_u16(&kLeastMs[id])) return false;
   }
+  if (send(id, fields, size, now_us)) {
+    if (paced) last_ms_[id] = now_ms;
+    return true;
+  }
+  if (dropped_ != 0xFFFFU) ++dropped_;
+  return false;
 }
 
 bool Telemetry::poll(uint32_t now_us) {

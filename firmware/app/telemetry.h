@@ -13,8 +13,9 @@ class Telemetry {
  public:
   void start(const frames::ConfigFrame& config, uint32_t now_us);
 
-  // Sends the frame if it is its turn, else counts it as dropped. `size` is without the id.
-  void offer(uint8_t id, const void* fields, uint8_t size, uint32_t now_us);
+  // Sends the frame if it is its turn; one that then finds no room or budget is counted as
+  // dropped. True if it was sent. `size` is without the id.
+  bool offer(uint8_t id, const void* fields, uint8_t size, uint32_t now_us);
   // The hash of the schema; true every 5 s, when config and identity are to be offered too.
   bool poll(uint32_t now_us);
 
@@ -28,7 +29,9 @@ class Telemetry {
 
   core::ByteBudget budget_;
   core::Every heads_;
-  uint16_t last_ms_[frames::kBaroCoefficientsId + 1] = {};  // in steps of 1.024 ms
+  // Of the kinds with a rate, by id, in steps of 1.024 ms.
+  static constexpr uint8_t kPaced = frames::kBaroId + 1;
+  uint16_t last_ms_[kPaced] = {};
   uint16_t dropped_ = 0;
   frames::Telemetry mode_ = frames::Telemetry::kOff;
 };

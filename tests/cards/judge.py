@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
+from host.wire.framing import text_of
 from numpy.typing import NDArray
 
 from tests.cards.sparse import BLOCK
@@ -49,7 +50,7 @@ class Judgement:
 
 def message_of(sent: bytes) -> str:
     """Return what the last whole status line says of the card."""
-    lines = sent.decode("ascii", "replace").split("\r\n")
+    lines = text_of(sent).decode("ascii", "replace").split("\r\n")
     found = [m[1] for line in lines[:-1] if (m := CARD_WORDS.search(line))]
     return found[-1] if found else ""
 

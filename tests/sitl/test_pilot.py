@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from host.original import rows as original_rows
 from host.twin.recorder.sitl_library import TICKS_PER_S, Level, Port
+from host.wire.framing import text_of
 from host.wire.schema_text import packed_schema
 
 from tests.protocol import oracle
@@ -155,7 +156,7 @@ def test_status_line_says_what_is_there() -> None:
     idle_receiver(bench.sitl, 0.1, 6.0)
     bench.sitl.power_on()
     bench.sitl.run_until(ticks(5.5))
-    lines = bench.sitl.sent(Port.USB).decode("ascii").split("\r\n")
+    lines = text_of(bench.sitl.sent(Port.USB)).decode("ascii").split("\r\n")
     assert lines[0].startswith("sitl ")
     assert lines[-2].startswith("sitl ")
     assert "imu missing | alpha missing" in lines[-2]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from host.link.status_line import StatusLine, parse_status
 from host.twin.recorder.sitl_library import TICKS_PER_S, Level, Port
+from host.wire.framing import text_of
 
 from tests.sitl import script as scripted
 from tests.sitl.bench import Bench, flight
@@ -20,7 +21,7 @@ def ticks(seconds: float) -> int:
 
 
 def last_line(bench: Bench) -> StatusLine:
-    text = bench.sitl.sent(Port.USB).decode("ascii").split("\r\n")[-2]
+    text = text_of(bench.sitl.sent(Port.USB)).decode("ascii").split("\r\n")[-2]
     line = parse_status(text)
     assert line is not None, text
     return line

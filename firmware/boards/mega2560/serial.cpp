@@ -55,7 +55,7 @@ class Fifo {
   volatile uint8_t tail_ = 0;
 };
 
-Fifo<52> g_usb_out;  // the longest part of the status line has 48
+Fifo<74> g_usb_out;  // an ident in its envelope has 73, the longest part of the status line 48
 Fifo<32> g_gps_in;   // 8 ms at 38400 baud
 Fifo<10> g_gps_out;
 Fifo<96> g_radio_out;  // the longest envelope has 77

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from devices.ardu_imu import ArduImu, ImuSample
+from host.wire.framing import text_of
 from host.wire.schema_text import packed_schema
 from simavr_bench import (
     Bmp085,
@@ -221,7 +222,7 @@ class FlightRig:
 
     def status_lines(self) -> list[str]:
         """Lines of the USB port so far."""
-        return self.chip.uart_sent(0).decode("ascii", "replace").splitlines()
+        return text_of(self.chip.uart_sent(0)).decode("ascii", "replace").splitlines()
 
     def save_card(self, target: Path) -> Path:
         """Copy the card as it is now to a sparse file."""

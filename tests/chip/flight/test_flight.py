@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from compilers import TESTED
 from host.link.status_line import parse_status
+from host.wire.framing import text_of
 from image_hash import image_hash
 
 import host
@@ -27,7 +28,7 @@ def test_bare_board_boots_and_says_what_is_missing(flight_elf: Path) -> None:
         chip.load(flight_elf)
         chip.power_on()
         chip.run_s(3.0)
-        text = chip.uart_sent(0).decode()
+        text = text_of(chip.uart_sent(0)).decode("ascii")
         for missing in ("imu missing", "baro missing", "gps missing", "card missing"):
             assert missing in text
         assert chip.faults() == []
@@ -45,7 +46,7 @@ def test_every_sample_is_in_the_log_once(
     rig.chip.run_s(8.0)
     sent = {s.sequence: s for s in rig.imu.sent}
     assert rig.relay.engaged
-    said = rig.chip.uart_sent(0).decode("ascii").split("\r\n")
+    said = text_of(rig.chip.uart_sent(0)).decode("ascii").split("\r\n")
     rig.land()
     check_card(rig.card_image)
     log = host.read_log(take_log(rig.card_image, tmp_path / "flight.bin"))

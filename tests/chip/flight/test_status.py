@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 from host.link.status_line import ANALOGUE, StatusLine, parse_status
+from host.wire.framing import text_of
+
+import host
 
 if TYPE_CHECKING:
     from flight.rig import FlightRig
@@ -22,7 +27,7 @@ TOOL = Path(__file__).resolve().parents[3] / "hw" / "calibration" / "reference_r
 
 def last_line(rig: FlightRig) -> StatusLine:
     """The newest whole status line."""
-    text = rig.chip.uart_sent(0).decode("ascii").split("\r\n")[-2]
+    text = text_of(rig.chip.uart_sent(0)).decode("ascii").split("\r\n")[-2]
     line = parse_status(text)
     assert line is not None, text
     return line
@@ -80,6 +85,42 @@ def test_host_status_shows_the_line_of_the_real_image(make_rig: MakeRig) -> None
     assert shown["card"] == {"state": "ready", "file_number": 1}
     assert shown["receiver"]["pulse_us"] == pytest.approx([1500, 1500, 1500, 1000, 1000], abs=4)
     assert shown["complaints"] == []
+
+
+def test_host_live_hears_the_channels_of_the_real_image(make_rig: MakeRig, tmp_path: Path) -> None:
+    """The same port: envelopes between the lines, 20 a second, decoded like any capture."""
+    from simavr_bench.pty_bridge import PtyBridge
+
+    rig = make_rig()
+    rig.power_on()
+    rig.chip.run_s(11.0)
+    capture = tmp_path / "usb.radio"
+    with PtyBridge(rig.chip, 0) as bridge:
+        command = [sys.executable, "-m", "host", "live", bridge.path, "--no-page", "--baud",
+                   "115200", "-o", str(capture)]  # fmt: skip
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as running:
+            try:
+                bridge.serve(
+                    lambda: (
+                        (capture.exists() and capture.stat().st_size > 5000)
+                        or running.poll() is not None
+                    ),
+                    limit_s=120.0,
+                )
+                running.send_signal(signal.SIGINT)
+                _, err = running.communicate(timeout=60)
+            finally:
+                running.kill()
+    assert running.returncode == 0, err
+    assert " 0 did not arrive" in err
+    log = host.read_log(capture)
+    assert not log.loss.any
+    ident = log.frames["ident"]
+    assert len(ident) > 45
+    assert np.all(np.abs(np.diff(ident["t_us"].astype(float)) - 50_000) < 200)
+    sums = [ident[name].mean() for name in ("alpha_a", "dp_b", "pot_rudder")]
+    volts = [0.8 + 0.33 * slot for slot in (0, 5, 9)]
+    assert sums == pytest.approx([v / 5.0 * 4096 for v in volts], abs=8)
 
 
 def test_contact_closed_before_the_first_heartbeat_is_refused(make_rig: MakeRig) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from host.bench_calibration.bench_plan import Subject
 from host.bench_calibration.held_position import Held
 from host.bench_calibration.plateaus import Plateau, before_marks, matched, plateaus
+from host.bench_calibration.raw_channel import raw_channel
 from host.bench_calibration.six_faces import AXES, FORCES, face_held
 from host.bench_calibration.turned_gyro import RATES, Rest, Turn
 from host.constants import RAD_PER_DEG
@@ -77,14 +78,7 @@ class BenchLog:
 
     def raw(self, name: str) -> Array:
         """Return a channel in the raw unit; NaN where it was not valid."""
-        frame = self.log.schema.by_name["ident"]
-        field, rows = frame.field(name), self.log.frames["ident"]
-        value = rows[name].astype(np.float64)
-        if field.invalid is not None:
-            value[value == field.invalid] = np.nan
-        if field.valid is not None:
-            value[(rows["valid"] >> field.valid & 1) == 0] = np.nan
-        return value * field.scale
+        return raw_channel(self.log.schema, self.log.frames["ident"], name)
 
     def magnetic_counts(self) -> Array:
         """Return what the magnetometer read, counts (n, 3)."""

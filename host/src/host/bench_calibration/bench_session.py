@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -26,10 +26,14 @@ from host.bench_calibration.six_faces import FaceTable, crooked_deg, crooked_dou
 from host.bench_calibration.supply_reference import NOMINAL_MV, supply_reference
 from host.bench_calibration.turned_gyro import Rest, Turn, gyro_lines, read_turns
 from host.bench_calibration.typed_readings import TypedSource
+from host.bench_calibration.usb_channels import UsbChannels
+from host.bench_calibration.usb_port import is_port, open_port, record_port
+from host.bench_calibration.usb_readings import UsbSource
 from host.errors import ExitCode, UsageError
 from host.files.regular import regular_file
 
 TYPED = Path("-")
+_RECORDED = ("accelerometers", "gyros")  # over USB: in any order, found in what was recorded
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +43,8 @@ class Bench:
     Attributes
     ----------
     sources : tuple of Path
-        Tables, logs, captured radio; ``-``: typed. A further source is a further repeat.
+        Tables, logs, captured radio, the logger's port; ``-``: typed. A further source is a
+        further repeat.
     positions : tuple of float
         Of one round; empty: those of the subject.
     into, picture : Path or None
@@ -78,24 +83,46 @@ class Result:
 
 
 def calibrate(
-    bench: Bench, ask: Callable[[str], str] = input, say: Callable[[str], None] = print
+    bench: Bench,
+    ask: Callable[[str], str] = input,
+    say: Callable[[str], None] = print,
+    show: Callable[[str], None] | None = None,
 ) -> Result:
     """Calibrate one subject; lines that nobody doubts go into the file.
+
+    Parameters
+    ----------
+    bench : Bench
+    ask, say : callable
+        A question to whoever is at the bench, and a line for them.
+    show : callable, optional
+        Takes the question again with the value over USB as it is now.
 
     Raises
     ------
     UsageError
-        If a source is none, or too little is in it.
+        If a source is none, or too little is in it; DeviceError of a port.
     """
     if bench.picture is not None and bench.picture.suffix.lower() != ".svg":
         raise UsageError(f"{bench.picture}: a picture's name ends in .svg")
+    ports = [p for p in bench.sources if is_port(p)]
+    if ports and bench.subject.name in ("magnetometer", "supply", "inertia", "speed"):
+        raise UsageError(
+            f"{ports[0]}: {bench.subject.name} is not read over USB; give a table or a recording"
+            f" (host calibrate {bench.subject.name} says how)"
+        )
     if bench.subject.name == "magnetometer":
         return _magnetometer(bench)
     if bench.subject.name == "supply":
         return _supply(bench)
     if bench.subject.name == "inertia":
         return _inertia(bench)
-    temperature, lines, extra = _lines(bench, ask, say)
+    if bench.subject.name in _RECORDED:
+        sources = [
+            record_port(p, bench.subject, ask, say) if is_port(p) else p for p in bench.sources
+        ]
+        bench = replace(bench, sources=tuple(sources))
+    temperature, lines, extra = _lines(bench, ask, say, show)
     made = Made(
         bench.instrument,
         bench.day or date.today().isoformat(),
@@ -125,7 +152,10 @@ def calibrate(
 
 
 def _lines(
-    bench: Bench, ask: Callable[[str], str], say: Callable[[str], None]
+    bench: Bench,
+    ask: Callable[[str], str],
+    say: Callable[[str], None],
+    show: Callable[[str], None] | None,
 ) -> tuple[float | None, list[Calibrated], list[str]]:
     """Return temperature, lines and what is wrong beside them."""
     logs = {p: BenchLog.read(p) for p in bench.sources if _is_log(p)}
@@ -136,7 +166,10 @@ def _lines(
     held: list[Held] = []
     for path in bench.sources:
         first = max((p.repeat for p in held), default=0) + 1
-        held += _source(bench, path, logs, first, ask, say).held()
+        if is_port(path):
+            held += _over_usb(bench, path, first, ask, say, show)
+        else:
+            held += _source(bench, path, logs, first, ask, say).held()
     lines = calibrated_lines(bench.subject, held, density_kgpm3=bench.density_kgpm3)
     if not lines:
         wanted = bench.channel or ", ".join(bench.subject.channels)
@@ -164,15 +197,36 @@ def _source(
         )
     if path not in logs and path != TYPED:
         return TableSource(path, subject, channel, first)
-    if not channel:
-        raise UsageError(
-            f"which channel was moved? name one of {', '.join(subject.channels)} in place of"
-            f" {subject.name}"
-        )
+    _one_channel(bench)
     positions = bench.positions or subject.positions
     if path == TYPED:
         return TypedSource(subject, channel, positions, ask, say)
     return LogSource(logs[path], subject, channel, positions, first)
+
+
+def _over_usb(
+    bench: Bench,
+    path: Path,
+    first: int,
+    ask: Callable[[str], str],
+    say: Callable[[str], None],
+    show: Callable[[str], None] | None,
+) -> list[Held]:
+    _one_channel(bench)
+    positions = bench.positions or bench.subject.positions
+    with open_port(path, say) as link, UsbChannels(link) as channels:
+        channels.next_rows(1)  # it is our logger, and it sends
+        return UsbSource(
+            channels, bench.subject, bench.channel, positions, ask, say, first, show
+        ).held()
+
+
+def _one_channel(bench: Bench) -> None:
+    if not bench.channel:
+        raise UsageError(
+            f"which channel was moved? name one of {', '.join(bench.subject.channels)} in place of"
+            f" {bench.subject.name}"
+        )
 
 
 def _gyros(bench: Bench, logs: Mapping[Path, BenchLog]) -> list[Calibrated]:
@@ -252,7 +306,7 @@ def _inertia(bench: Bench) -> Result:
 
 def _is_log(path: Path) -> bool:
     """Return whether a source is a recording: a table is text and has a comma in its first line."""
-    if path == TYPED:
+    if path == TYPED or is_port(path):
         return False
     if not path.exists():
         raise UsageError(f"{path}: no such file; a table, a log of the bench, or - to type")

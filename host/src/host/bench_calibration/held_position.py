@@ -39,7 +39,7 @@ class Held:
 
 
 class Source(Protocol):
-    """Where held positions come from: a table, a keyboard, a log, later the live stream."""
+    """Where held positions come from: a table, a keyboard, a log, the logger over USB."""
 
     def held(self) -> list[Held]:
         """Return all held positions in the order in which they were set."""

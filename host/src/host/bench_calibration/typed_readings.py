@@ -15,6 +15,8 @@ _BACK = "b"
 class TypedSource:
     """Held positions that somebody reads aloud at the bench.
 
+    `asks` is what the question ends with.
+
     Parameters
     ----------
     subject : Subject
@@ -26,6 +28,8 @@ class TypedSource:
     say : callable
         Given a line that needs no answer.
     """
+
+    asks = "counts"
 
     def __init__(
         self,
@@ -54,21 +58,29 @@ class TypedSource:
         found: list[Held] = []
         while len(found) < len(wanted):
             repeat, position = wanted[len(found)]
-            line = self._ask(self._question(repeat, position, found)).strip().lower()
-            if line in ENDS or not line:
+            answer = self._ask(self._question(repeat, position, found))
+            line = answer.strip().lower()
+            if line in ENDS or not answer:
                 break
             if line == _BACK:
                 found[-1:] = []
                 continue
-            try:
-                value = float(line)
-            except ValueError:
-                self._say(f"{line!r} is no number; type the counts, b for back, q to end")
+            held = self.read(line, repeat, position)
+            if held is None:
                 continue
-            found.append(Held(self._channel, repeat, position, {self._channel: value}))
+            found.append(held)
         if not found:
-            raise UsageError(f"{self._channel}: nothing was typed; nothing is written")
+            raise UsageError(f"{self._channel}: nothing was read; nothing is written")
         return found
+
+    def read(self, line: str, repeat: int, position: float) -> Held | None:
+        """Return the position that was answered with a line; None if it is to be asked again."""
+        try:
+            value = float(line)
+        except ValueError:
+            self._say(f"{line!r} is no number; type the counts, b for back, q to end")
+            return None
+        return Held(self._channel, repeat, position, {self._channel: value})
 
     def _question(self, repeat: int, position: float, found: Sequence[Held]) -> str:
         unit = self._subject.tool.setting if self._subject.tool is not None else ""
@@ -81,5 +93,5 @@ class TypedSource:
             side = "from below" if position > last.position else "from above"
         return (
             f"{self._channel} repeat {repeat}/{self._subject.repeats}: set {position:+g} {unit}"
-            f" ({side}), hold, counts? "
+            f" ({side}), hold, {self.asks}? "
         )

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from host.errors import ExitCode, HostError, UsageError
+from host.wire.framing import EnvelopeReader
 
 BAUD = 115200
 LONGEST_LINE = 1024  # bytes; a status line has at most 210
@@ -272,11 +273,16 @@ class _Bytes(Protocol):
 
 
 def receive(link: _Bytes, clock: Callable[[], float] = time.monotonic) -> Iterator[Received]:
-    """Yield for ever what comes in, at least every 50 ms; the first line may be cut and is left."""
-    splitter = LineSplitter()
+    """Yield for ever what comes in, at least every 50 ms; the first line may be cut and is left.
+
+    Between two lines the logger sends its channels in envelopes; these are passed over.
+    """
+    splitter, envelopes = LineSplitter(), EnvelopeReader()
     begun = False
     while True:
         data = link.data()
-        lines = splitter.feed(data)
+        envelopes.feed(data)
+        text = envelopes.between
+        lines = splitter.feed(text)
         yield Received(data, lines if begun else lines[1:], clock())
-        begun = begun or b"\n" in data
+        begun = begun or b"\n" in text

@@ -19,7 +19,6 @@ from host.live.estimates.live_estimates import LiveEstimates, live_estimates
 from host.live.ground_capture import GroundCapture, new_capture_path, utc_now
 from host.live.live_session import Audience, LiveSession
 from host.live.live_sources import (
-    RADIO_BAUD,
     Source,
     is_file_like,
     port_source,
@@ -53,7 +52,7 @@ class LiveRequest:
 
     source: str | None = None
     output: Path | None = None
-    baud: int = RADIO_BAUD
+    baud: int | None = None
     calibration: Path | None = None
     rate_hz: float = RADIO_RATE_HZ
     port: int | None = None

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from host.link.status_line import StatusLine
+
 Array = NDArray[np.float64]
 
 # Columns of the page: name -> unit. Angles in degrees, as pilots read them.
@@ -65,6 +67,10 @@ class LiveUpdate:
     slow : list of SlowFrame
     arrived_s : float
         When the portion was read, on the clock of `time.time`.
+    told : list of str
+        What a person should know.
+    status : StatusLine or None
+        The newest status line in it: USB has one a second, the radio none.
     """
 
     rows: dict[str, Array]
@@ -73,6 +79,7 @@ class LiveUpdate:
     slow: list[SlowFrame]
     arrived_s: float
     told: list[str] = field(default_factory=list)
+    status: StatusLine | None = None
 
     def __len__(self) -> int:
         return len(self.rows["t_s"]) if self.rows else 0

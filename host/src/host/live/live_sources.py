@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Protocol, Self
 
 from host.errors import UsageError
-from host.link.serial import DeviceError, SerialLink, SerialPort, serial_ports
+from host.link.serial import BAUD, DeviceError, SerialLink, SerialPort, serial_ports
 
 RADIO_BAUD = 57600  # firmware/settings.toml: telemetry_baud
 _WAIT_S = 0.05
@@ -172,16 +172,24 @@ def choose_radio(ports: list[SerialPort]) -> SerialPort:
     )
 
 
-def port_source(name: str | None, baud: int, tell: Tell) -> PortSource:
-    """Return the port that was named, or the one that looks like a radio's."""
+def port_source(name: str | None, baud: int | None, tell: Tell) -> PortSource:
+    """Return the port that was named, or the one that looks like a radio's.
+
+    Without a baud rate it is the radio's; that of USB where the port can only be the logger's own.
+    """
     ports = serial_ports()
     if name is None:
         chosen = choose_radio(ports)
         tell(f"listening to {chosen.device} ({chosen.looks_like}, {chosen.description})")
-        return PortSource(chosen.device, baud).open()
-    if any(port.device == name and (port.is_mega or port.chip) for port in ports):
-        tell(f"{name} may be a Mega: opening its port resets it, never do so in flight")
-    return PortSource(name, baud).open()
+        return PortSource(chosen.device, baud or RADIO_BAUD).open()
+    named = next((p for p in ports if p.device == name and (p.is_mega or p.chip)), None)
+    usual = RADIO_BAUD if named is None or named.chip in _RADIO_CHIPS else BAUD
+    if named is not None:
+        tell(
+            f"{name} may be a Mega: opening its port resets it, never do so in flight; listening"
+            f" at {baud or usual} baud, to what it sends while it records nothing"
+        )
+    return PortSource(name, baud or usual).open()
 
 
 def udp_source(text: str) -> UdpSource:

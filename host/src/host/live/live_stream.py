@@ -9,19 +9,22 @@ from __future__ import annotations
 import zlib
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from statistics import median
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from host.link.serial import LineSplitter
+from host.link.status_line import StatusLine, parse_status
 from host.live.live_sample import LIVE_UNITS, Array, LiveUpdate, SlowFrame
 from host.live.text_rows import TextRows
 from host.people_units import people_columns
 from host.physical.airdata import calibrated_airspeed_mps, pressure_altitude_m
 from host.physical.calibration import Calibration
 from host.physical.channels import ChannelMaker, Rows
-from host.wire.framing import SCHEMA_HASH_ID, EnvelopeReader
+from host.wire.framing import SCHEMA_HASH_ID, EnvelopeReader, is_text
 from host.wire.schema import Schema
 from host.wire.schema_text import known_schemas, parse_schema
 
@@ -56,6 +59,8 @@ class LiveStream:
         self.unread = 0
         self._known = known_schemas() | {zlib.crc32(text): text for text in texts}
         self._reader = EnvelopeReader()
+        self._lines = LineSplitter()
+        self._text_bytes = 0
         self._text = TextRows(calibration)
         self._waiting: deque[bytes] = deque(maxlen=_WAITING)
         self._recent: dict[int, deque[bytes]] = {}
@@ -70,8 +75,8 @@ class LiveStream:
 
     @property
     def damaged_bytes(self) -> int:
-        """Bytes in no whole envelope and no row of text."""
-        return 0 if self._text.rows else self._reader.skipped
+        """Bytes in no whole envelope and no text."""
+        return 0 if self._text.rows else self._reader.skipped - self._text_bytes
 
     @property
     def heard(self) -> bool:
@@ -105,7 +110,7 @@ class LiveStream:
                 self._waiting.append(frame)
             elif self._is_new(frame):
                 frames.append(frame)
-        update = self._decoded(frames, arrived_s, told)
+        update = replace(self._decoded(frames, arrived_s, told), status=self._status())
         if self._reader.skipped and not self.frames:
             text = self._text.feed(data, arrived_s)
             if text is not None:
@@ -114,6 +119,15 @@ class LiveStream:
         for consumer in self._consumers:
             consumer(update)
         return update
+
+    def _status(self) -> StatusLine | None:
+        """Return the last status line that ended between the envelopes of this portion."""
+        text = self._reader.between
+        if not is_text(text):
+            return None
+        self._text_bytes += len(text)
+        found = [parse_status(line) for line in self._lines.feed(text)]
+        return next(filter(None, reversed(found)), None)
 
     def _schema_named(self, frame: bytes, told: list[str]) -> list[bytes]:
         """Take the hash of the schema; return the frames that waited for it."""

@@ -114,7 +114,7 @@ def _wanted(request: PreflightRequest, aircraft: Aircraft, calibration: Calibrat
     return Wanted(aircraft, calibration, without=request.without, by_wire=by_wire)
 
 
-def _wire_baud(live: LiveRequest) -> int:
+def _wire_baud(live: LiveRequest) -> int | None:
     """Return the baud rate: that of USB where the port named is a Mega's."""
     if live.source is None or live.opened is not None:
         return live.baud

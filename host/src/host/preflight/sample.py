@@ -73,8 +73,9 @@ def in_order(update: LiveUpdate, schema: Schema | None) -> Iterator[Sample | Hea
         found += [
             Heard(frame.name, frame.t_s, slow_reading(schema, frame)) for frame in update.slow
         ]
-    status = getattr(update, "status", None)
-    if status is not None:
+    if update.status is not None:
         t_s = max((one.t_s for one in found), default=0.0)
-        found += [Heard(name, t_s, said) for name, said in status_readings(status, t_s).items()]
+        found += [
+            Heard(name, t_s, said) for name, said in status_readings(update.status, t_s).items()
+        ]
     return iter(sorted(found, key=lambda one: one.t_s))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from host.errors import ExitCode, UsageError
+from host.terminal import bare
 
 if TYPE_CHECKING:
     from host.bench_calibration.bench_plan import Subject
@@ -17,12 +18,13 @@ if TYPE_CHECKING:
 _DESCRIPTION = """\
 Calibrate a sensor: held positions in, zero and slope with their deviations out, into a dated
 calibration file that `host decode --calibration` and `host identify` take. Without SUBJECT it
-lists what there is, without SOURCE it says what to do. SOURCE is a CSV table, a log recorded on
-the bench, what a ground station received, or - to type the readings; another is another repeat.
+lists what there is, without SOURCE it says what to do. SOURCE is the logger itself (usb, or its
+port: COM5, /dev/ttyACM0), a CSV table, a log recorded on the bench, what a ground station received,
+or - to type the readings; another is another repeat.
 """
 _EPILOG = """\
-exit codes: 0 ok, 2 usage, 4 not a log, 6 a channel is doubted (it is not written), or --check
-found lines that moved
+exit codes: 0 ok, 2 usage, 4 not a log, 5 no logger at the port, 6 a channel is doubted (it is not
+written), or --check found lines that moved
 """
 
 
@@ -164,7 +166,9 @@ def _calibrate(args: argparse.Namespace, subject: Subject, channel: str) -> int:
         into=args.into,
         picture=args.picture,
     )
-    result = calibrate(bench, _ask, lambda line: print(line, file=sys.stderr))
+    result = calibrate(
+        bench, _ask, lambda line: print(line, file=sys.stderr), _show if _watched() else None
+    )
     if args.json:
         print(json.dumps(result.data))
     else:
@@ -208,6 +212,16 @@ def _written(args: argparse.Namespace) -> Path | None:
 def _ask(question: str) -> str:
     print(question, end="", file=sys.stderr, flush=True)
     return sys.stdin.readline()
+
+
+def _watched() -> bool:
+    return sys.stderr.isatty() and sys.stdin.isatty()
+
+
+def _show(line: str) -> None:
+    """Write a question again over itself, with what is read now."""
+    bare(sys.stderr).write(f"\r{line}\033[K")
+    sys.stderr.flush()
 
 
 def _positions(text: str) -> tuple[float, ...]:

@@ -14,7 +14,8 @@ Receive the logger's radio: every byte goes to disk first, then to a page in the
 browser. Listens only: nothing is ever sent to the aircraft. SOURCE is
 
   nothing               the one port that looks like a radio's (a Mega is not tried)
-  COM5, /dev/ttyUSB0    a port; opening a Mega's port resets it: never in flight
+  COM5, /dev/ttyUSB0    a port; a Mega's own too, which sends its channels while it records
+                        nothing: opening it resets it, never in flight
   udp:14600             datagrams at this UDP port (udp:HOST:PORT: at another address)
   replay:FILE[@10x]     a log of the card or a ground capture, as the radio had sent it
   FILE                  the same; @max as fast as it can be decoded
@@ -48,8 +49,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--wanted", metavar="PERCENT",
                         help="half-widths that are enough, per cent of each value: 8, or"
                         " Cm_q=15,Cn_r=25 (default 10 to 20)")  # fmt: skip
-    parser.add_argument("--baud", type=_whole, default=57600, metavar="N",
-                        help="of the radio's port (default 57600)")  # fmt: skip
+    parser.add_argument("--baud", type=_whole, metavar="N",
+                        help="of the port (the radio's 57600, a Mega's USB 115200)")  # fmt: skip
     parser.add_argument("--rate", type=_rate, default=20.0, metavar="HZ",
                         help="rows a second of a replay, as far as it has them (default 20, as the"
                         " radio)")  # fmt: skip

@@ -7,6 +7,7 @@ per envelope, so that eight hours from the radio (a million envelopes) take seco
 from __future__ import annotations
 
 import binascii
+import re
 from dataclasses import dataclass, field
 
 SYNC = b"\xa5\x5a"
@@ -14,6 +15,7 @@ LONGEST_FRAME = 128
 HEAD_BYTES = 3  # sync and length
 TAIL_BYTES = 2  # CRC-16
 SCHEMA_HASH_ID = 0  # an envelope of five bytes: id 0 and the hash of the schema
+_TEXT = re.compile(rb"\n?[ -~]*(?:\r\n[ -~]*)*\r?")
 
 
 def crc16(data: bytes | memoryview) -> int:
@@ -97,6 +99,27 @@ def find_envelopes(data: bytes | bytearray, *, ended: bool = False) -> Found:
     return found
 
 
+def _between(data: bytes | bytearray, found: Found) -> bytes:
+    """Return the bytes that were skipped."""
+    parts, at = [], 0
+    for place in found.places:
+        parts.append(data[at:place])
+        at = place + HEAD_BYTES + data[place + 2] + TAIL_BYTES
+    return b"".join([*parts, data[at : found.pending_from]])
+
+
+def text_of(data: bytes) -> bytes:
+    """Return what lies between the envelopes of a whole recording: on USB, lines of text."""
+    reader = EnvelopeReader()
+    reader.feed(data)
+    return reader.between
+
+
+def is_text(data: bytes) -> bool:
+    r"""Tell whether bytes between envelopes are printable ASCII with line ends, cut or whole."""
+    return _TEXT.fullmatch(data) is not None
+
+
 @dataclass(slots=True)
 class EnvelopeReader:
     """Finds frames in a stream that comes in any portions.
@@ -107,10 +130,13 @@ class EnvelopeReader:
         Syncs followed by a bad length or a wrong CRC.
     skipped : int
         Bytes that belong to no good envelope.
+    between : bytes
+        Those of the last portion. On USB they are text: see `is_text`.
     """
 
     failed: int = 0
     skipped: int = 0
+    between: bytes = b""
     _held: bytearray = field(default_factory=bytearray)
 
     @property
@@ -138,5 +164,6 @@ class EnvelopeReader:
         ]
         self.failed += found.failed
         self.skipped += found.skipped
+        self.between = _between(held, found) if found.skipped else b""
         del held[: found.pending_from]
         return frames

@@ -19,7 +19,14 @@ from numpy.typing import NDArray
 from host.errors import LogError
 from host.wire.blocks import MAGIC, Blocks, Progress
 from host.wire.frames import FrameSet, Piece
-from host.wire.framing import HEAD_BYTES, LONGEST_FRAME, SCHEMA_HASH_ID, TAIL_BYTES, find_envelopes
+from host.wire.framing import (
+    HEAD_BYTES,
+    LONGEST_FRAME,
+    SCHEMA_HASH_ID,
+    TAIL_BYTES,
+    find_envelopes,
+    is_text,
+)
 from host.wire.schema import Schema
 from host.wire.schema_text import known_schemas, parse_schema
 from host.wire.store import FrameStore
@@ -47,7 +54,8 @@ class Stream:
         One per frame that is used, in the order of arrival: `position` is that of its envelope,
         `used` the length of the frame, `session` a number for each run of the Mega's clock.
     bad : list of (int, int)
-        Byte ranges in no good envelope; not the beginning of an envelope at the end.
+        Byte ranges in no good envelope; not the beginning of an envelope at the end, nor the
+        status lines that USB has between envelopes.
     failed : int
         Syncs followed by a bad length or a wrong CRC.
     repeated : NDArray[np.int64]
@@ -127,7 +135,7 @@ def read_stream(path: Path, *, texts: Collection[bytes] = (), limit_bytes: int =
     return Stream(
         data=data,
         blocks=blocks,
-        bad=_bad(place, length, len(data)),
+        bad=[(a, b) for a, b in _bad(place, length, len(data)) if not is_text(data[a:b])],
         failed=failed,
         repeated=place[again],
         unfit=place[(~fits & (kind != SCHEMA_HASH_ID)) | astray],
