@@ -2,21 +2,26 @@
 own logs with vanes.
 
 Each flight of the card `demo` is flown once with all tolerances drawn, in calm air or in gusts. Its
-own log has vanes; the log that a PX4 plane would have written has none.
+own log has vanes; the log that a PX4 plane would have written has none. One row a number goes to a
+file that a later run continues.
 """
 
 from __future__ import annotations
 
+import argparse
+import sys
 import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
+from host.arrays import Array
+from host.compiled import prefer_machine_code
+from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.identification_error import IdentificationError
-from host.sysid.pipeline.aircraft_data import aircraft_data
-from host.sysid.pipeline.flight_preparation import prepare
-from host.sysid.pipeline.reading_options import ReadingOptions
+from host.sysid.pipeline.identification import Identification
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
 from host.twin.outcome.ideal import true_table
@@ -25,8 +30,10 @@ from host.twin.testcard.cards import load
 
 import host
 from studies.imported_logs import AIRCRAFT, MODELS, own_log, truth
+from studies.stored_rows import Row, flown_rows
 
-FIRST_SEED = 420  # 400 and 401 were looked at while the reconstruction was written
+FIRST_SEED = 440  # 400, 401 and 420-425 were looked at
+WITH_VANES = 6  # flights of each cell whose own log is identified too
 TURBULENCE_MPS = (0.0, 0.5)
 SETTLED_S = 5.0  # behind the launch
 # The coefficient of each row and the derivative whose mark it has.
@@ -34,140 +41,161 @@ TWIN = {
     "CL_alpha": "Z_alpha", "Cm_alpha": "M_alpha", "Cm_q": "M_q", "Cm_de": "M_de", "Cl_p": "L_p",
     "Cl_da": "L_da", "Cn_beta": "N_beta", "Cn_r": "N_r", "Cn_dr": "N_dr",
 }  # fmt: skip
+ANGLES = {"alpha": 1, "beta": 2}  # and the axis that the IMU's tilt turns them about
+# Of an angle: rms, mean and told deviation of its error, tilt of the IMU, deg.
+COLUMNS = (
+    "seed", "turbulence_mps", "name", "true", "estimate", "half_width", "mark", "with_vanes",
+    "rms_deg", "mean_deg", "told_deg", "tilt_deg",
+)  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Angle:
-    """One reconstructed angle of a flight: error against the air, and what was told, deg."""
-
-    turbulence_mps: float
-    seed: int
-    name: str
-    rms_deg: float
-    mean_deg: float
-    told_deg: float
-
-
-@dataclass(frozen=True, slots=True)
-class Told:
-    """One coefficient of a flight without vanes, and its half-width with them (NaN: not told)."""
-
-    turbulence_mps: float
-    seed: int
-    name: str
-    true: float
-    value: float
-    half_width: float
-    mark: str
-    with_vanes: float
-
-    @property
-    def held(self) -> bool:
-        """Whether the interval holds the truth."""
-        return abs(self.value - self.true) <= self.half_width
-
-
-def study(turbulence_mps: float, seeds: range) -> Iterator[Angle | Told]:
-    """Fly, hide the vanes, reconstruct and identify."""
+def rows_of(seed: int, turbulence_mps: float, *, beside: bool = False) -> Iterator[Row]:
+    """Fly, hide the vanes, reconstruct and identify; `beside` identifies the own log too."""
     card = load("demo")
     card = replace(card, air=replace(card.air, turbulence_mps=turbulence_mps))
-    for seed in seeds:
-        record = fly(card, seed=seed)
-        data = air_data(record)
-        with tempfile.TemporaryDirectory() as folder:
-            stem = Path(folder) / "flight"
+    record = fly(card, seed=seed)
+    data = air_data(record)
+    key: dict[str, object] = {"seed": seed, "turbulence_mps": turbulence_mps}
+    with tempfile.TemporaryDirectory() as folder:
+        stem = Path(folder) / "flight"
+        path = write_autopilot_log("ulog", record, data, stem, airframe="conventional")
+        try:
+            found = host.identify(path, aircraft=AIRCRAFT, models=MODELS)
+        except IdentificationError as error:
+            yield {**key, "name": "refused", "mark": str(error)[:80]}
+            return
+        vanes = {}
+        if beside:
             own, by = own_log(record, data, stem)
-            path = write_autopilot_log("ulog", record, data, stem, airframe="conventional")
-            yield from _angles(turbulence_mps, record, data, path)
-            yield from _told(turbulence_mps, seed, truth(record, data), path, own, by)
+            answer = host.identify(own, aircraft=AIRCRAFT, models=MODELS, calibration=by)
+            vanes = _half_widths(answer)
+    yield from ({**key, **row} for row in _angles(record, data, found))
+    yield from ({**key, **row} for row in _told(truth(record, data), found, vanes))
 
 
-def _angles(
-    turbulence_mps: float, record: FlightRecord, data: AirData, path: Path
-) -> Iterator[Angle]:
-    prepared = prepare(path, ReadingOptions(), aircraft_data(AIRCRAFT))
-    if prepared.angles is None:
+def _angles(record: FlightRecord, data: AirData, found: Identification) -> Iterator[Row]:
+    [flight] = found.flights
+    if flight.angles is None:
         return
-    true, t = true_table(record, data), prepared.flight.corrected["t_s"]
+    true, t = true_table(record, data), flight.corrected["t_s"]
     begin = record.card.flight.ground_s + SETTLED_S
     aloft = (t > begin) & (t < float(true["t_s"].iloc[-1]) - 1.0)
-    for name in ("alpha", "beta"):
-        found = getattr(prepared.angles, f"{name}_rad")
-        error = np.degrees(found - np.interp(t, true["t_s"], true[f"{name}_rad"]))[aloft]
-        told = np.degrees(getattr(prepared.angles, f"{name}_sd_rad"))
-        yield Angle(turbulence_mps, record.seed, name, float(np.sqrt(np.mean(error**2))),
-                    float(error.mean()), float(told))  # fmt: skip
+    tilt = np.degrees(record.draws.vector("misalignment_rad"))
+    for name, axis in ANGLES.items():
+        angle = getattr(flight.angles, f"{name}_rad")
+        error = np.degrees(angle - np.interp(t, true["t_s"], true[f"{name}_rad"]))[aloft]
+        yield {
+            "name": name, "rms_deg": float(np.sqrt(np.mean(error**2))),
+            "mean_deg": float(error.mean()),
+            "told_deg": float(np.degrees(getattr(flight.angles, f"{name}_sd_rad"))),
+            "tilt_deg": float(tilt[axis]),
+        }  # fmt: skip
 
 
-def _told(
-    turbulence_mps: float, seed: int, true: dict[str, float], path: Path, own: Path, by: Path
-) -> Iterator[Told]:
-    try:
-        table = host.identify(path, aircraft=AIRCRAFT, models=MODELS).table
-        beside = host.identify(own, aircraft=AIRCRAFT, models=MODELS, calibration=by).table
-    except IdentificationError:
-        return
-    flat, with_vanes = (t.reset_index().set_index("name") for t in (table, beside))
-    for name, value in true.items():
-        if name in flat.index:
-            estimate, half_width = (float(flat[k].to_dict()[name]) for k in ("value", "half_width"))
-            width = float(with_vanes["half_width"].to_dict().get(name, np.nan))
-            mark = str(flat["verdict"].to_dict()[TWIN[name]])
-            yield Told(turbulence_mps, seed, name, value, estimate, half_width, mark, width)
+def _told(true: dict[str, float], found: Identification, vanes: dict[str, float]) -> Iterator[Row]:
+    flat = found.table.reset_index().set_index("name")
+    marks, value = flat["verdict"].to_dict(), flat["value"].to_dict()
+    half = _half_widths(found)
+    for name, expected in true.items():
+        if name in half:
+            yield {
+                "name": name, "true": expected, "estimate": value[name], "half_width": half[name],
+                "mark": marks[TWIN[name]], "with_vanes": vanes.get(name, ""),
+            }  # fmt: skip
 
 
-def angle_rows(found: list[Angle]) -> list[tuple[float | str, ...]]:
-    """Return for each turbulence and angle: median and worst rms, rms about the mean, told sd."""
-    keys = dict.fromkeys((a.turbulence_mps, a.name) for a in found)
-    rows: list[tuple[float | str, ...]] = []
-    for turbulence, name in keys:
-        mine = [a for a in found if (a.turbulence_mps, a.name) == (turbulence, name)]
-        rms, mean = np.array([a.rms_deg for a in mine]), np.array([a.mean_deg for a in mine])
-        rows.append((
-            turbulence, name, float(np.median(rms)), float(rms.max()),
-            float(np.median(np.sqrt(rms**2 - mean**2))),
-            float(np.median([a.told_deg for a in mine])),
-        ))  # fmt: skip
-    return rows
+def _half_widths(found: Identification) -> dict[str, float]:
+    flat = found.table.reset_index().set_index("name")
+    return {str(name): float(half) for name, half in flat["half_width"].to_dict().items()}
 
 
-def coefficient_rows(found: list[Told]) -> list[tuple[float | str, ...]]:
-    """Return for each turbulence and coefficient: held, of, width over that with vanes, estimate
-    over truth, and how many are under "trust" or "use with care"."""
-    keys = dict.fromkeys((t.turbulence_mps, t.name) for t in found)
-    rows: list[tuple[float | str, ...]] = []
-    for turbulence, name in keys:
-        mine = [t for t in found if (t.turbulence_mps, t.name) == (turbulence, name)]
-        rows.append((
-            turbulence, name, sum(t.held for t in mine), len(mine),
-            float(np.median([t.half_width / t.with_vanes for t in mine])),
-            float(np.median([t.half_width / abs(t.true) for t in mine])),
-            float(np.median([t.value / t.true for t in mine])),
-            sum(t.mark in ("trust", "use with care") for t in mine),
-        ))  # fmt: skip
-    return rows
-
-
-def main(flights: int = 6) -> int:
-    """Print both tables."""
-    found = [
-        one
-        for turbulence in TURBULENCE_MPS
-        for one in study(turbulence, range(FIRST_SEED, FIRST_SEED + flights))
+def table(rows: Sequence[dict[str, str]]) -> list[str]:
+    """Return the lines of both tables, and what all intervals of a cell come to."""
+    lines = [
+        "| gusts m/s | angle | median rms deg | worst | about its mean | less the IMU's tilt"
+        " | told sd |"
     ]
-    angles = angle_rows([a for a in found if isinstance(a, Angle)])
-    print("| gusts m/s | angle | median rms deg | worst | about its mean | told sd |")
-    for row in angles:
-        print("|", " | ".join(x if isinstance(x, str) else f"{x:.2f}" for x in row), "|")
-    told = [t for t in found if isinstance(t, Told)]
-    print("| gusts m/s | | held | of | width over vanes' | width | over truth | not doubtful |")
-    for row in coefficient_rows(told):
-        print("|", " | ".join(x if isinstance(x, str) else f"{x:.3g}" for x in row), "|")
-    for turbulence in TURBULENCE_MPS:
-        mine = [t for t in told if t.turbulence_mps == turbulence]
-        print(f"{turbulence:g} m/s: {sum(t.held for t in mine)} of {len(mine)} held")
+    cells = [[r for r in rows if float(r["turbulence_mps"]) == t] for t in TURBULENCE_MPS]
+    for turbulence, (cell, name) in zip(
+        np.repeat(TURBULENCE_MPS, len(ANGLES)), product(cells, ANGLES), strict=True
+    ):
+        if own := [r for r in cell if r["name"] == name]:
+            numbers = " | ".join(f"{x:.2f}" for x in _angle_numbers(own))
+            lines.append(f"| {turbulence:g} | {name} | {numbers} |")
+    lines.append(
+        "| gusts m/s | | held | width over vanes' | width % | over rms error | mean error %"
+        " | not doubtful |"
+    )
+    for turbulence, cell in zip(TURBULENCE_MPS, cells, strict=True):
+        held = total = sure = 0
+        for name in TWIN:
+            if not (own := [r for r in cell if r["name"] == name]):
+                continue
+            error, half, within = _errors(own)
+            marked = [r["mark"] in (TRUSTED, CAREFUL) for r in own]
+            both = [r for r in own if r["with_vanes"]]
+            ratio = [float(r["half_width"]) / float(r["with_vanes"]) for r in both]
+            rms = float(np.sqrt(np.mean(error**2)))
+            lines.append(
+                f"| {turbulence:g} | {name} | {int(within.sum())} of {len(own)}"
+                f" | {np.median(ratio) if ratio else np.nan:.1f} | {np.median(half):.1f}"
+                f" | {np.median(half) / rms:.1f} | {error.mean():+.1f} | {sum(marked)} |"
+            )
+            held, total, sure = held + int(within.sum()), total + len(own), sure + sum(marked)
+        refused = sum(r["name"] == "refused" for r in cell)
+        wide = sum(
+            r["mark"] == TRUSTED and float(r["half_width"]) > 0.1 * abs(float(r["estimate"]))
+            for r in cell
+            if r["name"] in TWIN
+        )
+        if total:
+            lines.append(
+                f"{turbulence:g} m/s: {held} of {total} hold ({100.0 * held / total:.1f} %),"
+                f" {sure} not doubtful ({100.0 * sure / total:.0f} %), {refused} flights refused,"
+                f" {wide} under trust though the coefficient is wider than 10 %"
+            )
+    return lines
+
+
+def _angle_numbers(own: Sequence[dict[str, str]]) -> tuple[float, ...]:
+    rms, mean, told, tilt = (
+        np.array([float(r[f"{k}_deg"]) for r in own]) for k in ("rms", "mean", "told", "tilt")
+    )
+    about = np.sqrt(np.maximum(rms**2 - mean**2, 0.0))
+    # The tilt turns alpha and beta against the air by as much, of opposite sign laterally.
+    level = np.sqrt(about**2 + np.minimum(np.abs(mean - tilt), np.abs(mean + tilt)) ** 2)
+    return (
+        float(np.median(rms)), float(rms.max()), float(np.median(about)),
+        float(np.median(level)), float(np.median(told)),
+    )  # fmt: skip
+
+
+def _errors(own: Sequence[dict[str, str]]) -> tuple[Array, Array, Array]:
+    """Return errors and half-widths in percent of the truth, and which hold."""
+    true, value, half = (
+        np.array([float(r[k]) for r in own]) for k in ("true", "estimate", "half_width")
+    )
+    scale = 100.0 / np.abs(true)
+    return (value - true) * scale, half * scale, np.abs(value - true) <= half
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Fly what is not in the file yet, then print both tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--flights", type=int, default=6, help="of each cell (the page: 50)")
+    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
+    parser.add_argument("--rows", type=Path, default=Path("../build/study/no_vanes.csv"))
+    options = parser.parse_args(arguments)
+    prefer_machine_code()
+    seeds = range(options.first, options.first + options.flights)
+
+    def both(seed: int, turbulence_mps: float) -> Iterator[Row]:
+        return rows_of(seed, turbulence_mps, beside=seed < options.first + WITH_VANES)
+
+    rows = flown_rows(options.rows, COLUMNS, product(seeds, TURBULENCE_MPS), both)
+    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
     return 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    sys.exit(main())

@@ -1,10 +1,14 @@
 """Departures from the linear model: coefficients hold while airspeed and attitude vary."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from host.sysid import Maneuver, fit
 from host.sysid.aerodynamics.varying_airspeed import VaryingModel
 from host.sysid.identification_error import IdentificationError
+from host.sysid.models.state_space_model import without_outputs
+from host.sysid.models.templates import Trim, template
 from studies.gusts import AXES, DT_S, gusty_aircraft
 from studies.nonlinear_gusts import NonlinearFlight, fly_nonlinear, varying
 from studies.turbulence import fit_both, nonlinear_setup
@@ -39,6 +43,23 @@ def test_coefficients_of_a_flight_that_changes_speed_come_back(
         errors.append(np.abs(found / truth - 1.0))
     assert np.all(errors[1] < 0.08)
     assert np.max(errors[0]) > 3.0 * np.max(errors[1])
+
+
+def test_a_short_period_without_a_vane_is_explained_while_airspeed_varies() -> None:
+    """As of an autopilot's log: az has the lift that airspeed makes, and no state says so."""
+    flight = fly_nonlinear("longitudinal", 0.0, [3], with_pilot=False)[0]
+    c = flight.columns
+    trim = Trim(flight.airspeed_mps, float(c["alpha_rad"].mean()), float(c["theta_rad"].mean()))
+    base = without_outputs(template("short-period", trim), ("alpha_rad",))
+    base = replace(base, output_biases=("q_radps",))
+    wide = VaryingModel(base, "short-period", trim, None)
+    departed = wide.maneuver(c, DT_S)
+    plain = replace(departed, inputs=departed.inputs[:, :1])
+    left = []
+    for model, maneuver in ((base, plain), (wide.model, departed)):
+        residuals = fit("output-error-white", model, [maneuver]).residuals[0]
+        left.append(np.std(residuals, axis=0) / np.std(maneuver.outputs, axis=0))
+    assert np.all(left[1] < np.array([0.6, 0.2]) * left[0])  # q, az
 
 
 def test_departures_vanish_at_the_trim() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.sysid.answer.json_document import answer_document
 from host.sysid.answer.marks import CAREFUL, TRUSTED
-from host.sysid.answer.trust_rules import Evidence
+from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, driven_by_inputs
 from host.sysid.answer.verdict import verdict_lines, verdict_of
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.linear_estimator import Answer, identify
@@ -98,6 +98,10 @@ def test_what_inputs_drive_beside_the_model_is_no_noise() -> None:
     assert "q_radps" in answer.coherence.coherent
     assert not relied_on(answer) & {"M_alpha", "M_q", "M_de"}
     assert any("the inputs drive what the fit leaves" in w for w in answer.result.warnings)
+    # Of an output that is explained to a percent it is little, and widening answers for it.
+    little = replace(answer, fits=tuple(replace(f, nrmse=0.01) for f in answer.fits))
+    assert not driven_by_inputs(little, NO_EVIDENCE)
+    assert driven_by_inputs(answer, NO_EVIDENCE)
 
 
 def test_an_estimate_on_its_bound_is_not_relied_on(flight: LinearFlight) -> None:

@@ -73,7 +73,7 @@ def _errors_deg(found: FlowAngles, t: np.ndarray) -> dict[str, np.ndarray]:
 
 def test_angles_are_those_of_the_air(prepared: PreparedFlight) -> None:
     """In gusts of 0.2 m/s (0.7 deg): within the figure of the study, and within what is told."""
-    found = prepared.angles
+    found = prepared.flight.angles
     assert found is not None
     agreement = prepared.agreement
     assert agreement is not None

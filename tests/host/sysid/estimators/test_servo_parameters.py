@@ -39,7 +39,9 @@ def _command() -> Array:
     return u
 
 
-def _found(shift_s: float, prior: ServoPrior) -> tuple[ServoEstimate, FitResult]:
+def _found(
+    shift_s: float, prior: ServoPrior, noise_radps: float = 0.003
+) -> tuple[ServoEstimate, FitResult]:
     """Return servos and fit of a flight whose commands are `shift_s` earlier than they were."""
     model = template("short-period", Trim(17.0), accelerometers=False)
     model = replace(model, delays=())
@@ -50,7 +52,7 @@ def _found(shift_s: float, prior: ServoPrior) -> tuple[ServoEstimate, FitResult]
     problem = OutputProblem(model, [flown])
     outputs = problem.outputs(np.array([TRUE.get(n, 0.0) for n in problem.names]))
     assert outputs is not None
-    noise = np.random.default_rng(7).normal(0.0, 0.003, (len(T), len(model.outputs)))
+    noise = np.random.default_rng(7).normal(0.0, noise_radps, (len(T), len(model.outputs)))
     y = outputs[0].T + noise
     early = np.interp(T + shift_s, T, command)
 
@@ -89,6 +91,12 @@ def test_a_prior_that_knows_the_servo_is_held_to() -> None:
     """A delay known to 3 ms is not looked for at 50."""
     servo, _ = _found(0.0, ServoPrior((0.05, 8.0, 5.2), (0.003, 0.4, 0.5)))
     assert abs(servo.setting[0] - 0.05) < 0.006
+
+
+def test_in_calm_air_the_delay_is_told_to_a_millisecond() -> None:
+    """Noise of 0.02 mrad/s: a parabola over 12 ms is not that of the likelihood."""
+    servo, _ = _found(0.0, ServoPrior((0.047, 8.0, 5.2), (0.0125, 0.4, 0.5)), 2e-5)
+    assert servo.setting[0] == pytest.approx(LATE[0], abs=1e-3)
 
 
 def test_a_servo_that_is_not_estimated_is_carried() -> None:

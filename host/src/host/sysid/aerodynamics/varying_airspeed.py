@@ -34,8 +34,9 @@ MEASURED = (
 SMOOTH_S = 0.1  # of airspeed: its noise would multiply every term
 # Second-order terms with a parameter of their own: name, row, factors. Drag is a parabola in lift;
 # dihedral, roll by yawing and yaw by rolling follow lift, so the angle of attack.
-SECOND_ORDER_TERMS = {
+SECOND_ORDER_TERMS: dict[str, tuple[tuple[str, str, str], ...]] = {
     "longitudinal": (("D_alpha_alpha", "airspeed_mps", "alpha_rad"),),
+    "short-period": (),
     "lateral": (
         ("L_beta_alpha", "p_radps", "beta_rad"),
         ("L_r_alpha", "p_radps", "r_radps"),
@@ -47,10 +48,15 @@ SECOND_ORDER_TERMS = {
 # what holds against it in trim does (left out, Cn_r is 4 % off in still air).
 AIRSPEED_TERMS: dict[str, tuple[tuple[str, str], ...]] = {
     "longitudinal": (),
+    "short-period": (),
     "lateral": (("Y_V", "beta_rad"), ("L_V", "p_radps"), ("N_V", "r_radps")),
 }
 # States in whose equations a gust that turns with the aircraft appears.
-GUST_TURNING_STATES = {"longitudinal": ("airspeed_mps", "alpha_rad"), "lateral": ("beta_rad",)}
+GUST_TURNING_STATES = {
+    "longitudinal": ("airspeed_mps", "alpha_rad"),
+    "short-period": ("alpha_rad",),
+    "lateral": ("beta_rad",),
+}
 # Prior mean and deviation of `gust_turns`: 1 if gusts turn with the aircraft, 0 if they stay with
 # the ground.
 GUST_TURNS_PRIOR = (0.5, 0.5)
@@ -261,7 +267,8 @@ class VaryingModel:
         gz = GRAVITY_MPS2 * np.cos(theta) * np.cos(phi)
         # The linear model has the lift of its trim by V^2; this maneuver's turns the path by V.
         ratio = airspeed / self.trim.airspeed_mps
-        lift = (np.mean((az * ca - ax * sa) / ratio**2) - 2.0 * self._trim_lift) * (ratio - 1.0)
+        own = np.mean((az * ca - ax * sa) / ratio**2)
+        lift = (own - 2.0 * self._lift_by_airspeed) * (ratio - 1.0)
         turning = q * np.sin(phi) + r * np.cos(phi)
         return {
             "airspeed_mps": (gx * ca + gz * sa) * cb + gy * sb,
@@ -281,6 +288,11 @@ class VaryingModel:
     def _trim_lift(self) -> float:
         """Specific force normal to the path in the steady flight that the template is about."""
         return -GRAVITY_MPS2 * float(np.cos(self.trim.theta_rad - self.trim.alpha_rad))
+
+    @property
+    def _lift_by_airspeed(self) -> float:
+        """Return the lift whose change by airspeed the template has: none without that state."""
+        return self._trim_lift if "airspeed_mps" in self.base.states else 0.0
 
     def _inertial(self, p: Array, q: Array, r: Array) -> dict[str, Array]:
         """Return angular accelerations that rates and the rotor make."""
@@ -314,7 +326,7 @@ class VaryingModel:
         }
         # A maneuver flown faster than the trim has its lift by less angle of attack, and so less of
         # it by airspeed; left out, az had 5 times its noise along the inputs in calm air.
-        own = np.mean(normal / ratio**2) - self._trim_lift
+        own = np.mean(normal / ratio**2) - self._lift_by_airspeed
         by_airspeed = {"ax_mps2": -2.0 * own * sine, "az_mps2": 2.0 * own * cosine}
         return [
             (ratio - 1.0) ** 2 * np.mean(columns[y])

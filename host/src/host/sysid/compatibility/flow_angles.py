@@ -10,7 +10,7 @@ Identification, ch. 10). The coefficients are told by what the controls move, gu
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,6 +81,11 @@ class FlowAngles:
     alpha_scale_sd: float
     beta_scale_sd: float
     gust_rad: tuple[float, float]
+
+    def hidden(self, columns: Collection[str]) -> dict[str, Array]:
+        """Return those that are not among the columns."""
+        found = {"alpha_rad": self.alpha_rad, "beta_rad": self.beta_rad}
+        return {name: values for name, values in found.items() if name not in columns}
 
     def line(self) -> str:
         """Return what an answer says of them."""

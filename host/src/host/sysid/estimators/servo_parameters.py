@@ -30,7 +30,9 @@ SERVO = (DELAY, "servo_bandwidth_hz", "servo_rate_limit_radps")
 LEAST, MOST = (-0.15, 0.3, 0.2), (0.5, 60.0, 60.0)  # a delay, a bandwidth, a rate that can be
 WIDE_DELAY_S = 0.02  # one deviation: above it the search begins with delays far apart
 SCAN_S = np.arange(-0.08, 0.241, 0.04)
-FINE_S = 0.01  # between the delays about the best
+FINE_S = 0.01  # between the delays about the best, at first
+STEP_SHRINKS = 5.0
+SHORT_STEPS, LEAST_STEP_S = 4.0, 3e-3  # deviations of the delay that the parabola may span
 STILL = 1e-4  # of the motion of the surface: what moves it by less moves nothing
 TOLD = 0.7  # of the prior's deviation: below it the data say it
 ALIKE = 0.9  # correlation of a derivative with the servo: they cannot be told apart
@@ -169,26 +171,42 @@ def estimate_servo(
         profile.ask([coarse.best])
     else:
         profile.ask([prior.mean[0]])
-    for _ in range(8):
-        best = profile.best
-        profile.ask([best - step, best + step])
-        if profile.best == best:
-            break
-    below, above = round(best - step, 5), round(best + step, 5)
-    if below not in profile.costs or above not in profile.costs:
-        raise IdentificationError("the fit does not come about beside the best delay")
-    low, least, high = (profile.costs[d] for d in (below, best, above))
-    curvature = max((low - 2.0 * least + high) / step**2, prior.sd[0] ** -2)
-    delay = float(np.clip(best - 0.5 * (high - low) / step / curvature, below, above))
+    delay, best, step, curvature = _least(profile, step)
     at = profile.fits[best]
     sd = min(_colour(at) / float(np.sqrt(curvature)), prior.sd[0])
     count = len(model.parameters)
-    apart = profile.fits[above].estimate[:count] - profile.fits[below].estimate[:count]
+    below, above = (profile.fits[round(best + d, 5)] for d in (-step, step))
+    apart = above.estimate[:count] - below.estimate[:count]
     slope = apart / (2.0 * step)
     shifts = [np.append(slope * sd, sd)]
     for k in (1, 2):
         shifts += _carried(profile, best, k, count)
     return _estimate(model, tuple(commanded), delay, prior, at, np.stack(shifts))
+
+
+def _least(profile: _Profile, step: float) -> tuple[float, float, float, float]:
+    """Return the delay of the least cost by a parabola, the delay asked next to it, the step, and
+    the curvature.
+
+    The step shrinks until the parabola is no wider than what it tells: in calm air one over
+    steps of 13 ms was 8 ms off, by five of its half-widths.
+    """
+    while True:
+        for _ in range(8):
+            best = profile.best
+            profile.ask([best - step, best + step])
+            if profile.best == best:
+                break
+        below, above = round(best - step, 5), round(best + step, 5)
+        if below not in profile.costs or above not in profile.costs:
+            raise IdentificationError("the fit does not come about beside the best delay")
+        low, least, high = (profile.costs[d] for d in (below, best, above))
+        curvature = max((low - 2.0 * least + high) / step**2, profile.prior.sd[0] ** -2)
+        delay = float(np.clip(best - 0.5 * (high - low) / step / curvature, below, above))
+        if step <= max(SHORT_STEPS * curvature**-0.5, LEAST_STEP_S):
+            return delay, best, step, curvature
+        profile.ask([delay])
+        step /= STEP_SHRINKS
 
 
 def _cost(found: FitResult) -> float:

@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Sequence
 from dataclasses import replace
 
+from host.arrays import Array
 from host.sysid.compatibility.servo_response import behind_servos
 from host.sysid.estimators.filter_error_gust import fit_gust_state
 from host.sysid.estimators.method_registry import fit
@@ -16,6 +17,7 @@ from host.sysid.estimators.servo_parameters import (
     estimate_servo,
 )
 from host.sysid.estimators.start_values import start_values_of
+from host.sysid.flight.first_departures import without
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
@@ -24,7 +26,10 @@ from host.sysid.models.state_space_model import LinearModel
 
 
 def servo_of(
-    model: LinearModel, used: Sequence[FlownManeuver], airspeed_mps: float | None
+    model: LinearModel,
+    used: Sequence[FlownManeuver],
+    airspeed_mps: float | None,
+    departed: Sequence[Array],
 ) -> tuple[ServoEstimate | None, str]:
     """Return the servos of the commanded inputs of a model, and a remark; None without any.
 
@@ -37,6 +42,8 @@ def servo_of(
         Those of the fit.
     airspeed_mps : float or None
         Of the trim where the gust is a state; None: output error.
+    departed : sequence of Array
+        What departures from the trim do to the outputs of each maneuver: without them.
     """
     flights = {id(m.flight): m.flight for m in used}.values()
     commands = {u for f in flights for u in f.commands if f.servo is not None}
@@ -53,7 +60,7 @@ def servo_of(
     )
 
     def behind(values: tuple[float, float, float]) -> list[Maneuver]:
-        return [m.cut(plain) for m in brought_behind(used, values)]
+        return without([m.cut(plain) for m in brought_behind(used, values)], departed)
 
     remark = ""
     if airspeed_mps is not None:

@@ -39,6 +39,7 @@ from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.filter_step import feels_roll, sensors_known, with_filter_step
+from host.sysid.flight.first_departures import first_departures, without
 from host.sysid.flight.free_simulation import (
     fits_of,
     free_responses,
@@ -276,14 +277,15 @@ class LinearEstimator:
             and trim.known
             and bool(set(model.states) & set(VANES))
         )
-        servo, remark = servo_of(model, used, trim.airspeed_mps if gusty else None)
+        departed = self._first_departures(model, used, trim)
+        servo, remark = servo_of(model, used, trim.airspeed_mps if gusty else None, departed)
         if servo is not None:
             remarks += (remark,) if remark else ()
             used, held = brought_behind(used, servo.setting), brought_behind(held, servo.setting)
         if method == GUST and self.own is None:
             used = with_filter_step(used, model)
         data = [m.cut(model) for m in used]
-        cuts = [m.inside() for m in used]
+        cuts, departing = [m.inside() for m in used], [m.departing() for m in used]
         delays: dict[str, tuple[float, float]] = {}
         fitted = None
         if gusty:
@@ -303,13 +305,17 @@ class LinearEstimator:
             calm: dict[str, object] = (
                 {"multiple_starts": False} if single.startswith("output-error") else {}
             )
-            found = fit(single, model, data, **{**calm, **self.options})
+            fitted = without(data, departed)
+            found = fit(single, model, fitted, **{**calm, **self.options})
+            both = list(zip(found.fitted, departed, strict=True))
+            if all(y.shape == gone.shape for y, gone in both):  # of frequencies they are others
+                found = replace(found, fitted=tuple(y + gone for y, gone in both))
         found = found if servo is None else servo.added_to(found)
         found = replace(found, warnings=(*remarks, *found.warnings))
         left = None
         if trim.known and self.own is None and found.residual_kind in FREE:
             left = correct_trim_departure(
-                found, data, cuts, self.airframe, trim, self.powerplant, fitted
+                found, data, departing, self.airframe, trim, self.powerplant, fitted
             )
         return LinearEstimate(
             template=self.template if self.own is None else model.name,
@@ -326,6 +332,22 @@ class LinearEstimator:
             delays=delays,
             servo=servo,
         )
+
+    def _first_departures(
+        self, model: LinearModel, used: Sequence[FlownManeuver], trim: Trim
+    ) -> list[Array]:
+        """Return them where an angle is hidden, else nothing: with vanes a filter finds them."""
+        hidden = any(m.flight.angles is not None for m in used)
+        bare = replace(model, delays=())
+
+        def departure_of(
+            rough: FitResult, data: Sequence[Maneuver], cuts: Sequence[Mapping[str, Array]]
+        ) -> Departure | None:
+            return correct_trim_departure(rough, data, cuts, self.airframe, trim, self.powerplant)
+
+        if not hidden or not trim.known or self.own is not None:
+            return [np.zeros_like(m.cut(bare).outputs) for m in used]
+        return first_departures(bare, used, departure_of)
 
     def _with_gust(
         self,
@@ -420,7 +442,7 @@ class LinearEstimator:
             held_out
             if e.departure is None
             else e.departure.removed_from_unseen(
-                held_out, [m.inside() for m in e.held_out], total.estimate
+                held_out, [m.departing() for m in e.held_out], total.estimate
             )
         )
         unseen = _simulated(frozen, held_out, at_trim)

@@ -17,6 +17,7 @@ from host.arrays import Array, BoolArray
 from host.instrument.deviations import SensorErrorModel
 from host.instrument.servo_prior import ServoPrior
 from host.near_names import like
+from host.sysid.compatibility.flow_angles import FlowAngles
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import (
@@ -59,6 +60,8 @@ class ReconstructedFlight:
         Surfaces that no pot measured, as commanded; their columns are behind usual servos.
     servo : ServoPrior or None
         Of these; None: not to be estimated.
+    angles : FlowAngles or None
+        Those that no vane measured, reconstructed: for products with airspeed and rates only.
     """
 
     source: str
@@ -72,6 +75,7 @@ class ReconstructedFlight:
     resolution: Mapping[str, float] = field(default_factory=dict)
     commands: Mapping[str, Array] = field(default_factory=dict)
     servo: ServoPrior | None = None
+    angles: FlowAngles | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,13 +96,21 @@ class FlownManeuver:
 
     def inside(self) -> dict[str, Array]:
         """Return all corrected columns of it, a moment of trim before the input included."""
+        return self._inside(self.flight.corrected)
+
+    def departing(self) -> dict[str, Array]:
+        """Return the same with the angles that no vane measured."""
+        columns, angles = self.flight.corrected, self.flight.angles
+        return self._inside(columns if angles is None else {**angles.hidden(columns), **columns})
+
+    def _inside(self, columns: Mapping[str, Array]) -> dict[str, Array]:
         t = self.flight.corrected["t_s"]
         first, last = self.found.fit_window()
         at = np.flatnonzero((t >= first) & (t <= last))
         at = at[: len(at) // self.block * self.block]
         return {
             name: values[at].reshape(-1, self.block).mean(axis=1) if self.block > 1 else values[at]
-            for name, values in self.flight.corrected.items()
+            for name, values in columns.items()
         }
 
     def cut(self, model: LinearModel) -> Maneuver:

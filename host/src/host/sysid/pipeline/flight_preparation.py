@@ -13,7 +13,7 @@ import numpy as np
 from host.instrument.deviations import unknown_sensors
 from host.instrument.error_labels import recording_notes
 from host.instrument.servo_prior import servo_prior
-from host.sysid.compatibility.flow_angles import FlowAngles, reconstruct_flow_angles
+from host.sysid.compatibility.flow_angles import reconstruct_flow_angles
 from host.sysid.compatibility.reconstruction import (
     Compatibility,
     NoAgreementError,
@@ -44,13 +44,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PreparedFlight:
-    """A flight ready for estimation, its data-compatibility check, notes, and without vanes the
-    angles that were reconstructed."""
+    """A flight ready for estimation, its data-compatibility check, and notes."""
 
     flight: ReconstructedFlight
     agreement: Compatibility | None
     notes: tuple[str, ...]
-    angles: FlowAngles | None = None
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -128,8 +126,9 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         delays_open=flight.delays_open and how.delays,
         commands=commands,
         servo=servo_prior(sensors) if commands and how.delays else None,
+        angles=angles,
     )
-    return PreparedFlight(flight, agreement, tuple(notes), angles)
+    return PreparedFlight(flight, agreement, tuple(notes))
 
 
 def listed_flights(flights: Source | Sequence[Source]) -> list[Source]:
