@@ -8,7 +8,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.sysid.estimators.hac_inflation import hac_inflation, inflation_lines
-from host.sysid.estimators.innovation_search import InnovationObjective, first_noise
+from host.sysid.estimators.innovation_search import InnovationObjective, first_noise, noise_floor
 from host.sysid.estimators.noise_model_comparison import compare_noise_models
 from host.sysid.estimators.start_values import start_values
 from host.sysid.identification_error import IdentificationError
@@ -28,7 +28,6 @@ from host.sysid.numerics.output_error import minimise
 
 MAX_ITERATIONS = 60
 NEAR_BOUNDS = 0.2  # Cramer-Rao bounds: a search that still creeps by so little has ended
-NOISE_FLOOR = 1e-3  # of an output's deviation, or of the first guess of process noise
 
 
 def fit_filter_error(
@@ -84,16 +83,7 @@ def fit_filter_error(
         if noise is None
         else np.concatenate([first, noise])
     )
-    output_sd = np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
-    # Noise that the data do not show would decrease for ever, and the search would not end.
-    # The step of the numbers is noise of step^2 / 12 in any case.
-    steps = [m.resolution for m in maneuvers if m.resolution is not None]
-    if steps:
-        least_sd = np.max(steps, axis=0) / np.sqrt(12.0) / NOISE_FLOOR
-        output_sd = np.maximum(output_sd, least_sd)
-    floor = np.log(NOISE_FLOOR) + np.concatenate(
-        [theta[problem.n_model : problem.n_model + len(process)], np.log(output_sd)]
-    )
+    floor = noise_floor(maneuvers, theta[problem.n_model : problem.n_model + len(process)])
     objective = _FilterError(problem, floor)
     ends = {"step_limit": NEAR_BOUNDS} if roughly else {}
     found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS, **ends)

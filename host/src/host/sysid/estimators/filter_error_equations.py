@@ -12,8 +12,8 @@ import numpy as np
 from host.arrays import Array
 from host.compiled import has_compiler
 from host.extras import install_hint
-from host.sysid.estimators.filter_error import MAX_ITERATIONS, NOISE_FLOOR
-from host.sysid.estimators.innovation_search import InnovationObjective, first_noise
+from host.sysid.estimators.filter_error import MAX_ITERATIONS
+from host.sysid.estimators.innovation_search import InnovationObjective, first_noise, noise_floor
 from host.sysid.estimators.noise_model_comparison import compare_noise_models
 from host.sysid.estimators.output_error_fit import fit_output_error
 from host.sysid.identification_error import IdentificationError
@@ -72,14 +72,8 @@ def fit_equation_filter_error(
     A, _, C, _ = first.model.matrices(first.estimate)
     driven = first_noise(A, C, problem.process_index, deviation)
     theta = np.concatenate([first.estimate, driven])
-    spread = np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
-    steps = [m.resolution for m in maneuvers if m.resolution is not None]
-    if steps:
-        spread = np.maximum(spread, np.max(steps, axis=0) / np.sqrt(12.0) / NOISE_FLOOR)
     count = len(problem.process)
-    floor = np.log(NOISE_FLOOR) + np.concatenate(
-        [theta[problem.n_model : problem.n_model + count], np.log(spread)]
-    )
+    floor = noise_floor(maneuvers, theta[problem.n_model : problem.n_model + count])
     objective = _EquationFilterError(problem, floor)
     found = gauss_newton(objective, theta, max_iterations=MAX_ITERATIONS)
     if found is None:

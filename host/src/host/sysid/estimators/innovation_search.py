@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array, BoolArray
+from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.filter_scoring import total_information
 from host.sysid.numerics.gauss_newton import Objective, StepLine, Trial, free_of_bounds
 from host.sysid.numerics.output_error_problem import OutputProblem
@@ -25,6 +26,7 @@ VARIANCE_CHANGE = (0.01, 100.0)  # times what it was: most of one step
 # With too small a guess of process noise the gain is too small, and the search ends elsewhere.
 NOISE_SHARE, PROCESS_SHARE = 0.6, 2.7
 LARGEST_HIDDEN = 0.1  # rad, rad/s or m/s: largest first guess for states without an output
+NOISE_FLOOR = 1e-3  # of an output's deviation, or of the first guess of process noise
 SLOWEST_DECAY_RADPS = 0.1  # rad/s, of a state that process noise drives
 
 
@@ -45,6 +47,25 @@ def first_noise(A: Array, C: Array, driven: Sequence[int], deviation: Array) -> 
         size = float(np.min(deviation / np.maximum(np.abs(C[:, i]), 1e-9), initial=LARGEST_HIDDEN))
         process.append(PROCESS_SHARE * size * np.sqrt(2.0 * max(-A[i, i], SLOWEST_DECAY_RADPS)))
     return np.concatenate([np.log(process), np.log(NOISE_SHARE * deviation)])
+
+
+def noise_floor(maneuvers: Sequence[Maneuver], process: Array) -> Array:
+    """Return the least logarithms of process and measurement deviations.
+
+    Noise that the data do not show would decrease for ever, and the search would not end. The step
+    of the numbers is noise of step^2 / 12 in any case.
+
+    Parameters
+    ----------
+    maneuvers : sequence of Maneuver
+    process : Array
+        First guess of the logarithms of the process deviations.
+    """
+    spread = np.maximum(np.std(np.vstack([m.outputs for m in maneuvers]), axis=0), 1e-9)
+    steps = [m.resolution for m in maneuvers if m.resolution is not None]
+    if steps:
+        spread = np.maximum(spread, np.max(steps, axis=0) / np.sqrt(12.0) / NOISE_FLOOR)
+    return np.asarray(np.log(NOISE_FLOOR) + np.concatenate([process, np.log(spread)]))
 
 
 class InnovationObjective(Objective[Trial]):
