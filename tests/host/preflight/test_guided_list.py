@@ -86,6 +86,28 @@ def test_usb_says_why_a_card_is_not_ready(card: str, ready: bool, said: str) -> 
     assert found["baro"]["static_pressure"] == 98000.0
 
 
+def test_over_usb_the_status_line_stands_for_the_slower_frames() -> None:
+    """Channels in envelopes and a line a second between them, as USB brings them."""
+    walk = ground_walk(aircraft(), 9454)
+    frames = ground_frames(walk)
+    frames.slow = {name: rows[:0] for name, rows in frames.slow.items()}
+    frames.kept[:] = True
+    line = (STATUS.format(card="full") + "\r\n").encode()
+    stream = LiveStream(lines())
+    preflight = Preflight(Wanted(aircraft(), lines(), by_wire=True), stream)
+    rest = walk.windows[0][2]
+    for at, (_, data) in enumerate(frames.timed()):
+        stream.feed(data + (line if at % 20 == 19 else b""), 0.0)
+        if at > rest:
+            break
+    checks = {check.key: check for check in preflight.checks if not check.asked}
+    states = {key: check.state.value for key, check in checks.items()}
+    assert states.pop("card") == "failed"
+    assert set(states.values()) == {"seen"}, states
+    assert "no room for 15 minutes" in checks["card"].reason
+    assert preflight.logger["board"] == "mega2560"
+
+
 def test_only_three_things_can_be_asked_of_it() -> None:
     assert _is_preflight({"type": "preflight", "do": "next"})
     assert _is_preflight({"type": "preflight", "do": "again", "item": "rudder"})

@@ -10,10 +10,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from host.aircraft.file import Aircraft
 from host.aircraft.linear_aircraft import load
 from host.export.toml import dumps
-from host.link.serial import BAUD, serial_ports
+from host.link.serial import BAUD
 from host.live.live_program import LiveRequest, LiveSummary, run_live
 from host.live.live_session import LiveSession
 from host.physical.calibration import Calibration
@@ -93,11 +92,12 @@ def run_preflight(
         from host.preflight.walk_source import walk_source
 
         live.opened = walk_source(live.source, aircraft, live.seed)
-    live.baud = _wire_baud(live)
     done: list[_Walk] = []
 
     def join(session: LiveSession, calibration: Calibration) -> Callable[[], None]:
-        walk = _Walk(request, session, _wanted(request, aircraft, calibration), screen)
+        by_wire = session.source.baud == BAUD
+        wanted = Wanted(aircraft, calibration, without=request.without, by_wire=by_wire)
+        walk = _Walk(request, session, wanted, screen)
         done.append(walk)
         if keys is not None:
             threading.Thread(target=walk.listen, args=(keys,), daemon=True).start()
@@ -107,19 +107,6 @@ def run_preflight(
     summary = run_live(live, screen.told, lambda line: None)
     walk = done[0]
     return PreflightSummary(walk.preflight.go, walk.sheet, summary)
-
-
-def _wanted(request: PreflightRequest, aircraft: Aircraft, calibration: Calibration) -> Wanted:
-    by_wire = request.live.baud == BAUD and request.live.opened is None
-    return Wanted(aircraft, calibration, without=request.without, by_wire=by_wire)
-
-
-def _wire_baud(live: LiveRequest) -> int | None:
-    """Return the baud rate: that of USB where the port named is a Mega's."""
-    if live.source is None or live.opened is not None:
-        return live.baud
-    mega = any(port.device == live.source and port.is_mega for port in serial_ports())
-    return BAUD if mega else live.baud
 
 
 class _Walk:

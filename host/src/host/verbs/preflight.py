@@ -45,8 +45,8 @@ def add_parser(subparsers: Any) -> None:
                         help="where the sheet goes; beside the capture without it")  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, metavar="PATH",
                         help="capture's file or folder; the working folder without it")  # fmt: skip
-    parser.add_argument("--baud", type=int, default=57600, metavar="N",
-                        help="of the radio's port (default 57600; USB is 115200)")  # fmt: skip
+    parser.add_argument("--baud", type=int, metavar="N",
+                        help="of the port (57600 of a radio, 115200 of a Mega's USB)")  # fmt: skip
     parser.add_argument("--port", type=int, metavar="N", help="of the page")
     parser.add_argument("--lan", action="store_true", help="let others in this network look")
     parser.add_argument("--no-page", action="store_true",
