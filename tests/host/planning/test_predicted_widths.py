@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from host.cli import main
 from host.export.toml import dumps
+from host.planning.point_widths import PointPromise, promise_points
 from host.planning.predicted_widths import Prediction, predict_widths
 from host.twin.testcard.cards import Card, parse
 
@@ -46,6 +47,17 @@ def test_a_flight_of_other_gusts_and_tolerances_keeps_the_promise(
     assert not set(widths) & {"L_p", "Cl_p"}
 
 
+def test_one_point_alone_tells_less_than_three_of_it(card: Card, promised: Prediction) -> None:
+    shares: list[float] = []
+    [alone] = promise_points(card, 0.3, flights=1, progress=shares.append)
+    assert (alone.kind, alone.axes, alone.amplitudes) == ("3211", ("elevator",), (3.0,))
+    assert [w.name for w in alone.widths] == ["M_alpha", "M_q", "M_de"]
+    assert not alone.failures
+    assert shares == [1.0]
+    together = {w.name: w.half_width for w in promised.widths}
+    assert sum(w.half_width / together[w.name] for w in alone.widths) > 3.0
+
+
 def test_the_verb_prints_them_beside_the_bound(
     promised: Prediction, tmp_path: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -68,6 +80,11 @@ def test_the_verb_prints_them_beside_the_bound(
     answer = json.loads(capsys.readouterr().out)
     assert answer["predicted"]["gusts_mps"] == 0.3
     assert asked == [(0.3, 2), (None, 3)]
+    assert answer["alone"] == []
+    told = [PointPromise("3211", ("elevator",), (3.0,), 0.25, promised.widths[:1], ())]
+    monkeypatch.setattr("host.planning.point_widths.promise_points", lambda *_, **__: told)
+    assert main(["plan", str(path), "--alone"]) == 0
+    assert "    3211 elevator, 3 deg: " in capsys.readouterr().out
     assert main(["plan", str(path), "--flights", "0"]) == 0
     assert "white sensor noise only" in capsys.readouterr().out
     assert main(["plan", str(path), "--gusts", "9"]) == 2

@@ -119,6 +119,17 @@ def test_pilot_keeps_off_during_an_input_unless_he_corrects_early() -> None:
     assert all(w.attention_s < w.input_end_s for w in early.windows)
 
 
+def test_a_pilot_who_breaks_off_lets_go_early_and_corrects_at_once() -> None:
+    card = cards.load("calm")
+    whole = schedule(card, 17.0, 1e-3, np.random.default_rng(1)).windows
+    hasty = replace(card, pilot=replace(card.pilot, breaks_off=1.0, early=0.0))
+    broken = schedule(hasty, 17.0, 1e-3, np.random.default_rng(1)).windows
+    for kept, w in zip(whole, broken, strict=True):
+        if w.kind in ("doublet", "3211"):
+            assert w.input_end_s - w.start_s < 0.85 * (kept.input_end_s - kept.start_s)
+            assert w.attention_s == w.input_end_s
+
+
 def test_three_multisines_reach_the_sticks_orthogonal_and_in_their_own_sizes() -> None:
     document = {
         **MINIMAL,

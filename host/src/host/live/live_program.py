@@ -62,6 +62,7 @@ class LiveRequest:
     mavlink: str | None = None
     aircraft: str | None = None
     wanted: str | None = None
+    card: str | None = None
     seed: int = 0
     opened: Source | None = None  # in place of what `source` names
     joins: list[Join] = field(default_factory=list)
@@ -147,6 +148,7 @@ def run_live(
             session.audiences.append(_JsonLines(show))
         known = own or request.calibration is not None
         estimates = _estimates(request, session, calibration.text if known else "")
+        _test_points(request, session)
         try:
             with contextlib.suppress(KeyboardInterrupt):
                 asyncio.run(_serve(request, session, tell))
@@ -188,6 +190,21 @@ def _estimates(
     found = live_estimates(aircraft, request.wanted, capture, calibration)
     session.listeners["estimates"] = found
     return found
+
+
+def _test_points(request: LiveRequest, session: LiveSession) -> None:
+    """Let the points of the card be judged that is named, or that a virtual flight flies."""
+    name, source = request.card, "" if request.opened else request.source or ""
+    if name is None and source.startswith("sim:"):
+        name = source.removeprefix("sim:")
+    if name is None:
+        return
+    from host.live.test_point.point_watch import PointWatch
+    from host.twin.testcard import cards
+
+    watch = PointWatch(cards.load(name), session.judged)
+    session.stream.subscribe(watch.hear)
+    session.listeners["test_point"] = watch
 
 
 def _capture(
@@ -329,17 +346,22 @@ def own_addresses() -> list[str]:
 
 
 class _JsonLines(Audience):
-    """The state, one line of JSON a second."""
+    """The state, one line of JSON a second; each verdict of a test point a line at once."""
 
     def __init__(self, show: Callable[[str], None]) -> None:
         self._show = show
-        self._last = 0
+        self._last = self._verdict = 0
 
     def rows(self, message: bytes) -> None:
         """Not shown."""
 
     def state(self, message: str) -> None:
-        """Show every fifth: five come in a second."""
+        """Show new verdicts, and every fifth state: five come in a second."""
         self._last += 1
+        said = json.loads(message)
+        for verdict in said.get("test_point", {}).get("verdicts", []):
+            if verdict["number"] > self._verdict:
+                self._verdict = verdict["number"]
+                self._show(json.dumps({"type": "verdict"} | verdict))
         if self._last % 5 == 1:
-            self._show(json.dumps(json.loads(message)))
+            self._show(json.dumps(said))

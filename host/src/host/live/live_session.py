@@ -9,7 +9,7 @@ import json
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -181,6 +181,12 @@ class LiveSession:
             message = rows_message(update)
             for audience in self.audiences:
                 audience.rows(message)
+
+    def judged(self, verdict: Mapping[str, Any]) -> None:
+        """Note the verdict of a test point, in the thread that feeds."""
+        self.state.say("verdict", f"point {verdict['point']}: {verdict['text']}")
+        if self.capture is not None:
+            self.capture.note("verdict", **verdict)
 
     def _said(self, text: str) -> None:
         self._tell(text)

@@ -66,7 +66,14 @@ def add_parser(subparsers: Any) -> None:
                         " MAVProxy")  # fmt: skip
     parser.add_argument("--preflight", type=Path, metavar="SHEET",
                         help="what `host preflight` wrote: its GO or NO-GO on top")  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print the state once a second as JSON")
+    parser.add_argument("--card", metavar="CARD",
+                        help="that is flown (host plan): each test point gets a verdict, and what"
+                        " is next a countdown")  # fmt: skip
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print the state once a second, and every verdict, as JSON",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -90,6 +97,7 @@ def run(args: argparse.Namespace) -> int:
         mavlink=args.mavlink,
         aircraft=args.aircraft,
         wanted=args.wanted,
+        card=args.card,
     )
     if args.preflight is not None:
         from host.preflight.preflight_sheet import shown_sheet

@@ -15,6 +15,7 @@ from host.terminal import command_line
 
 if TYPE_CHECKING:
     from host.planning.card_planning import Bound, Plan, Point
+    from host.planning.point_widths import PointPromise
     from host.planning.predicted_widths import Prediction
     from host.twin.testcard.cards import Card
 
@@ -63,6 +64,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="virtual flights that the intervals are the median of (default 3);"
         " 0: only the bounds of white noise in calm air, at once",
     )
+    parser.add_argument(
+        "--alone",
+        action="store_true",
+        help="also what each test point tells by itself, which its verdict in flight (host live)"
+        " is measured against",
+    )
     parser.add_argument("--save", type=Path, metavar="FILE", help="write the designed card as TOML")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(run=run)
@@ -98,6 +105,7 @@ def run(args: argparse.Namespace) -> int:
     plan = planning.judge(card)
     tell_aircraft([args.aircraft])
     prediction = _predicted(card, args) if args.flights else None
+    alone = _alone(card, args) if args.flights and args.alone else []
     for doubt in plan.aircraft.doubts:
         print(f"host: {doubt}", file=sys.stderr)
     if args.json:
@@ -111,12 +119,14 @@ def run(args: argparse.Namespace) -> int:
                     "bounds": [asdict(bound) for bound in plan.bounds],
                     "refused": plan.refused,
                     "predicted": None if prediction is None else asdict(prediction),
+                    "alone": [asdict(point) for point in alone],
                 }
             )
         )
         return ExitCode.OK
     _print(plan)
     _print_intervals(plan, prediction)
+    _print_alone(alone)
     if args.save is not None:
         print(f"wrote {args.save}; fly it with: {command_line('host', 'simulate', args.save)}")
     return ExitCode.OK
@@ -178,6 +188,34 @@ def _predicted(card: Card, args: argparse.Namespace) -> Prediction:
     )
     bar.clear()
     return found
+
+
+def _alone(card: Card, args: argparse.Namespace) -> list[PointPromise]:
+    """Fly each different test point by itself."""
+    from host.planning.point_widths import promise_points
+    from host.progress import draw_share
+    from host.terminal import bar
+
+    found = promise_points(
+        card,
+        args.gusts,
+        flights=args.flights,
+        progress=lambda share: draw_share("points alone", share),
+    )
+    bar.clear()
+    return found
+
+
+def _print_alone(alone: list[PointPromise]) -> None:
+    """Print what each test point alone will tell."""
+    if alone:
+        print("\n  One test point alone, the same gusts and tolerances:")
+    for point in alone:
+        size = "/".join(f"{a:g}" for a in point.amplitudes)
+        told = ", ".join(f"{w.name} {w.percent:.0f} %" for w in point.widths) or "nothing"
+        print(f"    {point.kind} {'+'.join(point.axes)}, {size} deg: {told}".rstrip())
+        for text in point.failures:
+            print(f"      {text}")
 
 
 def _print_intervals(plan: Plan, prediction: Prediction | None) -> None:

@@ -8,6 +8,7 @@ import { Plan } from "./plan.js";
 import { Plots } from "./plots.js";
 import { Preflight } from "./preflight.js";
 import { Sound } from "./sound.js";
+import { Verdict } from "./verdict.js";
 
 const REDRAW_MS = 1000 / 30;
 const OLD_S = 1;
@@ -16,6 +17,7 @@ const GAPS = 4000; // latencies kept for the bench
 const byId = (id) => document.getElementById(id);
 const plan = new Plan(byId("plan"));
 const sound = new Sound(byId("sound"));
+const verdict = new Verdict(sound);
 const measured = { redraws: 0, latencies: [], rows: 0 };
 let history = null;
 let plots = null;
@@ -47,6 +49,7 @@ const server = connect({
     showState(said);
     preflight.show(said.preflight);
     if (showEstimates(said.estimates)) sound.play([660, 880]);
+    verdict.show(said.test_point ?? null);
     const marks = said.events.filter((event) => event.kind === "mark").length;
     if (marks > marked) sound.play([660]);
     marked = marks;

@@ -21,6 +21,7 @@ from host.twin.testcard.input_shapes import (
 
 CROSSOVER_RADPS = 1.2  # of attitude control by eye; a person on the ground manages about 1-2 rad/s
 WINDOW_TAIL_S = 3.0
+BROKEN_OFF = (0.2, 0.7)  # share of an input after which it is let go, drawn evenly
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,12 +121,17 @@ def _fly_input(
 ) -> tuple[float, float, float]:
     """Add one input; return its start, its end and when the pilot corrects again."""
     pilot = card.pilot
+    broken_off = False
     if s.kind in STEPS:
         signs = np.array([sign for sign, _ in STEPS[s.kind]])
         lengths = np.array([length for _, length in STEPS[s.kind]]) * s.width_s
         edges = np.concatenate([[0.0], np.cumsum(lengths)])
         edges = edges + rng.normal(0.0, pilot.timing_s, len(edges))
         edges = start_s + np.maximum.accumulate(edges)  # a hand is never back before it left
+        broken_off = pilot.breaks_off > 0.0 and rng.random() < pilot.breaks_off
+        if broken_off:
+            share = rng.uniform(*BROKEN_OFF)
+            edges = np.minimum(edges, edges[0] + share * (edges[-1] - edges[0]))
         levels = signs * (1.0 + rng.normal(0.0, pilot.amplitude, len(signs)))
         begin, end = float(edges[0]), float(edges[-1]) + pilot.hand_s
         span = _span(t, begin - 0.1, end + 0.1)
@@ -154,7 +160,7 @@ def _fly_input(
     for axis, amplitude, wave in zip(s.axes, s.amplitudes, waves, strict=True):
         size = amplitude if axis == "throttle" else math.radians(amplitude)
         into.program[span, AXES.index(axis)] += size * wave
-    again = end + pilot.hands_off_s
+    again = end + (0.0 if broken_off else pilot.hands_off_s)
     if rng.random() < pilot.early:
         again = begin + rng.uniform(0.6, 1.0) * (end - begin)
     # The pilot lets go half a second before the input and comes back within 0.4 s.

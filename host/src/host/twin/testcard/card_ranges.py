@@ -47,6 +47,7 @@ RANGES: Mapping[str, Quantity] = {
     "pilot.delay_s": Quantity("s", 0.0, 5.0, _HAND),
     "pilot.gain": Quantity("", 0.0, 10.0, "1: crossover at 1.2 rad/s"),
     "pilot.early": Quantity("", 0.0, 1.0, "a share of the maneuvers"),
+    "pilot.breaks_off": Quantity("", 0.0, 1.0, "a share of the step inputs"),
     "pilot.hands_off_s": Quantity("s", 0.0, 600.0, "a phugoid: 60 s"),
     "segment.duration_s": _SECONDS,
     "segment.bank_deg": Quantity("deg", -85.0, 85.0, "a level turn at 85 deg pulls 11 g"),

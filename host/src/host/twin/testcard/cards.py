@@ -52,6 +52,7 @@ class Pilot:
     gain: float = 1.0  # of the corrections, 1: crossover at 1.2 rad/s
     early: float = 0.1  # share of maneuvers corrected before they end
     hands_off_s: float = 2.5  # after the last input
+    breaks_off: float = 0.0  # share of step inputs let go before their end, and corrected at once
 
 
 @dataclass(frozen=True, slots=True)

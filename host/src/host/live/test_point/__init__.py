@@ -1,0 +1,1 @@
+"""Verdict of a test point while the aircraft is still in the air."""

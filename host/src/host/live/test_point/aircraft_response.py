@@ -1,0 +1,114 @@
+"""What a movement of the surfaces tells of this aircraft, before anybody looks at its response.
+
+The aircraft file's linear model turns the movement into motion; the information of that motion
+about each derivative is that of a regression (Klein & Morelli, Aircraft System Identification,
+chapter 5). Only its ratio to that of the card's own input is used, so neither noise nor scale of
+the model is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.linalg import expm
+
+from host.aircraft.air import atmosphere
+from host.aircraft.air import density_kgpm3 as density_at
+from host.aircraft.file import Aircraft
+from host.aircraft.linearisation import linearise, modes
+from host.aircraft.trim import solve
+from host.arrays import Array
+
+STEP_S = 0.01
+_SURFACES = {"longitudinal": ("elevator",), "lateral": ("aileron", "rudder")}
+# Rows of the equations of motion -> motion, and columns of what multiplies their derivatives.
+_ROWS = {
+    "M": ("longitudinal", ("alpha", "q", "de")),
+    "L": ("lateral", ("beta", "p", "r", "da", "dr")),
+    "N": ("lateral", ("beta", "p", "r", "da", "dr")),
+}
+_LEAST_RAD = 1e-4  # of a regressor: without any movement nothing is known, but not infinitely so
+
+
+class AircraftResponse:
+    """The nominal aircraft about one trim.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    airspeed_mps : float
+    height_m : float
+        For the air's density.
+
+    Raises
+    ------
+    TrimError
+        It cannot be trimmed there.
+    """
+
+    def __init__(self, aircraft: Aircraft, airspeed_mps: float, height_m: float = 100.0) -> None:
+        frame = aircraft.airframe()
+        rho = density_at(atmosphere(101325.0, 15.0), height_m)
+        linear = linearise(frame, solve(frame, airspeed_mps, density_kgpm3=rho))
+        self.airspeed_mps = airspeed_mps
+        self.servo_radps = float(frame.servo_bandwidth_radps)
+        self.modes = {mode.name: mode for mode in modes(linear)}
+        self._steps = {
+            "longitudinal": _discrete(linear.longitudinal_a, linear.longitudinal_b),
+            "lateral": _discrete(linear.lateral_a, linear.lateral_b),
+        }
+
+    def motion(self, name: str, surfaces: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the motion that deflections from the trim cause.
+
+        Parameters
+        ----------
+        name : str
+            ``longitudinal`` or ``lateral``.
+        surfaces : dict of str to (n,) Array
+            ``elevator``, ``aileron``, ``rudder``, rad, every `STEP_S`.
+        """
+        a, b = self._steps[name]
+        moved = np.stack([surfaces[one] for one in _SURFACES[name]], axis=1)
+        driven = moved @ b.T
+        x = np.zeros((len(moved), 4))
+        for k in range(1, len(x)):
+            x[k] = a @ x[k - 1] + driven[k - 1]
+        if name == "longitudinal":
+            return {"alpha": x[:, 1] / self.airspeed_mps, "q": x[:, 2], "de": moved[:, 0]}
+        return {
+            "beta": x[:, 0] / self.airspeed_mps, "p": x[:, 1], "r": x[:, 2],
+            "da": moved[:, 0], "dr": moved[:, 1],
+        }  # fmt: skip
+
+    def deviations(self, names: tuple[str, ...], surfaces: Mapping[str, Array]) -> Array:
+        """Return the standard deviation of each derivative for unit noise.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Such as ``M_q``.
+        surfaces : dict
+            As `motion` takes them.
+        """
+        found = []
+        for name in names:
+            row, _, of = name.partition("_")
+            motion, columns = _ROWS[row]
+            moved = self.motion(motion, surfaces)
+            x = np.stack([moved[one] for one in columns], axis=1)
+            x -= x.mean(axis=0)  # each point has a constant of its own
+            information = x.T @ x * STEP_S + np.eye(len(columns)) * _LEAST_RAD**2
+            at = columns.index(of)
+            found.append(float(np.sqrt(np.linalg.inv(information)[at, at])))
+        return np.array(found)
+
+
+def _discrete(a: Array, b: Array) -> tuple[Array, Array]:
+    """Return the step of a model whose inputs are held over `STEP_S`."""
+    n, m = b.shape
+    whole = np.zeros((n + m, n + m))
+    whole[:n, :n], whole[:n, n:] = a, b
+    step = expm(whole * STEP_S)
+    return step[:n, :n], step[:n, n:]

@@ -1,0 +1,123 @@
+"""The verdict of one test point: its measures in, a score and words for the pilot out.
+
+The score is the half-width that the card promises over the one that is to be expected of what was
+flown, 100 at best. Which flights fixed the constants: `studies/point_verdicts.md`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.live.test_point.point_measures import PointMeasures
+from host.twin.testcard.cards import Segment
+
+GOOD = 75
+# Share of a promised variance that the movement makes smaller; tolerances are the rest of it.
+NOISE_SHARE = {"elevator": 0.02, "aileron": 0.5, "rudder": 0.5, "throttle": 0.5}
+WEAK, LOUD = 0.7, 1.5  # of the wanted amplitude
+SHORT, LONG = 0.75, 1.35  # of the wanted length
+WRONG_AXIS_WIDTH = 5.0  # times the promised: nothing is told
+UNQUIET = 0.25
+OTHERS = 0.5
+CORRECTED = 0.6
+OFF_SPEED, SPEED_CHANGE = 0.12, 0.3
+GUSTY = 2.2  # times the card's
+LOST = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class PointVerdict:
+    """What is said of a test point.
+
+    Attributes
+    ----------
+    score : int
+        0 to 100; `GOOD` and more is good.
+    remarks : tuple of str
+        What is wrong, the worst first.
+    """
+
+    score: int
+    remarks: tuple[str, ...]
+
+    @property
+    def good(self) -> bool:
+        """Whether the point need not be flown again."""
+        return self.score >= GOOD
+
+    @property
+    def text(self) -> str:
+        """Such as ``good 86`` or ``repeat: amplitude 40 % of what is wanted``."""
+        if self.good:
+            return f"good {self.score}"
+        return "repeat: " + "; ".join(self.remarks[:2] or (f"{self.score} of 100",))
+
+
+def judge_point(measures: PointMeasures, wanted: Segment) -> PointVerdict:
+    """Judge one test point.
+
+    Parameters
+    ----------
+    measures : PointMeasures
+    wanted : Segment
+        The card's.
+    """
+    score = round(min(100.0, 100.0 / expected_width(measures, wanted)))
+    return PointVerdict(score, _remarks(measures, wanted))
+
+
+def expected_width(m: PointMeasures, wanted: Segment) -> float:
+    """Return the half-width to expect over the promised one.
+
+    The information of the movement counts as far as noise does. What the linear model does not see
+    is a factor: a small response drowns, slow steps carry the aircraft far from its trim, a pilot
+    or a gust moves it besides.
+    """
+    if not m.axis_wanted:
+        return WRONG_AXIS_WIDTH
+    share = max(NOISE_SHARE[axis] for axis in wanted.axes)
+    deviation = float(np.exp(np.mean(np.log(np.maximum(m.deviations, 1.0)))))
+    width = math.sqrt(1.0 - share + share * deviation**2)
+    for value, limit in (
+        (WEAK, max(m.amplitude, 0.01)),
+        (m.length, LONG),
+        (m.corrected, CORRECTED),
+        (m.gusts, GUSTY),
+        (m.airspeed_change, SPEED_CHANGE),
+    ):
+        width *= max(1.0, value / limit)
+    return width
+
+
+def _remarks(m: PointMeasures, wanted: Segment) -> tuple[str, ...]:
+    """Return words for everything that is out of its range."""
+    axes = " and ".join(wanted.axes)
+    if not m.axis_wanted:
+        return (f"{m.axis} moved, {axes} is wanted",)
+    said = []
+    if m.amplitude < WEAK:
+        said.append(f"amplitude {100 * m.amplitude:.0f} % of what is wanted")
+    if m.length < SHORT:
+        said.append("hold longer" if m.length > 0.5 else "broken off: fly all of its steps")
+    if m.length > LONG:
+        said.append(f"{100 * (m.length - 1):.0f} % too long: shorter steps")
+    if m.corrected > CORRECTED:
+        said.append("corrected too early: hands off until the response is over")
+    if m.others > OTHERS:
+        said.append(f"another surface moved {100 * m.others:.0f} % of the input")
+    if m.unquiet > UNQUIET:
+        said.append("not trimmed before: wait for quiet")
+    if abs(m.airspeed) > OFF_SPEED:
+        said.append(f"airspeed {100 * m.airspeed:+.0f} % off the card's")
+    if m.airspeed_change > SPEED_CHANGE:
+        said.append("airspeed not kept")
+    if m.gusts > GUSTY:
+        said.append(f"gusts {m.gusts:.1f} times the card's: wait for calm air")
+    if m.lost > LOST:
+        said.append(f"{100 * m.lost:.0f} % of it not received")
+    if m.amplitude > LOUD:
+        said.append(f"amplitude {100 * m.amplitude:.0f} % of what is wanted")
+    return tuple(said)

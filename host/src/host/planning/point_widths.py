@@ -1,0 +1,133 @@
+"""What one test point tells by itself: the widths that a verdict in flight is measured against.
+
+A card's points are flown together with others like them, and identification uses them all. Whether
+this one was worth flying is another question: here it is flown alone, some times, in gusts and
+with every tolerance, and identified as a real flight of it would be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from host.planning.predicted_widths import (
+    FIRST_SEED,
+    FLIGHTS,
+    PredictedWidth,
+    Progress,
+    predict_widths,
+)
+from host.twin.testcard.cards import Card, Segment
+
+# What an input on an axis is flown for: damping, stiffness and control of the mode it excites.
+TOLD_BY = {
+    "elevator": ("M_alpha", "M_q", "M_de"),
+    "aileron": ("L_p", "L_da"),
+    "rudder": ("N_beta", "N_r", "N_dr"),
+    "throttle": (),
+}
+TRIM_BEFORE_S, TRIM_BEHIND_S = 9.0, 8.0  # reconstruction needs 12 s of flight
+
+
+@dataclass(frozen=True, slots=True)
+class PointPromise:
+    """Half-widths that one test point alone will give.
+
+    Attributes
+    ----------
+    kind : str
+        Input, as test cards name it.
+    axes : tuple of str
+    amplitudes : tuple of float
+        One per axis, deg.
+    width_s : float
+        Of a step of the input.
+    widths : tuple of PredictedWidth
+        Of the derivatives in `TOLD_BY` of its axes; medians of some flights.
+    failures : tuple of str
+        Why a flight gave no answer.
+    """
+
+    kind: str
+    axes: tuple[str, ...]
+    amplitudes: tuple[float, ...]
+    width_s: float
+    widths: tuple[PredictedWidth, ...]
+    failures: tuple[str, ...]
+
+
+def test_points(card: Card) -> list[Segment]:
+    """Return the segments of a card that are test points, in its order."""
+    return [s for s in card.segments if s.kind not in ("trim", "turn")]
+
+
+def point_alone(card: Card, point: Segment) -> Card:
+    """Return the card with one test point and rest about it."""
+    rest = [Segment("trim", duration_s=s) for s in (TRIM_BEFORE_S, TRIM_BEHIND_S)]
+    return replace(card, segments=(rest[0], point, rest[1]), faults=())
+
+
+def told_by(point: Segment) -> tuple[str, ...]:
+    """Return the derivatives that a test point is flown for."""
+    return tuple(name for axis in point.axes for name in TOLD_BY[axis])
+
+
+def promise_points(
+    card: Card,
+    gusts_mps: float | None = None,
+    *,
+    flights: int = FLIGHTS,
+    first_seed: int = FIRST_SEED,
+    progress: Progress | None = None,
+) -> list[PointPromise]:
+    """Fly each different test point of a card alone and say what it will tell.
+
+    Parameters
+    ----------
+    card : Card
+    gusts_mps : float, optional
+        Standard deviation of the vertical gust; the card's, or that of a calm morning.
+    flights : int
+        Of each point.
+    first_seed : int
+    progress : callable, optional
+        Called with the share that is done.
+
+    Returns
+    -------
+    list of PointPromise
+        In the order of the card; none for a point that no derivative is named for.
+    """
+    points = [p for p in dict.fromkeys(test_points(card)) if told_by(p)]
+    return [
+        _promised(card, point, gusts_mps, flights, first_seed, _part(progress, k, points))
+        for k, point in enumerate(points)
+    ]
+
+
+def _promised(
+    card: Card,
+    point: Segment,
+    gusts_mps: float | None,
+    flights: int,
+    first_seed: int,
+    progress: Progress | None,
+) -> PointPromise:
+    found = predict_widths(
+        point_alone(card, point),
+        gusts_mps,
+        flights=flights,
+        first_seed=first_seed,
+        progress=progress,
+    )
+    widths = {w.name: w for w in found.widths}
+    told = tuple(widths[name] for name in told_by(point) if name in widths)
+    return PointPromise(
+        point.kind, point.axes, point.amplitudes, point.width_s, told, found.failures
+    )
+
+
+def _part(progress: Progress | None, done: int, points: Sequence[Segment]) -> Progress | None:
+    if progress is None:
+        return None
+    return lambda share: progress((done + share) / len(points))

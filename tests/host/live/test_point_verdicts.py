@@ -1,0 +1,202 @@
+"""Test points judged as they end: on rows as the radio sends them, some of them lost."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from host.aircraft.linear_aircraft import load
+from host.live.live_program import _JsonLines
+from host.live.live_sample import LIVE_UNITS, Array, LiveUpdate
+from host.live.test_point.aircraft_response import STEP_S, AircraftResponse
+from host.live.test_point.card_progress import CardProgress, card_points
+from host.live.test_point.point_watch import PointWatch
+from host.live.test_point.wanted_input import RESPONSE_S, wanted_surfaces
+from host.twin.testcard.cards import Card, Segment, parse
+
+SPEED_MPS, START_S = 17.0, 18.0
+CARD: dict[str, object] = {
+    "format": 1,
+    "aircraft": "ultrastick25e",
+    "flight": {"airspeed_mps": SPEED_MPS},
+    "segment": [
+        {"kind": "trim", "duration_s": 10},
+        {"kind": "doublet", "axis": "aileron", "amplitude": 4.0, "width_s": 0.6},
+        {"kind": "turn", "duration_s": 14, "bank_deg": 30},
+        {"kind": "3211", "axis": "elevator", "amplitude": 3.0, "width_s": 0.25},
+    ],
+}
+AXES = {"elevator": "longitudinal", "aileron": "lateral", "rudder": "lateral"}
+
+
+@pytest.fixture(scope="module")
+def card() -> Card:
+    return parse(CARD, "card")
+
+
+@pytest.fixture(scope="module")
+def response() -> AircraftResponse:
+    return AircraftResponse(load("ultrastick25e"), SPEED_MPS)
+
+
+def flown(
+    response: AircraftResponse, inputs: list[tuple[float, Segment]], *, seconds: float = 25.0,
+    gusts: float = 0.3,
+) -> dict[str, Array]:  # fmt: skip
+    """Return rows at 20 Hz: 5 s on the ground, then the linear aircraft under these inputs."""
+    rng = np.random.default_rng(5)
+    t = np.arange(0.0, seconds, STEP_S)
+    moved = {axis: np.zeros(len(t)) for axis in AXES}
+    for at_s, segment in inputs:
+        first = round(at_s / STEP_S)
+        for axis, wave in wanted_surfaces(segment, response).items():
+            moved[axis][first : first + len(wave)] += wave[: len(t) - first]
+    motion = response.motion("longitudinal", moved) | response.motion("lateral", moved)
+    every = slice(None, None, round(0.05 / STEP_S))
+    deg = np.degrees
+    rows = {name: np.zeros(len(t))[every] for name in LIVE_UNITS}
+    noise = {name: rng.normal(0.0, 0.05, len(rows["t_s"])) for name in rows}
+    gust = np.repeat(rng.normal(0.0, 0.26 * gusts / math.sqrt(2.0), 200), 5)[: len(rows["t_s"])]
+    rows["t_s"] = t[every].copy()
+    for side in "ab":
+        rows[f"airspeed_{side}_mps"] = np.where(rows["t_s"] < 5.0, 0.0, SPEED_MPS)
+        rows[f"alpha_{side}_deg"] = deg(motion["alpha"][every] + gust / SPEED_MPS)
+        rows[f"beta_{side}_deg"] = deg(motion["beta"][every])
+    for name in "pqr":
+        rows[f"{name}_degps"] = deg(motion[name][every]) + noise[f"{name}_degps"]
+    rows["elevator_pot_deg"] = deg(moved["elevator"][every]) + noise["elevator_pot_deg"] - 7.0
+    rows["rudder_pot_deg"] = deg(moved["rudder"][every]) + noise["rudder_pot_deg"]
+    rows["aileron_left_deg"] = deg(moved["aileron"][every]) + noise["aileron_left_deg"]
+    rows["aileron_right_deg"] = -deg(moved["aileron"][every]) + noise["aileron_right_deg"]
+    return rows
+
+
+def watched(card: Card, rows: dict[str, Array], *, lost: slice | None = None) -> PointWatch:
+    """Return who judged the rows, which came one by one."""
+    watch = PointWatch(card)
+    come = np.ones(len(rows["t_s"]), bool)
+    if lost is not None:
+        come[lost] = False
+    for at in np.flatnonzero(come):
+        row = {name: column[at : at + 1] for name, column in rows.items()}
+        watch.hear(LiveUpdate(row, np.ones(1, bool), 0, [], 0.0))
+    return watch
+
+
+def only(watch: PointWatch) -> dict[str, Any]:
+    assert len(watch.verdicts) == 1, list(watch.verdicts)
+    return watch.verdicts[0]
+
+
+def test_a_point_as_the_card_wants_it_is_good_soon_after_its_end(
+    card: Card, response: AircraftResponse
+) -> None:
+    wanted = card.segments[1]
+    said = only(watched(card, flown(response, [(START_S, wanted)])))
+    assert said["text"] == f"good {said['score']}"
+    assert said["score"] >= 90
+    assert said["flown"] == "aileron doublet"
+    assert said["start_s"] == pytest.approx(START_S, abs=0.15)
+    assert said["end_s"] == pytest.approx(START_S + 1.2 + RESPONSE_S, abs=0.3)
+    assert 0.0 <= said["said_s"] - said["end_s"] <= 0.6
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"amplitudes": (1.6,)}, "amplitude 4[0-4] % of what is wanted"),
+        ({"amplitudes": (0.5,)}, "amplitude 1[0-9] % of what is wanted"),
+        ({"axes": ("rudder",)}, "rudder moved, aileron is wanted"),
+        ({"width_s": 1.4}, "too long: shorter steps"),
+        ({"kind": "pulse", "width_s": 0.4}, "broken off|hold longer"),
+    ],
+)
+def test_what_is_wrong_is_said(
+    card: Card, response: AircraftResponse, change: dict[str, Any], words: str
+) -> None:
+    wanted = card.segments[1]
+    said = only(watched(card, flown(response, [(START_S, replace(wanted, **change))])))
+    assert not said["good"]
+    assert said["text"].startswith("repeat: ")
+    assert re.search(words, said["text"]), said
+
+
+def test_gusts_of_the_card_are_no_matter_and_others_are(
+    card: Card, response: AircraftResponse
+) -> None:
+    wanted = card.segments[1]
+    said = only(watched(card, flown(response, [(START_S, wanted)], gusts=2.0)))
+    assert not said["good"]
+    assert "gusts" in said["text"]
+    windy = replace(card, air=replace(card.air, turbulence_mps=2.0))
+    assert only(watched(windy, flown(response, [(START_S, wanted)], gusts=2.0)))["good"]
+
+
+def test_the_response_to_the_point_before_is_no_gust(
+    card: Card, response: AircraftResponse
+) -> None:
+    _, aileron, _, elevator = card.segments
+    two = replace(card, segments=(card.segments[0], elevator, aileron))
+    rows = flown(response, [(12.0, elevator), (19.0, aileron)])
+    assert [v["good"] for v in watched(two, rows).verdicts] == [True, True]
+
+
+def test_rows_that_did_not_arrive_change_no_verdict_of_a_burst(
+    card: Card, response: AircraftResponse
+) -> None:
+    rows = flown(response, [(START_S, card.segments[1])])
+    first = round((START_S + 0.35) / 0.05)
+    assert only(watched(card, rows, lost=slice(first, first + 6)))["good"]
+    behind = round((START_S + 1.5) / 0.05)
+    response_lost = only(watched(card, rows, lost=slice(behind, behind + 30)))
+    assert "not received" in " ".join(response_lost["remarks"])
+    assert not watched(card, rows, lost=slice(first - 10, first + 30)).verdicts
+
+
+def test_nothing_is_said_of_handling_of_the_ground_and_of_a_second_look(
+    card: Card, response: AircraftResponse
+) -> None:
+    small = Segment("doublet", axes=("elevator",), amplitudes=(1.0,), width_s=0.4)
+    assert not watched(card, flown(response, [(10.0, small), (22.0, small)])).verdicts
+    assert not watched(card, flown(response, [(1.0, card.segments[1])])).verdicts
+
+
+def test_the_card_goes_on_when_a_point_is_good_and_stays_when_it_is_not(card: Card) -> None:
+    points = card_points(card)
+    assert [p.text for p in points] == [
+        "aileron doublet, 4 deg, steps of 0.6 s",
+        "elevator 3-2-1-1, 3 deg, steps of 0.25 s",
+    ]
+    progress = CardProgress(card)
+    assert progress.as_json(3.0) == {
+        "number": 1, "of": 2, "text": points[0].text, "before": "", "in_s": None,
+    }  # fmt: skip
+    progress.airborne(5.0)
+    assert progress.as_json(8.0) == progress.as_json(3.0) | {"in_s": 10.0}  # type: ignore[operator]
+    progress.judged(22.0, good=False)
+    again = progress.as_json(22.0)
+    assert again is not None
+    assert (again["number"], again["in_s"]) == (1, 6.0)
+    progress.judged(32.0, good=True)
+    after = progress.as_json(33.0)
+    assert after is not None
+    assert (after["number"], after["before"]) == (2, "turn of 14 s")
+    assert after["in_s"] == pytest.approx(14.0 + 3.0 - 0.5 - 1.0)
+    progress.judged(60.0, good=True)
+    assert progress.as_json(61.0) is None
+
+
+def test_a_verdict_is_a_line_of_json_once(card: Card, response: AircraftResponse) -> None:
+    watch = watched(card, flown(response, [(START_S, card.segments[1])]))
+    lines: list[str] = []
+    shown = _JsonLines(lines.append)
+    for _ in range(3):
+        shown.state(json.dumps({"type": "state", "test_point": watch.as_json()}))
+    assert [json.loads(line)["type"] for line in lines] == ["verdict", "state"]
+    assert json.loads(lines[0])["text"].startswith("good ")
+    assert json.loads(lines[1])["test_point"]["next"]["number"] == 2
