@@ -115,4 +115,5 @@ def log_id(source: str, seen: dict[str, str]) -> str:
 def _missing(address: str, error: ImportError) -> str:
     needs = str(error).splitlines()[0]
     name = address.partition("://")[0]
-    return f"{address}: {name} addresses need a library: {needs} ({install_hint(error.name)})"
+    how = f" ({install_hint(error.name)})" if error.name else ""
+    return f"{address}: {name} addresses need a library: {needs}{how}"
