@@ -23,7 +23,7 @@ from host.twin.sensors.mega_clock import TICKS_PER_S, clock_share, ticks
 from host.twin.sensors.receiver import EDGE, edges
 
 GPS_BYTE_S = 10.0 / 38_400.0
-RAIL_COUNT = 614.0  # 5.0 V servo rail through a divider of 1.67 on a 5 V reference
+RAIL_COUNT = 512.0  # 5.0 V servo rail through 10 k / 10 k (hw/pin_map.toml) on a 5 V reference
 # Analogue grid: 0.58 ms. Two conversions of a channel (1.144 ms apart) share no grid point, and
 # from frame to frame they fall elsewhere between two: the noise of a logged sum of four is that of
 # independent conversions within 0.6 % at every rate and with every error of both clocks.
