@@ -35,7 +35,7 @@ def flown_rows(
     known = {tuple(r[c] for c in columns[: len(key)]) for key in keys[:1] for r in rows}
     with path.open("a", newline="") as file:
         writer = csv.DictWriter(file, columns, restval="")
-        if not rows:
+        if file.tell() == 0:  # not where a run was stopped before its first flight
             writer.writeheader()
         for key in keys:
             if tuple(map(str, key)) not in known:

@@ -25,3 +25,10 @@ def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     assert flown == [(0.5, 1), (0.0, 0), (0.5, 0)]
     assert [r["name"] for r in rows] == ["M_q", "M_de", "refused", "refused"]
     assert flown_rows(path, COLUMNS, [], fly) == rows
+
+
+def test_a_run_that_was_stopped_before_its_first_flight_has_one_head(tmp_path: Path) -> None:
+    path = tmp_path / "rows.csv"
+    assert flown_rows(path, COLUMNS, [], lambda *_: []) == []
+    [row] = flown_rows(path, COLUMNS, [(0.5, 1)], lambda a, s: [{"air_mps": a, "seed": s}])
+    assert row["seed"] == "1"
