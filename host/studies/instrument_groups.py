@@ -21,7 +21,7 @@ from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.compatibility.servo_response import surface_positions
-from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.recorded import recording_of_table
 from host.twin.faults import Fault

@@ -27,7 +27,7 @@ from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.instrument.instrument_errors import InstrumentErrors, instrument_errors
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.even_grid import even_columns
 from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import Card, load
 from host.twin.virtual import VirtualFlight, virtual_flight

@@ -28,7 +28,7 @@ from host.physical.calibration import calibration_of_text
 from host.planning.card_planning import design
 from host.planning.point_widths import point_alone, promise_points, test_points, told_by
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.identification_error import IdentificationError
 from host.twin.flight.fly import FlightRecord

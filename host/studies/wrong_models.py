@@ -18,7 +18,8 @@ import numpy as np
 from host.compiled import prefer_machine_code
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
-from host.sysid.flight.linear_estimator import Answer, identify
+from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.numerics.input_coherence import input_coherence

@@ -8,7 +8,7 @@ from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
 from host.physical.calibration import load_calibration
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
-from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.even_grid import even_columns
 from host.twin.outcome.instrument import calibration
 from host.twin.virtual import virtual_flight
 

@@ -17,8 +17,9 @@ from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.compatibility.reconstruction import reconstruct
-from host.sysid.flight.flight_tables import even_columns
-from host.sysid.flight.linear_estimator import Answer, identify
+from host.sysid.flight.even_grid import even_columns
+from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import Card
 from host.twin.virtual import virtual_flight

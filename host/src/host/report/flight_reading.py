@@ -31,7 +31,8 @@ from host.report.gps_position import (
     log_utc_s,
 )
 from host.report.shown_flight import Happening, ServoJump, ShownFlight, with_gaps
-from host.sysid.flight.flight_tables import FITTED, even_arrays, read_columns
+from host.sysid.flight.even_grid import FITTED, even_arrays
+from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.maneuver_detection import (
     DetectedManeuver,
     Grade,

@@ -24,7 +24,8 @@ from host.sysid.answer.aircraft_export import AXES, CONTROLS, aircraft_document
 from host.sysid.answer.truth_comparison import read_truth, true_coefficients
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.coefficients.coefficient_fit import MeanCondition, ThrustEffect
-from host.sysid.flight.flight_tables import even_columns, read_columns
+from host.sysid.flight.even_grid import even_columns
+from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_estimator import identify
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight

@@ -14,7 +14,8 @@ from host.sysid.answer.mat_file import labels, mat_name, write_mat
 from host.sysid.answer.output_files import OutputPaths, check_outputs
 from host.sysid.answer.simulators.forms import write_form
 from host.sysid.flight.flight_tables import read_columns
-from host.sysid.flight.linear_estimator import Answer, identify
+from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.identification_error import IdentificationError
 from scipy import io
 

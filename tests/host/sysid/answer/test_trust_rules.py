@@ -9,7 +9,8 @@ from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, driven_by_inputs
 from host.sysid.answer.verdict import verdict_lines, verdict_of
 from host.sysid.flight.data_finding import Finding
-from host.sysid.flight.linear_estimator import Answer, identify
+from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.models.templates import Trim, template
 from studies.wrong_flights import LinearFlight, fly
 

@@ -9,7 +9,7 @@ from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.trust_rules import uncarried_states
 from host.sysid.answer.verdict import verdict_lines
 from host.sysid.estimators.method_registry import fit
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.diagnostics import SignalFit, collinearity, reference_values
 from host.sysid.models.modal_analysis import modes, modes_of
 from host.sysid.models.residual_delays import STANDARD_DELAYS

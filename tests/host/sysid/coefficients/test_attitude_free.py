@@ -13,7 +13,7 @@ from host.sysid.coefficients.coefficient_model import standard_model
 from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.window_spectra import Window
 from host.sysid.compatibility.inverse_sensor_model import Record
-from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.even_grid import even_columns
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight
 

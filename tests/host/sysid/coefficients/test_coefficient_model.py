@@ -24,7 +24,7 @@ from host.sysid.coefficients.coefficient_model import (
 from host.sysid.coefficients.coefficient_search import fit_coefficients
 from host.sysid.coefficients.trim_derivatives import TrimMeans, derivatives_at_trim
 from host.sysid.coefficients.window_spectra import Window
-from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.even_grid import even_columns
 from host.sysid.identification_error import IdentificationError
 from host.twin.testcard.cards import load
 from host.twin.virtual import VirtualFlight, virtual_flight

@@ -29,7 +29,7 @@ from host.sysid.coefficients.window_spectra import (
     window_transform,
 )
 from host.sysid.compatibility.inverse_sensor_model import Spectrum
-from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.even_grid import even_columns
 from host.sysid.numerics.maneuver_agreement import scatter_test
 from host.twin.testcard.cards import load
 from host.twin.virtual import virtual_flight

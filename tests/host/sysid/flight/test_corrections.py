@@ -27,7 +27,8 @@ from host.sysid.compatibility.sensor_corrections import (
     residual_deviations,
 )
 from host.sysid.flight import linear_estimator, linear_model
-from host.sysid.flight.linear_estimator import Answer, identify
+from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template

@@ -18,7 +18,8 @@ from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.data_finding import Feedback, Finding
 from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns
-from host.sysid.flight.linear_estimator import Answer, identify
+from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_selection import select_maneuvers
 from studies.wrong_flights import fly
 

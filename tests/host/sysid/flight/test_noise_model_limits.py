@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from host.sysid.flight.linear_estimator import Answer, identify
+from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.prediction_limits import drawn_noise, power_freedom
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from studies.wrong_flights import fly

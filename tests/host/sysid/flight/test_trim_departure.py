@@ -13,7 +13,7 @@ from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.estimators.start_values import regression_estimates, start_values
 from host.sysid.flight import linear_estimator
-from host.sysid.flight.flight_tables import even_columns
+from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.linear_model import imu_place_m, without_attitude
 from host.sysid.flight.maneuver_detection import DetectedManeuver

@@ -9,7 +9,7 @@ from host.sysid import Maneuver, fit
 from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.json_document import answer_document
 from host.sysid.answer.verdict import verdict_lines
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.diagnostics import (
     NOT_IDENTIFIABLE,
     WEAKLY_IDENTIFIABLE,

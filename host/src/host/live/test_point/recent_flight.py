@@ -10,7 +10,7 @@ import numpy as np
 from host.arrays import Array
 from host.constants import DEG_PER_RAD
 from host.live.live_sample import LiveUpdate
-from host.sysid.flight.flight_tables import BRIDGED, even_arrays
+from host.sysid.flight.even_grid import BRIDGED, even_arrays
 from host.sysid.identification_error import IdentificationError
 
 KEPT_S = 45.0

@@ -26,7 +26,7 @@ from host.sysid.answer.mat_file import labels
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.truth_comparison import true_coefficients, true_poles
 from host.sysid.compatibility.inverse_sensor_model import FIT_RATE_HZ
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
 from host.sysid.models.modal_analysis import Mode
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from host.people_units import people_name
 from host.sysid.answer.parameter_units import parameter_unit
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.model_constants import known_constants
 
 IN_A_LINE = 4  # maneuvers

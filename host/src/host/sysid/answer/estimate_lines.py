@@ -14,7 +14,8 @@ from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.servo_lines import servo_estimate_lines
 from host.sysid.answer.settling_history import settling_lines
 from host.sysid.answer.trust_rules import uncarried_states
-from host.sysid.flight.linear_estimator import Answer, from_zero
+from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_estimator import from_zero
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:

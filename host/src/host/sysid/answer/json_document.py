@@ -16,7 +16,7 @@ from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, uncarried_state
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.compatibility.sensor_corrections import correction_document
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
 from host.sysid.flight.reconstructed_flight import maneuver_name
 from host.sysid.models.modal_analysis import Mode

@@ -14,7 +14,7 @@ from host.arrays import Array
 from host.sysid.answer.atomic_files import atomic_write
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.compatibility.inverse_sensor_model import FIT_RATE_HZ
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.modal_analysis import Mode
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from host.sysid.answer.atomic_files import atomic_write, check_destination, file
 from host.sysid.answer.mat_file import labels, write_mat
 from host.sysid.answer.settling_history import has_history, write_history
 from host.sysid.answer.simulators.forms import CONTROL, FORMS, files_of, form_of, write_form
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:

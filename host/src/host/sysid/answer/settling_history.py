@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from host.sysid.answer.atomic_files import atomic_write
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 
 # What a step is, by what a method notes of it.
 SETTLED = 0.1

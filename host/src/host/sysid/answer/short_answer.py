@@ -11,7 +11,7 @@ from host.sysid.answer.marks import SMALL
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.verdict import verdict_of
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.diagnostics import reference_values
 
 if TYPE_CHECKING:

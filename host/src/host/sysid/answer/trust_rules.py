@@ -21,7 +21,7 @@ from host.sysid.answer.impossible_signs import impossible_signs
 from host.sysid.answer.method_agreement import disagreements
 from host.sysid.answer.parameter_places import leaning_on
 from host.sysid.flight.data_finding import Finding, open_channels
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.models.diagnostics import SignalFit
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 

@@ -13,7 +13,7 @@ from host.aircraft.mode_names import LATERAL, LONGITUDINAL
 from host.files.user_text import read_toml
 from host.sysid.aerodynamics.coefficient_table import CoefficientTable
 from host.sysid.answer.mat_file import labels
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_model import AXIS_OF
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.modal_analysis import Mode

@@ -13,7 +13,7 @@ from host.sysid.answer.model_agreement import disagreements_of_models
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
 from host.sysid.compatibility.sensor_corrections import correction_lines
 from host.sysid.flight.data_finding import open_channels
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 
 if TYPE_CHECKING:
     from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer

@@ -11,18 +11,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from host.aircraft.mass_properties import AirframeData, Condition
+from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
-    CoefficientTable,
     ShiftedEstimate,
     coefficients,
     trim_of,
 )
 from host.sysid.compatibility.reconstruction import Compatibility
-from host.sysid.compatibility.sensor_corrections import Correction, corrections
+from host.sysid.compatibility.sensor_corrections import corrections
 from host.sysid.compatibility.sensor_dynamics import IMU_DELAY, SERVO_DELAY
 from host.sysid.estimators.coherence_inflation import inflate_by_coherence
 from host.sysid.estimators.filter_error_gust import (
@@ -34,7 +33,6 @@ from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.gust_penetration import without_gust_penetration
 from host.sysid.estimators.method_registry import fit
-from host.sysid.estimators.servo_parameters import ServoEstimate
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
@@ -46,6 +44,7 @@ from host.sysid.flight.free_simulation import (
     free_simulation,
     frozen_model,
 )
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_model import (
     AXIS_OF,
     DEFAULT_METHOD,
@@ -55,10 +54,11 @@ from host.sysid.flight.linear_model import (
     with_drag_arm,
     without_attitude,
 )
+from host.sysid.flight.linear_stages import LinearEstimate, LinearIntervals, LinearValidation
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade, detect_maneuvers, grade
 from host.sysid.flight.maneuver_selection import HELD_OUT_FROM, excited_axes, joined_windows
 from host.sysid.flight.noise_model_limits import excess_over_noise_model
-from host.sysid.flight.prediction_limits import Prediction, predictions
+from host.sysid.flight.prediction_limits import predictions
 from host.sysid.flight.reconstructed_flight import (
     FlownManeuver,
     ReconstructedFlight,
@@ -70,24 +70,20 @@ from host.sysid.flight.systematic_errors import add_systematic_covariance, syste
 from host.sysid.flight.trim_departure import Departure, correct_trim_departure
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
-    Collinearity,
-    IdentifiabilityFlag,
-    SignalFit,
     assess_identifiability,
     collinearity,
     constant_inputs,
 )
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
-from host.sysid.models.modal_analysis import Mode, modes
+from host.sysid.models.modal_analysis import modes
 from host.sysid.models.residual_delays import (
-    STANDARD_DELAYS,
     delays_of,
     without_standard_delays,
 )
 from host.sysid.models.state_space_model import DelayGroup, LinearModel
 from host.sysid.models.templates import Trim
-from host.sysid.numerics.input_coherence import InputCoherence, input_coherence
+from host.sysid.numerics.input_coherence import input_coherence
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
 
 
@@ -97,138 +93,6 @@ class NoManeuverError(IdentificationError):
 
 FREE = ("output", "innovation")  # residuals of methods that simulate
 WEAK_GRADE = 0.2
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What one model of one axis says, and what it rests on."""
-
-    template: str
-    method: str
-    model: LinearModel
-    trim: Trim
-    condition: Condition
-    maneuvers: tuple[Maneuver, ...]
-    used: tuple[DetectedManeuver, ...]
-    held_out: tuple[DetectedManeuver, ...]
-    result: FitResult
-    fits: tuple[SignalFit, ...]
-    validation: tuple[SignalFit, ...]
-    identifiability_flags: tuple[IdentifiabilityFlag, ...]
-    collinearity: Collinearity
-    modes: tuple[Mode, ...]
-    coefficients: tuple[Coefficient, ...]
-    constant_inputs: tuple[str, ...]
-    delays: dict[str, tuple[float, float]]
-    servo: ServoEstimate | None = None  # of inputs that are commands
-    corrections: tuple[Correction, ...] = ()
-    simulated: tuple[Array, ...] = ()  # outputs of the maneuvers by free simulation
-    own_model: bool = False  # of the user, not a template
-    coherence: InputCoherence | None = None  # of what free simulation leaves with the inputs
-    predictions: dict[str, Prediction] = field(default_factory=dict)  # of outputs held out
-    noise_covariance: Array | None = None  # of the estimate, without systematic errors
-    unseen: tuple[
-        tuple[Maneuver, Array], ...
-    ] = ()  # held out, with their outputs by free simulation
-
-    @property
-    def at_bound(self) -> tuple[str, ...]:
-        """Delays that the search wanted larger than a sensor can be late."""
-        limits = {d.name: d.limit_s for d in (*STANDARD_DELAYS, *self.model.delays)}
-        values = {name: value for name, (value, _) in self.delays.items()}
-        values |= {
-            d.name: self.result.value(d.name)
-            for d in self.model.delays
-            if d.name in self.result.names
-        }
-        return tuple(n for n, v in values.items() if abs(v) >= limits.get(n, np.inf) * (1.0 - 1e-9))
-
-    @property
-    def table(self) -> CoefficientTable:
-        """The coefficients and what they rest on."""
-        return CoefficientTable(self.template, self.method, self.trim.alpha_rad, self.coefficients)
-
-
-@dataclass(frozen=True)
-class LinearEstimate:
-    """What estimation made: a model, its fit, and the data both rest on.
-
-    Attributes
-    ----------
-    template, method : str
-    model : LinearModel
-        As fitted.
-    trim, condition
-        Means over the maneuvers of the fit.
-    used, held_out : tuple of FlownManeuver
-        In the fit, and kept for validation.
-    maneuvers : tuple of Maneuver
-        Those used, as fitted.
-    cuts : tuple of mapping
-        All corrected columns of each.
-    fit : FitResult
-        As the method returned it.
-    departure : Departure or None
-        By how much airspeed and attitude that varied move the estimate.
-    delays : dict
-        Estimated before the fit: value and 95 % half-width, s.
-    servo : ServoEstimate or None
-        Of the inputs that are commands.
-    """
-
-    template: str
-    method: str
-    model: LinearModel
-    trim: Trim
-    condition: Condition
-    used: tuple[FlownManeuver, ...]
-    held_out: tuple[FlownManeuver, ...]
-    maneuvers: tuple[Maneuver, ...]
-    cuts: tuple[Mapping[str, Array], ...]
-    fit: FitResult
-    departure: Departure | None
-    delays: dict[str, tuple[float, float]]
-    servo: ServoEstimate | None = None
-
-    @property
-    def estimate(self) -> Array:
-        """All parameters, (P,)."""
-        return self.fit.estimate + (0.0 if self.departure is None else self.departure.step)
-
-    def at_trim(self, estimate: Array) -> list[Maneuver]:
-        """Return the maneuvers as if airspeed and attitude had not varied."""
-        if self.departure is None:
-            return list(self.maneuvers)
-        return self.departure.removed_from(self.maneuvers, estimate)
-
-
-@dataclass(frozen=True)
-class LinearIntervals:
-    """What the intervals count: `statistical` noise, scatter of maneuvers and what inputs drive
-    beside the model (`coherence`), `total` with every systematic error of `shifts`; coefficients
-    with mass and inertia in theirs."""
-
-    statistical: FitResult
-    coherence: InputCoherence | None
-    shifts: tuple[ShiftedEstimate, ...]
-    total: FitResult
-    coefficients: tuple[Coefficient, ...]
-
-
-@dataclass(frozen=True)
-class LinearValidation:
-    """Free simulation of the maneuvers fitted, and of those held out.
-
-    Departures from the trim are as measured: airspeed and attitude in products with what moves.
-    `predictions` sets the error of each output held out beside what noise and covariance allow;
-    `unseen` are the maneuvers held out, with their outputs.
-    """
-
-    simulated: tuple[Array, ...]
-    fits: tuple[SignalFit, ...]
-    held_out: tuple[SignalFit, ...]
-    predictions: dict[str, Prediction]
-    unseen: tuple[tuple[Maneuver, Array], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from host.sysid.compatibility.reconstruction import (
     compatibility_lines,
 )
 from host.sysid.flight.data_finding import Finding, finding_document
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.pipeline.aircraft_data import AircraftData
 from host.sysid.pipeline.arguments import chosen_stretches, numbers_of, path_of

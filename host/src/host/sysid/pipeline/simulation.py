@@ -13,7 +13,7 @@ from host.sysid.answer.figure_kinds import Trace, histories
 from host.sysid.answer.mat_file import labels
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.flight.free_simulation import FreeRun, fits_of, free_runs, frozen_model
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.maneuver_selection import excited_axes, merge_overlapping
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, flown_maneuvers
 from host.sysid.flight.window_prediction import WINDOWS_S, WindowErrors, window_errors

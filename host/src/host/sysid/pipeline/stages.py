@@ -14,7 +14,8 @@ from host.sysid.answer.truth_comparison import read_truth
 from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer, coefficient_estimator
 from host.sysid.estimators.method_options import check_options, options_of
 from host.sysid.flight.estimator import answer_of
-from host.sysid.flight.linear_estimator import Answer, LinearEstimator
+from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_estimator import LinearEstimator
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData, aircraft_data

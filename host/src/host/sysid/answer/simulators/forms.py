@@ -19,7 +19,7 @@ from host.sysid.answer.simulators.straight_coefficients import (
     straight_coefficients,
 )
 from host.sysid.coefficients.coefficient_fit import MeanCondition
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 from host.sysid.identification_error import IdentificationError
 
 FLIGHTGEAR, CONTROL = "-set.xml", ".control.py"

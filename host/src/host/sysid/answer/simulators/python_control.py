@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.flight.linear_estimator import Answer
+from host.sysid.flight.linear_answer import Answer
 
 
 def control_text(answers: Sequence[Answer]) -> str:

@@ -1,0 +1,77 @@
+"""What one linear model of one axis says, and what it rests on: the answer of a flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from host.aircraft.mass_properties import Condition
+from host.arrays import Array
+from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+from host.sysid.compatibility.sensor_corrections import Correction
+from host.sysid.estimators.servo_parameters import ServoEstimate
+from host.sysid.flight.maneuver_detection import DetectedManeuver
+from host.sysid.flight.prediction_limits import Prediction
+from host.sysid.models.diagnostics import (
+    Collinearity,
+    IdentifiabilityFlag,
+    SignalFit,
+)
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.modal_analysis import Mode
+from host.sysid.models.residual_delays import STANDARD_DELAYS
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.templates import Trim
+from host.sysid.numerics.input_coherence import InputCoherence
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one model of one axis says, and what it rests on."""
+
+    template: str
+    method: str
+    model: LinearModel
+    trim: Trim
+    condition: Condition
+    maneuvers: tuple[Maneuver, ...]
+    used: tuple[DetectedManeuver, ...]
+    held_out: tuple[DetectedManeuver, ...]
+    result: FitResult
+    fits: tuple[SignalFit, ...]
+    validation: tuple[SignalFit, ...]
+    identifiability_flags: tuple[IdentifiabilityFlag, ...]
+    collinearity: Collinearity
+    modes: tuple[Mode, ...]
+    coefficients: tuple[Coefficient, ...]
+    constant_inputs: tuple[str, ...]
+    delays: dict[str, tuple[float, float]]
+    servo: ServoEstimate | None = None  # of inputs that are commands
+    corrections: tuple[Correction, ...] = ()
+    simulated: tuple[Array, ...] = ()  # outputs of the maneuvers by free simulation
+    own_model: bool = False  # of the user, not a template
+    coherence: InputCoherence | None = None  # of what free simulation leaves with the inputs
+    predictions: dict[str, Prediction] = field(default_factory=dict)  # of outputs held out
+    noise_covariance: Array | None = None  # of the estimate, without systematic errors
+    unseen: tuple[
+        tuple[Maneuver, Array], ...
+    ] = ()  # held out, with their outputs by free simulation
+
+    @property
+    def at_bound(self) -> tuple[str, ...]:
+        """Delays that the search wanted larger than a sensor can be late."""
+        limits = {d.name: d.limit_s for d in (*STANDARD_DELAYS, *self.model.delays)}
+        values = {name: value for name, (value, _) in self.delays.items()}
+        values |= {
+            d.name: self.result.value(d.name)
+            for d in self.model.delays
+            if d.name in self.result.names
+        }
+        return tuple(n for n, v in values.items() if abs(v) >= limits.get(n, np.inf) * (1.0 - 1e-9))
+
+    @property
+    def table(self) -> CoefficientTable:
+        """The coefficients and what they rest on."""
+        return CoefficientTable(self.template, self.method, self.trim.alpha_rad, self.coefficients)

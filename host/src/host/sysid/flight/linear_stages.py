@@ -1,0 +1,102 @@
+"""What each stage of a linear model hands on: estimate, intervals, validation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from host.aircraft.mass_properties import Condition
+from host.arrays import Array
+from host.sysid.aerodynamics.coefficient_table import Coefficient, ShiftedEstimate
+from host.sysid.estimators.servo_parameters import ServoEstimate
+from host.sysid.flight.prediction_limits import Prediction
+from host.sysid.flight.reconstructed_flight import FlownManeuver
+from host.sysid.flight.trim_departure import Departure
+from host.sysid.models.diagnostics import SignalFit
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.state_space_model import LinearModel
+from host.sysid.models.templates import Trim
+from host.sysid.numerics.input_coherence import InputCoherence
+
+
+@dataclass(frozen=True)
+class LinearEstimate:
+    """What estimation made: a model, its fit, and the data both rest on.
+
+    Attributes
+    ----------
+    template, method : str
+    model : LinearModel
+        As fitted.
+    trim, condition
+        Means over the maneuvers of the fit.
+    used, held_out : tuple of FlownManeuver
+        In the fit, and kept for validation.
+    maneuvers : tuple of Maneuver
+        Those used, as fitted.
+    cuts : tuple of mapping
+        All corrected columns of each.
+    fit : FitResult
+        As the method returned it.
+    departure : Departure or None
+        By how much airspeed and attitude that varied move the estimate.
+    delays : dict
+        Estimated before the fit: value and 95 % half-width, s.
+    servo : ServoEstimate or None
+        Of the inputs that are commands.
+    """
+
+    template: str
+    method: str
+    model: LinearModel
+    trim: Trim
+    condition: Condition
+    used: tuple[FlownManeuver, ...]
+    held_out: tuple[FlownManeuver, ...]
+    maneuvers: tuple[Maneuver, ...]
+    cuts: tuple[Mapping[str, Array], ...]
+    fit: FitResult
+    departure: Departure | None
+    delays: dict[str, tuple[float, float]]
+    servo: ServoEstimate | None = None
+
+    @property
+    def estimate(self) -> Array:
+        """All parameters, (P,)."""
+        return self.fit.estimate + (0.0 if self.departure is None else self.departure.step)
+
+    def at_trim(self, estimate: Array) -> list[Maneuver]:
+        """Return the maneuvers as if airspeed and attitude had not varied."""
+        if self.departure is None:
+            return list(self.maneuvers)
+        return self.departure.removed_from(self.maneuvers, estimate)
+
+
+@dataclass(frozen=True)
+class LinearIntervals:
+    """What the intervals count: `statistical` noise, scatter of maneuvers and what inputs drive
+    beside the model (`coherence`), `total` with every systematic error of `shifts`; coefficients
+    with mass and inertia in theirs."""
+
+    statistical: FitResult
+    coherence: InputCoherence | None
+    shifts: tuple[ShiftedEstimate, ...]
+    total: FitResult
+    coefficients: tuple[Coefficient, ...]
+
+
+@dataclass(frozen=True)
+class LinearValidation:
+    """Free simulation of the maneuvers fitted, and of those held out.
+
+    Departures from the trim are as measured: airspeed and attitude in products with what moves.
+    `predictions` sets the error of each output held out beside what noise and covariance allow;
+    `unseen` are the maneuvers held out, with their outputs.
+    """
+
+    simulated: tuple[Array, ...]
+    fits: tuple[SignalFit, ...]
+    held_out: tuple[SignalFit, ...]
+    predictions: dict[str, Prediction]
+    unseen: tuple[tuple[Maneuver, Array], ...] = ()
