@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -89,3 +90,26 @@ def test_the_verb_prints_them_beside_the_bound(
     assert "white sensor noise only" in capsys.readouterr().out
     assert main(["plan", str(path), "--gusts", "9"]) == 2
     assert "--gusts is 9 m/s, expected 0 to 5" in capsys.readouterr().err
+
+
+def test_a_width_that_no_card_makes_smaller_is_called_so(
+    promised: Prediction, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    path = tmp_path / "card.toml"
+    path.write_text(dumps(DOCUMENT))
+    wide = [
+        replace(w, half_width=0.5 * abs(w.value), noise_share=share)
+        for name, share in (("M_alpha", 0.1), ("M_q", 0.9))
+        for w in promised.widths
+        if w.name == name
+    ]
+    known = replace(promised, widths=tuple(wide))
+    monkeypatch.setattr("host.planning.predicted_widths.predict_widths", lambda *_, **__: known)
+    assert main(["plan", str(path)]) == 0
+    text = capsys.readouterr().out
+    said = {one.name: line for one in wide for line in text.splitlines() if f" {one.name} " in line}
+    assert "weak: by tolerances" in said[wide[0].name]
+    assert "weak: fly more of it" in said[wide[1].name]
+    assert "no card makes them smaller" in text
+    assert all(0.0 < w.noise_share <= 1.0 for w in promised.widths)

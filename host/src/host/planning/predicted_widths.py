@@ -12,8 +12,11 @@ import statistics
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
+from host.constants import NORMAL_95
 from host.instrument.deviations import sensor_error_model
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.compatibility.reconstruction import reconstruct
@@ -40,6 +43,9 @@ class PredictedWidth:
     name, unit : str
     value, half_width : float
         Medians over the flights that had it; 95 % interval, systematic errors in it.
+    noise_share : float
+        Median share of noise and gusts in the variance. The rest are tolerances of instrument and
+        aircraft, which no flight makes smaller.
     flights : int
         Those flights.
     """
@@ -48,6 +54,7 @@ class PredictedWidth:
     unit: str
     value: float
     half_width: float
+    noise_share: float
     flights: int
 
     @property
@@ -72,6 +79,16 @@ class Prediction:
     gusts_mps: float
     widths: tuple[PredictedWidth, ...]
     failures: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """A derivative as one flight tells it."""
+
+    unit: str
+    value: float
+    half_width: float
+    noise_share: float
 
 
 def predict_widths(
@@ -106,7 +123,7 @@ def predict_widths(
     """
     gusts = gusts_mps if gusts_mps is not None else card.air.turbulence_mps or LIGHT_GUSTS_MPS
     windy = replace(card, air=replace(card.air, turbulence_mps=gusts), faults=())
-    told: dict[str, list[tuple[str, float, float]]] = {}
+    told: dict[str, list[_Row]] = {}
     failures: list[str] = []
     for number in range(flights):
         try:
@@ -122,9 +139,10 @@ def predict_widths(
     widths = [
         PredictedWidth(
             name,
-            rows[0][0],
-            statistics.median(value for _, value, _ in rows),
-            statistics.median(half for _, _, half in rows),
+            rows[0].unit,
+            statistics.median(row.value for row in rows),
+            statistics.median(row.half_width for row in rows),
+            statistics.median(row.noise_share for row in rows),
             len(rows),
         )
         for name, rows in told.items()
@@ -144,12 +162,17 @@ def _identified(card: Card, seed: int) -> list[Answer]:
     )
 
 
-def _rows(answer: Answer) -> dict[str, tuple[str, float, float]]:
-    """Return unit, value and half-width of every derivative and coefficient."""
-    result = answer.result
-    halves = result.half_width()
-    rows = {}
+def _rows(answer: Answer) -> dict[str, _Row]:
+    """Return every derivative and coefficient of an answer."""
+    result, rows = answer.result, {}
+    halves, variances = result.half_width(), result.standard_error**2
+    noise = variances if answer.noise_covariance is None else np.diag(answer.noise_covariance)
     for name in (p.name for p in answer.model.parameters if p.name in result.names):
-        half = float(halves[result.index(name)])
-        rows[name] = parameter_unit(answer.model, name), result.value(name), half
-    return rows | {c.name: ("1", c.value, c.half_width) for c in answer.coefficients}
+        k = result.index(name)
+        share = float(noise[k] / variances[k]) if variances[k] > 0.0 else 1.0
+        unit = parameter_unit(answer.model, name)
+        rows[name] = _Row(unit, result.value(name), float(halves[k]), share)
+    for one in answer.coefficients:
+        share = (NORMAL_95 * one.fit_error / one.half_width) ** 2 if one.half_width > 0.0 else 1.0
+        rows[one.name] = _Row("1", one.value, one.half_width, share)
+    return rows

@@ -16,11 +16,12 @@ from host.terminal import command_line
 if TYPE_CHECKING:
     from host.planning.card_planning import Bound, Plan, Point
     from host.planning.point_widths import PointPromise
-    from host.planning.predicted_widths import Prediction
+    from host.planning.predicted_widths import PredictedWidth, Prediction
     from host.twin.testcard.cards import Card
 
 # A derivative whose predicted half-width is above this is named.
 WEAK_PERCENT = 20.0
+BY_TOLERANCES = "by tolerances, not by the card"
 NOT_TOLD_PERCENT = 100.0  # from here on the sign is open too
 MOST_FLIGHTS = 100
 MOST_GUSTS_MPS = 5.0
@@ -218,9 +219,17 @@ def _print_alone(alone: list[PointPromise]) -> None:
             print(f"      {text}")
 
 
+def _remedy(width: PredictedWidth | None) -> str:
+    """Return what makes a wide interval narrower."""
+    if width is not None and width.noise_share < 0.5:
+        return BY_TOLERANCES
+    return "fly more of it, or larger"
+
+
 def _print_intervals(plan: Plan, prediction: Prediction | None) -> None:
     """Print what identification will state, beside the bound of white noise."""
     least = {b.name: b for b in plan.bounds}
+    widths = {w.name: w for w in prediction.widths} if prediction is not None else {}
     rows: list[tuple[str, float, float, float, Bound | None]]
     if prediction is None:
         print("\n  What the data will tell, at best (white sensor noise only, 95 % half-width):")
@@ -232,7 +241,6 @@ def _print_intervals(plan: Plan, prediction: Prediction | None) -> None:
             f" instrument and aircraft (medians of virtual flights).\n  At best: white noise alone."
         )
         shown = (*least, *COEFFICIENTS)
-        widths = {w.name: w for w in prediction.widths if w.name in shown}
         rows = [
             (n, widths[n].value, widths[n].half_width, widths[n].percent, least.get(n))
             for n in shown
@@ -240,9 +248,14 @@ def _print_intervals(plan: Plan, prediction: Prediction | None) -> None:
         ]
     for name, value, half, percent, best in rows:
         bound = f"  at best {best.percent:5.1f} %" if best is not None else 17 * " "
-        weak = "  weak: fly more of it, or larger" if percent > WEAK_PERCENT else ""
+        weak = f"  weak: {_remedy(widths.get(name))}" if percent > WEAK_PERCENT else ""
         share = f"{percent:5.1f} %" if percent < NOT_TOLD_PERCENT else "no sign"
         line = f"    {name:8s} {value:+10.4g} +- {half:8.2g}  ({share})"
         print(f"{line}{bound if prediction is not None else ''}{weak}".rstrip())
+    if any(_remedy(widths.get(name)) == BY_TOLERANCES for name, _, _, percent, _ in rows
+           if percent > WEAK_PERCENT):  # fmt: skip
+        print(
+            "    Tolerances are those of calibration and aircraft file: no card makes them smaller."
+        )
     for text in (*plan.refused, *(prediction.failures if prediction is not None else ())):
         print(f"    {text}")
