@@ -146,6 +146,15 @@ def test_the_response_to_the_point_before_is_no_gust(
     assert [v["good"] for v in watched(two, rows).verdicts] == [True, True]
 
 
+def test_a_launch_is_no_gust(card: Card, response: AircraftResponse) -> None:
+    rows = flown(response, [(START_S, card.segments[1])])
+    ground = rows["t_s"] < START_S - 4.0
+    for side in "ab":
+        rows[f"airspeed_{side}_mps"][ground] = 0.5
+        rows[f"alpha_{side}_deg"][~ground] += 6.0
+    assert only(watched(card, rows))["good"]
+
+
 def test_rows_that_did_not_arrive_change_no_verdict_of_a_burst(
     card: Card, response: AircraftResponse
 ) -> None:

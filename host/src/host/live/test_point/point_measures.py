@@ -12,12 +12,13 @@ from host.arrays import Array
 from host.live.test_point.aircraft_response import STEP_S, AircraftResponse
 from host.live.test_point.wanted_input import RESPONSE_S, SURFACES, input_length_s, wanted_surfaces
 from host.planning.point_widths import told_by
-from host.sysid.flight.maneuver_detection import DetectedManeuver
+from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver
 from host.twin.testcard.cards import Segment
 
 TRIM_S = 1.0  # before the input, which is where the surfaces' trim is read
 GUST_S = 0.25  # over which a change of the vanes is no motion of the whole aircraft
 GUSTS_OVER_S, GUSTS_LEAST_S = 7.0, 1.5
+LAUNCH_S = 1.0  # after the last row slower than flight
 CHANGE_OF_GUST = 0.26  # rms change over `GUST_S` of the gust's deviation, as flown
 _RATE_OF = {"elevator": "q_radps", "aileron": "p_radps", "rudder": "r_radps"}
 
@@ -146,10 +147,14 @@ def gust_change_mps(columns: Mapping[str, Array], since_s: float, until_s: float
     t = columns["t_s"]
     lag = max(1, round(GUST_S / float(t[1] - t[0])))
     from_s = max(until_s - GUSTS_OVER_S, since_s)
-    quiet = (t >= from_s) & (t < until_s)
+    speed, before = columns["airspeed_mps"], t < until_s
+    standing = before & (speed < FLYING_SHARE * float(np.median(speed[before][-lag:])))
+    if standing.any():  # a launch is no gust
+        from_s = max(from_s, float(t[standing][-1]) + LAUNCH_S)
+    quiet = (t >= from_s) & before
     if until_s - from_s < GUSTS_LEAST_S or quiet.sum() <= lag:
         return 0.0
-    air = columns["alpha_rad"][quiet] * columns["airspeed_mps"][quiet]
+    air = columns["alpha_rad"][quiet] * speed[quiet]
     return _rms(air[lag:] - air[:-lag])
 
 
