@@ -9,8 +9,9 @@ import pytest
 from host.errors import UsageError
 from host.live.live_session import LiveSession
 from host.live.live_stream import LiveStream
-from host.live.mavlink_bridge import MavlinkBridge, mavlink_place
+from host.live.mavlink_bridge import MavlinkBridge
 from host.live.mavlink_parameters import LONGEST_NAME, calibration_parameters
+from host.live.udp_place import udp_place
 from host.physical.calibration import load_calibration
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -161,4 +162,4 @@ def test_nothing_can_be_commanded(station: Station) -> None:
 @pytest.mark.parametrize("place", ["", "udpin:127.0.0.1:14550", "udpout:14550", "udpout:h:0"])
 def test_a_wrong_place_is_refused(place: str) -> None:
     with pytest.raises(UsageError, match="udpout:HOST:PORT"):
-        mavlink_place(place)
+        udp_place("--mavlink", place)

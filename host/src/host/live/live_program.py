@@ -25,8 +25,10 @@ from host.live.live_sources import (
     udp_source,
 )
 from host.live.live_stream import LiveStream
-from host.live.mavlink_bridge import MavlinkBridge, mavlink_place
+from host.live.mavlink_bridge import MavlinkBridge
+from host.live.plotjuggler_bridge import PlotJugglerBridge
 from host.live.replay import RADIO_RATE_HZ, replay_source
+from host.live.udp_place import udp_place
 from host.log.capture_head import SUFFIX, CaptureHead
 from host.physical.calibration import Calibration, calibration_of_text, load_calibration
 from host.wire.schema_text import packed_schema
@@ -60,6 +62,7 @@ class LiveRequest:
     page: bool = True
     json: bool = False
     mavlink: str | None = None
+    plotjuggler: str | None = None
     aircraft: str | None = None
     wanted: str | None = None
     card: str | None = None
@@ -132,8 +135,9 @@ def run_live(
     own = getattr(source, "calibration_text", "")  # of a virtual instrument
     if own and request.calibration is None:
         calibration = calibration_of_text(own, Path(source.name))
-    if request.mavlink is not None:
-        mavlink_place(request.mavlink)
+    for option, place in (("--mavlink", request.mavlink), ("--plotjuggler", request.plotjuggler)):
+        if place is not None:
+            udp_place(option, place)
     texts = [packed_schema().text]
     capture = _capture(request, source, calibration)
     with capture if capture is not None else contextlib.nullcontext():
@@ -141,6 +145,8 @@ def run_live(
         if capture is not None:
             tell(f"every byte goes to {capture.path}")
         leave = [join(session, calibration) for join in request.joins]
+        if request.plotjuggler is not None:
+            leave.append(PlotJugglerBridge(session, request.plotjuggler).close)
         bridge = MavlinkBridge(session, request.mavlink) if request.mavlink else None
         if bridge is not None:
             session.audiences.append(bridge)

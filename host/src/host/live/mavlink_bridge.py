@@ -18,6 +18,7 @@ from host.extras import install_hint
 from host.live.live_sample import LiveUpdate, SlowFrame
 from host.live.live_session import LiveSession
 from host.live.mavlink_parameters import calibration_parameters
+from host.live.udp_place import udp_address
 
 _SYSTEM = 1  # of the aircraft; 0 would be everybody
 _FAST_S = 0.045  # 20 rows a second come from the radio
@@ -38,16 +39,6 @@ _NAMED = {
 }  # fmt: skip
 
 
-def mavlink_place(text: str) -> tuple[str, int]:
-    """Return host and port of ``udpout:HOST:PORT``; raises UsageError."""
-    kind, _, rest = text.partition(":")
-    host, _, port = rest.rpartition(":")
-    if kind != "udpout" or not host or not port.isdecimal() or not 0 < int(port) < 65536:
-        raise UsageError(f"--mavlink {text}: expected udpout:HOST:PORT, such as"
-                         " udpout:127.0.0.1:14550")  # fmt: skip
-    return host, int(port)
-
-
 class MavlinkBridge:
     """Sends what the stream holds and answers what is asked.
 
@@ -65,11 +56,7 @@ class MavlinkBridge:
     """
 
     def __init__(self, session: LiveSession, place: str) -> None:
-        host, port = mavlink_place(place)
-        try:
-            self._place = socket.gethostbyname(host), port
-        except OSError:
-            raise UsageError(f"--mavlink {place}: {host} is not known") from None
+        self._place = udp_address("--mavlink", place)
         try:
             from pymavlink.dialects.v20 import ardupilotmega
         except ModuleNotFoundError:

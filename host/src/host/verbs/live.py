@@ -64,6 +64,10 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--mavlink", metavar="udpout:HOST:PORT",
                         help="tell a ground station: QGroundControl, Mission Planner,"
                         " MAVProxy")  # fmt: skip
+    parser.add_argument("--plotjuggler", metavar="udpout:HOST:PORT", nargs="?",
+                        const="udpout:127.0.0.1:9870",
+                        help="rows as JSON datagrams for PlotJuggler's UDP server; to its own port"
+                        " on this computer without a value")  # fmt: skip
     parser.add_argument("--preflight", type=Path, metavar="SHEET",
                         help="what `host preflight` wrote: its GO or NO-GO on top")  # fmt: skip
     parser.add_argument("--card", metavar="CARD",
@@ -95,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
         page=not args.no_page,
         json=args.json,
         mavlink=args.mavlink,
+        plotjuggler=args.plotjuggler,
         aircraft=args.aircraft,
         wanted=args.wanted,
         card=args.card,

@@ -26,7 +26,7 @@ from host.sysid.compatibility.sensor_corrections import (
     pressure_share,
     residual_deviations,
 )
-from host.sysid.flight import linear_estimator, linear_model
+from host.sysid.flight import linear_answer, linear_model
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
@@ -290,7 +290,7 @@ def test_a_delay_at_its_bound_is_called_so(
     tight = tuple(
         replace(d, limit_s=0.001) if d.name == "delay_vanes_s" else d for d in STANDARD_DELAYS
     )
-    for module in (linear_estimator, linear_model):
+    for module in (linear_answer, linear_model):
         monkeypatch.setattr(module, "STANDARD_DELAYS", tight)
     answers = identify(columns, airframe=airframe_data(NAME))
     for answer in answers:
