@@ -11,7 +11,7 @@
 namespace frames {
 
 constexpr uint8_t kVersion = 1;
-constexpr uint32_t kSchemaHash = 0x5DF8D341u;
+constexpr uint32_t kSchemaHash = 0x21C00BC2u;
 constexpr size_t kMaxWireSize = 68;  // longest frame with its id
 
 // Bits of `valid`.
@@ -126,6 +126,81 @@ enum class EndCause : uint8_t {
   kNoFlight = 3,
 };
 
+enum class CardShape : uint8_t {
+  kPulse = 1,
+  kDoublet = 2,
+  kThreeTwoOneOne = 3,
+  kSweep = 4,
+  kMultisine = 5,
+};
+
+enum class CardCommand : uint8_t {
+  kState = 1,
+  kErase = 2,
+  kWrite = 3,
+  kCommit = 4,
+  kRead = 5,
+};
+
+enum class CardResult : uint8_t {
+  kOk = 0,
+  kMore = 1,
+  kNoCard = 2,
+  kRecording = 3,
+  kRelay = 4,
+  kAirborne = 5,
+  kDamaged = 6,
+  kRequest = 7,
+  kEeprom = 8,
+};
+
+enum class CardFault : uint8_t {
+  kNone = 0,
+  kMagic = 1,
+  kOtherVersion = 2,
+  kRows = 3,
+  kCrc = 4,
+  kAircraft = 5,
+  kLimits = 6,
+  kRowCrc = 7,
+  kRowShape = 8,
+  kRowAxes = 9,
+  kRowTime = 10,
+  kRowAmplitude = 11,
+  kRowFrequency = 12,
+  kRowComponents = 13,
+  kNotValid = 14,
+};
+
+enum class InputEnd : uint8_t {
+  kDone = 0,
+  kStick = 1,
+  kSwitch = 2,
+  kReceiver = 3,
+  kFrameTime = 4,
+  kRelay = 5,
+  kDrive = 6,
+  kAirspeed = 7,
+  kAlpha = 8,
+  kBeta = 9,
+  kBank = 10,
+  kPitch = 11,
+  kRates = 12,
+  kLoadFactor = 13,
+  kHeight = 14,
+  kDistance = 15,
+  kSensorLost = 16,
+  kSensorStill = 17,
+  kSupply = 18,
+  kRecorder = 19,
+  kDropped = 20,
+  kLoopLate = 21,
+  kButton = 22,
+  kThrottleIdle = 23,
+  kRowDamaged = 24,
+  kTravel = 25,
+};
+
 enum class Event : uint8_t {
   kSessionStart = 1,
   kSessionEnd = 2,
@@ -159,6 +234,11 @@ enum class Event : uint8_t {
   kFlightState = 30,
   kRelayLost = 31,
   kReceiverRefused = 32,
+  kCardEnabled = 33,
+  kCardRefused = 34,
+  kInputStart = 35,
+  kInputEnd = 36,
+  kInputRefused = 37,
 };
 
 // All identification channels at one instant. A new-type IMU packet triggers it (every n-th at lower rates), or the timer 1.5 periods after the last trigger.
@@ -590,6 +670,36 @@ static_assert(sizeof(ImageFrame) == 8, "size of ImageFrame");
 static_assert(offsetof(ImageFrame, t_us) == 0, "offset of ImageFrame::t_us");
 static_assert(offsetof(ImageFrame, hash) == 4, "offset of ImageFrame::hash");
 
+// A part of the flight card that was enabled: parts 0 to 2 are its head, part 3 + n its row n (layouts card_head, card_learning, card_row). The whole card heads each session behind the enabling, and a row stands before its input_start. No card, no such frame.
+struct __attribute__((packed)) CardFrame {
+  uint32_t t_us;  // us
+  uint8_t part;
+  uint8_t bytes[48];  // as the EEPROM holds it
+
+  static constexpr uint8_t id() { return 13; }
+  static constexpr uint8_t wire_size() { return 54; }
+};
+constexpr uint8_t kCardId = 13;
+constexpr uint8_t kCardWireSize = 54;  // with the id byte
+static_assert(sizeof(CardFrame) == 53, "size of CardFrame");
+static_assert(offsetof(CardFrame, t_us) == 0, "offset of CardFrame::t_us");
+static_assert(offsetof(CardFrame, part) == 4, "offset of CardFrame::part");
+static_assert(offsetof(CardFrame, bytes) == 5, "offset of CardFrame::bytes");
+
+// Settings of the test inputs in force; stands before the parts of the card. No card, no such frame.
+struct __attribute__((packed)) InputConfigFrame {
+  uint32_t t_us;  // us
+  uint16_t switch_armed_min_us;  // us; switch at or above: armed; Mega ends 100 us below
+
+  static constexpr uint8_t id() { return 14; }
+  static constexpr uint8_t wire_size() { return 7; }
+};
+constexpr uint8_t kInputConfigId = 14;
+constexpr uint8_t kInputConfigWireSize = 7;  // with the id byte
+static_assert(sizeof(InputConfigFrame) == 6, "size of InputConfigFrame");
+static_assert(offsetof(InputConfigFrame, t_us) == 0, "offset of InputConfigFrame::t_us");
+static_assert(offsetof(InputConfigFrame, switch_armed_min_us) == 4, "offset of InputConfigFrame::switch_armed_min_us");
+
 // Packet of our own ArduIMU firmware; ends in CRC-16/CCITT-FALSE over all bytes before it. Signs and scales as in frame ident.
 struct __attribute__((packed)) ImuPacket {
   uint8_t kind;  // marks this kind of packet
@@ -678,6 +788,131 @@ static_assert(offsetof(OriginalImu2Packet, ground_speed_mps) == 20, "offset of O
 static_assert(offsetof(OriginalImu2Packet, fix) == 24, "offset of OriginalImu2Packet::fix");
 static_assert(offsetof(OriginalImu2Packet, satellites) == 28, "offset of OriginalImu2Packet::satellites");
 
+// Whose card it is, and what an input may do. A value on a limit is inside.
+struct __attribute__((packed)) CardHeadLayout {
+  uint16_t magic;  // FC
+  uint8_t version;
+  uint8_t rows;  // 1 to 32
+  char aircraft[16];  // must be config.aircraft of the logger
+  uint8_t airspeed_input;  // bit of ident.valid of the pitot that is watched: 4 dp_a, 5 dp_b; 255: none
+  uint8_t alpha_input;  // 0 alpha_a, 1 alpha_b; 255: none
+  uint8_t beta_input;  // 2 beta_a, 3 beta_b; 255: none
+  uint8_t reserved_1;
+  uint16_t dp_min;  // 0.25 count; airspeed, as ident.dp_a
+  uint16_t dp_max;  // 0.25 count
+  uint16_t alpha_min;  // 0.25 count; as ident.alpha_a; the smaller count, whatever the sign of the slope
+  uint16_t alpha_max;  // 0.25 count
+  uint16_t beta_min;  // 0.25 count; as ident.beta_a
+  uint16_t beta_max;  // 0.25 count
+  uint16_t phi_max;  // 0.000174533 rad; bank to either side, 0.01 deg
+  int16_t theta_min;  // 0.000174533 rad; pitch, 0.01 deg
+  int16_t theta_max;  // 0.000174533 rad
+  uint16_t p_max;  // 0.000266462 rad/s; either way; at most 32767
+  uint16_t q_max;  // 0.000266462 rad/s
+  uint16_t r_max;  // 0.000266462 rad/s
+  int16_t az_min;  // 0.0011971 m/s2; load factor: the most lift is the least az
+  int16_t az_max;  // 0.0011971 m/s2
+  uint16_t height_min_pa;  // Pa; least drop of the static pressure since the card was enabled on the ground: 12 Pa a metre; above 0
+  uint16_t height_max_pa;  // Pa
+  uint16_t distance_max_m;  // m; from where the card was enabled; 0: not watched, and no GPS needed; at most 3000
+  uint16_t still_ms;  // ms; a sensor whose value has not moved for so long is stuck; 100 to 2000 (the GPS: 1000 more)
+  uint16_t stick_us;  // us; a stick this far from its place at the trigger ends the input; 10 to 200, usually 40
+  uint16_t rail_min;  // 0.25 count; servo rail, as system.rail; 0: not watched
+  uint16_t servo_min_us[3];  // us; travel of aileron, elevator, rudder; the travel the pilot showed counts as well; 800 to 2200
+  uint16_t servo_max_us[3];  // us
+  uint16_t amplitude_max_us[3];  // us; largest deflection of a row; at most 500
+  uint16_t rate_max_usps;  // us/s; the command moves no faster (flutter, servos): steps become ramps; 100 to 60000
+  uint16_t frequency_max_chz;  // 0.01 Hz; highest frequency of a row; at most 500: 5 Hz
+  uint8_t reserved_2[6];
+  uint32_t crc;  // CRC-32 of the bytes before it, of part 2 and of all rows: the card's hash; not 0
+};
+constexpr uint8_t kCardHeadLayoutSize = 96;
+constexpr uint16_t kCardHeadLayoutMagic = 17222u;
+constexpr uint8_t kCardHeadLayoutVersion = 1u;
+constexpr uint8_t kCardHeadLayoutReserved1 = 0;
+constexpr uint8_t kCardHeadLayoutReserved2 = 0;
+static_assert(sizeof(CardHeadLayout) == 96, "size of CardHeadLayout");
+static_assert(offsetof(CardHeadLayout, magic) == 0, "offset of CardHeadLayout::magic");
+static_assert(offsetof(CardHeadLayout, version) == 2, "offset of CardHeadLayout::version");
+static_assert(offsetof(CardHeadLayout, rows) == 3, "offset of CardHeadLayout::rows");
+static_assert(offsetof(CardHeadLayout, aircraft) == 4, "offset of CardHeadLayout::aircraft");
+static_assert(offsetof(CardHeadLayout, airspeed_input) == 20, "offset of CardHeadLayout::airspeed_input");
+static_assert(offsetof(CardHeadLayout, alpha_input) == 21, "offset of CardHeadLayout::alpha_input");
+static_assert(offsetof(CardHeadLayout, beta_input) == 22, "offset of CardHeadLayout::beta_input");
+static_assert(offsetof(CardHeadLayout, reserved_1) == 23, "offset of CardHeadLayout::reserved_1");
+static_assert(offsetof(CardHeadLayout, dp_min) == 24, "offset of CardHeadLayout::dp_min");
+static_assert(offsetof(CardHeadLayout, dp_max) == 26, "offset of CardHeadLayout::dp_max");
+static_assert(offsetof(CardHeadLayout, alpha_min) == 28, "offset of CardHeadLayout::alpha_min");
+static_assert(offsetof(CardHeadLayout, alpha_max) == 30, "offset of CardHeadLayout::alpha_max");
+static_assert(offsetof(CardHeadLayout, beta_min) == 32, "offset of CardHeadLayout::beta_min");
+static_assert(offsetof(CardHeadLayout, beta_max) == 34, "offset of CardHeadLayout::beta_max");
+static_assert(offsetof(CardHeadLayout, phi_max) == 36, "offset of CardHeadLayout::phi_max");
+static_assert(offsetof(CardHeadLayout, theta_min) == 38, "offset of CardHeadLayout::theta_min");
+static_assert(offsetof(CardHeadLayout, theta_max) == 40, "offset of CardHeadLayout::theta_max");
+static_assert(offsetof(CardHeadLayout, p_max) == 42, "offset of CardHeadLayout::p_max");
+static_assert(offsetof(CardHeadLayout, q_max) == 44, "offset of CardHeadLayout::q_max");
+static_assert(offsetof(CardHeadLayout, r_max) == 46, "offset of CardHeadLayout::r_max");
+static_assert(offsetof(CardHeadLayout, az_min) == 48, "offset of CardHeadLayout::az_min");
+static_assert(offsetof(CardHeadLayout, az_max) == 50, "offset of CardHeadLayout::az_max");
+static_assert(offsetof(CardHeadLayout, height_min_pa) == 52, "offset of CardHeadLayout::height_min_pa");
+static_assert(offsetof(CardHeadLayout, height_max_pa) == 54, "offset of CardHeadLayout::height_max_pa");
+static_assert(offsetof(CardHeadLayout, distance_max_m) == 56, "offset of CardHeadLayout::distance_max_m");
+static_assert(offsetof(CardHeadLayout, still_ms) == 58, "offset of CardHeadLayout::still_ms");
+static_assert(offsetof(CardHeadLayout, stick_us) == 60, "offset of CardHeadLayout::stick_us");
+static_assert(offsetof(CardHeadLayout, rail_min) == 62, "offset of CardHeadLayout::rail_min");
+static_assert(offsetof(CardHeadLayout, servo_min_us) == 64, "offset of CardHeadLayout::servo_min_us");
+static_assert(offsetof(CardHeadLayout, servo_max_us) == 70, "offset of CardHeadLayout::servo_max_us");
+static_assert(offsetof(CardHeadLayout, amplitude_max_us) == 76, "offset of CardHeadLayout::amplitude_max_us");
+static_assert(offsetof(CardHeadLayout, rate_max_usps) == 82, "offset of CardHeadLayout::rate_max_usps");
+static_assert(offsetof(CardHeadLayout, frequency_max_chz) == 84, "offset of CardHeadLayout::frequency_max_chz");
+static_assert(offsetof(CardHeadLayout, reserved_2) == 86, "offset of CardHeadLayout::reserved_2");
+static_assert(offsetof(CardHeadLayout, crc) == 92, "offset of CardHeadLayout::crc");
+
+// Scales of the estimate on the chip; zeros: none is made.
+struct __attribute__((packed)) CardLearningLayout {
+  uint8_t reserved[48];
+};
+constexpr uint8_t kCardLearningLayoutSize = 48;
+constexpr uint8_t kCardLearningLayoutReserved = 0;
+static_assert(sizeof(CardLearningLayout) == 48, "size of CardLearningLayout");
+static_assert(offsetof(CardLearningLayout, reserved) == 0, "offset of CardLearningLayout::reserved");
+
+// One input. Deflections are added to the sticks, in us of the servo pulse.
+struct __attribute__((packed)) CardRowLayout {
+  uint8_t shape;  // see card_shape
+  uint8_t axes;  // bit 0 aileron, 1 elevator, 2 rudder: those with an amplitude
+  uint16_t quiet_ms;  // ms; between trigger and shape; no deflection, all limits watched
+  uint16_t duration_ms;  // ms; of the shape; 100 or more, with quiet_ms at most 20000
+  int16_t amplitude_us[3];  // us; aileron, elevator, rudder; its sign is that of the first deflection
+  uint16_t first_chz;  // 0.01 Hz; sweep: at its beginning; else 0
+  uint16_t last_chz;  // 0.01 Hz; sweep: at its end, above or below; else 0
+  uint8_t components[30];  // multisine: ten times harmonic of 1/duration (0: unused), phase in 1/256 turn, 64 * axis + share of the amplitude in 1/64; else 0
+  uint16_t crc;  // CRC-16 of the bytes before it
+};
+constexpr uint8_t kCardRowLayoutSize = 48;
+static_assert(sizeof(CardRowLayout) == 48, "size of CardRowLayout");
+static_assert(offsetof(CardRowLayout, shape) == 0, "offset of CardRowLayout::shape");
+static_assert(offsetof(CardRowLayout, axes) == 1, "offset of CardRowLayout::axes");
+static_assert(offsetof(CardRowLayout, quiet_ms) == 2, "offset of CardRowLayout::quiet_ms");
+static_assert(offsetof(CardRowLayout, duration_ms) == 4, "offset of CardRowLayout::duration_ms");
+static_assert(offsetof(CardRowLayout, amplitude_us) == 6, "offset of CardRowLayout::amplitude_us");
+static_assert(offsetof(CardRowLayout, first_chz) == 12, "offset of CardRowLayout::first_chz");
+static_assert(offsetof(CardRowLayout, last_chz) == 14, "offset of CardRowLayout::last_chz");
+static_assert(offsetof(CardRowLayout, components) == 16, "offset of CardRowLayout::components");
+static_assert(offsetof(CardRowLayout, crc) == 46, "offset of CardRowLayout::crc");
+
+constexpr uint16_t kCardPartBytes = 48u;
+constexpr uint16_t kCardHeadParts = 3u;
+constexpr uint16_t kCardMostRows = 32u;
+constexpr uint16_t kCardComponents = 10u;
+constexpr uint16_t kCardLeastMs = 100u;
+constexpr uint16_t kCardLongestMs = 20000u;
+constexpr uint16_t kCardMostAmplitudeUs = 500u;
+constexpr uint16_t kCardMostFrequencyChz = 500u;
+constexpr uint16_t kCardMostDistanceM = 3000u;
+constexpr uint16_t kCardRequest = 240u;
+constexpr uint16_t kCardAnswer = 241u;
+
 // Bytes of a frame with its id byte, from that byte; 0 for an unknown id.
 constexpr uint8_t wire_size(uint8_t id) {
   switch (id) {
@@ -705,6 +940,10 @@ constexpr uint8_t wire_size(uint8_t id) {
       return 13;
     case 12:
       return 9;
+    case 13:
+      return 54;
+    case 14:
+      return 7;
     default:
       return 0;
   }

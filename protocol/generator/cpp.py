@@ -38,7 +38,10 @@ def frames_header(schema: Schema) -> str:
         lines += [*_struct(frame, f"{camel(frame.name)}Frame"), ""]
     for packet in schema.packets:
         lines += [*_struct(packet, f"{camel(packet.name)}Packet"), ""]
-    lines += [*_wire_size(schema), "", "}  // namespace frames", ""]
+    for layout in schema.layouts:
+        lines += [*_struct(layout, f"{camel(layout.name)}Layout"), ""]
+    lines += [f"constexpr uint16_t k{camel(name)} = {n}u;" for name, n in schema.numbers.items()]
+    lines += ["", *_wire_size(schema), "", "}  // namespace frames", ""]
     return "\n".join(lines)
 
 
@@ -91,6 +94,9 @@ def _struct(frame: Frame, name: str) -> list[str]:
     if frame.id is not None:
         lines.append(f"constexpr uint8_t {base}Id = {frame.id};")
         lines.append(f"constexpr uint8_t {base}WireSize = {frame.wire_size};  // with the id byte")
+    elif frame.address is None:
+        base += "Layout"
+        lines.append(f"constexpr uint8_t {base}Size = {frame.body_size};")
     else:
         base += "Packet"
         lines.append(f"constexpr uint8_t {base}Address = {frame.address};")
@@ -148,7 +154,7 @@ def _width(schema: Schema, table: str) -> int:
     """Bits of the widest field that a bits table explains."""
     sizes = [
         field.size
-        for frame in (*schema.frames, *schema.packets)
+        for frame in (*schema.frames, *schema.packets, *schema.layouts)
         for field in frame.fields
         if field.table == table
     ]

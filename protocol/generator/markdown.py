@@ -37,6 +37,17 @@ def frames_page(schema: Schema) -> str:
             *_fields(packet, first=0),
             "",
         ]
+    lines += [
+        "# The flight card",
+        "",
+        "How it is written and flown: [flight-card.md](../flight-card.md).",
+        "",
+    ]
+    for layout in schema.layouts:
+        lines += [f"## {layout.name}", "", f"{layout.doc} {layout.body_size} bytes.", ""]
+        lines += [*_fields(layout, first=0), ""]
+    lines += ["| number | value |", "| --- | --- |"]
+    lines += [f"| {name} | {value} |" for name, value in schema.numbers.items()] + [""]
     lines += ["# Bits", ""]
     for name, bits in schema.bits.items():
         lines += [f"## {name}", "", "| bit | name |", "| --- | --- |"]

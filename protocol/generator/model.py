@@ -18,7 +18,7 @@ NUMBERS: dict[str, tuple[int, str]] = {
     "char": (1, "char"),
 }
 SI_UNITS = ("us", "ms", "s", "Hz", "rad", "rad/s", "deg", "m", "m/s", "m/s2", "T", "Pa")
-UNITS = frozenset((*SI_UNITS, "degC", "mV", "count", "LSB", "byte", "byte/s", "baud"))
+UNITS = frozenset((*SI_UNITS, "degC", "mV", "us/s", "count", "LSB", "byte", "byte/s", "baud"))
 AXES = frozenset(("x", "y", "z", "north", "east", "down"))
 # What a name that ends so must have as its unit.
 SUFFIXES = {
@@ -32,13 +32,18 @@ SUFFIXES = {
     "_m": "m",
     "_baud": "baud",
     "_byteps": "byte/s",
+    "_pa": "Pa",
+    "_usps": "us/s",
+    "_chz": "Hz",
 }
 IDENT_LIMIT_BYTES = 68  # a ring of 4.45 kB then holds 500 ms at 100 Hz
 FRAME_LIMIT_BYTES = 128  # the longest a telemetry envelope carries
 VALUE_KEYS = ("name", "type", "unit", "scale", "axis", "invalid", "valid", "age", "delay_us")
 FIELD_KEYS = frozenset((*VALUE_KEYS, "enum", "bits", "always", "doc"))
+TOP_KEYS = frozenset(("version", "frame", "packet", "layout", "numbers", "bits", "enum"))
 FRAME_KEYS = frozenset(("id", "name", "rate_hz", "doc", "field"))
 PACKET_KEYS = frozenset(("name", "address", "doc", "field"))
+LAYOUT_KEYS = frozenset(("name", "doc", "field"))
 TYPE = re.compile(r"(u8|i8|u16|i16|u32|i32|f32|char)(?:\[([1-9][0-9]*)\])?")
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -81,7 +86,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A frame (with id) or, where `id` is None, a packet on the I2C bus (with address)."""
+    """A frame (with id), a packet on the I2C bus (with address), or a layout (with neither)."""
 
     id: int | None
     address: int | None
@@ -108,6 +113,8 @@ class Schema:
     version: int
     frames: tuple[Frame, ...]
     packets: tuple[Frame, ...]
+    layouts: tuple[Frame, ...]
+    numbers: dict[str, int]
     bits: dict[str, tuple[str, ...]]
     enums: dict[str, dict[str, int]]
 
@@ -136,7 +143,7 @@ def load(path: Path) -> Schema:
 
 def parse(data: Mapping[str, object]) -> Schema:
     """Check the content of a frames.toml, already read, and give it types."""
-    _only_keys(data, frozenset(("version", "frame", "packet", "bits", "enum")), "frames.toml")
+    _only_keys(data, TOP_KEYS, "frames.toml")
     version = _integer(data.get("version"), "version", 1, 255)
     bits = {
         name: tuple(_text(bit, f"bits.{name}") for bit in _list(row, f"bits.{name}"))
@@ -156,35 +163,46 @@ def parse(data: Mapping[str, object]) -> Schema:
         if len(set(names)) != len(names):
             raise SchemaError(f"bits.{name}: a name stands twice")
     frames = tuple(
-        _frame(_table(row, "frame"), bits, enums, packet=False)
+        _frame(_table(row, "frame"), bits, enums, "frame")
         for row in _list(data.get("frame", []), "frame")
     )
     packets = tuple(
-        _frame(_table(row, "packet"), bits, enums, packet=True)
+        _frame(_table(row, "packet"), bits, enums, "packet")
         for row in _list(data.get("packet", []), "packet")
     )
+    layouts = tuple(
+        _frame(_table(row, "layout"), bits, enums, "layout")
+        for row in _list(data.get("layout", []), "layout")
+    )
+    numbers = {
+        name: _integer(value, f"numbers.{name}", 0, 65535)
+        for name, value in _table(data.get("numbers", {}), "numbers").items()
+    }
     if not frames:
         raise SchemaError("no [[frame]] found, expected at least one")
     _unique([frame.id for frame in frames], "frame id")
     _unique([frame.name for frame in frames], "frame name")
     _unique([packet.name for packet in packets], "packet name")
+    _unique([layout.name for layout in layouts], "layout name")
     _check_rates(frames)
-    return Schema(version, frames, packets, bits, enums)
+    return Schema(version, frames, packets, layouts, numbers, bits, enums)
 
 
 def _frame(
     row: Mapping[str, object],
     bits: Mapping[str, tuple[str, ...]],
     enums: Mapping[str, Mapping[str, int]],
-    *,
-    packet: bool,
+    kind: str,
 ) -> Frame:
-    name = _name(row.get("name"), "packet" if packet else "frame")
-    where = f"{'packet' if packet else 'frame'} {name}"
-    _only_keys(row, PACKET_KEYS if packet else FRAME_KEYS, where)
-    number = None if packet else _integer(row.get("id"), f"{where}: id", 1, 255)
-    address = _integer(row.get("address"), f"{where}: address", 8, 119) if packet else None
-    rate = 0 if packet else row.get("rate_hz")
+    name = _name(row.get("name"), kind)
+    where = f"{kind} {name}"
+    keys = {"frame": FRAME_KEYS, "packet": PACKET_KEYS, "layout": LAYOUT_KEYS}[kind]
+    _only_keys(row, keys, where)
+    framed = kind == "frame"
+    number = _integer(row.get("id"), f"{where}: id", 1, 255) if framed else None
+    addressed = kind == "packet"
+    address = _integer(row.get("address"), f"{where}: address", 8, 119) if addressed else None
+    rate = row.get("rate_hz") if framed else 0
     if isinstance(rate, bool) or not isinstance(rate, int | str):
         raise SchemaError(f"{where}: rate_hz is {rate!r}, expected a number or 'frame.field'")
     fields: list[Field] = []

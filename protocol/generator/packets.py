@@ -1,4 +1,4 @@
-"""packets.json: the packets on the IMU's bus for programs that are not C++.
+"""packets.json: packets on the IMU's bus, layouts of the flight card, for programs not in C++.
 
 They are not in the schema text: no log carries them.
 """
@@ -9,15 +9,25 @@ from protocol.generator.model import Frame, Schema
 
 
 def json_file(schema: Schema) -> str:
-    """Return packets.json: address and fields of each packet by its name."""
+    """Return packets.json: fields of each packet and layout by its name, and the numbers."""
     head = '{"generator":"protocol/generate.py from protocol/frames.toml","packets":{\n'
     rows = [f"{_json(packet.name)}:{_json(_packet_row(packet))}" for packet in schema.packets]
-    return head + ",\n".join(rows) + "\n}}\n"
+    layouts = [f"{_json(layout.name)}:{_json(_row(layout))}" for layout in schema.layouts]
+    return (
+        head
+        + ",\n".join(rows)
+        + '\n},"layouts":{\n'
+        + ",\n".join(layouts)
+        + f'\n}},"numbers":{_json(schema.numbers)}}}\n'
+    )
 
 
 def _packet_row(packet: Frame) -> dict[str, object]:
+    return {"address": packet.address} | _row(packet)
+
+
+def _row(packet: Frame) -> dict[str, object]:
     return {
-        "address": packet.address,
         "columns": ["name", "type", "unit", "scale"],
         "fields": [[f.name, f.type, f.unit, f.scale] for f in packet.fields],
         "always": {f.name: f.always for f in packet.fields if f.always is not None},

@@ -40,6 +40,9 @@ BAD = {
     "unknown key": ('"fix", type = "u8"', '"fix", type = "u8", colour = 1', "'colour'"),
     "rate of no field": ('rate_hz = "config.rate_hz"', 'rate_hz = "config.rate"', "config.rate"),
     "enum number twice": ("bmp085 = 1", "bmp085 = 2", "two names have one number"),
+    "layout twice": ('name = "card_row"', 'name = "card_head"', "layout name 'card_head' stands"),
+    "layout with an id": ('name = "card_row"', 'id = 1\nname = "card_row"', "layout card_row: key"),
+    "number too large": ("card_longest_ms = 20000", "card_longest_ms = 70000", "numbers.card_"),
     "not TOML": ("[bits]", "[bits", "is not TOML"),
 }  # fmt: skip
 
@@ -153,6 +156,28 @@ def test_schema_text_says_what_frames_toml_says() -> None:
             assert len(row) == 2 or row[-1] != default_of_last, "row not cut"
     assert text["bits"] == truth["bits"]
     assert text["enum"] == truth["enum"]
+
+
+def test_parts_of_the_flight_card_are_whole() -> None:
+    data = json.loads((ROOT / "protocol/generated/packets.json").read_text())
+    part = data["numbers"]["card_part_bytes"]
+    sizes = {name: _bytes(layout["fields"]) for name, layout in data["layouts"].items()}
+    assert sizes == {"card_head": 2 * part, "card_learning": part, "card_row": part}
+    assert data["layouts"]["card_head"]["fields"][-1][0] == "crc"
+    assert len(_always(data["layouts"]["card_head"])) == 4
+
+
+def _bytes(fields: list[list[object]]) -> int:
+    sizes = {"u8": 1, "char": 1, "u16": 2, "i16": 2, "u32": 4}
+    total = 0
+    for _, kind, *_ in fields:
+        base, _, length = str(kind).rstrip("]").partition("[")
+        total += sizes[base] * int(length or 1)
+    return total
+
+
+def _always(layout: dict[str, dict[str, int]]) -> dict[str, int]:
+    return layout["always"]
 
 
 def test_hashes_are_the_crc_of_the_text() -> None:
