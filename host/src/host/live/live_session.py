@@ -21,7 +21,7 @@ from host.live.live_sample import LIVE_UNITS, LiveUpdate
 from host.live.live_sources import Source
 from host.live.live_stream import LiveStream
 
-_BATCH_S = 0.030
+_BATCH_S = 0.016  # half a redraw of the page
 _STATE_S = 0.2
 _REST_S = 0.05
 _BIG = 1 << 14
@@ -130,13 +130,15 @@ class LiveSession:
     def _receive(self) -> None:
         held = bytearray()
         fed_s = self._shown_s = 0.0
+        arrived_s = 0.0  # of the first byte held
         for data in self.source.portions(self._said):
             if data and self.capture is not None:
                 self._written(self.capture, data)
+            arrived_s = arrived_s if held else time.time()
             held += data
             now_s = time.monotonic()
             if held and (now_s - fed_s >= _BATCH_S or len(held) >= _BIG):
-                self._safely(self._feed, bytes(held))
+                self._safely(self._feed, bytes(held), arrived_s)
                 held.clear()
                 fed_s = now_s
             self._answer()
@@ -144,7 +146,7 @@ class LiveSession:
             if self._stop.is_set():
                 break
         if held:
-            self._safely(self._feed, bytes(held))
+            self._safely(self._feed, bytes(held), arrived_s)
 
     def _safely(self, show: Callable[..., None], *given: Any) -> None:
         """Show something; a mistake of ours in it is told once and never ends the recording."""
@@ -169,8 +171,8 @@ class LiveSession:
                 f"{capture.path} takes no more ({error.strerror}): NOT RECORDED from here on"
             )
 
-    def _feed(self, data: bytes) -> None:
-        update = self.stream.feed(data, time.time())
+    def _feed(self, data: bytes, arrived_s: float) -> None:
+        update = self.stream.feed(data, arrived_s)
         self.state.received(len(data), update)
         for listener in self.listeners.values():
             listener.take(data)

@@ -22,8 +22,8 @@ from host.live.page_guard import PILOT, ROLE, PageGuard
 
 WINDOW_S = 30.0
 MOST_VIEWERS = 20
-_QUEUE = 64  # messages: two seconds
-_KEPT = 1200  # of rows: more than 30 s at 30 messages a second
+_QUEUE = 128  # messages: two seconds
+_KEPT = 2000  # of rows: more than 30 s at 60 messages a second
 _TRACK = 3000  # points that a new viewer gets
 _LONGEST_MESSAGE = 256  # bytes; {"type":"mark"} and three words to a preflight
 _MARK_S = 0.2

@@ -1,6 +1,5 @@
 // The last seconds of every column, as arrays that uPlot draws: null where there is no value.
 
-const MOST_POINTS = 1500; // of a line: five for each pixel
 const TURN_S = 0.25; // wider than a pixel
 const SPARE = 2; // times the window, before what is older is thrown away
 
@@ -64,6 +63,7 @@ export class History {
   }
 
   clear() {
+    this.forgotten = this.made; // numbers of rows are never used again
     for (const column of this.values.values()) column.length = 0;
   }
 
@@ -90,12 +90,17 @@ export class History {
 
   // Columns of the window; of more rows than pixels the least and the greatest of each few, so that
   // no peak is lost. The few are the same from redraw to redraw: nothing shimmers.
-  window(names, first) {
+  window(names, first, pixels) {
     const count = this.values.get("t_s").length - first;
-    const few = Math.ceil(count / MOST_POINTS) * 2;
+    const few = Math.ceil(count / pixels);
     if (few <= 2) return names.map((name) => this.values.get(name).slice(first));
     const start = first + ((few - ((this.forgotten + first) % few)) % few);
     return names.map((name) => thinned(this.values.get(name), start, few, name === "t_s"));
+  }
+
+  // Rows since the beginning: number of the next one.
+  get made() {
+    return this.forgotten + this.values.get("t_s").length;
   }
 
   last(name) {

@@ -1,4 +1,8 @@
 // Plots of the last seconds: uPlot draws lines and axes, the heading above them says the values.
+//
+// The window moves by whole pixels, ten a second. uPlot draws a plot anew only then; between two such
+// steps everything but the newest rows stands where it stood, and only these are added. The plots
+// take their steps in turn, so that a redraw has four of them to draw anew and not all twelve.
 
 import { PLOTS } from "./channels.js";
 
@@ -31,9 +35,16 @@ function element(kind, className, text = "") {
   return made;
 }
 
+function set(figure, text) {
+  if (figure.textContent !== text) figure.textContent = text;
+}
+
 class Plot {
-  constructor(what, parent) {
+  constructor(what, parent, turn) {
     this.what = what;
+    this.turn = turn; // share of a pixel by which this one steps behind the first
+    this.end = null; // of the window as it is drawn, s
+    this.made = 0; // rows that are drawn
     this.columns = what.series.map(([column]) => column);
     const box = element("section", what.jumps ? "plot surface" : "plot");
     box.setAttribute("aria-label", what.title);
@@ -110,25 +121,76 @@ class Plot {
   fit() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width > 20 && height > 20) this.chart.setSize({ width, height });
+    this.end = null;
   }
 
-  draw(history, first, span) {
-    this.span = span;
-    this.chart.setData(history.window(["t_s", ...this.columns], first));
+  // Shows what came since; returns true where the whole plot was drawn.
+  draw(history, first, now) {
+    const pixels = this.chart.bbox.width;
+    const step = history.windowS / pixels;
+    const end = (Math.ceil(now / step - this.turn) + this.turn) * step;
+    const whole = end !== this.end || !this.add(history);
+    if (whole) {
+      this.end = end;
+      this.span = [end - history.windowS, end];
+      this.chart.setData(history.window(["t_s", ...this.columns], first, pixels));
+    }
+    this.made = history.made;
+    return whole;
+  }
+
+  // Adds the lines of the newest rows; returns false where one of them leaves the axis.
+  add(history) {
+    const from = Math.max(this.made - 1 - history.forgotten, 0);
+    const t = history.values.get("t_s");
+    if (from >= t.length - 1) return true;
+    const { chart, columns } = this;
+    const series = columns.map((name, at) => ({ line: chart.series[at + 1], column: history.values.get(name) }));
+    const inside = ({ line, column }) => {
+      const { min, max } = chart.scales[line.scale];
+      for (let at = from; at < t.length; at += 1) if (column[at] !== null && !(column[at] >= min && column[at] <= max)) return false;
+      return true;
+    };
+    if (!series.every(inside)) return false;
+    const { ctx, bbox } = chart;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    for (const { line, column } of series) {
+      ctx.strokeStyle = line.stroke();
+      ctx.lineWidth = line.width * devicePixelRatio;
+      ctx.beginPath();
+      let pen = false;
+      for (let at = from; at < t.length; at += 1) {
+        if (column[at] === null) {
+          pen = false;
+          continue;
+        }
+        const x = Math.round(chart.valToPos(t[at], "x", true));
+        const y = Math.round(chart.valToPos(column[at], line.scale, true));
+        if (pen) ctx.lineTo(x, y);
+        else ctx.moveTo(x, y);
+        pen = true;
+      }
+      ctx.stroke();
+    }
+    ctx.restore();
+    return true;
   }
 
   say(history, jumps) {
     const { digits, series, difference } = this.what;
     series.forEach(([column, , , unit], at) => {
       const value = history.last(column);
-      this.values[at].textContent = value === null ? "-" : value.toFixed(unit === "deg" ? 1 : digits);
+      set(this.values[at], value === null ? "-" : value.toFixed(unit === "deg" ? 1 : digits));
     });
     if (difference) {
       const [left, right] = difference.map((column) => history.last(column));
-      this.extra.textContent = left === null || right === null ? "-" : (left - right).toFixed(digits);
+      set(this.extra, left === null || right === null ? "-" : (left - right).toFixed(digits));
     } else if (this.what.jumps) {
       const count = jumps[this.what.jumps] ?? 0;
-      this.extra.textContent = String(count);
+      set(this.extra, String(count));
       this.extra.parentElement.classList.toggle("bad", count > 0);
     }
   }
@@ -141,7 +203,7 @@ class Plot {
 
 export class Plots {
   constructor(parent) {
-    this.plots = PLOTS.map((what) => new Plot(what, parent));
+    this.plots = PLOTS.map((what, at) => new Plot(what, parent, at / PLOTS.length));
     new ResizeObserver(() => this.plots.forEach((plot) => plot.fit())).observe(parent);
   }
 
@@ -149,8 +211,7 @@ export class Plots {
     if (history.lastT === null) return;
     const first = history.firstInWindow();
     const now = history.now();
-    const span = [now - history.windowS, now];
-    for (const plot of this.plots) plot.draw(history, first, span);
+    for (const plot of this.plots) plot.draw(history, first, now);
   }
 
   say(history, jumps) {
