@@ -86,6 +86,15 @@ def test_wind_is_what_circles_leave() -> None:
     assert track.points[-1] == pytest.approx((0.0, 0.0, 0.0))
 
 
+def test_a_pitot_blown_into_on_the_ground_is_no_wind() -> None:
+    track, schema = LiveTrack(), packed_schema()
+    row = rows("gps", 1, fix=number("gps_fix", "fix_3d"), v_east=30, v_north=-140)[0]  # carried
+    for _ in range(50):
+        track.add(schema, row, 24.0, 0.1, 1.0)
+    assert track.wind_mps is None
+    assert len(track.points) == 50
+
+
 def test_no_wind_on_the_ground_and_no_track_without_a_fix() -> None:
     track, schema = LiveTrack(), packed_schema()
     track.add(schema, rows("gps", 1, fix=number("gps_fix", "none"))[0], 16.0, 0.0, 0.0)
