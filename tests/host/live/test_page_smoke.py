@@ -15,6 +15,46 @@ from tests.host.live.radio import Sent, joined, sent
 from tests.protocol.log_writer import envelope, rows
 
 HANGS_S = 300  # ends a test that hangs; none is timed
+# Two seconds of thirty redraws on a clock of our own; then the same instant drawn anew.
+REDRAWS = """(async () => {
+  const { History } = await import("./history.js");
+  const { Plots } = await import("./plots.js");
+  const { PLOTS } = await import("./channels.js");
+  const parent = document.getElementById("plots");
+  parent.replaceChildren();
+  const names = ["t_s", ...new Set(PLOTS.flatMap((what) => what.series.map(([name]) => name)))];
+  const [history, plots] = [new History(names, 30), new Plots(parent)];
+  let [clock, row, whole] = [35, 0, 0];
+  history.now = () => clock;
+  const drawn = async () => {
+    const rows = [];
+    for (; row < clock * 50; row += 1) {
+      rows.push(row / 50, ...names.slice(1).map((_, at) => Math.sin(row / 50 + at)));
+    }
+    if (rows.length) history.add([0, rows.length / names.length, ...rows]);
+    whole += plots.draw(history);
+    await null; // uPlot draws behind what asked for it
+  };
+  await drawn();
+  whole = 0;
+  for (let at = 0; at < 60; at += 1) {
+    clock += 1 / 30;
+    await drawn();
+  }
+  const often = whole;
+  const seen = () => plots.plots.map(({ chart: { ctx: { canvas }, ctx } }) =>
+    ctx.getImageData(0, 0, canvas.width, canvas.height).data);
+  const grown = seen();
+  plots.plots.forEach((plot) => { plot.end = null; });
+  await drawn();
+  let [off, inked] = [0, 0];
+  seen().forEach((anew, plot) => anew.forEach((value, at) => {
+    if (at % 4 !== 3) return; // how opaque a pixel is
+    inked += value > 127;
+    off += Math.abs(value - grown[plot][at]) > 127;
+  }));
+  return { often, off, inked };
+})()"""
 PLANTED = b"<script>x=1"  # twelve characters of identity.board
 
 
@@ -84,3 +124,6 @@ def look(url: str, folder: Path) -> None:
         others = [one for one in page.requests if not one.startswith((base, "ws" + base[4:]))]
         assert others == []
         assert page.console_errors == []
+        drawn = page.evaluate(REDRAWS)
+        assert drawn["often"] < 12 * 60 / 2, drawn  # of 12 plots and 60 redraws
+        assert drawn["off"] < 0.01 * drawn["inked"], drawn  # rows that are added stand in place

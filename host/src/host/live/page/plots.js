@@ -207,11 +207,12 @@ export class Plots {
     new ResizeObserver(() => this.plots.forEach((plot) => plot.fit())).observe(parent);
   }
 
+  // Returns how many plots were drawn anew.
   draw(history) {
-    if (history.lastT === null) return;
+    if (history.lastT === null) return 0;
     const first = history.firstInWindow();
     const now = history.now();
-    for (const plot of this.plots) plot.draw(history, first, now);
+    return this.plots.filter((plot) => plot.draw(history, first, now)).length;
   }
 
   say(history, jumps) {
