@@ -43,7 +43,7 @@ def mavlink_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels:
 
 
 def _field(messages: Messages, name: str, gain: float = 1.0) -> Array:
-    return numbers(messages.fields[name] * gain)
+    return numbers(messages.fields[name]) * gain
 
 
 def _inertial(log: AutopilotLog, found: Channels) -> None:

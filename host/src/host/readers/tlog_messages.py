@@ -1,43 +1,59 @@
-"""MAVLink telemetry logs, frame by frame: pymavlink decodes and checks each frame's CRC.
+"""MAVLink telemetry logs in portions: pymavlink says how messages are laid out, numpy reads them.
 
-Each frame stands behind the ground station's time. A message's own time since boot counts where it
-has one; the radio's delay is then not in it.
+A message's own time since boot counts where it has one; the radio's delay is then not in it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from host.arrays import Array
+from host.progress import progress_bar
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
+from host.readers.mavlink_frames import Frames, frames_of
+from host.readers.mavlink_layout import Layout, layouts
 from host.readers.plausible_times import plausible
 from host.readers.ulog_messages import BY_MAV_TYPE
 
-WANTED = (
-    "HEARTBEAT", "ATTITUDE", "RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "HIGHRES_IMU",
-    "SERVO_OUTPUT_RAW", "VFR_HUD", "SCALED_PRESSURE", "GLOBAL_POSITION_INT", "PARAM_VALUE",
-    "STATUSTEXT",
-)  # fmt: skip
 AUTOPILOTS = {3: "ardupilot", 12: "px4"}
-STAMP_BYTES = 8
-V1, V2 = 0xFE, 0xFD
 GROUND_STATION, NO_AUTOPILOT = 6, 8
 WRAP_US = float(1 << 32)
 OTHER_CLOCK_S = 1e9  # a time since boot is shorter than thirty years
+PORTION_BYTES = 8 << 20  # read at a time
+STAMP = "received_s"  # of the ground station, beside a message's own fields
+Fields = dict[str, NDArray[Any]]
 
 
 @dataclass(slots=True)
-class _Frames:
-    """What was decoded: messages by sender, frames of each, gaps in their numbers, wrong bytes."""
+class _Received:
+    """What came: parts of each kind of message of each system, and what was lost of each sender."""
 
-    decoded: dict[int, list[tuple[float, Any]]] = field(default_factory=dict)
-    numbers: dict[tuple[int, int], list[int]] = field(default_factory=dict)
+    parts: dict[tuple[int, str], list[Fields]] = field(default_factory=dict)
+    last_number: dict[int, int] = field(default_factory=dict)
+    lost: dict[int, int] = field(default_factory=dict)
+    many: dict[int, int] = field(default_factory=dict)
     wrong_crc: int = 0
     strange_bytes: int = 0
+
+    def systems(self) -> dict[int, int]:
+        """Return how many wanted messages each system sent."""
+        found: dict[int, int] = {}
+        for (system, _), parts in self.parts.items():
+            found[system] = found.get(system, 0) + sum(len(p[STAMP]) for p in parts)
+        return found
+
+    def take(self, system: int, name: str) -> Fields | None:
+        """Return all messages of a kind, and forget them: a log may have a gigabyte."""
+        parts = self.parts.pop((system, name), None)
+        if parts is None:
+            return None
+        return {key: np.concatenate([part.pop(key) for part in parts]) for key in list(parts[0])}
 
 
 def read_tlog(path: Path) -> AutopilotLog:
@@ -50,137 +66,171 @@ def read_tlog(path: Path) -> AutopilotLog:
     ModuleNotFoundError
         If pymavlink is missing.
     """
-    frames = _frames(path.read_bytes())
-    vehicles = {system: _heartbeat(found) for system, found in frames.decoded.items()}
+    received = _received(path)
+    many = received.systems()
+    vehicles = {system: _heartbeat(received, system) for system in many}
     known = {system: beat for system, beat in vehicles.items() if beat is not None}
     if not known:
         raise NotAutopilotLogError(
             f"{path}: no frame of a vehicle (HEARTBEAT) in it; expected a MAVLink telemetry log"
         )
-    system = max(known, key=lambda s: len(frames.decoded[s]))
-    damage = _damage(frames, system)
+    system = max(known, key=lambda s: many[s])
+    damage = _damage(received, system)
     if len(known) > 1:
         damage.append(f"{len(known)} vehicles speak in it; system {system} is read")
-    beat = known[system]
-    every = frames.decoded[system]
-    messages, parameters, texts = _sorted(every, damage)
+    kind, autopilot = known[system]
+    texts = _words((received.take(system, "STATUSTEXT") or {}).get("text", ()))
+    values = received.take(system, "PARAM_VALUE") or {}
+    parameters = dict(
+        zip(_words(values.get("param_id", ())), map(float, values.get("param_value", ())),
+            strict=True)
+    )  # fmt: skip
     return AutopilotLog(
         path=path,
         format="tlog",
-        autopilot=AUTOPILOTS.get(int(beat.autopilot), "ardupilot"),
-        vehicle=BY_MAV_TYPE.get(int(beat.type), ""),
+        autopilot=AUTOPILOTS.get(autopilot, "ardupilot"),
+        vehicle=BY_MAV_TYPE.get(kind, ""),
         firmware=next((t for t in texts if "ardu" in t.lower() or "px4" in t.lower()), ""),
-        messages=messages,
+        messages=_messages(received, system, damage),
         parameters=parameters,
         damage=tuple(damage),
-        lost=frames.wrong_crc + (1 if frames.strange_bytes else 0),
+        lost=received.wrong_crc + (1 if received.strange_bytes else 0),
         texts=tuple(texts),
     )
 
 
-def _frames(data: bytes) -> _Frames:
-    """Decode every frame of a wanted kind."""
-    from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-    link = dialect.MAVLink(None)
-    wanted = {getattr(dialect, f"MAVLINK_MSG_ID_{name}") for name in WANTED}
-    found = _Frames()
-    at, size = 0, len(data)
-    while at + STAMP_BYTES + 8 <= size:
-        start = data[at + STAMP_BYTES]
-        if start not in (V1, V2):
-            found.strange_bytes += 1
-            at += 1
-            continue
-        first = at + STAMP_BYTES
-        second = start == V2
-        length = data[first + 1] + (12 if second else 8)
-        length += 13 if second and data[first + 2] & 1 else 0
-        frame = data[first : first + length]
-        if len(frame) < length:
-            break
-        kind = int.from_bytes(frame[7:10], "little") if second else frame[5]
-        sender = (frame[5], frame[6]) if second else (frame[3], frame[4])
-        if kind in wanted:
-            try:
-                message = link.decode(bytearray(frame))
-            except Exception:  # of a wrong CRC pymavlink raises its own, of wrong lengths others
-                found.wrong_crc += 1
-                at += 1
-                continue
-            stamp_s = int.from_bytes(data[at:first], "big") * 1e-6
-            found.decoded.setdefault(sender[0], []).append((stamp_s, message))
-        found.numbers.setdefault(sender, []).append(frame[4] if second else frame[2])
-        at = first + length
-    found.strange_bytes += size - at
+def _received(path: Path) -> _Received:
+    """Read every wanted message."""
+    known = layouts()
+    extras = {number: layout.extra for number, layout in known.items()}
+    size = path.stat().st_size
+    progress = progress_bar("reading", size)
+    found, data, done = _Received(), b"", 0
+    with path.open("rb") as file:
+        while more := file.read(PORTION_BYTES):
+            data += more
+            done += len(more)
+            frames = frames_of(data, extras)
+            _add(found, data, frames, known)
+            data = data[frames.rest :]
+            if progress is not None:
+                progress(done, size)
+    found.strange_bytes += len(data)
     return found
 
 
-def _heartbeat(found: list[tuple[float, Any]]) -> Any | None:
+def _add(found: _Received, data: bytes, frames: Frames, known: Mapping[int, Layout]) -> None:
+    """Add the frames of a portion."""
+    found.wrong_crc += frames.wrong_crc
+    found.strange_bytes += frames.strange_bytes
+    for sender in np.unique(frames.senders).tolist():
+        numbers = frames.numbers[frames.senders == sender].astype(np.int64)
+        before = found.last_number.get(sender, int(numbers[0]) - 1)
+        missed = (np.diff(numbers, prepend=before) - 1) % 256
+        found.lost[sender] = found.lost.get(sender, 0) + int(missed.sum())
+        found.many[sender] = found.many.get(sender, 0) + len(numbers)
+        found.last_number[sender] = int(numbers[-1])
+    view = np.frombuffer(data, dtype=np.uint8)
+    systems = frames.senders >> 8
+    for number, layout in known.items():
+        of_kind = frames.kinds == number
+        for system in np.unique(systems[of_kind]).tolist():
+            rows = np.flatnonzero(of_kind & (systems == system))
+            part = _fields(view, frames, rows, layout)
+            found.parts.setdefault((system, layout.name), []).append(part)
+
+
+def _fields(
+    view: NDArray[np.uint8], frames: Frames, rows: NDArray[np.intp], layout: Layout
+) -> Fields:
+    """Return the wanted fields of messages of a kind, and when they were received."""
+    places = np.arange(layout.payload.itemsize)
+    at = frames.body_at[rows, None] + places
+    sent = places < frames.body_bytes[rows, None]  # MAVLink 2 leaves zeros at the end out
+    body = np.where(sent, view[np.minimum(at, len(view) - 1)], np.uint8(0))
+    table = np.ascontiguousarray(body).view(layout.payload)[:, 0]
+    part = {name: table[name].copy() for name in layout.fields}
+    stamps = np.ascontiguousarray(view[frames.starts[rows, None] + np.arange(8)]).view(">u8")
+    part[STAMP] = stamps[:, 0].astype(np.float64) * 1e-6
+    return part
+
+
+def _heartbeat(received: _Received, system: int) -> tuple[int, int] | None:
+    """Return kind of vehicle and of autopilot as a system says them; None if it is neither."""
+    parts = received.parts.get((system, "HEARTBEAT"), [])
     beats = [
-        m for _, m in found
-        if m.get_type() == "HEARTBEAT" and m.type != GROUND_STATION and m.autopilot != NO_AUTOPILOT
-    ]  # fmt: skip
+        (int(kind), int(autopilot))
+        for part in parts
+        for kind, autopilot in zip(part["type"], part["autopilot"], strict=True)
+        if kind != GROUND_STATION and autopilot != NO_AUTOPILOT
+    ]
     return beats[len(beats) // 2] if beats else None
 
 
-def _damage(frames: _Frames, system: int) -> list[str]:
+def _damage(received: _Received, system: int) -> list[str]:
     said = []
-    if frames.wrong_crc:
-        said.append(f"{frames.wrong_crc} frames have a wrong checksum and were left out")
-    if frames.strange_bytes:
-        said.append(f"{frames.strange_bytes} bytes belong to no frame")
-    numbers = [n for sender, n in frames.numbers.items() if sender[0] == system]
-    lost = sum(int(np.sum((np.diff(n) - 1) % 256)) for n in numbers if len(n) > 1)
-    total = sum(map(len, numbers))
+    if received.wrong_crc:
+        said.append(f"{received.wrong_crc} frames have a wrong checksum and were left out")
+    if received.strange_bytes:
+        said.append(f"{received.strange_bytes} bytes belong to no frame")
+    senders = [sender for sender in received.many if sender >> 8 == system]
+    lost = sum(received.lost[sender] for sender in senders)
+    total = sum(received.many[sender] for sender in senders)
     if lost:
         share = 100.0 * lost / (lost + total)
         said.append(f"{lost} frames ({share:.1f} %) of the vehicle never came: the radio lost them")
     return said
 
 
-def _sorted(
-    every: list[tuple[float, Any]], damage: list[str]
-) -> tuple[dict[str, dict[int, Messages]], dict[str, float], list[str]]:
-    by_name: dict[str, list[tuple[float, Any]]] = {}
-    for stamp_s, message in every:
-        by_name.setdefault(message.get_type(), []).append((stamp_s, message))
-    parameters = {
-        str(m.param_id).strip("\0"): float(m.param_value) for _, m in by_name.pop("PARAM_VALUE", [])
-    }
-    texts = [str(m.text).strip("\0") for _, m in by_name.pop("STATUSTEXT", [])]
-    boots = [s - m.time_boot_ms * 1e-3 for s, m in by_name.get("ATTITUDE", [])]
-    boot_s = float(np.median(boots)) if boots else min(s for s, _ in every)
+def _words(raw: Any) -> list[str]:
+    return [bytes(one).decode("ascii", "replace").strip("\0") for one in raw]
+
+
+def _messages(
+    received: _Received, system: int, damage: list[str]
+) -> dict[str, dict[int, Messages]]:
+    boot_s = _boot_s(received, system)
     found: dict[str, dict[int, Messages]] = {}
-    for name, some in by_name.items():
-        t_s = _times(some, boot_s)
-        kept, wrong = plausible(t_s)
-        if wrong:
-            damage.append(f"{wrong} messages {name} have an impossible time and were left out")
-        rows = np.flatnonzero(kept)
-        rows = rows[np.concatenate([[True], np.diff(t_s[rows]) > 0.0])] if len(rows) else rows
-        if not len(rows):
-            continue
-        names = [f for f in some[0][1].get_fieldnames() if _number(getattr(some[0][1], f))]
-        fields = {f: np.array([getattr(some[k][1], f) for k in rows.tolist()]) for f in names}
-        found[name] = {0: Messages(t_s[rows], fields)}
-    return found, parameters, texts
+    for name in [name for one, name in received.parts if one == system]:
+        fields = received.take(system, name) or {}
+        t_s = _times(name, fields, boot_s)
+        ports = fields.pop("port", None)
+        for port in (0,) if ports is None else np.unique(ports).tolist():
+            mine = np.arange(len(t_s)) if ports is None else np.flatnonzero(ports == port)
+            kept, wrong = plausible(t_s[mine])
+            if wrong:
+                damage.append(f"{wrong} messages {name} have an impossible time and were left out")
+            rows = mine[kept]
+            if len(rows):
+                rows = rows[np.concatenate([[True], np.diff(t_s[rows]) > 0.0])]
+                own = {k: v[rows] for k, v in fields.items()}
+                if ports is not None:  # outputs without a pulse are half of them
+                    own = {k: v for k, v in own.items() if v.any()}
+                found.setdefault(name, {})[int(port)] = Messages(t_s[rows], own)
+    return found
 
 
-def _times(some: list[tuple[float, Any]], boot_s: float) -> Array:
+def _boot_s(received: _Received, system: int) -> float:
+    """Return the ground station's time at which the autopilot started."""
+    parts = received.parts.get((system, "ATTITUDE"), [])
+    boots = [part[STAMP] - part["time_boot_ms"] * 1e-3 for part in parts]
+    if boots:
+        return float(np.median(np.concatenate(boots)))
+    every = [part[STAMP] for (one, _), some in received.parts.items() if one == system
+             for part in some]  # fmt: skip
+    return float(min(stamps.min() for stamps in every)) if every else 0.0
+
+
+def _times(name: str, fields: Fields, boot_s: float) -> Array:
     """Return times since boot: a message's own where it has one."""
-    stamps = np.array([s for s, _ in some]) - boot_s
-    first = some[0][1]
-    if hasattr(first, "time_boot_ms"):
-        return np.array([m.time_boot_ms for _, m in some]) * 1e-3
-    if hasattr(first, "time_usec"):
-        raw_us = np.array([m.time_usec for _, m in some], dtype=np.float64)
-        if first.get_type() == "SERVO_OUTPUT_RAW":  # 32 bits
+    stamps: Array = fields.pop(STAMP) - boot_s
+    if "time_boot_ms" in fields:
+        return np.asarray(fields.pop("time_boot_ms") * 1e-3, dtype=np.float64)
+    raw = fields.pop("time_usec", None)
+    if raw is not None:
+        raw_us = raw.astype(np.float64)
+        if name == "SERVO_OUTPUT_RAW":  # 32 bits
             raw_us = np.unwrap(raw_us, period=WRAP_US)
         if np.median(raw_us) * 1e-6 < OTHER_CLOCK_S:
             return np.asarray(raw_us * 1e-6)
-    return np.asarray(stamps)
-
-
-def _number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return stamps

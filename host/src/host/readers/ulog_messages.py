@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from host.files.watched import watched_file
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
 from host.readers.plausible_times import plausible
 from host.readers.ulog_walk import walk
@@ -44,7 +45,7 @@ def read_ulog(path: Path) -> AutopilotLog:
 
     try:
         # It prints what it does not know, and leaves a file open that it cannot read.
-        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):
+        with watched_file(path) as file, contextlib.redirect_stdout(io.StringIO()):
             log = ULog(file, list(WANTED), disable_str_exceptions=True)
     except Exception as error:  # pyulog names no common ancestor of what damaged files raise
         raise NotAutopilotLogError(
