@@ -1,5 +1,6 @@
 """A walk round a drawn aircraft, fed to a preflight as the radio brings it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -12,10 +13,11 @@ from host.physical.calibration import Calibration, calibration_of_text
 from host.preflight.check import State
 from host.preflight.check_list import Wanted
 from host.preflight.guided_list import Preflight
-from host.twin.ground.ground_faults import GROUND_FAULTS, broken_walk
-from host.twin.ground.ground_instrument import GroundFrames, ground_frames
-from host.twin.ground.ground_walk import GroundWalk, ground_walk
+from host.twin.ground.ground_faults import GROUND_FAULTS, GroundFault, broken_walk
+from host.twin.ground.ground_instrument import START_US, GroundFrames, ground_frames
+from host.twin.ground.ground_walk import STEP_S, GroundWalk, ground_walk
 from host.twin.outcome.instrument import calibration
+from host.twin.recorder.recorded_walk import Prepare, recorded_walk
 
 
 @cache
@@ -43,10 +45,15 @@ class Outcome:
 
 
 def walked(walk: GroundWalk, frames: GroundFrames, last: str = "", **wanted: Any) -> Preflight:
-    """Do each item in its window, to the last; a pilot goes on where none turned green or red."""
+    """Do each item in its window, to the last."""
+    return heard(frames.stream(walk.windows), last, **wanted)
+
+
+def heard(parts: Iterable[tuple[str, bytes]], last: str = "", **wanted: Any) -> Preflight:
+    """Listen to each item's part; a pilot goes on where none turned green or red."""
     stream = LiveStream(lines())
     preflight = Preflight(Wanted(aircraft(), lines(), **wanted), stream)
-    for item, data in frames.stream(walk.windows):
+    for item, data in parts:
         stream.feed(data, 0.0)
         if item == "still" and preflight.asked is None:
             preflight.pass_on()
@@ -68,3 +75,23 @@ def broken(fault: str, seed: int) -> Outcome:
     item, frames = broken_walk(GROUND_FAULTS[fault], walk, ground_frames)
     asked = any(item == name for name, _, _ in walk.windows)
     return Outcome(walked(walk, frames, item if asked else "supply"), item)
+
+
+def by_recorder(
+    fault: str, seed: int, last: str = "", prepare: Prepare = lambda _: None
+) -> Outcome:
+    """Walk round an aircraft whose logger is the recorder's own program."""
+    walk = ground_walk(aircraft(), seed)
+    item, frames = broken_walk(GROUND_FAULTS.get(fault, GroundFault("")), walk, ground_frames)
+    sent = recorded_walk(walk, frames, prepare)
+
+    def windows() -> Iterable[tuple[str, bytes]]:
+        for name, _, end in walk.windows:
+            data = b""
+            for at_us, portion in sent:
+                data += portion
+                if at_us >= START_US + end * STEP_S * 1e6:
+                    break
+            yield name, data
+
+    return Outcome(heard(windows(), last or item), item)
