@@ -6,10 +6,11 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from host.aircraft.airframe import NORTH
 from host.aircraft.attitude import euler
 from host.twin.flight.draws import GROUPS
-from host.twin.flight.fly import FlightRecord, fly
-from host.twin.outcome.ideal import measured_table, true_table
+from host.twin.flight.fly import STEP_S, FlightRecord, fly
+from host.twin.outcome.ideal import gps_columns, measured_table, times, true_table
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors import bmp085
 from host.twin.sensors.analog import analog, convert, nominal
@@ -18,7 +19,7 @@ from host.twin.sensors.imu import imu
 from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.sensors.mega_clock import ticks
 from host.twin.sensors.sensor_delays import FILTERS
-from host.twin.sensors.ubx import packet
+from host.twin.sensors.ubx import VELOCITY_NOISE_MPS, packet
 from host.twin.testcard.cards import Card, Sensors, load
 from host.wire.packets import packet as imu_packet
 from scipy.stats import kstest
@@ -56,6 +57,17 @@ def test_without_errors_the_table_is_the_truth_to_the_resolution(perfect: Flight
                "aileron_rad": 0.004, "rudder_rad": 0.004}  # fmt: skip
     for name, limit in allowed.items():
         assert np.abs(measured[name] - true[name])[flying].max() < limit, name
+
+
+def test_gps_columns_are_the_true_velocity_as_late_as_the_receiver(real: FlightRecord) -> None:
+    at, north = times(real), gps_columns(real)["v_north_mps"]
+    late_s = 0.15
+    true = np.gradient(real.states[:, NORTH], STEP_S)
+    flying = at > 6.5
+    error = (north - np.interp(at - late_s, real.t_s, true))[flying]
+    assert np.std(error) < 1.5 * VELOCITY_NOISE_MPS
+    assert np.isnan(north[at < 0.2]).all()
+    assert np.isfinite(north[flying][:-100]).all()
 
 
 def test_deterministic_by_seed_and_different_by_seed(calm: Card, real: FlightRecord) -> None:

@@ -19,7 +19,7 @@ from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors.local_flow import air_data
 from host.twin.testcard.cards import Card, load
 
-CHAINS = ("sitl", "none", "true", "thesis")
+CHAINS = ("sitl", "gps", "none", "true", "thesis")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ def virtual_flight(
     seed : int
     chain : str
         ``sitl`` through the recorder, decoded with the calibration of the virtual instrument;
-        ``none`` the sensors without recorder; ``true`` the truth in the same columns; ``thesis``
+        ``gps`` the sensors without recorder, ``none`` the same without GPS; ``true`` the truth in the same columns; ``thesis``
         its logger.
     errors, instrument_seed
         Of the instrument, as `fly` takes them.
@@ -85,8 +85,10 @@ def virtual_flight(
     data = air_data(record)
     if chain == "true":
         table = ideal.true_table(record, data)
-    elif chain == "none":
+    elif chain in ("gps", "none"):
         table = ideal.measured_table(record, data)
+        if chain == "gps":
+            table = table.assign(**ideal.gps_columns(record))
     elif chain == "thesis":
         table = thesis.table(thesis.rows(record, data))
     else:

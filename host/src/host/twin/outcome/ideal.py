@@ -16,6 +16,7 @@ from host.twin.sensors.analog import CHANNELS, analog, convert, nominal
 from host.twin.sensors.imu import imu
 from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.sensors.sensor_delays import FILTERS, dlpf_for
+from host.twin.sensors.ubx import fixes
 from host.twin.testcard.cards import AXES
 
 CONVERSIONS = 4  # the recorder sums four conversions of each channel
@@ -156,3 +157,25 @@ def measured_table(record: FlightRecord, data: AirData | None = None) -> pd.Data
         "mega_drives": np.ones(len(at)),
     }
     return pd.DataFrame(columns)
+
+
+def gps_columns(record: FlightRecord) -> dict[str, Array]:
+    """Return what GPS says at the rows of `measured_table`: lines between fixes as they arrive.
+
+    Parameters
+    ----------
+    record : FlightRecord
+
+    Returns
+    -------
+    dict
+        ``v_north_mps``, ``v_east_mps``, ``v_down_mps``; NaN before the first fix.
+    """
+    at = times(record)
+    seen = fixes(record, np.random.default_rng([record.seed, 15]))
+    arrived = seen.t_s + seen.late_s
+    names = ("v_north_mps", "v_east_mps", "v_down_mps")
+    return {
+        name: np.interp(at, arrived, v, left=np.nan, right=np.nan)
+        for name, v in zip(names, seen.velocity_mps.T, strict=True)
+    }

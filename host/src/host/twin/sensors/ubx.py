@@ -47,8 +47,26 @@ def packet(kind: int, payload: bytes) -> bytes:
     return b"\xb5\x62" + body + bytes((a, b))
 
 
-def epochs(record: FlightRecord, rng: np.random.Generator) -> list[Epoch]:
-    """Return every epoch of a flight with noise and latency.
+@dataclass(frozen=True, slots=True)
+class Fixes:
+    """Solutions of the receiver: when they are true, how late they come, what they say.
+
+    Attributes
+    ----------
+    t_s : (n,) array
+    late_s : float
+    place_m, velocity_mps : (n, 3) arrays
+        North, east, down; with noise.
+    """
+
+    t_s: Array
+    late_s: float
+    place_m: Array
+    velocity_mps: Array
+
+
+def fixes(record: FlightRecord, rng: np.random.Generator) -> Fixes:
+    """Return every solution of a flight, faults left out.
 
     Parameters
     ----------
@@ -60,21 +78,38 @@ def epochs(record: FlightRecord, rng: np.random.Generator) -> list[Epoch]:
     place = record.states[:, NORTH : DOWN + 1]
     velocity = np.gradient(place, STEP_S, axis=0)
     # The launch is a cut, not a motion.
-    cut = np.abs(record.t_s - flight.ground_s) < 3 * STEP_S
-    velocity[cut] = 0.0
+    velocity[np.abs(record.t_s - flight.ground_s) < 3 * STEP_S] = 0.0
     noise = rng.standard_normal((len(at), 6)) * (1.0 if switches.noise else 0.0)
-    slow = record.draws.vector("field_m")
     late = 0.0
     if switches.gps_latency:
         late = sensor_delays(record.aircraft, record.draws, dlpf_for(flight.rate_hz))["gps"]
+    k = np.minimum(np.rint(at / STEP_S).astype(np.int64), len(place) - 1)
+    wander = noise[:, :3] * POSITION_NOISE_M * np.array([1.0, 1.0, 2.0])
+    return Fixes(
+        t_s=at,
+        late_s=late,
+        place_m=place[k] + record.draws.vector("field_m") + wander,
+        velocity_mps=velocity[k] + noise[:, 3:] * VELOCITY_NOISE_MPS,
+    )
+
+
+def epochs(record: FlightRecord, rng: np.random.Generator) -> list[Epoch]:
+    """Return every epoch of a flight with noise and latency.
+
+    Parameters
+    ----------
+    record : FlightRecord
+    rng : numpy Generator
+    """
+    seen = fixes(record, rng)
+    late = seen.late_s
     found = []
-    for i, t in enumerate(at):
+    for i, (t, spot, speed) in enumerate(
+        zip(seen.t_s, seen.place_m, seen.velocity_mps, strict=True)
+    ):
         wrong = [f for f in record.card.faults if f.at_s <= t + late < f.end_s]
         if any(f.kind == "gps_off" for f in wrong):
             continue
-        k = min(round(float(t) / STEP_S), len(place) - 1)
-        spot = place[k] + slow + noise[i, :3] * POSITION_NOISE_M * np.array([1.0, 1.0, 2.0])
-        speed = velocity[k] + noise[i, 3:] * VELOCITY_NOISE_MPS
         message = _messages(record, float(t), spot, speed, wrong)
         if any(f.kind == "gps_garbage" for f in wrong):
             # A stream of its own: the epochs behind it stay as they were.
