@@ -28,6 +28,7 @@ VERBS = {
     "status": "show what the logger says of itself, live over USB",
     "simulate": "fly a virtual test and write the log it would leave",
     "calibrate": "measure zero and slope of every sensor on the bench",
+    "card": "write, read, check or erase the logger's flight card over USB",
     "plan": "judge planned maneuvers before they are flown",
     "preflight": "walk round the aircraft: each check turns green by itself",
     "live": "receive the radio in flight: on disk, and on a page",

@@ -219,6 +219,14 @@ class SerialLink:
         except (self._error, OSError) as error:
             raise DeviceError(f"{self.device}: went away; is the cable still in?") from error
 
+    def send(self, data: bytes) -> None:
+        """Send bytes; they have left when this returns."""
+        try:
+            self._port.write(data)
+            self._port.flush()
+        except (self._error, OSError) as error:
+            raise DeviceError(f"{self.device}: went away; is the cable still in?") from error
+
 
 def _keep_dtr(port: Any) -> None:
     if sys.platform == "win32":

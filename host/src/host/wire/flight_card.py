@@ -1,0 +1,237 @@
+"""The bytes of a flight card: parts of 48 bytes, what is in them, what makes them good.
+
+Layouts and numbers are generated (`protocol/frames.toml`); what a good card is stands in
+protocol/flight-card.md, and the logger asks the same before it makes a card valid.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from host.resources import resource
+from host.wire.framing import crc16
+from host.wire.schema import Field
+from host.wire.schema_text import packed_schema
+
+HEAD, LEARNING, ROW = "card_head", "card_learning", "card_row"
+AXES = ("aileron", "elevator", "rudder")
+SHAPES = ("pulse", "doublet", "three_two_one_one", "sweep", "multisine")
+# Highest frequency of a shape in units of 1/duration, times 100000 (flight-card.md).
+FREQUENCY = {"pulse": 50_000, "doublet": 100_000, "three_two_one_one": 350_000}
+MOST_SHARES = 252  # of an axis; each is of 64
+TRAVEL_US = (800, 2200)
+NONE = 255
+
+
+@dataclass(frozen=True, slots=True)
+class CardFile:
+    """A card in numbers: `head` and each of `rows` by field name, raw."""
+
+    head: dict[str, Any]
+    rows: tuple[dict[str, Any], ...]
+
+    @property
+    def hash(self) -> int:
+        """The card's CRC-32, by which the logger names it."""
+        return int(self.head["crc"])
+
+
+@cache
+def _table() -> dict[str, Any]:
+    text = resource("packets.json").read_text(encoding="ascii")
+    return dict(json.loads(text))
+
+
+def number(name: str) -> int:
+    """Return a number of the protocol, such as ``card_most_rows``."""
+    return int(_table()["numbers"][name])
+
+
+@cache
+def fields(layout: str) -> tuple[Field, ...]:
+    """Return the fields of `HEAD`, `LEARNING` or `ROW`."""
+    return tuple(
+        Field(name=name, type=kind, unit=unit, scale=float(scale))
+        for name, kind, unit, scale in _table()["layouts"][layout]["fields"]
+    )
+
+
+@cache
+def dtype(layout: str) -> np.dtype[Any]:
+    """Return the packed little-endian layout."""
+    return np.dtype([(field.name, field.numpy_type) for field in fields(layout)])
+
+
+def scale(layout: str, name: str) -> float:
+    """Return one raw step of a field in its unit."""
+    return {field.name: field.scale for field in fields(layout)}[name]
+
+
+def card_bytes(head: Mapping[str, object], rows: Sequence[Mapping[str, object]]) -> bytes:
+    """Return a card's file with its counts, constants and checks put in.
+
+    Parameters
+    ----------
+    head, rows : mapping
+        Raw numbers by field; what is left out is 0.
+    """
+    always = _table()["layouts"][HEAD]["always"]
+    first = _packed(HEAD, {**head, **always, "rows": len(rows)})
+    body = bytes(number("card_part_bytes"))
+    for row in rows:
+        bare = _packed(ROW, row)[:-2]
+        body += bare + crc16(bare).to_bytes(2, "little")
+    return first[:-4] + zlib.crc32(first[:-4] + body).to_bytes(4, "little") + body
+
+
+def _packed(layout: str, values: Mapping[str, object]) -> bytes:
+    record = np.zeros(1, dtype=dtype(layout))
+    for name, value in values.items():
+        record[name] = value
+    return record.tobytes()
+
+
+def parts(data: bytes) -> list[bytes]:
+    """Return the parts of 48 bytes."""
+    size = number("card_part_bytes")
+    return [data[i : i + size] for i in range(0, len(data), size)]
+
+
+def read_card(data: bytes) -> CardFile:
+    """Return a card in numbers; ask `card_faults` first."""
+    heads, size = number("card_head_parts"), number("card_part_bytes")
+    head = _numbers(HEAD, data)
+    rows = [_numbers(ROW, part) for part in parts(data[heads * size :])]
+    return CardFile(head, tuple(rows))
+
+
+def _numbers(layout: str, data: bytes) -> dict[str, Any]:
+    record = np.frombuffer(data, dtype=dtype(layout), count=1)[0]
+    return {name: record[name].tolist() for name in dtype(layout).names or ()}
+
+
+def card_faults(data: bytes) -> list[str]:
+    """Return in words what makes a card no good; nothing of a good one.
+
+    Parameters
+    ----------
+    data : bytes
+        Of a file.
+    """
+    size, heads, most = (number(f"card_{n}") for n in ("part_bytes", "head_parts", "most_rows"))
+    rows = len(data) // size - heads
+    if len(data) % size or not 1 <= rows <= most:
+        return [
+            f"{len(data)} bytes, expected {size} times {heads + 1} to {heads + most}:"
+            " the head and 1 to 32 rows"
+        ]
+    always = _table()["layouts"][HEAD]["always"]
+    card = read_card(data)
+    head = card.head
+    wrong = [
+        f"{k} is {head[k]}, expected {v}"
+        for k, v in always.items()
+        if np.any(np.asarray(head[k]) != v)
+    ]
+    if head["rows"] != rows:
+        wrong.append(f"rows is {head['rows']}, expected {rows} as there are")
+    body = dtype(HEAD).itemsize
+    check = zlib.crc32(data[: body - 4] + data[body:])
+    if head["crc"] != check or check == 0:
+        wrong.append(f"CRC-32 is {head['crc']:08x}, expected {check:08x}: a byte was changed")
+    return [*wrong, *_limit_faults(head), *(x for k, row in enumerate(card.rows)
+            for x in _row_faults(k + 1, row, head, data[(heads + k) * size :][:size]))]  # fmt: skip
+
+
+def _limit_faults(head: Mapping[str, Any]) -> Iterator[str]:
+    pairs = ("dp", "alpha", "beta", "theta", "az")
+    for name in pairs:
+        if head[f"{name}_min"] > head[f"{name}_max"]:
+            yield f"{name}_min {head[f'{name}_min']} is above {name}_max {head[f'{name}_max']}"
+    ranges = {
+        "height_min_pa": (1, head["height_max_pa"]), "phi_max": (0, 18_000), "p_max": (0, 32_767),
+        "q_max": (0, 32_767), "r_max": (0, 32_767),
+        "distance_max_m": (0, number("card_most_distance_m")),
+        "still_ms": (100, 2000), "stick_us": (10, 200), "rate_max_usps": (100, 60_000),
+        "frequency_max_chz": (1, number("card_most_frequency_chz")),
+    }  # fmt: skip
+    for name, (least, largest) in ranges.items():
+        if not least <= head[name] <= largest:
+            yield f"{name} is {head[name]}, expected {least} to {largest}"
+    inputs = {"airspeed_input": (4, 5), "alpha_input": (0, 1), "beta_input": (2, 3)}
+    for name, known in inputs.items():
+        if head[name] not in (*known, NONE):
+            yield f"{name} is {head[name]}, expected {known[0]}, {known[1]} or {NONE}"
+    for k, axis in enumerate(AXES):
+        low, high = head["servo_min_us"][k], head["servo_max_us"][k]
+        if not TRAVEL_US[0] <= low <= high <= TRAVEL_US[1]:
+            yield f"travel of the {axis} {low} to {high} us, expected within 800 to 2200"
+        if head["amplitude_max_us"][k] > number("card_most_amplitude_us"):
+            yield f"amplitude_max_us of the {axis} is {head['amplitude_max_us'][k]}, at most 500"
+
+
+def _row_faults(
+    place: int, row: Mapping[str, Any], head: Mapping[str, Any], data: bytes
+) -> Iterator[str]:
+    shapes = {value: name for name, value in packed_schema().enums["card_shape"].items()}
+    where, shape = f"row {place}", shapes.get(row["shape"], "")
+    if row["crc"] != crc16(data[:-2]):
+        yield f"{where}: CRC-16 is {row['crc']:04x}, expected {crc16(data[:-2]):04x}"
+    if not shape:
+        yield f"{where}: shape {row['shape']}, expected of {', '.join(SHAPES)}"
+    moved = sum(1 << k for k, size in enumerate(row["amplitude_us"]) if size)
+    if row["axes"] != moved or not moved:
+        yield f"{where}: axes {row['axes']:03b}, expected {moved:03b}: those with an amplitude"
+    longest, least = number("card_longest_ms"), number("card_least_ms")
+    if row["duration_ms"] < least or row["duration_ms"] + row["quiet_ms"] > longest:
+        yield (
+            f"{where}: {row['duration_ms']} ms and {row['quiet_ms']} ms before, expected"
+            f" {least} ms or more, together up to {longest}"
+        )
+    for k, size in enumerate(row["amplitude_us"]):
+        if abs(size) > head["amplitude_max_us"][k]:
+            yield (f"{where}: {AXES[k]} {size} us, expected up to {head['amplitude_max_us'][k]} us")
+    tones = components(row)
+    yield from (f"{where}: {text}" for text in _tone_faults(row, shape, tones))
+    fastest = FREQUENCY.get(shape, 100_000 * max((t[1] for t in tones), default=0))
+    if shape == "sweep":
+        fastest = max(row["first_chz"], row["last_chz"]) * row["duration_ms"]
+    if fastest > head["frequency_max_chz"] * row["duration_ms"]:
+        yield (
+            f"{where}: up to {fastest / row['duration_ms'] / 100.0:.2f} Hz, expected up to"
+            f" {head['frequency_max_chz'] / 100.0:g} Hz"
+        )
+
+
+def components(row: Mapping[str, Any]) -> list[tuple[int, int, int, int]]:
+    """Return axis, harmonic, share of 64 and phase of 256 of each used tone of a row."""
+    data = row["components"]
+    each = [data[i : i + 3] for i in range(0, len(data), 3)]
+    return [(c >> 6, h, c & 63, phase) for h, phase, c in each if h]
+
+
+def _tone_faults(
+    row: Mapping[str, Any], shape: str, tones: Sequence[tuple[int, int, int, int]]
+) -> Iterator[str]:
+    used = 3 * len(tones)
+    if any(row["components"][used:]) or (tones and shape != "multisine"):
+        yield "bytes behind the last tone are not 0"
+    if (shape == "sweep") != bool(row["first_chz"] or row["last_chz"]) or (
+        shape == "sweep" and not (row["first_chz"] and row["last_chz"])
+    ):
+        yield f"sweep from {row['first_chz']} to {row['last_chz']}, expected both of a sweep only"
+    if shape != "multisine":
+        return
+    for k, axis in enumerate(AXES):
+        own = [share for place, _, share, _ in tones if place == k]
+        if bool(own) != bool(row["axes"] >> k & 1):
+            yield f"{len(own)} tones of the {axis}, expected them of each axis of the row only"
+        if sum(own) > MOST_SHARES:
+            yield f"shares of the {axis} add up to {sum(own)}, at most {MOST_SHARES}"
