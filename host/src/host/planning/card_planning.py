@@ -8,7 +8,7 @@ white noise, all longitudinal test points together, all lateral ones together.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -57,6 +57,8 @@ LATERAL_SHOWN = (
 )  # fmt: skip
 # Excursions a first test flight of a trainer keeps to; amplitudes of a designed card aim at them.
 TARGET_EXCURSIONS = {"alpha_deg": 3.5, "beta_deg": 6.0, "bank_deg": 30.0}
+HAND_S = 0.2  # a thumb is no faster
+ROLL_UNIT_S = 0.3  # of a 3-2-1-1 on the aileron: long against the roll mode of models
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +176,7 @@ def judge(card: Card) -> Plan:
     segments = [s for s in card.segments if s.kind not in ("trim", "turn")]
     windows = record.schedule.windows
     data = air_data(record)
-    points = [_point(record, data, s, w) for s, w in zip(segments, windows, strict=True)]
+    points = [point_of(record, data, s, w) for s, w in zip(segments, windows, strict=True)]
     table = true_table(record, data)
     _, theta, _ = euler(record.trim.state[6:10])
     condition = Condition(record.trim.airspeed_mps, record.trim.alpha_rad, float(theta))
@@ -250,7 +252,17 @@ def _distinct(segments: list[Segment], windows: list[Window]) -> list[tuple[Wind
     return list(found.values())
 
 
-def _point(record: FlightRecord, data: AirData, s: Segment, w: Window) -> Point:
+def point_of(record: FlightRecord, data: AirData, s: Segment, w: Window) -> Point:
+    """Return a test point with its excursions on a flight.
+
+    Parameters
+    ----------
+    record : FlightRecord
+    data : AirData
+        Of it.
+    s, w : Segment, Window
+        What was asked for, and when it was flown.
+    """
     inside = (record.t_s >= w.start_s) & (record.t_s < w.end_s)
     first = int(np.argmax(inside))
 
@@ -275,6 +287,27 @@ def _point(record: FlightRecord, data: AirData, s: Segment, w: Window) -> Point:
         pitch_deg=math.degrees(largest(theta)),
         load_factor=(float(load.min()), float(load.max())),
     )
+
+
+def _periods_s(aircraft: Aircraft, airspeed_mps: float) -> tuple[float, float]:
+    """Return the undamped periods of short period and dutch roll."""
+    frame = aircraft.airframe()
+    found = {m.name: m for m in modes(linearise(frame, solve(frame, airspeed_mps)))}
+    short, dutch = (found[name].frequency_radps for name in (SHORT_PERIOD, DUTCH_ROLL))
+    return 2.0 * math.pi / short, 2.0 * math.pi / dutch
+
+
+def mode_widths_s(aircraft: Aircraft, airspeed_mps: float) -> dict[str, float]:
+    """Return the unit of a 3-2-1-1 on each axis: 0.3 periods of the mode that it excites.
+
+    Parameters
+    ----------
+    aircraft : Aircraft
+    airspeed_mps : float
+    """
+    short, dutch = _periods_s(aircraft, airspeed_mps)
+    units = {"elevator": 0.3 * short, "aileron": ROLL_UNIT_S, "rudder": 0.3 * dutch}
+    return {axis: round(max(unit, HAND_S), 2) for axis, unit in units.items()}
 
 
 def design(name: str, airspeed_mps: float = 0.0) -> Card:
@@ -303,11 +336,8 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
     """
     aircraft = load(name)
     speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")
-    frame = aircraft.airframe()
-    found = {m.name: m for m in modes(linearise(frame, solve(frame, speed)))}
-    short = 2.0 * math.pi / found[SHORT_PERIOD].frequency_radps
-    dutch = 2.0 * math.pi / found[DUTCH_ROLL].frequency_radps
-    hand = 0.2  # a thumb is no faster
+    short, dutch = _periods_s(aircraft, speed)
+    hand = HAND_S
     draft = (
         Segment("3211", axes=("elevator",), amplitudes=(2.0,), width_s=max(0.3 * short, hand)),
         Segment("doublet", axes=("elevator",), amplitudes=(2.0,), width_s=max(0.5 * short, hand)),
@@ -320,7 +350,7 @@ def design(name: str, airspeed_mps: float = 0.0) -> Card:
     data = air_data(record)
     segments: list[Segment] = [Segment("trim", duration_s=5.0)]
     for s, w in zip(draft, record.schedule.windows, strict=True):
-        p = _point(record, data, s, w)
+        p = point_of(record, data, s, w)
         excursion = {
             "elevator": (p.alpha_deg, TARGET_EXCURSIONS["alpha_deg"]),
             "rudder": (p.beta_deg, TARGET_EXCURSIONS["beta_deg"]),
@@ -360,6 +390,10 @@ def document(card: Card) -> dict[str, object]:
             value = getattr(s, key)
             if value:
                 row[key] = value
+        if s.attention >= 0.0:
+            row["attention"] = s.attention
+        if s.tones:
+            row["tones"] = [list(astuple(tone)) for tone in s.tones]
         if listed and {k: v for k, v in listed[-1].items() if k != "repeat"} == row:
             listed[-1]["repeat"] = int(str(listed[-1].get("repeat", 1))) + 1
         else:

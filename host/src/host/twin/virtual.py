@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from host.aircraft.file import Aircraft
 from host.errors import UsageError
 from host.instrument.instrument_errors import InstrumentErrors
 from host.log import read_log
@@ -48,6 +49,7 @@ def virtual_flight(
     chain: str = "sitl",
     errors: InstrumentErrors | None = None,
     instrument_seed: int | None = None,
+    aircraft: Aircraft | None = None,
 ) -> VirtualFlight:
     """Fly a card once.
 
@@ -57,10 +59,10 @@ def virtual_flight(
     seed : int
     chain : str
         ``sitl`` through the recorder, decoded with the calibration of the virtual instrument;
-        ``gps`` the sensors without recorder, ``none`` the same without GPS; ``true`` the truth in the same columns; ``thesis``
-        its logger.
-    errors, instrument_seed
-        Of the instrument, as `fly` takes them.
+        ``gps`` the sensors without recorder, ``none`` the same without GPS; ``true`` the truth in
+        the same columns; ``thesis`` its logger.
+    errors, instrument_seed, aircraft
+        Of the instrument, and what flies in place of the card's aircraft, as `fly` takes them.
 
     Returns
     -------
@@ -81,7 +83,9 @@ def virtual_flight(
     if chain not in CHAINS:
         raise ValueError(f"chain is {chain!r}, expected one of {', '.join(CHAINS)}")
     flown = card if isinstance(card, Card) else load(card)
-    record = fly(flown, seed=seed, errors=errors, instrument_seed=instrument_seed)
+    record = fly(
+        flown, seed=seed, errors=errors, instrument_seed=instrument_seed, aircraft=aircraft
+    )
     data = air_data(record)
     if chain == "true":
         table = ideal.true_table(record, data)

@@ -71,9 +71,53 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="also what each test point tells by itself, which its verdict in flight (host live)"
         " is measured against",
     )
+    _add_designs(parser)
     parser.add_argument("--save", type=Path, metavar="FILE", help="write the designed card as TOML")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(run=run)
+
+
+def _add_designs(parser: argparse.ArgumentParser) -> None:
+    """Add the options of designed cards and of the logger's file."""
+    parser.add_argument(
+        "--optimal",
+        action="store_true",
+        help="design multisines on all axes at once that reach the wanted half-widths in the least"
+        " time, for aircraft of the prior's range",
+    )
+    parser.add_argument(
+        "--prior",
+        type=Path,
+        metavar="FILE",
+        help="with --optimal: coefficients of AVL, Datcom or TOML in place of the aircraft's",
+    )
+    parser.add_argument(
+        "--want",
+        type=float,
+        default=10.0,
+        metavar="PERCENT",
+        help="with --optimal: half-width that noise and gusts may leave (default 10)",
+    )
+    parser.add_argument(
+        "--card",
+        dest="logger_card",
+        type=Path,
+        metavar="FILE",
+        help="write the inputs for the logger to fly, such as flight.card (host card write)",
+    )
+    parser.add_argument(
+        "--calibration",
+        type=Path,
+        metavar="TOML",
+        help="with --card: calibration of the logger; the default one without",
+    )
+    parser.add_argument(
+        "--amplitude",
+        type=float,
+        default=1.0,
+        metavar="SHARE",
+        help="with --card: of all deflections, such as 0.33 on first flights (default 1)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -92,8 +136,11 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"--flights is {args.flights}, expected 0 to {MOST_FLIGHTS}")
     if args.gusts is not None and not 0.0 <= args.gusts <= MOST_GUSTS_MPS:
         raise UsageError(f"--gusts is {args.gusts:g} m/s, expected 0 to {MOST_GUSTS_MPS:g}")
-    if args.card is None:
+    if args.optimal or args.prior:
+        card = _optimal(args)
+    elif args.card is None:
         card = planning.design(args.aircraft or "ultrastick25e", args.airspeed or 0.0)
+    if args.card is None:
         if args.save is not None:
             _save(args.save, dumps(planning.document(card)))
     elif args.save is not None:
@@ -103,6 +150,8 @@ def run(args: argparse.Namespace) -> int:
         card = replace(card, aircraft=args.aircraft or card.aircraft)
         speed = args.airspeed or card.flight.airspeed_mps
         card = replace(card, flight=replace(card.flight, airspeed_mps=speed))
+    if args.logger_card is not None:
+        _write_logger_card(card, args)
     plan = planning.judge(card)
     tell_aircraft([args.aircraft])
     prediction = _predicted(card, args) if args.flights else None
@@ -131,6 +180,58 @@ def run(args: argparse.Namespace) -> int:
     if args.save is not None:
         print(f"wrote {args.save}; fly it with: {command_line('host', 'simulate', args.save)}")
     return ExitCode.OK
+
+
+def _optimal(args: argparse.Namespace) -> Card:
+    """Design the card of the least time, and say on stderr what it promises."""
+    from host.aircraft.linear_aircraft import load
+    from host.planning.optimal_card import optimal_card, prior_of
+
+    if args.card is not None or not args.optimal:
+        raise UsageError(
+            "--optimal designs a card, --prior goes with it: leave the card's name out"
+        )
+    if not 0.1 <= args.want <= NOT_TOLD_PERCENT:
+        raise UsageError(f"--want is {args.want:g} %, expected 0.1 to {NOT_TOLD_PERCENT:g}")
+    aircraft = load(args.aircraft or "ultrastick25e")
+    if args.prior is not None:
+        aircraft, replaced = prior_of(aircraft, args.prior, args.airspeed or 0.0)
+        print(f"host: {args.prior}: {', '.join(replaced)}", file=sys.stderr)
+    found = optimal_card(
+        aircraft,
+        args.airspeed or 0.0,
+        gusts_mps=0.3 if args.gusts is None else max(args.gusts, 0.05),
+        wanted_share=0.01 * args.want,
+    )
+    print(f"host: {found.line()}", file=sys.stderr)
+    return found.card
+
+
+def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
+    """Write the file that `host card write` puts into the logger."""
+    from host.aircraft.linear_aircraft import load
+    from host.physical.calibration import load_calibration
+    from host.planning.logger_card import Envelope, logger_card
+    from host.sysid.answer.atomic_files import atomic_write, check_destination
+    from host.wire.card_text import card_lines
+    from host.wire.flight_card import read_card
+
+    if not 0.01 <= args.amplitude <= 1.0:
+        raise UsageError(f"--amplitude is {args.amplitude:g}, expected 0.01 to 1")
+    check_destination("--card", args.logger_card, folder=False)
+    calibration = load_calibration(args.calibration)
+    if calibration.lines["pulse.elevator"].default:
+        print(
+            "host: pulses of the default calibration: calibrate the servos before this card flies",
+            file=sys.stderr,
+        )
+    data = logger_card(
+        card, load(card.aircraft), calibration, Envelope(amplitude_share=args.amplitude)
+    )
+    with atomic_write(args.logger_card) as part:
+        part.write_bytes(data)
+    print("\n".join(card_lines(read_card(data))))
+    print(f"wrote {args.logger_card}\n")
 
 
 def _save(path: Path, text: str) -> None:

@@ -53,6 +53,8 @@ RANGES: Mapping[str, Quantity] = {
     "segment.bank_deg": Quantity("deg", -85.0, 85.0, "a level turn at 85 deg pulls 11 g"),
     "segment.amplitude": Quantity("deg", -90.0, 90.0, _ANGLE),
     "segment.width_s": Quantity("s", 0.0, 600.0, "a phugoid: 60 s"),
+    "segment.tone_share": Quantity("", 0.0, 1.0, "of the amplitude", above=True),
+    "segment.tone_phase": Quantity("", 0.0, 1.0, "a turn"),
     "segment.low_hz": _BAND_HZ,
     "segment.high_hz": _BAND_HZ,
     "segment.before_s": Quantity("s", 0.0, 600.0, "trim before an input: 3 s"),

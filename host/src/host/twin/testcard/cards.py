@@ -89,8 +89,19 @@ class Sensors:
 
 
 @dataclass(frozen=True, slots=True)
+class Tone:
+    """One sine of a multisine: harmonic of 1/duration, share of the amplitude, phase in turns."""
+
+    axis: str
+    harmonic: int
+    share: float
+    phase_turn: float
+
+
+@dataclass(frozen=True, slots=True)
 class Segment:
-    """One line of the card; angles in degrees, throttle as a share."""
+    """One line of the card; angles in degrees, throttle as a share. A multisine without `tones`
+    deals the harmonics of its band out to its axes."""
 
     kind: str
     duration_s: float = 0.0
@@ -103,6 +114,7 @@ class Segment:
     before_s: float = 3.0
     airspeed_mps: float = 0.0
     attention: float = -1.0  # of the pilot during the input; -1: 0 for steps, 0.25 for long inputs
+    tones: tuple[Tone, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,6 +272,7 @@ def _segments(where: str, value: object) -> list[Segment]:
     amplitude = table.pop("amplitude", [])
     listed = amplitude if isinstance(amplitude, list) else [amplitude]
     amplitudes = tuple(_number(where, "segment.amplitude", x) for x in listed)
+    tones = _tones(where, str(kind), axes, table.pop("tones", []))
     numbers: dict[str, float] = {}
     allowed = ("duration_s", "bank_deg", "width_s", "low_hz", "high_hz", "before_s",
                "airspeed_mps", "attention")  # fmt: skip
@@ -273,28 +286,56 @@ def _segments(where: str, value: object) -> list[Segment]:
         )
     if kind in STEPS:
         needed: tuple[str, ...] = ("width_s",)
-    elif kind in KINDS:
+    elif kind in KINDS and not tones:
         needed = ("duration_s", "low_hz", "high_hz")
     else:
         needed = ("duration_s",)
     for key in needed:
         if numbers.get(key, 0.0) <= 0.0:
             raise CardError(f"{where}: {kind} needs {key} above 0, found {numbers.get(key)!r}")
-    if kind in KINDS and kind not in STEPS and numbers["high_hz"] <= numbers["low_hz"]:
+    if "low_hz" in needed and numbers["high_hz"] <= numbers["low_hz"]:
         raise CardError(f"{where}: high_hz is {numbers['high_hz']!r}, expected above low_hz")
-    if kind == "multisine":
-        tones = harmonics(numbers["duration_s"], numbers["low_hz"], numbers["high_hz"])
-        if len(tones) > MOST_TONES:
+    if kind == "multisine" and not tones:
+        band = harmonics(numbers["duration_s"], numbers["low_hz"], numbers["high_hz"])
+        if len(band) > MOST_TONES:
             raise CardError(
-                f"{where}: {len(tones)} whole multiples of 1/duration_s between low_hz and high_hz,"
+                f"{where}: {len(band)} whole multiples of 1/duration_s between low_hz and high_hz,"
                 f" expected up to {MOST_TONES}: a shorter input or a narrower band"
             )
-        if len(tones) < len(axes):
+        if len(band) < len(axes):
             raise CardError(
-                f"{where}: {len(tones)} whole multiples of 1/duration_s between low_hz and high_hz"
+                f"{where}: {len(band)} whole multiples of 1/duration_s between low_hz and high_hz"
                 f" for {len(axes)} axes, expected at least one each: a longer input or a wider band"
             )
-    return [Segment(kind=str(kind), axes=tuple(axes), amplitudes=amplitudes, **numbers)] * repeat
+    point = Segment(str(kind), axes=tuple(axes), amplitudes=amplitudes, tones=tones, **numbers)
+    return [point] * repeat
+
+
+def _tones(where: str, kind: str, axes: list[str], value: object) -> tuple[Tone, ...]:
+    """Return the tones of a multisine, ``[axis, harmonic, share, phase_turn]`` each."""
+    if value == []:
+        return ()
+    if not isinstance(value, list) or kind != "multisine" or len(value) > MOST_TONES:
+        raise CardError(
+            f"{where}: tones of {kind}, expected a list of up to {MOST_TONES} of a multisine"
+        )
+    tones = tuple(_tone(where, axes, one) for one in value)
+    missing = [axis for axis in axes if axis not in {tone.axis for tone in tones}]
+    if missing:
+        raise CardError(f"{where}: tones have none of {missing[0]}, expected one of each axis")
+    return tones
+
+
+def _tone(where: str, axes: list[str], value: object) -> Tone:
+    match value:
+        case [str(axis), int(harmonic), int() | float() as share, int() | float() as phase] if (
+            axis in axes and 1 <= harmonic <= MOST_TONES
+        ):
+            share = _number(where, "segment.tone_share", share)
+            return Tone(axis, harmonic, share, _number(where, "segment.tone_phase", phase))
+    raise CardError(
+        f"{where}: tone {value!r}, expected [axis, harmonic, share, phase in turns] of its axes"
+    )
 
 
 def _fault(where: str, value: object) -> Fault:

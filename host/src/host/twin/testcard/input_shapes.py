@@ -111,3 +111,25 @@ def sweep_signal(t_s: Array, duration_s: float, low_hz: float, high_hz: float) -
     phase = 2 * np.pi * low_hz * duration_s / rate * (np.exp(rate * share) - 1.0)
     fade = np.clip(np.minimum(share, 1.0 - share) * 10.0, 0.0, 1.0)
     return np.where((t_s >= 0.0) & (t_s < duration_s), fade * np.sin(phase), 0.0)
+
+
+def tone_signal(t_s: Array, duration_s: float, tones: Array) -> Array:
+    """Return a multisine of chosen tones as the logger flies it: held within one, zero outside.
+
+    Parameters
+    ----------
+    t_s : (n,) array
+    duration_s : float
+    tones : (k, 3) array
+        Harmonic of 1/`duration_s`, share of the amplitude, phase in turns.
+
+    Returns
+    -------
+    (n,) array
+        ``sum share * sin(2 pi (harmonic t / duration + phase))`` (protocol/flight-card.md).
+    """
+    inside = (t_s >= 0.0) & (t_s < duration_s)
+    turns = np.outer(t_s[inside] / duration_s, tones[:, 0]) + tones[:, 2]
+    out = np.zeros(len(t_s))
+    out[inside] = np.clip(np.sin(2.0 * np.pi * turns) @ tones[:, 1], -1.0, 1.0)
+    return out
