@@ -50,17 +50,18 @@ def _derivatives(numbers: JsonNumbers, at: int, label: str) -> str:
         rows.append([
             escaped(name), numbers.html(*place, "value"),
             numbers.html(*place, "half_width", digits=2), escaped(own["unit"]),
-            numbers.html("truth", label, name, "truth"), _mark(mark.get("mark", "")),
-            escaped("; ".join(mark.get("reasons", ()))),
+            numbers.html("truth", label, name, "truth"), escaped(own["widened_by"]),
+            _mark(mark.get("mark", "")), escaped("; ".join(mark.get("reasons", ()))),
         ])  # fmt: skip
-    heads = ["name", "value", "95 % \u00b1", "unit", "truth", "verdict", "because"]
+    heads = ["name", "value", "95 % \u00b1", "unit", "truth", "widened most by", "verdict",
+             "because"]  # fmt: skip
     judged = [row for row, name in zip(rows, answer["parameters"], strict=True) if name in marks]
     rest = [row for row, name in zip(rows, answer["parameters"], strict=True) if name not in marks]
     more = (
         "<details><summary>constants of each maneuver, places, noise</summary>"
-        f"{_without_empty(heads, rest, (0, 3, 5, 6))}</details>"
+        f"{_without_empty(heads, rest, (0, 3, 5, 6, 7))}</details>"
     )
-    return _without_empty(heads, judged, (0, 3, 5, 6)) + (more if rest else "")
+    return _without_empty(heads, judged, (0, 3, 5, 6, 7)) + (more if rest else "")
 
 
 def _coefficients(numbers: JsonNumbers, at: int, label: str, causes: Mapping[str, str]) -> str:

@@ -106,6 +106,7 @@ def answer_document(
                 "value": float(result.estimate[k]),
                 "half_width": float(half[k]),
                 "unit": parameter_unit(answer.model, name),
+                "widened_by": answer.causes.get(name, ""),
             }
             for k, name in enumerate(result.names)
         },

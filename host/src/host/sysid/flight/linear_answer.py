@@ -55,6 +55,7 @@ class Answer:
     coherence: InputCoherence | None = None  # of what free simulation leaves with the inputs
     predictions: dict[str, Prediction] = field(default_factory=dict)  # of outputs held out
     noise_covariance: Array | None = None  # of the estimate, without systematic errors
+    causes: dict[str, str] = field(default_factory=dict)  # what widens each interval most
     unseen: tuple[
         tuple[Maneuver, Array], ...
     ] = ()  # held out, with their outputs by free simulation

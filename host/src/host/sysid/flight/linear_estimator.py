@@ -68,6 +68,7 @@ from host.sysid.flight.reconstructed_flight import (
 from host.sysid.flight.sampling_error import hold_shift
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
 from host.sysid.flight.trim_departure import Departure, correct_trim_departure
+from host.sysid.flight.widest_errors import widest_errors
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
     assess_identifiability,
@@ -352,6 +353,7 @@ class LinearEstimator:
             predictions=validation.predictions,
             unseen=validation.unseen,
             noise_covariance=statistical.covariance,
+            causes=widest_errors(e.fit, intervals.statistical, intervals.total, intervals.shifts),
         )
 
     def _maneuvers(

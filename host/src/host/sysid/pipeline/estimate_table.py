@@ -75,7 +75,8 @@ def _linear_rows(answer: Answer, evidence: Evidence) -> Iterator[tuple[str, tupl
         share = float(half[k]) / max(float(size[k]), 1e-300)
         unit = parameter_unit(answer.model, p.name)
         value = float(result.estimate[k])
-        yield p.name, (value, float(half[k]), unit, share, marks.get(p.name, ""), "")
+        cause = answer.causes.get(p.name, "")
+        yield p.name, (value, float(half[k]), unit, share, marks.get(p.name, ""), cause)
     for name, (value, width) in answer.delays.items():
         yield name, (value, width, "s", _share(value, width), "", "")
     for d in (x for x in answer.model.delays if x.name in result.names):

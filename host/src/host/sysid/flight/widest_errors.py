@@ -1,0 +1,46 @@
+"""What widens each interval of a linear model most: noise, what the model leaves, a known error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from host.instrument.error_labels import ERROR_LABELS
+from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate
+from host.sysid.models.consider_covariance import dominant_error_source
+from host.sysid.models.fit_result import FitResult
+
+NOISE = "noise and gusts"
+BESIDE = "maneuvers that differ, motion beside the model"
+
+
+def widest_errors(
+    fit: FitResult, statistical: FitResult, total: FitResult, shifts: Sequence[ShiftedEstimate]
+) -> dict[str, str]:
+    """Return what causes most of the variance of each parameter; none where nothing causes a
+    quarter of it.
+
+    Parameters
+    ----------
+    fit : FitResult
+        As estimated: noise alone.
+    statistical : FitResult
+        With scatter of the maneuvers and what inputs drive beside the model.
+    total : FitResult
+        With the systematic errors.
+    shifts : sequence of ShiftedEstimate
+        Of one deviation of each systematic error.
+    """
+    noise = np.diag(fit.covariance)
+    parts = {NOISE: noise, BESIDE: np.maximum(np.diag(statistical.covariance) - noise, 0.0)}
+    for shift in shifts:
+        label = ERROR_LABELS.get(shift.error, shift.error)
+        moved = (shift.estimate - statistical.estimate) ** 2
+        parts[label] = parts.get(label, np.zeros(len(noise))) + moved
+    variance = np.diag(total.covariance)
+    causes = {
+        name: dominant_error_source({c: float(p[k]) for c, p in parts.items()}, float(variance[k]))
+        for k, name in enumerate(total.names)
+    }
+    return {name: cause for name, cause in causes.items() if cause}
