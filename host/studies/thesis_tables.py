@@ -38,6 +38,7 @@ from studies.report import Table, write
 from studies.thesis import thesis_data, truth_31
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SNRS = {"noise-free": (np.inf, 200_000), "SNR 10": (10.0, 900_000)}  # and the thesis's iterations
@@ -61,6 +62,7 @@ PERIODS = {  # of table 3.2: what its comments say was obtained
     "3-2-1-1": "both", "pulse": "short", "doublet": "short",
 }  # fmt: skip
 NEAR = 0.1  # relative: a pole this near to the truth's was obtained
+THIN, ROUGHLY = 5, 40  # every so-manieth sample is drawn of a model, of a measurement
 _NAMES = (*(f"a{i}{j}" for i in range(1, 5) for j in range(1, 5)), "b1", "b2", "b3", "b4")
 
 
@@ -246,33 +248,37 @@ def period_lines(found: Sequence[Periods]) -> str:
 
 
 def figures_35_to_38(halves: Sequence[Noise]) -> Figure:
-    """Draw what figures 3.5 to 3.8 show: states, a sample state, parameters, error by iteration."""
+    """Draw what figures 3.5 to 3.8 show: states and slopes, a state, parameters, their errors."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11, 15))
-    axes = figure.subplots(4, len(halves))
+    figure = Figure(figsize=(11, 17))
+    axes = figure.subplots(5, len(halves))
     truth = truth_31()
     for column, half in enumerate(halves):
         clean = thesis_data("3-2-1-1", 100.0)
-        t = np.arange(clean.samples) * clean.dt_s
-        thin = slice(None, None, 25)
-        run = half.runs["stable step"]
-        model = model_31()
+        run, model = half.runs["stable step"], model_31()
         estimated = free_run(model, half.data, run.beta)
-        top, sample, bars, error = axes[:, column]
-        for k, (state, colour) in enumerate(zip(STATES, ("C0", "C1", "C2", "C3"), strict=True)):
-            size = np.max(np.abs(clean.outputs[:, k])) or 1.0
-            top.plot(t[thin], half.data.outputs[thin, k] / size - 3 * k, ".", color="0.75", ms=2)
-            top.plot(t[thin], clean.outputs[thin, k] / size - 3 * k, color=colour, label=state)
-            if estimated is not None:
-                top.plot(t[thin], estimated[thin, k] / size - 3 * k, "--", color="black", lw=0.8)
-        top.set_title(f"fig. 3.5, {half.name}: states over their size; dashed: stable step",
-                      fontsize=9)  # fmt: skip
-        top.legend(fontsize=7, loc="upper right")
-        sample.plot(t[thin], half.data.outputs[thin, 1], ".", color="0.75", ms=2, label="measured")
-        sample.plot(t[thin], clean.outputs[thin, 1], color="C0", label="true")
+        top, slopes, sample, bars, error = axes[:, column]
+        model_slopes = None
         if estimated is not None:
-            sample.plot(t[thin], estimated[thin, 1], "--", color="black", lw=0.9, label="estimated")
+            A, B, _, _ = model.matrices(run.beta)
+            model_slopes = estimated @ A.T + half.data.inputs @ B.T
+        noisy = half.name != "noise-free"
+        _over_size(top, clean.outputs, half.data.outputs if noisy else None, estimated, STATES)
+        top.set_title(f"fig. 3.5, {half.name}: states over their size\n(grey measured, dashed"
+                      " stable step)", fontsize=9)  # fmt: skip
+        assert clean.rates is not None
+        _over_size(slopes, clean.rates, half.data.rates if noisy else None, model_slopes,
+                   [f"d/dt {name}" for name in STATES])  # fmt: skip
+        slopes.set_title("fig. 3.5: slopes over their size", fontsize=9)
+        t = _thinned_time(clean)
+        if noisy:
+            rough = half.data.outputs[::ROUGHLY, 1]
+            sample.plot(t[:: ROUGHLY // THIN], rough, color="0.8", lw=1.2, label="measured")
+        sample.plot(t, clean.outputs[::THIN, 1], color="C0", label="true")
+        if estimated is not None:
+            sample.plot(t, estimated[::THIN, 1], "--", color="black", lw=0.9, label="estimated")
+        sample.set_xticks(range(0, 21, 5))
         sample.set_title("fig. 3.6: alpha, rad", fontsize=9)
         sample.legend(fontsize=7)
         place = np.arange(20)
@@ -287,11 +293,35 @@ def figures_35_to_38(halves: Sequence[Noise]) -> Figure:
         bars.set_yscale("symlog", linthresh=0.1)
         bars.set_xticks(place, _NAMES, rotation=90, fontsize=6)
         bars.set_title("fig. 3.7: parameters", fontsize=9)
-        bars.legend(fontsize=7)
-        error.loglog(run.steps[1:], np.abs(run.history[1:] - truth) + 1e-12, lw=0.7)
+        if column == 0:
+            bars.legend(fontsize=7)
+        error.loglog(run.steps[1::8], np.abs(run.history[1::8] - truth) + 1e-12, lw=0.7)
+        for scaled in (bars, error):
+            scaled.minorticks_off()
         error.set_title("fig. 3.8: |error| of each parameter over iterations, stable step",
                         fontsize=9)  # fmt: skip
     return figure
+
+
+def _thinned_time(data: Maneuver) -> Array:
+    return np.asarray(np.arange(data.samples)[::THIN] * data.dt_s)
+
+
+def _over_size(
+    axes: Axes, true: Array, measured: Array | None, estimated: Array | None, names: Sequence[str]
+) -> None:
+    """Draw signals one below the other, each over its largest value."""
+    t = np.arange(len(true))[::THIN] * 0.01
+    for k, colour in zip(range(len(names)), ("C0", "C1", "C2", "C3"), strict=True):
+        size = np.max(np.abs(true[:, k])) or 1.0
+        if measured is not None:
+            rough = measured[::ROUGHLY, k] / size - 3 * k
+            axes.plot(t[:: ROUGHLY // THIN], rough, color="0.8", lw=1.2)
+        axes.plot(t, true[::THIN, k] / size - 3 * k, color=colour)
+        if estimated is not None:
+            axes.plot(t, estimated[::THIN, k] / size - 3 * k, "--", color="black", lw=0.8)
+    axes.set_xticks(range(0, 21, 5))
+    axes.set_yticks(range(0, -3 * len(names), -3), names, fontsize=7)
 
 
 def program_figure(half: Noise, method: str) -> float:

@@ -3,7 +3,7 @@
     .venv/bin/python tests/bench/identification_aeroid.py flight.ulg ultrastick25e 300
 
 AeroID takes one unbroken record and no maneuvers. Given all test points of an axis it did not end
-within 550 s, so it is given the shortest stretch with a test point of each surface: airspeed and
+within 550 s, so it is given the shortest stretch with a 3-2-1-1 of each surface: airspeed and
 bank as measured inputs, surfaces behind the aircraft's servos, handbook values to start from. It
 knows no free start states: they are parameters of a shift. Its intervals are its own standard
 errors. Processor time is limited; each axis is printed as it ends.
@@ -47,7 +47,9 @@ LATERAL = {
     "Cn_da": -0.01, "Cn_dr": -0.05,
 }  # fmt: skip
 LONGITUDINAL_INPUTS = ("elevator_rad", "qbar_pa", "airspeed_mps", "gravity_mps2")
-LATERAL_INPUTS = ("aileron_rad", "rudder_rad", "qbar_pa", "airspeed_mps", "gravity_mps2")
+LATERAL_INPUTS = (
+    "aileron_rad", "rudder_rad", "qbar_pa", "airspeed_mps", "gravity_mps2", "trim_alpha_rad",
+)  # fmt: skip
 
 
 def by_aeroid(path: Path, aircraft: str, limit_s: int) -> tuple[Told, float]:
@@ -72,6 +74,7 @@ def _print_axes(path: Path, aircraft: str) -> None:
     columns = dict(flight.corrected)
     columns["qbar_pa"] = 0.5 * columns["density_kgpm3"] * columns["airspeed_mps"] ** 2
     down = GRAVITY_MPS2 * np.cos(columns["theta_rad"])
+    climb = np.arcsin(np.clip(-columns["v_down_mps"] / columns["airspeed_mps"], -1.0, 1.0))
     begin_s = time.process_time()
     for axes, inputs, outputs, start, bank in (
         (("elevator_rad",), LONGITUDINAL_INPUTS, ("q_radps", "az_mps2"), LONGITUDINAL, np.cos),
@@ -79,7 +82,10 @@ def _print_axes(path: Path, aircraft: str) -> None:
          np.sin),
     ):  # fmt: skip
         columns["gravity_mps2"] = down * bank(columns["phi_rad"])
-        first, last = _stretch([[m for m in flight.maneuvers if m.axis == a] for a in axes])
+        first, last = _stretch([_sharpest(flight.maneuvers, axis) for axis in axes])
+        within = (columns["t_s"] >= first) & (columns["t_s"] <= last)
+        trim_rad = float(np.nanmean((columns["theta_rad"] - climb)[within]))
+        columns["trim_alpha_rad"] = np.full(len(climb), trim_rad)
         cut = _means(columns, (*inputs, *outputs), first, last)
         build = _longitudinal if axes == ("elevator_rad",) else _lateral
         try:
@@ -88,6 +94,12 @@ def _print_axes(path: Path, aircraft: str) -> None:
             told = {}
         took_s = time.process_time() - begin_s
         print(json.dumps({"told": told, "took_s": took_s, "stretch_s": last - first}), flush=True)
+
+
+def _sharpest(found: Sequence[DetectedManeuver], axis: str) -> list[DetectedManeuver]:
+    """Return the 3-2-1-1s of an axis, all of its maneuvers if it has none."""
+    mine = [m for m in found if m.axis == axis]
+    return [m for m in mine if m.kind == "3-2-1-1"] or mine
 
 
 def _stretch(by_axis: Sequence[Sequence[DetectedManeuver]]) -> tuple[float, float]:
@@ -176,7 +188,7 @@ def _lateral(a: AirframeData) -> aeroid.Model:
         roll += p["Cl_da"] * u[0]
         yaw += p["Cn_da"] * u[0] + p["Cn_dr"] * u[1]
         return np.array([
-            (side(x, u, p) + u[4]) / u[3] - x[2],
+            (side(x, u, p) + u[4]) / u[3] - x[2] + x[1] * u[5],
             torque / a.ixx_kgm2 * roll,
             torque / a.izz_kgm2 * yaw,
         ])  # fmt: skip

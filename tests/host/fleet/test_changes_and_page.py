@@ -16,6 +16,8 @@ from host.fleet.statistics.loaded_flight import LoadedFlight
 from host.fleet.statistics.type_model import TypeModel, type_model
 from studies.fleet_changes import USUAL, covariance, false_alarms, patterns, power
 
+from tests.browser.chromium import PHONE, Chromium
+
 HOSTILE = "<script>alert(1)</script>"
 
 
@@ -87,7 +89,16 @@ def test_the_page_shows_everything_and_runs_nothing(
     assert HOSTILE not in page
     for word in ("throw of the elevator", "hangs", "new aircraft", "fly more aircraft: 4 are few"):
         assert word in page
-    (tmp_path / "trainer.html").write_text(page)
+    path = tmp_path / "trainer.html"
+    path.write_text(page, encoding="utf-8")
+    with Chromium() as browser:
+        shown = browser.open(path.as_uri())
+        shown.wait_for("document.readyState === 'complete'")
+        assert shown.evaluate("[...document.images].filter((one) => !one.naturalWidth).length") == 0
+        shown.resize(PHONE)
+        assert shown.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+        assert [one for one in shown.requests if not one.startswith("data:")] == [path.as_uri()]
+        assert shown.console_errors == []
 
 
 def test_the_prior_is_what_identify_reads(

@@ -14,7 +14,7 @@ from host.cli import main
 from host.report.flight_sections import calibration_and_preflight, data_health, maneuver_cards
 from host.report.shown_flight import ShownFlight
 
-from tests.browser.chromium import Chromium
+from tests.browser.chromium import PHONE, Chromium
 from tests.host.report.flights import PLANTED
 
 ASKED = ("--model", "short-period", "--method", "output-error-white", "--no-delays")
@@ -96,6 +96,9 @@ def test_numbers_of_the_report_are_those_of_json_and_nothing_planted_runs(
     assert "<img src=x" not in text and "</script><b>" not in text and "\x01" not in text
     page = browser.open(target.as_uri())
     page.wait_for("document.readyState === 'complete'")
+    page.resize(PHONE)
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+    page.resize((1280, 900))
     assert page.console_errors == []
     assert [one for one in page.requests if not one.startswith("data:")] == [target.as_uri()]
     broken = "[...document.images].filter((one) => !one.naturalWidth).length"

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from host.files.watched import watched_file
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
@@ -22,6 +24,12 @@ WANTED = (
     "vehicle_torque_setpoint", "vehicle_thrust_setpoint", "autotune_attitude_control_status",
     "vehicle_status", "vehicle_land_detected", "vehicle_imu_status",
 )  # fmt: skip
+# Fields of topics that come with every sample.
+LARGE = {
+    "sensor_combined": ("gyro_rad", "accelerometer_m_s2"), "vehicle_attitude": ("q",),
+    "vehicle_angular_velocity": ("xyz",), "vehicle_acceleration": ("xyz",),
+}  # fmt: skip
+OUTPUTS = ("actuator_servos", "actuator_motors")
 # vehicle_status.vehicle_type, and MAV_TYPE of MAVLink's common.xml.
 BY_STATUS = {1: "copter", 2: "plane", 3: "rover", 4: "airship"}
 BY_MAV_TYPE = {
@@ -99,25 +107,53 @@ def _damage(path: Path, log: Any) -> tuple[list[str], int]:
 
 
 def _messages(log: Any, damage: list[str]) -> dict[str, dict[int, Messages]]:
+    """Return the messages of each topic; what pyulog holds of it is given up, small ones first.
+
+    A gigabyte is in memory once, and of a topic only what is read is there twice.
+    """
     found: dict[str, dict[int, Messages]] = {}
-    for data in log.data_list:
-        stamps = data.data.get("timestamp")
-        if stamps is None or not len(stamps):
+    log.data_list.sort(key=lambda data: sum(v.nbytes for v in data.data.values()), reverse=True)
+    while log.data_list:
+        data = log.data_list.pop()
+        name, instance = str(data.name), int(data.multi_id)
+        messages = _topic(name, data.data, damage)
+        if messages is not None:
+            found.setdefault(name, {})[instance] = messages
+    return dict(sorted(found.items()))
+
+
+def _topic(name: str, data: Mapping[str, NDArray[Any]], damage: list[str]) -> Messages | None:
+    """Return the messages of one topic, copied."""
+    stamps = data.get("timestamp")
+    if stamps is None or not len(stamps):
+        return None
+    sampled = data.get("timestamp_sample")
+    use = sampled if sampled is not None and (sampled > 0).mean() > 0.9 else stamps
+    t_s = np.asarray(use, dtype=np.float64) * 1e-6
+    kept, wrong = plausible(t_s)
+    if wrong:
+        damage.append(f"{wrong} messages of {name} have an impossible time, left out")
+    rows = np.flatnonzero(kept)
+    # A topic may be published twice for one sample: the first counts.
+    rows = rows[np.concatenate([[True], np.diff(t_s[rows]) > 0.0])] if len(rows) else rows
+    if not len(rows):
+        return None
+    own = {}
+    for key, values in data.items():
+        if len(values) != len(stamps) or not _read(name, str(key)):
             continue
-        fields = {str(k): np.asarray(v) for k, v in data.data.items() if len(v) == len(stamps)}
-        sampled = fields.get("timestamp_sample")
-        use = sampled if sampled is not None and (sampled > 0).mean() > 0.9 else stamps
-        t_s = np.asarray(use, dtype=np.float64) * 1e-6
-        kept, wrong = plausible(t_s)
-        if wrong:
-            damage.append(f"{wrong} messages of {data.name} have an impossible time, left out")
-        rows = np.flatnonzero(kept)
-        # A topic may be published twice for one sample: the first counts.
-        rows = rows[np.concatenate([[True], np.diff(t_s[rows]) > 0.0])] if len(rows) else rows
-        if len(rows):
-            own = {key: values[rows] for key, values in fields.items()}
-            found.setdefault(data.name, {})[int(data.multi_id)] = Messages(t_s[rows], own)
-    return found
+        column = values[rows]
+        # Outputs that nothing is assigned to are most of them.
+        if name not in OUTPUTS or not np.isnan(column).all():
+            own[str(key)] = column
+    return Messages(t_s[rows], own)
+
+
+def _read(name: str, key: str) -> bool:
+    """Return whether a field is of use: of the large topics only some are."""
+    if name in LARGE:
+        return key.partition("[")[0] in LARGE[name]
+    return key not in ("timestamp", "timestamp_sample")
 
 
 def _vehicle(messages: dict[str, dict[int, Messages]], parameters: dict[str, float]) -> str:
