@@ -114,38 +114,60 @@ def flown(seed: int) -> Flown:
     return Flown(recording.log, text, truth_files.maneuvers(record, data), np.asarray(t_s))
 
 
-def rows_of(flight: Flown, seed: int) -> Iterator[dict[str, object]]:
-    """Learn every row of a flight, and ask the live estimator after each."""
+@dataclass(frozen=True, slots=True)
+class LearningRow:
+    """What the logger is given of one row: its card, and raw counts at 50 Hz."""
+
+    name: str
+    card: AxisCard
+    samples: NDArray[np.int64]
+    end_s: float
+
+
+def learning_rows(flight: Flown) -> Iterator[LearningRow]:
+    """Return the rows of a flight, from its log."""
     with tempfile.TemporaryDirectory() as folder:
-        log, text = Path(folder) / "flight.bin", Path(folder) / "calibration.toml"
-        log.write_bytes(flight.log)
-        text.write_text(flight.calibration, encoding="utf-8")
-        decoded = read_log(log, calibration=text)
-        frames = decoded.frames["ident"]
-        live = FlightEstimator(AIRCRAFT, text)
-        read = read_flight_columns(decoded)
-        for row, (axis, point, harmonics, rate) in ROWS.items():
+        log, text = _files(flight, Path(folder))
+        frames, lines = read_log(log, calibration=text).frames["ident"], load_calibration(text)
+        for name, (axis, point, harmonics, rate) in ROWS.items():
             of = flight.maneuvers[point]
             end_s = float(of["input_end_s"]) + (BEHIND_S if of["kind"] == "3211" else 0.0)
             begin_s = float(of["start_s"]) - BEFORE_S
             inside = (flight.t_s >= begin_s) & (flight.t_s < end_s)
-            samples = _signals(frames, axis)[inside][:: RATE_HZ // SAMPLE_HZ]
             at = LearningCondition(AIRSPEED_MPS, DENSITY_KGPM3, harmonics, rate)
-            told = learning_card(AIRCRAFT, axis, at, load_calibration(text))
-            ours, exact = (learned(told, samples, double=d) for d in (False, True))
-            known = int(np.searchsorted(flight.t_s, end_s + LIVE_BEHIND_S))
+            samples = _signals(frames, axis)[inside][:: RATE_HZ // SAMPLE_HZ]
+            yield LearningRow(name, learning_card(AIRCRAFT, axis, at, lines), samples, end_s)
+
+
+def rows_of(flight: Flown, seed: int) -> Iterator[dict[str, object]]:
+    """Learn every row of a flight, and ask the live estimator after each."""
+    with tempfile.TemporaryDirectory() as folder:
+        log, text = _files(flight, Path(folder))
+        live = FlightEstimator(AIRCRAFT, text)
+        read = read_flight_columns(read_log(log, calibration=text))
+        for row in learning_rows(flight):
+            truth = flight.maneuvers[ROWS[row.name][1]]["derivatives"]
+            ours, exact = (learned(row.card, row.samples, double=d) for d in (False, True))
+            known = int(np.searchsorted(flight.t_s, row.end_s + LIVE_BEHIND_S))
             beside = live.of(_until(read, known)).values
             for after_s in AFTER_S:
                 one, other = (_last(found, after_s) for found in (ours, exact))
                 if one is None or other is None or (after_s < 99.0 and len(ours) <= after_s):
                     continue
-                for k, name in enumerate(NAMES[axis]):
+                for k, name in enumerate(NAMES[row.card.axis]):
                     value = (
-                        seed, row, after_s, name, of["derivatives"][name], one.estimate[k],
+                        seed, row.name, after_s, name, truth[name], one.estimate[k],
                         one.half_width[k], other.estimate[k], other.half_width[k],
                         *beside.get(name, (np.nan, np.nan)),
                     )  # fmt: skip
                     yield dict(zip(COLUMNS, value, strict=True))
+
+
+def _files(flight: Flown, folder: Path) -> tuple[Path, Path]:
+    log, text = folder / "flight.bin", folder / "calibration.toml"
+    log.write_bytes(flight.log)
+    text.write_text(flight.calibration, encoding="utf-8")
+    return log, text
 
 
 def learned(told: AxisCard, samples: NDArray[np.int64], *, double: bool) -> dict[int, Learned]:

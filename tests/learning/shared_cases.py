@@ -143,9 +143,10 @@ def every_case() -> list[Case]:
     ]
 
 
-def header() -> str:
-    """Return the text of cases.h."""
-    return _HEAD + "\n".join(_of(c) for c in every_case()) + "\n}  // namespace cases\n"
+def header(cases: list[Case] | None = None) -> str:
+    """Return the text of cases.h, of the shared cases or of others."""
+    given = every_case() if cases is None else cases
+    return _HEAD + "\n".join(_of(c) for c in given) + "\n}  // namespace cases\n"
 
 
 def _of(case: Case) -> str:
