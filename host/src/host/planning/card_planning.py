@@ -33,7 +33,7 @@ from host.twin.flight.fly import FlightRecord, fly
 from host.twin.flight.pilot import Window
 from host.twin.outcome.ideal import true_table
 from host.twin.sensors.local_flow import AirData, air_data
-from host.twin.testcard.cards import Card, Pilot, Segment, Sensors
+from host.twin.testcard.cards import BEFORE_S, Card, Pilot, Segment, Sensors
 
 # White noise of each output at 100 Hz: two vanes and two pitots averaged, four conversions each,
 # MPU-6000 behind its filter; attitude as good as a filter makes it over one maneuver.
@@ -390,6 +390,8 @@ def document(card: Card) -> dict[str, object]:
             value = getattr(s, key)
             if value:
                 row[key] = value
+        if s.before_s != BEFORE_S:
+            row["before_s"] = s.before_s
         if s.attention >= 0.0:
             row["attention"] = s.attention
         if s.tones:
@@ -398,10 +400,12 @@ def document(card: Card) -> dict[str, object]:
             listed[-1]["repeat"] = int(str(listed[-1].get("repeat", 1))) + 1
         else:
             listed.append(row)
-    return {
+    document: dict[str, object] = {
         "format": 1,
         "title": card.title,
         "aircraft": card.aircraft,
         "flight": {"airspeed_mps": card.flight.airspeed_mps},
-        "segment": listed,
     }
+    if card.pilot.hands_off_s != Pilot().hands_off_s:
+        document["pilot"] = {"hands_off_s": card.pilot.hands_off_s}
+    return document | {"segment": listed}

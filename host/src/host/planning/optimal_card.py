@@ -41,12 +41,14 @@ FIRST_DRAW = 980_001
 HIGHEST_HZ, LOWEST_HZ = 3.5, 0.2  # slower is the pilot's and the phugoid's
 TONES = {"longitudinal": (3,), "lateral": (3, 4)}  # ten in a row of the logger's card
 SHARES = 64  # steps of a share of the amplitude there
-DURATION_S = 10.0  # hands off: longer, and bank and speed wander
+DURATION_S = 12.0  # hands off: longer, and bank and speed wander
+QUIET_S, REST_S = 1.5, 1.0  # before it and behind it; a 3-2-1-1 needs its free response
 WANTED_SHARE = 0.10
 STEPS = 2  # to the largest amplitudes
 MOST_POINTS = 12
 # What is flown by the logger: exact, on the receiver's frames; the pilot only watches.
 LOGGER = Pilot(timing_s=0.0, amplitude=0.0, drift=0.0, hand_s=0.02, early=0.0)
+WATCHING = replace(LOGGER, hands_off_s=REST_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,10 +136,11 @@ def optimal_card(
         axes=tuple(amplitudes),
         amplitudes=tuple(amplitudes.values()),
         duration_s=duration_s,
+        before_s=QUIET_S,
         attention=0.0,
         tones=tuple(tones),
     )
-    card = _card(aircraft, speed, [point])
+    card = _card(aircraft, speed, [point], WATCHING)
     scaled = within_limits(card, fleet)
     by = {a: x / y for a, x, y in zip(point.axes, scaled.segments[1].amplitudes, point.amplitudes,
                                       strict=True)}  # fmt: skip
@@ -154,7 +157,9 @@ def optimal_card(
     points = min(max(math.ceil(float(np.median(seconds)) / point_s), 1), MOST_POINTS)
     title = f"{aircraft.title}: {points} orthogonal multisines on three axes, for its prior's range"
     return OptimalCard(
-        replace(_card(aircraft, speed, [point] * points), title=title), point_s, np.array(seconds)
+        replace(_card(aircraft, speed, [point] * points, WATCHING), title=title),
+        point_s,
+        np.array(seconds),
     )
 
 
@@ -176,10 +181,12 @@ def prior_of(
     return found, replaced
 
 
-def _card(aircraft: Aircraft, airspeed_mps: float, points: list[Segment]) -> Card:
+def _card(
+    aircraft: Aircraft, airspeed_mps: float, points: list[Segment], pilot: Pilot = LOGGER
+) -> Card:
     rest = [Segment("trim", duration_s=x) for x in (4.0, 3.0)]
     card = Card(name="plan", title="", aircraft=aircraft.name, segments=(rest[0], *points, rest[1]),
-                pilot=LOGGER)  # fmt: skip
+                pilot=pilot)  # fmt: skip
     return replace(card, flight=replace(card.flight, airspeed_mps=airspeed_mps))
 
 
@@ -212,7 +219,7 @@ def standard_card(aircraft: Aircraft, airspeed_mps: float = 0.0, repeat: int = 1
     speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")
     fleet = [aircraft, *(drawn(aircraft, FIRST_DRAW + k) for k in range(AIRCRAFT - 1))]
     points = [
-        Segment("3211", axes=(axis,), amplitudes=(3.0,), width_s=width)
+        Segment("3211", axes=(axis,), amplitudes=(3.0,), width_s=width, before_s=QUIET_S)
         for axis, width in mode_widths_s(aircraft, speed).items()
     ]
     scaled = within_limits(_card(aircraft, speed, points), fleet).segments[1:-1]

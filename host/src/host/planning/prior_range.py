@@ -16,6 +16,7 @@ import numpy as np
 
 from host.aircraft.airframe import COEFFICIENTS, Array
 from host.aircraft.file import Aircraft
+from host.aircraft.linear_dynamics import LinearDynamics
 from host.aircraft.prior.prior_table import PriorTable
 from host.constants import NORMAL_95
 from host.sysid.answer.aircraft_export import AXES, CONTROLS
@@ -59,7 +60,7 @@ def drawn(aircraft: Aircraft, seed: int) -> Aircraft:
     """
     rng = np.random.default_rng([seed, 5])
     if aircraft.straight is not None:
-        return replace(aircraft, straight=_drawn_matrices(aircraft, rng))
+        return replace(aircraft, straight=_drawn_matrices(aircraft.straight, rng))
     vectors = dict(aircraft.vectors)
     for name in COEFFICIENTS:
         by = 1.0 + np.clip(share(aircraft, name) * rng.standard_normal(), -LARGEST, LARGEST)
@@ -67,10 +68,7 @@ def drawn(aircraft: Aircraft, seed: int) -> Aircraft:
     return replace(aircraft, vectors=vectors)
 
 
-def _drawn_matrices(aircraft: Aircraft, rng: np.random.Generator):  # type: ignore[no-untyped-def]
-    straight = aircraft.straight
-    assert straight is not None
-
+def _drawn_matrices(straight: LinearDynamics, rng: np.random.Generator) -> LinearDynamics:
     def moved(matrix: Array) -> Array:
         # Row 2 of pitch, rows 1 and 2 of roll and yaw: moments, which turning axes are not in.
         by = 1.0 + np.clip(MATRIX_SHARE * rng.standard_normal(matrix.shape), -LARGEST, LARGEST)

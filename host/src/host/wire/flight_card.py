@@ -112,6 +112,11 @@ def read_card(data: bytes) -> CardFile:
     return CardFile(head, tuple(rows))
 
 
+def read_row(part: bytes) -> dict[str, Any]:
+    """Return one row in numbers."""
+    return _numbers(ROW, part)
+
+
 def _numbers(layout: str, data: bytes) -> dict[str, Any]:
     record = np.frombuffer(data, dtype=dtype(layout), count=1)[0]
     return {name: record[name].tolist() for name in dtype(layout).names or ()}

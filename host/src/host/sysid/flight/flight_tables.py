@@ -33,6 +33,7 @@ from host.sysid.flight.foreign_tables import (
     refuse_other,
     same_length,
 )
+from host.sysid.flight.logged_inputs import input_columns
 from host.sysid.flight.measured import Measured, measured
 from host.sysid.flight.original_table import is_original, original_table
 from host.sysid.flight.recorded import commanded_by_map, recording_of_log, recording_of_table
@@ -157,6 +158,7 @@ def read_flight_columns(
     same_length(used, called)
     if recorded:
         columns = even_grid(used, notes)
+        columns |= input_columns(columns["t_s"], found.inputs)
         columns |= derived_columns(columns, wanted)
         return FlightColumns(columns, notes, found.recording, found.calibration)
     seen = _measured(used, notes, accept)
@@ -281,8 +283,15 @@ def _log(source: Path, calibration: Path | None, wanted: Collection[str]) -> For
 
 
 def _of_log(log: FlightLog, columns: dict[str, Array], notes: list[str]) -> Foreign:
-    recording = recording_of_log(log)
-    return Foreign(columns, notes=notes, recording=recording, calibration=log.calibration)
+    from host.log.flown_inputs import flown_inputs
+
+    return Foreign(
+        columns,
+        notes=notes,
+        recording=recording_of_log(log),
+        calibration=log.calibration,
+        inputs=flown_inputs(log),
+    )
 
 
 def _columns_of(log: FlightLog, wanted: Collection[str]) -> tuple[dict[str, Array], list[str]]:

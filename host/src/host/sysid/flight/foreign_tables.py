@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,8 @@ from host.sysid.identification_error import IdentificationError
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from host.log.flown_inputs import FlownInput
 
 TEXT_KINDS = (".csv", ".tsv", ".txt", ".dat")
 MOST_UNIT_ROWS = 2
@@ -38,7 +40,8 @@ class Foreign:
 
     `twice` are names that several columns have; `recording` is what the source shows of itself,
     `calibration` what made the columns of a log; of an autopilot's log `shares` are the surfaces in
-    shares of full travel, `findings` what was found on reading it.
+    shares of full travel, `findings` what was found on reading it; `inputs` are those that our
+    logger flew itself.
     """
 
     columns: dict[str, Array] = field(default_factory=dict)
@@ -50,6 +53,7 @@ class Foreign:
     calibration: Calibration | None = None
     shares: tuple[str, ...] = ()
     findings: list[Finding] = field(default_factory=list)
+    inputs: Sequence[FlownInput] = ()
 
 
 def read_foreign(source: Path) -> Foreign:

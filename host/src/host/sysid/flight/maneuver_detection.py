@@ -16,6 +16,7 @@ import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
 from host.sysid.flight.free_response import with_free_response
+from host.sysid.flight.logged_inputs import logged_inputs
 from host.sysid.flight.sustained_inputs import sustained_inputs
 
 LAG_S = 0.12  # a hand needs about this long for one edge
@@ -116,6 +117,9 @@ def _of_record(columns: Mapping[str, Array], flying: BoolArray) -> list[Detected
         found += _find_axis(axis, t, series, flying)
     found.sort(key=lambda f: f.start_s)
     found = _bounded(found, float(t[-1]))
+    told = logged_inputs(columns, surfaces)
+    if told:
+        found = _told_windows(told, found, float(t[-1]))
     if "bridged" in columns:
         measured = ~(np.asarray(columns["bridged"]) > 0.0)
         found = [part for f in found for part in _parts(f, t, measured)]
@@ -352,6 +356,34 @@ def _bounded(found: list[DetectedManeuver], last_s: float) -> list[DetectedManeu
         limit = kept[k + 1].start_s if k + 1 < len(kept) else last_s
         result.append(replace(item, end_s=min(item.end_s, max(limit, item.input_end_s), last_s)))
     return result
+
+
+def _told_windows(
+    told: Mapping[tuple[str, float, float], tuple[str, float]],
+    found: list[DetectedManeuver],
+    last_s: float,
+) -> list[DetectedManeuver]:
+    """Return the inputs that the logger flew with their exact windows, and others beside them."""
+    spans = [(start_s, end_s) for _, start_s, end_s in told]
+    others = [
+        item
+        for item in found
+        if not any(item.start_s < end_s and item.input_end_s > start_s for start_s, end_s in spans)
+    ]
+    starts = sorted([*(start_s for start_s, _ in spans), *(item.start_s for item in others)])
+    exact = [
+        DetectedManeuver(
+            axis=axis,
+            kind=kind,
+            start_s=start_s,
+            input_end_s=end_s,
+            end_s=min([end_s + RESPONSE_S, last_s, *(s for s in starts if s >= end_s)]),
+            amplitude=amplitude,
+            edges=0,
+        )
+        for (axis, start_s, end_s), (kind, amplitude) in told.items()
+    ]
+    return sorted([*exact, *others], key=lambda f: f.start_s)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ FOLDER = Path(__file__).parent / "cards"
 MOST_SEGMENTS = 2000  # repeated ones counted each
 MOST_TONES = 1000  # of a multisine; the widest card has 60
 AXES = ("elevator", "aileron", "rudder", "throttle")
+BEFORE_S = 3.0  # of trim, as a pilot needs it
 
 
 class CardError(UsageError):
@@ -111,7 +112,7 @@ class Segment:
     width_s: float = 0.0
     low_hz: float = 0.0
     high_hz: float = 0.0
-    before_s: float = 3.0
+    before_s: float = BEFORE_S
     airspeed_mps: float = 0.0
     attention: float = -1.0  # of the pilot during the input; -1: 0 for steps, 0.25 for long inputs
     tones: tuple[Tone, ...] = ()
