@@ -233,7 +233,8 @@ def table(rows: Sequence[Mapping[str, str]]) -> list[str]:
         )
     ends = [r for r in rows if r["after_s"] == str(AFTER_S[-1]) and np.isfinite(float(r["live"]))]
     live = _holds(ends, "live", "live_half_width")
-    lines.append(f"live: {live.sum()} of {len(live)} ({100.0 * live.mean():.1f} %)")
+    if len(live):
+        lines.append(f"live: {live.sum()} of {len(live)} ({100.0 * live.mean():.1f} %)")
     return lines
 
 
