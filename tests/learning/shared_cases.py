@@ -126,7 +126,7 @@ def every_case() -> list[Case]:
     yaw_card = AxisCard(
         YAW, (3, 6, 10, 14, 19, 25), *advances, -0.0036, -0.002,
         (4.1e-4, 1.1e-2, 1.1e-2, 5.7e-4, 2.9e-4), (0.002, 0.004, 0.004, 0.002, 0.002),
-        (10, 50, 20, 50, 10),
+        (10, 0, 20, 0, 10),
     )  # fmt: skip
     # An aileron that never moved, and a rudder that is another signal's copy.
     still, copied = both.copy(), both.copy()

@@ -18,8 +18,8 @@ constexpr uint8_t kMostAdvances = 3;
 struct AxisCard {
   LearningAxis axis;
   uint8_t harmonic_count;
-  uint8_t harmonics[kMostHarmonics];  // times 50 / 512 Hz
-  uint8_t wanted_percent[kMostSignals];
+  uint8_t harmonics[kMostHarmonics];     // times 50 / 512 Hz
+  uint8_t wanted_percent[kMostSignals];  // half-width that is enough; 0: is not told, saves 1 ms
   // A signal x is x + advance x' + curvature x''; in s and s2.
   float advance_s[kMostAdvances];
   float curvature_s2[kMostAdvances];

@@ -123,7 +123,7 @@ bool EquationError::step(const AxisCard& card, const FourierSums& sums) {
       end_pivot();
       break;
     case Task::kResidual:
-      take_residual();
+      take_residual(card);
       break;
     case Task::kInfluence:
       add_influence(card);
@@ -271,7 +271,7 @@ void EquationError::end_pivot() {
   }
 }
 
-void EquationError::take_residual() {
+void EquationError::take_residual(const AxisCard& card) {
   for (uint8_t c = 0; c < signals_; ++c) {
     add_scaled(moment_, -*entry(c, signals_), row_[c]);
   }
@@ -279,7 +279,7 @@ void EquationError::take_residual() {
   moment_.re = squared(moment_);
   residual_ += moment_.re;
   first_ = 0;
-  task_ = Task::kInfluence;
+  next_influence(card);
 }
 
 // What this harmonic's residual moves one derivative by.
@@ -290,7 +290,17 @@ void EquationError::add_influence(const AxisCard& card) {
   }
   const float by = moment_.re * squared(moved);
   spread_[first_] += by;
-  if (++first_ == signals_) {
+  ++first_;
+  next_influence(card);
+}
+
+// Of the derivatives that are wanted.
+void EquationError::next_influence(const AxisCard& card) {
+  task_ = Task::kInfluence;
+  while (first_ < signals_ && card.wanted_percent[first_] == 0) {
+    ++first_;
+  }
+  if (first_ == signals_) {
     next_row(card);
   }
 }
@@ -303,7 +313,8 @@ void EquationError::finish(const AxisCard& card) {
   }
   row_[s] = {0.0F, 0.0F};
   // More columns than lines: the count has gone below zero and wrapped.
-  if ((dropped_ >> s & 1U) == 0 && freedom != 0 && freedom <= 2 * kMostHarmonics) {
+  const bool told = (dropped_ >> s & 1U) == 0 && card.wanted_percent[s] != 0;
+  if (told && freedom != 0 && freedom <= 2 * kMostHarmonics) {
     const uint8_t t = freedom < kMostFreedom ? freedom : kMostFreedom;
     const float student = static_cast<float>(flash_u16(&kStudent[t - 1])) * 0.001F;
     const float mean = residual_ * -*entry(s, s);

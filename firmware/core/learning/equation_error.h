@@ -20,7 +20,7 @@ struct Complex {
 
 struct LearnedDerivative {
   float estimate;
-  float half_width;  // two-sided 95 %, of residual and instrument; 0: the data do not tell it
+  float half_width;  // two-sided 95 %, of residual and instrument; 0: not told
 };
 
 class EquationError {
@@ -58,8 +58,9 @@ class EquationError {
   void choose_pivot();
   void sweep_row();
   void end_pivot();
-  void take_residual();
+  void take_residual(const AxisCard& card);
   void add_influence(const AxisCard& card);
+  void next_influence(const AxisCard& card);
   void next_row(const AxisCard& card);
   void finish(const AxisCard& card);
 

@@ -22,7 +22,7 @@ TEST_CASE("roll, six harmonics of five signals: every bit of the host's") {
                    cases::kRollSums);
 }
 
-TEST_CASE("yaw: every bit of the host's") {
+TEST_CASE("yaw, two derivatives that nobody wants: every bit of the host's") {
   replay::run_case(
       &cases::kYawCard, cases::kYawRows, cases::kYawSamples, cases::kYawSolves, cases::kYawSums);
 }

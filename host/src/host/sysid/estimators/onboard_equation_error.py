@@ -38,7 +38,7 @@ class Learned:
     Attributes
     ----------
     estimate, half_width : (signals,) arrays
-        Of the coefficient's derivatives; a half-width of 0: the data do not tell it.
+        Of the coefficient's derivatives; a half-width of 0: not told.
     enough : tuple of bool
         The half-width is at most the wanted share of the estimate.
     """
@@ -90,6 +90,7 @@ class EquationError:
             matrix += _outer(every[:, 0]) + _outer(every[:, 1])
             yield from _nothing(-(-(count + 1) * (count + 2) // 2 // PRODUCTS_AT_ONCE))
         dropped = yield from _swept(matrix, count)
+        wanted = [s for s in range(count) if self._card.wanted_percent[s] > 0]
         spread = np.zeros(count, dtype=self._real)
         residual = self._real(0.0)
         for harmonic in range(len(self._card.harmonics)):
@@ -98,12 +99,12 @@ class EquationError:
                 row.moment += -matrix[c, count] * row.columns[c]
             square = _squared(row.moment)
             residual += square
-            for s in range(self._card.signals):
+            for s in wanted:
                 moved = np.zeros(2, dtype=self._real)
                 for c in range(count):
                     moved += -matrix[s, c] * row.columns[c]
                 spread[s] += square * _squared(moved)
-            yield from _nothing(2 * self._card.signals + 2)
+            yield from _nothing(self._card.signals + 2 + len(wanted))
         self._finish(matrix, spread, residual, dropped)
         yield from _nothing(self._card.signals - 1)
 
@@ -137,7 +138,7 @@ class EquationError:
         estimate, half_width = (np.zeros(card.signals, dtype=real) for _ in range(2))
         enough = [False] * card.signals
         for s in range(card.signals):
-            if s in dropped or freedom <= 0:
+            if s in dropped or freedom <= 0 or not card.wanted_percent[s]:
                 continue
             student = real(STUDENT[min(freedom, len(STUDENT)) - 1]) * real(0.001)
             mean = residual * -matrix[s, s]
