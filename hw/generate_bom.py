@@ -12,6 +12,7 @@ import io
 import sys
 import tomllib
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +20,12 @@ HERE = Path(__file__).resolve().parent
 BOM = HERE / "bom.csv"
 PETG_USD_PER_G = 0.025
 KITS = ("logger", "radio", "flight")
+# Parts of each printed board and how many boards a logger has; the shield's references are bare.
+SYMBOLS = {
+    "": ("board/generated/parts.csv", 1),
+    "vane": ("board/sensors/generated/vane/parts.csv", 4),
+    "pitot": ("board/sensors/generated/pitot/parts.csv", 1),
+}
 COLUMNS = (
     "what", "maker", "part number", "alternative", "quantity", "unit price USD", "price class",
     "unit weight g", "kit", "refs", "drawing", "part of the 2015 logger", "note",
@@ -60,13 +67,25 @@ def price_class(price_usd: float) -> str:
     return "ABCD"[sum(price_usd >= limit for limit in (0.1, 1.0, 10.0))]
 
 
-def counted(parts_text: str) -> dict[tuple[str, str], list[str]]:
-    """Return the references of each (part, value) of the schematic's parts.csv."""
+def counted(parts_texts: Mapping[str, str]) -> dict[tuple[str, str], list[str]]:
+    """Return the references of each (part, value), the wing's with their board's name.
+
+    Parameters
+    ----------
+    parts_texts
+        parts.csv of each board, keys as in SYMBOLS.
+    """
     found: dict[tuple[str, str], list[str]] = defaultdict(list)
-    for row in csv.DictReader(parts_text.splitlines()[1:]):
-        if row["part"] != "none":
-            found[row["part"], row["value"]].append(row["ref"])
+    for board, text in parts_texts.items():
+        for row in csv.DictReader(text.splitlines()[1:]):
+            if row["part"] != "none":
+                found[row["part"], row["value"]].append(f"{board} {row['ref']}".strip())
     return found
+
+
+def pieces(ref: str) -> int:
+    """Return how many of a reference one logger has: four vane boards have four of its parts."""
+    return SYMBOLS[ref.rpartition(" ")[0]][1]
 
 
 def wire_m(harness_text: str) -> float:
@@ -87,20 +106,22 @@ def resistor_code(value: str) -> str:
     return f"{whole}K{part}"
 
 
-def lines(parts_toml: str, parts_csv: str, harness_text: str) -> list[Line]:
+def lines(parts_toml: str, parts_texts: Mapping[str, str], harness_text: str) -> list[Line]:
     """Return the list.
 
     Parameters
     ----------
-    parts_toml, parts_csv, harness_text
-        Content of parts.toml, board/generated/parts.csv and harness.toml.
+    parts_toml, harness_text
+        Content of parts.toml and harness.toml.
+    parts_texts
+        parts.csv of each board, keys as in SYMBOLS.
 
     Raises
     ------
     BomError
         A part of the schematic that parts.toml lacks; a line that nothing counts; an unknown kit.
     """
-    symbols = counted(parts_csv)
+    symbols = counted(parts_texts)
     found: list[Line] = []
     seen: set[str] = set()
     for row in tomllib.loads(parts_toml)["part"]:
@@ -120,8 +141,8 @@ def lines(parts_toml: str, parts_csv: str, harness_text: str) -> list[Line]:
             if key == "resistor":
                 named["number"] = row["number"].format(code=resistor_code(value))
                 named["what"] = f"{row['what']}, {value}ohm"
-            quantity = named.pop("quantity", len(refs))
-            ordered = sorted(refs, key=lambda ref: (ref[0], int(ref[1:])))
+            quantity = named.pop("quantity", sum(map(pieces, refs)))
+            ordered = sorted(refs, key=_by_board)
             found.append(Line(quantity=quantity, refs=tuple(ordered), **named))
     for part, _ in symbols:
         if part not in seen:
@@ -129,6 +150,11 @@ def lines(parts_toml: str, parts_csv: str, harness_text: str) -> list[Line]:
                 f"the schematic uses {part or 'a symbol without Part'}: not in parts.toml"
             )
     return found
+
+
+def _by_board(ref: str) -> tuple[str, str, int]:
+    board, _, name = ref.rpartition(" ")
+    return board, name.rstrip("0123456789"), int(name.lstrip("ABCDEFGHIJKLMNOPQRSTUVWXYZ"))
 
 
 def made(masses_csv: str) -> list[Line]:
@@ -174,10 +200,14 @@ def read() -> list[Line]:
     BomError
         See `lines`.
     """
-    paths = ("parts.toml", "board/generated/parts.csv", "harness.toml")
-    texts = [(HERE / path).read_text(encoding="utf-8") for path in paths]
-    masses = (HERE / "mechanics/generated/masses.csv").read_text(encoding="utf-8")
-    return lines(*texts) + made(masses)
+    parts, harness, masses = (
+        (HERE / path).read_text(encoding="utf-8")
+        for path in ("parts.toml", "harness.toml", "mechanics/generated/masses.csv")
+    )
+    symbols = {
+        board: (HERE / path).read_text(encoding="utf-8") for board, (path, _) in SYMBOLS.items()
+    }
+    return lines(parts, symbols, harness) + made(masses)
 
 
 def text(found: list[Line]) -> str:

@@ -57,6 +57,7 @@ class Device:
     connector: str
     length_mm: int
     pins: tuple[tuple[str, str], ...]
+    board: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,9 +203,10 @@ def cable_table(harness_text: str, nets_text: str) -> str:
         "# Cables of the shield, plug by plug",
         "",
         "Pin 1 has the square pad. Lengths for a span of 1.8 m; 28 AWG, servo leads 22 AWG.",
+        "A sensor board's J1 has the same pins as its plug here: wire for wire.",
         "",
-        "| plug | to | pin | wire | colour | length m |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "| plug | to | far end | pin | wire | colour | length m |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for device in tomllib.loads(harness_text)["device"]:
         for plug in _plugs(device["connector"]):
@@ -216,9 +218,9 @@ def cable_table(harness_text: str, nets_text: str) -> str:
                 if name in words:  # as in the picture of the Mega's wires
                     colour = _WIRE_COLOURS[words.index(name)]
                 length = f"{device['length_mm'] / 1000:g}" if device["length_mm"] else "plugged in"
-                lines.append(
-                    f"| {plug} | {device['name']} | {row['pin']} | {name} | {colour} | {length} |"
-                )
+                far = f"{device['board']} board J1" if "board" in device else "its own"
+                cells = (plug, device["name"], far, row["pin"], name, colour, length)
+                lines.append(f"| {' | '.join(map(str, cells))} |")
     return "\n".join(lines) + "\n"
 
 

@@ -1,6 +1,6 @@
-"""Check the schematic with KiCad and write what people and tests read of it.
+"""Check the schematics with KiCad and write what people and tests read of them.
 
-python hw/board/export.py           check, then write hw/board/generated
+python hw/board/export.py           check, then write each board's generated folder
 python hw/board/export.py --check   check, and prove that what is committed there is current
 
 Needs kicad-cli 9 (`.ci/setup.sh hw`). The sheets are the source: they are drawn in KiCad.
@@ -10,94 +10,40 @@ from __future__ import annotations
 
 import argparse
 import csv
-import hashlib
 import io
-import json
 import re
-import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-ROOT_SHEET = "logger.kicad_sch"
+from boards import BOARDS, Board, BoardError
+
 MADE_BY = "made by hw/board/export.py from the sheets, sha256"
 # Numbers of a picture: a hundredth of a millimetre is a twentieth of a pixel.
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 
 
-class ExportError(Exception):
-    """KiCad found a violation, or is not there."""
-
-
-def sheets_hash(folder: Path) -> str:
-    """Return the hash of all sheets, the same with any line ending."""
-    digest = hashlib.sha256()
-    for path in sorted(folder.glob("*.kicad_sch")):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes().replace(b"\r\n", b"\n"))
-    return digest.hexdigest()
-
-
-def kicad(folder: Path, *arguments: str) -> None:
-    """Run kicad-cli in a folder.
-
-    Raises
-    ------
-    ExportError
-        No kicad-cli, or it failed; with what it said.
-    """
-    try:
-        done = subprocess.run(
-            ["kicad-cli", *arguments], cwd=folder, capture_output=True, text=True, check=False
-        )
-    except FileNotFoundError:
-        raise ExportError("no kicad-cli found: run .ci/setup.sh hw") from None
-    if done.returncode:
-        raise ExportError(f"kicad-cli {' '.join(arguments[:2])}: {done.stdout}{done.stderr}")
-
-
-def check_rules(folder: Path, out: Path) -> None:
-    """Run the electrical rules; any violation, warnings too, is an error.
-
-    Raises
-    ------
-    ExportError
-        Names every violation.
-    """
-    report = out / "erc.json"
-    kicad(
-        folder,
-        *("sch", "erc", "--severity-all", "--format", "json", "-o", str(report), ROOT_SHEET),
-    )
-    found = [
-        f"{sheet['path']}: {one['description']}: "
-        + "; ".join(item["description"] for item in one["items"])
-        for sheet in json.loads(report.read_text(encoding="utf-8"))["sheets"]
-        for one in sheet["violations"]
-    ]
-    if found:
-        raise ExportError("electrical rules:\n  " + "\n  ".join(found))
-
-
-def netlist(folder: Path, out: Path) -> dict[str, str]:
+def netlist(board: Board, out: Path) -> dict[str, str]:
     """Return nets.csv and parts.csv."""
     path = out / "netlist.xml"
-    kicad(folder, "sch", "export", "netlist", "--format", "kicadxml", "-o", str(path), ROOT_SHEET)
+    board.kicad(
+        *("sch", "export", "netlist", "--format", "kicadxml", "-o", str(path), board.root_sheet)
+    )
     tree = ElementTree.parse(path).getroot()
-    head = f"# {MADE_BY} {sheets_hash(folder)}"
+    head = f"# {MADE_BY} {board.sheets_hash()}"
     parts = []
     for comp in tree.iterfind("components/comp"):
         fields = {f.get("name", ""): f.text or "" for f in comp.iterfind("fields/field")}
-        board = not any(p.get("name") == "exclude_from_board" for p in comp.iterfind("property"))
+        placed = not any(p.get("name") == "exclude_from_board" for p in comp.iterfind("property"))
         parts.append(
             (
                 comp.get("ref", ""),
                 comp.findtext("value", ""),
                 fields.get("Part", ""),
                 fields.get("Device", ""),
-                comp.findtext("footprint", "") if board else "",
+                comp.findtext("footprint", "") if placed else "",
             )
         )
     nets = [
@@ -133,13 +79,15 @@ def _table(head: str, names: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -
     return text.getvalue()
 
 
-def pictures(folder: Path, out: Path) -> dict[str, str]:
+def pictures(board: Board, out: Path) -> dict[str, str]:
     """Return the sheets as SVG, without date and in hundredths of a millimetre."""
-    kicad(folder, "sch", "export", "svg", "-o", str(out / "svg"), ROOT_SHEET)
+    board.kicad("sch", "export", "svg", "-o", str(out / "svg"), board.root_sheet)
     found: dict[str, str] = {}
-    for path in sorted((out / "svg").glob("*.svg")):
-        name = path.stem.removeprefix("logger-").replace(", ", "-").replace(" ", "-").lower()
-        found[f"schematic/{name}.svg"] = slim(path.read_text(encoding="utf-8"), name)
+    paths = sorted((out / "svg").glob("*.svg"))
+    for path in paths:
+        name = path.stem.removeprefix(f"{board.name}-").replace(", ", "-").replace(" ", "-").lower()
+        place = f"schematic/{name}.svg" if len(paths) > 1 else "schematic.svg"
+        found[place] = slim(path.read_text(encoding="utf-8"), name)
     return found
 
 
@@ -156,50 +104,66 @@ def _joined(paths: re.Match[str]) -> str:
     return '<path d="' + "\n".join(re.findall(r'd="([^"]*)"', paths[0])) + '" />\n'
 
 
-def outputs(folder: Path) -> tuple[dict[str, str], bytes]:
+def outputs(board: Board) -> tuple[dict[str, str], bytes]:
     """Check the sheets and make every text, and the PDF.
 
     Raises
     ------
-    ExportError
-        See `check_rules` and `kicad`.
+    BoardError
+        See `Board.check_rules` and `Board.kicad`.
     """
     with tempfile.TemporaryDirectory() as scratch:
         out = Path(scratch)
-        check_rules(folder, out)
-        made = netlist(folder, out) | pictures(folder, out)
-        kicad(folder, "sch", "export", "pdf", "-o", str(out / "schematic.pdf"), ROOT_SHEET)
+        board.check_rules("sch", out / "erc.json")
+        made = netlist(board, out) | pictures(board, out)
+        board.kicad("sch", "export", "pdf", "-o", str(out / "schematic.pdf"), board.root_sheet)
         return made, (out / "schematic.pdf").read_bytes()
+
+
+def stale(board: Board, made: dict[str, str]) -> list[str]:
+    """Return which of a board's texts are not those in its generated folder."""
+    return [
+        name
+        for name, text in made.items()
+        if not (path := board.generated / name).exists() or path.read_text(encoding="utf-8") != text
+    ]
+
+
+def write(board: Board, made: dict[str, str]) -> None:
+    """Write a board's texts into its generated folder."""
+    for name, text in made.items():
+        path = board.generated / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Write or check; 0 ok, 5 no KiCad or a violation, 6 a file is not current."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true", help="compare with what is committed")
-    check = parser.parse_args(arguments).check
-    try:
-        made, pdf = outputs(HERE)
-    except ExportError as error:
-        print(f"hw/board: {error}", file=sys.stderr)
-        return 5
-    generated = HERE / "generated"
-    stale = [
-        name
-        for name, text in made.items()
-        if not (generated / name).exists() or (generated / name).read_text("utf-8") != text
-    ]
-    if check:
-        for name in stale:
-            print(f"hw/board/generated/{name} is not current: run export.py", file=sys.stderr)
-        return 6 if stale else 0
-    for name, text in made.items():
-        (generated / name).parent.mkdir(parents=True, exist_ok=True)
-        (generated / name).write_text(text, encoding="utf-8", newline="\n")
-    # A PDF carries its date: write it only where something changed.
-    if stale or not (generated / "schematic.pdf").exists():
-        (generated / "schematic.pdf").write_bytes(pdf)
-    print(f"wrote hw/board/generated: {len(made) + 1} files, {len(stale)} changed")
-    return 0
+    parser.add_argument("--only", choices=[board.name for board in BOARDS], help="one board")
+    parsed = parser.parse_args(arguments)
+    code = 0
+    for board in BOARDS:
+        if parsed.only not in (None, board.name):
+            continue
+        try:
+            made, pdf = outputs(board)
+        except BoardError as error:
+            print(f"hw/board: {error}", file=sys.stderr)
+            return 5
+        old = stale(board, made)
+        if parsed.check:
+            for name in old:
+                print(f"{board.name}: {name} is not current: run export.py", file=sys.stderr)
+            code = 6 if old else code
+            continue
+        write(board, made)
+        # A PDF carries its date: write it only where something changed.
+        if old or not (board.generated / "schematic.pdf").exists():
+            (board.generated / "schematic.pdf").write_bytes(pdf)
+        print(f"{board.name}: {len(made) + 1} files, {len(old)} changed")
+    return code
 
 
 if __name__ == "__main__":

@@ -14,10 +14,12 @@ from tests.hw.test_pin_map import load_module
 ROOT = Path(__file__).resolve().parents[2]
 HW = ROOT / "hw"
 GENERATOR: ModuleType = load_module("generate_bom")
-PARTS, SYMBOLS, HARNESS = (
-    (HW / path).read_text(encoding="utf-8")
-    for path in ("parts.toml", "board/generated/parts.csv", "harness.toml")
+PARTS, HARNESS = (
+    (HW / path).read_text(encoding="utf-8") for path in ("parts.toml", "harness.toml")
 )
+SYMBOLS = {
+    board: (HW / path).read_text(encoding="utf-8") for board, (path, _) in GENERATOR.SYMBOLS.items()
+}
 
 
 def test_committed_list_is_current() -> None:
@@ -29,7 +31,10 @@ def test_readme_states_every_total() -> None:
     sums = GENERATOR.totals(GENERATOR.read())
     for price, weight in sums.values():
         assert f"{price:.2f} USD, {weight:.0f} g" in said
-    first = (ROOT / "README.md").read_text(encoding="utf-8").split("![")[0]
+    top = (ROOT / "README.md").read_text(encoding="utf-8")
+    prices = [f"{sums[kit][0]:.0f}" for kit in GENERATOR.KITS]
+    assert "about {} USD, {} with a radio pair, {} ready to fly".format(*prices) in top
+    first = top.split("![")[0]
     (promise,) = map(int, re.findall(r"about (\d+) USD of electronics", " ".join(first.split())))
     assert abs(promise - sums["logger"][0]) <= 1.0
 
@@ -46,6 +51,13 @@ def test_every_symbol_stands_in_exactly_one_line() -> None:
     symbols = [ref for refs in GENERATOR.counted(SYMBOLS).values() for ref in refs]
     listed = [ref for line in GENERATOR.read() for ref in line.refs]
     assert sorted(listed) == sorted(symbols)
+
+
+def test_four_vane_boards_have_four_times_its_parts() -> None:
+    (chip,) = (line for line in GENERATOR.read() if line.number == "AS5600-ASOM")
+    (plug,) = (line for line in GENERATOR.read() if line.number == "B3B-XH-A")
+    assert (chip.quantity, chip.refs) == (4, ("vane U1",))
+    assert plug.quantity == len(plug.refs) - 2 + 4 + 1  # one a reference but the vane's
 
 
 def test_drawings_named_are_there() -> None:
@@ -66,7 +78,7 @@ def test_parts_that_contradict_are_refused(before: str, after: str, complaint: s
 
 
 def test_a_symbol_without_a_line_is_refused() -> None:
-    more = SYMBOLS + "U9,LM358,lm358,,\n"
+    more = SYMBOLS | {"": SYMBOLS[""] + "U9,LM358,lm358,,\n"}
     with pytest.raises(GENERATOR.BomError, match="schematic uses lm358"):
         GENERATOR.lines(PARTS, more, HARNESS)
 

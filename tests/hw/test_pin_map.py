@@ -22,6 +22,9 @@ def load_module(name: str) -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[f"hw_{name}"] = module
+    folder = str((HW / name).parent)  # as if it were run: its neighbours are found
+    if folder not in sys.path:
+        sys.path.append(folder)
     spec.loader.exec_module(module)
     return module
 

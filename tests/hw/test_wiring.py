@@ -90,5 +90,5 @@ def test_a_wire_has_one_colour_in_table_and_pictures() -> None:
     (cable,) = re.findall(r'- "Arduino Mega 2560": \[16, 17\]\n    - (W\d+)', modules)
     (colours,) = re.findall(rf"  {cable}:\n    wirecount: 2\n    colors: \[(\w+), (\w+)\]", modules)
     assert colours == ("BN", "OG")  # GPS: RX first in the harness, then TX
-    assert "| J24 | GPS | 4 | RX | BN |" in table
-    assert "| J24 | GPS | 3 | TX | OG |" in table
+    assert "| J24 | GPS | its own | 4 | RX | BN |" in table
+    assert "| J24 | GPS | its own | 3 | TX | OG |" in table
