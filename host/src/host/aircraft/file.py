@@ -15,6 +15,7 @@ from host.aircraft.airframe import COEFFICIENTS, Airframe, Array
 from host.aircraft.dimension_file import from_dimensions, is_dimensions
 from host.aircraft.linear_dynamics import LinearDynamics
 from host.aircraft.size_ratios import doubts, impossible
+from host.aircraft.vane_file import with_vane
 from host.constants import GRAVITY_MPS2
 from host.errors import UsageError
 from host.files import toml_reader
@@ -169,7 +170,7 @@ def read_document(source: str | Path) -> dict[str, object]:
     if is_dimensions(document):
         document = from_dimensions(document, source, AircraftError)
     toml_reader.check_format(document, Path(source).name, AircraftError)
-    return document
+    return with_vane(document, Path(source).parent, Path(source).name, AircraftError)
 
 
 def load(source: str | Path) -> Aircraft:
