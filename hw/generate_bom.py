@@ -91,11 +91,21 @@ def pieces(ref: str) -> int:
 def wire_m(harness_text: str) -> float:
     """Return the metres of wire: every pin of a cable, supply and ground with it."""
     total = 0.0
-    for device in tomllib.loads(harness_text)["device"]:
+    harness = tomllib.loads(harness_text)
+    for link in harness["link"]:
+        if "length_mm" in link and link["from"] != "Shield J22":  # that is J22's own cable
+            total += len(link["pins"]) * link["length_mm"] / 1000.0
+    for device in harness["device"]:
         lead = "servo leads" in device["connector"]  # bought ready
         supplies = 2 if device["supply"] != "none" else 1
         total += 0.0 if lead else (len(device["pins"]) + supplies) * device["length_mm"] / 1000.0
     return round(total + 0.5)
+
+
+def supply_wire_m(harness_text: str) -> float:
+    """Return the metres of thick wire: both wires of each lead that has a gauge of its own."""
+    leads = tomllib.loads(harness_text)["lead"]
+    return sum(2.0 * float(lead["length_mm"]) / 1000.0 for lead in leads if "gauge" in lead)
 
 
 def resistor_code(value: str) -> str:
@@ -132,6 +142,8 @@ def lines(parts_toml: str, parts_texts: Mapping[str, str], harness_text: str) ->
         uses = [(value, refs) for (part, value), refs in symbols.items() if part == key]
         if key == "wire":
             row["quantity"] = wire_m(harness_text)
+        if key == "supply_wire":
+            row["quantity"] = supply_wire_m(harness_text)
         if key != "resistor":  # only a resistor's value makes another part number
             uses = [("", [ref for _, refs in uses for ref in refs])]
         if "quantity" not in row and not any(refs for _, refs in uses):

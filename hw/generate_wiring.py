@@ -38,6 +38,8 @@ _SUPPLY_COLOURS = {
     "HV": "RD",
     "+ servo rail": "RD",
     "3V3": "PK",
+    "7 to 15 V": "RD",
+    "4.8 to 6 V": "RD",
 }
 _WIRE_COLOURS = ("BN", "OG", "YE", "GN", "BU", "VT", "GY", "PK", "TQ", "WH")
 
@@ -221,7 +223,41 @@ def cable_table(harness_text: str, nets_text: str) -> str:
                 far = f"{device['board']} board J1" if "board" in device else "its own"
                 cells = (plug, device["name"], far, row["pin"], name, colour, length)
                 lines.append(f"| {' | '.join(map(str, cells))} |")
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_lead_rows(harness_text, rows), *_link_rows(harness_text)]) + "\n"
+
+
+def _lead_rows(harness_text: str, rows: list[dict[str, str]]) -> list[str]:
+    # Servos and supplies, in the same table.
+    found = []
+    for lead in tomllib.loads(harness_text).get("lead", ()):
+        pins = [row for row in rows if row["ref"] == lead["connector"]]
+        if not pins:
+            raise HarnessError(f"lead {lead['connector']} of harness.toml is no plug of the shield")
+        for row in sorted(pins, key=lambda row: int(row["pin"])):
+            name = row["pin name"]
+            gauge = f"its own, {lead['gauge']} AWG" if "gauge" in lead else "its own"
+            colour = _SUPPLY_COLOURS.get(name, "WH")
+            cells = (lead["connector"], lead["to"], gauge, row["pin"], name, colour)
+            found.append(f"| {' | '.join(cells)} | {lead['length_mm'] / 1000:g} |")
+    return found
+
+
+def _link_rows(harness_text: str) -> list[str]:
+    # Wires between boxes that do not touch the shield's plugs: the IMU's tray.
+    found = [
+        "",
+        "## On the IMU's tray",
+        "",
+        "| from | pin | to | pin | colour | length m |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for link in tomllib.loads(harness_text)["link"]:
+        if "length_mm" in link and link["from"] != "Shield J22":
+            for here, there in link["pins"]:
+                colour = _SUPPLY_COLOURS.get(here) or _BUS_COLOURS.get(here) or "BU"
+                cells = (link["from"], here, link["to"], there, colour)
+                found.append(f"| {' | '.join(cells)} | {link['length_mm'] / 1000:g} |")
+    return found
 
 
 def _plugs(connector: str) -> list[str]:

@@ -21,6 +21,8 @@ from export import slim, stale, write
 LAYERS = "F.Cu,B.Cu,F.Mask,B.Mask,F.SilkS,B.SilkS,F.Paste,Edge.Cuts"
 # Dates and the reader's clock: everything else of a Gerber is the board's.
 _DATED = re.compile(r"^.*(?:CreationDate|Created by KiCad|DRILL file|\"CreationDate\").*\n", re.M)
+# What stands on a footprint.
+_MODEL = re.compile(r'\n\t\t\(model "[^"]*"\n.*?\n\t\t\)', re.S)
 _PICTURE_PX = {"logger": 1366, "vane": 640, "pitot": 640}
 
 
@@ -63,12 +65,19 @@ def _assembly(board: Board, scratch: Path, places: Path) -> str:
 
 
 def render(board: Board) -> None:
-    """Write the pictures of both sides, bare: every label is seen."""
-    px = str(_PICTURE_PX[board.name])
-    for side in ("top", "bottom"):
-        picture = str(board.generated / f"{side}.png")
-        size = ("-w", px, "--height", px)
-        board.kicad("pcb", "render", "--side", side, *size, "-o", picture, board.copper)
+    """Write the pictures: both sides bare, where every label is seen; the upper one with parts."""
+    with tempfile.TemporaryDirectory() as scratch:
+        bare = Path(scratch) / board.copper
+        text = (board.folder / board.copper).read_text(encoding="utf-8")
+        bare.write_text(_MODEL.sub("", text), encoding="utf-8")
+        for side in ("top", "bottom"):
+            _picture(board, side, f"{side}.png", str(bare))
+    _picture(board, "top", "assembled.png", board.copper)
+
+
+def _picture(board: Board, side: str, name: str, copper: str) -> None:
+    px, to = str(_PICTURE_PX[board.name]), str(board.generated / name)
+    board.kicad("pcb", "render", "--side", side, "-w", px, "--height", px, "-o", to, copper)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -94,7 +103,7 @@ def main(arguments: list[str] | None = None) -> int:
                 print(f"{board.name}: {name} is not current: run fabricate.py", file=sys.stderr)
                 code = 6
         else:
-            print(f"{board.name}: {len(made)} files and two pictures")
+            print(f"{board.name}: {len(made)} files and three pictures")
     return code
 
 

@@ -18,12 +18,13 @@ with S the fin's area, r from the shaft to its quarter chord, and a its lift slo
 from __future__ import annotations
 
 import csv
-import hashlib
 import math
 import sys
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+
+from sources import hash_of
 
 HERE = Path(__file__).resolve().parent
 # What bodies and drawings are made of.
@@ -36,10 +37,7 @@ SHIPPED = {"frequency_hz_per_mps": 0.8, "damping": 0.35, "friction_rad": 0.0017}
 
 def sources_hash() -> str:
     """Return the hash of the sources of the bodies."""
-    digest = hashlib.sha256()
-    for name in SOURCES:
-        digest.update((HERE / name).read_bytes().replace(b"\r\n", b"\n"))
-    return digest.hexdigest()
+    return hash_of(HERE / name for name in SOURCES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +109,8 @@ def vane_file(fin: Fin) -> str:
     """Return the vane in the words of an aircraft file's [sensors] table."""
     return (
         "# made by hw/mechanics/make_parts.py from the solids; do not edit\n"
-        "# In the words of an aircraft file's [sensors]: copy these lines there to fly this vane.\n"
+        '# An aircraft file flies it by [sensors] vane = "vane.toml", this file beside it.\n'
+        'source = "hw/mechanics: its solids, quasi-steady lift, assumed friction"\n'
         f"vane_frequency_hz_per_mps = {fin.frequency_hz_per_mps:.3f}\n"
         f"vane_damping = {fin.damping:.3f}\n"
         f"vane_friction_rad = {fin.friction_rad():.5f}  # at {REFERENCE_MPS:g} m/s\n"

@@ -18,8 +18,12 @@ from pathlib import Path
 
 import drawing
 import dynamics
+import kicad_text
+import pictures
 import solids
-from build123d import Compound, Rot, export_step, export_stl
+import stack
+from build123d import Color, Compound, Rot, export_step, export_stl
+from sources import SHIELD
 
 HERE = Path(__file__).resolve().parent
 OUT = HERE / "generated"
@@ -68,6 +72,7 @@ def faults(sizes: solids.Sizes, vane: list[solids.Body], every: list[solids.Body
     gap = sizes["magnet"]["air_gap"]
     if not 0.5 <= gap <= 3.0:
         found.append(f"air gap {gap} mm, AS5600 wants 0.5 to 3")
+    found += jig_faults(sizes, vane, every)
     least = sizes["print"]["wall_least"]
     found += [f"{n}: wall {w:.2f} mm, least {least}" for n, w in walls(sizes).items() if w < least]
     for body in every:
@@ -77,6 +82,30 @@ def faults(sizes: solids.Sizes, vane: list[solids.Body], every: list[solids.Body
                 found.append(f"{body.name} is larger than the bed")
             if not body.shape.is_valid or len(body.shape.solids()) != 1:
                 found.append(f"{body.name} is not one sound solid")
+    return found
+
+
+def jig_faults(sizes: solids.Sizes, vane: list[solids.Body], every: list[solids.Body]) -> list[str]:
+    """Name what the protractor jig touches on the vane, and a fork that does not hold the fin."""
+    parts = {body.name: body for body in every}
+    if "protractor jig" not in parts:
+        return []
+    jig, fork = parts["protractor jig"], parts["protractor fork"].shape
+    found = [
+        f"protractor jig and {body.name} share {overlap_mm3(jig, body):.2f} mm3"
+        for body in vane
+        if overlap_mm3(jig, body) > 1e-3
+    ]
+    (fin,) = (body.shape for body in vane if body.name == "fin")
+    for turn in (-40.0, 0.0, 20.0):
+        for off, touches in ((0.0, False), (1.0, True)):
+            shared = (Rot(0, 0, turn + off) * fin) & (Rot(0, 0, turn) * fork)
+            if bool(shared and shared.volume > 1e-3) != touches:
+                word = "lets the fin turn" if touches else "bends the fin"
+                found.append(f"protractor fork at {turn:g} deg {word} by {off:g} deg")
+        shared = (Rot(0, 0, turn) * fork) & jig.shape
+        if shared and shared.volume > 1e-3:
+            found.append(f"protractor fork does not enter its slot at {turn:g} deg")
     return found
 
 
@@ -136,7 +165,8 @@ def sheets(
         "shaft": "shaft",
         "magnet holder": "magnet", "housing": "housing", "boom": "boom", "boom clamp": "clamp",
         "pitot holder": "pitot", "pot arm": "pot", "surface horn": "pot", "box": "box",
-        "protractor jig": "protractor", "throw gauge": "gauge", "IMU tray": "imu_tray",
+        "protractor jig": "protractor", "protractor fork": "protractor",
+        "throw gauge": "gauge", "IMU tray": "imu_tray",
     }  # fmt: skip
     for body in every:
         if body.material == "bought" or body.name == "magnet":
@@ -148,6 +178,24 @@ def sheets(
         note = f"{body.material}, {solids.mass_g(body, sizes):.2f} g, {body.quantity} of it"
         found[body.name.replace(" ", "-")] = drawing.draw(body.shape, body.name, rows, note)
     return found
+
+
+def write_components(folder: Path) -> int:
+    """Write what stands on the boards as STEP, for KiCad's pictures; return how many."""
+    folder.mkdir(parents=True, exist_ok=True)
+    boards = [SHIELD, *sorted((SHIELD.parent / "sensors").glob("*.kicad_pcb"))]
+    outlines = {
+        part.package: part.outline
+        for path in boards
+        for part in kicad_text.placed(path.read_text(encoding="utf-8"))
+        if not part.below  # those are stored as seen from below
+    }
+    table = stack.components()["package"]
+    for package, row in table.items():
+        body = stack.body_of(package, outlines[package], row["height"])
+        body.color = Color(row["colour"])
+        export_step(body, folder / f"{package}.step")
+    return len(table)
 
 
 def write(sizes: solids.Sizes, vane: list[solids.Body], every: list[solids.Body]) -> int:
@@ -172,6 +220,10 @@ def write(sizes: solids.Sizes, vane: list[solids.Body], every: list[solids.Body]
         path.write_text(text, encoding="utf-8", newline="\n")
         if tool:
             subprocess.run([tool, "-f", "pdf", path, "-o", path.with_suffix(".pdf")], check=True)
+    write_components(OUT / "components")
+    pictures.write(sizes, OUT / "pictures")
+    bodies = stack.everything(sizes, SHIELD.read_text(encoding="utf-8"))
+    (OUT / "stack.csv").write_text(stack.report(sizes, bodies), encoding="utf-8", newline="\n")
     text = masses(sizes, vane, every)
     (OUT / "masses.csv").write_text(text, encoding="utf-8", newline="\n")
     fin = dynamics.load((HERE / "vane.toml").read_text(encoding="utf-8"), text)
@@ -187,15 +239,24 @@ def main(arguments: list[str] | None = None) -> int:
     sizes = solids.load_sizes()
     vane = solids.vane(sizes)
     every = vane + solids.mounts(sizes) + solids.jigs(sizes) + solids.cases(sizes)
-    found = faults(sizes, vane, every)
+    bodies = stack.everything(sizes, SHIELD.read_text(encoding="utf-8"))
+    found = faults(sizes, vane, every) + stack.faults(bodies)
     if found:
         print("hw/mechanics: " + "\nhw/mechanics: ".join(found), file=sys.stderr)
         return 5
     if check:
-        path = OUT / "masses.csv"
-        if not path.exists() or path.read_text(encoding="utf-8") != masses(sizes, vane, every):
-            print("hw/mechanics/generated/masses.csv is not current: run build.py", file=sys.stderr)
-            return 6
+        made = {
+            "masses.csv": masses(sizes, vane, every),
+            "stack.csv": stack.report(sizes, bodies),
+        }
+        for name, text in made.items():
+            path = OUT / name
+            if not path.exists() or path.read_text(encoding="utf-8") != text:
+                print(
+                    f"hw/mechanics/generated/{name} is not current: run make_parts.py",
+                    file=sys.stderr,
+                )
+                return 6
         return 0
     count = write(sizes, vane, every)
     grams = Counter()  # type: Counter[str]

@@ -154,7 +154,11 @@ def _standing(sizes: Sizes) -> list[Body]:
     floor = board_top - sensor["thickness"]
     side = sensor["side"]
     board = Pos(0, 0, floor) * Box(side, side, sensor["thickness"], align=_UP)
-    board += Pos(0, 0, board_top) * Box(5.0, 4.0, sensor["chip"], align=_UP)
+    board += Pos(0, 0, board_top) * Box(5.0, 6.0, sensor["chip"], align=_UP)
+    plug_x, wide, long = sensor["plug_x"], sensor["plug_wide"], sensor["plug_long"]
+    high = sensor["plug_high"]
+    board += Pos(plug_x, 0, floor - high) * Box(wide, long, high, align=_UP)
+    board += Pos(plug_x - 0.5, 0, board_top) * Box(1.0, 6.0, sensor["pins"], align=_UP)
     return [
         Body("bearing", rings[0], "bought", 8, mass_g=bearing["mass_g"]),
         Body("second bearing", rings[1], "bought", 0, mass_g=bearing["mass_g"]),
@@ -212,7 +216,10 @@ def _housing(sizes: Sizes, board_top: float, floor: float) -> Part:
 def _lid(sizes: Sizes, floor: float) -> Part:
     housing = sizes["housing"]
     body = Pos(0, 0, floor - 2.4) * Box(housing["side"], housing["side"], 2.4, align=_UP)
-    body -= Pos(8.0, 0, floor - 3) * Box(4.0, 8.0, 4.0, align=_UP)
+    sensor, play = sizes["sensor"], 2 * housing["play"]
+    body -= Pos(sensor["plug_x"], 0, floor - 3) * Box(
+        sensor["plug_wide"] + play, sensor["plug_long"] + play, 4.0, align=_UP
+    )
     for x, y in _corners(sizes):
         body -= Pos(x, y, floor - 3) * Cylinder(1.1, 4.0, align=_UP)
     return body
@@ -259,66 +266,151 @@ def _lever(pot: dict[str, float], *, shaped: bool) -> Part:
 
 
 def jigs(sizes: Sizes) -> list[Body]:
-    """Return protractor jig and throw gauge: teeth at known angles."""
-    jig, gauge, boom = sizes["protractor"], sizes["gauge"], sizes["boom"]
-    radius, thick = jig["radius"], jig["thickness"]
-    plate = Cylinder(radius, thick) - Cylinder(sizes["hub"]["tab_outer"] + 4.0, thick)
-    away = Pos(-radius * 0.2, 0, 0) * Box(
-        2 * radius, 3 * radius, thick, align=(Align.MAX, *_REAR[1:])
-    )
-    plate = plate - away
-    for sign in (-1, 1):
-        edge = Rot(0, 0, sign * (jig["reach_deg"] + 6)) * Pos(0, sign * radius, 0)
-        plate -= edge * Box(4 * radius, 2 * radius, thick)
-    plate -= _slots(radius, jig["reach_deg"], jig["step_deg"], thick)
-    foot = Pos(radius * 0.62, 0, -8.0) * Box(16.0, boom["outer"] + 8.0, 14.0)
-    foot -= Pos(0, 0, -12.0) * Rot(0, 90, 0) * Cylinder(boom["outer"] / 2 + 0.15, 4 * radius)
+    """Return protractor jig with its fork, and throw gauge: teeth at known angles."""
+    gauge = sizes["gauge"]
     hinge, reach = gauge["hinge"], gauge["reach_deg"]
     arc = Cylinder(hinge + gauge["width"], gauge["thickness"]) - Cylinder(hinge, gauge["thickness"])
     arc -= Pos(-3 * hinge + 20.0, 0, 0) * Box(6 * hinge, 6 * hinge, gauge["thickness"])
     for sign in (-1, 1):
         edge = Rot(0, 0, sign * (reach + 5)) * Pos(0, sign * 2 * hinge, 0)
         arc -= edge * Box(8 * hinge, 4 * hinge, gauge["thickness"])
-    arc -= _slots(hinge + 3.0, reach, 10.0, gauge["thickness"])
+    arc -= _slots(hinge + 3.0, reach, 10.0, (6.0, 0.8, gauge["thickness"]))
     return [
-        Body("protractor jig", plate + foot, "petg", 1, group="jig"),
+        Body("protractor jig", _protractor(sizes), "petg", 1, group="jig"),
+        Body("protractor fork", _fork(sizes), "petg", 1, group="jig"),
         Body("throw gauge", arc, "petg", 1, group="jig"),
     ]
 
 
-def _slots(radius: float, reach_deg: float, step_deg: float, thick: float) -> Part:
+def _plate_top(sizes: Sizes) -> float:
+    return -sizes["fin"]["span"] / 2 - sizes["protractor"]["below_fin"]
+
+
+def boom_z(sizes: Sizes) -> float:
+    """Return z of the boom's axis, which lies along x."""
+    sensor = sizes["sensor"]
+    chip_top = magnet_face(sizes) - sizes["magnet"]["air_gap"]
+    floor = chip_top - sensor["chip"] - sensor["thickness"]
+    return floor + sizes["housing"]["socket_outer"] / 2
+
+
+def _protractor(sizes: Sizes) -> Part:
+    # Stands where it is used: on the boom of a vane, below its fin.
+    jig, boom, housing = sizes["protractor"], sizes["boom"], sizes["housing"]
+    radius, thick, top = jig["radius"], jig["thickness"], _plate_top(sizes)
+    middle, axis = top - thick / 2, boom_z(sizes)
+    plate = Cylinder(radius, thick) - Cylinder(sizes["hub"]["tab_outer"] + 4.0, thick)
+    plate -= Pos(-radius * 0.2, 0, 0) * Box(
+        2 * radius, 3 * radius, thick, align=(Align.MAX, *_REAR[1:])
+    )
+    for sign in (-1, 1):
+        edge = Rot(0, 0, sign * (jig["reach_deg"] + 6)) * Pos(0, sign * radius, 0)
+        plate -= edge * Box(4 * radius, 2 * radius, thick)
+    wide = jig["fork_gap"] + 2 * jig["fork_prong"] + 0.1
+    slot = (2 * jig["slot"], wide, thick)
+    plate -= _slots(radius, jig["reach_deg"], jig["step_deg"], slot)
+    # The boom's socket stands higher than the plate.
+    reach = housing["side"] / 2 + housing["socket_length"] + 1.0
+    plate -= Box(2 * reach, housing["socket_outer"] + 0.6, thick)
+    body = Pos(0, 0, middle) * plate
+    low = axis - 3.0
+    foot = Pos(reach + 10.0, 0, low) * Box(
+        18.0, boom["outer"] + 8.0, top - low, align=(Align.CENTER, Align.CENTER, Align.MIN)
+    )
+    clip = Pos(0, 0, axis) * Rot(0, 90, 0) * Cylinder(boom["outer"] / 2 + 0.15, 4 * radius)
+    return body + foot - clip
+
+
+def _fork(sizes: Sizes) -> Part:
+    # In the slot at neutral: its tongue in the plate, a prong on each side of the fin.
+    jig = sizes["protractor"]
+    wide = jig["fork_gap"] + 2 * jig["fork_prong"]
+    inner, top = jig["radius"] - jig["slot"] + 0.2, _plate_top(sizes)
+    tongue = Pos(inner, 0, top - jig["fork_thick"]) * Box(
+        jig["fork_long"], wide, jig["fork_thick"], align=(Align.MIN, Align.CENTER, Align.MIN)
+    )
+    prongs = Pos(inner, 0, top) * Box(
+        jig["slot"], wide, jig["fork_high"], align=(Align.MIN, Align.CENTER, Align.MIN)
+    )
+    return (
+        tongue
+        + prongs
+        - Pos(0, 0, top) * Box(4 * jig["radius"], jig["fork_gap"], jig["fork_high"], align=_UP)
+    )
+
+
+def _slots(
+    radius: float, reach_deg: float, step_deg: float, size: tuple[float, float, float]
+) -> Part:
     count = round(reach_deg // step_deg)
     cuts = Part()
     for k in range(-count, count + 1):
-        cuts += Rot(0, 0, k * step_deg) * Pos(radius, 0, 0) * Box(6.0, 0.8, thick)
+        cuts += Rot(0, 0, k * step_deg) * Pos(radius, 0, 0) * Box(*size)
     return cuts
 
 
 def cases(sizes: Sizes) -> list[Body]:
-    """Return box, its lid, and the IMU's tray."""
-    box, tray = sizes["box"], sizes["imu_tray"]
-    wall, inner, height = box["wall"], box["inner"], box["height"]
-    outer = inner + 2 * wall
-    body = Box(outer, outer, height + wall, align=_UP)
-    body -= Pos(0, 0, wall) * Box(inner, inner, height, align=_UP)
-    count = round(box["glands"])
-    for k in range(count):
-        place = (k - (count - 1) / 2) * 30.0
-        hole = Pos(place, -outer, height * 0.55) * Rot(-90, 0, 0)
-        body -= hole * Cylinder(box["gland"] / 2, outer, align=_UP)
-    body -= Pos(-outer, 10.0, wall + 3.0) * Box(outer, 14.0, 13.0, align=(*_REAR[:2], Align.MIN))
-    lid = Box(outer, outer, wall, align=_UP)
-    lid += Pos(0, 0, -2.0) * (
-        Box(inner - 0.4, inner - 0.4, 2.0, align=_UP) - Box(inner - 4, inner - 4, 2.0, align=_UP)
-    )
+    """Return box, its lid, and the IMU's tray; the box stands around the Mega's corner."""
+    tray = sizes["imu_tray"]
     long, wide, base, rim = tray["length"], tray["width"], tray["base"], tray["rim"]
     plate = Box(long, wide, base + rim, align=_UP)
     plate -= Pos(0, 0, base) * Box(long - 4, wide - 4, rim, align=_UP)
     return [
-        Body("box", body, "petg", 1, group="case"),
-        Body("box lid", lid, "petg", 1, group="case"),
+        Body("box", _box(sizes), "petg", 1, group="case"),
+        Body("box lid", _box_lid(sizes), "petg", 1, group="case"),
         Body("IMU tray", plate, "petg", 1, group="case"),
     ]
+
+
+def mega_holes() -> list[tuple[float, float]]:
+    """Return the four outer holes of the Mega, from its lower left corner."""
+    text = (SIZES_PATH.parent / "components.toml").read_text(encoding="utf-8")
+    holes = tomllib.loads(text)["mega"]["holes"]
+    return [(x, y) for x, y in holes if not 60.0 < x < 70.0]
+
+
+def _box(sizes: Sizes) -> Part:
+    # Inner corner at zero, then moved so that the Mega's corner is.
+    box = sizes["box"]
+    wall, x, y, height = box["wall"], box["inner_x"], box["inner_y"], box["height"]
+    low = (Align.MIN, Align.MIN, Align.MIN)
+    body = Pos(-wall, -wall, -wall) * Box(x + 2 * wall, y + 2 * wall, height + wall, align=low)
+    body -= Box(x, y, height, align=low)
+    count = round(box["glands"])
+    for k in range(count):
+        place = x / 2 + (k - (count - 1) / 2) * 30.0
+        hole = Pos(place, -3 * wall, box["gland_z"]) * Rot(-90, 0, 0)
+        body -= hole * Cylinder(box["gland"] / 2, 6 * wall, align=_UP)
+    body -= Pos(
+        -2 * wall,
+        box["mega_y"] + box["usb_y"],
+        box["boss"] + 1.6 + box["usb_z"],
+    ) * Box(4 * wall, box["usb_wide"], box["usb_high"])
+    slot = Box(box["servo_slot"], 4 * wall, 2 * box["servo_slot_deep"])
+    body -= Pos(x / 2, y, height) * slot
+    for hole_x, hole_y in mega_holes():
+        at = Pos(box["mega_x"] + hole_x, box["mega_y"] + hole_y, 0)
+        body += at * Cylinder(box["boss_diameter"] / 2, box["boss"], align=_UP)
+        body -= at * Cylinder(box["boss_hole"] / 2, box["boss"], align=_UP)
+    return Pos(*_mega_corner(sizes)) * body
+
+
+def _mega_corner(sizes: Sizes) -> tuple[float, float, float]:
+    # z is zero on the upper face of the Mega's board, 1.6 mm thick.
+    box = sizes["box"]
+    return -box["mega_x"], -box["mega_y"], -box["boss"] - 1.6
+
+
+def _box_lid(sizes: Sizes) -> Part:
+    box = sizes["box"]
+    wall, x, y = box["wall"], box["inner_x"], box["inner_y"]
+    lid = Pos(x / 2, y / 2, 0) * Box(x + 2 * wall, y + 2 * wall, wall, align=_UP)
+    rim = Box(x - 0.4, y - 0.4, 2.0, align=_UP) - Box(x - 4, y - 4, 2.0, align=_UP)
+    lid += Pos(x / 2, y / 2, -2.0) * rim
+    lid -= Pos(20.0, 20.0, 0) * Cylinder(box["button"] / 2, wall, align=_UP)
+    lid -= Pos(35.0, 20.0, 0) * Cylinder(box["led"] / 2, wall, align=_UP)
+    left, front, floor = _mega_corner(sizes)
+    return Pos(left, front, floor + box["height"]) * lid
 
 
 def everything(sizes: Sizes) -> list[Body]:

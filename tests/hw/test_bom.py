@@ -62,7 +62,8 @@ def test_four_vane_boards_have_four_times_its_parts() -> None:
 
 def test_drawings_named_are_there() -> None:
     for line in GENERATOR.read():
-        assert not line.drawing or (HW / line.drawing).exists(), line.what
+        assert line.drawing, line.what
+        assert (HW / line.drawing).exists(), line.what
 
 
 @pytest.mark.parametrize(

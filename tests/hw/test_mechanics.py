@@ -17,6 +17,8 @@ MECHANICS = Path(__file__).resolve().parents[2] / "hw" / "mechanics"
 MASSES = (MECHANICS / "generated" / "masses.csv").read_text(encoding="utf-8")
 SIZES = (MECHANICS / "vane.toml").read_text(encoding="utf-8")
 DYNAMICS: ModuleType = load_module("mechanics/dynamics")
+SOURCES: ModuleType = load_module("mechanics/sources")
+STACK = (MECHANICS / "generated" / "stack.csv").read_text(encoding="utf-8")
 FIN = DYNAMICS.load(SIZES, MASSES)
 
 
@@ -79,3 +81,25 @@ def test_every_body_has_its_files() -> None:
             assert (MECHANICS / "generated/drawings" / f"{stem}.svg").exists(), stem
             printed = (MECHANICS / "generated/stl" / f"{stem}.stl").exists()
             assert printed == (row["material"] == "petg"), stem
+
+
+def test_stack_is_that_of_the_committed_board_and_sizes() -> None:
+    assert STACK.splitlines()[0].endswith(SOURCES.hash_of(SOURCES.STACK)), "run make_parts.py"
+
+
+def test_room_is_left_around_mega_and_shield() -> None:
+    left = dict(re.findall(r"^left (.+),(\S+)$", STACK, re.M))
+    assert set(left) >= {"below the lid", "left", "right", "front", "back", "under the Mega"}
+    assert min(map(float, left.values())) >= 1.0
+    page = (MECHANICS.parent / "build.md").read_text(encoding="utf-8")
+    assert f"{float(left['left']):.2f} mm from USB shell to wall" in page
+    assert f"{float(left['below the lid']):.1f} mm below the lid" in page
+
+
+def test_boards_name_solids_that_are_there() -> None:
+    boards = MECHANICS.parent / "board"
+    for path in (boards / "logger.kicad_pcb", *sorted((boards / "sensors").glob("*.kicad_pcb"))):
+        models = re.findall(r'\(model "\$\{KIPRJMOD\}/([^"]+)"', path.read_text(encoding="utf-8"))
+        assert models, path.name
+        assert {m for m in set(models) if not (path.parent / m).exists()} == set(), path.name
+        assert "3DMODEL_DIR" not in path.read_text(encoding="utf-8")

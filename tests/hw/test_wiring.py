@@ -92,3 +92,18 @@ def test_a_wire_has_one_colour_in_table_and_pictures() -> None:
     assert colours == ("BN", "OG")  # GPS: RX first in the harness, then TX
     assert "| J24 | GPS | its own | 4 | RX | BN |" in table
     assert "| J24 | GPS | its own | 3 | TX | OG |" in table
+
+
+def test_every_plug_of_the_shield_has_a_cable() -> None:
+    nets = (HW / "board/generated/nets.csv").read_text(encoding="utf-8")
+    plugs = set(re.findall(r",(J\d+),", nets))
+    table = GENERATOR.cable_table(HARNESS, nets)
+    assert {plug for plug in plugs if f"| {plug} |" not in table} == set()
+    assert "| J11 | BEC or servo battery | its own, 18 AWG | 2 | 4.8 to 6 V | RD | 0.25 |" in table
+    assert "| Pro Mini | D2 | GY-521 | INT | BU | 0.04 |" in table
+
+
+def test_a_lead_to_no_plug_is_refused() -> None:
+    nets = (HW / "board/generated/nets.csv").read_text(encoding="utf-8")
+    with pytest.raises(GENERATOR.HarnessError, match=r"J66 of harness\.toml is no plug"):
+        GENERATOR.cable_table(HARNESS.replace('connector = "J6"', 'connector = "J66"'), nets)

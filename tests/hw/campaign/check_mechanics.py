@@ -13,6 +13,8 @@ sys.path.insert(0, str(MECHANICS))
 
 import make_parts  # noqa: E402
 import solids  # noqa: E402
+import stack  # noqa: E402
+from sources import SHIELD  # noqa: E402
 
 
 def test_bodies_fit_and_committed_masses_are_current() -> None:
@@ -41,3 +43,39 @@ def test_a_limiter_in_the_wrong_place_is_found() -> None:
     vane = solids.vane(sizes)
     sizes["housing"]["limit_deg"] = 50.0
     assert "limiter: at 53 deg the hub passes" in "\n".join(make_parts.faults(sizes, vane, []))
+
+
+@pytest.mark.parametrize(
+    ("group", "name", "value", "complaint"),
+    [
+        ("box", "usb_z", 12.0, "box and USB plug share"),
+        ("box", "mega_y", 27.0, "share"),  # the nuts of the glands stand in the sensor plugs
+        ("box", "height", 40.0, "box lid"),
+        ("box", "boss", 1.0, "Mega's leads and box share"),
+    ],
+)
+def test_a_box_that_does_not_fit_is_found(
+    group: str, name: str, value: float, complaint: str
+) -> None:
+    sizes = solids.load_sizes()
+    sizes[group][name] = value
+    bodies = stack.everything(sizes, SHIELD.read_text(encoding="utf-8"))
+    assert complaint in "\n".join(stack.faults(bodies))
+
+
+def test_a_part_moved_into_another_is_found() -> None:
+    # Relay K1 at K2's place; a plug's wire above the Mega's USB shell.
+    text = SHIELD.read_text(encoding="utf-8")
+    moved = text.replace("(at 77.5 63)", "(at 90.5 63)").replace("(at 77 110.8)", "(at 63 84)")
+    assert moved.count("(at 90.5 63)") == 1
+    said = "\n".join(stack.faults(stack.everything(solids.load_sizes(), moved)))
+    assert "K1 and K2 share" in said or "K2 and K1 share" in said
+    assert "USB shell" in said
+
+
+def test_a_jig_in_the_vanes_way_is_found() -> None:
+    sizes = solids.load_sizes()
+    sizes["protractor"]["below_fin"] = -6.0
+    vane = solids.vane(sizes)
+    said = "\n".join(make_parts.jig_faults(sizes, vane, solids.jigs(sizes)))
+    assert "protractor jig and fin share" in said
