@@ -12,7 +12,7 @@ from host.aircraft.prior.datcom import read_datcom
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorError, PriorTable, about_body_axes
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
-from host.sysid.answer.prior_comparison import prior_lines
+from host.sysid.answer.prior_comparison import prior_document, prior_lines
 
 DEGREE = 180.0 / np.pi
 DATCOM = Path(__file__).with_name("datcom_layout.dat").read_text()
@@ -365,3 +365,29 @@ def test_a_prior_of_other_names_says_so(tmp_path: Path) -> None:
     found = (Coefficient("Cm_q", -9.0, 0.4, 1.0),)
     (line,) = prior_lines([CoefficientTable("all", "by hand", 0.1, found)], prior)
     assert line == ("prior: none of its coefficients (Cmq) is in the answer, which has Cm_q")
+
+
+def test_a_prior_with_half_widths_is_weighed_with_the_flight(tmp_path: Path) -> None:
+    text = "[coefficients]\nCm_q = -10.0\nCL_alpha = 4.0\n[half_width]\nCm_q = 1.0\n"
+    prior = read(tmp_path, "type.toml", text)
+    flown = tuple(
+        Coefficient(n, v, h, h) for n, v, h in (("Cm_q", -12.0, 2.0), ("CL_alpha", 5.0, 0.5))
+    )
+    table = CoefficientTable("longitudinal", "one", 0.1, flown)
+    # Precisions 1/4 and 1: four fifths are the type's. 2 apart is inside sqrt(5), not inside 2.
+    found = prior_document([table], prior)["longitudinal, one"]
+    assert found["Cm_q"]["together"] == pytest.approx(-10.4)
+    assert found["Cm_q"]["together_half_width"] == pytest.approx(np.sqrt(0.8))
+    assert found["Cm_q"]["inside"]
+    assert not found["CL_alpha"]["inside"]
+    assert "together" not in found["CL_alpha"]
+    assert any("-10.4" in line and "inside" in line for line in prior_lines([table], prior))
+
+
+@pytest.mark.parametrize(
+    ("width", "said"),
+    [("Cm_q = 0.0", "half_width.Cm_q"), ("Cm_r = 1.0", "no coefficient of this name")],
+)
+def test_a_wrong_half_width_is_refused(tmp_path: Path, width: str, said: str) -> None:
+    with pytest.raises(PriorError, match=said):
+        read(tmp_path, "type.toml", f"[coefficients]\nCm_q = -10.0\n[half_width]\n{width}\n")

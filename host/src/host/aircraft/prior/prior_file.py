@@ -1,7 +1,8 @@
 """What a handbook or a vortex lattice said before the flight, beside what the flight says.
 
 TOML (`[coefficients]` with names as in the answer, per radian, body axes; with `alpha_deg = [...]`
-each may be a list, a table over the angle of attack), text that AVL writes with ST or SB (`avl`),
+each may be a list, a table over the angle of attack; `[half_width]` their 95 % half-widths, as
+`host fleet` writes them), text that AVL writes with ST or SB (`avl`),
 or Digital Datcom's output (`datcom`). Tables are read between their rows at the flight's angle of
 attack, lateral derivatives turned from stability to body axes there. Signs are the house's: body
 axes x forward, y right, z down; elevator and aileron as in the answer. Coefficients are referred
@@ -23,6 +24,7 @@ from host.files.user_text import parse_toml, read_text, shown
 
 _ALPHA = Quantity("deg", -180.0, 180.0, "half a turn")
 # Roskam, Heffley: Cm_q -40, Cm_alphadot -20; per degree they would be 57 times smaller.
+_HALF_WIDTH = Quantity("", 1e-12, 1000.0, "as of the coefficients, above zero")
 COEFFICIENT = Quantity("", -1000.0, 1000.0, "twenty times the largest of published tables")
 SOUND_MPS = 340.3  # standard atmosphere, sea level: chooses between Mach numbers of a handbook
 
@@ -83,4 +85,18 @@ def _from_toml(document: dict[str, Any]) -> PriorTable:
             (float(np.radians(a)), COEFFICIENT.check(name, v, PriorError))
             for a, v in zip(angles, values, strict=True)
         ]
-    return PriorTable(points, stability_axes=False)
+    return PriorTable(points, stability_axes=False, half_widths=_half_widths(document, points))
+
+
+def _half_widths(document: dict[str, Any], points: Points) -> dict[str, float]:
+    """Return the 95 % half-widths of a file that has some."""
+    table = document.get("half_width", {})
+    if not isinstance(table, dict):
+        raise ValueError(f"half_width is {shown(table)}, expected a table [half_width]")
+    unknown = [name for name in table if name not in points]
+    if unknown:
+        raise ValueError(f"half_width.{unknown[0]}: no coefficient of this name")
+    return {
+        str(name): _HALF_WIDTH.check(f"half_width.{name}", value, PriorError)
+        for name, value in table.items()
+    }

@@ -29,11 +29,15 @@ class PriorTable:
         Whether rolling and yawing moments and rates are about stability axes.
     source : tuple of str
         In words: configuration, flight condition, reference sizes, axes as printed.
+    half_widths : dict
+        95 % half-width of some coefficients, at every angle of attack: what `host fleet` says of a
+        further aircraft. A handbook has none.
     """
 
     points: Points
     stability_axes: bool
     source: tuple[str, ...] = field(default=())
+    half_widths: dict[str, float] = field(default_factory=dict)
 
     @property
     def limits_rad(self) -> tuple[float, float]:

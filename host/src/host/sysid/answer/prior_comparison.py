@@ -1,13 +1,18 @@
-"""What a handbook or a vortex lattice said, beside what the flight says."""
+"""What a handbook, a vortex lattice or the fleet of its type said, beside what the flight says.
+
+A prior with half-widths, as `host fleet` writes it for a further aircraft of a type, is weighed
+with the flight: both are estimates of the same number, each counts by its inverse variance.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from host.aircraft.prior.prior_table import PriorTable, half_turned
-from host.sysid.aerodynamics.coefficient_table import CoefficientTable
+from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 
 
 def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[str]:
@@ -41,14 +46,44 @@ def prior_lines(tables: Sequence[CoefficientTable], prior: PriorTable) -> list[s
                 f"not or not wholly turned, what they turn with is not in the prior:"
                 f" {', '.join(sorted(apart))}"
             )
-        lines.append(f"{'coefficient':12s} {'identified':>12s} {'95 %':>10s} {'prior':>10s}")
-        for c in shared:
-            outside = abs(c.value - expected[c.name]) > c.half_width
-            lines.append(
-                f"{c.name:12s} {c.value:12.4g} {c.half_width:10.2g} {expected[c.name]:10.4g}"
-                f"  {'outside the interval' if outside else 'inside'}"
-            )
+        widths = "".join(f" {name:>10s}" for name in ("95 %", "together", "95 %"))
+        lines.append(
+            f"{'coefficient':12s} {'identified':>12s} {'95 %':>10s} {'prior':>10s}"
+            + (widths if prior.half_widths else "")
+        )
+        lines += [_line(c, expected[c.name], prior) for c in shared]
     return lines
+
+
+def _line(c: Coefficient, expected: float, prior: PriorTable) -> str:
+    half = prior.half_widths.get(c.name)
+    text = f"{c.name:12s} {c.value:12.4g} {c.half_width:10.2g} {expected:10.4g}"
+    if half is not None:
+        value, width = together(c, expected, half)
+        text += f" {half:10.2g} {value:10.4g} {width:10.2g}"
+    elif prior.half_widths:
+        text += 33 * " "
+    inside = _agrees(c, expected, half)
+    return f"{text}  {'inside' if inside else 'outside the interval'}"
+
+
+def _agrees(c: Coefficient, expected: float, half: float | None) -> bool:
+    """Return whether flight and prior may be of one aircraft."""
+    return abs(c.value - expected) <= math.hypot(c.half_width, half or 0.0)
+
+
+def together(c: Coefficient, expected: float, half: float) -> tuple[float, float]:
+    """Return what flight and prior say together, and its 95 % half-width.
+
+    Parameters
+    ----------
+    c : Coefficient
+        Of the flight.
+    expected, half : float
+        Of the prior, which knows nothing of this flight.
+    """
+    share = half**2 / (half**2 + c.half_width**2)  # of the flight
+    return share * c.value + (1.0 - share) * expected, math.sqrt(share) * c.half_width
 
 
 def prior_document(
@@ -63,12 +98,20 @@ def prior_document(
                 "value": c.value,
                 "half_width": c.half_width,
                 "prior": expected[c.name],
-                "inside": abs(c.value - expected[c.name]) <= c.half_width,
+                "inside": _agrees(c, expected[c.name], prior.half_widths.get(c.name)),
+                **_together(c, expected[c.name], prior.half_widths.get(c.name)),
             }
             for c in table.coefficients
             if c.name in expected
         }
     return found
+
+
+def _together(c: Coefficient, expected: float, half: float | None) -> dict[str, float]:
+    if half is None:
+        return {}
+    value, width = together(c, expected, half)
+    return {"prior_half_width": half, "together": value, "together_half_width": width}
 
 
 def _place(table: PriorTable, alpha_deg: float) -> str:
