@@ -10,7 +10,7 @@ from host.fleet.flight_task import IDENTIFIED, SET_ASIDE, TaskLimits
 from host.fleet.tasks.guarded_child import GuardedChild
 
 STUB = "tests.host.fleet.stub_work:stub_row"
-LIMITS = TaskLimits(processor_s=2.0, memory_mb=400.0, waiting_s=100.0)
+LIMITS = TaskLimits(processor_s=0.5, memory_mb=400.0, waiting_s=100.0)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def test_a_child_works_on_one_flight_after_another(child: GuardedChild) -> None:
     [
         ("damaged", "no intact block, expected a log"),
         ("eats", "more than 400 MB of memory"),
-        ("works", "more than 2 s of processor time"),
+        ("works", "more than 0.5 s of processor time"),
         ("hangs", "hangs: no answer after 1 s"),
         ("ends", "the process of this flight ended (7), 2 times"),
     ],

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 IDENTIFY = "host.fleet.tasks.flight_identification:flight_row"
+ROWS = 2  # raised where a row says something else than before: such flights are done again
 IDENTIFIED, SET_ASIDE = "identified", "set aside"
 
 
@@ -35,7 +36,7 @@ class FlightTask:
     date : str
         ``2026-11-23``, or empty where the log shall say it.
     version : str
-        Of this package.
+        Of this package and of its rows.
     """
 
     key: str

@@ -29,6 +29,9 @@ SCHEMA = pa.schema(
         ("errors", _TEXTS),
         ("error_sources", _TEXTS),
         ("loadings", _NUMBERS),  # error by error: shift of every estimate by one deviation of it
+        ("watched", _TEXTS),  # what no derivative shows, with values and standard deviations
+        ("watched_values", _NUMBERS),
+        ("watched_deviations", _NUMBERS),
         ("doubted", _TEXTS),  # by findings about the data
         ("verdict", _TEXTS),
         ("findings", pa.string()),

@@ -38,6 +38,11 @@ def type_flights(rows: pd.DataFrame) -> list[LoadedFlight]:
     return [_flight(row, at) for row in found]
 
 
+def _watched(row: dict[Any, Any]) -> dict[str, tuple[float, float]]:
+    columns = (row[name] for name in ("watched", "watched_values", "watched_deviations"))
+    return {str(n): (float(v), float(sd)) for n, v, sd in zip(*columns, strict=True)}
+
+
 def _flight(row: dict[Any, Any], at: Place) -> LoadedFlight:
     names = tuple(row["parameters"])
     errors, count = list(row["errors"]), len(names)
@@ -52,6 +57,7 @@ def _flight(row: dict[Any, Any], at: Place) -> LoadedFlight:
         date=str(row["date"] or ""),
         label=str(row["source"]),
         conditions={name: float(row[name]) for name in CONDITIONS},
+        watched=_watched(row),
     )
     x, y, z = (a - float(b) for a, b in zip(at, row["cg_m"], strict=True))
     return about_cg(flight, (x, y, z))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from host.arrays import Array
-from host.fleet.statistics.change_causes import cause_patterns
+from host.fleet.statistics.change_causes import RARE, cause_patterns, size_text
 from host.fleet.statistics.changes import BASELINE, Alarm, ChangeTest
 from host.fleet.statistics.loaded_flight import LoadedFlight
 from host.fleet.statistics.type_model import TypeModel
+from host.fleet.statistics.watched_quantities import flight_spread, with_watched
+
+_MOST_MOVED = 3  # of the quantities that a line names
 
 
 @dataclass(frozen=True)
@@ -40,57 +43,54 @@ class AircraftHistory:
 
 def histories(model: TypeModel) -> list[AircraftHistory]:
     """Return every aircraft of a type, each held against its own first flights."""
+    flown = {a: _flown(model, a) for a in model.aircraft}
+    first = [f for flights in flown.values() for f in flights[:BASELINE]]
+    known = [*model.effects, *dict.fromkeys(n for f in first for n in f.watched)]
+    spread = {n: flight_spread(first, n) for n in known}
     found = []
-    for aircraft in model.aircraft:
-        own = sorted(
-            (f for f in model.flights if f.aircraft == aircraft), key=lambda f: (f.date, f.label)
-        )
-        names = _told_by_all(own, list(model.effects))
+    for aircraft, own in flown.items():
+        names = _told_by_all(own, known)
         flights = [f for f in own if all(f.tells(n) for n in names)]
-        alarms = _alarms(model, flights, names) if names and len(flights) > BASELINE else []
+        alarms = _alarms(flights, names, spread) if names and len(flights) > BASELINE else []
         found.append(AircraftHistory(aircraft, tuple(flights), names, tuple(alarms)))
     return found
 
 
+def _flown(model: TypeModel, aircraft: str) -> list[LoadedFlight]:
+    """Return an aircraft's flights by date, each with what is watched."""
+    own = (with_watched(f) for f in model.flights if f.aircraft == aircraft)
+    return sorted(own, key=lambda f: (f.date, f.label))
+
+
 def _told_by_all(flights: Sequence[LoadedFlight], names: Sequence[str]) -> tuple[str, ...]:
-    """Return the derivatives that nine of ten flights tell."""
+    """Return the quantities that nine of ten flights tell."""
     return tuple(n for n in names if sum(f.tells(n) for f in flights) >= 0.9 * len(flights))
 
 
 def _alarms(
-    model: TypeModel, flights: Sequence[LoadedFlight], names: tuple[str, ...]
+    flights: Sequence[LoadedFlight], names: tuple[str, ...], spread: Mapping[str, float]
 ) -> list[Alarm]:
-    at = flights[0].conditions
-    usual = {n: model.effects[n].mean.value for n in names}
-    patterns = cause_patterns(names, usual, at["chord_m"] / at["span_m"])
-    spread = np.nan_to_num(np.array([model.effects[n].within.value for n in names]))
+    at, each = flights[0].conditions, [_part(f, names) for f in flights]
+    usual = np.mean([v for v, _ in each[:BASELINE]], axis=0)
+    patterns = cause_patterns(
+        names, dict(zip(names, usual.tolist(), strict=True)), at["chord_m"] / at["span_m"]
+    )
     if not patterns:
         return []
-    each = [_part(f, names) for f in flights]
-    test = ChangeTest(patterns, spread)
+    test = ChangeTest(patterns, np.array([spread[n] for n in names]), RARE)
     return test.alarms([v for v, _ in each], [c for _, c in each])
 
 
 def _part(flight: LoadedFlight, names: tuple[str, ...]) -> tuple[Array, Array]:
     at = [flight.names.index(n) for n in names]
     own = flight.own[np.ix_(at, at)]
-    least = 1e-9 * float(np.max(np.diag(own)))
-    return flight.values[at], own + least * np.eye(len(at))
+    # Quantities are of different units: each by its own variance.
+    return flight.values[at], own + 1e-9 * np.diag(np.maximum(np.diag(own), 1e-12))
 
 
 def change_lines(found: Sequence[AircraftHistory]) -> list[str]:
     """Return a line for each aircraft that has changed, and one for what could not be judged."""
-    lines = []
-    for one in found:
-        if one.alarms:
-            first, last = one.alarms[0], one.alarms[-1]
-            flight = one.flights[first.since]
-            others = f", or {' or '.join(last.others)}" if last.others else ""
-            lines.append(
-                f"changed: {one.aircraft} from flight {first.since + 1}"
-                f" ({flight.date or 'undated'}) on: {last.cause}{others}, {100 * last.size:+.1f} %"
-                f" ({last.strength:.1f} standard deviations)"
-            )
+    lines = [_changed(one) for one in found if one.alarms]
     young = [one.aircraft for one in found if not one.judged]
     if young:
         lines.append(
@@ -98,3 +98,15 @@ def change_lines(found: Sequence[AircraftHistory]) -> list[str]:
             f" {', '.join(young)}"
         )
     return lines or ["no aircraft has changed"]
+
+
+def _changed(one: AircraftHistory) -> str:
+    first, last = one.alarms[0], one.alarms[-1]
+    flight = one.flights[first.since]
+    others = f", or {' or '.join(last.others)}" if last.others else ""
+    moved = ", ".join(one.names[k] for k in last.moved[:_MOST_MOVED])
+    return (
+        f"changed: {one.aircraft} from flight {first.since + 1} ({flight.date or 'undated'}) on:"
+        f" {last.cause}{others}, {size_text(last.cause, last.size)}"
+        f" ({last.strength:.1f} standard deviations" + (f"; moved: {moved})" if moved else ")")
+    )

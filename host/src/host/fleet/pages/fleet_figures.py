@@ -94,10 +94,13 @@ def drift_figure(model: TypeModel, one: AircraftHistory) -> Figure | None:
 
 
 def _shown(model: TypeModel, one: AircraftHistory) -> list[str]:
-    """Return the derivatives that flights tell best, and those are where a change is seen."""
+    """Return what moved, and the derivatives that flights tell best: there a change is seen."""
     share = {
-        n: model.effects[n].mean_deviation / max(abs(model.effects[n].mean.value), 1e-300)
-        for n in one.names
+        n: e.mean_deviation / max(abs(e.mean.value), 1e-300)
+        for n, e in model.effects.items()
+        if n in one.names
     }
-    best = sorted(share, key=share.__getitem__)[:_MOST_DRIFTS]
-    return [n for n in one.names if n in best]
+    moved = [one.names[k] for k in one.alarms[-1].moved] if one.alarms else []
+    best = [*moved, *sorted(share, key=share.__getitem__)]
+    chosen = set(list(dict.fromkeys(best))[:_MOST_DRIFTS])
+    return [n for n in one.names if n in chosen]

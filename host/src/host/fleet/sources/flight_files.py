@@ -32,6 +32,9 @@ def opened(address: str) -> AbstractContextManager[Any]:
     """
     import fsspec
 
+    from host.fleet.sources.object_store import provide_s3
+
+    provide_s3()
     try:
         found: AbstractContextManager[Any] = fsspec.open(address, "rb")
     except ImportError as error:
@@ -72,6 +75,9 @@ def _on_disk(source: str) -> list[str]:
 def _at_address(source: str) -> list[str]:
     import fsspec
 
+    from host.fleet.sources.object_store import provide_s3
+
+    provide_s3()
     try:
         system, path = fsspec.core.url_to_fs(source)
     except ImportError as error:

@@ -11,7 +11,7 @@ from pathlib import Path
 from host import __version__
 from host.aircraft.file import load_measured, read_document
 from host.fleet.fleet_error import FleetError
-from host.fleet.flight_task import FlightTask
+from host.fleet.flight_task import ROWS, FlightTask
 from host.fleet.sources.fleet_table import TableRow, row_of
 from host.fleet.sources.flight_files import flight_files, is_address, log_id
 from host.physical.calibration import load_calibration
@@ -50,6 +50,7 @@ class FleetSources:
         FleetError
             If a source has none, or no aircraft file is known of a flight.
         """
+        _check_models(self.models)
         given = list(self.sources) or [row.source for row in self.table if row.source]
         if not given:
             raise FleetError("no sources; name files, folders, patterns or a --table")
@@ -82,7 +83,7 @@ class FleetSources:
             "aircraft_id": _once(self._files, f"aircraft {file}", lambda: _aircraft_id(file)),
             "calibration_id": self._calibration_id(row.calibration),
             "date": row.date,
-            "version": __version__,
+            "version": f"{__version__}, rows {ROWS}",
         }
         map_id = _file_id(row.map) if row.map and Path(row.map).is_file() else row.map
         settings = [list(self.models), list(self.accept), map_id]
@@ -96,6 +97,20 @@ class FleetSources:
             models=self.models,
             accept=self.accept,
             **known,
+        )
+
+
+def _check_models(names: Sequence[str]) -> None:
+    """Refuse models whose parameters are not the same from flight to flight."""
+    from host.sysid.pipeline.requested_models import requested_models
+
+    asked = requested_models(names)
+    if asked.linear or asked.coefficients is None:
+        name = asked.linear[0][0] if asked.linear else "none"
+        raise FleetError(
+            f"--model {name} is linear: its A and B are those of one flight's airspeed, air and"
+            " loading, so that a spread between flights would be that of the weather; give"
+            " 'coefficients', or a model of that kind"
         )
 
 

@@ -1,31 +1,39 @@
 """What a change of the aircraft does to its derivatives: one pattern for each likely cause.
 
-Sizes are shares (of a throw, a mass, a vane's slope) and, of the CG, shares of the chord, aft
-positive.
+Sizes are shares (of a throw, a mass, a vane's or a pot's slope), of the CG shares of the chord, aft
+positive, of a vane's zero rad, of a servo's lag s.
+
+A throw moves all derivatives of its surface where commands stand for positions. Where a pot
+measures the surface no derivative moves, only the slope of command to position; a pot whose own
+slope has changed moves both, against each other.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from host.arrays import Array
+from host.fleet.statistics.watched_quantities import LAG_S, SLOPE, SURFACES, ZEROS
 
 CG, MASS = "place of the CG", "mass"
-THROWS = {"de": "throw of the elevator", "da": "throw of the ailerons", "dr": "throw of the rudder"}
 VANES = {"alpha": "slope of the alpha vane", "beta": "slope of the beta vane"}
+THROW, POT, LAG, VANE_ZERO = "throw of the", "pot of the", "lag of the", "zero of the"
+_WHOSE = {"elevator": "elevator", "aileron": "ailerons", "rudder": "rudder", "servo": "servos"}
+RARE = frozenset(f"{POT} {whose}" for whose in _WHOSE.values())  # a linkage slips more often
 
 
 def cause_patterns(
     names: Sequence[str], usual: Mapping[str, float], chord_over_span: float
 ) -> dict[str, Array]:
-    """Return by how much a change of size 1 moves each derivative, (P,), by cause.
+    """Return by how much a change of size 1 moves each quantity, (P,), by cause.
 
     Parameters
     ----------
     names : sequence of str
-        Derivatives.
+        Derivatives and watched quantities (`watched_quantities`).
     usual : mapping
         Their values before the change.
     chord_over_span : float
@@ -34,14 +42,41 @@ def cause_patterns(
     found: dict[str, dict[str, float]] = {CG: _aft_cg(value, chord_over_span)}
     # All forces and moments are mass and inertia times what was measured.
     found[MASS] = {n: -v for n, v in value.items() if n.startswith(("CL", "CD", "CY"))}
-    for label, cause in (THROWS | VANES).items():
-        sign = 1.0 if label in THROWS else -1.0
-        found[cause] = {n: sign * v for n, v in value.items() if n.endswith(f"_{label}")}
+    for label, cause in VANES.items():
+        found[cause] = _of_input(value, label, -1.0)
+    for surface, label in SURFACES.items():
+        found |= _surface(value, surface, label)
+    for name, vane in ZEROS.items():
+        found[f"{VANE_ZERO} {vane} vane"] = {name: 1.0}
+    for whose in _WHOSE:
+        found[f"{LAG} {_WHOSE[whose]}"] = {f"{whose}{LAG_S}": 1.0}
     return {
         cause: np.array([moved.get(n, 0.0) for n in names])
         for cause, moved in found.items()
-        if any(moved.values())
+        if any(moved.get(n, 0.0) for n in names)
     }
+
+
+def size_text(cause: str, size: float) -> str:
+    """Return the size of a change in the unit that people use for it."""
+    if cause.startswith(VANE_ZERO):
+        return f"{math.degrees(size):+.2f} deg"
+    if cause.startswith(LAG):
+        return f"{1e3 * size:+.1f} ms"
+    return f"{100.0 * size:+.1f} %" + (" of the chord" if cause == CG else "")
+
+
+def _of_input(value: Mapping[str, float], label: str, sign: float) -> dict[str, float]:
+    return {n: sign * v for n, v in value.items() if n.endswith(f"_{label}")}
+
+
+def _surface(value: Mapping[str, float], surface: str, label: str) -> dict[str, dict[str, float]]:
+    """Return what a changed throw does, and a changed pot where there is one."""
+    slope, whose = f"{surface}{SLOPE}", _WHOSE[surface]
+    if slope not in value:
+        return {f"{THROW} {whose}": _of_input(value, label, 1.0)}
+    moved = {slope: value[slope]}
+    return {f"{THROW} {whose}": moved, f"{POT} {whose}": moved | _of_input(value, label, -1.0)}
 
 
 def _aft_cg(value: Mapping[str, float], chord_over_span: float) -> dict[str, float]:

@@ -18,9 +18,10 @@ from host.arrays import Array
 
 BASELINE = 8  # flights that say what the aircraft is
 WINDOW = 4  # flights over which a change is looked for
-# Of 6000 flights of unchanged aircraft 0.32 in a hundred began an alarm (`studies.fleet_changes`).
-THRESHOLD = 3.6
+# Of a hundred flights of unchanged aircraft 0.4 begin an alarm (`studies.fleet_changes`).
+THRESHOLD = 3.75
 _NEAR = 4.0  # of the square: a cause as near to the best is not ruled out
+_MOVED = 2.0  # standard deviations
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,8 @@ class Alarm:
         Size over its standard deviation.
     others : tuple of str
         Causes that explain it nearly as well.
+    moved : tuple of int
+        Places of the quantities that moved by more than two standard deviations, the surest first.
     """
 
     flight: int
@@ -49,6 +52,7 @@ class Alarm:
     size: float
     strength: float
     others: tuple[str, ...] = ()
+    moved: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -61,10 +65,13 @@ class ChangeTest:
         By how much a cause of size 1 moves each derivative.
     spread : Array, shape (P,)
         Standard deviation between flights of an unchanged aircraft, from the whole type.
+    rare : frozenset of str
+        Causes that are named first only where no other explains a change nearly as well.
     """
 
     patterns: Mapping[str, Array]
     spread: Array
+    rare: frozenset[str] = frozenset()
 
     def alarms(
         self, values: Sequence[Array], own: Sequence[Array], threshold: float = THRESHOLD
@@ -78,40 +85,54 @@ class ChangeTest:
         own : sequence of (P, P) Array
             Covariance of each that its other flights do not share.
         """
-        found = []
-        for last in range(BASELINE, len(values)):
-            best = self.strongest(values[: last + 1], own[: last + 1])
-            if best is not None and best.strength > threshold:
-                found.append(best)
-        return found
+        if len(values) <= BASELINE:
+            return []
+        flown = _Flown(np.stack(values), np.linalg.inv(np.stack(own) + np.diag(self.spread**2)))
+        base = flown.mean(0, BASELINE)
+        found = (self._strongest(flown, base, last) for last in range(BASELINE, len(values)))
+        return [alarm for alarm in found if alarm.strength > threshold]
 
-    def strongest(self, values: Sequence[Array], own: Sequence[Array]) -> Alarm | None:
-        """Return the likeliest change that ends with the last flight; None without a baseline."""
-        last = len(values) - 1
-        if last < BASELINE:
-            return None
-        full = [c + np.diag(self.spread**2) for c in own]
-        base, base_covariance = _mean(values[:BASELINE], full[:BASELINE])
+    def _strongest(self, flown: _Flown, base: tuple[Array, Array], last: int) -> Alarm:
+        """Return the likeliest change that ends with a flight."""
         names = list(self.patterns)
         shapes = np.stack([self.patterns[name] for name in names], axis=1)
         best: Alarm | None = None
         for since in range(max(BASELINE, last - WINDOW + 1), last + 1):
-            now, covariance = _mean(values[since:], full[since:])
-            weighed = np.linalg.solve(covariance + base_covariance, shapes)
+            now, covariance = flown.mean(since, last + 1)
+            covariance = covariance + base[1]
+            weighed = np.linalg.solve(covariance, shapes)
             information = np.einsum("pc,pc->c", shapes, weighed)
-            size = (now - base) @ weighed / information
+            size = (now - base[0]) @ weighed / information
             strength = np.abs(size) * np.sqrt(information)
-            k = int(np.argmax(strength))
+            k = self._named(names, strength)
             if best is None or float(strength[k]) > best.strength:
                 near = [names[j] for j in np.argsort(-strength) if j != k and strength[j] ** 2
                         > strength[k] ** 2 - _NEAR]  # fmt: skip
-                best = Alarm(last, since, names[k], float(size[k]), float(strength[k]), tuple(near))
+                off = np.abs(now - base[0]) / np.sqrt(np.diag(covariance))
+                moved = [int(j) for j in np.argsort(-off) if off[j] > _MOVED]
+                best = Alarm(last, since, names[k], float(size[k]), float(strength[k]),
+                             tuple(near), tuple(moved))  # fmt: skip
+        assert best is not None  # the last flight alone at the least
         return best
 
+    def _named(self, names: Sequence[str], strength: Array) -> int:
+        """Return which cause is named first: a rare one only where no other is as near."""
+        order = [int(j) for j in np.argsort(-strength)]
+        near = strength[order[0]] ** 2 - _NEAR
+        usual = (j for j in order if names[j] not in self.rare and strength[j] ** 2 > near)
+        return next(usual, order[0])
 
-def _mean(values: Sequence[Array], covariances: Sequence[Array]) -> tuple[Array, Array]:
-    """Return the weighted mean of some flights and its covariance."""
-    inverses = [np.linalg.inv(c) for c in covariances]
-    covariance = np.linalg.inv(np.sum(inverses, axis=0))
-    total = np.sum([w @ v for w, v in zip(inverses, values, strict=True)], axis=0)
-    return covariance @ total, covariance
+
+@dataclass(frozen=True)
+class _Flown:
+    """Values of flights, (n, P), and the inverse of what each may be wrong by, (n, P, P)."""
+
+    values: Array
+    inverses: Array
+
+    def mean(self, first: int, end: int) -> tuple[Array, Array]:
+        """Return the weighted mean of some flights and its covariance."""
+        inverses = self.inverses[first:end]
+        covariance = np.linalg.inv(inverses.sum(axis=0))
+        total = np.einsum("nij,nj->i", inverses, self.values[first:end])
+        return covariance @ total, covariance

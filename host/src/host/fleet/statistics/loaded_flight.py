@@ -38,6 +38,10 @@ class LoadedFlight:
         Derivatives that a finding about the data speaks against.
     date, label : str
         When it was flown, and what it is called in a picture.
+    conditions : dict
+        Of the flight and its aircraft file.
+    watched : dict of str to (float, float)
+        Value and standard deviation of what no derivative shows (`watched_quantities`).
     """
 
     aircraft: str
@@ -50,6 +54,7 @@ class LoadedFlight:
     date: str = ""
     label: str = ""
     conditions: dict[str, float] = field(default_factory=dict)
+    watched: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def tells(self, name: str) -> bool:
         """Return whether the flight counts for a derivative."""

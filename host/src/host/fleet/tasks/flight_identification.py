@@ -14,18 +14,27 @@ from typing import Any
 import numpy as np
 
 from host.aircraft.file import load_measured
+from host.errors import HostError
 from host.fleet.flight_task import IDENTIFIED, described
 from host.fleet.sources.flight_files import is_address, opened
+from host.fleet.statistics.watched_quantities import LAG_S
 from host.fleet.tasks.estimate_loadings import LoadedEstimates, coefficient_loadings
+from host.fleet.tasks.surface_response import surface_quantities
+from host.fleet.tasks.vane_zeros import vane_zeros
 from host.instrument.error_sources import AIRCRAFT_FILE
 from host.sysid.answer.coefficient_rules import open_finding
+from host.sysid.coefficients.coefficient_fit import CoefficientFit
+from host.sysid.compatibility.sensor_dynamics import SERVO_DELAY
 from host.sysid.flight.data_finding import finding_document, open_channels
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.stages import identify
 
 _GPS_EPOCH = datetime(1980, 1, 6, tzinfo=UTC)
+_TOLD = 0.9  # of what was assumed: an estimate nearly as wide says nothing
 _LEAST_WEEK = 1024  # below, a receiver without almanac counts from its own beginning
+
+Watched = dict[str, tuple[float, float]]
 
 
 def flight_row(values: dict[str, Any]) -> dict[str, Any]:
@@ -47,6 +56,7 @@ def flight_row(values: dict[str, Any]) -> dict[str, Any]:
             accept=list(values["accept"]),
         )
         date = values["date"] or _recorded_on(path)
+        surfaces = _surfaces(path, values["calibration"])
     if found.coefficients is None:
         raise IdentificationError("; ".join(found.notes) or "no coefficients")
     instrument = found.flights[0].instrument
@@ -57,6 +67,7 @@ def flight_row(values: dict[str, Any]) -> dict[str, Any]:
     return (
         row
         | _answer_columns(found)
+        | _watched_columns(found, parts, values["aircraft_file"], surfaces)
         | _aircraft_columns(values["aircraft_file"])
         | {
             "state": IDENTIFIED,
@@ -109,6 +120,50 @@ def _aircraft_columns(source: str) -> dict[str, Any]:
     }
 
 
+def _watched_columns(
+    found: Identification, parts: LoadedEstimates, aircraft_file: str, surfaces: Watched
+) -> dict[str, Any]:
+    """Return what no derivative shows (`statistics.watched_quantities`)."""
+    if found.coefficients is None:
+        return {}
+    fit, own = found.coefficients.fit, np.sqrt(np.diag(parts.own))
+    told = {
+        n: (float(v), float(sd)) for n, v, sd in zip(parts.names, parts.values, own, strict=True)
+    }
+    watched = vane_zeros(
+        found.flights[0], told, float(fit.condition.drag), load_measured(aircraft_file)
+    )
+    watched |= surfaces or _commanded_lag(fit)
+    return {
+        "watched": list(watched),
+        "watched_values": [value for value, _ in watched.values()],
+        "watched_deviations": [sd for _, sd in watched.values()],
+    }
+
+
+def _commanded_lag(fit: CoefficientFit) -> Watched:
+    """Return by how much usual servos are late, as the data alone say: less what was assumed."""
+    if SERVO_DELAY not in fit.errors:
+        return {}
+    value, sd = fit.errors[SERVO_DELAY]
+    before = fit.error_deviations.get(SERVO_DELAY, 0.0)
+    if not 0.0 < sd < _TOLD * before:
+        return {}
+    told = 1.0 / sd**2 - 1.0 / before**2
+    return {f"servo{LAG_S}": (float(value / sd**2 / told), float(told**-0.5))}
+
+
+def _surfaces(path: Path, calibration: str) -> Watched:
+    """Return what pots say of surfaces; nothing of logs that are not ours."""
+    from host.log import read_log
+
+    try:
+        table = read_log(path, calibration=Path(calibration) if calibration else None).table()
+    except (HostError, KeyError, OSError):
+        return {}
+    return surface_quantities({name: np.asarray(table[name]) for name in table.columns})
+
+
 @contextmanager
 def _local(source: str) -> Iterator[Path]:
     """Give a path of a source, downloaded where it is an address."""
@@ -125,7 +180,6 @@ def _local(source: str) -> Iterator[Path]:
 
 def _recorded_on(path: Path) -> str:
     """Return the day of a log of ours as its GPS said; empty where nothing says it."""
-    from host.errors import HostError
     from host.log import read_log
 
     try:

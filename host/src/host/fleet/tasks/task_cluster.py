@@ -11,8 +11,9 @@ import itertools
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
@@ -40,6 +41,8 @@ _SETTINGS = {
 }
 _LOCAL = ("127.0.0.1", "localhost", "::1")
 _DASHBOARD = 8787
+_WORKERS_S = 30.0  # until the first worker of a cluster that is starting
+_MOST_TRIED = 50  # files of each kind that a worker is asked to open before it gets flights
 
 Row = dict[str, Any]
 _children: dict[str, GuardedChild] = {}  # of this worker, by their work
@@ -100,8 +103,9 @@ def run_tasks(
     from dask import config
     from distributed import as_completed
 
-    waiting = iter(tasks)
-    with config.set(_SETTINGS), _client(options, tell) as client:
+    listed = list(tasks)
+    waiting = iter(listed)
+    with config.set(_SETTINGS), _client(options, tell, sample_files(listed)) as client:
         ahead = max(_LEAST_AHEAD, _AHEAD * len(client.scheduler_info(n_workers=-1)["workers"]))
 
         def given() -> Iterator[Any]:
@@ -142,10 +146,12 @@ def _lost(options: ClusterOptions, error: Exception) -> str:
 
 
 @contextlib.contextmanager
-def _client(options: ClusterOptions, tell: Callable[[str], None]) -> Iterator[Client]:
+def _client(
+    options: ClusterOptions, tell: Callable[[str], None], files: list[str]
+) -> Iterator[Client]:
     """Give a client of the cluster that was asked for."""
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    with _remote(options, tell) if options.scheduler else _local(options, tell) as client:
+    with _remote(options, tell, files) if options.scheduler else _local(options, tell) as client:
         yield client
 
 
@@ -173,31 +179,56 @@ def _local(options: ClusterOptions, tell: Callable[[str], None]) -> Iterator[Cli
 
 
 @contextlib.contextmanager
-def _remote(options: ClusterOptions, tell: Callable[[str], None]) -> Iterator[Client]:
+def _remote(
+    options: ClusterOptions, tell: Callable[[str], None], files: list[str]
+) -> Iterator[Client]:
     from distributed import Client
 
     address = options.scheduler
-    parts = urlsplit(address)
-    if parts.scheme != "tls" and (parts.hostname or "") not in _LOCAL:
-        tell(
-            f"warning: {address} is not encrypted, and whoever reaches it runs programs there and"
-            " here; use tls:// (distributed.security in Dask's settings)"
-        )
+    for line in address_warnings(address):
+        tell(line)
     try:
         client = Client(address, timeout="10s")
     except (OSError, ValueError, TimeoutError) as error:
         raise FleetError(f"scheduler {address}: not reached: {error}") from None
     with client:
         _same_versions(client, address)
+        check_readable(client.run(unreadable, files))
+        workers = client.scheduler_info(n_workers=-1)["workers"]
+        tell(f"{len(workers)} workers of {address}; dashboard {client.dashboard_link}")
         yield client
+
+
+def address_warnings(address: str) -> list[str]:
+    """Return what is to be said of a scheduler's address before it is used."""
+    parts = urlsplit(address)
+    if parts.scheme == "tls" or (parts.hostname or "") in _LOCAL:
+        return []
+    return [
+        f"warning: {address} is not encrypted, and whoever reaches it runs programs there and"
+        " here; use tls:// (distributed.security in Dask's settings)"
+    ]
 
 
 def _same_versions(client: Client, address: str) -> None:
     """Check that every worker runs what we run."""
-    ours = worker_versions()
-    theirs = client.run(worker_versions)
-    if not theirs:
-        raise FleetError(f"scheduler {address} has no workers; start some with dask worker")
+    try:
+        client.wait_for_workers(1, timeout=_WORKERS_S)
+    except TimeoutError:
+        raise FleetError(
+            f"scheduler {address} has no workers; start some with dask worker"
+        ) from None
+    check_versions(worker_versions(), client.run(worker_versions))
+
+
+def check_versions(ours: dict[str, str], theirs: dict[str, dict[str, str]]) -> None:
+    """Check versions of workers.
+
+    Raises
+    ------
+    FleetError
+        At the first that differs.
+    """
     for worker, found in theirs.items():
         for name, version in ours.items():
             if found.get(name) != version:
@@ -205,6 +236,52 @@ def _same_versions(client: Client, address: str) -> None:
                     f"worker {worker} has {name} {found.get(name)}, expected {version}; install the"
                     " same on every machine"
                 )
+
+
+def check_readable(theirs: dict[str, str]) -> None:
+    """Check that workers read what they are to read.
+
+    Parameters
+    ----------
+    theirs : dict of str to str
+        What `unreadable` returned, by worker.
+
+    Raises
+    ------
+    FleetError
+        Of the first that does not.
+    """
+    for worker, found in theirs.items():
+        if found:
+            raise FleetError(
+                f"worker {worker} cannot read {found}; every machine must see the sources, aircraft"
+                " files and calibrations by the same names"
+            )
+
+
+def sample_files(tasks: Sequence[FlightTask]) -> list[str]:
+    """Return files to try: one log of each folder, and every file beside the logs."""
+    logs = {task.source.rpartition("/")[0]: task.source for task in tasks}
+    beside = {
+        name
+        for task in tasks
+        for name in (task.aircraft_file, task.calibration, task.mapping)
+        if name and Path(name).is_file()
+    }
+    return [*list(logs.values())[:_MOST_TRIED], *sorted(beside)[:_MOST_TRIED]]
+
+
+def unreadable(files: list[str]) -> str:
+    """Return the first file that cannot be read here, and why; empty if all can."""
+    from host.fleet.sources.flight_files import is_address, opened
+
+    for name in files:
+        try:
+            with opened(name) if is_address(name) else Path(name).open("rb") as file:
+                file.read(1)
+        except (OSError, FleetError) as error:
+            return f"{name}: {getattr(error, 'strerror', None) or error}"
+    return ""
 
 
 def worker_versions() -> dict[str, str]:
