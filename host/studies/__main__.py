@@ -47,6 +47,8 @@ THESIS_FLIGHTS = (1, 10)
 WINDOW_SEEDS = (3, 50)
 CARD_SEEDS = (1, 50)
 IMPORTED_FLIGHTS = (1, 6)
+FLEETS = (1, 500)
+CHANGED_AIRCRAFT = (12, 300)
 
 
 def study_a(stem: Path, size: int) -> list[Path]:
@@ -155,6 +157,18 @@ def study_j(stem: Path, size: int) -> list[Path]:
     return thesis_tables.study(stem, (("3-2-1-1",), tuple(SHAPES))[size])
 
 
+def study_k(stem: Path, size: int) -> list[Path]:
+    """Fleets at the level of estimates: intervals, and changes."""
+    from studies import fleet_report as fleets
+
+    truth, changes = fleets.truth_rows(FLEETS[size]), fleets.change_rows(CHANGED_AIRCRAFT[size])
+    other = stem.with_name(f"{stem.name}_changes")
+    return [
+        *write(fleets.truth_table(truth), fleets.truth_figure(truth), stem),
+        *write(fleets.change_table(changes), fleets.change_figure(changes), other),
+    ]
+
+
 STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
     "a_thesis": study_a,
     "b_accuracy": study_b,
@@ -166,6 +180,7 @@ STUDIES: dict[str, Callable[[Path, int], list[Path]]] = {
     "h_windows": study_h,
     "i_imported_logs": study_i,
     "j_thesis_tables": study_j,
+    "k_fleets": study_k,
 }
 
 
