@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench study live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean
+.PHONY: help setup demo test native mega sitl lint format bench study fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # Runs a module of tests/chip in that folder; what it imports lies elsewhere.
@@ -50,6 +50,9 @@ study: setup sitl ## tables and pictures of identification in build/study (SIZE=
 
 flight-bench: setup ## load, stack, pulse errors and losses of the Mega's image on the simulated chip
 	@cd tests/chip && { $(CHIP_PYTHON) -m flight.bench $(BENCH); bad=$$?; $(CHIP_PYTHON) -m imu.bench --minutes 1 && exit $$bad; }
+
+fleet-bench: setup sitl ## flights an hour of `host fleet`, its overhead, 10 000 tasks, what 10^6 flights would cost (ten minutes)
+	@$(PYTHON) tests/bench/fleet_bench.py $(FLEET_BENCH)
 
 live-bench: setup ## redraws, latency, load and memory of `host live` with Chromium (five minutes, on a quiet machine)
 	@$(PYTHON) tests/bench/live_bench.py $(LIVE_BENCH)
