@@ -90,7 +90,7 @@ def reckoning(f: Figures) -> list[str]:
         "",
         *_table(f"measured{'' if f.quiet else ' on a busy machine'}, load {f.load:.1f}", _told(f)),
         "",
-        *_table(f"10^6 flights of {f.minutes:g} min", _many(f)),
+        *_table(f"10^6 flights of {f.minutes:.1f} min", _many(f)),
         "",
         f"breaks first: {_first(f)}",
     ]
@@ -103,7 +103,7 @@ def _table(head: str, rows: dict[str, str]) -> list[str]:
 def _told(f: Figures) -> dict[str, str]:
     slept = f"{f.tasks} tasks that sleep {1e3 * f.sleep_s:.0f} ms, two workers"
     return {
-        "plain loop": f"{f.loop_s:.2f} s a flight of {f.minutes:g} min,"
+        "plain loop": f"{f.loop_s:.2f} s a flight of {f.minutes:.1f} min,"
         f" {f.loop_used_s:.2f} s of processor",
         "one worker": f"{f.one_s:.2f} s a flight, {3600 / f.one_s:.0f} an hour,"
         f" {f.one_used_s:.2f} s of processor",
