@@ -63,7 +63,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory, store: str) -> Twice:
     with pytest.MonkeyPatch.context() as patched:  # the pictures are the same ones
         patched.setattr(fleet_answer, "fleet_page", lambda *given: "")
         again, told = said(words)
-    return Twice(*(json.loads(x) for x in (first, again)), told, folder / "out")
+    return Twice(json.loads(first), json.loads(again), told, folder / "out")
 
 
 def test_a_fleet_of_stored_flights_is_what_was_flown(fleet: Twice) -> None:
@@ -87,12 +87,12 @@ def test_a_second_run_does_nothing_and_says_the_same(fleet: Twice) -> None:
 
 def test_every_flight_has_zeros_of_vanes_and_a_response_of_its_elevator(fleet: Twice) -> None:
     rows = pd.read_parquet(fleet.out / "flights")
-    for row in rows.itertuples():
-        value = dict(zip(row.watched, row.watched_values, strict=True))
+    for row in rows.to_dict("records"):
+        value = dict(zip(row["watched"], row["watched_values"], strict=True))
         # 25 deg by 400 us, 8 Hz: 1.09 mrad/us, 20 ms.
         assert value["elevator_slope"] == pytest.approx(1.09e-3, rel=0.1)
         assert 0.005 < value["elevator_lag_s"] < 0.04
-        deviation = dict(zip(row.watched, row.watched_deviations, strict=True))
+        deviation = dict(zip(row["watched"], row["watched_deviations"], strict=True))
         assert abs(value["alpha_zero_rad"]) < 0.02 + 3.0 * deviation["alpha_zero_rad"]
 
 

@@ -16,7 +16,7 @@ def sticks(seed: int, count: int = 3000) -> tuple[Array, Array]:
     """Return times and a pulse that a hand moves."""
     rng = np.random.default_rng(seed)
     t = 0.01 * np.arange(count)
-    held = np.repeat(rng.uniform(-60.0, 60.0, count // 40 + 1), 40)[:count]
+    held: Array = np.repeat(rng.uniform(-60.0, 60.0, count // 40 + 1), 40)[:count]
     return t, 1500.0 + np.convolve(held, np.ones(10) / 10.0, mode="same")
 
 

@@ -162,8 +162,8 @@ def _local(options: ClusterOptions, tell: Callable[[str], None]) -> Iterator[Cli
     from host.fleet.tasks.guarded_child import ONE_THREAD
 
     os.environ.update(ONE_THREAD)  # before workers are spawned
-    with (
-        LocalCluster(
+    try:
+        started = LocalCluster(
             n_workers=options.workers or os.cpu_count() or 1,
             threads_per_worker=1,
             processes=True,
@@ -171,9 +171,10 @@ def _local(options: ClusterOptions, tell: Callable[[str], None]) -> Iterator[Cli
             dashboard_address=f"{HERE}:{_free(_DASHBOARD)}",
             memory_limit=0,
             silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
+        )
+    except (OSError, RuntimeError) as error:
+        raise FleetError(f"workers on this computer did not start: {error}; try again") from error
+    with started as cluster, Client(cluster) as client:
         tell(f"{len(cluster.workers)} workers on this computer; dashboard {cluster.dashboard_link}")
         yield client
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from host.aircraft.file import Aircraft
 from host.arrays import Array
@@ -41,7 +42,7 @@ def vane_zeros(
     columns = flight.recorded
     if flight.angles is not None or any(name not in columns for name in _NEEDED):
         return {}
-    inside = np.zeros(len(columns["t_s"]), dtype=bool)
+    inside: NDArray[np.bool_] = np.zeros(len(columns["t_s"]), dtype=np.bool_)
     for one in flight.maneuvers:
         first, last = one.fit_window()
         inside |= (columns["t_s"] >= first) & (columns["t_s"] <= last)
