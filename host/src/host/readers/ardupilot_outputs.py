@@ -86,7 +86,7 @@ def _demand(
         parameters.get(f"SERVO{number}_{key}", DEFAULTS[key])
         for key in ("MIN", "MAX", "TRIM", "REVERSED")
     )
-    width = np.where(pulse > 0.0, pulse, np.nan).astype(np.float64)
+    width = np.where(pulse > 0.0, pulse, np.nan)
     ends = int(np.sum((width <= low) | (width >= high)))
     if high <= low:
         return np.full(len(width), np.nan), 0

@@ -13,7 +13,7 @@ import numpy as np
 from host.arrays import Array
 from host.constants import GRAVITY_MPS2
 from host.physical.airdata import KELVIN, density_kgpm3
-from host.readers.ardupilot_outputs import surfaces
+from host.readers.ardupilot_outputs import moves_a_surface, surfaces
 from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.named_channels import STANDARD_DENSITY_KGPM3, Channels, instance_of, numbers
 
@@ -43,7 +43,11 @@ def mavlink_channels(log: AutopilotLog, chosen: Mapping[str, int]) -> Channels:
 
 
 def _field(messages: Messages, name: str, gain: float = 1.0) -> Array:
-    return numbers(messages.fields[name]) * gain
+    values = messages.fields[name]
+    if values.dtype == np.float32 or values.dtype.itemsize <= np.dtype(np.int16).itemsize:
+        # Single precision holds what the message has: of a gigabyte twice is too much.
+        return np.asarray(np.multiply(values, np.float32(gain), dtype=np.float32))
+    return numbers(values) * gain
 
 
 def _inertial(log: AutopilotLog, found: Channels) -> None:
@@ -90,7 +94,7 @@ def _outputs(log: AutopilotLog, found: Channels) -> None:
     pulses = {
         k: _field(out, f"servo{k}_raw")
         for k in range(1, MOST_SERVOS + 1)
-        if f"servo{k}_raw" in out.fields
+        if f"servo{k}_raw" in out.fields and moves_a_surface(k, log.parameters)
     }
     made = surfaces(pulses, log.parameters)
     found.output_period_s = 1.0 / max(log.parameters.get("SERVO_RATE", 50.0), 1.0)

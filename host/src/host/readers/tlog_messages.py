@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from host.arrays import Array
+from host.arrays import Array, BoolArray
 from host.progress import progress_bar
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
 from host.readers.mavlink_frames import Frames, frames_of
@@ -27,6 +27,7 @@ WRAP_US = float(1 << 32)
 OTHER_CLOCK_S = 1e9  # a time since boot is shorter than thirty years
 PORTION_BYTES = 8 << 20  # read at a time
 STAMP = "received_s"  # of the ground station, beside a message's own fields
+BOTH_CLOCKS = "ATTITUDE"  # says when the autopilot started, by the ground station's clock
 Fields = dict[str, NDArray[Any]]
 
 
@@ -35,6 +36,7 @@ class _Received:
     """What came: parts of each kind of message of each system, and what was lost of each sender."""
 
     parts: dict[tuple[int, str], list[Fields]] = field(default_factory=dict)
+    started_s: dict[int, list[Array]] = field(default_factory=dict)
     last_number: dict[int, int] = field(default_factory=dict)
     lost: dict[int, int] = field(default_factory=dict)
     many: dict[int, int] = field(default_factory=dict)
@@ -45,7 +47,7 @@ class _Received:
         """Return how many wanted messages each system sent."""
         found: dict[int, int] = {}
         for (system, _), parts in self.parts.items():
-            found[system] = found.get(system, 0) + sum(len(p[STAMP]) for p in parts)
+            found[system] = found.get(system, 0) + sum(len(next(iter(p.values()))) for p in parts)
         return found
 
     def take(self, system: int, name: str) -> Fields | None:
@@ -53,7 +55,16 @@ class _Received:
         parts = self.parts.pop((system, name), None)
         if parts is None:
             return None
-        return {key: np.concatenate([part.pop(key) for part in parts]) for key in list(parts[0])}
+        found = {}
+        sizes = [len(next(iter(part.values()))) for part in parts]
+        for key in dict.fromkeys(key for part in parts for key in part):
+            if key == STAMP and not all(key in part for part in parts):
+                continue
+            kind = next(part[key].dtype for part in parts if key in part)
+            found[key] = np.concatenate(
+                [part.pop(key, np.zeros(n, kind)) for part, n in zip(parts, sizes, strict=True)]
+            )
+        return found
 
 
 def read_tlog(path: Path) -> AutopilotLog:
@@ -137,6 +148,10 @@ def _add(found: _Received, data: bytes, frames: Frames, known: Mapping[int, Layo
         for system in np.unique(systems[of_kind]).tolist():
             rows = np.flatnonzero(of_kind & (systems == system))
             part = _fields(view, frames, rows, layout)
+            if layout.name == BOTH_CLOCKS:
+                started = part.pop(STAMP) - part["time_boot_ms"] * 1e-3
+                begins = found.started_s.setdefault(system, [started[:1]])
+                begins.append((started - begins[0]).astype(np.float32))  # jitter of the radio
             found.parts.setdefault((system, layout.name), []).append(part)
 
 
@@ -149,7 +164,13 @@ def _fields(
     sent = places < frames.body_bytes[rows, None]  # MAVLink 2 leaves zeros at the end out
     body = np.where(sent, view[np.minimum(at, len(view) - 1)], np.uint8(0))
     table = np.ascontiguousarray(body).view(layout.payload)[:, 0]
-    part = {name: table[name].copy() for name in layout.fields}
+    # Outputs without a pulse are most of them; who has a clock of its own needs no other.
+    part = {name: table[name].copy() for name in layout.fields
+            if not name.startswith("servo") or table[name].any()}  # fmt: skip
+    if "time_usec" in part and np.median(part["time_usec"]) * 1e-6 < OTHER_CLOCK_S:
+        return part
+    if "time_boot_ms" in part and layout.name != BOTH_CLOCKS:
+        return part
     stamps = np.ascontiguousarray(view[frames.starts[rows, None] + np.arange(8)]).view(">u8")
     part[STAMP] = stamps[:, 0].astype(np.float64) * 1e-6
     return part
@@ -196,41 +217,48 @@ def _messages(
         t_s = _times(name, fields, boot_s)
         ports = fields.pop("port", None)
         for port in (0,) if ports is None else np.unique(ports).tolist():
-            mine = np.arange(len(t_s)) if ports is None else np.flatnonzero(ports == port)
-            kept, wrong = plausible(t_s[mine])
+            mine = slice(None) if ports is None or len(np.unique(ports)) == 1 else ports == port
+            own_s = t_s[mine]
+            kept, wrong = plausible(own_s)
             if wrong:
                 damage.append(f"{wrong} messages {name} have an impossible time and were left out")
-            rows = mine[kept]
-            if len(rows):
-                rows = rows[np.concatenate([[True], np.diff(t_s[rows]) > 0.0])]
-                own = {k: v[rows] for k, v in fields.items()}
-                if ports is not None:  # outputs without a pulse are half of them
-                    own = {k: v for k, v in own.items() if v.any()}
-                found.setdefault(name, {})[int(port)] = Messages(t_s[rows], own)
+            rows = _later(own_s, kept)
+            if rows is None:
+                continue
+            own = {k: v[mine][rows] for k, v in fields.items()}
+            if ports is not None:  # outputs without a pulse are half of them
+                own = {k: v for k, v in own.items() if v.any()}
+            found.setdefault(name, {})[int(port)] = Messages(own_s[rows], own)
     return found
+
+
+def _later(t_s: Array, kept: BoolArray) -> Any:
+    """Return the rows kept and later than the one before: all as a slice, a view; None if none."""
+    if kept.all() and (np.diff(t_s) > 0.0).all():
+        return slice(None) if len(t_s) else None
+    rows = np.flatnonzero(kept)
+    if not len(rows):
+        return None
+    return rows[np.concatenate([[True], np.diff(t_s[rows]) > 0.0])]
 
 
 def _boot_s(received: _Received, system: int) -> float:
     """Return the ground station's time at which the autopilot started."""
-    parts = received.parts.get((system, "ATTITUDE"), [])
-    boots = [part[STAMP] - part["time_boot_ms"] * 1e-3 for part in parts]
-    if boots:
-        return float(np.median(np.concatenate(boots)))
+    if started := received.started_s.pop(system, None):
+        return float(started[0][0] + np.median(np.concatenate(started[1:])))
     every = [part[STAMP] for (one, _), some in received.parts.items() if one == system
-             for part in some]  # fmt: skip
+             for part in some if STAMP in part]  # fmt: skip
     return float(min(stamps.min() for stamps in every)) if every else 0.0
 
 
 def _times(name: str, fields: Fields, boot_s: float) -> Array:
     """Return times since boot: a message's own where it has one."""
-    stamps: Array = fields.pop(STAMP) - boot_s
     if "time_boot_ms" in fields:
         return np.asarray(fields.pop("time_boot_ms") * 1e-3, dtype=np.float64)
-    raw = fields.pop("time_usec", None)
-    if raw is not None:
-        raw_us = raw.astype(np.float64)
-        if name == "SERVO_OUTPUT_RAW":  # 32 bits
-            raw_us = np.unwrap(raw_us, period=WRAP_US)
-        if np.median(raw_us) * 1e-6 < OTHER_CLOCK_S:
-            return np.asarray(raw_us * 1e-6)
-    return stamps
+    raw_us, stamps = fields.pop("time_usec", None), fields.pop(STAMP, None)
+    if stamps is not None:
+        return np.asarray(stamps - boot_s)
+    own_us = np.asarray(raw_us, dtype=np.float64)
+    if name == "SERVO_OUTPUT_RAW":  # 32 bits
+        own_us = np.unwrap(own_us, period=WRAP_US)
+    return own_us * 1e-6
