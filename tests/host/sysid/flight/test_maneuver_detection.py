@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.flight.maneuver_selection import joined_windows
+from host.sysid.flight.sustained_inputs import running_maximum
 from numpy.typing import NDArray
+from scipy import ndimage
 
 Vector = NDArray[np.float64]
 STEPS = ((3.0, 1.0), (2.0, -1.0), (1.0, 1.0), (1.0, -1.0))
@@ -122,3 +124,11 @@ def test_windows_that_touch_stay_apart_where_one_can_be_held_out() -> None:
     assert len(joined_windows([found_in(t, two)])[0]) == 1
     three = two + steps(t, 50.0, 0.3)
     assert len(joined_windows([found_in(t, three)])[0]) == 3
+
+
+@pytest.mark.parametrize("samples", [1, 6, 7, 1000])
+@pytest.mark.parametrize("half", [1, 3, 100])
+def test_the_running_maximum_is_that_of_scipy(samples: int, half: int) -> None:
+    series = np.random.default_rng(samples).standard_normal(samples)
+    expected = ndimage.maximum_filter1d(series, 2 * half + 1)
+    np.testing.assert_array_equal(running_maximum(series, half), expected)

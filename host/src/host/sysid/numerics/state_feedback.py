@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, optimize
+from scipy import linalg
 
 from host.arrays import Array, IntArray
 
@@ -117,6 +117,7 @@ class _Record:
         kept = [np.asarray(w)[::stride] for w in windows if len(w)]
         self.dt_s = dt_s
         self.values = values - values[0]
+        self._lagged = (0.0, self.values)  # of the lag asked for last
         self.rows: IntArray = np.concatenate(kept) if kept else np.zeros(0, dtype=np.int64)
         self.sizes = np.array([len(w) for w in kept])
         self.target = self._centred(moved[self.rows][None, :, None])[0, :, 0]
@@ -131,9 +132,10 @@ class _Record:
 
     def products(self, shape: Shape, delays: Array) -> Array:
         """Return products of the input and all signals, (delays, 1 + signals, 1 + signals)."""
-        values = self.values
-        for b, a in _sections(*shape, self.dt_s):
-            values = _filtered(b, a, values)
+        lag_s, washout_s = shape
+        if self._lagged[0] != lag_s:
+            self._lagged = (lag_s, self._filtered(self.values, lag_s, np.inf))
+        values = self._filtered(self._lagged[1], 0.0, washout_s)
         whole = np.floor(delays / self.dt_s + 1e-9).astype(np.int64)
         part = (delays / self.dt_s - whole)[:, None, None]
         at = self.rows[None, :] - whole[:, None]
@@ -145,6 +147,11 @@ class _Record:
         for decay in self._free_decays(shape):
             both -= decay[:, None] * (decay @ both)[:, None, :]
         return np.asarray(both.transpose(0, 2, 1) @ both)
+
+    def _filtered(self, values: Array, lag_s: float, washout_s: float) -> Array:
+        for b, a in _sections(lag_s, washout_s, self.dt_s):
+            values = _filtered(b, a, values)
+        return values
 
     def _free_decays(self, shape: Shape) -> list[Array]:
         """Return what a filter's unknown state at the start of the record leaves, orthonormal."""
@@ -193,6 +200,8 @@ def _best(
 
 def _refined(record: _Record, found: _Found, names: Sequence[str]) -> FeedbackLaw:
     """Return the law with delay and time constants between those of the grid."""
+    from scipy import optimize  # where no input follows anything, nothing else loads it (0.25 s)
+
     lag_s, washout_s = found.shape
     lagged, washed = lag_s > 0.0, washout_s < np.inf
     shape = [np.log(x) for x, there in ((lag_s, lagged), (washout_s, washed)) if there]
