@@ -1,7 +1,9 @@
 """The default answer on flights of a simulator with equations of its own.
 
-Eight cells of gusts and calm air, ideally placed sensors, no aircraft file. One row a flight goes
-to a file that a later run continues.
+Eight cells of gusts and calm air, ideally placed sensors. Each flight is analysed without an
+aircraft file (dimensional derivatives), with one (coefficients; every tolerance of the file and
+of the sensors is drawn), or straight by ``coefficients``. One row a flight goes to a file that a
+later run continues.
 """
 
 from __future__ import annotations
@@ -9,14 +11,26 @@ from __future__ import annotations
 import argparse
 import itertools
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
+from host.compiled import prefer_machine_code
+from host.instrument.recording import FOREIGN
 from host.sysid.flight.linear_estimator import identify
 from host.sysid.identification_error import IdentificationError
 
+import host
+from studies.foreign.aeroplane import TRAINER
 from studies.foreign.flight import Air, derivatives, fly
+from studies.foreign.instrument import (
+    SENSORS_FILE,
+    Columns,
+    drawn_file,
+    with_sensor_errors,
+)
 from studies.stored_rows import flown_rows
 
 # 0-5 were looked at while delays and turning air were written.
@@ -25,7 +39,13 @@ NAMES = {
     "longitudinal": ("Z_alpha", "M_alpha", "M_q", "M_de"),
     "lateral": ("L_p", "L_da", "N_beta", "N_r", "N_dr"),
 }
-EVERY = {name for names in NAMES.values() for name in names}
+COEFFICIENTS = {
+    "longitudinal": ("CL_alpha", "Cm_alpha", "Cm_q", "Cm_de"),
+    "lateral": ("Cl_p", "Cl_da", "Cn_beta", "Cn_r", "Cn_dr"),
+}
+DIMENSIONAL, WITH_FILE, DIRECT = "dimensional", "aircraft", "coefficients"
+DRAW = 14  # of the stream that errors of an instrument are drawn from
+EVERY = {name for by in (NAMES, COEFFICIENTS) for names in by.values() for name in names}
 COLUMNS = ("cell", "seed", "name", "true", "estimate", "half_width")
 LIMIT_MEAN = 2.0  # %, plus two standard errors of the mean
 
@@ -43,28 +63,57 @@ def cells() -> dict[str, Air]:
     return found
 
 
-def rows_of(cell: str, air: Air, seed: int, axis: str) -> list[dict[str, object]]:
+def rows_of(
+    cell: str, air: Air, seed: int, axis: str, analysis: str = DIMENSIONAL
+) -> list[dict[str, object]]:
     """Fly and identify one axis; no estimate where the answer is refused."""
     measured, _ = fly(air, seed)
+    key: dict[str, object] = {"cell": cell, "seed": seed}
     try:
-        [answer] = identify(dict(measured), names=(axis,))
+        if analysis == DIMENSIONAL:
+            found = list(dimensional(measured, axis))
+        else:
+            found = list(with_instrument(measured, seed, axis, analysis))
     except IdentificationError:
-        return [dict.fromkeys(COLUMNS, "") | {"cell": cell, "seed": seed, "name": "refused"}]
+        return [dict.fromkeys(COLUMNS, "") | key | {"name": "refused"}]
+    return [key | dict(zip(COLUMNS[2:], one, strict=True)) for one in found]
+
+
+def dimensional(measured: Columns, axis: str) -> Iterator[tuple[str, float, float, float]]:
+    """Return name, truth, estimate and half-width of derivatives, without an aircraft file."""
+    [answer] = identify(dict(measured), names=(axis,), maker=FOREIGN)
     expected = derivatives(answer.trim.airspeed_mps)  # where the answer says that it holds
     half, result = answer.result.half_width(), answer.result
-    return [
-        {
-            "cell": cell, "seed": seed, "name": name, "true": expected[name],
-            "estimate": result.value(name), "half_width": float(half[result.index(name)]),
-        }
-        for name in NAMES[axis]
-    ]  # fmt: skip
+    for name in NAMES[axis]:
+        yield name, expected[name], result.value(name), float(half[result.index(name)])
+
+
+def with_instrument(
+    measured: Columns, seed: int, axis: str, analysis: str
+) -> Iterator[tuple[str, float, float, float]]:
+    """Return the same of coefficients, all errors of the instrument drawn."""
+    rng = np.random.default_rng([DRAW, seed])
+    table = pd.DataFrame(with_sensor_errors(measured, rng))
+    with tempfile.TemporaryDirectory() as folder:
+        answer = host.identify(
+            table,
+            aircraft=drawn_file(Path(folder), rng),
+            calibration=SENSORS_FILE,
+            models=DIRECT if analysis == DIRECT else axis,
+        )
+    direct = answer.coefficients
+    told = answer.linear[0].coefficients if direct is None else direct.fit.derivatives
+    known = {c.name: c for c in told}
+    for name in COEFFICIENTS[axis]:
+        if name in known:
+            yield name, float(getattr(TRAINER, name)), known[name].value, known[name].half_width
 
 
 def table(rows: Sequence[dict[str, str]]) -> list[str]:
     """Return a line for each cell and derivative: mean error, rms, half-width, held of flights."""
     lines = [
-        "cell                                derivative  mean error %   rms  half-width  holds"
+        "cell                                derivative  mean error %   rms  half-width  over rms"
+        "  holds"
     ]
     kept = [r for r in rows if r["name"] in EVERY]
     held_all = total = 0
@@ -78,10 +127,12 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
             spread = float(np.std(error, ddof=1)) / np.sqrt(len(own)) if len(own) > 1 else np.nan
             held = int(np.sum(np.abs(error) <= width))
             held_all, total = held_all + held, total + len(own)
+            rms = float(np.sqrt(np.mean(error**2)))
+            beyond = abs(float(np.mean(error))) > LIMIT_MEAN + 2.0 * spread
             lines.append(
                 f"{cell:36s}{name:10s} {np.mean(error):+6.1f} +- {spread:3.1f}"
-                f"  {np.sqrt(np.mean(error**2)):5.1f}  {np.median(width):9.1f}"
-                f"  {held:3d} of {len(own)}"
+                f"  {rms:5.1f}  {np.median(width):9.1f}  {np.median(width) / rms:7.1f}"
+                f"  {held:3d} of {len(own)}{'  mean beyond its limit' if beyond else ''}"
             )
     refused = sum(r["name"] == "refused" for r in rows)
     if total:
@@ -97,14 +148,19 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
     parser.add_argument("--only", default="", help="cells whose name holds this")
     parser.add_argument("--axis", choices=tuple(NAMES), default="longitudinal")
-    parser.add_argument("--rows", type=Path, help="of a run that goes on; a file for each axis")
+    parser.add_argument("--analysis", choices=(DIMENSIONAL, WITH_FILE, DIRECT), default=DIMENSIONAL)
+    parser.add_argument(
+        "--rows", type=Path, help="of a run that goes on; a file for each axis and analysis"
+    )
     options = parser.parse_args(arguments)
-    path = options.rows or Path(f"../build/study/independent_{options.axis}.csv")
+    prefer_machine_code()
+    named = "" if options.analysis == DIMENSIONAL else f"_{options.analysis}"
+    path = options.rows or Path(f"../build/study/independent_{options.axis}{named}.csv")
     seeds = range(options.first, options.first + options.flights)
     airs = {cell: air for cell, air in cells().items() if options.only in cell}
 
     def fly(cell: str, seed: int) -> list[dict[str, object]]:
-        return rows_of(cell, airs[cell], seed, options.axis)
+        return rows_of(cell, airs[cell], seed, options.axis, options.analysis)
 
     keys = ((cell, seed) for seed in seeds for cell in airs)
     rows = flown_rows(path, COLUMNS, keys, fly)

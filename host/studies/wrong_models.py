@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from host.compiled import prefer_machine_code
+from host.instrument.recording import FOREIGN
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.flight.linear_answer import Answer
@@ -111,6 +112,7 @@ def answer_to(row: Row, flight: LinearFlight) -> Answer:
         method=row.method,
         windows=flight.windows,
         user_model=flight.model,
+        maker=FOREIGN,
     )
     return answer
 

@@ -1,13 +1,16 @@
-"""Lateral maneuvers of our instrument reach the gust filter as means over 20 ms."""
+"""Lateral maneuvers reach the gust filter: ours as means over 20 ms, others' as they are."""
 
 import numpy as np
 import pytest
 from host.instrument.deviations import sensor_error_model
+from host.instrument.recording import AUTOPILOT, FOREIGN, OWN
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.flight.filter_step import with_filter_step
+from host.sysid.flight.linear_estimator import identify
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
 from host.sysid.models.templates import Trim, template
+from studies.wrong_flights import fly
 
 NAMES = (
     "airspeed_mps", "alpha_rad", "q_radps", "theta_rad", "ax_mps2", "az_mps2", "elevator_rad",
@@ -16,12 +19,12 @@ NAMES = (
 FOUND = DetectedManeuver("aileron_rad", "doublet", 2.0, 3.0, 6.0, 0.1, 3)
 
 
-def _flown(dt_s: float, *, known: bool) -> FlownManeuver:
+def _flown(dt_s: float, *, known: bool, maker: str = OWN) -> FlownManeuver:
     t = np.arange(0.0, 10.0, dt_s)
     columns = {"t_s": t} | {name: np.sin((k + 1.0) * t) for k, name in enumerate(NAMES)}
     instrument = sensor_error_model("ultrastick25e") if known else None
     agreement = Compatibility((), {}, (), gps=False, instrument=instrument)
-    flight = ReconstructedFlight("", columns, columns, (FOUND,), agreement, not known)
+    flight = ReconstructedFlight("", columns, columns, (FOUND,), agreement, not known, maker=maker)
     return FlownManeuver(FOUND, flight, "doublet")
 
 
@@ -45,7 +48,29 @@ def test_slow_columns_of_others_and_longitudinal_ones_stay_as_they_are() -> None
         (_flown(0.02, known=True), lateral),
         (_flown(0.04, known=True), lateral),
         (_flown(0.005, known=False), lateral),
+        (_flown(0.005, known=True, maker=FOREIGN), lateral),
         (_flown(0.005, known=True), template("longitudinal", Trim(18.0))),
     ):
         [same] = with_filter_step([plain], model)
         np.testing.assert_array_equal(same.cut(model).outputs, plain.cut(model).outputs)
+
+
+@pytest.mark.parametrize(
+    ("maker", "method"),
+    [
+        (OWN, "output-error-white"),
+        (AUTOPILOT, "output-error-white"),
+        (FOREIGN, "filter-error-gust"),
+    ],
+)
+def test_without_an_aircraft_file_tables_of_others_are_fitted_with_rolling_gusts(
+    maker: str, method: str
+) -> None:
+    """In gusts output error knows N_dr to 11 % and misses N_r on an independent simulator by 24."""
+    flight = fly("lateral", "none", "gust", 1200)
+    [answer] = identify(flight.columns, names=("lateral",), windows=flight.windows, maker=maker)
+    assert answer.method == method
+    off = abs(answer.result.value("N_dr") - flight.truth["N_dr"])
+    half = float(answer.result.half_width()[answer.result.index("N_dr")])
+    assert off < half
+    assert (half < 0.02 * abs(flight.truth["N_dr"])) == (maker == FOREIGN)

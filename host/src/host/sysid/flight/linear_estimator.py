@@ -14,6 +14,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.aircraft.powerplant import Powerplant
 from host.arrays import Array
+from host.instrument.recording import OWN
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
     ShiftedEstimate,
@@ -36,7 +37,12 @@ from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
-from host.sysid.flight.filter_step import feels_roll, sensors_known, with_filter_step
+from host.sysid.flight.filter_step import (
+    feels_roll,
+    rolling_gust_told,
+    sensors_known,
+    with_filter_step,
+)
 from host.sysid.flight.first_departures import first_departures, without
 from host.sysid.flight.free_simulation import (
     fits_of,
@@ -67,7 +73,12 @@ from host.sysid.flight.reconstructed_flight import (
 )
 from host.sysid.flight.sampling_error import hold_shift
 from host.sysid.flight.systematic_errors import add_systematic_covariance, systematic_error_shifts
-from host.sysid.flight.trim_departure import Departure, correct_trim_departure
+from host.sysid.flight.trim_departure import (
+    NO_SPIN,
+    Departure,
+    correct_trim_departure,
+    spin_of,
+)
 from host.sysid.flight.widest_errors import widest_errors
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.diagnostics import (
@@ -151,10 +162,11 @@ class LinearEstimator:
             used = with_filter_step(used, model)
         data = [m.cut(model) for m in used]
         cuts, departing = [m.inside() for m in used], [m.departing() for m in used]
+        spin = spin_of(self.powerplant, departing) if self.own is None else NO_SPIN
         delays: dict[str, tuple[float, float]] = {}
         fitted = None
         if gusty:
-            staged, data, fitted = self._with_gust(model, data, cuts, trim)
+            staged, data, fitted = self._with_gust(model, data, cuts, trim, spin)
             found, model, delays = staged.result, staged.model, staged.delays
         elif self.own is not None:
             speed = trim.airspeed_mps if trim.known else None
@@ -179,9 +191,7 @@ class LinearEstimator:
         found = replace(found, warnings=(*remarks, *found.warnings))
         left = None
         if trim.known and self.own is None and found.residual_kind in FREE:
-            left = correct_trim_departure(
-                found, data, departing, self.airframe, trim, self.powerplant, fitted
-            )
+            left = correct_trim_departure(found, data, departing, self.airframe, trim, spin, fitted)
         return LinearEstimate(
             template=self.template if self.own is None else model.name,
             method=method,
@@ -208,7 +218,8 @@ class LinearEstimator:
         def departure_of(
             rough: FitResult, data: Sequence[Maneuver], cuts: Sequence[Mapping[str, Array]]
         ) -> Departure | None:
-            return correct_trim_departure(rough, data, cuts, self.airframe, trim, self.powerplant)
+            spin = spin_of(self.powerplant, cuts)
+            return correct_trim_departure(rough, data, cuts, self.airframe, trim, spin)
 
         if not hidden or not trim.known or self.own is not None:
             return [np.zeros_like(m.cut(bare).outputs) for m in used]
@@ -220,6 +231,7 @@ class LinearEstimator:
         data: Sequence[Maneuver],
         cuts: Sequence[Mapping[str, Array]],
         trim: Trim,
+        spin: tuple[float, float],
     ) -> tuple[GustFit, list[Maneuver], list[Maneuver]]:
         """Fit with the gust what a first such fit says is left without departures from the trim.
 
@@ -236,9 +248,7 @@ class LinearEstimator:
         rough = fit_with_gust(bare, data, trim.airspeed_mps, roughly=True).result
         at_trim, before = list(data), None
         if rough.residual_kind == "innovation":
-            departed = correct_trim_departure(
-                rough, data, cuts, self.airframe, trim, self.powerplant
-            )
+            departed = correct_trim_departure(rough, data, cuts, self.airframe, trim, spin)
             before = rough if departed is None else departed.corrected(rough)
             if departed is not None:
                 at_trim = departed.removed_from(data, before.estimate)
@@ -419,8 +429,8 @@ class LinearEstimator:
         if method == DEFAULT_METHOD and self.own is None:
             # A filter takes the line between two values of a slow sensor for measurements.
             evenly = not any(m.cut(model).held for m in used)
-            # Laterally only where places and delays of the sensors are known (`filter_step`).
-            rolls = feels_roll(model) and sensors_known(used)
+            # Of our own log laterally only where its sensors are known (`filter_step`).
+            rolls = feels_roll(model) and rolling_gust_told(used)
             vane = "beta_rad" if rolls else "alpha_rad"
             measured = vane in model.states and vane in model.outputs
             gust = measured and trim.known and evenly
@@ -468,6 +478,7 @@ def identify(
     with_delays: bool = True,
     compatibility: Compatibility | None = None,
     powerplant: Powerplant | None = None,
+    maker: str = OWN,
 ) -> list[Answer]:
     """Fit every model that has maneuvers to the columns of one flight.
 
@@ -492,6 +503,9 @@ def identify(
         of all errors is carried into the intervals.
     powerplant : Powerplant, optional
         Gives the rotor's spin.
+    maker : str
+        Who recorded the columns, as `Recording.maker`: lateral motion of others' tables is fitted
+        with rolling gusts by default, of ours only where an aircraft file is known.
 
     Raises
     ------
@@ -504,7 +518,9 @@ def identify(
             f"no template '{strangers[0]}'; there are {', '.join(AXIS_OF)}, or give a TOML file"
         )
     found = detect_maneuvers(columns) if windows is None else windows
-    flight = reconstruct_flight(columns, found, airframe=airframe, compatibility=compatibility)
+    flight = reconstruct_flight(
+        columns, found, airframe=airframe, compatibility=compatibility, maker=maker
+    )
     flight = replace(flight, delays_open=flight.delays_open and with_delays)
     answers: list[Answer] = []
     failed: list[str] = []

@@ -42,7 +42,8 @@ STILL_RAD = 1e-9  # a surface that moves less stands still but for rounding
 # One equation at a time: accelerations repeat the entries of others, and are left out.
 UNTIED = ("equation-error-total", "recursive", "neural-delta")
 STAGED = {
-    "flight": "gust filter where alpha (with an aircraft file also beta) is a state (default)",
+    "flight": "gust filter where alpha is a measured state; beta too, of our log only with an"
+    " aircraft file (default)",
     GUST: "filter error with the gust as a state, delays estimated beside it",
 }
 

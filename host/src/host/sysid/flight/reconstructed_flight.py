@@ -15,6 +15,7 @@ import numpy as np
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, BoolArray
 from host.instrument.deviations import SensorErrorModel
+from host.instrument.recording import OWN
 from host.instrument.servo_prior import ServoPrior
 from host.near_names import like
 from host.sysid.compatibility.flow_angles import FlowAngles
@@ -62,6 +63,8 @@ class ReconstructedFlight:
         Of these; None: not to be estimated.
     angles : FlowAngles or None
         Those that no vane measured, reconstructed: for products with airspeed and rates only.
+    maker : str
+        Who recorded it, as `Recording.maker` says: our logger, an autopilot, or others.
     """
 
     source: str
@@ -76,6 +79,7 @@ class ReconstructedFlight:
     commands: Mapping[str, Array] = field(default_factory=dict)
     servo: ServoPrior | None = None
     angles: FlowAngles | None = None
+    maker: str = OWN
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +162,7 @@ def reconstruct_flight(
     instrument: SensorErrorModel | None = None,
     findings: Sequence[Finding] = (),
     resolution: Mapping[str, float] | None = None,
+    maker: str = OWN,
 ) -> ReconstructedFlight:
     """Return a flight with its columns corrected by all that is known.
 
@@ -178,6 +183,8 @@ def reconstruct_flight(
         What checks found in its columns.
     resolution : mapping, optional
         Step of the numbers of each quantised column.
+    maker : str
+        Who recorded it.
     """
     sensor_errors = {c.name: c.value for c in corrections(compatibility)} if compatibility else {}
     delays_open = True
@@ -200,6 +207,7 @@ def reconstruct_flight(
         instrument,
         tuple(findings),
         resolution or {},
+        maker=maker,
     )
 
 

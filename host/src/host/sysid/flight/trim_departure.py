@@ -45,6 +45,7 @@ TURNING_AIR = "gust along the path, turning with the aircraft"
 TURNING_SHARE = 0.5
 # Of D_alpha_alpha over V Z_alpha, which is 2 C_D_CL2 C_L_alpha of a parabolic polar: 0.3 to 1.
 LARGEST_CURVATURE = 3.0
+NO_SPIN = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +147,7 @@ def correct_trim_departure(
     cuts: Sequence[Mapping[str, Array]],
     airframe: AirframeData | None,
     trim: Trim,
-    powerplant: Powerplant | None = None,
+    spin: tuple[float, float] = NO_SPIN,
     fitted: Sequence[Maneuver] | None = None,
 ) -> Departure | None:
     """Return the shift of the estimate of a template by the departures from its trim.
@@ -161,8 +162,8 @@ def correct_trim_departure(
     airframe : AirframeData or None
         Inertia; without, what body rates do to each other is left out.
     trim : Trim
-    powerplant : Powerplant, optional
-        Tells the rotor's spin, which joins pitch and yaw; without, it is left out.
+    spin : tuple
+        Of the rotor (`spin_of`), which joins pitch and yaw.
     fitted : sequence of Maneuver, optional
         What the result was fitted to, if departures had been removed from it; the shift is then
         what the removal left.
@@ -182,7 +183,7 @@ def correct_trim_departure(
     one_step = one_step_of(result, maneuvers if fitted is None else fitted, trim)
     if one_step is None:
         return None
-    varying = VaryingModel(base, base.name, trim, airframe, spin_of(powerplant, cuts))
+    varying = VaryingModel(base, base.name, trim, airframe, spin)
     straight = _with_second_order(varying.model, base, {})
     curvature = _curvature_sd(result, trim)
     curved = [_with_second_order(varying.model, base, {name: 1.0}) for name in curvature]
@@ -267,7 +268,7 @@ def spin_of(
     """Return the mean angular momentum of the rotor along x and z, kg m2/s."""
     wanted = ("throttle", "airspeed_mps", "density_kgpm3")
     if powerplant is None or not all(name in cuts[0] for name in wanted):
-        return 0.0, 0.0
+        return NO_SPIN
     speeds = []
     for c in cuts:
         dt_s = float(c["t_s"][1] - c["t_s"][0])

@@ -113,6 +113,7 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         instrument=instrument,
         findings=findings,
         resolution=read.resolution,
+        maker=read.recording.maker,
     )
     angles = None
     if agreement is not None and not agreement.vanes and known is not None:
