@@ -58,6 +58,25 @@ REDRAWS = """(async () => {
 PLANTED = b"<script>x=1"  # twelve characters of identity.board
 
 
+# One derivative known well enough, one not yet, one not at all; then one more.
+ESTIMATES = """(async () => {
+  const { showEstimates } = await import("./estimates.js");
+  const row = (name, value, percent, wanted) => ({ name, value, percent, wanted_percent: wanted,
+    half_width: value, enough: percent !== null && percent <= wanted });
+  const said = (...rows) => ({ rows, enough: rows.filter((one) => one.enough).length, until_s: 42,
+    points: ["<b>elevator</b> 3-2-1-1 at 31.0 s"], under_way: "rudder doublet at 40.1 s",
+    why_not: "" });
+  const known = row("Cm_q", -12.34, 9, 20);
+  const first = showEstimates(said(known, row("Cn_r", -0.1, 55, 20), row("Cl_p", null, null, 15)));
+  const more = showEstimates(said(known, row("Cn_r", -0.1, 12, 20), row("Cl_p", null, null, 15)));
+  const lines = [...document.querySelectorAll("#estimates-rows tr")].map((line) => line.innerText);
+  return { first, more, lines, hidden: document.getElementById("estimates-box").hidden,
+    head: document.getElementById("estimates-text").innerText,
+    foot: document.getElementById("estimates-said").innerText,
+    markup: document.querySelectorAll("#estimates-said b").length };
+})()"""
+
+
 def planted(seconds: float) -> bytes:
     """Return a stream whose board and aircraft names are markup."""
     parts = sent(seconds)
@@ -100,7 +119,7 @@ def look(url: str, folder: Path) -> None:
     """Do what a pilot does, and what a stranger's text would do."""
     with Chromium() as browser:
         page = browser.open(url)
-        page.wait_for("window.hostLive && hostLive.redraws > 20 && hostLive.rows > 100", 60)
+        page.wait_for("window.hostLive && hostLive.redraws > 0 && hostLive.rows > 100", 60)
         assert page.evaluate("document.querySelectorAll('#plots .plot canvas').length") == 12
         assert page.evaluate("location.search") == ""  # the token is out of sight
         page.wait_for("document.querySelector('#facts').textContent.includes('<img src=x>')", 60)
@@ -124,6 +143,16 @@ def look(url: str, folder: Path) -> None:
         others = [one for one in page.requests if not one.startswith((base, "ws" + base[4:]))]
         assert others == []
         assert page.console_errors == []
+        told = page.evaluate(ESTIMATES)
+        assert (told["first"], told["more"], told["hidden"]) == (True, True, False), told
+        assert told["head"] == "2 of 3 enough"
+        assert [("enough" in line, line.split()[0]) for line in told["lines"]] == [
+            (True, "Cm"), (True, "Cn"), (False, "Cl"),
+        ]  # fmt: skip
+        assert "± 12.0 %" in told["lines"][1], told
+        assert "-" in told["lines"][2], told
+        assert told["foot"] == "1 test point, in rudder doublet, to 42 s"
+        assert told["markup"] == 0
         drawn = page.evaluate(REDRAWS)
         assert drawn["often"] < 12 * 60 / 2, drawn  # of 12 plots and 60 redraws
         assert drawn["off"] < 0.01 * drawn["inked"], drawn  # rows that are added stand in place
