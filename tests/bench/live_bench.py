@@ -38,6 +38,36 @@ from tests.browser.chromium import Chromium  # noqa: E402
 from tests.host.logs import flight, written  # noqa: E402
 
 WARM_UP_S = 5.0
+STEPS = 300
+# Thirty redraws a second on a clock of the page's own, one frame each: what others do on the
+# machine neither drops a redraw nor makes it a larger one.
+DRAWING = """(async () => {
+  for (let timer = 0; timer < 2000; timer += 1) clearInterval(timer);
+  const { History } = await import("./history.js");
+  const { Plots } = await import("./plots.js");
+  const { PLOTS } = await import("./channels.js");
+  const parent = document.getElementById("plots");
+  parent.replaceChildren();
+  document.body.className = "";
+  const names = ["t_s", ...new Set(PLOTS.flatMap((what) => what.series.map(([name]) => name)))];
+  const [history, plots] = [new History(names, 30), new Plots(parent)];
+  let [clock, row] = [35, 0];
+  history.now = () => clock;
+  window.drawing = async (steps) => {
+    for (let at = 0; at < steps; at += 1) {
+      const rows = [];
+      for (; row < clock * RATE; row += 1) {
+        const [t, noise] = [row / RATE, Math.sin(row * 12.9898) * 0.3];
+        rows.push(t, ...names.slice(1).map((_, k) => 9 * Math.sin(t + k) + noise));
+      }
+      if (rows.length) history.add([0, rows.length / names.length, ...rows]);
+      plots.draw(history);
+      clock += 1 / 30;
+      await new Promise(requestAnimationFrame);
+    }
+  };
+  await drawing(10);
+})()"""
 TICK_HZ = os.sysconf("SC_CLK_TCK")
 ROOT_PROC = Path("/proc")
 PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
@@ -126,6 +156,19 @@ def page(folder: Path, rate_hz: int, seconds: float) -> Iterator[Figure]:
     yield Figure(f"{name} errors on the console", len(errors), 0, "")
 
 
+def drawing(folder: Path, rate_hz: int) -> Iterator[Figure]:
+    """Measure the processor time of a redraw, all processes of the browser together."""
+    (folder / "short.bin").write_bytes(written(*flight(3.0)))
+    with live(folder, f"replay:{folder / 'short.bin'}") as (_, url), Chromium() as browser:
+        shown = browser.open(url)
+        shown.wait_for("window.hostLive && hostLive.rows > 30", 120)
+        shown.evaluate(DRAWING.replace("RATE", str(rate_hz)))
+        used_s = family_s(browser.pid)
+        shown.evaluate(f"drawing({STEPS})")
+        used_s = family_s(browser.pid) - used_s
+    yield Figure(f"a redraw at {rate_hz} Hz, processor time", 1e3 * used_s / STEPS, 33.0, "ms")
+
+
 def endurance(folder: Path, hours: float) -> Iterator[Figure]:
     """Replay hours as fast as they decode, an hour's log again and again through one stream."""
     stream = LiveStream(load_calibration())
@@ -189,7 +232,7 @@ def slow_viewers(folder: Path, seconds: float) -> Iterator[Figure]:
 def main() -> int:
     """Measure and print; 6 if a limit is missed."""
     parser = argparse.ArgumentParser(description="Measure `host live` on a quiet machine.")
-    parser.add_argument("--only", choices=("page", "endurance", "viewers"))
+    parser.add_argument("--only", choices=("page", "drawing", "endurance", "viewers"))
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--hours", type=float, default=8.0)
     asked = parser.parse_args()
@@ -202,6 +245,9 @@ def main() -> int:
         if asked.only in (None, "page"):
             for rate_hz in (50, 100):
                 figures += page(folder, rate_hz, asked.seconds)
+        if asked.only in (None, "drawing"):
+            for rate_hz in (50, 100):
+                figures += drawing(folder, rate_hz)
         if asked.only in (None, "viewers"):
             figures += slow_viewers(folder, asked.seconds)
         if asked.only in (None, "endurance"):
