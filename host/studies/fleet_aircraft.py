@@ -15,8 +15,8 @@ from host.aircraft.airframe import Airframe
 from host.aircraft.file import MEASURED, MEASURED_IF_THERE, Aircraft, load, read_document
 from host.aircraft.local_derivatives import local_derivatives
 from host.aircraft.trim import solve
-from host.arrays import Array
 from host.instrument.instrument_errors import InstrumentErrors, instrument_errors
+from numpy.typing import NDArray
 
 TYPE = "ultrastick25e"
 # Standard deviations between aircraft, as shares; of the CG, m.
@@ -83,7 +83,7 @@ def built(name: str, rng: np.random.Generator) -> BuiltAircraft:
     return BuiltAircraft(plane, document)
 
 
-def resized(base: Aircraft, sizes: dict[str, float]) -> dict[str, Array]:
+def resized(base: Aircraft, sizes: dict[str, float]) -> dict[str, NDArray[np.float64]]:
     """Return the aircraft's tables with surfaces larger by these shares."""
     vectors = {name: v.copy() for name, v in base.vectors.items()}
     arm = base.scalar("geometry.elevator_arm_m") / base.scalar("geometry.chord_m")

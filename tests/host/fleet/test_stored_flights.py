@@ -106,7 +106,9 @@ def test_the_page_s_examples_read_what_is_kept(fleet: Twice) -> None:
         exec(compile(python, str(PAGE), "exec"), {})
     assert "Cm_q" in printed.getvalue()
     (sql,) = re.findall(r"```sql\n(.*?)```", page, re.S)
-    found = duckdb.sql(sql).fetchall()
+    relation = duckdb.sql(sql)
+    assert relation is not None
+    found = relation.fetchall()
     mean = fleet.first["types"][0]["derivatives"]["Cm_q"]["mean"]["value"]
     assert sorted((name, count) for name, count, _ in found) == [(f"N{k}", 5) for k in range(4)]
     assert all(estimate == pytest.approx(mean, rel=0.3) for _, _, estimate in found)
