@@ -62,7 +62,8 @@ bool ByteRing::tell_dropped() {
   event.code = static_cast<uint8_t>(frames::Event::kFramesDropped);
   event.arg = dropped_pending_;
   dropped_pending_ = 0;
-  append(&frames::kEventId, 1);
+  const uint8_t id = frames::kEventId;
+  append(&id, 1);
   append(&event, sizeof(event));
   return true;
 }

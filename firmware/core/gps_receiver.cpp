@@ -310,14 +310,18 @@ void GpsReceiver::begin_epoch(uint32_t itow_ms) {
   parts_ = 0;
   epoch_ms_ = itow_ms;
   // Whoever looks while an epoch comes in (45 ms at 38400 baud, of 200) sees the last one, not a
-  // hole: fix, satellites and what tells that the aircraft moves.
+  // hole: fix, place, satellites and what tells that the aircraft moves.
   const uint8_t fix = frame_.fix;
   const uint8_t satellites = frame_.satellites;
+  const int32_t latitude = frame_.latitude;
+  const int32_t longitude = frame_.longitude;
   const uint16_t ground_speed = time_known_ ? frame_.ground_speed : frames::kGpsGroundSpeedInvalid;
   time_known_ = true;
   clear_gps(frame_);
   frame_.fix = fix;
   frame_.satellites = satellites;
+  frame_.latitude = latitude;
+  frame_.longitude = longitude;
   frame_.ground_speed = ground_speed;
   frame_.t_us = parser_.first_byte_us();
 }

@@ -63,6 +63,15 @@ class RcDecoder {
                ? uint16_t{0}
                : static_cast<uint16_t>(1000000UL * kTicksPerUs / fast_ticks_);
   }
+  // Since the oldest of the inputs' last accepted pulses rose; while none is lost.
+  uint32_t oldest_us(uint32_t now_ticks) const {
+    uint32_t oldest = 0;
+    for (const Input& input : inputs_) {
+      const uint32_t age = now_ticks - input.accepted;
+      if (age > oldest) oldest = age;
+    }
+    return oldest / kTicksPerUs;
+  }
   uint8_t changes() const { return changes_; }     // counts what poll and edge changed of these
   uint16_t glitches() const { return glitches_; }  // pulses rejected
 

@@ -7,7 +7,8 @@
 namespace core {
 namespace {
 
-constexpr uint16_t kMagic = 0x5346;  // "FS"
+constexpr uint16_t kMagic = 0x5346;       // "FS"
+constexpr uint16_t kInputMagic = 0x5349;  // "IS"
 constexpr uint8_t kHead = 4;
 constexpr uint8_t kFirst = sizeof(uint32_t);  // t_us is not part of the record
 constexpr uint8_t kCrcOffset = kHead + kSettingsSize;
@@ -16,6 +17,16 @@ uint32_t record_crc(const uint8_t* record) {
   Crc32 crc;
   crc.add(record, kCrcOffset);
   return crc.value();
+}
+
+uint16_t input_crc(const uint8_t* record) {
+  return crc16(kCrc16Start, record, 2 + kInputSettingsSize);
+}
+
+// Mega's place is as wide as the gap above it, or wider.
+bool goes_with(const frames::InputConfigFrame& input, const frames::ConfigFrame& config) {
+  return input.switch_armed_min_us == 0 ||
+         input.switch_armed_min_us >= config.switch_mega_min_us + 2 * settings::kLeastSwitchGapUs;
 }
 
 }  // namespace
@@ -61,6 +72,27 @@ void write_settings(uint8_t* record, const frames::ConfigFrame& config) {
   record[3] = kSettingsSize;
   memcpy(record + kHead, reinterpret_cast<const uint8_t*>(&config) + kFirst, kSettingsSize);
   put_le(record + kCrcOffset, record_crc(record));
+}
+
+void read_input_settings(const uint8_t* record,
+                         const frames::ConfigFrame& config,
+                         frames::InputConfigFrame& out) {
+  uint8_t* const fields = reinterpret_cast<uint8_t*>(&out) + kFirst;
+  memset(&out, 0, sizeof(out));
+  memcpy(fields, record + 2, kInputSettingsSize);
+  if (get_le<uint16_t>(record) == kInputMagic &&
+      get_le<uint16_t>(record + 2 + kInputSettingsSize) == input_crc(record) &&
+      settings::in_range(out) && goes_with(out, config)) {
+    return;
+  }
+  settings::put_defaults(out);
+  if (!goes_with(out, config)) out.switch_armed_min_us = 0;
+}
+
+void write_input_settings(uint8_t* record, const frames::InputConfigFrame& config) {
+  put_le(record, kInputMagic);
+  memcpy(record + 2, reinterpret_cast<const uint8_t*>(&config) + kFirst, kInputSettingsSize);
+  put_le(record + 2 + kInputSettingsSize, input_crc(record));
 }
 
 }  // namespace core

@@ -5,6 +5,7 @@
 
 #include "core/baro.h"
 #include "core/bytes.h"
+#include "core/progmem.h"
 #include "generated/frames.h"
 
 namespace drivers {
@@ -27,8 +28,9 @@ struct Bmp085 {
 
   // Table 8: 4.5 ms for a temperature, 13.5 ms for a pressure at oss 2; a tenth is added.
   static BaroPhase phase(uint8_t index) {
-    return index == 0 ? BaroPhase{0x2E, 4950, 0xF6, 2}
-                      : BaroPhase{0x34 | kOversampling << 6, 14850, 0xF6, 3};
+    static constexpr BaroPhase kPhase[kPhases] CORE_FLASH = {
+        {0x2E, 4950, 0xF6, 2}, {0x34 | kOversampling << 6, 14850, 0xF6, 3}};
+    return core::flash_load(&kPhase[index]);
   }
   // From the command to the middle of the pressure conversion.
   static constexpr uint16_t kMiddleUs = 6750;

@@ -20,7 +20,9 @@ struct Bmp280 {
 
   // Forced mode, temperature once, pressure 4 times: table 13 gives at most 13.3 ms.
   static BaroPhase phase(uint8_t) {
-    return BaroPhase{0b001'00'001 | kOversampling << 2, 14500, 0xF7, 6};
+    static constexpr BaroPhase kPhase CORE_FLASH = {
+        0b001'00'001 | kOversampling << 2, 14500, 0xF7, 6};
+    return core::flash_load(&kPhase);
   }
   // Section 3.8.1, typical: start 1 ms, temperature 2 ms, half of 0.5 + 4 * 2 ms pressure.
   static constexpr uint16_t kMiddleUs = 7250;

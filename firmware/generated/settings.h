@@ -50,4 +50,14 @@ inline bool in_range(const frames::ConfigFrame& config) {
          config.gps_source <= 2U;
 }
 
+inline void put_defaults(frames::InputConfigFrame& config) {
+  config = frames::InputConfigFrame();
+  config.switch_armed_min_us = 1850U;
+}
+
+// Each value by itself.
+inline bool in_range(const frames::InputConfigFrame& config) {
+  return config.switch_armed_min_us <= 2100U;
+}
+
 }  // namespace settings

@@ -10,8 +10,8 @@ enum class Port : uint8_t { kUsb, kGps, kTelemetry };
 
 void open_port(Port port, uint32_t baud);
 
-// Takes the oldest received byte; false if there is none. Main loop only. A board need receive on
-// the GPS's port only: nobody listens on the others, and their buffers cost RAM.
+// Takes the oldest received byte; false if there is none. Main loop only. A board need buffer the
+// GPS's port only; on USB it need hold one byte, and on the radio's nobody listens.
 bool take_byte(Port port, uint8_t* byte);
 
 // Room for bytes to send; the peer's "stop" (CTS) shows as room that does not grow.

@@ -34,7 +34,8 @@ uint16_t stack_free_bytes();
 // Restarts by the watchdog or a reset since the supply came; the IMU's board only.
 uint16_t restarts();
 
-// What the image calls itself, at most 11 characters (frames.toml, identity.board).
+// What the image calls itself, at most 11 characters (frames.toml, identity.board); in program
+// memory.
 const char* board_name();
 
 // The hash by which the image is known (firmware/toolchain/image_hash.py); 0: it has none.

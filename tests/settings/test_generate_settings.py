@@ -63,6 +63,8 @@ def test_old_header_is_told_in_one_line(
         ("input_elevator", "value", 0, r"\[input_elevator\] value is 0, which \[input_aileron\]"),
         ("input_switch", "value", 3, r"which \[input_throttle\] has already"),
         ("switch_mega_min_us", "value", 1499, "expected at least 1500"),
+        ("switch_armed_min_us", "value", 1799, "expected 0 or at least 1800"),
+        ("switch_armed_min_us", "value", 2101, "expected one of 0 to 2100"),
         ("aircraft", "value", "a name much too long", "1 to 15"),
         ("aircraft", "value", "it's", "letters, digits"),
         ("aircraft", "value", "", "1 to 15"),

@@ -26,6 +26,17 @@ uint8_t read_eeprom(const uint16_t address) {
   return EEDR;
 }
 
+void read_eeprom_bytes(uint16_t address, void* const to, const uint8_t size) {
+  uint8_t* bytes = static_cast<uint8_t*>(to);
+  (void)read_eeprom(address);  // waits
+  const uint8_t none = eeprom_ready() ? 0x00 : 0xFF;
+  for (uint8_t left = size; left != 0; --left) {
+    EEAR = address++;
+    EECR |= _BV(EERE);
+    *bytes++ = uint8_t(EEDR | none);
+  }
+}
+
 bool eeprom_ready() {
   return (EECR & _BV(EEPE)) == 0;
 }

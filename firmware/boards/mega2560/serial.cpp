@@ -204,7 +204,7 @@ void open_port(const Port port, const uint32_t baud) {
     case Port::kUsb:
       UCSR0A = _BV(U2X0);
       UBRR0 = ubrr;
-      UCSR0B = kSends;
+      UCSR0B = kSends | _BV(RXEN0);
       break;
     case Port::kGps:
       UCSR2A = _BV(U2X0);
@@ -219,7 +219,13 @@ void open_port(const Port port, const uint32_t baud) {
   }
 }
 
+// USB has no interrupt and no buffer but the chip's two bytes: its peer waits behind each byte for
+// an answer (app/card_console.h).
 bool take_byte(const Port port, uint8_t* const byte) {
+  if (port == Port::kUsb && (UCSR0A & _BV(RXC0)) != 0) {
+    *byte = UDR0;
+    return true;
+  }
   return port == Port::kGps && g_gps_in.take(byte);
 }
 

@@ -3,6 +3,7 @@
 
 #include <avr/interrupt.h>
 #include <avr/io.h>
+#include <avr/pgmspace.h>
 #include <avr/wdt.h>
 
 #include "boards/avr/interrupts_off.h"
@@ -163,7 +164,8 @@ uint16_t stack_free_bytes() {
 }
 
 const char* board_name() {
-  return "mega2560";
+  static const char name[] PROGMEM = "mega2560";
+  return name;
 }
 
 }  // namespace hal

@@ -186,6 +186,11 @@ uint8_t read_eeprom(uint16_t address) {
   return world().eeprom[address % kEepromBytes];
 }
 
+void read_eeprom_bytes(uint16_t address, void* to, uint8_t size) {
+  uint8_t* bytes = static_cast<uint8_t*>(to);
+  while (size-- != 0) *bytes++ = read_eeprom(address++);
+}
+
 bool eeprom_ready() {
   return world().now >= world().eeprom_ready_at;
 }

@@ -157,6 +157,10 @@ void sitl_add_gps(const int64_t* at, const uint8_t* bytes, size_t count) {
   add_bytes(&world().gps, at, bytes, count);
 }
 
+void sitl_add_usb(const int64_t* at, const uint8_t* bytes, size_t count) {
+  add_bytes(&world().usb, at, bytes, count);
+}
+
 void sitl_hold_port(int port, int64_t until) {
   if (port >= 0 && port <= 2) world().ports[port].drained_at = until;
 }

@@ -54,6 +54,8 @@ void sitl_hold_pressure_bus(int held);
 void sitl_add_gps(const int64_t* at, const uint8_t* bytes, size_t count);
 // The radio's modem takes no byte until then: what is sent waits. Port as for sitl_sent.
 void sitl_hold_port(int port, int64_t until);
+// Bytes that the USB line brings.
+void sitl_add_usb(const int64_t* at, const uint8_t* bytes, size_t count);
 void sitl_add_button(const int64_t* at, const uint8_t* pressed, size_t count);
 // kind: 0 next block busy for `value` us, 1 next `value` blocks refused, 2 removed, 3 inserted,
 // 4 every block busy for `value` us, 5 reads fail while `value` is not 0.

@@ -190,3 +190,32 @@ TEST_CASE("a count of writes that no EEPROM bears is not believed") {
   eeprom.write(again, 8, 9);
   CHECK(eeprom.read().latest().session == 8U);
 }
+
+TEST_CASE(
+    "settings of the inputs: their own record, defaults else, and armed never too near Mega") {
+  frames::ConfigFrame config;
+  core::default_settings(config);
+  uint8_t record[core::kInputSettingsRecordSize];
+  frames::InputConfigFrame wanted = {};
+  frames::InputConfigFrame read;
+  const uint16_t good[] = {0, 1800, 1950, 2100};
+  for (const uint16_t armed_us : good) {
+    wanted.switch_armed_min_us = armed_us;
+    core::write_input_settings(record, wanted);
+    core::read_input_settings(record, config, read);
+    CHECK_EQ(uint16_t{read.switch_armed_min_us}, armed_us);
+  }
+  const uint16_t bad[] = {1, 1799, 2101, 0xFFFF};
+  for (const uint16_t armed_us : bad) {
+    wanted.switch_armed_min_us = armed_us;
+    core::write_input_settings(record, wanted);
+    core::read_input_settings(record, config, read);
+    CHECK_EQ(uint16_t{read.switch_armed_min_us}, 1850);
+  }
+  for (uint8_t i = 0; i < sizeof record; ++i) record[i] = 0xFF;
+  core::read_input_settings(record, config, read);
+  CHECK_EQ(uint16_t{read.switch_armed_min_us}, 1850);
+  config.switch_mega_min_us = 1700;  // the default does not go with it: never armed
+  core::read_input_settings(record, config, read);
+  CHECK_EQ(uint16_t{read.switch_armed_min_us}, 0);
+}

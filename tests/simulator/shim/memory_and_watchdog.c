@@ -55,6 +55,7 @@ static void write_eecr(chip* c, uint16_t address, uint8_t value, void* param) {
   if ((value & kEere) && !busy) {
     c->avr->data[REG_EEDR] = c->eeprom.memory[cell];
     c->halt_cycles += 4;
+    c->avr->run_cycle_count = 0;  // at once: many reads in one burst would hold interrupts up
   }
   interrupt_refresh(c, kVectorEeReady);
 }

@@ -1,0 +1,31 @@
+// What the bytes of a flight card must say before a row of it is flown: protocol/flight-card.md.
+#pragma once
+
+#include <stdint.h>
+
+#include "core/crc.h"
+#include "generated/frames.h"
+
+namespace core {
+
+using CardHead = frames::CardHeadLayout;
+using CardRow = frames::CardRowLayout;
+
+constexpr uint8_t kCardAxes = 3;  // aileron, elevator, rudder: the servos but the throttle
+constexpr uint8_t kCardParts = frames::kCardHeadParts + frames::kCardMostRows;
+constexpr uint16_t kCardFieldsBytes = offsetof(CardHead, crc);
+
+// What of the head limits its rows.
+struct RowLimits {
+  uint16_t amplitude_max_us[kCardAxes];
+  uint16_t frequency_max_chz;
+};
+
+RowLimits row_limits(const CardHead& head);
+
+// Everything but the hash. `aircraft` has the 16 bytes of the setting.
+frames::CardFault judge_head(const CardHead& head, const char* aircraft);
+// Its CRC-16 too.
+frames::CardFault judge_row(const CardRow& row, const RowLimits& limits);
+
+}  // namespace core

@@ -1,0 +1,247 @@
+// Every limit of the card, every sensor lost or stuck, distance, and the travel that was shown.
+#include "check.h"
+#include "core/input_watch.h"
+#include "core/stick_travel.h"
+#include "random_numbers.h"
+
+namespace {
+
+using core::InputMotion;
+using core::InputReadings;
+using frames::InputEnd;
+
+struct Bench {
+  core::CardHead limits = {};
+  InputReadings in = {};
+  core::InputHome home;
+  InputMotion motion;
+  uint32_t now_us = 0xFFFFFFFFU - 700000U;
+  uint8_t turn = 0;
+  bool still[InputMotion::kSensors] = {};
+
+  Bench() {
+    limits.airspeed_input = 4;
+    limits.alpha_input = 1;
+    limits.beta_input = 2;
+    limits.dp_min = 2100;
+    limits.dp_max = 3000;
+    limits.alpha_min = limits.beta_min = 1000;
+    limits.alpha_max = limits.beta_max = 3000;
+    limits.phi_max = 6000;
+    limits.theta_min = -3000;
+    limits.theta_max = 3500;
+    limits.p_max = 20000;
+    limits.q_max = 12000;
+    limits.r_max = 11000;
+    limits.az_min = -24000;
+    limits.az_max = 100;
+    limits.height_min_pa = 200;
+    limits.height_max_pa = 2000;
+    limits.distance_max_m = 300;
+    limits.still_ms = 500;
+    limits.rail_min = 1000;
+    home.pressure_2pa = 50000;
+    home.latitude = 250000000;
+    home.cosine = core::home_cosine(home.latitude);
+    home.longitude = 1210000000;
+    in.force[2] = -8192;
+    in.pitot[0] = in.pitot[1] = 2500;
+    in.alpha[0] = in.alpha[1] = in.beta[0] = in.beta[1] = 2048;
+    in.valid = 0xFFFF;
+    in.rail = 2000;
+    in.static_pressure = 16UL * 99000UL;
+    in.latitude = home.latitude;
+    in.longitude = home.longitude;
+    in.imu = in.gps = true;
+    motion.start(now_us);
+    run(100);
+  }
+
+  // Every sensor moves a little, but those that stand still.
+  void run(uint16_t ms) {
+    for (; ms >= 5; ms = static_cast<uint16_t>(ms - 5)) {
+      now_us += 5000;
+      turn ^= 1U;
+      if (!still[InputMotion::kImu]) in.rates[0] = turn;
+      if (!still[InputMotion::kAirspeed]) in.pitot[0] = static_cast<uint16_t>(2500 + turn);
+      if (!still[InputMotion::kAlpha]) in.alpha[1] = static_cast<uint16_t>(2048 + turn);
+      if (!still[InputMotion::kBeta]) in.beta[0] = static_cast<uint16_t>(2048 + turn);
+      if (!still[InputMotion::kBaro]) in.static_pressure = 16UL * 99000UL + turn;
+      if (!still[InputMotion::kGps]) in.latitude = home.latitude + turn;
+      motion.look(limits, in, now_us);
+    }
+  }
+  int judge() const {
+    const InputEnd imu = core::judge_imu(limits, in);
+    const InputEnd others = core::judge_others(limits, in, home, motion, now_us);
+    return static_cast<int>(imu != InputEnd::kDone ? imu : others);
+  }
+};
+
+#define SAYS_IN(change, why)                                  \
+  {                                                           \
+    Bench bench;                                              \
+    change;                                                   \
+    CHECK_EQ(bench.judge(), static_cast<int>(InputEnd::why)); \
+  }
+
+}  // namespace
+
+TEST_CASE("all limits hold, at their edges too"){
+    SAYS_IN(, kDone) SAYS_IN(bench.in.phi = 6000, kDone) SAYS_IN(bench.in.phi = -6000, kDone)
+        SAYS_IN(bench.in.theta = 3500, kDone) SAYS_IN(bench.in.theta = -3000, kDone)
+            SAYS_IN(bench.in.rates[0] = -20000, kDone) SAYS_IN(bench.in.force[2] = 100, kDone)
+                SAYS_IN(bench.in.force[2] = -24000, kDone) SAYS_IN(bench.in.pitot[0] = 2100, kDone)
+                    SAYS_IN(bench.in.pitot[0] = 3000, kDone)
+                        SAYS_IN(bench.in.alpha[1] = 1000, kDone)
+                            SAYS_IN(bench.in.beta[0] = 3000, kDone)
+                                SAYS_IN(bench.in.static_pressure = 16UL * 99800UL, kDone)
+                                    SAYS_IN(bench.in.static_pressure = 16UL * 98000UL, kDone)
+                                        SAYS_IN(bench.in.rail = 1000, kDone)}
+
+TEST_CASE("each limit one step behind its edge"){
+    SAYS_IN(bench.in.phi = 6001, kBank) SAYS_IN(bench.in.phi = -6001,
+                                                kBank) SAYS_IN(bench.in.phi = INT16_MIN, kBank)
+        SAYS_IN(bench.in.theta = 3501, kPitch) SAYS_IN(bench.in.theta = -3001, kPitch) SAYS_IN(
+            bench.in.rates[0] = 20001, kRates) SAYS_IN(bench.in.rates[0] = -20001, kRates)
+            SAYS_IN(bench.in.rates[1] = -12001, kRates) SAYS_IN(bench.in.rates[2] = 11001, kRates)
+                SAYS_IN(bench.in.rates[2] = INT16_MIN, kRates) SAYS_IN(bench.in.force[2] = 101,
+                                                                       kLoadFactor)
+                    SAYS_IN(bench.in.force[2] = -24001,
+                            kLoadFactor) SAYS_IN(bench.in.pitot[0] = 2099, kAirspeed)
+                        SAYS_IN(bench.in.pitot[0] = 3001,
+                                kAirspeed) SAYS_IN(bench.in.alpha[1] = 999,
+                                                   kAlpha) SAYS_IN(bench.in.alpha[1] = 3001, kAlpha)
+                            SAYS_IN(bench.in.beta[0] = 999,
+                                    kBeta) SAYS_IN(bench.in.beta[0] = 3001, kBeta)
+                                SAYS_IN(bench.in.static_pressure = 16UL * 99801UL, kHeight)
+                                    SAYS_IN(bench.in.static_pressure = 16UL * 97999UL, kHeight)
+                                        SAYS_IN(bench.in.static_pressure = 16UL * 110000UL, kHeight)
+                                            SAYS_IN(bench.in.latitude += 30000, kDistance)
+                                                SAYS_IN(bench.in.rail = 999, kSupply)}
+
+TEST_CASE("what the card does not name is not watched") {
+  SAYS_IN(bench.in.pitot[1] = 0, kDone)
+  SAYS_IN(bench.in.alpha[0] = 0, kDone)
+  SAYS_IN(bench.limits.airspeed_input = 255; bench.in.pitot[0] = 0, kDone)
+  SAYS_IN(bench.limits.alpha_input = 255; bench.in.alpha[1] = 0, kDone)
+  SAYS_IN(bench.limits.beta_input = 255; bench.in.beta[0] = 0, kDone)
+  SAYS_IN(bench.limits.distance_max_m = 0; bench.in.gps = false, kDone)
+  SAYS_IN(bench.limits.rail_min = 0; bench.in.rail = 0, kDone)
+}
+
+TEST_CASE("a sensor that is not heard, or open, or old, proves nothing"){
+    SAYS_IN(bench.in.imu = false, kSensorLost) SAYS_IN(bench.in.imu_age_us = 30001, kSensorLost)
+        SAYS_IN(bench.in.imu_age_us = 30000, kDone)
+            SAYS_IN(bench.in.valid &= static_cast<uint16_t>(~0x10U), kSensorLost)
+                SAYS_IN(bench.in.valid &= static_cast<uint16_t>(~0x02U), kSensorLost)
+                    SAYS_IN(bench.in.valid &= static_cast<uint16_t>(~0x04U), kSensorLost)
+                        SAYS_IN(bench.in.valid &= static_cast<uint16_t>(~0x01U), kDone)
+                            SAYS_IN(bench.in.scan_age_us = 100001, kSensorLost)
+                                SAYS_IN(bench.in.static_pressure = 0, kSensorLost)
+                                    SAYS_IN(bench.in.baro_age_us = 150001, kSensorLost)
+                                        SAYS_IN(bench.in.gps = false, kSensorLost)
+                                            SAYS_IN(bench.in.gps_age_us = 1000001, kSensorLost)}
+
+TEST_CASE("each sensor that stands still is stuck behind the card's time") {
+  for (uint8_t sensor = 0; sensor < InputMotion::kSensors; ++sensor) {
+    Bench bench;
+    bench.still[sensor] = true;
+    const bool gps = sensor == InputMotion::kGps;
+    bench.run(gps ? 1450 : 450);
+    CHECK_EQ(bench.judge(), 0);
+    bench.run(100);
+    CHECK_EQ(bench.judge(), static_cast<int>(InputEnd::kSensorStill));
+    bench.run(10000);  // its count does not come round
+    CHECK_EQ(bench.judge(), static_cast<int>(InputEnd::kSensorStill));
+    bench.still[sensor] = false;
+    bench.run(10);
+    CHECK_EQ(bench.judge(), 0);
+  }
+}
+
+TEST_CASE("at the start nothing has moved yet") {
+  Bench bench;
+  bench.motion.start(bench.now_us);
+  CHECK_EQ(bench.judge(), static_cast<int>(InputEnd::kSensorStill));
+}
+
+TEST_CASE("distances: metres, the cosine of the latitude, and far away") {
+  core::InputHome home;
+  home.latitude = 600000000;
+  home.cosine = core::home_cosine(home.latitude);
+  home.longitude = 100000000;
+  const auto in = [&](int32_t north, int32_t east, uint16_t most_m) {
+    return core::within_distance(home, home.latitude + north, home.longitude + east, most_m);
+  };
+  CHECK(in(26900, 0, 300));  // 299.5 m
+  CHECK(!in(27100, 0, 300));
+  CHECK(in(-26900, 0, 300));
+  CHECK(in(0, 53400, 300));  // half of it at 60 deg
+  CHECK(!in(0, 54600, 300));
+  CHECK(in(-19000, 37900, 300));
+  CHECK(!in(-19300, 38500, 300));
+  CHECK(!in(0, 2000000000, 3000));
+  CHECK(!in(-1200000000, 0, 3000));
+  CHECK(in(0, 0, 1));
+  home.longitude = 1799999999;
+  CHECK(!core::within_distance(home, home.latitude, -1799999999, 3000));  // the date line: refused
+}
+
+TEST_CASE("travel is shown slowly, and one spoilt pulse adds one step") {
+  core::StickTravel travel;
+  core::RcChannels rc = {{3000, 3000, 3000, 2200, 2200}, 0x1F, 0x1F};
+  travel.look(rc);
+  CHECK(!travel.shown());
+  CHECK_EQ(travel.least_ticks(0), travel.most_ticks(0));
+  rc.width_ticks[0] = 4400;
+  travel.look(rc);
+  CHECK_EQ(travel.most_ticks(0) - travel.least_ticks(0), 16);
+  rc.width_ticks[0] = 3000;
+  for (uint8_t side = 0; side < 2; ++side) {
+    for (uint8_t i = 0; i < 3; ++i) rc.width_ticks[i] = side != 0 ? 3391 : 2609;
+    for (uint16_t n = 0; n < 100; ++n) travel.look(rc);
+  }
+  for (uint8_t i = 0; i < 3; ++i) {
+    CHECK(travel.least_ticks(i) >= 2609);  // rounded inwards
+    CHECK(travel.least_ticks(i) < 2609 + 16);
+    CHECK(travel.most_ticks(i) <= 3391);
+    CHECK(travel.most_ticks(i) > 3391 - 16);
+  }
+  CHECK(travel.shown());
+  CHECK(travel.at_end(1, 2609));
+  CHECK(travel.at_end(1, 3391));
+  CHECK(!travel.at_end(1, 3000));
+  CHECK(!travel.at_end(1, 3300));
+}
+
+TEST_CASE("a channel that is not steady shows nothing, and all three must be moved") {
+  core::StickTravel travel;
+  core::RcChannels rc = {{3000, 3000, 3000, 2200, 2200}, 0x1F, 0b11101};
+  for (uint16_t n = 0; n < 400; ++n) {
+    for (uint8_t i = 0; i < 3; ++i) rc.width_ticks[i] = n < 200 ? 2400 : 3600;
+    travel.look(rc);
+  }
+  CHECK(!travel.shown());
+  CHECK(travel.least_ticks(1) > travel.most_ticks(1));
+}
+
+TEST_CASE("a sign is held for 3 s without a break, and counts once") {
+  core::HeldSign sign;
+  uint32_t now_us = 0xFFFFFFFFU - 1000000U;
+  const auto held = [&](bool on, uint16_t ms) {
+    uint8_t count = 0;
+    for (; ms >= 8; ms = static_cast<uint16_t>(ms - 8)) {
+      now_us += 8000;
+      count = static_cast<uint8_t>(count + sign.look(on, now_us));
+    }
+    return count;
+  };
+  CHECK_EQ(held(true, 2960), 0);
+  CHECK_EQ(held(false, 8), 0);
+  CHECK_EQ(held(true, 2960), 0);
+  CHECK_EQ(held(true, 120), 1);
+  CHECK_EQ(held(true, 60000U), 0);
+  CHECK_EQ(held(false, 100), 0);
+  CHECK_EQ(held(true, 3100), 1);
+}
