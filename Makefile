@@ -1,6 +1,6 @@
 # Two commands: `make demo` and `make test`. Both set up what they need first.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test native mega sitl lint format bench study fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean
+.PHONY: help setup demo test native mega sitl lint format bench study fleet-bench live-bench flight-bench imu-bench faults power-cuts card-images fuzz mutants hw clean input-flights
 PYTHON := .venv/bin/python
 PIO := .venv/bin/pio
 # Runs a module of tests/chip in that folder; what it imports lies elsewhere.
@@ -78,6 +78,9 @@ fuzz: setup ## random input, guided by coverage: 2000 of each kind (FULL=1: all,
 
 card-images: setup sitl ## 10 000 cards altered at random, under sanitizers, and 200 on the simulated chip
 	@$(PYTHON) tests/sitl/card_images.py $(IMAGES); bad=$$?; cd tests/chip && $(CHIP_PYTHON) -m flight.card_images $(CHIP_IMAGES) && exit $$bad
+
+input-flights: setup sitl ## 1000 random flights with a flight card, a fault at any instant of an input (minutes)
+	@$(PYTHON) tests/sitl/input_faults.py $(INPUTS)
 
 clean: ## remove what builds made; .venv and downloads stay
 	rm -rf .pio build/unit-tests build/sitl build/sitl-sanitized build/logs

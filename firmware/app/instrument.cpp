@@ -40,6 +40,7 @@ void Instrument::boot() {
   if (settings != core::SettingsStatus::kOk) {
     outlet_.event(frames::Event::kSettingsDefault, static_cast<uint32_t>(settings), now_us);
   }
+  inputs_.load(config_);
   telemetry_.start(config_, now_us);
   pilot_.start();
   sensors_.start(config_, now_us);
@@ -55,15 +56,16 @@ void Instrument::boot() {
 
 void Instrument::step() {
   const uint32_t now_us = turn_us_;
-  pilot_.step(config_, supply_.good(), outlet_, now_us);
+  pilot_.step(config_, supply_.good(), inputs_, outlet_, now_us);
   const uint8_t frames = outlet_.frames();
   const storage::Volume::Job job = recorder_.card_job();
   sensors_.step(config_, pilot_, outlet_, now_us);
   const bool made_frame = outlet_.frames() != frames;
+  if (inputs_.watch(sensors_, outlet_, hal::now_us())) pilot_.send(inputs_, outlet_);
   pilot_.ran(kTaskSensors);
   // A receiver pulse that ends behind the pilot's step, or 0.3 ms before it, waits for the next,
   // and 2 ms is all it may: making a frame takes more than half of that, and so do the slow tasks.
-  if (made_frame) pilot_.step(config_, supply_.good(), outlet_, hal::now_us());
+  if (made_frame) pilot_.step(config_, supply_.good(), inputs_, outlet_, hal::now_us());
   recorder_.step(now_us);
   pilot_.ran(kTaskRecorder);
   // A turn that made a frame leaves the rest to the next, for the same reason.
@@ -73,7 +75,7 @@ void Instrument::step() {
     ascii_row_.step(sensors_, pilot_.channels(), telemetry_, now_us);
     wrote = status_.has_line() && write_status(now_us);
     if (!wrote) step_slow(now_us);
-    pilot_.step(config_, supply_.good(), outlet_, hal::now_us());
+    pilot_.step(config_, supply_.good(), inputs_, outlet_, hal::now_us());
   }
   // Nor is a job begun and worked on in one turn: deciding that a file is closed and building its
   // last block together took 3.7 ms. A part of the status line with a job, in turn after turn, let
@@ -121,7 +123,8 @@ uint32_t Instrument::idle_us() {
 
 // Not in step(): saving its registers in every turn took 0.4 % of the chip.
 __attribute__((noinline)) bool Instrument::write_status(uint32_t now_us) {
-  return status_.step(recorder_, sensors_, pilot_, store_.reference_mv(), outlet_.usb(), now_us);
+  return status_.step(
+      recorder_, sensors_, pilot_, store_.reference_mv(), inputs_, outlet_.usb(), now_us);
 }
 
 // What need not be done every turn takes turns: each of it every eighth, some 8 ms. A turn
@@ -133,10 +136,14 @@ void Instrument::step_slow(uint32_t now_us) {
       store_.poll();
       return;
     case 1:
-      panel_.step(recorder_, pilot_.relay_lost(), now_us);
+      panel_.step(recorder_, pilot_.relay_lost(), inputs_, now_us);
       return;
     case 2:
       status_.poll(recorder_.recording(), outlet_.usb(), now_us);
+      return;
+    case 3:
+      inputs_.step_slow(pilot_, sensors_, airborne_.state(), config_, outlet_, now_us);
+      listen(now_us);
       return;
     case 4:
       if (telemetry_.poll(now_us)) put_telemetry_heads(now_us);
@@ -153,6 +160,7 @@ void Instrument::step_slow(uint32_t now_us) {
       return;
     case 7:
       pass_self_test();
+      listen(now_us);
       return;
     default:
       return;
@@ -160,7 +168,8 @@ void Instrument::step_slow(uint32_t now_us) {
 }
 
 void Instrument::decide_recording(uint32_t now_us) {
-  const core::PilotInputs pilot = pilot_.inputs(config_);
+  core::PilotInputs pilot = pilot_.inputs(config_);
+  pilot.button_down = inputs_.button(pilot.button_down);
   core::AirborneInputs seen;
   sensors_.airborne_inputs(&seen);
   seen.throttle_valid = pilot.throttle_valid;
@@ -171,6 +180,12 @@ void Instrument::decide_recording(uint32_t now_us) {
     outlet_.event(frames::Event::kFlightState, static_cast<uint32_t>(state), now_us);
   }
   recorder_.decide(pilot, airborne_, config_, now_us);
+}
+
+// Lines stay whole: no answer within one.
+void Instrument::listen(uint32_t now_us) {
+  if (status_.has_line()) return;
+  card_console_.step(ring_, pilot_, airborne_.state(), config_, inputs_, now_us);
 }
 
 // As soon as the supply is measured; put_system() takes it back.
@@ -213,7 +228,7 @@ void Instrument::put_system(uint32_t now_us) {
   frame.stack_free_min = hal::stack_free_bytes();
   frame.drive = static_cast<uint8_t>(pilot_.drive());
   // All this took 1.3 ms and the rest takes 0.4: see step().
-  pilot_.step(config_, supply_.good(), outlet_, hal::now_us());
+  pilot_.step(config_, supply_.good(), inputs_, outlet_, hal::now_us());
   outlet_.put(frame);
   loop_max_us_ = 0;
   asleep_us_ = 0;

@@ -4,6 +4,7 @@
 #include <stdint.h>
 
 #include "app/ascii_row.h"
+#include "app/card_console.h"
 #include "app/outlet.h"
 #include "app/panel.h"
 #include "app/pilot_link.h"
@@ -12,6 +13,7 @@
 #include "app/status.h"
 #include "app/store.h"
 #include "app/telemetry.h"
+#include "app/test_inputs.h"
 #include "core/airborne.h"
 #include "core/byte_ring.h"
 #include "core/supply.h"
@@ -39,6 +41,7 @@ class Instrument {
   void step_slow(uint32_t now_us);
   bool write_status(uint32_t now_us);
   void decide_recording(uint32_t now_us);
+  void listen(uint32_t now_us);
   uint32_t idle_us();
   void pass_self_test();
   void put_system(uint32_t now_us);
@@ -51,11 +54,13 @@ class Instrument {
   AsciiRow ascii_row_;
   Outlet outlet_{ring_, telemetry_};
   Store store_;
+  TestInputs inputs_;
   PilotLink pilot_;
   Sensors sensors_;
   Recorder recorder_{ring_, outlet_, store_, sensors_};
   Panel panel_;
   Status status_;
+  CardConsole card_console_;
   core::Airborne airborne_;
   core::Every second_;
   uint32_t turn_us_ = 0;    // when this turn of the loop began

@@ -7,6 +7,7 @@
 #include "app/telemetry.h"
 #include "app/usb_channels.h"
 #include "core/byte_ring.h"
+#include "core/input_command.h"
 #include "generated/frames.h"
 
 namespace app {
@@ -76,6 +77,13 @@ class Outlet {
     waiting_count_ = 0;
   }
   void close() { logging_ = false; }
+  bool logging() const { return logging_; }
+  uint8_t dropped() const { return static_cast<uint8_t>(ring_.dropped()); }  // and round again
+  bool quiet() const { return ring_.free() > ring_.capacity() / 2; }  // room for what can wait
+
+  // Events wait between sessions only, so in one their memory is lent to the test input: to be
+  // asked for at each use, null while it is theirs.
+  core::InputMemory* lend() { return logging_ && waiting_count_ == 0 ? &input_memory_ : nullptr; }
 
  private:
   static constexpr uint8_t kWaiting = 8;
@@ -84,7 +92,10 @@ class Outlet {
   core::ByteRing& ring_;
   Telemetry& telemetry_;
   UsbChannels usb_;
-  frames::EventFrame waiting_[kWaiting] = {};
+  union {
+    frames::EventFrame waiting_[kWaiting] = {};
+    core::InputMemory input_memory_;
+  };
   uint8_t waiting_count_ = 0;
   uint8_t frames_ = 0;
   bool logging_ = false;

@@ -14,6 +14,7 @@ constexpr uint32_t kWorkUs = 1000000UL;
 constexpr uint32_t kWorkLitUs = 100000UL;
 constexpr uint32_t kWorkLitUsPerPercent = 8000UL;
 constexpr uint8_t kRelayFlashes = 9;
+constexpr uint8_t kQuick = 0x80;
 
 }  // namespace
 
@@ -40,7 +41,8 @@ uint8_t trouble_flashes(Recorder::State state, storage::VolumeStatus status) {
   return 0;
 }
 
-void Panel::step(const Recorder& recorder, bool relay_lost, uint32_t now_us) {
+void Panel::step(const Recorder& recorder, bool relay_lost, TestInputs& inputs, uint32_t now_us) {
+  if (show_input(inputs, now_us)) return;
   const Recorder::State state = recorder.state();
   if (state != shown_) {
     if (state == Recorder::State::kRecording) tones_ = 2;
@@ -81,6 +83,31 @@ void Panel::step(const Recorder& recorder, bool relay_lost, uint32_t now_us) {
     return;
   }
   sound(now_us);
+}
+
+// While one runs, and until its beeps are over, nothing else is heard.
+bool Panel::show_input(TestInputs& inputs, uint32_t now_us) {
+  const uint8_t beeps = inputs.take_beeps();
+  if (beeps != 0) {
+    tones_ = static_cast<uint8_t>(kQuick | (2U * beeps + 1U));  // behind a pause
+    tone_us_ = now_us;
+  }
+  if (inputs.running()) {
+    const bool on = alarm(now_us);
+    hal::set_led(on);
+    hal::set_buzzer(on);
+    return true;
+  }
+  if ((tones_ & kQuick) == 0) return false;
+  if (now_us - tone_us_ >= kHalfFlashUs) {
+    tone_us_ = now_us;
+    --tones_;
+  }
+  const bool on = tones_ != kQuick && tones_ % 2 == 0;
+  if (tones_ == kQuick) tones_ = 0;
+  hal::set_led(on);
+  hal::set_buzzer(on);
+  return true;
 }
 
 bool Panel::alarm(uint32_t now_us) {

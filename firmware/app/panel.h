@@ -2,28 +2,32 @@
 // fast blinks while an open file waits for the throttle, one blink a second that grows longer as
 // the work on the card goes on, else groups of flashes that say what is wrong. Buzzer: one long
 // tone at the start, two at the end, groups of beeps with the flashes, quick beeps while the
-// throttle is above idle and nothing can be recorded.
+// throttle is above idle and nothing can be recorded. A test input: quick flashes and chirps while
+// it runs, then quick beeps: 1 done, 2 pilot, 4 receiver or relay, 5 a limit left, 6 a sensor,
+// 7 recorder, loop, supply or row; 3: the card is enabled.
 #pragma once
 
 #include <stdint.h>
 
 #include "app/recorder.h"
+#include "app/test_inputs.h"
 
 namespace app {
 
 class Panel {
  public:
   // `relay_lost`: the relay did not follow the heartbeat.
-  void step(const Recorder& recorder, bool relay_lost, uint32_t now_us);
+  void step(const Recorder& recorder, bool relay_lost, TestInputs& inputs, uint32_t now_us);
 
  private:
   void sound(uint32_t now_us);
+  bool show_input(TestInputs& inputs, uint32_t now_us);
   bool alarm(uint32_t now_us);
 
   uint32_t turned_us_ = 0;
   uint32_t tone_us_ = 0;
   uint8_t flash_ = 0;  // half periods since the group began
-  uint8_t tones_ = 0;  // half periods of the tone still to come
+  uint8_t tones_ = 0;  // half periods of the tone still to come; kQuick: of quick ones
   bool alarm_on_ = false;
   Recorder::State shown_ = Recorder::State::kNoFile;
 };

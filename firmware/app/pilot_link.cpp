@@ -17,11 +17,13 @@ void PilotLink::start() {
 
 void PilotLink::step(const frames::ConfigFrame& config,
                      bool self_test_passed,
+                     TestInputs& inputs,
                      Outlet& outlet,
                      uint32_t now_us) {
   ran(kTaskPilot);
   hal::Edge edge;
-  bool due = decoder_.waiting() || now_us - polled_us_ >= kPollUs;
+  const bool running = inputs.running();
+  bool due = decoder_.waiting() || now_us - polled_us_ >= (running ? kInputPollUs : kPollUs);
   while (hal::take_edge(&edge)) {
     decoder_.edge(core::extend_ticks(hal::now_ticks(), edge.at_ticks), edge.levels, edge.late);
     due = due || decoder_.waiting();
@@ -29,11 +31,19 @@ void PilotLink::step(const frames::ConfigFrame& config,
   if (!due) return;
   polled_us_ = now_us;
   poll_receiver(outlet, now_us);
-  const uint16_t rest_us = drive_.drive() == frames::Drive::kMegaHolding ? kHoldingRestUs : kRestUs;
+  uint16_t rest_us = drive_.drive() == frames::Drive::kMegaHolding ? kHoldingRestUs : kRestUs;
+  // A frame and a half of silence ends an input at once: looked for each 2 ms.
+  const uint8_t now_2ms = static_cast<uint8_t>(now_us >> kSilenceShift);
+  if (running && now_2ms != silence_2ms_) {
+    silence_2ms_ = now_2ms;
+    const uint16_t frame_us = decoder_.frame_us();
+    const bool silent = decoder_.oldest_us(hal::now_ticks()) > frame_us + frame_us / 2U;
+    if (silent) rest_us = 0;
+  }
   if (now_us - decided_us_ >= rest_us || decoder_.changes() != decided_changes_) {
     decided_us_ = now_us;
     decided_changes_ = decoder_.changes();
-    decide(config, self_test_passed, outlet, now_us);
+    decide(config, self_test_passed, inputs, outlet, now_us);
   }
 }
 
@@ -53,18 +63,24 @@ void PilotLink::poll_receiver(Outlet& outlet, uint32_t now_us) {
 
 void PilotLink::decide(const frames::ConfigFrame& config,
                        bool self_test_passed,
+                       TestInputs& inputs,
                        Outlet& outlet,
                        uint32_t now_us) {
   channels_ = core::map_channels(decoder_, config);
   if (!drive_.relay()) look_at_contact(now_us);
   drive_.update(channels_, config, self_test_passed && !contact_stuck_, now_us);
+  inputs.decide(channels_, decoder_, drive_.drive(), self_test_passed, config, outlet, now_us);
+  send(inputs, outlet);
+  report(outlet, now_us);
+}
+
+void PilotLink::send(TestInputs& inputs, Outlet& outlet) {
   for (uint8_t servo = 0; servo < core::kServos; ++servo) {
-    const uint16_t ticks = drive_.servo_ticks(servo);
+    const uint16_t ticks = inputs.servo_ticks(servo, drive_.servo_ticks(servo), outlet);
     if (ticks == sent_ticks_[servo]) continue;
     sent_ticks_[servo] = ticks;
     hal::set_servo_pulse(servo, ticks);
   }
-  report(outlet, now_us);
 }
 
 // Part of the self-test: before the first edge, and some time after the last, the contact is open.

@@ -4,6 +4,7 @@
 #include <stdint.h>
 
 #include "app/outlet.h"
+#include "app/test_inputs.h"
 #include "core/drive.h"
 #include "core/health.h"
 #include "core/rc_decoder.h"
@@ -22,8 +23,11 @@ class PilotLink {
   // may have been accepted, else every kRestUs.
   void step(const frames::ConfigFrame& config,
             bool self_test_passed,
+            TestInputs& inputs,
             Outlet& outlet,
             uint32_t now_us);
+  // The pulses anew, because an input ended.
+  void send(TestInputs& inputs, Outlet& outlet);
   // Turns the heartbeat over and feeds the watchdog once every task has run.
   void ran(Task task) { health_.ran(static_cast<uint8_t>(task)); }
   // By its name a test on the chip stops it.
@@ -33,7 +37,7 @@ class PilotLink {
   const core::RcChannels& channels() const { return channels_; }
   const core::RcDecoder& decoder() const { return decoder_; }
   frames::Drive drive() const { return drive_.drive(); }
-  uint16_t servo_ticks(uint8_t servo) const { return drive_.servo_ticks(servo); }
+  uint16_t servo_ticks(uint8_t servo) const { return sent_ticks_[servo]; }  // 0: no pulse
   // The relay's contact says engaged although no heartbeat holds it: it must not be used.
   bool contact_stuck() const { return contact_stuck_; }
   // It did not follow the heartbeat, and has not been engaged since: an alarm.
@@ -42,6 +46,8 @@ class PilotLink {
  private:
   static constexpr uint16_t kPollUs = 3500;  // pulses that stay away show within this
   static constexpr uint16_t kRestUs = 10000;
+  static constexpr uint16_t kInputPollUs = 2000;  // while an input runs
+  static constexpr uint8_t kSilenceShift = 11;
   static constexpr uint32_t kReleaseUs = 200000UL;  // by then a contact is open again
   static constexpr uint16_t kHoldingRestUs = 1000;  // a hold ends on time
 
@@ -50,6 +56,7 @@ class PilotLink {
   void poll_receiver(Outlet& outlet, uint32_t now_us);
   void decide(const frames::ConfigFrame& config,
               bool self_test_passed,
+              TestInputs& inputs,
               Outlet& outlet,
               uint32_t now_us);
   void report(Outlet& outlet, uint32_t now_us);
@@ -67,6 +74,7 @@ class PilotLink {
   frames::Drive told_drive_ = frames::Drive::kDirectBoot;
   uint8_t told_missing_ = (1U << core::kChannels) - 1;
   uint8_t decided_changes_ = 0;
+  uint8_t silence_2ms_ = 0;
   bool stormy_ = false;
   bool toggled_ = false;  // a heartbeat edge may hold the relay
   bool contact_stuck_ = false;

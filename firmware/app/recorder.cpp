@@ -34,9 +34,13 @@ constexpr uint16_t kLastWords = 2 * frames::kEventWireSize + frames::kFileWireSi
 // Blocks the end of a session may need: the ring, and a return of the schema under way.
 constexpr uint32_t kEndBlocks = 32;
 
+// `from` lies in program memory.
 void copy_text(char* to, const char* from, uint8_t size) {
   memset(to, 0, size);
-  for (uint8_t i = 0; i + 1 < size && from[i] != '\0'; ++i) to[i] = from[i];
+  for (uint8_t i = 0; i + 1 < size; ++i) {
+    to[i] = static_cast<char>(core::flash_u8(from + i));
+    if (to[i] == '\0') return;
+  }
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ constexpr uint32_t kMagUs = 1000000UL / 15U;
 constexpr uint32_t kAttitudeUs = 100000UL;
 constexpr uint32_t kImuSilentUs = 100000UL;
 constexpr int32_t kScanDeadUs = 2L * hal::kScanUs;
+constexpr uint32_t kScanAheadUs = 1000;
 constexpr uint32_t kGpsSilentUs = 2000000UL;
 
 // An open or shorted sensor sits within two counts of a rail (sums of four conversions).
@@ -23,6 +24,12 @@ constexpr uint16_t kFullSum = 1023U * hal::kAnalogRounds;
 
 bool usable(uint16_t sum) {
   return sum >= kRailCounts && sum <= kFullSum - kRailCounts;
+}
+
+// A scan may begin some microseconds behind the packet that tells of it.
+uint32_t age_us(uint32_t since_us, uint32_t now_us) {
+  const uint32_t age = now_us - since_us;
+  return since_us - now_us < kScanAheadUs ? 0 : age;
 }
 
 }  // namespace
@@ -279,6 +286,41 @@ void Sensors::airborne_inputs(core::AirborneInputs* out) const {
              gps.ground_speed != frames::kGpsGroundSpeedInvalid;
   out->ground_speed_cmps = gps.ground_speed;
   out->static_pressure = barometer_.present() ? barometer_.frame().static_pressure : 0;
+}
+
+void Sensors::input_readings(core::InputReadings* out, uint32_t now_us) const {
+  const core::ImuSample& sample = imu_.sample();
+  out->rates[0] = sample.p;
+  out->rates[1] = sample.q;
+  out->rates[2] = sample.r;
+  out->force[0] = sample.ax;
+  out->force[1] = sample.ay;
+  out->force[2] = sample.az;
+  out->phi = sample.phi;
+  out->theta = sample.theta;
+  // Of an original packet neither scale nor age is known.
+  out->imu = imu_present_ && !sample.original && sample.unsaturated &&
+             (sample.flags & frames::kImuFlagsAttitudeValid) != 0;
+  out->imu_age_us = age_us(sample.start_us, now_us);
+  out->alpha[0] = ident_.alpha_a;
+  out->alpha[1] = ident_.alpha_b;
+  out->beta[0] = ident_.beta_a;
+  out->beta[1] = ident_.beta_b;
+  out->pitot[0] = ident_.dp_a;
+  out->pitot[1] = ident_.dp_b;
+  out->valid = analog_;
+  out->rail = rail_;
+  out->scan_age_us = age_us(ident_.t_us, now_us);
+  const frames::BaroFrame& baro = barometer_.frame();
+  out->static_pressure = barometer_.present() ? baro.static_pressure : 0;
+  out->baro_age_us = age_us(baro.t_us, now_us);
+  const frames::GpsFrame& gps = gps_.frame();
+  out->latitude = gps.latitude;
+  out->longitude = gps.longitude;
+  out->gps = gps_present_ && gps.fix >= static_cast<uint8_t>(frames::GpsFix::kFix2d) &&
+             gps.latitude != frames::kGpsLatitudeInvalid &&
+             gps.longitude != frames::kGpsLongitudeInvalid;
+  out->gps_age_us = age_us(gps_heard_us_, now_us);
 }
 
 void Sensors::put_health(frames::SystemFrame* out) {

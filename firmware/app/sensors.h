@@ -41,6 +41,7 @@ class Sensors {
   uint16_t analog() const { return analog_; }
   uint16_t rail() const { return rail_; }
   // What tells of flying or the ground; the receiver's part is left to the caller.
+  void input_readings(core::InputReadings* out, uint32_t now_us) const;
   void airborne_inputs(core::AirborneInputs* out) const;
 
  private:

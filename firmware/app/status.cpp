@@ -1,5 +1,6 @@
 #include "app/status.h"
 
+#include "app/card_store.h"
 #include "app/version.h"
 #include "core/progmem.h"
 #include "core/supply.h"
@@ -47,6 +48,10 @@ constexpr char kRelayText[] CORE_FLASH = " | relay ";
 constexpr char kReleased[] CORE_FLASH = "released";
 constexpr char kEngaged[] CORE_FLASH = "engaged";
 constexpr char kStuck[] CORE_FLASH = "stuck";
+constexpr char kInputsText[] CORE_FLASH = " | inputs ";
+constexpr char kRowsText[] CORE_FLASH = " rows ";
+constexpr char kOffText[] CORE_FLASH = " off";
+constexpr char kEnabledText[] CORE_FLASH = " enabled";
 constexpr char kRailText[] CORE_FLASH = " | rail";
 constexpr char kSupplyText[] CORE_FLASH = " | avcc ";
 constexpr char kMillivolt[] CORE_FLASH = " mV";
@@ -125,7 +130,7 @@ const char* volume_text(storage::VolumeStatus status) {
 }  // namespace
 
 void Status::name(TextOut* out) {
-  out->ram(hal::board_name());
+  out->flash(hal::board_name());
   out->letter(' ');
   out->flash(kVersion);
   if (hal::image_hash() == 0) return;
@@ -151,6 +156,7 @@ bool Status::step(const Recorder& recorder,
                   const Sensors& sensors,
                   const PilotLink& pilot,
                   uint16_t reference_mv,
+                  TestInputs& inputs,
                   UsbChannels& channels,
                   uint32_t now_us) {
   if (out_.room() < kLongestPart) return false;
@@ -196,6 +202,9 @@ bool Status::step(const Recorder& recorder,
         out_.flash(hal::relay_engaged() ? kEngaged : kReleased);
       }
       break;
+    case Part::kInputs:
+      this->inputs(inputs);
+      break;
     case Part::kCard:
       card(recorder);
       break;
@@ -215,7 +224,18 @@ bool Status::step(const Recorder& recorder,
       return false;
   }
   part_ = static_cast<Part>(static_cast<uint8_t>(part_) + 1U);
+  // Nothing to say without a card, and no turn spent on it.
+  if (part_ == Part::kInputs && inputs.rows() == 0) part_ = Part::kCard;
   return true;
+}
+
+void Status::inputs(TestInputs& inputs) {
+  out_.flash(kInputsText);
+  out_.hex(card_hash());
+  out_.flash(kRowsText);
+  out_.number(inputs.rows());
+  out_.flash(inputs.enabled() ? kEnabledText : kOffText);
+  inputs.hash_was_shown();
 }
 
 bool Status::found(const Sensors& sensors, uint8_t bits) {

@@ -24,6 +24,7 @@ class Status {
             const Sensors& sensors,
             const PilotLink& pilot,
             uint16_t reference_mv,
+            TestInputs& inputs,
             UsbChannels& channels,
             uint32_t now_us);
 
@@ -38,6 +39,7 @@ class Status {
     kReceiver,
     kServos,
     kRelay,
+    kInputs,
     kCard,
     kRail,
     kSupply,
@@ -56,6 +58,7 @@ class Status {
   void receiver(const PilotLink& pilot);
   void card(const Recorder& recorder);
   void work(const Recorder& recorder);
+  void inputs(TestInputs& inputs);
 
   TextOut out_{hal::Port::kUsb};
   core::Every turn_;

@@ -13,9 +13,12 @@ namespace app {
 class Store {
  public:
   static constexpr uint16_t kSettingsAddress = 0;
+  static constexpr uint16_t kInputSettingsAddress = 48;
   static constexpr uint16_t kSlotsAddress = 64;
   static constexpr uint16_t kReferenceAddress = hal::kEepromBytes - core::kReferenceRecordSize;
-  static_assert(core::kSettingsRecordSize <= kSlotsAddress, "the records do not overlap");
+  static_assert(core::kSettingsRecordSize <= kInputSettingsAddress &&
+                    kInputSettingsAddress + core::kInputSettingsRecordSize <= kSlotsAddress,
+                "the records do not overlap");
 
   // Reads everything; a boot is counted. Writing goes on in poll().
   core::SettingsStatus load(frames::ConfigFrame* config);

@@ -12,10 +12,6 @@ void TextOut::flash(const char* flash) {
   }
 }
 
-void TextOut::ram(const char* text) {
-  while (*text != '\0') letter(*text++);
-}
-
 void TextOut::number(int32_t value) {
   fixed(value, 0);
 }

@@ -14,7 +14,6 @@ class TextOut {
   uint16_t room() const { return hal::send_room(port_); }
   // `flash` lies in program memory.
   void flash(const char* flash);
-  void ram(const char* text);
   void number(int32_t value);
   // value / 10^places, with that many digits behind the point.
   void fixed(int32_t value, uint8_t places);

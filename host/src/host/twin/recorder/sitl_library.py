@@ -190,6 +190,10 @@ class Sitl:
         """Add bytes from the GPS receiver: ticks (n,), bytes (n,)."""
         self._add("sitl_add_gps", at, data)
 
+    def add_usb(self, at: npt.ArrayLike, data: npt.ArrayLike) -> None:
+        """Add bytes that the USB line brings: ticks (n,), bytes (n,)."""
+        self._add("sitl_add_usb", at, data)
+
     def add_button(self, at: npt.ArrayLike, pressed: npt.ArrayLike) -> None:
         """Add changes of the button: ticks (n,), 1 for pressed (n,)."""
         self._add("sitl_add_button", at, pressed)

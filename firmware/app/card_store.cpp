@@ -1,0 +1,88 @@
+#include "app/card_store.h"
+
+namespace app {
+
+using core::CardHead;
+using core::CardRow;
+using frames::CardFault;
+
+namespace {
+
+void add_bytes(core::Crc32* crc, uint16_t address, uint16_t size) {
+  for (; size != 0; --size) {
+    const uint8_t byte = hal::read_eeprom(address++);
+    crc->add(&byte, 1);
+  }
+}
+
+bool hash_holds(const CardHead& head) {
+  core::Crc32 crc;
+  crc.add(&head, core::kCardFieldsBytes);
+  const uint8_t parts = static_cast<uint8_t>(frames::kCardHeadParts - 2U + head.rows);
+  add_bytes(&crc, card_part_address(2), static_cast<uint16_t>(parts * frames::kCardPartBytes));
+  return head.crc != 0 && crc.value() == head.crc;
+}
+
+// Apart, so that head and row never lie on the stack together.
+__attribute__((noinline)) CardFault judge_card_head(const char* aircraft, core::RowLimits* limits) {
+  CardHead head;
+  read_card(0, &head, sizeof head);
+  const CardFault fault = core::judge_head(head, aircraft);
+  if (fault != CardFault::kNone && fault != CardFault::kAircraft && fault != CardFault::kLimits) {
+    return fault;
+  }
+  if (!hash_holds(head)) return CardFault::kCrc;
+  *limits = core::row_limits(head);
+  return fault;
+}
+
+__attribute__((noinline)) CardFault judge_card_row(uint8_t row, const core::RowLimits& limits) {
+  CardRow bytes;
+  read_card_row(row, &bytes);
+  return core::judge_row(bytes, limits);
+}
+
+}  // namespace
+
+void read_card(uint16_t offset, void* to, uint8_t size) {
+  hal::read_eeprom_bytes(static_cast<uint16_t>(kCardAddress + offset), to, size);
+}
+
+void read_card_part(uint8_t part, uint8_t* to) {
+  read_card(static_cast<uint16_t>(part * frames::kCardPartBytes), to, frames::kCardPartBytes);
+}
+
+uint16_t card_u16(uint16_t offset) {
+  uint16_t value;
+  read_card(offset, &value, sizeof value);
+  return value;
+}
+
+CardFault judge_card(const char* aircraft) {
+  core::RowLimits limits;
+  const CardFault head = judge_card_head(aircraft, &limits);
+  if (head != CardFault::kNone) return head;
+  for (uint8_t row = 0; row < card_rows(); ++row) {
+    const CardFault fault = judge_card_row(row, limits);
+    if (fault != CardFault::kNone) return fault;
+  }
+  return CardFault::kNone;
+}
+
+bool card_marked_valid() {
+  return hal::read_eeprom(kCardValidAddress) == kCardValid;
+}
+
+uint32_t card_hash() {
+  uint32_t hash;
+  read_card(offsetof(CardHead, crc), &hash, sizeof hash);
+  return hash;
+}
+
+uint8_t card_rows() {
+  uint8_t rows;
+  read_card(offsetof(CardHead, rows), &rows, sizeof rows);
+  return rows;
+}
+
+}  // namespace app
