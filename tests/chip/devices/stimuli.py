@@ -171,6 +171,10 @@ class Replay:
             volt = stimuli.analog[:, column] * (5.0 / 1024.0)
             chip.analog_profile(adc_channel(pins[name]), grid, volt)
 
+    def change(self, stimuli: Stimuli) -> None:
+        """Go on with edges, packets and GPS that are the same up to 0.2 s from now."""
+        self._given = stimuli
+
     def plan(self, kind: str, at_tick: int, value: float = 0.0) -> None:
         """Plan a fault.
 

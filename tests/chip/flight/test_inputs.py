@@ -1,0 +1,187 @@
+"""Test inputs on the chip: as commanded, given up in time, the recorder's figures beside them.
+
+One flight to the middle of an input; each fault begins there, in a child process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from copy import deepcopy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flight.faults.program import HANG, NOW_US
+from flight.input_rig import CYCLES_PER_TICK, TICKS_PER_S, InputRig
+from flight.rig import make_card
+from simavr_bench import Image, ResetCause
+from simavr_bench.fork import in_fork
+
+from tests.sitl import flight_cards as cards
+from tests.sitl.input_faults import ROWS
+from tests.sitl.input_flight import (
+    AILERON,
+    DIRECT_US,
+    ELEVATOR,
+    MEGA_US,
+    PACKET_S,
+    SWITCH,
+    TRIGGER_S,
+    UP_S,
+    InputFlight,
+    input_flight,
+)
+from tests.sitl.input_judge import Trigger, deflected, slewed, wrong_pulses
+from tests.sitl.input_shapes import shape_of
+
+ROW = ROWS[4]  # a multisine on three axes: the longest to compute
+QUIET_S, LENGTH_S = 0.2, 2.0
+FORK_S = TRIGGER_S + 0.5
+FAULT_S = FORK_S + 0.4
+NEAR_TICKS = 8  # a width measured on the chip is 2.6 us off at most
+PLAIN_S = 0.025
+
+
+@pytest.fixture(scope="module")
+def running(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[InputRig]:
+    """A rig in the middle of an input: for children made by in_fork only."""
+    card = make_card(tmp_path_factory.mktemp("inputs") / "card.img")
+    flight = input_flight(TRIGGER_S + QUIET_S + LENGTH_S + 1.0, np.random.default_rng(30_020))
+    flight.width_us[int((UP_S + 1.0) / flight.frame_s) :, :3] = 1500
+    rig = InputRig(flight_elf, card, flight, cards.eeprom_with(cards.card([ROW])))
+    rig.run_to(FORK_S)
+    yield rig
+    rig.chip.close()
+
+
+def wrong(rig: InputRig, known_s: float | None, within_s: float = PLAIN_S) -> list[str]:
+    """Return what is wrong with the servo pulses."""
+    shape = slewed(shape_of(ROW), cards.HEAD["rate_max_usps"])
+    end_s = TRIGGER_S + QUIET_S + LENGTH_S + 0.085
+    trigger = Trigger(TRIGGER_S, end_s, QUIET_S, shape)
+    pulses = rig.pulses()
+    found = wrong_pulses(pulses, rig.flight, trigger, near=NEAR_TICKS)
+    begun = deflected(pulses, rig.flight, 0.0, near=NEAR_TICKS)
+    if begun.size < 20:
+        found.append("no input was seen")
+    if known_s is not None:
+        late = deflected(pulses, rig.flight, known_s + within_s, near=NEAR_TICKS)
+        found += [f"deflected at {at / TICKS_PER_S:.4f} s" for at in late[:3]]
+    return found
+
+
+def frame(flight: InputFlight, at_s: float) -> int:
+    return int(np.ceil(at_s / flight.frame_s))
+
+
+def test_a_row_on_the_chip_is_what_the_page_says(running: InputRig) -> None:
+    """Pulses as commanded, no turn of the loop late, nothing lost."""
+
+    def fly() -> tuple[list[str], int, int]:
+        running.run_to(running.flight.seconds)
+        dropped = running.chip.uart_lost(2)
+        return wrong(running, None), dropped, running.replay.card.count().lost
+
+    said, uart_lost, blocks_lost = in_fork(fly)
+    assert said == []
+    assert (uart_lost, blocks_lost) == (0, 0)
+
+
+def _stick(flight: InputFlight) -> float:
+    first = frame(flight, FAULT_S)
+    flight.width_us[first:, ELEVATOR] += 100
+    return first * flight.frame_s + 0.001 + 0.0023 * ELEVATOR + 0.0025
+
+
+def _switch(flight: InputFlight) -> float:
+    first = frame(flight, FAULT_S)
+    flight.width_us[first:, SWITCH] = MEGA_US
+    return first * flight.frame_s + 0.001 + 0.0023 * SWITCH + 0.0025
+
+
+def _silence(flight: InputFlight) -> float:
+    first = frame(flight, FAULT_S)
+    flight.width_us[first:] = 0
+    return (first - 1) * flight.frame_s + 0.001 + 1.5 * flight.frame_s
+
+
+def _channel(flight: InputFlight) -> float:
+    first = frame(flight, FAULT_S)
+    flight.width_us[first:, AILERON] = 0
+    return (first - 1) * flight.frame_s + 0.001 + 1.5 * flight.frame_s
+
+
+def _imu_silent(flight: InputFlight) -> float:
+    flight.imu_sent[int(FAULT_S / PACKET_S) :] = False
+    return FAULT_S + 0.030
+
+
+def _imu_bank(flight: InputFlight) -> float:
+    packet = int(FAULT_S / PACKET_S)
+    flight.imu[packet:, 6] = 6200
+    return packet * PACKET_S + 0.005
+
+
+def _direct(flight: InputFlight) -> float:
+    first = frame(flight, FAULT_S)
+    flight.width_us[first:, SWITCH] = DIRECT_US
+    return first * flight.frame_s + 0.001 + 0.0023 * SWITCH + 0.0025
+
+
+@pytest.mark.parametrize(
+    "fault", [_stick, _switch, _direct, _silence, _channel, _imu_silent, _imu_bank]
+)
+def test_plain_pulses_behind_a_fault_of_the_pilots_link_or_the_imu(
+    running: InputRig, fault: Callable[[InputFlight], float]
+) -> None:
+    def fly() -> list[str]:
+        flight = deepcopy(running.flight)
+        known_s = fault(flight)
+        running.change(flight)
+        running.run_to(FAULT_S + 0.4)
+        return wrong(running, known_s)
+
+    assert in_fork(fly) == []
+
+
+def _alpha_open(rig: InputRig) -> float:
+    rig.chip.analog(1, 5.0)
+    return 0.016
+
+
+def _baro_off(rig: InputRig) -> float:
+    rig.replay.baro.present = False
+    return 0.150
+
+
+def _button(rig: InputRig) -> float:
+    rig.chip.drive(rig.pins["button"], False)
+    return 0.007
+
+
+def _watchdog(rig: InputRig) -> float:
+    rig.chip.reset(ResetCause.WATCHDOG)
+    return -PLAIN_S
+
+
+def _hang(rig: InputRig) -> float:
+    """The last pulse is repeated by the timer; 50 ms later the relay has given it up."""
+    rig.chip.load(Image({rig.chip.symbols[NOW_US][0]: HANG}))
+    return 0.050
+
+
+@pytest.mark.parametrize("fault", [_alpha_open, _baro_off, _button, _watchdog, _hang])
+def test_plain_pulses_behind_a_fault_of_the_board(
+    running: InputRig, fault: Callable[[InputRig], float]
+) -> None:
+    def fly() -> list[str]:
+        running.run_to(FAULT_S)
+        behind_s = fault(running)
+        running.run_to(FAULT_S + 0.5)
+        if fault is _hang:
+            cycle = running.zero + round((FAULT_S + behind_s) * TICKS_PER_S) * CYCLES_PER_TICK
+            mega = [c for c, state in running.relay.contacts if state == 2 and c > cycle]
+            return ["the relay is engaged"] if mega or running.relay.engaged else []
+        return wrong(running, FAULT_S + behind_s)
+
+    assert in_fork(fly) == []

@@ -1,0 +1,80 @@
+"""Flight cards made byte by byte from `packets.json`, and put into an EEPROM."""
+
+from __future__ import annotations
+
+import binascii
+import json
+import struct
+import zlib
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+VALID_AT, CARD_AT, VALID = 1024, 1040, 0xC5  # app/card_store.h
+EEPROM_BYTES = 4096
+PULSE, DOUBLET, THREE_TWO_ONE_ONE, SWEEP, MULTISINE = range(1, 6)
+FORMATS = {"u8": "B", "char": "s", "u16": "H", "i16": "h", "u32": "I"}
+
+# What the aircraft of these flights may do: wide where a flight does not ask for less.
+HEAD: dict[str, Any] = {
+    "magic": 0x4346, "version": 1, "aircraft": b"ultrastick25e",
+    "airspeed_input": 4, "alpha_input": 0, "beta_input": 2,
+    "dp_min": 2100, "dp_max": 3600, "alpha_min": 1200, "alpha_max": 2900,
+    "beta_min": 1200, "beta_max": 2900, "phi_max": 6000, "theta_min": -3000, "theta_max": 3000,
+    "p_max": 20000, "q_max": 12000, "r_max": 12000, "az_min": -24000, "az_max": 0,
+    "height_min_pa": 200, "height_max_pa": 2400, "distance_max_m": 400, "still_ms": 500,
+    "stick_us": 40, "servo_min_us": (1050, 1050, 1050), "servo_max_us": (1950, 1950, 1950),
+    "amplitude_max_us": (200, 200, 200), "rate_max_usps": 4000, "frequency_max_chz": 500,
+}  # fmt: skip
+ROW: dict[str, Any] = {"shape": DOUBLET, "axes": 2, "quiet_ms": 200, "duration_ms": 1000,
+                       "amplitude_us": (0, 100, 0)}  # fmt: skip
+
+
+@cache
+def _layouts() -> dict[str, Any]:
+    text = (ROOT / "protocol" / "generated" / "packets.json").read_text(encoding="utf-8")
+    layouts: dict[str, Any] = json.loads(text)["layouts"]
+    return layouts
+
+
+def _packed(name: str, values: dict[str, Any]) -> bytes:
+    """Return a layout's bytes; what is not given is zero."""
+    out = b""
+    for field, kind, *_ in _layouts()[name]["fields"]:
+        base, _, length = kind.rstrip("]").partition("[")
+        count = int(length or 1)
+        value = values.get(field, b"" if base == "char" else 0)
+        if base == "char":
+            out += struct.pack(f"<{count}s", value)
+        else:
+            numbers = value if isinstance(value, Sequence) else [value] * count
+            out += struct.pack(f"<{count}{FORMATS[base]}", *numbers)
+    return out
+
+
+def row(**changed: Any) -> bytes:
+    """Return a row with its CRC; a doublet of the elevator where nothing else is said."""
+    body = _packed("card_row", ROW | changed)[:-2]
+    return body + struct.pack("<H", binascii.crc_hqx(body, 0xFFFF))
+
+
+def card(rows: Sequence[bytes], **changed: Any) -> bytes:
+    """Return a whole card with its hash."""
+    head = _packed("card_head", HEAD | {"rows": len(rows)} | changed)[:-4]
+    rest = bytes(48) + b"".join(rows)
+    return head + struct.pack("<I", zlib.crc32(head + rest)) + rest
+
+
+def card_hash(data: bytes) -> int:
+    """Return the hash a card carries."""
+    return int(struct.unpack_from("<I", data, 92)[0])
+
+
+def eeprom_with(data: bytes, *, valid: int = VALID) -> bytes:
+    """Return an erased EEPROM with the card in it."""
+    content = bytearray(b"\xff" * EEPROM_BYTES)
+    content[VALID_AT] = valid
+    content[CARD_AT : CARD_AT + len(data)] = data
+    return bytes(content)
