@@ -153,7 +153,6 @@ def main(arguments: list[str] | None = None) -> int:
         "--rows", type=Path, help="of a run that goes on; a file for each axis and analysis"
     )
     options = parser.parse_args(arguments)
-    prefer_machine_code()
     named = "" if options.analysis == DIMENSIONAL else f"_{options.analysis}"
     path = options.rows or Path(f"../build/study/independent_{options.axis}{named}.csv")
     seeds = range(options.first, options.first + options.flights)
@@ -169,4 +168,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    prefer_machine_code()
     sys.exit(main())

@@ -4,12 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.aircraft.mass_properties import airframe_data
 from host.sysid.answer.trust_rules import doubts_of
 from host.sysid.flight.linear_estimator import identify
 from studies import independent
-from studies.foreign.aeroplane import TRAINER
+from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER
 from studies.foreign.air import SAMPLES, STEP_M, gusts
-from studies.foreign.flight import Air, derivatives, fly
+from studies.foreign.flight import COLUMNS, Air, derivatives, fly
+from studies.foreign.instrument import drawn_file, with_sensor_errors
 
 
 @pytest.mark.parametrize("form", ["dryden", "karman"])
@@ -91,7 +93,7 @@ def test_study_continues_where_it_stopped(
 ) -> None:
     flown: list[tuple[str, int]] = []
 
-    def row(cell: str, air: Air, seed: int, axis: str) -> list[dict[str, object]]:
+    def row(cell: str, air: Air, seed: int, axis: str, _analysis: str) -> list[dict[str, object]]:
         flown.append((cell, seed))
         return [
             {"cell": cell, "seed": seed, "name": name, "true": -2.0, "estimate": -2.0 + 0.01 * seed,
@@ -107,3 +109,18 @@ def test_study_continues_where_it_stopped(
     printed = capsys.readouterr().out.splitlines()
     assert "4 of 4" not in printed[-3]  # seed 11 is 0.11 off, its half-width 0.105
     assert printed[-2].startswith(f"{3 * 36} of {4 * 36} hold")
+
+
+def test_sensors_and_file_are_wrong_by_what_their_files_state(tmp_path: Path) -> None:
+    """200 draws; a calibration that says less than was drawn would make intervals too narrow."""
+    rng = np.random.default_rng(14)
+    rate, still = np.ones(50), np.zeros(50)
+    measured = dict.fromkeys(COLUMNS, still) | {"q_radps": rate, "airspeed_mps": 18.0 * rate}
+    drawn = [with_sensor_errors(measured, rng) for _ in range(200)]
+    gyro = np.hypot(0.003, 0.002)  # scale of 1 rad/s, and zero
+    speed = 18.0 * 0.5 * np.hypot(0.02, 1.0 / (0.5 * DENSITY_KGPM3 * 18.0**2))
+    for name, sd in (("q_radps", gyro), ("airspeed_mps", speed), ("density_kgpm3", 0.006)):
+        assert np.std([d[name][0] for d in drawn]) == pytest.approx(sd, rel=0.15), name
+    masses = [airframe_data(str(drawn_file(tmp_path, rng))).mass_kg for _ in range(30)]
+    assert 0.005 < max(masses) - 4.0 < 0.008
+    assert -0.008 < min(masses) - 4.0 < -0.005

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
+import pytest
 from host.sysid.estimators.coherence_inflation import COUNTED, inflate_by_coherence
 from host.sysid.estimators.gust_penetration import PREFIX, with_gust_penetration
 from host.sysid.models.fit_result import FitResult
@@ -13,21 +14,32 @@ from host.sysid.models.templates import Trim, template
 from host.sysid.numerics.input_coherence import InputCoherence
 
 
-def test_the_parameters_of_the_gust_are_left_out() -> None:
-    """Four times the power widens derivatives twice; what gusts do keeps its interval."""
+def _fitted(kind: str) -> FitResult:
+    """Return unit deviations of a short period with the parameters of a gust."""
     plain = template("short-period", Trim(17.0))
     model, start = with_gust_penetration(plain, 17.0, np.ones(len(plain.parameters)))
     count = len(model.parameters)
-    result = FitResult(
+    return FitResult(
         "filter error with gust", model, model.parameter_names, start, np.eye(count),
-        np.eye(count), np.full(count, np.inf), (), (), "innovation", np.eye(3), 1, converged=True,
+        np.eye(count), np.full(count, np.inf), (), (), kind, np.eye(3), 1, converged=True,
     )  # fmt: skip
+
+
+def _coherent(count: int, variance: float, power: float, shift: float) -> InputCoherence:
     found = SimpleNamespace(
         suspected=("q_radps",), coherent=("q_radps",), likely_error="", outputs=("q_radps",),
-        columns=np.array([8.0]), shift=np.full(count, 0.5), covariance=lambda: np.eye(count),
-        widened_covariance=lambda: 4.0 * np.eye(count),
+        columns=np.array([8.0]), shift=np.full(count, shift),
+        covariance=lambda: variance * np.eye(count),
+        widened_covariance=lambda: power * variance * np.eye(count),
     )  # fmt: skip
-    wide = inflate_by_coherence(result, cast("InputCoherence", found))
+    return cast("InputCoherence", found)
+
+
+def test_the_parameters_of_the_gust_are_left_out() -> None:
+    """Four times the power widens derivatives twice; what gusts do keeps its interval."""
+    result = _fitted("innovation")
+    model = result.model
+    wide = inflate_by_coherence(result, _coherent(len(model.parameters), 1.0, 4.0, 0.5))
     factor = np.asarray(wide.details[COUNTED])
     gust = np.array([name.startswith(PREFIX) for name in model.parameter_names])
     assert gust.any()
@@ -36,3 +48,15 @@ def test_the_parameters_of_the_gust_are_left_out() -> None:
     assert np.allclose(factor[~gust], np.sqrt(4.25))
     assert np.all(np.isinf(wide.degrees_of_freedom[gust]))
     assert PREFIX not in " ".join(wide.warnings).replace("filter error with gust", "")
+
+
+@pytest.mark.parametrize(("kind", "expected"), [("output", 401.0), ("innovation", 4.01)])
+def test_the_bias_of_a_free_simulation_counts_in_its_own_deviations(
+    kind: str, expected: float
+) -> None:
+    """One that knows ten times less is biased by as much more: N_r was widened 38 times for 1 %."""
+    result = _fitted(kind)
+    found = _coherent(len(result.model.parameters), 100.0, 4.0, 1.0)
+    wide = inflate_by_coherence(result, found)
+    k = result.index("M_alpha")
+    assert wide.covariance[k, k] == pytest.approx(expected)

@@ -44,7 +44,9 @@ def inflate_by_coherence(
     """Return the result with intervals that hold what the inputs drive beside the model.
 
     They are widened where that is suspected at 10 %, and it is said at 1 %. The bias by the error
-    that the residual looks most like is a consider covariance.
+    that the residual looks most like is a consider covariance: of output error as it is, of other
+    methods in deviations of a free simulation, whose bias it is. In gusts that knows N_r eight
+    times worse than the filter, which its bias of 30 % would widen 38 times for an error of 1 %.
 
     Output error is widened to the covariance of that residual, other methods by its ratio to the
     covariance in noise alone, or by what a residual larger than they predict makes of each
@@ -64,10 +66,13 @@ def inflate_by_coherence(
     count = len(result.model.parameter_names)
     own = np.diag(result.covariance)[:count]
     wide = np.diag(found.widened_covariance())[:count]
+    moved = found.shift[:count]
     if result.residual_kind == "output":
         ratio = wide / np.maximum(own, 1e-300)
     else:
-        ratio = wide / np.maximum(np.diag(found.covariance())[:count], 1e-300)
+        simulated = np.maximum(np.diag(found.covariance())[:count], 1e-300)
+        ratio = wide / simulated
+        moved = moved * np.sqrt(own / simulated)
         if excess is not None:
             ratio = np.maximum(ratio, excess.variance_ratio[:count])
     factor = np.ones(len(result.covariance))
@@ -75,7 +80,7 @@ def inflate_by_coherence(
     own = np.where([n.startswith(PREFIX) for n in result.names[:count]], 0.0, own)
     factor[:count] = np.where(own > 0.0, np.sqrt(np.maximum(ratio, 1.0)), 1.0)
     covariance = result.covariance * np.outer(factor, factor)
-    shift = np.where(own > 0.0, found.shift[:count], 0.0)
+    shift = np.where(own > 0.0, moved, 0.0)
     covariance[:count, :count] += consider_covariance(shift[None])
     factor[:count] = np.sqrt(np.diag(covariance)[:count] / np.where(own > 0.0, own, 1.0))
     factor[:count] = np.where(own > 0.0, factor[:count], 1.0)
