@@ -106,31 +106,18 @@ def optimal_card(
         The aircraft cannot be trimmed at that airspeed.
     """
     speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")
-    fleet = [aircraft, *(drawn(aircraft, FIRST_DRAW + k) for k in range(AIRCRAFT - 1))]
+    fleet = _fleet(aircraft)
     harmonics = np.arange(math.ceil(LOWEST_HZ * duration_s), int(HIGHEST_HZ * duration_s) + 1)
     rng = np.random.default_rng([FIRST_DRAW, len(harmonics)])
     taken: set[int] = set()
-    amplitudes: dict[str, float] = {}
-    tones: list[Tone] = []
-    blocks: dict[str, tuple[list[ToneTable], Array]] = {}
-    for block, each in TONES.items():
-        tables = [tone_table(a, block, speed, gusts_mps, harmonics / duration_s) for a in fleet]
-        number = np.tile(harmonics, len(BLOCKS[block]))
-        weights = powers(tables, block, ~np.isin(number, list(taken)), each)
-        chosen = np.flatnonzero(weights > 1e-3 * weights.max())
-        taken |= set(number[chosen].tolist())
-        amplitude = np.sqrt(2.0 * weights[chosen])
-        turns = phases(_rows(tables[0], chosen), amplitude, number[chosen], rng)
-        for k, surface in enumerate(BLOCKS[block]):
-            own = tables[0].axis[chosen] == k
-            peak = _peak(number[chosen][own], amplitude[own], turns[own])
-            amplitudes[surface] = math.degrees(peak)
-            shares = np.maximum(np.floor(SHARES * amplitude[own] / peak), 1.0) / SHARES
-            tones += [
-                Tone(surface, int(h), float(min(s, 1.0 - 1.0 / SHARES)), float(t))
-                for h, s, t in zip(number[chosen][own], shares, turns[own], strict=True)
-            ]
-        blocks[block] = (tables, weights)
+    blocks: list[_Block] = []
+    for name, each in TONES.items():
+        tables = [tone_table(a, name, speed, gusts_mps, harmonics / duration_s) for a in fleet]
+        number = np.tile(harmonics, len(BLOCKS[name]))
+        weights = powers(tables, name, ~np.isin(number, list(taken)), each)
+        taken |= set(number[weights > 0.0].tolist())
+        blocks.append(_Block(name, tables, weights, *_tones(name, tables[0], number, weights, rng)))
+    amplitudes = {axis: size for b in blocks for axis, size in b.amplitudes_deg.items()}
     point = Segment(
         "multisine",
         axes=tuple(amplitudes),
@@ -138,29 +125,64 @@ def optimal_card(
         duration_s=duration_s,
         before_s=QUIET_S,
         attention=0.0,
-        tones=tuple(tones),
+        tones=tuple(tone for b in blocks for tone in b.tones),
     )
-    card = _card(aircraft, speed, [point], WATCHING)
-    scaled = within_limits(card, fleet)
-    by = {a: x / y for a, x, y in zip(point.axes, scaled.segments[1].amplitudes, point.amplitudes,
-                                      strict=True)}  # fmt: skip
-    point = scaled.segments[1]
+    card = within_limits(_card(aircraft, speed, [point], WATCHING), fleet)
+    point = card.segments[1]
     point_s = length_s(card, point)
-    seconds = [
-        _seconds(
-            [(tables[k], block, weights * by[BLOCKS[block][0]] ** 2)
-             for block, (tables, weights) in blocks.items()],
-            duration_s, point_s, wanted_share,
-        )
+    scaled = dict(zip(point.axes, point.amplitudes, strict=True))
+    # Of one point, of each aircraft: the variance of the widest wanted derivative over its square.
+    variance = [
+        max(b.widest(k, (scaled[axis] / size) ** 2) for b in blocks
+            for axis, size in list(b.amplitudes_deg.items())[:1])
         for k in range(len(fleet))
     ]  # fmt: skip
+    seconds = np.array(variance) * point_s / duration_s * (NORMAL_95 / wanted_share) ** 2
     points = min(max(math.ceil(float(np.median(seconds)) / point_s), 1), MOST_POINTS)
     title = f"{aircraft.title}: {points} orthogonal multisines on three axes, for its prior's range"
-    return OptimalCard(
-        replace(_card(aircraft, speed, [point] * points, WATCHING), title=title),
-        point_s,
-        np.array(seconds),
-    )
+    whole = _card(aircraft, speed, [point] * points, WATCHING)
+    return OptimalCard(replace(whole, title=title), point_s, seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """Axes that move together, on every drawn aircraft: powers, amplitudes and tones."""
+
+    name: str
+    tables: list[ToneTable]
+    weights: Array
+    amplitudes_deg: dict[str, float]
+    tones: list[Tone]
+
+    def widest(self, aircraft: int, times: float) -> float:
+        """Return the largest relative variance of a second, with so many times the power."""
+        weights = 2.0 * times * self.weights
+        return float(relative_variances(self.tables[aircraft], self.name, weights).max())
+
+
+def _fleet(aircraft: Aircraft) -> list[Aircraft]:
+    """Return the aircraft and some of its prior's range."""
+    return [aircraft, *(drawn(aircraft, FIRST_DRAW + k) for k in range(AIRCRAFT - 1))]
+
+
+def _tones(
+    block: str, table: ToneTable, number: IntArray, weights: Array, rng: np.random.Generator
+) -> tuple[dict[str, float], list[Tone]]:
+    """Return amplitudes (deg) and tones of each surface, in steps of the logger's card."""
+    chosen = np.flatnonzero(weights > 1e-3 * weights.max())
+    amplitude, harmonic = np.sqrt(2.0 * weights[chosen]), number[chosen]
+    turns = phases(_rows(table, chosen), amplitude, harmonic, rng)
+    sizes, tones = {}, []
+    for k, surface in enumerate(BLOCKS[block]):
+        own = table.axis[chosen] == k
+        peak = _peak(harmonic[own], amplitude[own], turns[own])
+        sizes[surface] = math.degrees(peak)
+        steps = np.clip(np.floor(SHARES * amplitude[own] / peak), 1.0, SHARES - 1.0)
+        tones += [
+            Tone(surface, int(h), float(n) / SHARES, float(t))
+            for h, n, t in zip(harmonic[own], steps, turns[own], strict=True)
+        ]
+    return sizes, tones
 
 
 def prior_of(
@@ -202,14 +224,6 @@ def _peak(harmonic: IntArray, amplitude: Array, turns: Array) -> float:
     return float(np.abs(np.sin(2.0 * np.pi * (np.outer(at, harmonic) + turns)) @ amplitude).max())
 
 
-def _seconds(
-    blocks: Sequence[tuple[ToneTable, str, Array]], duration_s: float, point_s: float, share: float
-) -> float:
-    """Return the time until the widest wanted derivative is as narrow as wanted."""
-    variance = max(float(relative_variances(t, b, 2.0 * w).max()) for t, b, w in blocks)
-    return point_s * variance / duration_s * (NORMAL_95 / share) ** 2
-
-
 def standard_card(aircraft: Aircraft, airspeed_mps: float = 0.0, repeat: int = 1) -> Card:
     """Return the card that is beaten: a 3-2-1-1 on each axis within the same excursions.
 
@@ -217,12 +231,11 @@ def standard_card(aircraft: Aircraft, airspeed_mps: float = 0.0, repeat: int = 1
     keep the excursions on the same drawn aircraft.
     """
     speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")
-    fleet = [aircraft, *(drawn(aircraft, FIRST_DRAW + k) for k in range(AIRCRAFT - 1))]
     points = [
         Segment("3211", axes=(axis,), amplitudes=(3.0,), width_s=width, before_s=QUIET_S)
         for axis, width in mode_widths_s(aircraft, speed).items()
     ]
-    scaled = within_limits(_card(aircraft, speed, points), fleet).segments[1:-1]
+    scaled = within_limits(_card(aircraft, speed, points), _fleet(aircraft)).segments[1:-1]
     title = f"{aircraft.title}: 3-2-1-1 on each axis"
     return replace(_card(aircraft, speed, list(scaled) * repeat), title=title)
 

@@ -193,7 +193,8 @@ def _optimal(args: argparse.Namespace) -> Card:
         )
     if not 0.1 <= args.want <= NOT_TOLD_PERCENT:
         raise UsageError(f"--want is {args.want:g} %, expected 0.1 to {NOT_TOLD_PERCENT:g}")
-    aircraft = load(args.aircraft or "ultrastick25e")
+    source = args.aircraft or "ultrastick25e"
+    aircraft = load(source)
     if args.prior is not None:
         aircraft, replaced = prior_of(aircraft, args.prior, args.airspeed or 0.0)
         print(f"host: {args.prior}: {', '.join(replaced)}", file=sys.stderr)
@@ -204,7 +205,7 @@ def _optimal(args: argparse.Namespace) -> Card:
         wanted_share=0.01 * args.want,
     )
     print(f"host: {found.line()}", file=sys.stderr)
-    return found.card
+    return replace(found.card, aircraft=source)
 
 
 def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
