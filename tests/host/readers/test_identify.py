@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
+from host.export.dataflash_writer import Records
 from host.readers.autopilot_flight import read_autopilot
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
+from host.twin.outcome import ardupilot_log
 from host.twin.outcome.truth_files import maneuvers
 from host.twin.sensors.autopilot_sensors import DLPF
 from host.twin.sensors.sensor_delays import FILTERS
@@ -123,6 +126,34 @@ def test_every_verb_takes_it(
     capsys.readouterr()
     assert main(["predict", str(model), path]) == 0
     assert "windows" in capsys.readouterr().out
+
+
+def test_maneuvers_names_what_the_autopilot_flew(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A flight of which the autopilot says that it flew a chirp, an autotune, a script's doublet."""
+    usual, at_us = ardupilot_log._records, np.arange(8e6, 12e6, 1e5)
+    more = [
+        Records("SIDD", "Qff", {"TimeUS": at_us, "Time": at_us * 1e-6 - 8.0, "Targ": 0.0 * at_us}),
+        Records("ATRP", "QBf", {"TimeUS": at_us + 10e6, "Axis": 0 * at_us, "P": 0.1 + 0.0 * at_us}),
+        Records("MSG", "QZ", {"TimeUS": np.array([0.0, 30e6]),
+                              "Message": [ardupilot_log.FIRMWARE, "Starting doublet"]}),
+        Records("MODE", "QMBB", {"TimeUS": np.array([0.0, 17e6, 23e6]), "Mode": [0, 8, 0],
+                                 "ModeNum": [0, 8, 0], "Rsn": [1, 1, 1]}),
+    ]  # fmt: skip
+
+    def records(*args: Any) -> list[Records]:
+        return more + [one for one in usual(*args) if one.name not in ("MODE", "MSG")]
+
+    monkeypatch.setattr(ardupilot_log, "_records", records)
+    assert main(["maneuvers", str(write("dataflash", tmp_path))]) == 0
+    said = capsys.readouterr().out
+    for words in (
+        "system-identification chirp from 8.0 to 11.9 s (SIDD)",
+        "autotune from 18.0 to 21.9 s (ATRP)", "mode AUTOTUNE from 17.0 to 23.0 s (MODE)",
+        "doublet of a script from 30.0 to 35.0 s (MSG 'Starting doublet')",
+    ):  # fmt: skip
+        assert f"the autopilot's own test: {words}" in said
 
 
 def test_a_missing_library_is_one_line(
