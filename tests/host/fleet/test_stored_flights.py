@@ -9,6 +9,7 @@ import io
 import json
 import os
 import re
+import statistics
 import time
 import zipfile
 from dataclasses import dataclass
@@ -87,13 +88,16 @@ def test_a_second_run_does_nothing_and_says_the_same(fleet: Twice) -> None:
 
 def test_every_flight_has_zeros_of_vanes_and_a_response_of_its_elevator(fleet: Twice) -> None:
     rows = pd.read_parquet(fleet.out / "flights")
+    zeros = []
     for row in rows.to_dict("records"):
         value = dict(zip(row["watched"], row["watched_values"], strict=True))
         # 25 deg by 400 us, 8 Hz: 1.09 mrad/us, 20 ms.
         assert value["elevator_slope"] == pytest.approx(1.09e-3, rel=0.1)
         assert 0.005 < value["elevator_lag_s"] < 0.04
-        deviation = dict(zip(row["watched"], row["watched_deviations"], strict=True))
-        assert abs(value["alpha_zero_rad"]) < 0.02 + 3.0 * deviation["alpha_zero_rad"]
+        zeros.append(value["alpha_zero_rad"])
+    # One instrument, no zero of its own; of 12 s in gusts the mean lift line is known to 0.015 rad.
+    assert abs(statistics.mean(zeros)) < 0.02
+    assert statistics.stdev(zeros) < 0.025
 
 
 def test_the_page_s_examples_read_what_is_kept(fleet: Twice) -> None:
