@@ -21,7 +21,8 @@ uint16_t apart(uint16_t a, uint16_t b) {
 // At most what the rate allows, less by 0.2 ticks at most.
 uint16_t ticks_at(uint16_t rate_usps, uint16_t rest_us) {
   const uint32_t way = static_cast<uint32_t>(rate_usps) * rest_us >> 16U;
-  return static_cast<uint16_t>(static_cast<uint32_t>(static_cast<uint16_t>(way)) * kRateShare >> 16U);
+  return static_cast<uint16_t>(static_cast<uint32_t>(static_cast<uint16_t>(way)) * kRateShare >>
+                               16U);
 }
 
 bool all_channels(const RcChannels& rc) {

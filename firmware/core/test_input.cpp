@@ -63,8 +63,8 @@ uint16_t sweep_phase(const CardRow& row, uint32_t t_ms) {
 uint16_t times_upper(uint32_t turns, uint8_t harmonic) {
   const uint8_t low = static_cast<uint8_t>(turns);
   const uint8_t next = static_cast<uint8_t>(turns >> 8U);
-  const uint16_t carry = static_cast<uint16_t>(
-      static_cast<uint16_t>(next * harmonic) + (static_cast<uint16_t>(low * harmonic) >> 8U));
+  const uint16_t carry = static_cast<uint16_t>(static_cast<uint16_t>(next * harmonic) +
+                                               (static_cast<uint16_t>(low * harmonic) >> 8U));
   // Of next * harmonic + carry all 16 bits are used: 255 * 255 + 254 fits.
   const uint16_t upper = static_cast<uint16_t>(turns >> 16U);
   return static_cast<uint16_t>(static_cast<uint16_t>(upper * harmonic) + (carry >> 8U));

@@ -17,6 +17,7 @@ from collections import Counter
 from pathlib import Path
 
 import drawing
+import drawing_rows
 import dynamics
 import kicad_text
 import pictures
@@ -160,23 +161,13 @@ def sheets(
     assembly = Compound([body.shape for body in vane])
     rows = [(f"{b.name}, {b.material}", f"{solids.mass_g(b, sizes):.2f} g") for b in vane]
     found["vane"] = drawing.draw(assembly, "vane, assembled", rows, "one of four")
-    tables = {
-        "fin": "fin", "arm": "arm", "counterweight": "counterweight", "hub": "hub",
-        "shaft": "shaft",
-        "magnet holder": "magnet", "housing": "housing", "boom": "boom", "boom clamp": "clamp",
-        "pitot holder": "pitot", "pot arm": "pot", "surface horn": "pot", "box": "box",
-        "protractor jig": "protractor", "protractor fork": "protractor",
-        "throw gauge": "gauge", "IMU tray": "imu_tray",
-    }  # fmt: skip
     for body in every:
         if body.material == "bought" or body.name == "magnet":
             continue
-        key = tables.get(body.name, "")
-        rows = [
-            (what.replace("_", " "), f"{value:g}") for what, value in sizes.get(key, {}).items()
-        ]
         note = f"{body.material}, {solids.mass_g(body, sizes):.2f} g, {body.quantity} of it"
-        found[body.name.replace(" ", "-")] = drawing.draw(body.shape, body.name, rows, note)
+        found[body.name.replace(" ", "-")] = drawing.draw(
+            body.shape, body.name, drawing_rows.rows(body, sizes), note
+        )
     return found
 
 

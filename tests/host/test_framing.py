@@ -4,7 +4,7 @@ import tomllib
 from typing import Any
 
 import pytest
-from host.wire.framing import EnvelopeReader, crc16, envelope
+from host.wire.framing import EnvelopeReader, crc16, envelope, is_text_cut_short
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -47,3 +47,14 @@ def test_every_frame_comes_back(parts: list[tuple[bytes, bytes]]) -> None:
 def test_frames_that_do_not_fit_are_refused(length: int) -> None:
     with pytest.raises(ValueError, match=f"{length} bytes"):
         envelope(bytes(length))
+
+
+def test_text_with_an_envelope_still_coming_is_no_damage() -> None:
+    """A capture of USB ends wherever it was stopped: once in three inside an envelope."""
+    line, sent = b"ready, 3.9 V\r\nnext li", envelope(bytes(range(20)))
+    assert all(is_text_cut_short(line + sent[:size]) for size in range(1, len(sent)))
+    assert not is_text_cut_short(line + b"\x07" + sent[:9])  # no text
+    assert not is_text_cut_short(sent[:9])  # the radio's own end
+    broken = bytearray(sent)
+    broken[-1] ^= 1
+    assert not is_text_cut_short(line + bytes(broken))  # whole, and wrong

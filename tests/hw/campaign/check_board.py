@@ -65,7 +65,7 @@ def test_a_label_above_a_pad_is_found(tmp_path: Path) -> None:
     path = folder / "logger.kicad_pcb"
     text = path.read_text()
     at = text.index('(gr_text "FLIGHT-TEST LOGGER rev 1"')
-    path.write_text(text[:at] + text[at:].replace("86.3", "58.6", 1).replace("81.5", "78.0", 1))
+    path.write_text(text[:at] + text[at:].replace("86.3", "63.0", 1).replace("81.5", "78.0", 1))
     code, said = labels(folder)
     assert code == 6
     assert "'FLIGHT-TEST LOGGER rev 1' lies above a pad of K1" in said

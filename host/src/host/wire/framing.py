@@ -120,6 +120,16 @@ def is_text(data: bytes) -> bool:
     return _TEXT.fullmatch(data) is not None
 
 
+def is_text_cut_short(data: bytes) -> bool:
+    """Tell whether a recording's last bytes are text and an envelope that was still coming."""
+    at = data.rfind(SYNC[:1])
+    if at < 1 or not is_text(data[:at]):
+        return False
+    rest = data[at:]
+    whole = HEAD_BYTES + rest[2] + TAIL_BYTES if len(rest) > 2 else HEAD_BYTES
+    return SYNC.startswith(rest[:2]) and len(rest) < whole
+
+
 @dataclass(slots=True)
 class EnvelopeReader:
     """Finds frames in a stream that comes in any portions.

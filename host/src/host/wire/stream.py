@@ -26,6 +26,7 @@ from host.wire.framing import (
     TAIL_BYTES,
     find_envelopes,
     is_text,
+    is_text_cut_short,
 )
 from host.wire.schema import Schema
 from host.wire.schema_text import known_schemas, parse_schema
@@ -135,7 +136,12 @@ def read_stream(path: Path, *, texts: Collection[bytes] = (), limit_bytes: int =
     return Stream(
         data=data,
         blocks=blocks,
-        bad=[(a, b) for a, b in _bad(place, length, len(data)) if not is_text(data[a:b])],
+        bad=[
+            (a, b)
+            for a, b in _bad(place, length, len(data))
+            if not is_text(data[a:b])
+            and not (b == len(data) and is_text_cut_short(data[a:b]))
+        ],
         failed=failed,
         repeated=place[again],
         unfit=place[(~fits & (kind != SCHEMA_HASH_ID)) | astray],
