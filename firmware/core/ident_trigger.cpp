@@ -4,6 +4,10 @@ namespace core {
 namespace {
 
 constexpr uint16_t kLateUs = 1000;
+// The loop wakes each millisecond where nothing else does. A frame that it has just missed is due
+// half of one later from then on, or one in some would be missed and the next not.
+constexpr uint16_t kMissedUs = 850;
+constexpr uint16_t kApartUs = 500;
 constexpr uint16_t kTransferUs = 1100;  // START to STOP of a packet at 400 kHz
 
 void count(uint16_t& counter) {
@@ -101,6 +105,8 @@ IdentTrigger::Source IdentTrigger::poll(uint32_t now_us, bool ready) {
   }
   imu_leads_ = false;
   last_us_ += wait_us;
+  const uint32_t behind_us = since_us - wait_us;
+  if (behind_us >= kMissedUs && behind_us < kLateUs) last_us_ += kApartUs;
   if (now_us - last_us_ >= period_us_) {
     last_us_ = now_us;
   }

@@ -21,7 +21,7 @@ BUILT_FROM = ("firmware", "protocol", "platformio.ini", "platformio.local.ini")
 pytestmark = pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
 
 RAM_LIMIT_BYTES = 6600
-FLASH_LIMIT_BYTES = 100_000  # 253 952 are there; more than this is a mistake
+FLASH_LIMIT_BYTES = 120_000  # 253 952 are there; more than this is a mistake
 STACK_LEFT_BYTES = 1200
 
 HEAP = re.compile(r"^(malloc|free|realloc|calloc|__malloc_\w+|__brkval|_Zn[wa]\w*|_Zd[la]\w*)$")
