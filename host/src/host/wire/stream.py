@@ -139,8 +139,7 @@ def read_stream(path: Path, *, texts: Collection[bytes] = (), limit_bytes: int =
         bad=[
             (a, b)
             for a, b in _bad(place, length, len(data))
-            if not is_text(data[a:b])
-            and not (b == len(data) and is_text_cut_short(data[a:b]))
+            if not is_text(data[a:b]) and not (b == len(data) and is_text_cut_short(data[a:b]))
         ],
         failed=failed,
         repeated=place[again],
