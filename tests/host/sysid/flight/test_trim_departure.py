@@ -11,6 +11,7 @@ from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import unknown_sensors
 from host.sysid.aerodynamics.coefficient_table import coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
+from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.start_values import regression_estimates, start_values
 from host.sysid.flight import linear_estimator
 from host.sysid.flight.even_grid import even_columns
@@ -19,6 +20,7 @@ from host.sysid.flight.linear_model import imu_place_m, without_attitude
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.flight.reconstructed_flight import flown_maneuvers, reconstruct_flight
 from host.sysid.flight.trim_departure import spin_of
+from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.residual_delays import STANDARD_DELAYS
 from host.sysid.models.templates import Trim, template
@@ -166,3 +168,18 @@ def test_truth_in_derivatives_is_what_conversion_turns_back() -> None:
     )  # fmt: skip
     table = coefficients(result, airframe, Condition(19.0, 220.0))
     assert {c.name: c.value for c in table} == pytest.approx(local)
+
+
+def test_a_fit_that_ran_away_is_one_line(
+    calm: tuple[Columns, list[dict[str, Any]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One test point's search ended at M_alpha -57 000 with no covariance: a traceback then."""
+    columns, maneuvers = calm
+
+    def ran_away(*given: Any, **options: Any) -> FitResult:
+        found = fit(*given, **options)
+        return replace(found, covariance=np.full_like(found.covariance, np.nan))
+
+    monkeypatch.setattr(linear_estimator, "fit", ran_away)
+    with pytest.raises(IdentificationError, match="the covariance is not finite; these data do no"):
+        identify(columns, names=("lateral",), windows=windows(maneuvers))

@@ -162,13 +162,24 @@ def fit(
             f"{method}: the equations are singular ({str(error).lower().rstrip('.')}); these data"
             f" do not determine {model.name}"
         ) from error
+    refuse_unless_finite(result, method)
+    return result
+
+
+def refuse_unless_finite(result: FitResult, method: str) -> None:
+    """Raise if a fit ran away.
+
+    Raises
+    ------
+    IdentificationError
+        If estimate or covariance hold a number that is none.
+    """
     for label in ("estimate", "covariance", "covariance_white"):
         if not np.isfinite(getattr(result, label)).all():
             raise IdentificationError(
                 f"{method}: the {label.split('_')[0]} is not finite; these data do not determine"
-                f" {model.name}"
+                f" {result.model.name}"
             )
-    return result
 
 
 def _check(method: str, model: LinearModel, maneuvers: Sequence[Maneuver]) -> None:

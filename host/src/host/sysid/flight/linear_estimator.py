@@ -33,7 +33,7 @@ from host.sysid.estimators.filter_error_gust import (
 from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.gust_penetration import without_gust_penetration
-from host.sysid.estimators.method_registry import fit
+from host.sysid.estimators.method_registry import fit, refuse_unless_finite
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
@@ -187,6 +187,8 @@ class LinearEstimator:
             both = list(zip(found.fitted, departed, strict=True))
             if all(y.shape == gone.shape for y, gone in both):  # of frequencies they are others
                 found = replace(found, fitted=tuple(y + gone for y, gone in both))
+        # The start of a gust filter that was lost may have run away: M_alpha -57 000 of one point.
+        refuse_unless_finite(found, found.method)
         found = found if servo is None else servo.added_to(found)
         found = replace(found, warnings=(*remarks, *found.warnings))
         left = None
