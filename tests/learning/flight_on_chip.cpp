@@ -3,6 +3,7 @@
 
 TEST_CASE("pitch: every bit of the host's, at every solve of the row") {
   replay::run_case(&cases::kPitchCard,
+                   cases::kPitchWorth,
                    cases::kPitchRows,
                    cases::kPitchSamples,
                    cases::kPitchSolves,
@@ -11,6 +12,7 @@ TEST_CASE("pitch: every bit of the host's, at every solve of the row") {
 
 TEST_CASE("roll: every bit of the host's, at every solve of the row") {
   replay::run_case(&cases::kRollCard,
+                   cases::kRollWorth,
                    cases::kRollRows,
                    cases::kRollSamples,
                    cases::kRollSolves,
@@ -18,6 +20,10 @@ TEST_CASE("roll: every bit of the host's, at every solve of the row") {
 }
 
 TEST_CASE("yaw: every bit of the host's, at every solve of the row") {
-  replay::run_case(
-      &cases::kYawCard, cases::kYawRows, cases::kYawSamples, cases::kYawSolves, cases::kYawSums);
+  replay::run_case(&cases::kYawCard,
+                   cases::kYawWorth,
+                   cases::kYawRows,
+                   cases::kYawSamples,
+                   cases::kYawSolves,
+                   cases::kYawSums);
 }

@@ -152,17 +152,20 @@ def header(cases: list[Case] | None = None) -> str:
 def _of(case: Case) -> str:
     found, card = answer(case), case.card
     kinds = {PITCH: "kPitch", ROLL: "kRoll", YAW: "kYaw"}
-    floats = (
-        [_floats(v) for v in (card.advance_s, card.curvature_s2)]
-        + [_float(card.lever), _float(card.product)]
-        + [_floats(v) for v in (card.gain, card.tolerance)]
+    floats = [_floats(v) for v in (card.advance_s, card.curvature_s2)] + [
+        _float(card.lever),
+        _float(card.product),
+    ]
+    worth = ", ".join(
+        f"{{{_float(g)}, {_float(t)}, {w}}}"
+        for g, t, w in zip(card.gain, card.tolerance, card.wanted_percent, strict=True)
     )
     settings = ", ".join(
         [
             f"core::LearningAxis::{kinds[card.axis]}",
             str(len(card.harmonics)),
             _braced(card.harmonics),
-            _braced(card.wanted_percent),
+            str(sum(1 << n for n, w in enumerate(card.wanted_percent) if w)),
             *floats,
         ]
     )
@@ -176,6 +179,7 @@ def _of(case: Case) -> str:
     return f"""\
 constexpr core::AxisCard k{n}Card CORE_FLASH = {{
     {settings}}};
+constexpr core::DerivativeWorth k{n}Worth[] CORE_FLASH = {{{worth}}};
 constexpr uint16_t k{n}Samples = {len(case.rows)};
 constexpr int16_t k{n}Rows[] CORE_FLASH = {{
 {rows}}};

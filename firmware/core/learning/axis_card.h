@@ -1,4 +1,4 @@
-// What the flight card tells the learning of one axis: harmonics, how sensors are late, and what a
+// What the flight card tells the learning of one axis: harmonics, how late sensors are, and what a
 // ratio of counts is worth. `host.planning.learning_card` makes it from aircraft and calibration.
 #pragma once
 
@@ -18,8 +18,8 @@ constexpr uint8_t kMostAdvances = 3;
 struct AxisCard {
   LearningAxis axis;
   uint8_t harmonic_count;
-  uint8_t harmonics[kMostHarmonics];     // times 50 / 512 Hz
-  uint8_t wanted_percent[kMostSignals];  // half-width that is enough; 0: is not told, saves 1 ms
+  uint8_t harmonics[kMostHarmonics];  // times 50 / 512 Hz
+  uint8_t told;                       // bit by bit, as the signals; each that is not saves 1 ms
   // A signal x is x + advance x' + curvature x''; in s and s2.
   float advance_s[kMostAdvances];
   float curvature_s2[kMostAdvances];
@@ -27,9 +27,14 @@ struct AxisCard {
   float lever;
   // Share of the other rate's acceleration: Ixz / Ixx of roll, Ixz / Izz of yaw, 0 of pitch.
   float product;
-  // Derivative of the coefficient per ratio of counts; half-width that the instrument leaves.
-  float gain[kMostSignals];
-  float tolerance[kMostSignals];
+};
+
+// What a ratio of counts is worth: asked for behind a solve, so it may stay in the EEPROM until
+// then.
+struct DerivativeWorth {
+  float gain;              // derivative of the coefficient per ratio of counts
+  float tolerance;         // half-width that the instrument leaves
+  uint8_t wanted_percent;  // half-width that is enough, of the estimate
 };
 
 inline uint8_t signals_of(LearningAxis axis) {

@@ -80,13 +80,21 @@ uint8_t advance_of(LearningAxis axis, uint8_t signal) {
                      : static_cast<uint8_t>(signal - (axis == LearningAxis::kPitch ? 1 : 2));
 }
 
-}  // namespace
-
 // Packed by columns of the upper triangle; the column behind the regressors is the moment.
-float* EquationError::entry(uint8_t row, uint8_t column) {
+uint8_t place(uint8_t row, uint8_t column) {
   const uint8_t low = row < column ? row : column;
   const uint8_t high = row < column ? column : row;
-  return &entries_[high * (high + 1U) / 2U + low];
+  return static_cast<uint8_t>(high * (high + 1U) / 2U + low);
+}
+
+}  // namespace
+
+float* EquationError::entry(uint8_t row, uint8_t column) {
+  return &entries_[place(row, column)];
+}
+
+float EquationError::solved(uint8_t row, uint8_t column) const {
+  return entries_[place(row, column)];
 }
 
 void EquationError::start(const AxisCard& card) {
@@ -95,7 +103,6 @@ void EquationError::start(const AxisCard& card) {
   residual_ = 0.0F;
   harmonic_ = 0;
   dropped_ = 0;
-  enough_ = 0;
   solved_ = false;
   task_ = Task::kRow;
 }
@@ -128,11 +135,8 @@ bool EquationError::step(const AxisCard& card, const FourierSums& sums) {
     case Task::kInfluence:
       add_influence(card);
       break;
-    case Task::kFinish:
-      finish(card);
-      return task_ == Task::kIdle;
   }
-  return false;
+  return task_ == Task::kIdle;
 }
 
 // The sums of one harmonic at one instant, as integers. The newest sample counts half:
@@ -211,7 +215,7 @@ void EquationError::next_row(const AxisCard& card) {
   harmonic_ = 0;
   first_ = 0;
   if (solved_) {
-    task_ = Task::kFinish;
+    task_ = Task::kIdle;
     return;
   }
   for (uint8_t c = 0; c < signals_; ++c) {
@@ -297,7 +301,7 @@ void EquationError::add_influence(const AxisCard& card) {
 // Of the derivatives that are wanted.
 void EquationError::next_influence(const AxisCard& card) {
   task_ = Task::kInfluence;
-  while (first_ < signals_ && card.wanted_percent[first_] == 0) {
+  while (first_ < signals_ && (card.told >> first_ & 1U) == 0) {
     ++first_;
   }
   if (first_ == signals_) {
@@ -305,35 +309,30 @@ void EquationError::next_influence(const AxisCard& card) {
   }
 }
 
-void EquationError::finish(const AxisCard& card) {
-  const uint8_t s = first_;
+LearnedDerivative EquationError::derivative(const AxisCard& card,
+                                            const DerivativeWorth& worth,
+                                            uint8_t signal) const {
   uint8_t freedom = static_cast<uint8_t>(2 * card.harmonic_count);
   for (uint8_t c = 0; c < signals_; ++c) {
     freedom = static_cast<uint8_t>(freedom - ((dropped_ >> c & 1U) == 0 ? 1 : 0));
   }
-  row_[s] = {0.0F, 0.0F};
+  const bool told = (card.told >> signal & 1U) != 0 && (dropped_ >> signal & 1U) == 0;
   // More columns than lines: the count has gone below zero and wrapped.
-  const bool told = (dropped_ >> s & 1U) == 0 && card.wanted_percent[s] != 0;
-  if (told && freedom != 0 && freedom <= 2 * kMostHarmonics) {
-    const uint8_t t = freedom < kMostFreedom ? freedom : kMostFreedom;
-    const float student = static_cast<float>(flash_u16(&kStudent[t - 1])) * 0.001F;
-    const float mean = residual_ * -*entry(s, s);
-    const float own = static_cast<float>(card.harmonic_count) * spread_[s];
-    const float variance = (mean > own ? mean : own) / static_cast<float>(freedom);
-    const float scale = card.gain[s] * student;
-    const float random = scale * scale * variance;
-    const float known = card.tolerance[s] * card.tolerance[s];
-    const float estimate = card.gain[s] * *entry(s, signals_);
-    const float half_width = __builtin_sqrtf(random + known);
-    row_[s] = {estimate, half_width};
-    const float wanted = static_cast<float>(card.wanted_percent[s]) * 0.01F * estimate;
-    if (half_width <= (wanted < 0.0F ? -wanted : wanted)) {
-      enough_ = static_cast<uint8_t>(enough_ | 1U << s);
-    }
+  if (!told || freedom == 0 || freedom > 2 * kMostHarmonics) {
+    return {0.0F, 0.0F, false};
   }
-  if (++first_ == signals_) {
-    task_ = Task::kIdle;
-  }
+  const uint8_t t = freedom < kMostFreedom ? freedom : kMostFreedom;
+  const float student = static_cast<float>(flash_u16(&kStudent[t - 1])) * 0.001F;
+  const float mean = residual_ * -solved(signal, signal);
+  const float own = static_cast<float>(card.harmonic_count) * spread_[signal];
+  const float variance = (mean > own ? mean : own) / static_cast<float>(freedom);
+  const float scale = worth.gain * student;
+  const float random = scale * scale * variance;
+  const float known = worth.tolerance * worth.tolerance;
+  const float estimate = worth.gain * solved(signal, signals_);
+  const float half_width = __builtin_sqrtf(random + known);
+  const float wanted = static_cast<float>(worth.wanted_percent) * 0.01F * estimate;
+  return {estimate, half_width, half_width <= (wanted < 0.0F ? -wanted : wanted)};
 }
 
 }  // namespace core

@@ -21,6 +21,7 @@ struct Complex {
 struct LearnedDerivative {
   float estimate;
   float half_width;  // two-sided 95 %, of residual and instrument; 0: not told
+  bool enough;       // at most the wanted share of the estimate
 };
 
 class EquationError {
@@ -32,10 +33,10 @@ class EquationError {
   bool step(const AxisCard& card, const FourierSums& sums);
 
   bool idle() const { return task_ == Task::kIdle; }
-  // Of the last solve, from its end to the next start.
-  LearnedDerivative derivative(uint8_t signal) const { return {row_[signal].re, row_[signal].im}; }
-  // Bit by bit, as `derivative`: the half-width is at most the wanted share of the estimate.
-  uint8_t enough() const { return enough_; }
+  // Of the last solve, from its end to the next start; a slice of its own.
+  LearnedDerivative derivative(const AxisCard& card,
+                               const DerivativeWorth& worth,
+                               uint8_t signal) const;
 
  private:
   enum class Task : uint8_t {
@@ -47,11 +48,11 @@ class EquationError {
     kSweep,
     kSwept,
     kResidual,
-    kInfluence,
-    kFinish
+    kInfluence
   };
 
   float* entry(uint8_t row, uint8_t column);
+  float solved(uint8_t row, uint8_t column) const;
   void take_row(const AxisCard& card, const FourierSums& sums);
   void make_signal(const AxisCard& card);
   void add_products(const AxisCard& card);
@@ -62,11 +63,10 @@ class EquationError {
   void add_influence(const AxisCard& card);
   void next_influence(const AxisCard& card);
   void next_row(const AxisCard& card);
-  void finish(const AxisCard& card);
 
   float entries_[kMostEntries];  // normal equations, then minus their inverse beside the solution
   float spread_[kMostSignals];   // the diagonal as it was, then the sandwich's
-  Complex row_[kMostSignals];    // one harmonic's regressors, then the answer
+  Complex row_[kMostSignals];    // one harmonic's regressors
   Complex moment_;               // its left side, then its residual
   float residual_;               // sum of squares
   int16_t row_last_[kMostSignals];
@@ -76,7 +76,6 @@ class EquationError {
   uint8_t first_ = 0;    // where the task is: signal, row of the matrix, pivot
   uint8_t second_ = 0;   // column, row of a sweep
   uint8_t dropped_ = 0;  // columns that are a combination of those before, bit by bit
-  uint8_t enough_ = 0;
   bool solved_ = false;
   Task task_ = Task::kIdle;
 };

@@ -22,17 +22,23 @@ inline uint32_t bits_of(float value) {
 
 inline void check_solve(const cases::Solve& expected,
                         const core::EquationError& found,
-                        uint16_t count,
-                        uint8_t signals) {
+                        const core::AxisCard& card,
+                        const core::DerivativeWorth* worth_flash,
+                        uint16_t count) {
   CHECK_EQ(count, expected.count);
-  for (uint8_t s = 0; s < signals; ++s) {
-    CHECK_EQ(bits_of(found.derivative(s).estimate), expected.estimate[s]);
-    CHECK_EQ(bits_of(found.derivative(s).half_width), expected.half_width[s]);
+  uint8_t enough = 0;
+  for (uint8_t s = 0; s < core::signals_of(card.axis); ++s) {
+    const core::LearnedDerivative one =
+        found.derivative(card, core::flash_load(&worth_flash[s]), s);
+    CHECK_EQ(bits_of(one.estimate), expected.estimate[s]);
+    CHECK_EQ(bits_of(one.half_width), expected.half_width[s]);
+    enough = static_cast<uint8_t>(enough | (one.enough ? 1U << s : 0U));
   }
-  CHECK_EQ(found.enough(), expected.enough);
+  CHECK_EQ(enough, expected.enough);
 }
 
 inline void run(const core::AxisCard* card_flash,
+                const core::DerivativeWorth* worth_flash,
                 const int16_t* rows,
                 uint16_t samples,
                 const cases::Solve* solves,
@@ -55,7 +61,7 @@ inline void run(const core::AxisCard* card_flash,
     for (uint8_t i = 0; i < kSlicesPerSample; ++i) {
       if (solver.step(card, sums)) {
         REQUIRE(solved < solve_count);
-        check_solve(core::flash_load(&solves[solved]), solver, sums.count(), signals);
+        check_solve(core::flash_load(&solves[solved]), solver, card, worth_flash, sums.count());
         ++solved;
       }
     }
@@ -72,11 +78,12 @@ inline void run(const core::AxisCard* card_flash,
 
 template <uint16_t kSolves>
 void run_case(const core::AxisCard* card,
+              const core::DerivativeWorth* worth,
               const int16_t* rows,
               uint16_t samples,
               const cases::Solve (&solves)[kSolves],
               const int32_t* sums) {
-  run(card, rows, samples, solves, static_cast<uint8_t>(kSolves), sums);
+  run(card, worth, rows, samples, solves, static_cast<uint8_t>(kSolves), sums);
 }
 
 }  // namespace replay

@@ -48,6 +48,15 @@ Costs costs_of(const core::AxisCard* card_flash, const int16_t* rows, uint16_t s
     most.slice = took > most.slice ? took : most.slice;
     most.solve += took;
   }
+  for (uint8_t s = 0; s < sums.signals(); ++s) {
+    const core::DerivativeWorth worth = {0.1F, 0.01F, 10};
+    const uint16_t began = TCNT1;
+    const core::LearnedDerivative one = solver.derivative(card, worth, s);
+    const uint16_t took = since(began);
+    most.slice = took > most.slice ? took : most.slice;
+    most.solve += took;
+    CHECK(one.half_width >= 0.0F);
+  }
   return most;
 }
 

@@ -8,6 +8,7 @@
 
 TEST_CASE("pitch, ten harmonics: every bit of the host's") {
   replay::run_case(&cases::kPitchCard,
+                   cases::kPitchWorth,
                    cases::kPitchRows,
                    cases::kPitchSamples,
                    cases::kPitchSolves,
@@ -16,6 +17,7 @@ TEST_CASE("pitch, ten harmonics: every bit of the host's") {
 
 TEST_CASE("roll, six harmonics of five signals: every bit of the host's") {
   replay::run_case(&cases::kRollCard,
+                   cases::kRollWorth,
                    cases::kRollRows,
                    cases::kRollSamples,
                    cases::kRollSolves,
@@ -23,12 +25,17 @@ TEST_CASE("roll, six harmonics of five signals: every bit of the host's") {
 }
 
 TEST_CASE("yaw, two derivatives that nobody wants: every bit of the host's") {
-  replay::run_case(
-      &cases::kYawCard, cases::kYawRows, cases::kYawSamples, cases::kYawSolves, cases::kYawSums);
+  replay::run_case(&cases::kYawCard,
+                   cases::kYawWorth,
+                   cases::kYawRows,
+                   cases::kYawSamples,
+                   cases::kYawSolves,
+                   cases::kYawSums);
 }
 
 TEST_CASE("an aileron that never moved is not told, the others are") {
   replay::run_case(&cases::kStillCard,
+                   cases::kStillWorth,
                    cases::kStillRows,
                    cases::kStillSamples,
                    cases::kStillSolves,
@@ -40,6 +47,7 @@ TEST_CASE("an aileron that never moved is not told, the others are") {
 
 TEST_CASE("a rudder that is the aileron's copy is not told") {
   replay::run_case(&cases::kCopiedCard,
+                   cases::kCopiedWorth,
                    cases::kCopiedRows,
                    cases::kCopiedSamples,
                    cases::kCopiedSolves,
@@ -50,6 +58,7 @@ TEST_CASE("a rudder that is the aileron's copy is not told") {
 
 TEST_CASE("the largest jumps that 16 bits hold") {
   replay::run_case(&cases::kWildCard,
+                   cases::kWildWorth,
                    cases::kWildRows,
                    cases::kWildSamples,
                    cases::kWildSolves,

@@ -104,9 +104,9 @@ class EquationError:
                 for c in range(count):
                     moved += -matrix[s, c] * row.columns[c]
                 spread[s] += square * _squared(moved)
-            yield from _nothing(self._card.signals + 2 + len(wanted))
+            last = harmonic == len(self._card.harmonics) - 1
+            yield from _nothing(self._card.signals + 2 + len(wanted) - last)
         self._finish(matrix, spread, residual, dropped)
-        yield from _nothing(self._card.signals - 1)
 
     def _row(self, harmonic: int) -> _Row:
         """Return one harmonic's regressors and moment at this instant."""
