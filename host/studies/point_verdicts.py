@@ -44,8 +44,8 @@ from host.wire.framing import EnvelopeReader, envelope
 from studies.stored_rows import flown_rows
 
 AIRCRAFT = "ultrastick25e"
-FIRST_SEED, FLIGHTS = 9300, 190
-PROMISE_FLIGHTS = 5
+FIRST_SEED, FLIGHTS = 9900, 190
+PROMISE_FLIGHTS = 11
 GUSTS_MPS = 0.3
 WITHIN = 1.3  # times the promise
 KINDS = ("good", "late", "good", "weak", "good", "axis", "good", "interrupted", "good", "gusty")

@@ -15,6 +15,8 @@ from host.live.live_program import _JsonLines
 from host.live.live_sample import LIVE_UNITS, Array, LiveUpdate
 from host.live.test_point.aircraft_response import STEP_S, AircraftResponse
 from host.live.test_point.card_progress import CardProgress, card_points
+from host.live.test_point.point_measures import PointMeasures
+from host.live.test_point.point_verdict import judge_point
 from host.live.test_point.point_watch import PointWatch
 from host.live.test_point.wanted_input import RESPONSE_S, wanted_surfaces
 from host.twin.testcard.cards import Card, Segment, parse
@@ -124,6 +126,17 @@ def test_what_is_wrong_is_said(
     assert not said["good"]
     assert said["text"].startswith("repeat: ")
     assert re.search(words, said["text"]), said
+
+
+def test_a_point_that_only_moved_too_softly_is_told_so(card: Card) -> None:
+    flown = PointMeasures(
+        axis="aileron", axis_wanted=True, amplitude=0.9, length=0.9, unquiet=0.0, others=0.0,
+        deviations=np.array([2.0, 1.9]), corrected=0.0, airspeed=0.0, airspeed_change=0.0,
+        gusts=1.0, lost=0.0,
+    )  # fmt: skip
+    said = judge_point(flown, card.segments[1])
+    assert said.text == "repeat: its steps are rounder or shorter than the card's"
+    assert judge_point(replace(flown, deviations=np.array([1.1, 1.0])), card.segments[1]).good
 
 
 def test_gusts_of_the_card_are_no_matter_and_others_are(
