@@ -198,6 +198,14 @@ def test_line_from_simulated_time() -> None:
     assert not line.supply_calibrated
 
 
+def test_a_flight_card_is_shown() -> None:
+    line = parse_status(WELL.replace(" | card", " | inputs 12345678 rows 3 enabled | card"))
+    assert line is not None
+    assert line.as_json()["flight_card"] == {"hash": "12345678", "rows": 3, "enabled": True}
+    assert "  flight card 12345678 rows 3 enabled" in line.lines()
+    assert parse_status(WELL.replace(" | card", " | inputs 12 rows 3 enabled | card")) is None
+
+
 def test_nothing_to_complain_of() -> None:
     line = parse_status(WELL)
     assert line is not None

@@ -20,6 +20,7 @@ _TITLES = {
     "rc": "receiver",
     "drive": "servos by",
     "relay": "relay",
+    "inputs": "flight card",
     "card": "card",
     "rail": "servo rail",
     "avcc": "supply",
@@ -47,10 +48,13 @@ _FIELDS: dict[str, tuple[str, float, float]] = {
     "rail": ("missing|# mV", 0, 65_535),
     "avcc": ("(?:about )?# mV", 0, 65_535),
 }  # fmt: skip
-KEYS = tuple(_FIELDS)
+# Written where there is a flight card only.
+_OF_A_CARD = {"inputs": ("[0-9a-f]{8} rows # (?:off|enabled)", 0.0, 99_999_999.0)}
+_KNOWN = {**_FIELDS, **_OF_A_CARD}
+KEYS = tuple(_KNOWN)
 _GRAMMAR = {
     key: re.compile(text.replace("@", r"(?:\d{1,9}|-)").replace("#", r"-?\d{1,9}"))
-    for key, (text, _, _) in _FIELDS.items()
+    for key, (text, _, _) in _KNOWN.items()
 }
 _LATER = re.compile(r"[ -~]{1,64}")  # of a field that a later firmware adds
 _LONGEST_KEY, _MOST_FIELDS = 16, 32
@@ -160,6 +164,7 @@ class StatusLine:
             "receiver": {"state": self.state("rc"), "pulse_us": self.numbers("rc")},
             "servos_by": self.fields["drive"],
             "relay": self.state("relay"),
+            "flight_card": self._flight_card(),
             "card": {"state": self.state("card"), "file_number": self._file_number()},
             "rail_mv": self._first("rail"),
             "supply_mv": self._first("avcc"),
@@ -188,6 +193,12 @@ class StatusLine:
 
     def _file_number(self) -> float | None:
         return None if "%" in self.fields["card"] else self._first("card")
+
+    def _flight_card(self) -> dict[str, object] | None:
+        if "inputs" not in self.fields:
+            return None
+        words = self.fields["inputs"].split()
+        return {"hash": words[0], "rows": int(words[2]), "enabled": words[3] == "enabled"}
 
     def _first(self, key: str) -> float | None:
         numbers = self.numbers(key)
@@ -222,7 +233,7 @@ def parse_status(line: str) -> StatusLine | None:
             return None
         fields[key] = " ".join(words)
     found = StatusLine(image[1], image[2], image[3] or "", fields)
-    if not set(KEYS) <= set(fields) or not all(_possible(found, key) for key in fields):
+    if not set(_FIELDS) <= set(fields) or not all(_possible(found, key) for key in fields):
         return None
     return found
 
@@ -230,9 +241,9 @@ def parse_status(line: str) -> StatusLine | None:
 def _possible(line: StatusLine, key: str) -> bool:
     """Return whether a field says what the firmware can say."""
     text = line.fields[key]
-    if key not in _FIELDS:
+    if key not in _KNOWN:
         return len(key) <= _LONGEST_KEY and _LATER.fullmatch(text) is not None
-    _, least, most = _FIELDS[key]
+    _, least, most = _KNOWN[key]
     if _GRAMMAR[key].fullmatch(text) is None:
         return False
     return all(least <= number <= most for number in line.numbers(key))
