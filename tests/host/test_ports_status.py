@@ -269,7 +269,7 @@ def test_half_lines_are_no_status_lines(cut: int, other: str) -> None:
     for text, whole in ((WELL[cut:], WELL), (WELL[:cut] + other, other)):
         half, line = parse_status(text), parse_status(whole)
         assert line is not None
-        assert half is None or {key: half.fields[key] for key in KEYS} == line.fields
+        assert half is None or {key: half.fields[key] for key in line.fields} == line.fields
 
 
 @given(st.binary(max_size=300), st.lists(st.integers(1, 60), min_size=1), st.data())
