@@ -87,7 +87,10 @@ def stick(flight: InputFlight, at_s: float, random: np.random.Generator) -> Faul
     channel, frame = int(random.integers(0, 4)), _frame(flight, at_s)
     size = int(random.integers(52, 250))
     flight.width_us[frame:, channel] += size if random.random() < 0.5 else -size
-    return Fault("stick", _accepted_s(flight, frame, channel))
+    known_s = _accepted_s(flight, frame, channel)
+    # Moved before the trigger was taken: that is its place at the trigger, and ends nothing.
+    early = known_s < TRIGGER_S + TRIGGER_SLACK_S
+    return Fault("stick", known_s, None if early else PLAIN_S)
 
 
 def small_stick(flight: InputFlight, at_s: float, random: np.random.Generator) -> Fault:
@@ -262,6 +265,7 @@ def fly(number: int, seed: int) -> Flown:
     bench.sitl.power_on()
     for when_s, act in fault.act:
         bench.sitl.run_until(round(when_s * TICKS_PER_S))
+        fault.known_s += bench.sitl.now() / TICKS_PER_S - when_s  # a turn of the loop, 1 ms at most
         act(bench)
     bench.sitl.run_until(round(flight.seconds * TICKS_PER_S))
     trigger = Trigger(TRIGGER_S, end_s + TRIGGER_SLACK_S + PLAIN_S, QUIET_S, shape)
