@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from host.cli import main
+from host.errors import UsageError
 from host.export.toml import dumps
 from host.planning import predicted_widths
 from host.planning.point_widths import PointPromise, promise_points
@@ -81,9 +82,24 @@ def test_one_point_alone_tells_less_than_three_of_it(card: Card, promised: Predi
     assert (alone.kind, alone.axes, alone.amplitudes) == ("3211", ("elevator",), (3.0,))
     assert [w.name for w in alone.widths] == ["M_alpha", "M_q", "M_de"]
     assert not alone.failures
+    assert alone.recorded  # sensors alone promised half of what a log gives of N_r
     assert shares == [1.0]
     together = {w.name: w.half_width for w in promised.widths}
     assert sum(w.half_width / together[w.name] for w in alone.widths) > 3.0
+
+
+def test_without_a_compiler_points_are_promised_by_the_sensors_alone(
+    card: Card, promised: Prediction, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def known(*_: object, chain: str = "none", **__: object) -> Prediction:
+        if chain == "sitl":
+            raise UsageError("no compiler")
+        return promised
+
+    monkeypatch.setattr("host.planning.point_widths.predict_widths", known)
+    [alone] = promise_points(card, 0.3, flights=1)
+    assert not alone.recorded
+    assert [w.name for w in alone.widths] == ["M_alpha", "M_q", "M_de"]
 
 
 def test_the_verb_prints_them_beside_the_bound(
@@ -113,6 +129,9 @@ def test_the_verb_prints_them_beside_the_bound(
     monkeypatch.setattr("host.planning.point_widths.promise_points", lambda *_, **__: told)
     assert main(["plan", str(path), "--alone"]) == 0
     assert "    3211 elevator, 3 deg: " in capsys.readouterr().out
+    told[0] = replace(told[0], recorded=False)
+    assert main(["plan", str(path), "--alone"]) == 0
+    assert "without the recorder" in capsys.readouterr().out
     assert main(["plan", str(path), "--flights", "0"]) == 0
     assert "white sensor noise only" in capsys.readouterr().out
     assert main(["plan", str(path), "--gusts", "9"]) == 2

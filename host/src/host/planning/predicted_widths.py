@@ -99,6 +99,7 @@ def predict_widths(
     *,
     flights: int = FLIGHTS,
     first_seed: int = FIRST_SEED,
+    chain: str = "gps",
     progress: Progress | None = None,
 ) -> Prediction:
     """Fly a card virtually and say what identification will state.
@@ -111,6 +112,8 @@ def predict_widths(
         Standard deviation of the vertical gust; the card's, or `LIGHT_GUSTS_MPS`.
     flights : int
     first_seed : int
+    chain : str
+        As `virtual_flight` takes it: ``sitl`` is the recorder, ``gps`` needs no compiler.
     progress : callable, optional
         Called with the share that is done.
 
@@ -129,7 +132,7 @@ def predict_widths(
     failures: list[str] = []
     for number in range(flights):
         try:
-            answers = _identified(windy, first_seed + number)
+            answers = _identified(windy, first_seed + number, chain)
         except IdentificationError as error:
             failures.append(str(error))
             answers = []
@@ -152,13 +155,13 @@ def predict_widths(
     return Prediction(gusts, tuple(widths), tuple(dict.fromkeys(failures)))
 
 
-def _identified(card: Card, seed: int) -> list[Answer]:
+def _identified(card: Card, seed: int, chain: str) -> list[Answer]:
     """Return the linear answers of one flight, as `host identify` gives them.
 
     With GPS, as every log has it: without, vanes' delays stay as open as their calibration left
     them and the clock's scale too, and M_q of the demo card was promised to 14 % in place of 9.
     """
-    found = from_frame(virtual_flight(card, seed, chain="gps").table)
+    found = from_frame(virtual_flight(card, seed, chain=chain).table)
     columns, _ = even_arrays(found.columns)
     airframe = airframe_data(card.aircraft)
     instrument = sensor_error_model(card.aircraft).recorded(recording_of_table(found.columns, {}))

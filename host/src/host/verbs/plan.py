@@ -312,7 +312,10 @@ def _alone(card: Card, args: argparse.Namespace) -> list[PointPromise]:
 def _print_alone(alone: list[PointPromise]) -> None:
     """Print what each test point alone will tell."""
     if alone:
-        print("\n  One test point alone, the same gusts and tolerances:")
+        by = "through the recorder"
+        if not all(point.recorded for point in alone):
+            by = "without the recorder (no C++ compiler: expect N_r and L_p wider)"
+        print(f"\n  One test point alone, {by}, the same gusts and tolerances:")
     for point in alone:
         size = "/".join(f"{a:g}" for a in point.amplitudes)
         told = ", ".join(f"{w.name} {w.percent:.0f} %" for w in point.widths) or "nothing"
