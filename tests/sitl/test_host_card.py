@@ -1,0 +1,97 @@
+"""`host card` and the recorder's own program at the two ends of one USB line."""
+
+from __future__ import annotations
+
+import pytest
+from host.link.card_console import CardConsole, CardError
+from host.twin.recorder.sitl_library import TICKS_PER_S, Port
+from host.wire.flight_card import card_bytes, card_faults, parts, read_card
+
+from tests.host.test_flight_card import DOUBLET, HEAD, MULTISINE
+from tests.sitl.bench import GROUND_S, Bench, config_places
+
+
+class Line:
+    """The USB line of an instrument: bytes sent arrive a millisecond later."""
+
+    device = "sitl"
+
+    def __init__(self, bench: Bench) -> None:
+        self._sitl, self._read = bench.sitl, 0
+
+    def now_s(self) -> float:
+        return self._sitl.now() / TICKS_PER_S
+
+    def data(self) -> bytes:
+        self._sitl.run_for(0.02)
+        sent = self._sitl.sent(Port.USB)
+        new, self._read = sent[self._read :], len(sent)
+        return new
+
+    def send(self, data: bytes) -> None:
+        at = self._sitl.now() + TICKS_PER_S // 1000
+        self._sitl.add_usb([at] * len(data), list(data))
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    """An instrument at rest on the ground, long enough to know it."""
+    found = Bench()
+    found.sitl.power_on()
+    found.sitl.run_for(GROUND_S)
+    return found
+
+
+@pytest.fixture(scope="module")
+def card(bench: Bench) -> bytes:
+    name = read_aircraft(bench)
+    return card_bytes(HEAD | {"aircraft": name}, [DOUBLET, MULTISINE])
+
+
+def read_aircraft(bench: Bench) -> bytes:
+    at, size = config_places()["aircraft"]
+    return bytes(bench.sitl.default_config()[at : at + size]).rstrip(b"\0")
+
+
+def test_a_card_is_written_committed_and_read_back(bench: Bench, card: bytes) -> None:
+    line = Line(bench)
+    console = CardConsole(line, line.now_s)
+    assert card_faults(card) == []
+    with pytest.raises(CardError, match="no valid card"):
+        console.read()
+    assert console.write(card) == read_card(card).hash
+    assert console.read() == card
+    console.must("write", 0, parts(card)[0])
+    with pytest.raises(CardError, match="no valid card"):
+        console.read()
+    console.must("commit")
+    console.must("erase")
+    with pytest.raises(CardError, match="no valid card"):
+        console.read()
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "fault"),
+    [
+        ({"aircraft": b"another"}, {}, "aircraft"),
+        ({"stick_us": 9}, {}, "limits"),
+        ({}, {"duration_ms": 90}, "row_time"),
+        ({}, {"amplitude_us": [0, 121, 0]}, "row_amplitude"),
+        ({}, {"duration_ms": 180}, "row_frequency"),
+        ({}, {"shape": 9}, "row_shape"),
+        ({}, {"axes": 3}, "row_axes"),
+        ({}, {"first_chz": 20}, "row_frequency"),
+        ({}, {"shape": 5}, "row_components"),
+    ],
+)
+def test_host_and_logger_refuse_the_same_cards(
+    bench: Bench, card: bytes, head: dict[str, object], row: dict[str, object], fault: str
+) -> None:
+    line = Line(bench)
+    console = CardConsole(line, line.now_s)
+    name = read_card(card).head["aircraft"]
+    wrong = card_bytes({**HEAD, "aircraft": name, **head}, [{**DOUBLET, **row}])
+    if fault != "aircraft":  # the host does not know whose logger it is
+        assert card_faults(wrong)
+    with pytest.raises(CardError, match=rf"damaged \({fault}\)"):
+        console.write(wrong)
