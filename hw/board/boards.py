@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import subprocess
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -64,9 +66,17 @@ class Board:
         """
         command = ["kicad-cli", *arguments]
         try:
-            done = subprocess.run(
-                command, cwd=self.folder, capture_output=True, text=True, check=False
-            )
+            with tempfile.TemporaryDirectory() as empty:
+                # The reader's own library tables must not decide what is found.
+                settings = {**os.environ, "KICAD_CONFIG_HOME": empty}
+                done = subprocess.run(
+                    command,
+                    cwd=self.folder,
+                    env=settings,
+                    capture_output=True,
+                    text=True,
+                    check=False,
+                )
         except FileNotFoundError:
             raise BoardError("no kicad-cli found: run .ci/setup.sh hw") from None
         if done.returncode:
