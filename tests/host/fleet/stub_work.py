@@ -8,6 +8,8 @@ from typing import Any
 from host.errors import UsageError
 from host.fleet.flight_task import IDENTIFIED, described
 
+EATEN_BYTES = 600_000_000  # beyond any limit of the tests; no more, so that others keep theirs
+
 
 def stub_row(values: dict[str, Any]) -> dict[str, Any]:
     """Return a row, unless the flight's name says to hang, eat memory, end or be damaged."""
@@ -18,9 +20,9 @@ def stub_row(values: dict[str, Any]) -> dict[str, Any]:
         while True:
             pass
     if "eats" in name:
-        held = []
-        while True:
-            held.append(b"x" * (32 << 20))
+        held = b"x" * EATEN_BYTES
+        while held:  # and waits to be found with it
+            time.sleep(600.0)
     if "ends" in name:
         os._exit(7)
     if "damaged" in name:
