@@ -11,7 +11,7 @@ import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.cli import main
 from host.sysid import Maneuver, fit
-from host.sysid.aerodynamics.coefficient_table import coefficients
+from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.compatibility.position_correction import transfer_to_cg
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.linear_estimator import identify
@@ -165,7 +165,9 @@ def test_coefficients_invert_the_textbook_derivatives() -> None:
     y = response[0].y.T
     noise = 1e-4 * y.std(axis=0) * np.random.default_rng(1).standard_normal(y.shape)
     result = fit("output-error", model.with_start(theta), [Maneuver(0.02, u, y + noise)])
-    found = {c.name: c for c in coefficients(result, airframe, Condition(V, qbar))}
+    found = {
+        c.name: c for c in coefficients(coefficient_parts(result, airframe, Condition(V, qbar)))
+    }
     for name, value in wanted.items():
         assert found[name].value == pytest.approx(value, rel=0.01), name
     assert found["Cm_alpha"].half_width == pytest.approx(

@@ -36,7 +36,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", required=True,
                         help="folder of the dataset and of the report")  # fmt: skip
     parser.add_argument("--model", action="append", metavar="FILE", help="kind 'coefficients', as"
-                        " of `host identify`")  # fmt: skip
+                        " of `host identify`; without one the standard coefficients, or the linear"
+                        " models of a flight without vanes")  # fmt: skip
     parser.add_argument("--accept", action="append", metavar="CHECK", help="as of `host identify`;"
                         " repeatable")  # fmt: skip
     parser.add_argument("--workers", type=int, default=0, metavar="N",
@@ -71,11 +72,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
-    from host.fleet.flight_task import TaskLimits
+    from host.fleet.flight_task import DEFAULT_MODELS, TaskLimits
     from host.fleet.runs.fleet_answer import fleet_answer
     from host.fleet.runs.fleet_run import run_fleet
     from host.fleet.sources.fleet_table import read_table
-    from host.fleet.sources.flight_keys import DEFAULT_MODELS, FleetSources
+    from host.fleet.sources.flight_keys import FleetSources
     from host.fleet.tasks.task_cluster import ClusterOptions
     from host.progress import draw_share
 

@@ -10,7 +10,7 @@ from host.aircraft.local_derivatives import coefficients as about_cg
 from host.aircraft.mass_properties import Condition, airframe_data
 from host.arrays import Array
 from host.instrument.deviations import sensor_error_model
-from host.sysid.aerodynamics.coefficient_table import coefficients
+from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.aerodynamics.derivative_conversion import (
     CONSIDERED_ERRORS,
     ConversionPoint,
@@ -185,7 +185,7 @@ def test_the_linear_answer_converts_by_the_same_equations() -> None:
         "by hand", some, out.names, out.values, out.covariance, out.covariance, many,
         (), (), "simulation", none, 1, True,
     )  # fmt: skip
-    found = {c.name: c for c in coefficients(result, AIRFRAME, PLACE.condition)}
+    found = {c.name: c for c in coefficients(coefficient_parts(result, AIRFRAME, PLACE.condition))}
     assert set(found) == set(TRUE)
     for name, value in TRUE.items():
         assert found[name].value == pytest.approx(value, rel=1e-9), name

@@ -13,7 +13,11 @@ from host.cli import main
 from host.instrument.deviations import dynamic_pressure_share
 from host.instrument.instrument_errors import InstrumentErrors, standard_errors
 from host.sysid import Maneuver, fit
-from host.sysid.aerodynamics.coefficient_table import ShiftedEstimate, coefficients
+from host.sysid.aerodynamics.coefficient_table import (
+    ShiftedEstimate,
+    coefficient_parts,
+    coefficients,
+)
 from host.sysid.answer.estimate_lines import model_lines
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.answer.verdict import verdict_lines
@@ -202,7 +206,7 @@ def test_a_better_pitot_narrows_a_coefficient() -> None:
     standard = standard_errors()
 
     def half(*moved: ShiftedEstimate, errors: InstrumentErrors | None = None) -> float:
-        table = coefficients(result, airframe, condition, moved, errors)
+        table = coefficients(coefficient_parts(result, airframe, condition, moved, errors))
         return next(c.half_width / abs(c.value) for c in table if c.name == "Cm_alpha")
 
     def pitot(share: float) -> ShiftedEstimate:

@@ -9,7 +9,7 @@ import pytest
 from host.aircraft.mass_properties import AirframeData, Condition, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.instrument.deviations import unknown_sensors
-from host.sysid.aerodynamics.coefficient_table import coefficients
+from host.sysid.aerodynamics.coefficient_table import coefficient_parts, coefficients
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.start_values import regression_estimates, start_values
@@ -166,7 +166,7 @@ def test_truth_in_derivatives_is_what_conversion_turns_back() -> None:
         "test", model, model.parameter_names, estimate, np.eye(size), np.eye(size),
         np.full(size, np.inf), (), (), "output", np.eye(1), 1, True,
     )  # fmt: skip
-    table = coefficients(result, airframe, Condition(19.0, 220.0))
+    table = coefficients(coefficient_parts(result, airframe, Condition(19.0, 220.0)))
     assert {c.name: c.value for c in table} == pytest.approx(local)
 
 

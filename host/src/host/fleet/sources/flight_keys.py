@@ -11,12 +11,10 @@ from pathlib import Path
 from host import __version__
 from host.aircraft.file import load_measured, read_document
 from host.fleet.fleet_error import FleetError
-from host.fleet.flight_task import ROWS, FlightTask
+from host.fleet.flight_task import DEFAULT_MODELS, ROWS, FlightTask
 from host.fleet.sources.fleet_table import TableRow, row_of
 from host.fleet.sources.flight_files import flight_files, is_address, log_id
 from host.physical.calibration import load_calibration
-
-DEFAULT_MODELS = ("coefficients",)
 
 
 @dataclass(slots=True)

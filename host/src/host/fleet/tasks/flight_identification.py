@@ -14,15 +14,20 @@ from typing import Any
 import numpy as np
 
 from host.aircraft.file import load_measured
+from host.aircraft.gains import dimensional_name
+from host.constants import GRAVITY_MPS2
 from host.errors import HostError
-from host.fleet.flight_task import IDENTIFIED, described
+from host.fleet.flight_task import DEFAULT_MODELS, IDENTIFIED, described
 from host.fleet.sources.flight_files import is_address, opened
 from host.fleet.statistics.watched_quantities import LAG_S
 from host.fleet.tasks.estimate_loadings import LoadedEstimates, coefficient_loadings
+from host.fleet.tasks.linear_loadings import linear_loadings
 from host.fleet.tasks.surface_response import surface_quantities
 from host.fleet.tasks.vane_zeros import vane_zeros
 from host.instrument.error_sources import AIRCRAFT_FILE
-from host.sysid.answer.coefficient_rules import open_finding
+from host.sysid.answer import trust_rules
+from host.sysid.answer.coefficient_rules import follows_states, open_finding
+from host.sysid.answer.feedback_pairs import feedback_of
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.compatibility.sensor_dynamics import SERVO_DELAY
 from host.sysid.flight.data_finding import finding_document, open_channels
@@ -47,22 +52,18 @@ def flight_row(values: dict[str, Any]) -> dict[str, Any]:
     """
     began_s = time.process_time()
     with _local(values["source"]) as path:
-        found = identify(
-            path,
-            aircraft=values["aircraft_file"],
-            models=list(values["models"]),
-            calibration=values["calibration"] or None,
-            mapping=values["mapping"] or None,
-            accept=list(values["accept"]),
-        )
+        found = _identified(path, values)
         date = values["date"] or _recorded_on(path)
         surfaces = _surfaces(path, values["calibration"])
-    if found.coefficients is None:
-        raise IdentificationError("; ".join(found.notes) or "no coefficients")
     instrument = found.flights[0].instrument
     if instrument is None:
         raise IdentificationError("the aircraft file does not describe its sensors")
-    parts = coefficient_loadings(found.coefficients.fit, instrument.errors)
+    if found.coefficients is not None:
+        parts = coefficient_loadings(found.coefficients.fit, instrument.errors)
+    else:
+        parts = linear_loadings(found.linear, instrument.errors)
+    if not parts.names:
+        raise IdentificationError("; ".join(found.notes) or "no coefficients")
     row = described({**values, "date": date}) | _estimate_columns(parts, values)
     return (
         row
@@ -75,6 +76,26 @@ def flight_row(values: dict[str, Any]) -> dict[str, Any]:
             "processor_s": time.process_time() - began_s,
         }
     )
+
+
+def _identified(path: Path, values: dict[str, Any]) -> Identification:
+    """Identify a flight: its coefficients, or linear models where no vane tells them."""
+    how = {
+        "aircraft": values["aircraft_file"],
+        "calibration": values["calibration"] or None,
+        "mapping": values["mapping"] or None,
+        "accept": list(values["accept"]),
+    }
+    try:
+        return identify(path, models=list(values["models"]), **how)
+    except IdentificationError as error:
+        if list(values["models"]) != list(DEFAULT_MODELS):
+            raise
+        why = error
+    try:
+        return identify(path, **how)
+    except IdentificationError:
+        raise why from None
 
 
 def _estimate_columns(parts: LoadedEstimates, values: dict[str, Any]) -> dict[str, Any]:
@@ -92,21 +113,55 @@ def _estimate_columns(parts: LoadedEstimates, values: dict[str, Any]) -> dict[st
 
 
 def _answer_columns(found: Identification) -> dict[str, Any]:
-    answer = found.coefficients
-    if answer is None:  # told by the caller already
-        return {}
-    doubts = open_finding(answer, open_channels(found.findings))
-    at = answer.fit.condition
+    answers = (found.coefficients,) if found.coefficients else found.linear
+    delays = {name: list(pair) for answer in answers for name, pair in answer.delays.items()}
     return {
-        "doubted": sorted({name for doubt in doubts for name in doubt.names}),
+        "models": ["coefficients"] if found.coefficients else [a.template for a in found.linear],
+        "doubted": _doubted(found),
         "verdict": list(found.verdict),
         "findings": json.dumps([finding_document(f) for f in found.findings]),
-        "maneuvers": len(answer.used),
+        "maneuvers": sum(len(answer.used) for answer in answers),
+        "delays": json.dumps(delays),
+    } | (_condition(found.coefficients.fit) if found.coefficients else _trimmed(found))
+
+
+def _doubted(found: Identification) -> list[str]:
+    """Return the coefficients that a finding about the data speaks against."""
+    if found.coefficients:
+        answer, laws = found.coefficients, feedback_of(found.findings)
+        doubts = open_finding(answer, open_channels(found.findings))
+        doubts += [one for law in laws for one in follows_states(answer, law)]
+        return sorted({name for doubt in doubts for name in doubt.names})
+    rules = (trust_rules.open_finding, trust_rules.follows_states)
+    doubts = [one for a in found.linear for rule in rules for one in rule(a, found.evidence)]
+    names = {name for doubt in doubts for name in doubt.names}
+    told = {c.name for answer in found.linear for c in answer.coefficients}
+    return sorted(name for name in told if dimensional_name(name) in names)
+
+
+def _condition(fit: CoefficientFit) -> dict[str, float]:
+    at = fit.condition
+    return {
         "airspeed_mps": at.airspeed_mps,
         "alpha_rad": at.alpha_rad,
         "lift": at.lift,
         "drag": at.drag,
-        "delays": json.dumps({name: list(pair) for name, pair in answer.delays.items()}),
+    }
+
+
+def _trimmed(found: Identification) -> dict[str, float]:
+    """Return the condition of linear answers: that of level flight at their trim.
+
+    The drag is not known and left out: of Cm_alpha about another CG it is the hundredth part.
+    """
+    first, known = found.linear[0], found.aircraft
+    assert known is not None  # a fleet's flights have an aircraft file
+    frame, at = known.airframe, first.condition
+    return {
+        "airspeed_mps": at.airspeed_mps,
+        "alpha_rad": first.trim.alpha_rad,
+        "lift": frame.mass_kg * GRAVITY_MPS2 / (at.qbar_pa * frame.wing_area_m2),
+        "drag": 0.0,
     }
 
 
@@ -124,16 +179,16 @@ def _watched_columns(
     found: Identification, parts: LoadedEstimates, aircraft_file: str, surfaces: Watched
 ) -> dict[str, Any]:
     """Return what no derivative shows (`statistics.watched_quantities`)."""
-    if found.coefficients is None:
-        return {}
-    fit, own = found.coefficients.fit, np.sqrt(np.diag(parts.own))
-    told = {
-        n: (float(v), float(sd)) for n, v, sd in zip(parts.names, parts.values, own, strict=True)
-    }
-    watched = vane_zeros(
-        found.flights[0], told, float(fit.condition.drag), load_measured(aircraft_file)
-    )
-    watched |= surfaces or _commanded_lag(fit)
+    watched = dict(surfaces)
+    if found.coefficients is not None:
+        fit, own = found.coefficients.fit, np.sqrt(np.diag(parts.own))
+        told = {
+            n: (float(v), float(d)) for n, v, d in zip(parts.names, parts.values, own, strict=True)
+        }
+        watched |= vane_zeros(
+            found.flights[0], told, float(fit.condition.drag), load_measured(aircraft_file)
+        )
+        watched |= {} if surfaces else _commanded_lag(fit)
     return {
         "watched": list(watched),
         "watched_values": [value for value, _ in watched.values()],

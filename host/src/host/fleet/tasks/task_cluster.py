@@ -175,7 +175,9 @@ def _local(options: ClusterOptions, tell: Callable[[str], None]) -> Iterator[Cli
     except (OSError, RuntimeError) as error:
         raise FleetError(f"workers on this computer did not start: {error}; try again") from error
     with started as cluster, Client(cluster) as client:
-        tell(f"{len(cluster.workers)} workers on this computer; dashboard {cluster.dashboard_link}")
+        count = len(cluster.workers)
+        workers = f"{count} worker{'s' * (count != 1)}"
+        tell(f"{workers} on this computer; dashboard {cluster.dashboard_link}")
         yield client
 
 

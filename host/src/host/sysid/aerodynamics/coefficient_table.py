@@ -58,13 +58,39 @@ class ShiftedEstimate:
     qbar_gain: float
 
 
-def coefficients(
+@dataclass(frozen=True)
+class CoefficientParts:
+    """Coefficients of a linear answer and, apart, all that they may be wrong by.
+
+    Attributes
+    ----------
+    names : tuple of str
+    values : Array, shape (K,)
+    statistical : Array, shape (K, K)
+        Covariance by the fit alone.
+    quantile : Array, shape (K,)
+        Of a two-sided 95 % interval, in standard errors: Student's where maneuvers are few.
+    assumed : dict of str to (K,) Array
+        Shift by one standard deviation of mass, inertia, dynamic pressure and upwash, by cause.
+    sensed : tuple of (str, (K,) Array)
+        Shift by one standard deviation of each sensor error.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    statistical: Array
+    quantile: Array
+    assumed: dict[str, Array]
+    sensed: tuple[tuple[str, Array], ...]
+
+
+def coefficient_parts(
     result: FitResult,
     airframe: AirframeData,
     condition: Condition,
     shifts: Sequence[ShiftedEstimate] = (),
     errors: InstrumentErrors | None = None,
-) -> tuple[Coefficient, ...]:
+) -> CoefficientParts:
     """Convert dimensional derivatives of the templates to coefficients.
 
     Parameters
@@ -79,12 +105,6 @@ def coefficients(
         Of the derivatives, by one deviation of each sensor error.
     errors : InstrumentErrors, optional
         What the pitots may be wrong by, where `shifts` has nothing of them; standard ones without.
-
-    Returns
-    -------
-    tuple of Coefficient
-        The interval adds mass, inertia, dynamic pressure, upwash and the shifts to the fit's
-        own. Errors of the vanes are what upwash allows for: the larger counts.
     """
 
     def converted(derivatives: Array, a: AirframeData, at: Condition) -> Array:
@@ -101,7 +121,6 @@ def coefficients(
     slopes = np.stack(
         [converted(row, airframe, condition) for row in np.eye(len(result.names))], axis=1
     )
-    fit_error = np.sqrt(np.einsum("ij,jk,ik->i", slopes, result.covariance, slopes))
     assumed: dict[str, Array] = {
         cause: (converted(result.estimate, a, at) - value) / PERTURBATION * share
         for cause, (share, a, at) in _perturbed_mass_properties(airframe, condition).items()
@@ -113,29 +132,47 @@ def coefficients(
         )
     of_flow_angle = np.array([name.endswith(("_alpha", "_beta")) for name in names])
     assumed[VANE] = np.asarray(of_flow_angle * value * airframe.upwash * airframe.upwash_share)
-    sensed: dict[str, list[Array]] = {}
+    sensed = []
     for m in shifts:
         there = Condition(condition.airspeed_mps * m.airspeed_gain, condition.qbar_pa * m.qbar_gain)
-        shift = converted(m.estimate, airframe, there) - value
-        cause = SHARED.get(m.error) or ERROR_LABELS.get(m.error, m.error)
-        sensed.setdefault(cause, []).append(shift)
-    parts = _variances(assumed, sensed)
-    extra = sum(parts.values(), np.zeros(len(names)))
+        sensed.append((m.error, converted(m.estimate, airframe, there) - value))
     quantile = result.half_width() / np.maximum(result.standard_error, 1e-300)
-    main = np.array([quantile[result.names.index(dimensional_name(name))] for name in names])
-    half = np.hypot(main * fit_error, NORMAL_95 * np.sqrt(extra))
+    return CoefficientParts(
+        tuple(names),
+        value,
+        slopes @ result.covariance @ slopes.T,
+        np.array([quantile[result.names.index(dimensional_name(name))] for name in names]),
+        assumed,
+        tuple(sensed),
+    )
+
+
+def coefficients(parts: CoefficientParts) -> tuple[Coefficient, ...]:
+    """Return coefficients with intervals of everything.
+
+    Mass, inertia, dynamic pressure, upwash and errors of sensors add to the fit's own. Errors of
+    the vanes are what upwash allows for: the larger counts.
+    """
+    sensed: dict[str, list[Array]] = {}
+    for error, shift in parts.sensed:
+        cause = SHARED.get(error) or ERROR_LABELS.get(error, error)
+        sensed.setdefault(cause, []).append(shift)
+    variances = _variances(parts.assumed, sensed)
+    extra = sum(variances.values(), np.zeros(len(parts.names)))
+    fit_error = np.sqrt(np.diag(parts.statistical))
+    half = np.hypot(parts.quantile * fit_error, NORMAL_95 * np.sqrt(extra))
     return tuple(
         Coefficient(
             name,
-            float(value[k]),
+            float(parts.values[k]),
             float(fit_error[k]),
             float(half[k]),
             dominant_error_source(
-                {cause: float(part[k]) for cause, part in parts.items()},
+                {cause: float(part[k]) for cause, part in variances.items()},
                 float(fit_error[k] ** 2 + extra[k]),
             ),
         )
-        for k, name in enumerate(names)
+        for k, name in enumerate(parts.names)
     )
 
 

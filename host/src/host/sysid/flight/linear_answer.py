@@ -8,7 +8,11 @@ import numpy as np
 
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
-from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
+from host.sysid.aerodynamics.coefficient_table import (
+    Coefficient,
+    CoefficientParts,
+    CoefficientTable,
+)
 from host.sysid.compatibility.sensor_corrections import Correction
 from host.sysid.estimators.servo_parameters import ServoEstimate
 from host.sysid.flight.maneuver_detection import DetectedManeuver
@@ -55,6 +59,7 @@ class Answer:
     coherence: InputCoherence | None = None  # of what free simulation leaves with the inputs
     predictions: dict[str, Prediction] = field(default_factory=dict)  # of outputs held out
     noise_covariance: Array | None = None  # of the estimate, without systematic errors
+    coefficient_parts: CoefficientParts | None = None
     causes: dict[str, str] = field(default_factory=dict)  # what widens each interval most
     unseen: tuple[
         tuple[Maneuver, Array], ...

@@ -17,7 +17,9 @@ from host.arrays import Array
 from host.instrument.recording import OWN
 from host.sysid.aerodynamics.coefficient_table import (
     Coefficient,
+    CoefficientParts,
     ShiftedEstimate,
+    coefficient_parts,
     coefficients,
     trim_of,
 )
@@ -290,11 +292,11 @@ class LinearEstimator:
         # that were estimated have taken up half a sample, and their intervals count it.
         if self.own is not None or not (e.delays or sensors_known(e.used)):
             shifts += hold_shift(statistical, e.maneuvers, e.trim)
-        found: tuple[Coefficient, ...] = ()
+        found: CoefficientParts | None = None
         if self.airframe is not None and e.trim.known:
             own = e.used[0].flight.instrument
             errors = own.errors if own is not None else None
-            found = coefficients(statistical, self.airframe, e.condition, shifts, errors)
+            found = coefficient_parts(statistical, self.airframe, e.condition, shifts, errors)
         return LinearIntervals(
             statistical, coherence, shifts, add_systematic_covariance(statistical, shifts), found
         )
@@ -354,7 +356,8 @@ class LinearEstimator:
             identifiability_flags=assess_identifiability(total, e.maneuvers).flags,
             collinearity=collinearity(statistical),
             modes=modes(total),
-            coefficients=intervals.coefficients,
+            coefficients=() if intervals.parts is None else coefficients(intervals.parts),
+            coefficient_parts=intervals.parts,
             constant_inputs=constant_inputs(e.model, e.maneuvers),
             delays=e.delays,
             servo=e.servo,

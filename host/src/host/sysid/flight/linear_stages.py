@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from host.aircraft.mass_properties import Condition
 from host.arrays import Array
-from host.sysid.aerodynamics.coefficient_table import Coefficient, ShiftedEstimate
+from host.sysid.aerodynamics.coefficient_table import CoefficientParts, ShiftedEstimate
 from host.sysid.estimators.servo_parameters import ServoEstimate
 from host.sysid.flight.prediction_limits import Prediction
 from host.sysid.flight.reconstructed_flight import FlownManeuver
@@ -76,14 +76,14 @@ class LinearEstimate:
 @dataclass(frozen=True)
 class LinearIntervals:
     """What the intervals count: `statistical` noise, scatter of maneuvers and what inputs drive
-    beside the model (`coherence`), `total` with every systematic error of `shifts`; coefficients
-    with mass and inertia in theirs."""
+    beside the model (`coherence`), `total` with every systematic error of `shifts`; `parts` of the
+    coefficients with mass and inertia in theirs."""
 
     statistical: FitResult
     coherence: InputCoherence | None
     shifts: tuple[ShiftedEstimate, ...]
     total: FitResult
-    coefficients: tuple[Coefficient, ...]
+    parts: CoefficientParts | None
 
 
 @dataclass(frozen=True)
