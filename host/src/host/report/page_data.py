@@ -16,6 +16,7 @@ AROUND_S = 5.0  # before and behind a test point
 OVERVIEW_BUCKETS = 4000  # two points each: more than any screen has columns
 OVERVIEW_BYTES = 2_600_000  # of the page; script and text are the rest of 3 MB
 PAGE_BYTES = 9_400_000  # of all samples; script, text and track are the rest of 10 MB
+SURELY = 0.7  # of the fewest bytes a row: a stretch that is larger even so is not packed to see it
 _ROWS_AT_ONCE = 1 << 18  # of a stretch
 
 
@@ -67,9 +68,13 @@ def page_data(flight: ShownFlight, channels: list[Channel], *, full: bool = Fals
     stretches: list[Packed] = []
     left_out: list[tuple[float, float]] = []
     room = PAGE_BYTES - len(overview)
+    smallest = 0.0  # bytes a row of the stretches packed so far
     for first, last in spans:
-        packed = _cut(t_s, values, (first, last))
-        if len(packed) > room:
+        packed = None
+        if SURELY * smallest * (last - first) <= room:
+            packed = _cut(t_s, values, (first, last))
+            smallest = min(smallest or np.inf, len(packed) / (last - first))
+        if packed is None or len(packed) > room:
             left_out.append((float(t_s[first]), float(t_s[last - 1])))
         else:
             room -= len(packed)

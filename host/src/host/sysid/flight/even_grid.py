@@ -219,6 +219,8 @@ def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
 def _unwrapped(name: str, series: Array, notes: list[str]) -> Array:
     """Return an angle without its jumps by a turn: of 360 where it is in degrees."""
     largest = float(np.max(np.abs(np.diff(series)), initial=0.0))
+    if largest < np.pi:
+        return series  # nothing to unwrap; np.unwrap of an hour costs more than the interpolation
     if largest <= MOST_JUMP_RAD:
         return np.asarray(np.unwrap(series))
     notes.append(f"{name} jumps by {largest:.3g} rad from one row to the next: turns of 360 there")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import special
 
 from host.arrays import Array
 from host.sysid.identification_error import IdentificationError
@@ -90,6 +89,8 @@ class FitResult:
 
     def half_width(self, confidence: float = 0.95) -> Array:
         """Return half-widths of two-sided intervals, units of the estimate, shape (P,)."""
+        from scipy import special  # 0.2 s, and who only looks at a flight needs no interval
+
         dof = np.minimum(self.degrees_of_freedom, 1e9)
         quantile = np.asarray(special.stdtrit(dof, 0.5 + confidence / 2.0), dtype=np.float64)
         return quantile * self.standard_error
