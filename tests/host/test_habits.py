@@ -65,6 +65,25 @@ def test_other_shells_get_a_script_with_every_verb(
     assert "ultrastick25e" in said or shell == "tcsh"
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("export x --to tlogg", "argument --to: no 'tlogg' (did you mean tlog?); there are tlog,"),
+        ("card wite", "argument do: no 'wite' (did you mean write?)"),
+        ("decode --session one", "argument --session: invalid int value: 'one'"),
+        ("convert", "the following arguments are required: source, --aircraft"),
+    ],
+)
+def test_a_wrong_argument_is_one_line_with_the_near_word(
+    words: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """argparse puts the whole usage before it, and names no near word."""
+    assert main(words.split()) == 2
+    err = capsys.readouterr().err
+    assert said in err and err.count("\n") == 1
+    assert err.endswith("--help says more\n")
+
+
 def test_colours_are_for_terminals_that_want_them(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("WT_SESSION", "1")

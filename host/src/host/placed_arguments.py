@@ -10,9 +10,10 @@ import argparse
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from host.errors import UsageError
+from host.near_names import like
 
 T = TypeVar("T")
 Placed = Sequence[tuple[int, T]]  # a value, and how many files stood before it
@@ -25,6 +26,22 @@ class PlacedParser(argparse.ArgumentParser):
     def __init__(self, *args: Any, **options: Any) -> None:
         self._takes_value: dict[str, bool] = {}
         super().__init__(*args, **options)
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse arguments in one line; argparse would print the whole usage before it.
+
+        Raises
+        ------
+        UsageError
+            Always.
+        """
+        raise UsageError(f"{message}; {self.prog} --help says more")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        known = [str(one) for one in action.choices or ()]
+        if known and str(value) not in known:
+            text = f"no {value!r}{like(str(value), known)}; there are {', '.join(known)}"
+            raise argparse.ArgumentError(action, text)
 
     def add_argument(self, *names: Any, **options: Any) -> argparse.Action:
         """Add an argument, and remember whether a value follows it."""

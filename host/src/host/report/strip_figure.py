@@ -9,6 +9,7 @@ from host.arrays import Array
 from host.errors import UsageError
 from host.export.unfinished import unfinished
 from host.extras import install_hint
+from host.near_names import like
 from host.report.channel_list import Channel, channels_of
 from host.report.overview import buckets, min_max
 from host.report.plotting import blamed_on
@@ -85,7 +86,10 @@ def _wanted(known: dict[str, Channel], names: tuple[str, ...]) -> list[list[str]
     strips = [strip.split("+") for strip in names]
     for name in (one for strip in strips for one in strip):
         if name not in known:
-            raise UsageError(f"--channels {name}: not measured here; there are {', '.join(known)}")
+            raise UsageError(
+                f"--channels {name}: not measured here{like(name, known)}; there are"
+                f" {', '.join(known)}"
+            )
     return strips
 
 
