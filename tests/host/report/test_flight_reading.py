@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.cli import main
+from host.report.flight_reading import Wanted, read_flight
 from host.report.shown_flight import ShownFlight, with_gaps
 
 from tests.host.report.flights import DOUBLETS_S, JUMP_S, LOST_S
@@ -20,6 +21,18 @@ def test_test_points_are_those_of_host_maneuvers(
     for told, (item, mark) in zip(listed, flight.maneuvers, strict=True):
         assert told["start_s"] == pytest.approx(item.start_s, abs=1e-9)
         assert told["grade"] == pytest.approx(mark.score, abs=1e-9)
+
+
+def test_of_original_rows_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Their vanes drop out: `host maneuvers` divides what stands over it, the page did not."""
+    asked = ("--firmware", "thesis", "--seed", "31005", "--no-picture", "-o", str(tmp_path))
+    assert main(["simulate", "thesis_flight1", *asked]) == 0
+    rows = tmp_path / "flight.thesis.txt"
+    capsys.readouterr()
+    assert main(["maneuvers", str(rows), "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["maneuvers"]
+    found = read_flight(Wanted(rows))[0].maneuvers
+    assert [one["start_s"] for one in listed] == pytest.approx([item.start_s for item, _ in found])
 
 
 def test_a_loss_is_a_gap_and_is_listed(flight: ShownFlight) -> None:

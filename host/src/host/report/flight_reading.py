@@ -153,7 +153,7 @@ def _of_rows(wanted: Wanted, path: Path) -> ShownFlight:
     if not table.rate.known:
         raise UsageError(f"{path}: the rate of its rows is {table.rate.text}")
     summary = finite(summarise_rows(path, rows, table, calibration))
-    maneuvers, notes = _maneuvers(table.columns) if wanted.maneuvers else ([], [])
+    maneuvers, notes = _found_in(path, wanted) if wanted.maneuvers else ([], [])
     return ShownFlight(
         name=shown(path.name),
         columns=with_gaps(table.columns),
@@ -182,11 +182,7 @@ def _of_autopilot(wanted: Wanted, path: Path) -> ShownFlight:
     if flight.judgement.refusal:
         notes.append(f"no maneuvers: {flight.judgement.refusal}")
     elif wanted.maneuvers:
-        try:
-            found, _ = read_columns(path, sensors=dict(wanted.sensors))
-            maneuvers = [(item, grade(found, item)) for item in detect_maneuvers(found)]
-        except HostError as error:
-            notes.append(f"no maneuvers: {error}")
+        maneuvers, notes = _found_in(path, wanted)
     return ShownFlight(
         name=shown(path.name),
         columns=_common_rows(columns),
@@ -222,6 +218,18 @@ def _common_rows(columns: Mapping[str, Array]) -> dict[str, Array]:
             drawn[between & (own[after] - own[after - 1] > max(3.0 * usual, 0.25))] = np.nan
         out[name] = drawn
     return out
+
+
+def _found_in(path: Path, wanted: Wanted) -> tuple[Maneuvers, list[str]]:
+    """Return the test points of a source whose sensors are slow, and drop out: what stands still
+    counts as missing there, as in `host maneuvers`."""
+    try:
+        found, _ = read_columns(path, calibration=wanted.calibration,
+                                sensors=dict(wanted.sensors),
+                                row_rate_hz=wanted.row_rate_hz)  # fmt: skip
+        return [(item, grade(found, item)) for item in detect_maneuvers(found)], []
+    except HostError as error:
+        return [], [f"no maneuvers: {error}"]
 
 
 def _maneuvers(columns: Mapping[str, Any]) -> tuple[Maneuvers, list[str]]:
