@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from host.aircraft.handbook import DIMENSIONS
 from host.aircraft.prior.datcom import read_datcom
 from host.aircraft.prior.prior_file import read_prior
 from host.aircraft.prior.prior_table import PriorError, PriorTable, about_body_axes
+from host.errors import UsageError
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.prior_comparison import prior_document, prior_lines
 
@@ -391,3 +393,16 @@ def test_a_prior_with_half_widths_is_weighed_with_the_flight(tmp_path: Path) -> 
 def test_a_wrong_half_width_is_refused(tmp_path: Path, width: str, said: str) -> None:
     with pytest.raises(PriorError, match=said):
         read(tmp_path, "type.toml", f"[coefficients]\nCm_q = -10.0\n[half_width]\n{width}\n")
+
+
+def test_an_aircraft_is_a_prior_by_name_by_file_and_by_its_dimensions(tmp_path: Path) -> None:
+    """Before it is flown a handbook's aircraft is all that is known of it."""
+    named = read_prior(Path("kadetlt40"))
+    assert "handbook estimates" in named.source[0]
+    measured = tmp_path / "mine.toml"
+    measured.write_text((DIMENSIONS / "kadetlt40.toml").read_text())
+    taped = read_prior(measured)
+    for name in ("CL_alpha", "Cm_q", "Cn_dr"):
+        assert taped.at(0.05)[name] == pytest.approx(named.at(0.05)[name], rel=0.05)
+    with pytest.raises(UsageError, match=r"no aircraft 'kadetlt4' \(did you mean kadetlt40\?\)"):
+        read_prior(Path("kadetlt4"))

@@ -11,7 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
+from host.report.fit_section import mode_table
 from host.report.flight_sections import calibration_and_preflight, data_health, maneuver_cards
+from host.report.json_numbers import JsonNumbers
 from host.report.shown_flight import ShownFlight
 
 from tests.browser.chromium import PHONE, Chromium
@@ -27,16 +29,19 @@ class Numbers(HTMLParser):
     def __init__(self) -> None:
         super().__init__()
         self.found: list[tuple[str, float, str]] = []
+        self.beside: list[tuple[str, float, str]] = []
         self._now: tuple[str, float] | None = None
+        self._to = self.found
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         own = dict(attrs)
         if own.get("data-json"):
             self._now = str(own["data-json"]), float(own.get("data-scale") or 1.0)
+            self._to = self.beside if own.get("data-file") else self.found
 
     def handle_data(self, data: str) -> None:
         if self._now:
-            self.found.append((*self._now, data))
+            self._to.append((*self._now, data))
             self._now = None
 
 
@@ -105,6 +110,40 @@ def test_numbers_of_the_report_are_those_of_json_and_nothing_planted_runs(
     assert page.evaluate(broken) == 0 and page.evaluate("document.images.length") >= 3
     printed = page.call("Page.printToPDF", printBackground=True)["data"]
     assert base64.b64decode(printed).startswith(b"%PDF")
+
+
+def test_a_second_method_and_what_the_aircraft_file_says_stand_beside(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nobody asked for either: a report of one method says nothing of what another would."""
+    source, target = tmp_path / "flight.csv", tmp_path / "report.html"
+    doublets().to_csv(source, index=False)
+    asked = [str(source), "--model", "short-period", "--no-delays", "--aircraft", "ultrastick25e"]
+    assert main(["report", *asked, "-o", str(target)]) == 0
+    capsys.readouterr()
+    assert main(["identify", *asked, "--method", "equation-error", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    numbers = Numbers()
+    numbers.feed(target.read_text(encoding="utf-8"))
+    assert {pointer.rsplit("/", 2)[-2] for pointer, _, _ in numbers.beside} == {
+        "Z_alpha", "Z_de", "M_alpha", "M_q", "M_de"
+    }  # fmt: skip
+    for pointer, scale, shown in numbers.beside:
+        assert float(shown) == pytest.approx(at(said, pointer) * scale, rel=6e-2), pointer
+    priors = {pointer.split("/")[-2]: float(shown) for pointer, _, shown in numbers.found
+              if pointer.endswith("/prior")}  # fmt: skip
+    assert priors["Cm_q"] == pytest.approx(-10.9, rel=0.01)  # of the file, at no angle of attack
+    text = target.read_text(encoding="utf-8")
+    assert "Methods side by side" in text and "coefficients of UASLab OpenFlight" in text
+    assert "Simulated" not in text
+
+
+def test_modes_of_a_simulated_flight_name_the_damping_once() -> None:
+    mode = {"name": "short period", "eigenvalue": [-10.0, 15.0], "frequency_radps": 18.0}
+    truth = {"short period": {"truth": 18.4}, "short period, damping": {"truth": 0.57}}
+    numbers = JsonNumbers({"answers": [{"modes": [mode]}], "truth": {"own": truth}})
+    text = re.sub("<[^>]+>", " ", mode_table(numbers, ["own"], ["mine"]))
+    assert " ".join(text.split()).endswith("18.4 , damping 0.57")
 
 
 def test_sections_of_a_hostile_log_stay_text(flight: ShownFlight) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from host.people_units import people_name
 from host.report.html_table import table
 from host.report.html_text import escaped
 from host.report.json_numbers import JsonNumbers
@@ -9,14 +10,14 @@ from host.report.json_numbers import JsonNumbers
 _KINDS = {"fitted": "free, fitted", "held_out": "free, unseen", "one_step": "one step, fitted"}
 
 
-def mode_table(numbers: JsonNumbers, label_of: list[str]) -> str:
+def mode_table(numbers: JsonNumbers, label_of: list[str], title_of: list[str]) -> str:
     """Return the modes of every answer with their intervals, truth where the flight was simulated.
 
     Parameters
     ----------
     numbers : JsonNumbers
-    label_of : list of str
-        What each answer is called.
+    label_of, title_of : list of str
+        What each answer is called under ``truth``, and for people.
     """
     rows = []
     for at, answer in enumerate(numbers.document["answers"]):
@@ -24,7 +25,7 @@ def mode_table(numbers: JsonNumbers, label_of: list[str]) -> str:
             place = ("answers", at, "modes", k)
             real = abs(mode["eigenvalue"][1] or 0.0) == 0.0
             rows.append([
-                escaped(label_of[at]), escaped(mode["name"]),
+                escaped(title_of[at]), escaped(mode["name"]),
                 numbers.html(*place, "eigenvalue", 0) if real
                 else numbers.html(*place, "frequency_radps"),
                 numbers.html(*place, "frequency_half_width_radps", digits=2),
@@ -43,7 +44,8 @@ def mode_table(numbers: JsonNumbers, label_of: list[str]) -> str:
 def _truth(numbers: JsonNumbers, label: str, mode: str) -> str:
     known = numbers.value("truth", label) or {}
     return ", ".join(
-        f"{escaped(name.removeprefix(mode).strip())} {numbers.html('truth', label, name, 'truth')}"
+        f"{escaped(name.removeprefix(mode).strip(', '))}"
+        f" {numbers.html('truth', label, name, 'truth')}".strip()
         for name in known
         if name.startswith(mode)
     )
@@ -58,11 +60,11 @@ def fit_table(numbers: JsonNumbers, at: int) -> str:
             place = ("answers", at, "fit", kind, name)
             theil = numbers.html(*place, "theil", digits=2) if "theil" in own else ""
             rows.append([
-                escaped(_KINDS.get(kind, kind)), escaped(name),
+                escaped(_KINDS.get(kind, kind)), escaped(people_name(name)[0]),
                 f"{numbers.html(*place, 'nrmse', digits=3, scale=100.0)} %", theil,
             ])  # fmt: skip
     unseen = (answer.get("unseen") or {}).get("nrmse", {})
     for name in unseen:
         number = numbers.html("answers", at, "unseen", "nrmse", name, "unseen", digits=3, scale=1e2)
-        rows.append(["one step, unseen", escaped(name), f"{number} %", ""])
+        rows.append(["one step, unseen", escaped(people_name(name)[0]), f"{number} %", ""])
     return table(["prediction", "output", "NRMSE", "Theil's U"], rows, (0, 1))

@@ -13,7 +13,7 @@ from host.report.ground_track import ground_track
 from host.report.html_page import HtmlPage
 from host.report.html_text import escaped, script_data
 from host.report.page_data import PageData, page_data
-from host.report.shown_flight import Happening, ShownFlight, quality
+from host.report.shown_flight import Happening, ShownFlight, is_simulated, quality
 from host.report.strip_list import strips_of
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
 
@@ -117,7 +117,8 @@ def _facts(summary: Mapping[str, Any]) -> list[str]:
     end = summary["complete"].replace("not proven", "its end is not proven")
     first = f"{kind}, {end}: {summary['duration_s']:.1f} s{rate}"
     aircraft = {one["aircraft"] for one in summary.get("sessions", ()) if one.get("aircraft")}
-    return [first + (f"; aircraft {', '.join(sorted(aircraft))}" if aircraft else "")]
+    first += f"; aircraft {', '.join(sorted(aircraft))}" if aircraft else ""
+    return [first + ("; simulated: not flown" if is_simulated(summary) else "")]
 
 
 def _doubts(flight: ShownFlight, data: PageData) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from host.constants import DEG_PER_RAD
+from host.people_units import people_name
 from host.report.html_table import items, table
 from host.report.html_text import escaped
 from host.report.json_numbers import JsonNumbers
@@ -73,20 +74,24 @@ def sensor_agreement(numbers: JsonNumbers) -> str:
         if not one:
             parts.append("<p>not checked: too few sensors, or no stretch long enough</p>")
             continue
-        rows = [
-            [escaped(name), numbers.html(*root, "findings", name, "value"),
-             numbers.html(*root, "findings", name, "half_width", digits=2),
-             numbers.html(*root, "findings", name, "calibration_half_width", digits=2),
-             escaped("taken out" if own["told"] else own["reason"])]
-            for name, own in one["findings"].items()
-        ]  # fmt: skip
+        rows = []
+        for name, own in one["findings"].items():
+            called, scale = people_name(name)
+            place = (*root, "findings", name)
+            rows.append([
+                escaped(called), numbers.html(*place, "value", scale=scale),
+                numbers.html(*place, "half_width", digits=2, scale=scale),
+                numbers.html(*place, "calibration_half_width", digits=2, scale=scale),
+                escaped("taken out" if own["told"] else own["reason"]),
+            ])  # fmt: skip
         heads = ["error", "found", "95 % \u00b1", "calibration's \u00b1", "what became of it"]
         parts.append(table(heads, rows, (0, 4)))
-        rms = [
-            [escaped(name), numbers.html(*root, "residual_rms", name, digits=3)]
-            for name in one["residual_rms"]
-        ]
-        parts.append("<h4>left between sensors (rms)</h4>" + table(["signal", "rms, SI"], rms))
+        rms = []
+        for name in one["residual_rms"]:
+            called, scale = people_name(name)
+            number = numbers.html(*root, "residual_rms", name, digits=3, scale=scale)
+            rms.append([escaped(called), number])
+        parts.append("<h4>left between sensors</h4>" + table(["signal", "rms"], rms))
     return "".join(parts)
 
 

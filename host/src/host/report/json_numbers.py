@@ -18,9 +18,12 @@ class JsonNumbers:
     ----------
     document : dict
         What ``host identify --json`` prints.
+    file : str
+        Under which the page holds it.
     """
 
     document: dict[str, Any]
+    file: str = "result"
 
     def value(self, *path: str | int) -> Any:
         """Return what stands at a place, None where nothing does."""
@@ -51,4 +54,5 @@ class JsonNumbers:
         steps = (str(step).replace("~", "~0").replace("/", "~1") for step in path)
         pointer = escaped("".join(f"/{step}" for step in steps))
         factor = "" if scale == 1.0 else f' data-scale="{scale!r}"'
-        return f'<span data-json="{pointer}"{factor}>{found * scale:.{digits}g}</span>'
+        own = "" if self.file == "result" else f' data-file="{escaped(self.file)}"'
+        return f'<span data-json="{pointer}"{own}{factor}>{found * scale:.{digits}g}</span>'

@@ -18,10 +18,22 @@ if TYPE_CHECKING:
 
 _MEASURED, _ONE_STEP, _FREE, _INPUT = "0.6", "C0", "C3", "C2"
 _GAP_S = 0.5
-CAPTION = (
-    "grey: measured; blue: one step ahead, fitted data; red: free simulation by the inputs"
-    " alone; shaded: unseen maneuvers, free simulation; green: the input"
-)
+
+
+def caption(answer: Answer) -> str:
+    """Return what the lines of `model_histories` are."""
+    ahead = "blue: one step ahead; " if _one_step(answer) else ""
+    unseen = (
+        "shaded: unseen maneuvers, free simulation" if answer.unseen else "no maneuver is unseen"
+    )
+    return (
+        f"grey: measured; {ahead}red: free simulation by the inputs alone; white: fitted;"
+        f" {unseen}; green: the input"
+    )
+
+
+def _one_step(answer: Answer) -> bool:
+    return answer.result.residual_kind == "innovation"
 
 
 def model_histories(answer: Answer) -> Figure:
@@ -37,10 +49,9 @@ def model_histories(answer: Answer) -> Figure:
     figure = Figure((9.0, 1.25 * (len(outputs) + len(inputs)) + 0.6), layout="constrained")
     axes = figure.subplots(len(outputs) + len(inputs), 1, sharex=True, squeeze=False)[:, 0]
     begin = 0.0
-    one_step = answer.result.residual_kind == "innovation"
     for k, maneuver in enumerate(answer.maneuvers):
         t_s = begin + maneuver.time_s
-        if one_step:
+        if _one_step(answer):
             _model(axes, t_s, answer.result.fitted[k], outputs, _ONE_STEP)
         free = answer.simulated[k] if answer.simulated else answer.result.fitted[k]
         _model(axes, t_s, free, outputs, _FREE)

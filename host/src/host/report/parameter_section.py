@@ -8,7 +8,11 @@ from host.report.html_table import table
 from host.report.html_text import escaped
 from host.report.json_numbers import JsonNumbers
 
-_CLASS = {"trust": "good", "use with care": "fair", "do not rely on": "poor"}
+_CLASS = {
+    "trust": "good", "use with care": "fair", "do not rely on": "poor", "do not use": "poor",
+}  # fmt: skip
+# No single cause makes a quarter of the variance; of a coefficient: none beside its derivative.
+_SEVERAL, _DERIVATIVE = "several, none a quarter", "as its derivative"
 
 
 def parameter_tables(numbers: JsonNumbers, at: int, label: str, causes: Mapping[str, str]) -> str:
@@ -50,7 +54,7 @@ def _derivatives(numbers: JsonNumbers, at: int, label: str) -> str:
         rows.append([
             escaped(name), numbers.html(*place, "value"),
             numbers.html(*place, "half_width", digits=2), escaped(own["unit"]),
-            numbers.html("truth", label, name, "truth"), escaped(own["widened_by"]),
+            numbers.html("truth", label, name, "truth"), escaped(own["widened_by"] or _SEVERAL),
             _mark(mark.get("mark", "")), escaped("; ".join(mark.get("reasons", ()))),
         ])  # fmt: skip
     heads = ["name", "value", "95 % \u00b1", "unit", "truth", "widened most by", "verdict",
@@ -67,6 +71,7 @@ def _derivatives(numbers: JsonNumbers, at: int, label: str) -> str:
 def _coefficients(numbers: JsonNumbers, at: int, label: str, causes: Mapping[str, str]) -> str:
     answer = numbers.document["answers"][at]
     prior = _prior_of(numbers, answer)
+    alone = _SEVERAL if answer["template"] == "coefficients" else _DERIVATIVE
     rows = []
     for name in answer["coefficients"]:
         place = ("answers", at, "coefficients", name)
@@ -76,7 +81,7 @@ def _coefficients(numbers: JsonNumbers, at: int, label: str, causes: Mapping[str
             numbers.html(*place, "half_width", digits=2),
             numbers.html("prior", prior, name, "prior") if prior else "",
             numbers.html("truth", label, name, "truth"),
-            escaped(causes.get(name, "")), _mark(mark.get("mark", "")),
+            escaped(causes.get(name) or alone), _mark(mark.get("mark", "")),
             escaped("; ".join(mark.get("reasons", ()))),
         ])  # fmt: skip
     heads = ["name", "value", "95 % \u00b1", "prior", "truth", "widened most by", "verdict",
@@ -85,10 +90,13 @@ def _coefficients(numbers: JsonNumbers, at: int, label: str, causes: Mapping[str
 
 
 def _prior_of(numbers: JsonNumbers, answer: dict[str, object]) -> str:
-    """Return the prior's table that belongs to an answer."""
+    """Return the prior's table that belongs to an answer: of its model, whatever the method.
+
+    Where coefficients were fitted directly there is theirs alone.
+    """
     known = numbers.document.get("prior") or {}
-    wanted = f"{answer['template']}, {answer['method']}"
-    return wanted if wanted in known else next(iter(known), "")
+    same = (name for name in known if name.startswith(f"{answer['template']}, "))
+    return next(same, next(iter(known), ""))
 
 
 def _mark(mark: str) -> str:
@@ -104,20 +112,26 @@ def _without_empty(heads: list[str], rows: list[list[str]], words: tuple[int, ..
     return table([heads[k] for k in kept], shorter, [kept.index(k) for k in words if k in kept])
 
 
-def method_comparison(numbers: JsonNumbers) -> str:
-    """Return models that several methods estimated, a column for each method."""
-    answers = [a for a in numbers.document["answers"] if "parameters" in a]
+def method_comparison(*documents: JsonNumbers) -> str:
+    """Return derivatives that several methods estimated, a column for each method."""
+    answers = [
+        (numbers, at, answer)
+        for numbers in documents
+        for at, answer in enumerate(numbers.document["answers"])
+        if "parameters" in answer
+    ]
     parts = []
-    for template in dict.fromkeys(a["template"] for a in answers):
-        places = [k for k, a in enumerate(numbers.document["answers"])
-                  if a["template"] == template and "parameters" in a]  # fmt: skip
-        if len(places) < 2:
+    for template in dict.fromkeys(answer["template"] for _, _, answer in answers):
+        by: dict[str, tuple[JsonNumbers, int]] = {}
+        names: dict[str, None] = {}
+        for numbers, at, answer in answers:
+            if answer["template"] == template:
+                by.setdefault(answer["method"], (numbers, at))
+                names |= dict.fromkeys(answer["marks"])
+        if len(by) < 2:
             continue
-        names = dict.fromkeys(
-            name for k in places for name in numbers.document["answers"][k]["parameters"]
-        )
-        rows = [[escaped(name), *(_pair(numbers, k, name) for k in places)] for name in names]
-        heads = ["name", *(numbers.document["answers"][k]["method"] for k in places)]
+        rows = [[escaped(name), *(_pair(*place, name) for place in by.values())] for name in names]
+        heads = ["name", *by]
         parts.append(f"<h4>{escaped(template)}</h4>" + table(heads, rows))
     return "".join(parts)
 

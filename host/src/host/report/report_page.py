@@ -21,17 +21,19 @@ from host.report.html_page import HtmlPage
 from host.report.html_table import items, table
 from host.report.html_text import escaped
 from host.report.json_numbers import JsonNumbers
-from host.report.model_histories import CAPTION, model_histories
+from host.report.model_histories import caption, model_histories
 from host.report.parameter_section import method_comparison, parameter_tables
-from host.report.shown_flight import ShownFlight
+from host.report.shown_flight import ShownFlight, is_simulated
 from host.report.strip_figure import overview_figure
 from host.report.track_figure import track_figure
+from host.sysid.answer.marks import MARKS
 from host.sysid.answer.mat_file import labels
 
 if TYPE_CHECKING:
     from host.sysid.pipeline.identification import Identification
 
-_TRUST, _CARE, _NOT = "trust", "use with care", "do not rely on"
+_TRUST, _CARE, _SMALL, _NOT, _NEVER = MARKS
+_BESIDE = "beside"  # file of the second method's numbers in the page
 _FLY = ("fly", "learn")  # words of lines that say what to do next
 
 
@@ -42,6 +44,8 @@ class ReportParts:
     Attributes
     ----------
     found : Identification
+    beside : Identification or None
+        The same flights by another method: stands beside the first, and is not judged.
     flights : list of ShownFlight
         Of the sources that are logs.
     aircraft : str
@@ -61,6 +65,7 @@ class ReportParts:
     command: str
     sheet: tuple[str, list[str]] | None = None
     calibrations: dict[str, str] = field(default_factory=dict)
+    beside: Identification | None = None
 
 
 def report_page(parts: ReportParts) -> str:
@@ -71,23 +76,37 @@ def report_page(parts: ReportParts) -> str:
     sources = numbers.document["source"]
     sources = sources if isinstance(sources, list) else [sources]
     called = [*labels(found.linear), *(["coefficients"] if found.coefficients else [])]
+    titles = _titles(numbers)
     figures = found.plot()
     cards = maneuver_cards(parts.flights, numbers.document["answers"])
+    others = parts.beside.to_json() if parts.beside else ""
+    beside = [JsonNumbers(json.loads(others), _BESIDE)] if others else []
+    models = [answer["template"] for answer in numbers.document["answers"]]
+    inputs = {  # the first method's: those of the others are the same
+        f"{label}_input": f"{model}: spectra of the inputs"
+        for at, (label, model) in enumerate(zip(called, models, strict=True))
+        if model not in models[:at]
+    }
+    poles = {
+        f"{label}_poles": f"{title}: poles" for label, title in zip(called, titles, strict=True)
+    }
     body = [
         f"<h1>Identification of {escaped(parts.aircraft or 'an aircraft without a file')}</h1>",
         f'<p class="facts">{escaped(", ".join(sources))}</p>',
+        _simulated(parts),
         _verdict_box(found, numbers),
         _section("Data health", data_health(parts.flights, sources) + _findings(found)),
         _section("Calibration and preflight",
                  calibration_and_preflight(parts.flights, parts.calibrations, parts.sheet)),
         _section("Flight", _overview(parts.flights)),
-        _section("Maneuvers", cards + _pictures(figures, "_input")),
+        _section("Maneuvers", cards + _pictures(figures, inputs)),
         _section("Sensor agreement", sensor_agreement(numbers)),
-        *(_answer(found, figures, numbers, at, label) for at, label in enumerate(called)),
-        _section("Methods side by side", method_comparison(numbers)),
-        _section("Modes", mode_table(numbers, called) + _pictures(figures, "_poles")),
+        *(_answer(found, figures, numbers, at, label, titles[at])
+          for at, label in enumerate(called)),
+        _section("Methods side by side", _methods(numbers, beside)),
+        _section("Modes", mode_table(numbers, called, titles) + _pictures(figures, poles)),
         _section("What to fly again", items(_advice(found))),
-        _appendix(parts, text),
+        _appendix(parts, {"result": text} | ({_BESIDE: others} if others else {})),
     ]  # fmt: skip
     return HtmlPage(
         title=f"Identification: {parts.aircraft or sources[0]}",
@@ -100,21 +119,54 @@ def _section(title: str, content: str) -> str:
     return f"<section><h2>{title}</h2>{content}</section>" if content else ""
 
 
+def _titles(numbers: JsonNumbers) -> list[str]:
+    """Return what each answer is called: its model, and its method where several were asked for."""
+    answers = numbers.document["answers"]
+    models = [answer["template"] for answer in answers]
+    return [
+        f"{answer['template']}, {answer['method']}" if models.count(answer["template"]) > 1
+        else answer["template"]
+        for answer in answers
+    ]  # fmt: skip
+
+
+def _simulated(parts: ReportParts) -> str:
+    """Return a line where a flight was none."""
+    recorders = any(is_simulated(flight.summary) for flight in parts.flights)
+    if not recorders and parts.found.truth is None:
+        return ""
+    return '<p class="facts"><strong>Simulated: this aircraft was not flown.</strong></p>'
+
+
+def _methods(numbers: JsonNumbers, beside: list[JsonNumbers]) -> str:
+    said = method_comparison(numbers, *beside)
+    if not said or not beside:
+        return said
+    return (
+        "<p>Equation error is a regression: it needs no search and no start value, and noise in"
+        " what it regresses on pulls it towards zero. It is there to compare and was not judged"
+        " (<code>--method</code> chooses others).</p>" + said
+    )
+
+
 def _verdict_box(found: Identification, numbers: JsonNumbers) -> str:
     rows = []
     for answer in numbers.document["answers"]:
-        by = {mark: [] for mark in (_TRUST, _CARE, _NOT)}  # type: dict[str, list[str]]
+        by: dict[str, list[str]] = {_TRUST: [], _CARE: [], _SMALL: [], _NOT: []}
         for name, own in answer["marks"].items():
-            by.setdefault(own["mark"], []).append(name)
+            by[_NOT if own["mark"] == _NEVER else own["mark"]].append(name)
         rows.append([
             escaped(f"{answer['template']}, {answer['method']}"),
             *(f'<span class="{kind}">{escaped(", ".join(by[mark]) or "none")}</span>'
-              for mark, kind in ((_TRUST, "good"), (_CARE, "fair"), (_NOT, "poor"))),
+              for mark, kind in ((_TRUST, "good"), (_CARE, "fair"), (_NOT, "poor"), (_SMALL, ""))),
         ])  # fmt: skip
-    heads = ["model", "trust (within 10 %)", "use with care", "do not rely on"]
+    heads = ["model", "trust (within 10 %)", "use with care", "do not rely on",
+             "small: under 5 % of its row"]  # fmt: skip
+    if all(row[-1].endswith(">none</span>") for row in rows):
+        heads, rows = heads[:-1], [row[:-1] for row in rows]
     lines = "\n".join(map(escaped, found.verdict))
     return (
-        f'<div class="verdict"><h2>Verdict</h2>{table(heads, rows, (0, 1, 2, 3))}'
+        f'<div class="verdict"><h2>Verdict</h2>{table(heads, rows, range(5))}'
         f"<details open><summary>in words</summary><pre>{lines}</pre></details></div>"
     )
 
@@ -135,16 +187,19 @@ def _overview(flights: Sequence[ShownFlight]) -> str:
     return "".join(parts)
 
 
-def _pictures(figures: Mapping[str, Any], ending: str) -> str:
+def _pictures(figures: Mapping[str, Any], captions: Mapping[str, str]) -> str:
     return "".join(
-        picture(figure, name.replace("_", " "))
-        for name, figure in figures.items()
-        if name.endswith(ending)
+        picture(figures[name], text) for name, text in captions.items() if name in figures
     )
 
 
 def _answer(
-    found: Identification, figures: Mapping[str, Any], numbers: JsonNumbers, at: int, label: str
+    found: Identification,
+    figures: Mapping[str, Any],
+    numbers: JsonNumbers,
+    at: int,
+    label: str,
+    title: str,
 ) -> str:
     causes: dict[str, str] = {}
     if label in found.table.index:
@@ -152,26 +207,38 @@ def _answer(
         causes = {str(name): str(cause) for name, cause in widest.items()}
     parts = []
     if at < len(found.linear):
-        parts.append(picture(model_histories(found.linear[at]), f"{label}: {CAPTION}"))
+        answer = found.linear[at]
+        parts.append(picture(model_histories(answer), f"{title}: {caption(answer)}"))
     else:
-        parts.append(_pictures(figures, "coefficients_fit"))
+        parts.append(_pictures(figures, {"coefficients_fit": f"{title}: measured and model"}))
     parts.append(fit_table(numbers, at))
     parts.append("<h3>Parameters</h3>" + parameter_tables(numbers, at, label, causes))
-    parts.append(_pictures(figures, f"{label}_intervals"))
-    return _section(f"Measured against model: {escaped(label)}", "".join(parts))
+    if found.prior is not None and numbers.document["answers"][at].get("coefficients"):
+        parts.append(items(f"prior: {line}" for line in found.prior.source if line))
+    parts.append(_pictures(figures, {f"{label}_intervals": f"{title}: 95 % intervals"}))
+    return _section(f"Measured against model: {escaped(title)}", "".join(parts))
 
 
 def _advice(found: Identification) -> list[str]:
     """Return the lines of the verdict that say what to fly or measure."""
-    return [
-        line.strip()
-        for line in found.verdict
-        if any(word in line.split() for word in _FLY) or "measure " in line
-    ] or ["nothing: the verdict asks for no other maneuver"]
+    said: dict[str, None] = {}
+    about = ""
+    for line in found.verdict:
+        if not line.startswith(" "):
+            about = line.partition(":")[0]
+        if any(word in line.split() for word in _FLY) or "measure " in line:
+            what = line.strip().replace("to learn them", "for what is not to be relied on", 1)
+            said[what if what.startswith(about) else f"{about}: {what}"] = None
+    return list(said) or ["nothing: the verdict asks for no other maneuver"]
 
 
-def _appendix(parts: ReportParts, text: str) -> str:
-    body = base64.b64encode(text.encode("utf-8")).decode("ascii")
+def _appendix(parts: ReportParts, documents: Mapping[str, str]) -> str:
+    """Return command, versions, hashes and the numbers themselves, each document a file to save."""
+    saved = " ".join(
+        f'<a download="{name}.json" id="{name}" href="data:application/json;base64,'
+        f'{base64.b64encode(text.encode("utf-8")).decode("ascii")}">{name}.json</a>'
+        for name, text in documents.items()
+    )
     rows = [[escaped(name), escaped(value)] for name, value in parts.versions.items()]
     files = [
         [escaped(name), f"<code>{escaped(value)}</code>"] for name, value in parts.hashes.items()
@@ -181,7 +248,6 @@ def _appendix(parts: ReportParts, text: str) -> str:
         f"<h3>Command</h3><pre>{escaped(parts.command)}</pre>"
         f"<h3>Versions</h3>{table(['what', 'version'], rows, (0, 1))}"
         f"<h3>Files</h3>{table(['file', 'SHA-256'], files, (0, 1))}"
-        '<h3>Numbers</h3><p><a download="result.json" id="result"'
-        f' href="data:application/json;base64,{body}">result.json</a>: all numbers of this page,'
-        " as <code>host identify --json</code> prints them.</p>",
+        f"<h3>Numbers</h3><p>{saved}: all numbers of this page, as"
+        " <code>host identify --json</code> prints them.</p>",
     )

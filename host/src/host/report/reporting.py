@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from host.aircraft.prior.aircraft_prior import has_coefficients
 from host.errors import HostError, UsageError
 from host.files.user_text import read_text
 from host.original.rows import looks_like_rows
@@ -18,11 +19,13 @@ from host.report.provenance import hashes, versions
 from host.report.report_page import ReportParts, report_page
 from host.report.shown_flight import ShownFlight
 from host.sysid.flight.foreign_tables import TEXT_KINDS
+from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.stages import identify
 
 if TYPE_CHECKING:
     from host.sysid.pipeline.identification import Identification
 
+BESIDE = "equation-error"
 _HEAD_BYTES = 4096
 _TABLES = (".csv", ".parquet", ".mat")
 
@@ -64,7 +67,12 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     if any(target.exists() and target.samefile(one) for one in request.sources):
         raise UsageError(f"{target} is the source itself; name another file with -o")
     sheet = _sheet(request.preflight or sheet_beside(first))
-    found = identify(request.sources, **request.options)
+    options = dict(request.options)
+    if options.get("prior") is None and options.get("aircraft") is not None:
+        own = options["aircraft"]
+        options["prior"] = own if has_coefficients(own) else None
+    found = identify(request.sources, **options)
+    beside = None if options.get("methods") else _beside(request.sources, options, found)
     flights = [
         flight
         for source, calibration in zip(request.sources, request.calibrations, strict=True)
@@ -74,6 +82,7 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     others = [one for one in request.files if one not in calibrations]
     parts = ReportParts(
         found=found,
+        beside=beside,
         flights=flights,
         aircraft=str(request.options.get("aircraft") or ""),
         versions=versions(),
@@ -84,6 +93,22 @@ def write_report(request: ReportRequest) -> tuple[Path, Identification]:
     )
     write_text(target, report_page(parts))
     return target, found
+
+
+def _beside(
+    sources: list[Path], options: Mapping[str, Any], found: Identification
+) -> Identification | None:
+    """Return the same flights by a second method, to stand beside the first; None if it has none.
+
+    A regression shares no search and no start value with the methods that fit histories, and takes
+    a second.
+    """
+    if not found.linear:
+        return None
+    try:
+        return identify(sources, **{**options, "methods": [BESIDE]})
+    except IdentificationError:
+        return None
 
 
 def _flight(

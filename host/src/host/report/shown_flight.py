@@ -12,6 +12,7 @@ from host.arrays import Array
 from host.sysid.flight.maneuver_detection import DetectedManeuver, Grade
 
 GOOD, FAIR = 0.6, 0.3  # grades from these on
+_NO_BOARDS = ("sitl",)  # names of the recorder's own program without an aircraft about it
 GAP_STEPS = 1.5  # of the usual interval: beyond it a sample is missing
 
 
@@ -100,6 +101,11 @@ class ShownFlight:
 def quality(score: float) -> str:
     """Return ``good``, ``fair`` or ``poor`` of a grade from 0 to 1."""
     return "good" if score >= GOOD else "fair" if score >= FAIR else "poor"
+
+
+def is_simulated(summary: Mapping[str, Any]) -> bool:
+    """Return whether the recorder of a log ran on a computer, which its identity says."""
+    return any(one.get("board") in _NO_BOARDS for one in summary.get("sessions", ()))
 
 
 def with_gaps(columns: Mapping[str, Array]) -> dict[str, Array]:

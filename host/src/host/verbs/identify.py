@@ -61,7 +61,8 @@ def add_parser(subparsers: Any) -> None:
                         help="truth of a simulated flight: compare with it; of several flights"
                         " one each")  # fmt: skip
     parser.add_argument("--prior", type=Path, metavar="FILE",
-                        help="coefficients to compare with: TOML, AVL, Datcom")  # fmt: skip
+                        help="coefficients to compare with: TOML, AVL, Datcom, an"
+                        " aircraft")  # fmt: skip
     _add_data(parser)
     _add_outputs(parser)
 

@@ -77,13 +77,15 @@ def _add_answer_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         action="append",
         metavar="NAME",
-        help="as of `host identify`; several stand side by side",
+        help="as of `host identify`; several stand side by side; equation error beside the default"
+        " one without it",
     )
     parser.add_argument(
         "--prior",
         type=Path,
         metavar="FILE",
-        help="coefficients to set beside them: TOML, AVL, Datcom",
+        help="coefficients to set beside them: TOML, AVL, Datcom, an aircraft; those of --aircraft"
+        " without it",
     )
     parser.add_argument(
         "--truth",

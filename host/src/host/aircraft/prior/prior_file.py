@@ -6,7 +6,8 @@ each may be a list, a table over the angle of attack; `[half_width]` their 95 % 
 or Digital Datcom's output (`datcom`). Tables are read between their rows at the flight's angle of
 attack, lateral derivatives turned from stability to body axes there. Signs are the house's: body
 axes x forward, y right, z down; elevator and aileron as in the answer. Coefficients are referred
-to the file's own area, chord and span, which are printed beside them where the file has them.
+to the file's own area, chord and span, which are printed beside them where the file has them. An
+aircraft file or one of dimensions serves too: what it says before it is flown.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from host.aircraft.dimension_file import is_dimensions
+from host.aircraft.prior.aircraft_prior import aircraft_prior
 from host.aircraft.prior.avl import is_avl, read_avl
 from host.aircraft.prior.datcom import is_datcom, read_datcom
 from host.aircraft.prior.prior_table import Points, PriorError, PriorTable
@@ -35,7 +38,7 @@ def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
     Parameters
     ----------
     path : Path
-        TOML, AVL's ST or SB output, or Datcom's output.
+        TOML, AVL's ST or SB output, Datcom's output, or an aircraft: its file or its name.
     airspeed_mps : float
         Of the flight: which Mach number of several.
 
@@ -43,9 +46,15 @@ def read_prior(path: Path, airspeed_mps: float = 0.0) -> PriorTable:
     ------
     PriorError
         If the file cannot be read, holds no coefficient, or one that is no number.
+    AircraftError
+        The same of an aircraft.
     """
+    if not path.suffix and not path.exists():
+        return aircraft_prior(path)
     text = read_text(path, PriorError, "prior", encoding_errors="replace")
     toml = parse_toml(text, str(path), PriorError) if path.suffix == ".toml" else None
+    if toml is not None and ("kind" in toml or is_dimensions(toml)):
+        return aircraft_prior(path)
     table: PriorTable | None = None
     try:
         if toml is not None:
