@@ -5,6 +5,10 @@ parameters at each of some delays, the prior of the delay added, a parabola abou
 the same for every method and needs no start. Linearised about the last delay the fit took the
 input's rate for a lead and went to where the prior is.
 
+What output error leaves is weighed as noise with a memory. Gusts are slow, a delay shows at the
+edges of the inputs: as white noise the gusts hid it there (0.5 m/s, no vanes: -7 to 13 ms of 2,
+and L_p went with it by 4 % a millisecond), whitened it is told to 2 ms.
+
 Bandwidth and rate limit are carried: 1 / (2 pi f) is a delay too, and a free bandwidth beside a
 free delay drew the filter to 3.5 Hz on thor75, where 6 Hz and 50 ms were published.
 """
@@ -24,6 +28,8 @@ from host.sysid.models.consider_covariance import consider_covariance
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.ar_noise import fit_ar, lagged_moments
+from host.sysid.numerics.input_coherence import block_length, block_means
 
 DELAY = "servo_delay_s"
 SERVO = (DELAY, "servo_bandwidth_hz", "servo_rate_limit_radps")
@@ -35,6 +41,9 @@ STEP_SHRINKS = 5.0
 SHORT_STEPS, LEAST_STEP_S = 4.0, 3e-3  # deviations of the delay that the parabola may span
 STILL = 1e-4  # of the motion of the surface: what moves it by less moves nothing
 TOLD = 0.7  # of the prior's deviation: below it the data say it
+# Of the noise of output error: its memory, in means over this long; and what a model lacks at any
+# frequency, over the motion: whitened, calm air's small errors of the model would tell the delay.
+AR_ORDER, AR_STEP_S, LACK = 8, 0.02, 0.02
 ALIKE = 0.9  # correlation of a derivative with the servo: they cannot be told apart
 
 # The third argument is a fit behind servos not far from these, to start from, or None.
@@ -119,13 +128,14 @@ class _Profile:
                 continue
             near = min(self.fits, key=lambda known: abs(known - delay_s), default=None)
             start = None if near is None else self.fits[near]
+            data = self.behind((delay_s, *self.prior.mean[1:]))
             try:
-                found = self.fit(self.model, self.behind((delay_s, *self.prior.mean[1:])), start)
+                found = self.fit(self.model, data, start)
             except IdentificationError:
                 continue
             self.fits[delay_s] = found
             far = (delay_s - self.prior.mean[0]) / self.prior.sd[0]
-            self.costs[delay_s] = _cost(found) + 0.5 * far**2
+            self.costs[delay_s] = _cost(found, data[0].dt_s) + 0.5 * far**2
 
     @property
     def best(self) -> float:
@@ -173,7 +183,7 @@ def estimate_servo(
         profile.ask([prior.mean[0]])
     delay, best, step, curvature = _least(profile, step)
     at = profile.fits[best]
-    sd = min(_colour(at) / float(np.sqrt(curvature)), prior.sd[0])
+    sd = min(_colour(at) * float(curvature**-0.5), prior.sd[0])
     count = len(model.parameters)
     below, above = (profile.fits[round(best + d, 5)] for d in (-step, step))
     apart = above.estimate[:count] - below.estimate[:count]
@@ -209,17 +219,35 @@ def _least(profile: _Profile, step: float) -> tuple[float, float, float, float]:
         step /= STEP_SHRINKS
 
 
-def _cost(found: FitResult) -> float:
-    """Return minus the logarithm of the likelihood of a fit, but for a constant."""
-    residuals = np.concatenate(found.residuals)
+def _cost(found: FitResult, dt_s: float) -> float:
+    """Return minus the logarithm of the likelihood of a fit, but for a constant.
+
+    Of output error in noise with a memory, estimated beside; innovations are white.
+    """
     if found.residual_kind == "innovation":
+        residuals = np.concatenate(found.residuals)
         return 0.5 * len(residuals) * float(np.linalg.slogdet(np.cov(residuals.T))[1])
-    variances = np.var(residuals, axis=0)
-    return 0.5 * len(residuals) * float(np.sum(np.log(variances + 1e-300)))
+    block = block_length(dt_s, AR_STEP_S)
+    left = [block_means(r, block) for r in found.residuals]
+    motion = np.std(np.concatenate(found.residuals) + np.concatenate(found.fitted), axis=0)
+    count = sum(len(r) - AR_ORDER for r in left)
+    none = [np.zeros((len(r), 0)) for r in left]
+    total = 0.0
+    for j in range(left[0].shape[1]):
+        moments = lagged_moments([r[:, j] for r in left], none, AR_ORDER)
+        moments += count * (LACK * motion[j]) ** 2 * np.eye(AR_ORDER + 1)
+        try:
+            _, innovation = fit_ar(moments, AR_ORDER)
+        except np.linalg.LinAlgError:  # nothing is left, or a straight line
+            innovation = float(moments[0, 0])
+        total += 0.5 * count * float(np.log(max(innovation / count, 1e-300)))
+    return total
 
 
 def _colour(found: FitResult) -> float:
-    """Return by how much coloured residuals widen, in the median of the parameters."""
+    """Return by how much coloured innovations widen, in the median of the parameters."""
+    if found.residual_kind != "innovation":
+        return 1.0
     count = len(found.model.parameters)
     white = np.diag(found.covariance_white)[:count]
     ratio = np.diag(found.covariance)[:count][white > 0.0] / white[white > 0.0]
