@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 IDENTIFY = "host.fleet.tasks.flight_identification:flight_row"
-ROWS = 3  # raised where a row says something else than before: such flights are done again
+ROWS = 4  # raised where a row says something else than before: such flights are done again
 DEFAULT_MODELS = ("coefficients",)  # of a flight without vanes its linear models
 IDENTIFIED, SET_ASIDE = "identified", "set aside"
 

@@ -9,6 +9,9 @@ from __future__ import annotations
 from host.instrument.instrument_errors import InstrumentErrors
 
 AIRCRAFT_FILE, INSTRUMENT, FLIGHT = "aircraft file", "instrument", "flight"
+TYPE = "type"
+# Where the air takes hold of a surface, and what ailerons do to the fin, no file and no flight has.
+_OF_TYPE = ("elevator_arm_share", "rudder_arm_share", "sidewash_share")
 # A quantity of `deviations` to the error of `standard.toml` that it is made of.
 _MADE_OF = {
     "mass_share": "mass_share",
@@ -27,7 +30,7 @@ _MADE_OF = {
 
 
 def error_source(name: str, errors: InstrumentErrors) -> str:
-    """Return who has an error: `AIRCRAFT_FILE`, `INSTRUMENT` or `FLIGHT`.
+    """Return who has an error: `TYPE`, `AIRCRAFT_FILE`, `INSTRUMENT` or `FLIGHT`.
 
     Parameters
     ----------
@@ -36,6 +39,8 @@ def error_source(name: str, errors: InstrumentErrors) -> str:
     errors : InstrumentErrors
         Of the flight. What they do not know by name is the instrument's.
     """
+    if name in _OF_TYPE:
+        return TYPE
     made_of = _MADE_OF.get(name, name)
     if made_of not in errors.named:
         return INSTRUMENT

@@ -8,6 +8,7 @@ import pytest
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.aircraft.powerplant import powerplant
 from host.arrays import Array
+from host.constants import NORMAL_95
 from host.instrument.deviations import SensorErrorModel, deviations, sensor_error_model
 from host.sysid.coefficients.coefficient_estimator import identify_coefficients
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
@@ -39,9 +40,13 @@ def flight() -> VirtualFlight:
 
 
 def fitted(
-    flight: VirtualFlight, data: SensorErrorModel, airframe: AirframeData | None = None
+    flight: VirtualFlight,
+    data: SensorErrorModel,
+    airframe: AirframeData | None = None,
+    gains: Mapping[str, float] | None = None,
 ) -> CoefficientFit:
     columns, _ = even_columns(flight.table)
+    columns = {k: v * (gains or {}).get(k, 1.0) for k, v in columns.items()}
     flying = columns["t_s"] > 8.0
     windows = [
         Window(float(str(m["start_s"])) - 0.5, float(str(m["end_s"])), m["axes"] == ["elevator"])
@@ -107,6 +112,25 @@ def test_the_drawing_tells_the_arm_of_the_accelerometers_from_lift(flight: Virtu
     assert lift["unknown"].flagged
     assert lift["told"].half_width < 0.11 * lift["told"].value
     assert lift["wrong"].value > 1.15 * lift["told"].value
+
+
+@pytest.mark.parametrize(
+    ("column", "error"),
+    [("alpha_rad", "alpha_scale"), ("beta_rad", "beta_scale"), ("p_radps", "gyro_x_scale")],
+)
+def test_an_error_shifts_the_derivatives_as_the_fit_says(
+    flight: VirtualFlight, column: str, error: str
+) -> None:
+    data = sensor_error_model(NAME)
+    still = fitted(flight, data)
+    moved = fitted(flight, data, gains={column: 1.0 + still.error_deviations[error]})
+    said = still.error_shifts[error]
+    found = [b.value - a.value for a, b in zip(still.derivatives, moved.derivatives, strict=True)]
+    own = np.array([d.half_width for d in still.derivatives]) / NORMAL_95
+    # Drag goes with the square of the lift, and so with the square of an angle's error.
+    linear = np.array([not d.name.startswith("CD") for d in still.derivatives])
+    assert float(np.max(np.abs(said / own)[linear])) > 0.05  # of a deviation: no small thing
+    assert ((np.array(found) - said) / own)[linear] == pytest.approx(0.0, abs=0.06)
 
 
 def test_undoes_vane_inertia_upwash_and_places() -> None:

@@ -49,8 +49,8 @@ class LoadedEstimates:
 def coefficient_loadings(fit: CoefficientFit, errors: InstrumentErrors) -> LoadedEstimates:
     """Return the parts of a direct fit of coefficients.
 
-    The fit takes each error for zero with its standard deviation s. If it is b instead, the
-    estimate is wrong by -P_xe b / s^2: P_xe is the covariance of estimate and error.
+    The fit's covariance with its errors has the noise in it by which the flight tells them; what is
+    wrong in every flight alike is the pull of each error's prior alone (`CoefficientFit`).
 
     Parameters
     ----------
@@ -59,16 +59,11 @@ def coefficient_loadings(fit: CoefficientFit, errors: InstrumentErrors) -> Loade
     errors : InstrumentErrors
     """
     count = len(fit.derivatives)
-    cross = fit.covariance[:count, count:]
-    deviations = np.array([fit.error_deviations[name] for name in fit.errors])
-    known = deviations > 0.0
-    shifts = np.zeros((len(deviations), count))
-    shifts[known] = -(cross[:, known] / deviations[known]).T
     return parted(
         tuple(d.name for d in fit.derivatives),
         np.array([d.value for d in fit.derivatives]),
         fit.covariance[:count, :count],
-        {name: shifts[k] for k, name in enumerate(fit.errors)},
+        fit.error_shifts,
         errors,
     )
 

@@ -24,7 +24,7 @@ from host.fleet.tasks.estimate_loadings import LoadedEstimates, coefficient_load
 from host.fleet.tasks.linear_loadings import linear_loadings
 from host.fleet.tasks.surface_response import surface_quantities
 from host.fleet.tasks.vane_zeros import vane_zeros
-from host.instrument.error_sources import AIRCRAFT_FILE
+from host.instrument.error_sources import AIRCRAFT_FILE, TYPE
 from host.sysid.answer import trust_rules
 from host.sysid.answer.coefficient_rules import follows_states, open_finding
 from host.sysid.answer.feedback_pairs import feedback_of
@@ -101,7 +101,10 @@ def _identified(path: Path, values: dict[str, Any]) -> Identification:
 def _estimate_columns(parts: LoadedEstimates, values: dict[str, Any]) -> dict[str, Any]:
     # Who never was calibrated is wrong in a way of its own.
     instrument = values["calibration_id"] or f"uncalibrated, {values['aircraft']}"
-    whose = {AIRCRAFT_FILE: f"aircraft file {values['aircraft_id']}"}
+    whose = {
+        AIRCRAFT_FILE: f"aircraft file {values['aircraft_id']}",
+        TYPE: f"type {values['type']}",
+    }
     return {
         "parameters": list(parts.names),
         "estimates": parts.values.tolist(),

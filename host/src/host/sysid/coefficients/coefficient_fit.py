@@ -130,6 +130,9 @@ class CoefficientFit:
         Scatter of the maneuvers about the joint estimate, in the last step.
     error_deviations : dict
         Standard deviation of each sensor error before the flight; empty of several flights.
+    error_shifts : dict of str to (derivatives,) Array
+        Of the derivatives by one standard deviation of each error of sensors and of the drawing;
+        empty of several flights. Noise is not in it, as it is in `covariance`.
     """
 
     derivatives: tuple[Derivative, ...]
@@ -140,6 +143,7 @@ class CoefficientFit:
     prediction: CrossValidation | None
     maneuver_agreement: ManeuverAgreement
     error_deviations: dict[str, float] = field(default_factory=dict)
+    error_shifts: dict[str, Array] = field(default_factory=dict)
 
 
 def derivatives_with_intervals(

@@ -58,6 +58,8 @@ class SearchResult:
     final : FinalStep
     error_deviations : Array, shape (errors,)
         Standard deviations of the sensor errors before the flight.
+    error_shifts : Array, shape (n, errors)
+        Of all unknowns by one standard deviation of each sensor error.
     """
 
     problem: FlightProblem
@@ -66,6 +68,7 @@ class SearchResult:
     level_slopes: Array
     final: FinalStep
     error_deviations: Array
+    error_shifts: Array
 
     @cached_property
     def data(self) -> EquationData:
@@ -109,6 +112,8 @@ class CoefficientIntervals:
     covariance : Array, shape (derivatives + errors, derivatives + errors)
     maneuver_agreement : ManeuverAgreement
         Scatter of the maneuvers about the joint estimate.
+    error_shifts : dict of str to (derivatives,) Array
+        Of the derivatives by one standard deviation of each error of sensors and of the drawing.
     """
 
     state: Array
@@ -116,6 +121,7 @@ class CoefficientIntervals:
     errors: dict[str, tuple[float, float]]
     covariance: Array
     maneuver_agreement: ManeuverAgreement
+    error_shifts: dict[str, Array]
 
 
 def intervals(search: SearchResult) -> CoefficientIntervals:
@@ -123,7 +129,7 @@ def intervals(search: SearchResult) -> CoefficientIntervals:
     problem, final, level_slopes = search.problem, search.final, search.level_slopes
     data, position = search.data, problem.position
     state = np.concatenate([search.theta, np.zeros(final.unknowns.gusts), search.errors])
-    state, covariance, gain_complement = apply_geometry_prior(
+    state, covariance, gain_complement, drawn = apply_geometry_prior(
         state,
         final.solution.covariance,
         derivatives_of(problem, data, state),
@@ -146,6 +152,8 @@ def intervals(search: SearchResult) -> CoefficientIntervals:
         *maneuver_influence(final, problem.windows, jacobian[: len(values)] @ gain_complement),
     )
     joint[np.diag_indices(len(values))] += agreement.extra_variance
+    told = dict(zip(problem.error_names, (gain_complement @ search.error_shifts).T, strict=True))
+    shifts = {name: jacobian[: len(values)] @ shift for name, shift in (told | drawn).items()}
     deviations = np.sqrt(np.maximum(np.diag(covariance)[errors], 0.0))
     pairs = zip(state[errors].tolist(), deviations.tolist(), strict=True)
     return CoefficientIntervals(
@@ -156,6 +164,7 @@ def intervals(search: SearchResult) -> CoefficientIntervals:
         dict(zip(problem.error_names, pairs, strict=True)),
         joint,
         agreement,
+        shifts,
     )
 
 
@@ -188,6 +197,7 @@ def coefficient_fit(
         error_deviations=dict(
             zip(problem.error_names, search.error_deviations.tolist(), strict=True)
         ),
+        error_shifts=widths.error_shifts,
     )
 
 

@@ -203,7 +203,13 @@ def _search(problem: FlightProblem, sd: Array) -> SearchResult:
             for block in blocks
         )
         iterate.noise = residual_spectra(problem.windows, residuals, iterate.noise)
-    return SearchResult(problem, iterate.theta, iterate.errors, iterate.level_slopes, final, sd)
+    # Each error is held to be zero with its deviation: what it truly is pulls by its prior alone,
+    # whatever noise the data have.
+    pull = np.divide(inverse_variance, 1.0 / sd, out=np.zeros_like(sd), where=sd > 0.0)
+    shifts = -final.solution.inverse[:, final.unknowns.first_error :] * pull
+    return SearchResult(
+        problem, iterate.theta, iterate.errors, iterate.level_slopes, final, sd, shifts
+    )
 
 
 def _linearise(

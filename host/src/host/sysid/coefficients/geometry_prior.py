@@ -18,12 +18,14 @@ from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array
 from host.sysid.coefficients.trim_derivatives import DerivativesAtTrim
 
+# Errors of the relations.
+ELEVATOR_ARM, RUDDER_ARM, SIDEWASH = "elevator_arm_share", "rudder_arm_share", "sidewash_share"
 SIDEWASH_SHARE = 0.1  # standard deviation of CY_da over CY_beta
 
 
 def apply_geometry_prior(
     state: Array, covariance: Array, at_trim: DerivativesAtTrim, airframe: AirframeData
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, dict[str, Array]]:
     """Update estimate and covariance with the geometry of the control surfaces.
 
     Parameters
@@ -43,20 +45,25 @@ def apply_geometry_prior(
     gain_complement : Array, shape (n, n)
         The product of all I - K H: the derivative of the updated estimate by that of the flight
         alone.
+    shifts : dict of str to (n,) Array
+        Of the updated estimate by one standard deviation of each relation: by as much the drawing
+        may be wrong, in every flight alike.
     """
     a = airframe
     chord, span = a.chord_m, a.span_m
-    relations: list[tuple[dict[str, float], float]] = []
+    relations: list[tuple[str, dict[str, float], float]] = []
     gain_complement = np.eye(len(state))
     if a.elevator_arm_m > 0.0 and {"CL_de", "Cm_de"} <= at_trim.keys():
         sd = a.arm_share * abs(at_trim["Cm_de"][0])
-        relations.append(({"CL_de": a.elevator_arm_m / chord, "Cm_de": 1.0}, sd))
+        relations.append((ELEVATOR_ARM, {"CL_de": a.elevator_arm_m / chord, "Cm_de": 1.0}, sd))
     if a.rudder_arm_m > 0.0 and {"CY_dr", "Cn_dr"} <= at_trim.keys():
         sd = a.arm_share * abs(at_trim["Cn_dr"][0])
-        relations.append(({"CY_dr": a.rudder_arm_m / span, "Cn_dr": 1.0}, sd))
+        relations.append((RUDDER_ARM, {"CY_dr": a.rudder_arm_m / span, "Cn_dr": 1.0}, sd))
     if {"CY_da", "CY_beta"} <= at_trim.keys():
-        relations.append(({"CY_da": 1.0}, SIDEWASH_SHARE * abs(at_trim["CY_beta"][0])))
-    for weights, sd in relations:
+        sd = SIDEWASH_SHARE * abs(at_trim["CY_beta"][0])
+        relations.append((SIDEWASH, {"CY_da": 1.0}, sd))
+    shifts: dict[str, Array] = {}
+    for error, weights, sd in relations:
         # One row h of H: the relation sum(weight * derivative) = 0 is measured with variance sd^2.
         h = np.zeros(len(state))
         for name, weight in weights.items():
@@ -67,4 +74,6 @@ def apply_geometry_prior(
         # Joseph's form: symmetric and positive for any gain.
         covariance = complement @ covariance @ complement.T + np.outer(gain, gain) * sd**2
         gain_complement = complement @ gain_complement
-    return state, covariance, gain_complement
+        shifts = {n: np.asarray(complement @ x, dtype=np.float64) for n, x in shifts.items()}
+        shifts[error] = np.asarray(gain * sd, dtype=np.float64)
+    return state, covariance, gain_complement, shifts
