@@ -4,33 +4,11 @@ from __future__ import annotations
 
 import pytest
 from host.link.card_console import CardConsole, CardError
-from host.twin.recorder.sitl_library import TICKS_PER_S, Port
+from host.twin.recorder.flight_card_line import SitlLine
 from host.wire.flight_card import card_bytes, card_faults, parts, read_card
 
 from tests.host.test_flight_card import DOUBLET, HEAD, MULTISINE
 from tests.sitl.bench import GROUND_S, Bench, config_places
-
-
-class Line:
-    """The USB line of an instrument: bytes sent arrive a millisecond later."""
-
-    device = "sitl"
-
-    def __init__(self, bench: Bench) -> None:
-        self._sitl, self._read = bench.sitl, 0
-
-    def now_s(self) -> float:
-        return self._sitl.now() / TICKS_PER_S
-
-    def data(self) -> bytes:
-        self._sitl.run_for(0.02)
-        sent = self._sitl.sent(Port.USB)
-        new, self._read = sent[self._read :], len(sent)
-        return new
-
-    def send(self, data: bytes) -> None:
-        at = self._sitl.now() + TICKS_PER_S // 1000
-        self._sitl.add_usb([at] * len(data), list(data))
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +32,7 @@ def read_aircraft(bench: Bench) -> bytes:
 
 
 def test_a_card_is_written_committed_and_read_back(bench: Bench, card: bytes) -> None:
-    line = Line(bench)
+    line = SitlLine(bench.sitl)
     console = CardConsole(line, line.now_s)
     assert card_faults(card) == []
     with pytest.raises(CardError, match="no valid card"):
@@ -87,7 +65,7 @@ def test_a_card_is_written_committed_and_read_back(bench: Bench, card: bytes) ->
 def test_host_and_logger_refuse_the_same_cards(
     bench: Bench, card: bytes, head: dict[str, object], row: dict[str, object], fault: str
 ) -> None:
-    line = Line(bench)
+    line = SitlLine(bench.sitl)
     console = CardConsole(line, line.now_s)
     name = read_card(card).head["aircraft"]
     wrong = card_bytes({**HEAD, "aircraft": name, **head}, [{**DOUBLET, **row}])

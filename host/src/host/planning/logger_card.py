@@ -16,8 +16,7 @@ from host.aircraft.trim import solve
 from host.constants import GRAVITY_MPS2
 from host.errors import UsageError
 from host.physical.calibration import Calibration
-from host.twin.testcard.cards import Card, Segment
-from host.twin.testcard.input_shapes import STEPS
+from host.twin.testcard.cards import Card, Segment, input_s
 from host.wire.flight_card import AXES, HEAD, TRAVEL_US, card_bytes, card_faults, number, scale
 from host.wire.schema_text import packed_schema
 
@@ -96,12 +95,11 @@ def _row(where: str, s: Segment, calibration: Calibration, share: float) -> dict
     for axis, degrees in zip(s.axes, s.amplitudes, strict=True):
         slope = calibration.lines[f"pulse.{axis}"].slope[0]
         amplitude[AXES.index(axis)] = round(share * math.radians(degrees) / slope)
-    units = sum(length for _, length in STEPS.get(s.kind, ()))
     row: dict[str, Any] = {
         "shape": packed_schema().enums["card_shape"][SHAPES.get(s.kind, s.kind)],
         "axes": sum(1 << k for k, size in enumerate(amplitude) if size),
         "quiet_ms": round(1000.0 * s.before_s),
-        "duration_ms": round(1000.0 * (units * s.width_s if units else s.duration_s)),
+        "duration_ms": round(1000.0 * input_s(s)),
         "amplitude_us": amplitude,
     }
     if s.kind == "sweep":

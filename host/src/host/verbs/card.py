@@ -13,7 +13,6 @@ from host.errors import ExitCode, UsageError
 if TYPE_CHECKING:
     from host.link.card_console import CardConsole
 
-LONGEST_FILE = 48 * 64
 DO = ("write", "read", "check", "erase")
 
 
@@ -56,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
 def _good(path: Path) -> bytes | None:
     """Return a good card; None behind what is wrong with it."""
     from host.files.regular import regular_file
-    from host.wire.flight_card import card_faults
+    from host.wire.flight_card import LONGEST_FILE, card_faults
 
     regular_file(path, UsageError)
     data = path.read_bytes()[: LONGEST_FILE + 1]

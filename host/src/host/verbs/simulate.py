@@ -37,6 +37,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         help="fly this aircraft in place of the card's, or what the card's becomes"
                         " with a model of `host identify --save-model`; a model per axis may be"
                         " given")  # fmt: skip
+    parser.add_argument("--flight-card", type=Path, metavar="FILE",
+                        help="the logger flies the card's inputs, by this file of `host plan"
+                        " CARD --card FILE`; the pilot only enables and triggers them")  # fmt: skip
     parser.add_argument("--both", action="store_true",
                         help="the thesis's logger flies along, into the same picture")  # fmt: skip
     parser.add_argument("--faults", action="store_true",
@@ -89,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
             both=args.both,
             logs=args.to,
             airframe=args.outputs,
+            flight_card=_flight_card(args.flight_card),
             progress=draw_share,
         )
     except OSError as error:
@@ -107,6 +111,17 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join(outcome_summary.lines(outcome, args.firmware)))
     outcome_summary.check(outcome)
     return ExitCode.OK
+
+
+def _flight_card(path: Path | None) -> bytes:
+    """Return the file's bytes, none without one."""
+    if path is None:
+        return b""
+    from host.files.regular import regular_file
+    from host.wire.flight_card import LONGEST_FILE
+
+    with regular_file(path).open("rb") as file:
+        return file.read(LONGEST_FILE + 1)
 
 
 def _list(*, as_json: bool) -> int:

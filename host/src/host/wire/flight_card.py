@@ -20,6 +20,7 @@ from host.wire.framing import crc16
 from host.wire.schema import Field
 from host.wire.schema_text import packed_schema
 
+LONGEST_FILE = 48 * 64  # longer than any good card
 HEAD, LEARNING, ROW = "card_head", "card_learning", "card_row"
 AXES = ("aileron", "elevator", "rudder")
 SHAPES = ("pulse", "doublet", "three_two_one_one", "sweep", "multisine")

@@ -14,6 +14,8 @@ from host.aircraft import air as air_model
 from host.aircraft.air import GUST_STATES, Atmosphere, Turbulence, density_kgpm3, gust_step
 from host.aircraft.airframe import (
     DOWN,
+    EAST,
+    NORTH,
     Q0,
     Q1,
     Q2,
@@ -32,7 +34,7 @@ from host.aircraft.trim import Trim, solve
 from host.compiled import compiled_fast
 from host.instrument.instrument_errors import InstrumentErrors
 from host.twin.flight.draws import GROUPS, Draws, draw, flown
-from host.twin.flight.pilot import Schedule, gains, schedule
+from host.twin.flight.pilot import NOWHERE_M, SWITCH_DIRECT_US, Schedule, gains, schedule
 from host.twin.testcard.cards import Card
 
 STEP_S = 1e-3
@@ -42,7 +44,7 @@ RC_CHANNELS = 5  # aileron, elevator, rudder, throttle, switch
 NEUTRAL_US = 1520.0
 THROW_US = 400.0
 IDLE_US = 1120.0
-SWITCH_DIRECT_US = 1100.0
+STEER_RAD = 0.35  # bank towards what is aimed at
 GAP_US = 300.0  # between the pulses of a sequential receiver
 JITTER_US = 1.0  # rms of a receiver's width
 LINK_OK, LINK_LOST, LINK_PRESET = 0, 1, 2  # state of the radio in one receiver frame
@@ -115,6 +117,11 @@ class FlightRecord:
         return len(self.t_s) < len(self.schedule.attention)
 
     @property
+    def by_logger(self) -> bool:
+        """Whether the pilot leaves the inputs to the logger."""
+        return bool((self.schedule.switch_us > SWITCH_DIRECT_US).any())
+
+    @property
     def sink_mps(self) -> float:
         """Vertical speed at the last sample, downwards."""
         return float(rotate_to_ned(self.states[-1], *self.states[-1, :3])[2])
@@ -135,6 +142,9 @@ def fly_steps(
     attention: Array,
     bank_rad: Array,
     airspeed_mps: Array,
+    switch_us: Array,
+    added_us: Array,
+    aim_m: Array,
     wind: Array,
     noise: Array,
     stick_noise: Array,
@@ -153,8 +163,9 @@ def fly_steps(
     """Integrate steps first..last; return how many were flown before the ground was touched.
 
     `more` (n, 8) takes specific force, angular acceleration, thrust, density; `held` (9,) keeps the
-    stick (4), its wander (4) and the commands between frames; `link` (frames,) says how the radio
-    does, `preset_us` (5,) what the receiver puts out without it; the rest is as in `FlightRecord`.
+    stick (4), its wander (4) and the commands between frames; `added_us` (n, 3) or (0, 3) is what
+    the logger adds to aileron, elevator, rudder; `link` (frames,) says how the radio does,
+    `preset_us` (5,) what the receiver puts out without it; the rest is as in `FlightRecord`.
     """
     work = np.empty((5, STATE_COUNT + 4))
     now = np.zeros(9)
@@ -206,7 +217,14 @@ def fly_steps(
                 else:
                     wish += min(max(-0.2 - 0.03 * slow, -0.5), 0.1)
                 held[0] += weight * hands.pitch_gain * (wish - theta)
-                held[1] += weight * hands.bank_gain * (bank_rad[i] - phi)
+                bank = bank_rad[i]
+                if len(aim_m) > 0 and aim_m[i, 0] < NOWHERE_M:
+                    north, east, _ = rotate_to_ned(s, s[0], s[1], s[2])
+                    off = math.atan2(aim_m[i, 1] - s[EAST], aim_m[i, 0] - s[NORTH])
+                    off -= math.atan2(east, north)
+                    off = math.atan2(math.sin(off), math.cos(off))
+                    bank += min(max(off, -STEER_RAD), STEER_RAD)
+                held[1] += weight * hands.bank_gain * (bank - phi)
                 held[3] += weight * hands.speed_gain_smpm * slow
             for k in range(3):
                 held[k] = min(max(held[k], -limit[k]), limit[k])
@@ -219,7 +237,7 @@ def fly_steps(
             pulses[row, 1] = NEUTRAL_US + THROW_US * (held[0] - zero[0]) / limit[0]
             pulses[row, 2] = NEUTRAL_US + THROW_US * (held[2] - zero[2]) / limit[2]
             pulses[row, 3] = IDLE_US + 2.0 * THROW_US * held[3]
-            pulses[row, 4] = SWITCH_DIRECT_US
+            pulses[row, 4] = switch_us[i]
             for k in range(5):
                 pulses[row, k] += hands.jitter_us * stick_noise[row, 8 + k]
                 if link[row] == LINK_PRESET:
@@ -238,7 +256,8 @@ def fly_steps(
                     command[3] = (pulses[row, 3] - IDLE_US) / (2.0 * THROW_US)
             elif since_us >= end + hands.servo_late_us:
                 j = 1 - k if k < 2 else 2  # the receiver's first channel is the aileron
-                asked_rad = (pulses[row, k] - NEUTRAL_US) / THROW_US * limit[j]
+                width_us = pulses[row, k] + (added_us[i, k] if len(added_us) > 0 else 0.0)
+                asked_rad = (width_us - NEUTRAL_US) / THROW_US * limit[j]
                 asked_rad += hands.servo_zero_rad[j]
                 command[j] = hands.servo_gain[j] * asked_rad
             end += GAP_US
@@ -269,6 +288,7 @@ def fly(
     aircraft: Aircraft | None = None,
     errors: InstrumentErrors | None = None,
     instrument_seed: int | None = None,
+    added_us: Array | None = None,
 ) -> FlightRecord:
     """Fly a card.
 
@@ -285,6 +305,9 @@ def fly(
         What is drawn from; without, the standard errors with the aircraft's tolerances.
     instrument_seed : int, optional
         Fixes what is constant of an instrument; without, every flight has one of its own.
+    added_us : (n, 3) array, optional
+        What the logger adds to aileron, elevator and rudder at each step: it flies the inputs, of
+        a card made by `flown_by_logger`. Of (0, 3): nothing yet.
 
     Returns
     -------
@@ -320,7 +343,7 @@ def fly(
     wanted = card.flight.airspeed_mps or plane.scalar("trim.airspeed_mps")
     rho = density_kgpm3(atmosphere, card.flight.height_m)
     trim = solve(frame, wanted, density_kgpm3=rho)
-    plan = schedule(card, wanted, STEP_S, rng_pilot)
+    plan = schedule(card, wanted, STEP_S, rng_pilot, by_logger=added_us is not None)
     n = len(plan.attention)
     period = round(RC_PERIOD_S / STEP_S)
     gain = gains(frame, trim) * card.pilot.gain
@@ -347,7 +370,7 @@ def fly(
     turn = quaternion(0.0, 0.0, heading)
     launch[Q0 : Q3 + 1] = multiply(turn, trim.state[Q0 : Q3 + 1])
     launch[0:3] += rotate_to_body(launch, wind[0], wind[1], wind[2])
-    launch[DOWN] = -card.flight.height_m
+    launch[DOWN] = card.flight.climb_m - card.flight.height_m
     rest = np.zeros(STATE_COUNT)
     rest[Q0 : Q3 + 1] = launch[Q0 : Q3 + 1]  # held at its flight attitude until it is let go
     rest[ROTOR - 3 : ROTOR] = trim.command[:3]
@@ -369,6 +392,7 @@ def fly(
             link[fault.inside(starts)] = LINK_PRESET
             preset[4] = fault.amount
     x, z, command = rest.copy(), np.zeros(GUST_STATES), trim.command.copy()
+    added = np.zeros((0, 3)) if added_us is None else added_us
     held = np.zeros(9)
     held[8] = math.asin(
         max(-1.0, min(1.0, -2 * (launch[Q1] * launch[Q3] - launch[Q0] * launch[Q2])))
@@ -379,8 +403,9 @@ def fly(
         last = min(first + chunk, n)
         done = fly_steps(
             frame, hands, atmosphere, turbulence, launch, rest, trim.command, plan.program,
-            link, preset, plan.attention, plan.bank_rad, plan.airspeed_mps, wind, noise,
-            stick_noise, STEP_S, first, last, x, z, held, command, states, more, air, pulses,
+            link, preset, plan.attention, plan.bank_rad, plan.airspeed_mps, plan.switch_us, added,
+            plan.aim_m, wind, noise, stick_noise, STEP_S, first, last, x, z, held, command, states,
+            more, air, pulses,
         )  # fmt: skip
         if progress is not None:
             progress(done / n)

@@ -10,7 +10,8 @@ import numpy as np
 from host.aircraft.airframe import Airframe, Array
 from host.aircraft.linearisation import linearise
 from host.aircraft.trim import Trim
-from host.twin.testcard.cards import AXES, Card, Segment, duration_s, length_s
+from host.twin.testcard.cards import AXES, Card, Segment, duration_s, input_s, length_s
+from host.twin.testcard.flown_by_logger import AT_ARMED_S, LEVEL_S, SWITCH_S
 from host.twin.testcard.input_shapes import (
     STEPS,
     multisine,
@@ -23,6 +24,14 @@ from host.twin.testcard.input_shapes import (
 CROSSOVER_RADPS = 1.2  # of attitude control by eye; a person on the ground manages about 1-2 rad/s
 WINDOW_TAIL_S = 3.0
 BROKEN_OFF = (0.2, 0.7)  # share of an input after which it is let go, drawn evenly
+SWITCH_DIRECT_US, SWITCH_MEGA_US, SWITCH_ARMED_US = 1100.0, 1675.0, 1900.0
+LET_GO_S = 0.4  # before the trigger the sticks are let go
+RELEASED_S = 0.3  # behind the input the switch goes back
+# On the ground: each stick to both ends, then the sign that enables a flight card.
+STIR_S, SIGN_S, SIGN_END_S = 7.0, 12.0, 15.4
+AIM_M = 500.0  # from home, ahead or behind: what a pilot steers at
+NOWHERE_M = 1e9
+FULL_RAD = 10.0  # beyond every surface: held at its end
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +71,10 @@ class Schedule:
         Weight of the pilot's corrections, 0 to 1.
     bank_rad, airspeed_mps : (n,) arrays
         What the pilot wants to see.
+    switch_us : (n,) array
+        Pulse of the switch channel.
+    aim_m : (n, 2) or (0, 2) array
+        Place north and east of home that is flown to; `NOWHERE_M` in turns.
     windows : list of Window
     """
 
@@ -69,10 +82,19 @@ class Schedule:
     attention: Array
     bank_rad: Array
     airspeed_mps: Array
+    switch_us: Array
+    aim_m: Array
     windows: list[Window] = field(default_factory=list)
 
 
-def schedule(card: Card, airspeed_mps: float, step_s: float, rng: np.random.Generator) -> Schedule:
+def schedule(
+    card: Card,
+    airspeed_mps: float,
+    step_s: float,
+    rng: np.random.Generator,
+    *,
+    by_logger: bool = False,
+) -> Schedule:
     """Turn a card into the pilot's program, with the errors of a human hand.
 
     Parameters
@@ -82,6 +104,9 @@ def schedule(card: Card, airspeed_mps: float, step_s: float, rng: np.random.Gene
         Wanted where the card does not say.
     step_s : float
     rng : numpy Generator
+    by_logger : bool
+        The logger flies the inputs of a card made by `flown_by_logger`: the pilot enables it on
+        the ground, moves the switch and lets go of the sticks.
 
     Returns
     -------
@@ -94,7 +119,13 @@ def schedule(card: Card, airspeed_mps: float, step_s: float, rng: np.random.Gene
         attention=np.ones(n),
         bank_rad=np.zeros(n),
         airspeed_mps=np.full(n, airspeed_mps),
+        switch_us=np.full(n, SWITCH_DIRECT_US),
+        aim_m=np.full((n if by_logger else 0, 2), NOWHERE_M),
     )
+    heading = math.radians(card.flight.heading_deg)
+    ahead = AIM_M * np.array([math.cos(heading), math.sin(heading)])
+    if by_logger:
+        _enable(t, result)
     inputs: list[tuple[Segment, float, float, float]] = []
     at = card.flight.ground_s
     for s in card.segments:
@@ -107,14 +138,51 @@ def schedule(card: Card, airspeed_mps: float, step_s: float, rng: np.random.Gene
             local = t[span] - begin
             share = np.clip(np.minimum(local, s.duration_s - local), 0.0, 1.0)
             result.bank_rad[span] = math.radians(s.bank_deg) * share
-        elif s.kind != "trim":
-            inputs.append((s, *_fly_input(card, s, begin + s.before_s, t, result, rng)))
+            ahead = -ahead
+            continue
+        if by_logger:
+            result.aim_m[span] = ahead
+        if s.kind != "trim":
+            start = begin + s.before_s
+            times = (
+                _leave_to_logger(card, s, begin, t, result)
+                if by_logger
+                else _fly_input(card, s, start, t, result, rng)
+            )
+            inputs.append((s, *times))
     for i, (s, start, end, again) in enumerate(inputs):
         tail = end + WINDOW_TAIL_S
         if i + 1 < len(inputs):
             tail = min(tail, inputs[i + 1][1])
         result.windows.append(Window(s.kind, s.axes, start, end, min(tail, n * step_s), again))
     return result
+
+
+def _enable(t: Array, into: Schedule) -> None:
+    """Show the travel of the sticks and hold the sign, on the ground."""
+    stirring = _span(t, STIR_S, SIGN_S)
+    quarter = np.floor(t[stirring] - STIR_S) % 4
+    into.program[stirring, :3] = (
+        FULL_RAD * np.select([quarter == 0, quarter == 2], [-1.0, 1.0], 0.0)[:, None]
+    )
+    sign = _span(t, SIGN_S, SIGN_END_S)
+    into.program[sign, AXES.index("aileron")] = FULL_RAD
+    into.program[sign, AXES.index("rudder")] = -FULL_RAD
+
+
+def _leave_to_logger(
+    card: Card, s: Segment, trigger_s: float, t: Array, into: Schedule
+) -> tuple[float, float, float]:
+    """Trigger one row; return start and end of its shape and when the pilot corrects again."""
+    start = trigger_s + s.before_s
+    end = start + input_s(s)
+    again = end + card.pilot.hands_off_s
+    into.switch_us[_span(t, trigger_s - SWITCH_S, t[-1])] = SWITCH_MEGA_US
+    into.switch_us[_span(t, trigger_s - AT_ARMED_S, end + RELEASED_S)] = SWITCH_ARMED_US
+    # Springs hold a stick that nobody touches.
+    into.attention[_span(t, trigger_s - LET_GO_S, again)] = 0.0
+    into.aim_m[_span(t, trigger_s - SWITCH_S - LEVEL_S, again)] = NOWHERE_M
+    return start, end, again
 
 
 def _fly_input(

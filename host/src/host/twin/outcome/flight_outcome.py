@@ -5,17 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
 from host.aircraft.file import Aircraft
+from host.errors import UsageError
 from host.log import read_log
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome import compare, ideal, picture, thesis, truth_files
 from host.twin.outcome.autopilot_logs import write_autopilot_log
 from host.twin.outcome.instrument import calibration
 from host.twin.recorder import avr, sitl, stimuli
+from host.twin.recorder.logger_flight import logger_flight
 from host.twin.sensors.imu import Imu
 from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.testcard.cards import Card, Segment
@@ -99,6 +102,7 @@ def simulate(
     logs: Sequence[str] = (),
     airframe: str = "conventional",
     aircraft: Aircraft | None = None,
+    flight_card: bytes = b"",
 ) -> Outcome:
     """Fly a card and write everything it leaves.
 
@@ -122,6 +126,8 @@ def simulate(
         Of these, one of `autopilot_outputs.AIRFRAMES`.
     aircraft : Aircraft, optional
         In place of the card's.
+    flight_card : bytes
+        In the recorder's EEPROM: it flies the inputs of the card itself (firmware ``sitl``).
 
     Returns
     -------
@@ -138,7 +144,16 @@ def simulate(
     progress("load", 0.0)
     load_kernels(card, aircraft)
     clock.mark("load")
-    record = fly(card, seed=seed, progress=lambda share: progress("fly", share), aircraft=aircraft)
+    recorder = _recorder(firmware, seed, flight_card, progress)
+    given: stimuli.Stimuli | None = None
+    recording: sitl.Recording | None = None
+    if flight_card:
+        record, given, recording = logger_flight(
+            flight_card, card, seed=seed, aircraft=aircraft, recorder=recorder
+        )
+    else:
+        share = partial(progress, "fly")
+        record = fly(card, seed=seed, progress=share, aircraft=aircraft)
     clock.mark("fly")
     folder.mkdir(parents=True, exist_ok=True)
     data = air_data(record)
@@ -155,9 +170,9 @@ def simulate(
         outcome.table, files = _thesis(record, data, folder)
         outcome.files += files
     else:
-        recorder = sitl.record if firmware == "sitl" else avr.record
-        given = stimuli.stimuli(record, data)
-        path = _recorded(outcome, given, folder, recorder, progress)
+        given = given or stimuli.stimuli(record, data)
+        outcome.recording = recording or recorder(record, given)
+        path = _written(outcome.recording, outcome, folder)
         clock.mark("record")
         if path is not None:
             chip = given.imu if firmware == "avr" else None
@@ -195,28 +210,36 @@ def simulate(
     return outcome
 
 
-def _recorded(
-    outcome: Outcome,
-    given: stimuli.Stimuli,
-    folder: Path,
-    recorder: Callable[..., sitl.Recording],
-    progress: Progress,
-) -> Path | None:
-    """Record with the firmware; write flight.bin, if there is one."""
-    record = outcome.record
-    outcome.recording = recorder(
-        given,
-        rate_hz=sitl.recorder_rate_hz(record.card.flight.rate_hz),
-        aircraft=record.aircraft.name,
-        faults=record.card.faults,
-        seed=record.seed,
-        progress=lambda share: progress("record", share),
-    )
+def _recorder(
+    firmware: str, seed: int, flight_card: bytes, progress: Progress
+) -> Callable[[FlightRecord, stimuli.Stimuli], sitl.Recording]:
+    """Return what lets the firmware live through a flight."""
+    live: Callable[..., sitl.Recording] = avr.record
+    if firmware == "sitl":
+        live = partial(sitl.record, flight_card=flight_card)
+    elif flight_card:
+        raise UsageError(f"--flight-card with --firmware {firmware}: only sitl flies it here")
+
+    def recorder(record: FlightRecord, given: stimuli.Stimuli) -> sitl.Recording:
+        return live(
+            given,
+            rate_hz=sitl.recorder_rate_hz(record.card.flight.rate_hz),
+            aircraft=record.aircraft.name,
+            faults=record.card.faults,
+            seed=seed,
+            progress=partial(progress, "record"),
+        )
+
+    return recorder
+
+
+def _written(recording: sitl.Recording, outcome: Outcome, folder: Path) -> Path | None:
+    """Write flight.bin, if there is one."""
     path = folder / "flight.bin"
     path.unlink(missing_ok=True)
-    if not outcome.recording.log:
+    if not recording.log:
         return None
-    path.write_bytes(outcome.recording.log)
+    path.write_bytes(recording.log)
     outcome.files.insert(0, path)
     return path
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import mmap
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from host.errors import UsageError
 from host.twin.faults import Action, Fault, recorder_actions
 from host.twin.flight.fly import IDLE_US, NEUTRAL_US
 from host.twin.recorder.fat32 import CARD_BYTES, CardImageError, CardReader, format_card
+from host.twin.recorder.flight_card_line import eeprom_with_card
 from host.twin.recorder.recorder_build import recorder_library
 from host.twin.recorder.sitl_library import TICKS_PER_US, CardFault, Port, Sitl
 from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli
@@ -30,6 +31,7 @@ CLOSE_S = 20.0  # the next power-on: on the ground the recorder closes the file
 BLOCKS_PER_S = 40
 PITOTS = (4, 5)  # places of dp_a and dp_b in a scan
 PITOT_ZERO = 512.0
+SERVO_PULSE = np.dtype([("at", np.int64), ("output", np.uint8), ("width", np.int64)])
 CARD_ID = b"\x03VIRT\x15card\x10\x00\x00\x01\x00\xf0"
 CARD_EVENTS = {
     "card_busy": CardFault.BUSY,
@@ -57,6 +59,8 @@ class Recording:
         Its name on the card; without a file, why there is none.
     lost_edges, lost_packets, lost_gps_bytes : int
         Stimuli the hardware model had no room for.
+    servos : structured array (at, output, width)
+        Every pulse of the Mega to a servo, in ticks; outputs in the order of the receiver.
     """
 
     log: bytes
@@ -64,6 +68,7 @@ class Recording:
     lost_edges: int
     lost_packets: int
     lost_gps_bytes: int
+    servos: NDArray[np.void] = field(default_factory=lambda: np.zeros(0, dtype=SERVO_PULSE))
 
 
 def recorder_rate_hz(wanted_hz: float) -> int:
@@ -78,6 +83,7 @@ def record(
     aircraft: str,
     faults: Sequence[Fault] = (),
     seed: int = 0,
+    flight_card: bytes = b"",
     progress: Callable[[float], None] = lambda _: None,
 ) -> Recording:
     """Let the recorder live through a flight.
@@ -93,6 +99,8 @@ def record(
         Those of card, barometer and supply act here; the others are in the stimuli already.
     seed : int
         Of the garbage that a power cut leaves in a block being programmed.
+    flight_card : bytes
+        In its EEPROM; empty for none.
     progress : callable
         Called with the share done.
 
@@ -112,7 +120,11 @@ def record(
     sitl = Sitl(recorder_library())
     sitl.set_file_blocks(blocks)
     try:
-        return _record(sitl, image, given, rate_hz, aircraft, faults, seed, progress)
+        kinds = {fault.kind for fault in faults}
+        configure(sitl, rate_hz, aircraft, damaged="settings_damaged" in kinds)
+        if flight_card:
+            sitl.set_eeprom(eeprom_with_card(sitl.eeprom(), flight_card))
+        return _record(sitl, image, given, faults, seed, progress)
     finally:
         sitl.close()
 
@@ -138,8 +150,6 @@ def _record(
     sitl: Sitl,
     image: mmap.mmap,
     given: Stimuli,
-    rate_hz: int,
-    aircraft: str,
     faults: Sequence[Fault],
     seed: int,
     progress: Callable[[float], None],
@@ -147,7 +157,6 @@ def _record(
     kinds = {fault.kind for fault in faults}
     if "card_absent" not in kinds:
         sitl.insert_card(image, CARD_ID)
-    configure(sitl, rate_hz, aircraft, damaged="settings_damaged" in kinds)
     for fault in faults:
         if fault.kind == "clock_wrap":
             offset_us = (1 << 32) - round(fault.at_s * 1e6)
@@ -167,6 +176,7 @@ def _record(
                 _act(sitl, given, at, action)
         progress(mark / end)
     state = sitl.state()
+    servos = np.rec.fromarrays(sitl.pulses(), dtype=SERVO_PULSE)
 
     # The pilot pulls the battery; at the bench the next power-on closes the file.
     sitl.power_cut(seed & 0xFFFFFFFF)
@@ -180,7 +190,8 @@ def _record(
     log, name = file_of(image, faults)
     if not log:
         name = VOLUMES[state.volume]
-    return Recording(log, name, state.lost_edges, state.lost_packets, state.lost_gps_bytes)
+    lost = state.lost_edges, state.lost_packets, state.lost_gps_bytes
+    return Recording(log, name, *lost, servos=servos)
 
 
 def file_of(image: mmap.mmap, faults: Sequence[Fault]) -> tuple[bytes, str]:

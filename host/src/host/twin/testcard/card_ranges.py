@@ -26,6 +26,7 @@ _BAND_HZ = Quantity("Hz", 0.0, 500.0, _NYQUIST)
 RANGES: Mapping[str, Quantity] = {
     "flight.airspeed_mps": _SPEED_MPS,
     "flight.height_m": Quantity("m", 0.0, 15_000.0, _STANDARD, above=True),
+    "flight.climb_m": Quantity("m", 0.0, 1000.0, "higher climbs are a flight of their own"),
     "flight.rate_hz": Quantity("Hz", 1.0, 1000.0, "the recorder's fastest is 200 Hz"),
     "flight.ground_s": Quantity("s", 0.0, 600.0, "the pitot's zero takes 5 s"),
     "flight.heading_deg": Quantity("deg", -360.0, 360.0, _CIRCLE),

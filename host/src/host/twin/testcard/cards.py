@@ -31,6 +31,7 @@ class Flight:
 
     airspeed_mps: float = 0.0  # 0: the aircraft file's
     height_m: float = 100.0
+    climb_m: float = 0.0  # to that height from the launch; 0: it is cut out
     rate_hz: float = 100.0
     ground_s: float = 5.0  # at rest before the launch, for the zero of the pitot
     heading_deg: float = 0.0
@@ -221,12 +222,14 @@ def duration_s(card: Card) -> float:
 
 def length_s(card: Card, s: Segment) -> float:
     """Return the length of one of its segments, with the trim before and the rest behind."""
-    if s.kind in STEPS:
-        units = sum(length for _, length in STEPS[s.kind])
-        return s.before_s + units * s.width_s + card.pilot.hands_off_s
     if s.kind in ("trim", "turn"):
         return s.duration_s
-    return s.before_s + s.duration_s + card.pilot.hands_off_s
+    return s.before_s + input_s(s) + card.pilot.hands_off_s
+
+
+def input_s(s: Segment) -> float:
+    """Return the length of an input itself."""
+    return sum(length for _, length in STEPS.get(s.kind, ())) * s.width_s or s.duration_s
 
 
 def _table(where: str, value: object) -> dict[str, object]:
