@@ -86,9 +86,9 @@ class Watched:
             for k, rows in enumerate(first)
             for row in rows
         ]
-        return ChangeTest(
-            self.patterns(), np.array([flight_spread(flights, n) for n in names]), RARE
-        )
+        spread = np.array([flight_spread(flights, n) for n in names])
+        test = ChangeTest(self.patterns(), spread, RARE)
+        return test.scaled([(list(rows), [self.own] * len(rows)) for rows in first])
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.aircraft.prior.prior_file import read_prior
+from host.arrays import Array
 from host.fleet.flight_task import IDENTIFIED, SET_ASIDE
 from host.fleet.pages.aircraft_changes import AircraftHistory, change_lines, histories
 from host.fleet.pages.fleet_page import fleet_page
 from host.fleet.pages.type_prior import type_prior
+from host.fleet.statistics.changes import ChangeTest
 from host.fleet.statistics.loaded_flight import LoadedFlight
 from host.fleet.statistics.type_model import TypeModel, type_model
 from studies.fleet_changes import (
@@ -48,7 +50,12 @@ def drawn(aircraft: int = 4, flights: int = 12) -> list[LoadedFlight]:
                     sources=(("aircraft file 1", "mass_share"),),
                     loadings=0.01 * mine[None],
                     date=f"2026-0{1 + flight // 10}-{10 + flight % 10}",
-                    conditions={"alpha_rad": 0.1, "chord_m": 0.25, "span_m": 1.25},
+                    conditions={
+                        "alpha_rad": 0.1,
+                        "airspeed_mps": 17.0,
+                        "chord_m": 0.25,
+                        "span_m": 1.25,
+                    },
                 )
             )
     return found
@@ -58,7 +65,7 @@ def drawn(aircraft: int = 4, flights: int = 12) -> list[LoadedFlight]:
 def fleet() -> tuple[TypeModel, list[AircraftHistory]]:
     kept = ("CL_alpha", "CL_de", "Cm_de")  # a picture each
     flights = [replace(f, left_out=frozenset(set(USUAL) - set(kept))) for f in drawn()]
-    model = type_model("trainer", flights)
+    model = type_model("trainer", flights, (0.01, 0.0, -0.02))
     return model, histories(model)
 
 
@@ -85,6 +92,27 @@ def test_a_shift_is_noticed_and_nothing_else_is() -> None:
     assert false_alarms(kind, fleets, 10, 5) <= 2.5
 
 
+def test_what_intervals_of_flights_miss_is_counted_and_no_change() -> None:
+    """Flights that scatter twice as far as their covariances say, in the lag of one servo."""
+    rng, names, usual = np.random.default_rng(9), ("rudder_lag_s", "Cm_q"), np.array([0.02, -11.0])
+    own = np.diag([1e-6, 0.25])
+    patterns = {"lag of the rudder": np.array([1.0, 0.0]), "damping": np.array([0.0, 1.0])}
+    plain = ChangeTest(patterns, np.zeros(len(names)))
+
+    def flights(count: int) -> tuple[list[Array], list[Array]]:
+        scatter = np.array([2e-3, 0.5]) * rng.standard_normal((count, 2))
+        return list(usual + scatter), [own] * count
+
+    test = plain.scaled([flights(8) for _ in range(12)])
+    assert set(test.scales) == {"lag of the rudder"}
+    assert test.scales["lag of the rudder"] == pytest.approx(2.0, rel=0.15)
+    later = [flights(28) for _ in range(5)]
+    alarms = [sum(len(one.alarms(*x)) for x in later) for one in (plain, test)]
+    assert alarms[0] >= 5
+    assert alarms[1] == 0
+    assert plain.scaled([]).scales == {}
+
+
 def test_the_page_shows_everything_and_runs_nothing(
     fleet: tuple[TypeModel, list[AircraftHistory]], tmp_path: Path
 ) -> None:
@@ -99,7 +127,13 @@ def test_the_page_shows_everything_and_runs_nothing(
     assert page.count("<img ") == len(model.effects) + len(model.aircraft)
     assert "script-src &#x27;none&#x27;" in page or "script-src 'none'" in page
     assert HOSTILE not in page
-    for word in ("throw of the elevator", "hangs", "new aircraft", "fly more aircraft: 4 are few"):
+    for word in (
+        "throw of the elevator",
+        "hangs",
+        "new aircraft",
+        "fly more aircraft: 4 are few",
+        "moments about 0.010, 0.000, -0.020 m; alpha 5.7 deg, airspeed 17.0 m/s",
+    ):
         assert word in page
     path = tmp_path / "trainer.html"
     path.write_text(page, encoding="utf-8")

@@ -1,5 +1,7 @@
 """Mean and spreads of a type: against statsmodels, against a dense covariance, against truth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from host.fleet.statistics.loaded_flight import LoadedFlight, fleet_estimates
@@ -99,6 +101,18 @@ def test_an_error_that_all_aircraft_share_does_not_average_out() -> None:
     assert each.shared_deviation == 0.0
     assert each.mean.width < 0.5
     assert each.between.upper < none.between.upper + 1e-9
+
+
+def test_loadings_that_go_with_the_estimate_do_not_draw_the_mean_down() -> None:
+    rng = np.random.default_rng(6)
+    values = 10.0 + rng.standard_normal(40)
+    told = [flight(f"N{k % 10}", v, "the type", 0.2 * v) for k, v in enumerate(values.tolist())]
+    found = fleet_estimates(told, "Cm_q")
+    kept = type_effect(found).mean
+    raw = type_effect(replace(found, shared=0.2 * found.value[:, None])).mean
+    assert raw.value < values.mean() - 0.5  # Peelle's puzzle
+    assert kept.value == pytest.approx(float(values.mean()), abs=0.05)
+    assert 0.5 * kept.width == pytest.approx(1.96 * 2.0, rel=0.1)  # a fifth, shared by all
 
 
 def test_a_flight_is_left_out_by_a_finding_only() -> None:

@@ -51,7 +51,9 @@ def histories(model: TypeModel) -> list[AircraftHistory]:
     for aircraft, own in flown.items():
         names = _told_by_all(own, known)
         flights = [f for f in own if all(f.tells(n) for n in names)]
-        alarms = _alarms(flights, names, spread) if names and len(flights) > BASELINE else []
+        alarms = []
+        if names and len(flights) > BASELINE:
+            alarms = _alarms(flights, names, spread, list(flown.values()))
         found.append(AircraftHistory(aircraft, tuple(flights), names, tuple(alarms)))
     return found
 
@@ -68,7 +70,10 @@ def _told_by_all(flights: Sequence[LoadedFlight], names: Sequence[str]) -> tuple
 
 
 def _alarms(
-    flights: Sequence[LoadedFlight], names: tuple[str, ...], spread: Mapping[str, float]
+    flights: Sequence[LoadedFlight],
+    names: tuple[str, ...],
+    spread: Mapping[str, float],
+    fleet: Sequence[Sequence[LoadedFlight]],
 ) -> list[Alarm]:
     at, each = flights[0].conditions, [_part(f, names) for f in flights]
     usual = np.mean([v for v, _ in each[:BASELINE]], axis=0)
@@ -78,7 +83,16 @@ def _alarms(
     if not patterns:
         return []
     test = ChangeTest(patterns, np.array([spread[n] for n in names]), RARE)
+    test = test.scaled([_first_parts(own, names) for own in fleet])
     return test.alarms([v for v, _ in each], [c for _, c in each])
+
+
+def _first_parts(
+    flights: Sequence[LoadedFlight], names: tuple[str, ...]
+) -> tuple[list[Array], list[Array]]:
+    """Return the first flights of an aircraft that tell these quantities."""
+    told = [_part(f, names) for f in flights[:BASELINE] if all(f.tells(n) for n in names)]
+    return [v for v, _ in told], [c for _, c in told]
 
 
 def _part(flight: LoadedFlight, names: tuple[str, ...]) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from host.fleet.flight_task import IDENTIFIED
 from host.fleet.pages.aircraft_changes import AircraftHistory, change_lines
 from host.fleet.pages.fleet_figures import drift_figure, funnel_figure
-from host.fleet.pages.type_text import half, spread
+from host.fleet.pages.type_text import condition_text, half, spread
 from host.fleet.pages.what_to_fly import advice_lines
 from host.fleet.statistics.type_model import DIFFERS, TypeModel
 from host.report.embedded_picture import picture
@@ -20,7 +20,10 @@ from host.report.html_text import escaped
 if TYPE_CHECKING:
     import pandas as pd
 
-_PAIRS = ".pairs figure { display: inline-block; width: 48%; vertical-align: top; margin: 1%; }\n"
+_PAIRS = """\
+.pairs figure { display: inline-block; width: 48%; vertical-align: top; margin: 1%; }
+@media (max-width: 40em) { .pairs figure { width: 98%; } }
+"""
 _MOST_ASIDE = 200  # rows of a table that somebody reads
 
 
@@ -42,6 +45,7 @@ def fleet_page(model: TypeModel, found: list[AircraftHistory], rows: pd.DataFram
     body = [
         f"<h1>{escaped(model.name)}: the type from its fleet</h1>",
         f'<p class="facts">{facts}</p>',
+        f'<p class="facts">{escaped(condition_text(model))}</p>',
         f'<div class="verdict"><h2>What has changed</h2>{items(change_lines(found))}'
         f"<h2>What to fly to learn most</h2>{items(advice_lines(model))}</div>",
         _section("Mean and spreads", _effects(model)),

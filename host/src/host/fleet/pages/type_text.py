@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from host.fleet.statistics.spread_intervals import Interval
 from host.fleet.statistics.type_model import DIFFERS, TypeModel
 
@@ -12,6 +14,7 @@ from host.fleet.statistics.type_model import DIFFERS, TypeModel
 def type_lines(model: TypeModel) -> list[str]:
     """Return mean and spreads of every derivative, and what differs between aircraft."""
     lines = [f"{model.name}: {len(model.aircraft)} aircraft, {len(model.flights)} flights"]
+    lines.append(condition_text(model))
     if not model.effects:
         return [*lines, "  one aircraft: its spread from others is not known; add a second one"]
     lines.append(
@@ -36,12 +39,26 @@ def type_lines(model: TypeModel) -> list[str]:
     return lines
 
 
+def condition_text(model: TypeModel) -> str:
+    """Return what the coefficients hold at: one CG, and the condition that flights have."""
+    alpha = np.degrees(model.conditions("alpha_rad"))
+    speed = np.array(model.conditions("airspeed_mps"))
+    place = "" if model.cg_m is None else ", ".join(f"{x:.3f}" for x in model.cg_m) + " m"
+    return (f"moments about {place}; " if place else "") + (
+        f"alpha {np.median(alpha):.1f} deg, airspeed {np.median(speed):.1f} m/s (flights:"
+        f" {alpha.min():.1f} to {alpha.max():.1f}, {speed.min():.1f} to {speed.max():.1f})"
+    )
+
+
 def type_document(model: TypeModel) -> dict[str, Any]:
     """Return the same as plain numbers; what is not known is null."""
     return {
         "type": model.name,
         "aircraft": model.aircraft,
         "flights": len(model.flights),
+        "cg_m": None if model.cg_m is None else list(model.cg_m),
+        "alpha_rad": model.alpha_rad(),
+        "airspeed_mps": float(np.median(model.conditions("airspeed_mps"))),
         "told_by_one_aircraft": list(model.alone),
         "derivatives": {
             name: {

@@ -39,7 +39,7 @@ def _cause(model: TypeModel, name: str, effect: TypeEffect) -> str:
     each = data.flights / data.fleet
     own = sum(data.variance.tolist()) / data.flights / each / data.fleet
     parts = {
-        "measure once more what all aircraft share (the aircraft file, one calibration)":
+        "measure once more what all aircraft share (drawing, aircraft file, calibration)":
             effect.shared_deviation**2,
         "fly more aircraft, they differ": effect.between.value**2 / data.fleet,
         "fly more flights of each, they differ": (

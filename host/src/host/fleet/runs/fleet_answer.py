@@ -64,13 +64,13 @@ def fleet_answer(rows: pd.DataFrame, output: Path) -> FleetAnswer:
     """
     answer = FleetAnswer()
     for name, own in rows[rows["state"] == IDENTIFIED].groupby("type", sort=True):
-        answer.models.append(type_model(str(name), type_flights(own)))
+        answer.models.append(type_model(str(name), type_flights(own), reference_cg(own)))
         answer.changes.append(histories(answer.models[-1]))
     stems = file_names(m.name for m in answer.models)
     for model, each, stem in zip(answer.models, answer.changes, stems, strict=True):
         own = rows[rows["type"] == model.name]
-        document = {**type_document(model), "cg_m": list(reference_cg(own))}
-        texts = {output / f"{stem}.json": json.dumps(document, indent=2, allow_nan=False)}
+        document = json.dumps(type_document(model), indent=2, allow_nan=False)
+        texts = {output / f"{stem}.json": document}
         texts[output / f"{stem}.html"] = fleet_page(model, each, own)
         if model.effects:
             texts[output / f"{stem}.prior.toml"] = type_prior(model)

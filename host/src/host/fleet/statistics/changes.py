@@ -10,9 +10,10 @@ an aircraft's flights share are in its first flights, too, and cancel.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import special
 
 from host.arrays import Array
 
@@ -22,6 +23,9 @@ WINDOW = 4  # flights over which a change is looked for
 THRESHOLD = 3.75
 _NEAR = 4.0  # of the square: a cause as near to the best is not ruled out
 _MOVED = 2.0  # standard deviations
+SELDOM = 0.025  # of types whose flights scatter as they say, above the usual mean square
+
+Mean = tuple[Array, Array]  # (P,) and its covariance
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +71,44 @@ class ChangeTest:
         Standard deviation between flights of an unchanged aircraft, from the whole type.
     rare : frozenset of str
         Causes that are named first only where no other explains a change nearly as well.
+    scales : dict of str to float
+        By how much a cause's size scatters more than covariances say; 1 without (`scaled`).
     """
 
     patterns: Mapping[str, Array]
     spread: Array
     rare: frozenset[str] = frozenset()
+    scales: Mapping[str, float] = field(default_factory=dict)
+
+    def scaled(self, first: Sequence[tuple[Sequence[Array], Sequence[Array]]]) -> ChangeTest:
+        """Return the test with what unchanged flights of the type say of each cause.
+
+        Each of an aircraft's first flights is held against the others of them. A cause whose size
+        scatters by more than covariances allow is counted in that scatter: what a flight's interval
+        misses is then no change.
+
+        Parameters
+        ----------
+        first : sequence of (values, own)
+            Of each aircraft its first flights, as in `alarms`.
+        """
+        squares: dict[str, list[float]] = {name: [] for name in self.patterns}
+        freedom = 0
+        for values, own in first:
+            if len(values) < 2:
+                continue
+            flown = self._flown(values, own)
+            freedom += len(values) - 1
+            for k in range(len(values)):
+                others = [j for j in range(len(values)) if j != k]
+                strength = np.abs(self._sizes(flown.mean([k]), flown.mean(others))[1])
+                for name, z in zip(self.patterns, strength.tolist(), strict=True):
+                    squares[name].append(z**2)
+        if not freedom:
+            return self
+        usual = float(special.chdtri(freedom, SELDOM)) / freedom
+        found = {name: float(np.mean(z)) for name, z in squares.items()}
+        return replace(self, scales={n: float(np.sqrt(x)) for n, x in found.items() if x > usual})
 
     def alarms(
         self, values: Sequence[Array], own: Sequence[Array], threshold: float = THRESHOLD
@@ -87,33 +124,41 @@ class ChangeTest:
         """
         if len(values) <= BASELINE:
             return []
-        flown = _Flown(np.stack(values), np.linalg.inv(np.stack(own) + np.diag(self.spread**2)))
-        base = flown.mean(0, BASELINE)
+        flown = self._flown(values, own)
+        base = flown.mean(range(BASELINE))
         found = (self._strongest(flown, base, last) for last in range(BASELINE, len(values)))
         return [alarm for alarm in found if alarm.strength > threshold]
 
     def _strongest(self, flown: _Flown, base: tuple[Array, Array], last: int) -> Alarm:
         """Return the likeliest change that ends with a flight."""
         names = list(self.patterns)
-        shapes = np.stack([self.patterns[name] for name in names], axis=1)
         best: Alarm | None = None
         for since in range(max(BASELINE, last - WINDOW + 1), last + 1):
-            now, covariance = flown.mean(since, last + 1)
-            covariance = covariance + base[1]
-            weighed = np.linalg.solve(covariance, shapes)
-            information = np.einsum("pc,pc->c", shapes, weighed)
-            size = (now - base[0]) @ weighed / information
-            strength = np.abs(size) * np.sqrt(information)
+            now = flown.mean(range(since, last + 1))
+            size, signed = self._sizes(now, base)
+            strength = np.abs(signed)
             k = self._named(names, strength)
             if best is None or float(strength[k]) > best.strength:
                 near = [names[j] for j in np.argsort(-strength) if j != k and strength[j] ** 2
                         > strength[k] ** 2 - _NEAR]  # fmt: skip
-                off = np.abs(now - base[0]) / np.sqrt(np.diag(covariance))
+                off = np.abs(now[0] - base[0]) / np.sqrt(np.diag(now[1] + base[1]))
                 moved = [int(j) for j in np.argsort(-off) if off[j] > _MOVED]
                 best = Alarm(last, since, names[k], float(size[k]), float(strength[k]),
                              tuple(near), tuple(moved))  # fmt: skip
         assert best is not None  # the last flight alone at the least
         return best
+
+    def _flown(self, values: Sequence[Array], own: Sequence[Array]) -> _Flown:
+        return _Flown(np.stack(values), np.linalg.inv(np.stack(own) + np.diag(self.spread**2)))
+
+    def _sizes(self, now: Mean, before: Mean) -> tuple[Array, Array]:
+        """Return the size of each cause's change between two means, and that over its deviation."""
+        shapes = np.stack(list(self.patterns.values()), axis=1)
+        weighed = np.linalg.solve(now[1] + before[1], shapes)
+        information = np.einsum("pc,pc->c", shapes, weighed)
+        size = (now[0] - before[0]) @ weighed / information
+        scale = np.array([self.scales.get(name, 1.0) for name in self.patterns])
+        return size, size * np.sqrt(information) / scale
 
     def _named(self, names: Sequence[str], strength: Array) -> int:
         """Return which cause is named first: a rare one only where no other is as near."""
@@ -130,9 +175,9 @@ class _Flown:
     values: Array
     inverses: Array
 
-    def mean(self, first: int, end: int) -> tuple[Array, Array]:
+    def mean(self, flights: Sequence[int]) -> Mean:
         """Return the weighted mean of some flights and its covariance."""
-        inverses = self.inverses[first:end]
-        covariance = np.linalg.inv(inverses.sum(axis=0))
-        total = np.einsum("nij,nj->i", inverses, self.values[first:end])
+        at = list(flights)
+        covariance = np.linalg.inv(self.inverses[at].sum(axis=0))
+        total = np.einsum("nij,nj->i", self.inverses[at], self.values[at])
         return covariance @ total, covariance

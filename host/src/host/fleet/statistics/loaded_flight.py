@@ -70,7 +70,10 @@ def fleet_estimates(flights: Sequence[LoadedFlight], name: str) -> FleetEstimate
     """Return what all flights that count say of one derivative.
 
     Errors of a source that only one aircraft's flights have are that aircraft's; others are shared
-    by aircraft. Of each the main patterns are kept, what they leave counts as the flights' own.
+    by aircraft. Each shifts all its flights by the mean of their loadings, and what a flight's own
+    differs by counts as its own error. For a loading goes with the estimate that it was computed
+    at: a low estimate has a small one, would be taken for sure, and draw the mean down (Peelle's
+    puzzle: D'Agostini, Nuclear Instruments and Methods A 346, 1994).
     """
     told = sorted((f for f in flights if f.tells(name)), key=lambda f: f.aircraft)
     at = [f.names.index(name) for f in told]
@@ -89,19 +92,25 @@ def fleet_estimates(flights: Sequence[LoadedFlight], name: str) -> FleetEstimate
     local, rest = np.zeros((len(told), LOCAL_RANK)), np.zeros(len(told))
     for code in range(int(codes[-1]) + 1 if len(codes) else 0):
         inside = np.flatnonzero(codes == code)
-        matrix = _matrix([rows[i] for i in inside], lambda s: s[0] not in common)
-        local[inside], rest[inside] = _patterns(matrix, LOCAL_RANK)
-    shared = _matrix(rows, lambda s: s[0] in common)
-    shared, left = _patterns(shared, _enough(shared))
-    return FleetEstimates(value, variance + rest + left, codes, local, shared)
+        matrix, uneven = _matrix([rows[i] for i in inside], lambda s: s[0] not in common)
+        local[inside], left = _patterns(matrix, LOCAL_RANK)
+        rest[inside] = left + uneven
+    matrix, uneven = _matrix(rows, lambda s: s[0] in common)
+    shared, left = _patterns(matrix, _enough(matrix))
+    return FleetEstimates(value, variance + rest + left + uneven, codes, local, shared)
 
 
-def _matrix(rows: Sequence[dict[Source, float]], wanted: Callable[[Source], bool]) -> Array:
-    """Return loadings of the flights by source, (flights, sources)."""
+def _matrix(
+    rows: Sequence[dict[Source, float]], wanted: Callable[[Source], bool]
+) -> tuple[Array, Array]:
+    """Return loadings of the flights by source, (flights, sources), the mean of each in all flights
+    that have it, and the variance of each flight by which its own differ."""
     names = list(dict.fromkeys(s for row in rows for s in row if wanted(s)))
-    return np.array([[row.get(s, 0.0) for s in names] for row in rows]).reshape(
-        len(rows), len(names)
-    )
+    shape = len(rows), len(names)
+    found = np.array([[row.get(s, 0.0) for s in names] for row in rows]).reshape(shape)
+    has = np.array([[s in row for s in names] for row in rows]).reshape(shape)
+    mean = has * (found.sum(axis=0) / np.maximum(has.sum(axis=0), 1))
+    return mean, np.sum((found - mean) ** 2, axis=1)
 
 
 def _patterns(matrix: Array, rank: int) -> tuple[Array, Array]:

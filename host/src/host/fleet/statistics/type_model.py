@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.fleet.statistics.loaded_flight import LoadedFlight, fleet_estimates
+from host.fleet.statistics.reference_cg import Place
 from host.fleet.statistics.spread_intervals import TypeEffect, type_effect
 from host.fleet.statistics.variance_components import FEWEST_AIRCRAFT, FleetEstimates
 
@@ -29,6 +30,8 @@ class TypeModel:
         About the reference CG.
     alone : tuple of str
         Derivatives that fewer than two aircraft tell.
+    cg_m : tuple of float, optional
+        What moments are about.
     """
 
     name: str
@@ -36,6 +39,7 @@ class TypeModel:
     estimates: dict[str, FleetEstimates]
     flights: tuple[LoadedFlight, ...]
     alone: tuple[str, ...]
+    cg_m: Place | None = None
 
     @property
     def aircraft(self) -> list[str]:
@@ -44,7 +48,11 @@ class TypeModel:
 
     def alpha_rad(self) -> float:
         """Return the median angle of attack of the flights, rad."""
-        return float(np.median([f.conditions["alpha_rad"] for f in self.flights]))
+        return float(np.median(self.conditions("alpha_rad")))
+
+    def conditions(self, name: str) -> list[float]:
+        """Return a condition of every flight."""
+        return [f.conditions[name] for f in self.flights]
 
     def differing(self) -> list[str]:
         """Return the derivatives that differ between aircraft, the surest first."""
@@ -52,13 +60,15 @@ class TypeModel:
         return sorted(found, key=found.__getitem__)
 
 
-def type_model(name: str, flights: Sequence[LoadedFlight]) -> TypeModel:
+def type_model(name: str, flights: Sequence[LoadedFlight], cg_m: Place | None = None) -> TypeModel:
     """Return the model of a type from flights about one CG.
 
     Parameters
     ----------
     name : str
     flights : sequence of LoadedFlight
+    cg_m : tuple of float, optional
+        That CG.
     """
     names = list(dict.fromkeys(n for flight in flights for n in flight.names))
     effects, estimates, alone = {}, {}, []
@@ -69,4 +79,4 @@ def type_model(name: str, flights: Sequence[LoadedFlight]) -> TypeModel:
             continue
         estimates[derivative] = fleet_estimates(flights, derivative)
         effects[derivative] = type_effect(estimates[derivative])
-    return TypeModel(name, effects, estimates, tuple(flights), tuple(alone))
+    return TypeModel(name, effects, estimates, tuple(flights), tuple(alone), cg_m)
