@@ -1,6 +1,6 @@
 """Mean and spreads of a type: against statsmodels, against a dense covariance, against truth."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -113,6 +113,20 @@ def test_loadings_that_go_with_the_estimate_do_not_draw_the_mean_down() -> None:
     assert raw.value < values.mean() - 0.5  # Peelle's puzzle
     assert kept.value == pytest.approx(float(values.mean()), abs=0.05)
     assert 0.5 * kept.width == pytest.approx(1.96 * 2.0, rel=0.1)  # a fifth, shared by all
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_a_wild_flight_that_says_it_tells_nothing_changes_nothing(seed: int) -> None:
+    rng, codes = np.random.default_rng(seed), np.repeat(np.arange(8), 6)
+    value = 5.0 + 0.5 * rng.standard_normal(8)[codes]
+    value += np.hypot(0.3, 0.3) * rng.standard_normal(48)
+    own, none = np.full(48, 0.3), np.zeros((48, 0))
+    still = type_effect(FleetEstimates(value, own**2, codes, none, none))
+    value[7], own[7] = 3000.0, 2000.0
+    wild = type_effect(FleetEstimates(value, own**2, codes, none, none))
+    for name in ("mean", "between", "within"):
+        ends = [astuple(getattr(effect, name)) for effect in (still, wild)]
+        assert ends[1] == pytest.approx(ends[0], rel=0.1, abs=0.03), name
 
 
 def test_a_flight_is_left_out_by_a_finding_only() -> None:

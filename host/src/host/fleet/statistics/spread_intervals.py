@@ -146,12 +146,12 @@ def _within_interval(data: FleetEstimates, within: float, told: KnownSpreads) ->
     inside = data.flights - data.fleet
     if inside < 1:
         return Interval(math.nan, 0.0, math.inf)
-    middle, scale = math.sqrt(within), math.sqrt(data.scatter)
+    middle, scale = math.sqrt(within), math.sqrt(data.grain)
     limit = CHI_SQUARE_95 * (1.0 + 1.0 / inside)
-    best = _profile(data, max(within, _LEAST * data.scatter), told)
+    best = _profile(data, max(within, _LEAST * data.grain), told)
 
     def beyond(deviation: float) -> float:
-        variance = max(deviation**2, _LEAST * data.scatter)
+        variance = max(deviation**2, _LEAST * data.grain)
         return _profile(data, variance, told) - best - limit
 
     lower = 0.0
@@ -174,7 +174,7 @@ def _profile(data: FleetEstimates, within: float, told: KnownSpreads) -> float:
         lambda x: reduced(data, x * x, within).deviance,
         bounds=(0.0, high),
         method="bounded",
-        options={"xatol": 1e-3 * high},
+        options={"xatol": 3e-3 * math.sqrt(data.grain)},
     )
     return min(float(found.fun), reduced(data, 0.0, within).deviance)
 
@@ -197,7 +197,7 @@ def _between_interval(
 
         return form
 
-    ends = [_where(surplus(p), 1.0, data.scatter, 0.0) for p in (LOWER, UPPER)]
+    ends = [_where(surplus(p), 1.0, data.grain, 0.0) for p in (LOWER, UPPER)]
     return Interval(math.sqrt(between), *(math.sqrt(e) for e in ends))
 
 

@@ -22,7 +22,9 @@ from scipy import optimize
 from host.arrays import Array, IntArray
 
 FEWEST_AIRCRAFT = 2  # below, nothing tells aircraft from type
+MAD_TO_DEVIATION = 1.4826  # of a normal distribution
 _START_SHARE = 0.02  # of the scatter: the search begins at no smaller variance
+_WILD = 10.0  # scatter over that of most: moments may then be far from where to begin
 _ZERO_SHARE = 1e-7  # of the scatter: a variance below it is zero
 
 
@@ -68,8 +70,15 @@ class FleetEstimates:
 
     @cached_property
     def scatter(self) -> float:
-        """Variance of all values, the scale of the search."""
+        """Variance of all values: no spread is sought much beyond it."""
         return float(np.var(self.value)) or 1.0
+
+    @cached_property
+    def grain(self) -> float:
+        """The same of most values, the scale of the search: one flight that tells nothing, with a
+        wild value and the deviation that belongs to it, shall not coarsen it."""
+        off = np.abs(self.value - np.median(self.value))
+        return min(float(MAD_TO_DEVIATION * np.median(off)) ** 2, self.scatter) or self.scatter
 
     @cached_property
     def products(self) -> Array:
@@ -168,7 +177,7 @@ def restricted_likelihood(data: FleetEstimates) -> tuple[float, float]:
     data : FleetEstimates
         Of two aircraft or more.
     """
-    scale = data.scatter
+    scale = data.grain
     floor = 0.0 if float(np.min(data.variance)) > 0.0 else _ZERO_SHARE
     # Aircraft of one flight each: the two variances are one, and all of it counts as aircraft's.
     limits = [(0.0, None), (floor, floor if data.flights == data.fleet else None)]
@@ -176,9 +185,15 @@ def restricted_likelihood(data: FleetEstimates) -> tuple[float, float]:
     def deviance(x: Array) -> float:
         return reduced(data, scale * max(x[0], 0.0), scale * max(x[1], floor)).deviance
 
-    start = np.maximum(_moments(data) / scale, (0.0, floor))
-    found = optimize.minimize(deviance, start, method="L-BFGS-B", bounds=limits)
-    between, within = (float(scale * x) if x > _ZERO_SHARE else 0.0 for x in found.x)
+    starts = [_moments(data) / scale]
+    if data.scatter > _WILD * scale:
+        starts.append(np.ones(2))
+    found = [
+        optimize.minimize(deviance, np.maximum(x, (0.0, floor)), method="L-BFGS-B", bounds=limits)
+        for x in starts
+    ]
+    best = min(found, key=lambda one: float(one.fun))
+    between, within = (float(scale * x) if x > _ZERO_SHARE else 0.0 for x in best.x)
     return between, within
 
 
