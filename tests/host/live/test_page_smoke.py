@@ -1,20 +1,15 @@
 """`host live` as a user starts it, seen through a browser: one start for everything."""
 
 import json
-import os
-import re
-import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 
 from tests.browser.chromium import PHONE, Chromium
+from tests.browser.served_page import ServedPage, served_page
 from tests.host.live.radio import Sent, joined, sent
 from tests.protocol.log_writer import envelope, rows
 
-HANGS_S = 300  # ends a test that hangs; none is timed
 # Two seconds of thirty redraws on a clock of our own; then the same instant drawn anew.
 REDRAWS = """(async () => {
   const { History } = await import("./history.js");
@@ -89,36 +84,21 @@ def planted(seconds: float) -> bytes:
 
 def test_the_page_shows_the_flight_and_asks_nobody_else(tmp_path: Path) -> None:
     (tmp_path / "in.radio").write_bytes(planted(48.0))
-    command = ("live", "in.radio@4x", "-o", "<b>out.radio", "--json")
-    with subprocess.Popen(
-        [sys.executable, "-m", "host", *command],
-        cwd=tmp_path, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        env=os.environ | {"PYTHONUNBUFFERED": "1"},
-    ) as live:  # fmt: skip
-        assert live.stderr is not None
-        url = ""
-        for line in live.stderr:
-            if found := re.search(r"page: (http://127\.0\.0\.1:\d+/\?token=\S+)", line):
-                url = found[1]
-                break
-        try:
-            look(url, tmp_path)
-        finally:
-            live.send_signal(signal.SIGINT)
-        out, err = live.communicate(timeout=HANGS_S)
-    assert live.returncode == 0, err
-    assert "Traceback" not in err
-    assert "next: host decode" in err
+    with served_page(tmp_path, "live", "in.radio@4x", "-o", "<b>out.radio", "--json") as live:
+        look(live, tmp_path)
+    assert live.code == 0, live.err
+    assert "Traceback" not in live.err
+    assert "next: host decode" in live.err
     notes = (tmp_path / "<b>out.radio.jsonl").read_text().splitlines()
     assert json.loads(notes[0])["source"] == "replay:in.radio@4x"
     assert [json.loads(one)["kind"] for one in notes[1:]].count("mark") == 1
-    assert json.loads(out.splitlines()[-1])["link"]["damaged_bytes"] == 0
+    assert json.loads(live.out.splitlines()[-1])["link"]["damaged_bytes"] == 0
 
 
-def look(url: str, folder: Path) -> None:
+def look(live: ServedPage, folder: Path) -> None:
     """Do what a pilot does, and what a stranger's text would do."""
     with Chromium() as browser:
-        page = browser.open(url)
+        page = browser.open(live.url)
         page.wait_for("window.hostLive && hostLive.redraws > 0 && hostLive.rows > 100", 60)
         assert page.evaluate("document.querySelectorAll('#plots .plot canvas').length") == 12
         assert page.evaluate("location.search") == ""  # the token is out of sight
@@ -139,9 +119,7 @@ def look(url: str, folder: Path) -> None:
         unnamed = "[...document.querySelectorAll('canvas, [role=img], button')].filter((one) =>"
         unnamed += " !one.closest('[aria-label]') && !one.textContent).length"
         assert page.evaluate(unnamed) == 0
-        base = url.partition("?")[0]
-        others = [one for one in page.requests if not one.startswith((base, "ws" + base[4:]))]
-        assert others == []
+        assert live.strangers(page.requests) == []
         assert page.console_errors == []
         told = page.evaluate(ESTIMATES)
         assert (told["first"], told["more"], told["hidden"]) == (True, True, False), told

@@ -7,11 +7,13 @@ from pathlib import Path
 import pytest
 from host.cli import main
 from host.report.flight_page import flight_page
+from host.report.flight_reading import Wanted, read_flight
 from host.report.shown_flight import Happening, ShownFlight
 
 from tests.browser.chromium import PHONE, Chromium
 from tests.host.report.flights import PLANTED
 
+PX4 = Path(__file__).resolve().parents[2] / "data/px4/sample_log_small.ulg"
 CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ufffe\uffff]")
 
 
@@ -71,3 +73,12 @@ def test_pictures_are_the_same_twice_and_name_what_is_unknown(
     assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
     assert main(["plot", str(log_file), "--png", str(tmp_path / "a.png"), "--channels", "nix"]) == 2
     assert "nix: not measured here; there are airspeed_mps" in capsys.readouterr().err
+
+
+def test_a_loss_whose_time_nobody_knows_is_listed_and_no_folder_is_told() -> None:
+    """The page said "listed under Losses", and there stood none; its note named a folder."""
+    flight = read_flight(Wanted(PX4))[0]
+    text = flight_page(flight)
+    assert "1 lost range: shown as a gap" in text
+    assert "<h2>Losses</h2><p>none</p>" not in text and "<td></td><td>" in text
+    assert str(PX4.parent) not in text.partition("<details")[0]

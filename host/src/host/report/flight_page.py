@@ -102,7 +102,7 @@ def _body(flight: ShownFlight, data: PageData, *, track: bool) -> str:
             _way(track),
             _jumps(flight),
             _happenings("Events", flight.events),
-            _happenings("Losses", flight.losses),
+            _happenings("Losses", flight.losses, _untimed(flight.summary)),
             "</aside></div>",
             "<details><summary>All that host decode says</summary><pre>"
             + "\n".join(map(escaped, flight.lines))
@@ -123,9 +123,13 @@ def _facts(summary: Mapping[str, Any]) -> list[str]:
 
 def _doubts(flight: ShownFlight, data: PageData) -> list[str]:
     losses = flight.summary["losses"]
-    said = [f"{len(losses['ranges'])} lost ranges: shown as gaps, listed under Losses."] * bool(
-        losses["ranges"]
-    )
+    lost = len(losses["ranges"])
+    said = []
+    if lost:
+        ranges = (
+            "1 lost range: shown as a gap" if lost == 1 else f"{lost} lost ranges: shown as gaps"
+        )
+        said.append(f"{ranges} where it is known when, listed under Losses.")
     names = (flight.summary.get("calibration") or {}).get("default_columns") or []
     if names:
         said.append(f"Default calibration, not this instrument's own, under: {', '.join(names)}.")
@@ -201,13 +205,21 @@ def _jumps(flight: ShownFlight) -> str:
     return f"<h2>Servo jumps without stick</h2><p>{escaped(said)}</p>"
 
 
-def _happenings(title: str, found: list[Happening]) -> str:
-    if not found:
+def _untimed(summary: Mapping[str, Any]) -> list[str]:
+    """Return the losses of which nobody knows when they happened."""
+    return [one["text"] for one in summary["losses"]["ranges"] if one.get("t_s") is None]
+
+
+def _happenings(title: str, found: list[Happening], untimed: list[str] | None = None) -> str:
+    if not found and not untimed:
         return f"<h2>{title}</h2><p>none</p>"
     rows = "".join(
         f'<tr data-from="{one.t_s:.3f}" data-to="{one.end_s:.3f}">'
         f'<td class="number">{one.t_s:.2f} s</td><td>{escaped(one.text)}</td></tr>'
         for one in found[:_LISTED]
+    )
+    rows += "".join(
+        f"<tr><td></td><td>{escaped(text)}</td></tr>" for text in (untimed or [])[:_LISTED]
     )
     more = f"<p>... and {len(found) - _LISTED} more</p>" if len(found) > _LISTED else ""
     return f'<h2>{title}</h2><div class="list"><table>{rows}</table></div>{more}'

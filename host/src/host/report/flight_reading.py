@@ -180,7 +180,7 @@ def _of_autopilot(wanted: Wanted, path: Path) -> ShownFlight:
     notes: list[str] = []
     maneuvers: Maneuvers = []
     if flight.judgement.refusal:
-        notes.append(f"no maneuvers: {flight.judgement.refusal}")
+        notes.append(_no_maneuvers(flight.judgement.refusal, path))
     elif wanted.maneuvers:
         maneuvers, notes = _found_in(path, wanted)
     return ShownFlight(
@@ -229,7 +229,12 @@ def _found_in(path: Path, wanted: Wanted) -> tuple[Maneuvers, list[str]]:
                                 row_rate_hz=wanted.row_rate_hz)  # fmt: skip
         return [(item, grade(found, item)) for item in detect_maneuvers(found)], []
     except HostError as error:
-        return [], [f"no maneuvers: {error}"]
+        return [], [_no_maneuvers(str(error), path)]
+
+
+def _no_maneuvers(why: str, path: Path) -> str:
+    """Return why there are none, without the folder: a page is mailed."""
+    return f"no maneuvers: {shown(why.removeprefix(f'{path}: '))}"
 
 
 def _maneuvers(columns: Mapping[str, Any]) -> tuple[Maneuvers, list[str]]:
