@@ -74,3 +74,11 @@ def test_each_kind_says_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "no coefficients" in aircraft_origin(own)
     assert main(["simulate", "calm", "--firmware", "none", "--aircraft", str(own)]) == 2
     assert "a file of its dimensions" in capsys.readouterr().err
+
+
+def test_a_saved_model_is_told_from_an_aircraft(tmp_path: Path) -> None:
+    """It was called a file of format None."""
+    model = tmp_path / "model.toml"
+    model.write_text('name = "longitudinal"\nstates = ["alpha_rad"]\n')
+    with pytest.raises(AircraftError, match=r"a model of one axis, no aircraft; .*--save-aircraft"):
+        read_document(model)

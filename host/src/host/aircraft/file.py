@@ -169,6 +169,11 @@ def read_document(source: str | Path) -> dict[str, object]:
     document = toml_reader.read(source, FOLDER, "aircraft", AircraftError)
     if is_dimensions(document):
         document = from_dimensions(document, source, AircraftError)
+    if "states" in document and "format" not in document:
+        raise AircraftError(
+            f"{source}: a model of one axis, no aircraft; `host identify LOG --aircraft NAME"
+            " --save-aircraft FILE` writes an aircraft with what was identified"
+        )
     toml_reader.check_format(document, Path(source).name, AircraftError)
     return with_vane(document, Path(source).parent, Path(source).name, AircraftError)
 

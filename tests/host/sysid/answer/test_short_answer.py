@@ -99,3 +99,11 @@ def test_what_the_fit_did_not_see_is_shaded(found: host.Identification) -> None:
         assert shade.get_x() == 6.0
     (answer,) = found.linear
     assert len(answer.unseen) == len(answer.held_out)
+
+
+def test_of_two_methods_each_has_its_modes(found: host.Identification) -> None:
+    alone = short_answer.mode_summary(found.linear, None)
+    assert not any(" by " in line for line in alone)
+    both = short_answer.mode_summary(found.linear * 2, None)
+    heads = [line for line in both if line.startswith("modes, ")]
+    assert len(heads) == 2 * len(found.linear) and all(" by " in line for line in heads)

@@ -26,11 +26,13 @@ REST = "--full adds the constants, sensors' errors, delays, fit and every cause"
 def mode_summary(linear: Sequence[Answer], direct: CoefficientAnswer | None) -> list[str]:
     """Return each model's condition and its modes."""
     lines = []
+    models = [answer.template for answer in linear]
     for answer in linear:
         known = answer.trim.known
+        by = f" by {answer.method}" if models.count(answer.template) > 1 else ""
         speed = f"{answer.condition.airspeed_mps:.2f} m/s" if known else "unknown airspeed"
         alpha = f"alpha {answer.trim.alpha_rad * DEG_PER_RAD:.1f} deg"
-        lines += [f"modes, {answer.template} at {speed}, {alpha}", *mode_lines(answer)]
+        lines += [f"modes, {answer.template}{by} at {speed}, {alpha}", *mode_lines(answer)]
     if direct and not linear:
         flight = direct.fit.condition
         alpha = f"alpha {flight.alpha_rad * DEG_PER_RAD:.1f} deg"

@@ -224,7 +224,7 @@ class Identification:
         return "\n".join(lines)
 
     def _short(self, width: int) -> list[str]:
-        modes = mode_summary(self.linear if len(self.methods) == 1 else (), self.coefficients)
+        modes = mode_summary(self.linear, self.coefficients)
         if len(self.methods) > 1:
             table = method_table(self.linear, width)
             if len(table) > MOST_LINES:
