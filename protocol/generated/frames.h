@@ -11,7 +11,7 @@
 namespace frames {
 
 constexpr uint8_t kVersion = 1;
-constexpr uint32_t kSchemaHash = 0x21C00BC2u;
+constexpr uint32_t kSchemaHash = 0xA5B43A8Du;
 constexpr size_t kMaxWireSize = 68;  // longest frame with its id
 
 // Bits of `valid`.
@@ -170,6 +170,7 @@ enum class CardFault : uint8_t {
   kRowFrequency = 12,
   kRowComponents = 13,
   kNotValid = 14,
+  kLearning = 15,
 };
 
 enum class InputEnd : uint8_t {
@@ -199,6 +200,22 @@ enum class InputEnd : uint8_t {
   kThrottleIdle = 23,
   kRowDamaged = 24,
   kTravel = 25,
+};
+
+enum class Derivative : uint8_t {
+  kCmAlpha = 0,
+  kCmQ = 1,
+  kCmDe = 2,
+  kClBeta = 3,
+  kClP = 4,
+  kClR = 5,
+  kClDa = 6,
+  kClDr = 7,
+  kCnBeta = 8,
+  kCnP = 9,
+  kCnR = 10,
+  kCnDa = 11,
+  kCnDr = 12,
 };
 
 enum class Event : uint8_t {
@@ -670,7 +687,7 @@ static_assert(sizeof(ImageFrame) == 8, "size of ImageFrame");
 static_assert(offsetof(ImageFrame, t_us) == 0, "offset of ImageFrame::t_us");
 static_assert(offsetof(ImageFrame, hash) == 4, "offset of ImageFrame::hash");
 
-// A part of the flight card that was enabled: parts 0 to 2 are its head, part 3 + n its row n (layouts card_head, card_learning, card_row). The whole card heads each session behind the enabling, and a row stands before its input_start. No card, no such frame.
+// A part of the flight card that was enabled: parts 0 to 2 are its head, part 3 + n its row n, behind the rows two for each learned axis (layouts card_head, card_learning, card_row, card_axis, card_worth). The whole card heads each session behind the enabling, and a row stands before its input_start. No card, no such frame.
 struct __attribute__((packed)) CardFrame {
   uint32_t t_us;  // us
   uint8_t part;
@@ -699,6 +716,31 @@ constexpr uint8_t kInputConfigWireSize = 7;  // with the id byte
 static_assert(sizeof(InputConfigFrame) == 6, "size of InputConfigFrame");
 static_assert(offsetof(InputConfigFrame, t_us) == 0, "offset of InputConfigFrame::t_us");
 static_assert(offsetof(InputConfigFrame, switch_armed_min_us) == 4, "offset of InputConfigFrame::switch_armed_min_us");
+
+// A derivative of a moment coefficient as the logger estimates it while a row is flown, once a second; only of a row whose card says what to learn (firmware/core/learning).
+struct __attribute__((packed)) LearnedFrame {
+  uint32_t t_us;  // us; the solve began
+  uint16_t samples;  // that it knew, 50 a second since the trigger
+  uint8_t row;  // of the card
+  uint8_t derivative;  // see derivative; body axes at the CG, per rad or per dimensionless rate (pb/2V, qc/2V, rb/2V)
+  uint8_t enough;  // 1: the half-width is at most the card's share of the estimate
+  int32_t estimate;  // 1e-06; cut at the ends of its range, as half_width is
+  uint32_t half_width;  // 1e-06; two-sided 95 %, of residual and instrument; none: the input did not tell it
+
+  static constexpr uint8_t id() { return 15; }
+  static constexpr uint8_t wire_size() { return 18; }
+};
+constexpr uint8_t kLearnedId = 15;
+constexpr uint8_t kLearnedWireSize = 18;  // with the id byte
+constexpr uint32_t kLearnedHalfWidthInvalid = 0;
+static_assert(sizeof(LearnedFrame) == 17, "size of LearnedFrame");
+static_assert(offsetof(LearnedFrame, t_us) == 0, "offset of LearnedFrame::t_us");
+static_assert(offsetof(LearnedFrame, samples) == 4, "offset of LearnedFrame::samples");
+static_assert(offsetof(LearnedFrame, row) == 6, "offset of LearnedFrame::row");
+static_assert(offsetof(LearnedFrame, derivative) == 7, "offset of LearnedFrame::derivative");
+static_assert(offsetof(LearnedFrame, enough) == 8, "offset of LearnedFrame::enough");
+static_assert(offsetof(LearnedFrame, estimate) == 9, "offset of LearnedFrame::estimate");
+static_assert(offsetof(LearnedFrame, half_width) == 13, "offset of LearnedFrame::half_width");
 
 // Packet of our own ArduIMU firmware; ends in CRC-16/CCITT-FALSE over all bytes before it. Signs and scales as in frame ident.
 struct __attribute__((packed)) ImuPacket {
@@ -797,7 +839,7 @@ struct __attribute__((packed)) CardHeadLayout {
   uint8_t airspeed_input;  // bit of ident.valid of the pitot that is watched: 4 dp_a, 5 dp_b; 255: none
   uint8_t alpha_input;  // 0 alpha_a, 1 alpha_b; 255: none
   uint8_t beta_input;  // 2 beta_a, 3 beta_b; 255: none
-  uint8_t reserved_1;
+  uint8_t learned_axes;  // 0 to 3: so many card_axis and card_worth stand behind the rows
   uint16_t dp_min;  // 0.25 count; airspeed, as ident.dp_a
   uint16_t dp_max;  // 0.25 count
   uint16_t alpha_min;  // 0.25 count; as ident.alpha_a; the smaller count, whatever the sign of the slope
@@ -824,12 +866,11 @@ struct __attribute__((packed)) CardHeadLayout {
   uint16_t rate_max_usps;  // us/s; the command moves no faster (flutter, servos): steps become ramps; 100 to 60000
   uint16_t frequency_max_chz;  // 0.01 Hz; highest frequency of a row; at most 500: 5 Hz
   uint8_t reserved_2[6];
-  uint32_t crc;  // CRC-32 of the bytes before it, of part 2 and of all rows: the card's hash; not 0
+  uint32_t crc;  // CRC-32 of the bytes before it and of all parts from 2 on: the card's hash; not 0
 };
 constexpr uint8_t kCardHeadLayoutSize = 96;
 constexpr uint16_t kCardHeadLayoutMagic = 17222u;
 constexpr uint8_t kCardHeadLayoutVersion = 1u;
-constexpr uint8_t kCardHeadLayoutReserved1 = 0;
 constexpr uint8_t kCardHeadLayoutReserved2 = 0;
 static_assert(sizeof(CardHeadLayout) == 96, "size of CardHeadLayout");
 static_assert(offsetof(CardHeadLayout, magic) == 0, "offset of CardHeadLayout::magic");
@@ -839,7 +880,7 @@ static_assert(offsetof(CardHeadLayout, aircraft) == 4, "offset of CardHeadLayout
 static_assert(offsetof(CardHeadLayout, airspeed_input) == 20, "offset of CardHeadLayout::airspeed_input");
 static_assert(offsetof(CardHeadLayout, alpha_input) == 21, "offset of CardHeadLayout::alpha_input");
 static_assert(offsetof(CardHeadLayout, beta_input) == 22, "offset of CardHeadLayout::beta_input");
-static_assert(offsetof(CardHeadLayout, reserved_1) == 23, "offset of CardHeadLayout::reserved_1");
+static_assert(offsetof(CardHeadLayout, learned_axes) == 23, "offset of CardHeadLayout::learned_axes");
 static_assert(offsetof(CardHeadLayout, dp_min) == 24, "offset of CardHeadLayout::dp_min");
 static_assert(offsetof(CardHeadLayout, dp_max) == 26, "offset of CardHeadLayout::dp_max");
 static_assert(offsetof(CardHeadLayout, alpha_min) == 28, "offset of CardHeadLayout::alpha_min");
@@ -868,14 +909,16 @@ static_assert(offsetof(CardHeadLayout, frequency_max_chz) == 84, "offset of Card
 static_assert(offsetof(CardHeadLayout, reserved_2) == 86, "offset of CardHeadLayout::reserved_2");
 static_assert(offsetof(CardHeadLayout, crc) == 92, "offset of CardHeadLayout::crc");
 
-// Scales of the estimate on the chip; zeros: none is made.
+// Which axis the logger learns while a row is flown.
 struct __attribute__((packed)) CardLearningLayout {
-  uint8_t reserved[48];
+  uint8_t axis_of_row[32];  // row by row: 0 none, n: the nth card_axis
+  uint8_t reserved[16];
 };
 constexpr uint8_t kCardLearningLayoutSize = 48;
 constexpr uint8_t kCardLearningLayoutReserved = 0;
 static_assert(sizeof(CardLearningLayout) == 48, "size of CardLearningLayout");
-static_assert(offsetof(CardLearningLayout, reserved) == 0, "offset of CardLearningLayout::reserved");
+static_assert(offsetof(CardLearningLayout, axis_of_row) == 0, "offset of CardLearningLayout::axis_of_row");
+static_assert(offsetof(CardLearningLayout, reserved) == 32, "offset of CardLearningLayout::reserved");
 
 // One input. Deflections are added to the sticks, in us of the servo pulse.
 struct __attribute__((packed)) CardRowLayout {
@@ -901,9 +944,51 @@ static_assert(offsetof(CardRowLayout, last_chz) == 14, "offset of CardRowLayout:
 static_assert(offsetof(CardRowLayout, components) == 16, "offset of CardRowLayout::components");
 static_assert(offsetof(CardRowLayout, crc) == 46, "offset of CardRowLayout::crc");
 
+// What the learning of one axis is told (firmware/core/learning/axis_card.h). Arrays are longer than pitch needs: 0 behind.
+struct __attribute__((packed)) CardAxisLayout {
+  uint8_t axis;  // 0 pitch, 1 roll, 2 yaw
+  uint8_t harmonic_count;  // 1 to 10 of pitch, to 6 of roll and yaw
+  uint8_t harmonics[10];  // times 50/512 Hz
+  uint8_t told;  // bit by bit the derivatives that are told: of alpha, q, de; of beta, p, r, da, dr
+  float advance_s[3];  // s; of the angle and the surfaces: a signal x is x + advance x' + curvature x''
+  float curvature_s2[3];  // s2
+  float lever;  // counts of the angle at the CG per count of the rate that turns with it
+  float product;  // share of the other rate's acceleration: Ixz/Ixx of roll, Ixz/Izz of yaw, 0 of pitch
+  uint8_t reserved[3];
+};
+constexpr uint8_t kCardAxisLayoutSize = 48;
+constexpr uint8_t kCardAxisLayoutReserved = 0;
+static_assert(sizeof(CardAxisLayout) == 48, "size of CardAxisLayout");
+static_assert(offsetof(CardAxisLayout, axis) == 0, "offset of CardAxisLayout::axis");
+static_assert(offsetof(CardAxisLayout, harmonic_count) == 1, "offset of CardAxisLayout::harmonic_count");
+static_assert(offsetof(CardAxisLayout, harmonics) == 2, "offset of CardAxisLayout::harmonics");
+static_assert(offsetof(CardAxisLayout, told) == 12, "offset of CardAxisLayout::told");
+static_assert(offsetof(CardAxisLayout, advance_s) == 13, "offset of CardAxisLayout::advance_s");
+static_assert(offsetof(CardAxisLayout, curvature_s2) == 25, "offset of CardAxisLayout::curvature_s2");
+static_assert(offsetof(CardAxisLayout, lever) == 37, "offset of CardAxisLayout::lever");
+static_assert(offsetof(CardAxisLayout, product) == 41, "offset of CardAxisLayout::product");
+static_assert(offsetof(CardAxisLayout, reserved) == 45, "offset of CardAxisLayout::reserved");
+
+// What a ratio of counts is worth, derivative by derivative of the card_axis before it.
+struct __attribute__((packed)) CardWorthLayout {
+  float gain[5];  // derivative of the coefficient per ratio of counts
+  float tolerance[5];  // half-width that the instrument leaves
+  uint8_t wanted_percent[5];  // half-width that is enough, of the estimate
+  uint8_t reserved[3];
+};
+constexpr uint8_t kCardWorthLayoutSize = 48;
+constexpr uint8_t kCardWorthLayoutReserved = 0;
+static_assert(sizeof(CardWorthLayout) == 48, "size of CardWorthLayout");
+static_assert(offsetof(CardWorthLayout, gain) == 0, "offset of CardWorthLayout::gain");
+static_assert(offsetof(CardWorthLayout, tolerance) == 20, "offset of CardWorthLayout::tolerance");
+static_assert(offsetof(CardWorthLayout, wanted_percent) == 40, "offset of CardWorthLayout::wanted_percent");
+static_assert(offsetof(CardWorthLayout, reserved) == 45, "offset of CardWorthLayout::reserved");
+
 constexpr uint16_t kCardPartBytes = 48u;
 constexpr uint16_t kCardHeadParts = 3u;
 constexpr uint16_t kCardMostRows = 32u;
+constexpr uint16_t kCardMostAxes = 3u;
+constexpr uint16_t kCardAxisParts = 2u;
 constexpr uint16_t kCardComponents = 10u;
 constexpr uint16_t kCardLeastMs = 100u;
 constexpr uint16_t kCardLongestMs = 20000u;
@@ -944,6 +1029,8 @@ constexpr uint8_t wire_size(uint8_t id) {
       return 54;
     case 14:
       return 7;
+    case 15:
+      return 18;
     default:
       return 0;
   }

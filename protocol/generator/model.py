@@ -18,7 +18,7 @@ NUMBERS: dict[str, tuple[int, str]] = {
     "char": (1, "char"),
 }
 SI_UNITS = ("us", "ms", "s", "Hz", "rad", "rad/s", "deg", "m", "m/s", "m/s2", "T", "Pa")
-UNITS = frozenset((*SI_UNITS, "degC", "mV", "us/s", "count", "LSB", "byte", "byte/s", "baud"))
+UNITS = frozenset((*SI_UNITS, "degC", "mV", "us/s", "s2", "count", "LSB", "byte", "byte/s", "baud"))
 AXES = frozenset(("x", "y", "z", "north", "east", "down"))
 # What a name that ends so must have as its unit.
 SUFFIXES = {
