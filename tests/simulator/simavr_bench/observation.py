@@ -48,15 +48,15 @@ class Observation(Core):
         """Record every byte the program writes to GPIOR0, 1 or 2 (one cycle of its time each)."""
         self._lib.bench_log_marks(self.handle, on)
 
-    def watch_pc(self, symbol: str) -> int:
-        """Record every execution of the first instruction of a function.
+    def watch_pc(self, symbol: str | int) -> int:
+        """Record every execution of the first instruction of a function, or of one instruction.
 
         The simulator then goes one instruction at a time, several times slower.
 
         Parameters
         ----------
-        symbol : str
-            Function in the ELF.
+        symbol : str or int
+            Function in the ELF, or a byte address.
 
         Returns
         -------
@@ -64,7 +64,8 @@ class Observation(Core):
             Source of its :attr:`LogKind.PC` records.
         """
         self._pc_watches += 1
-        self._lib.bench_watch_pc(self.handle, self.symbols[symbol][0], self._pc_watches)
+        address = self.symbols[symbol][0] if isinstance(symbol, str) else symbol
+        self._lib.bench_watch_pc(self.handle, address, self._pc_watches)
         return self._pc_watches
 
     def load_now(self) -> CpuLoad:
