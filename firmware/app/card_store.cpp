@@ -1,5 +1,7 @@
 #include "app/card_store.h"
 
+#include "core/learning/axis_card.h"
+
 namespace app {
 
 using core::CardHead;
@@ -18,7 +20,8 @@ void add_bytes(core::Crc32* crc, uint16_t address, uint16_t size) {
 bool hash_holds(const CardHead& head) {
   core::Crc32 crc;
   crc.add(&head, core::kCardFieldsBytes);
-  const uint8_t parts = static_cast<uint8_t>(frames::kCardHeadParts - 2U + head.rows);
+  const uint8_t parts = static_cast<uint8_t>(frames::kCardHeadParts - 2U + head.rows +
+                                             frames::kCardAxisParts * head.learned_axes);
   add_bytes(&crc, card_part_address(2), static_cast<uint16_t>(parts * frames::kCardPartBytes));
   return head.crc != 0 && crc.value() == head.crc;
 }
@@ -40,6 +43,25 @@ __attribute__((noinline)) CardFault judge_card_row(uint8_t row, const core::RowL
   CardRow bytes;
   read_card_row(row, &bytes);
   return core::judge_row(bytes, limits);
+}
+
+__attribute__((noinline)) bool learning_good(uint8_t rows, uint8_t axes) {
+  for (uint8_t row = 0; row < rows; ++row) {
+    if (!core::axis_of_row_good(card_axis_of_row(row), axes)) return false;
+  }
+  for (uint8_t n = 1; n <= axes; ++n) {
+    core::AxisCard axis;
+    read_card(
+        static_cast<uint16_t>(card_axis_part(n) * frames::kCardPartBytes), &axis, sizeof axis);
+    if (!core::axis_good(axis)) return false;
+  }
+  return true;
+}
+
+uint8_t card_u8(uint16_t offset) {
+  uint8_t value;
+  read_card(offset, &value, sizeof value);
+  return value;
 }
 
 }  // namespace
@@ -66,7 +88,8 @@ CardFault judge_card(const char* aircraft) {
     const CardFault fault = judge_card_row(row, limits);
     if (fault != CardFault::kNone) return fault;
   }
-  return CardFault::kNone;
+  const uint8_t axes = card_u8(offsetof(CardHead, learned_axes));
+  return learning_good(card_rows(), axes) ? CardFault::kNone : CardFault::kLearning;
 }
 
 bool card_marked_valid() {
@@ -80,9 +103,21 @@ uint32_t card_hash() {
 }
 
 uint8_t card_rows() {
-  uint8_t rows;
-  read_card(offsetof(CardHead, rows), &rows, sizeof rows);
-  return rows;
+  return card_u8(offsetof(CardHead, rows));
+}
+
+uint8_t card_axis_part(uint8_t n) {
+  return static_cast<uint8_t>(frames::kCardHeadParts + card_rows() +
+                              frames::kCardAxisParts * (n - 1U));
+}
+
+uint8_t card_parts() {
+  return card_axis_part(static_cast<uint8_t>(card_u8(offsetof(CardHead, learned_axes)) + 1U));
+}
+
+uint8_t card_axis_of_row(uint8_t row) {
+  return card_u8(static_cast<uint16_t>(2U * frames::kCardPartBytes +
+                                       offsetof(frames::CardLearningLayout, axis_of_row) + row));
 }
 
 }  // namespace app

@@ -74,7 +74,10 @@ void Instrument::step() {
     // A reading per turn: a row is 30 ms long, and no turn is.
     ascii_row_.step(sensors_, pilot_.channels(), telemetry_, now_us);
     wrote = status_.has_line() && write_status(now_us);
-    if (!wrote) step_slow(now_us);
+    // The learning has turns of its own, at most every second one.
+    const bool learns = !wrote && !learned_ && inputs_.learn(outlet_, now_us);
+    learned_ = learns;
+    if (!wrote && !learns) step_slow(now_us);
     pilot_.step(config_, supply_.good(), inputs_, outlet_, hal::now_us());
   }
   // Nor is a job begun and worked on in one turn: deciding that a file is closed and building its
@@ -235,7 +238,8 @@ void Instrument::put_system(uint32_t now_us) {
   system_us_ = now_us;
 }
 
-void Instrument::put_telemetry_heads(uint32_t now_us) {
+// Apart, so that its frames stand on the stack for as long as they are made.
+__attribute__((noinline)) void Instrument::put_telemetry_heads(uint32_t now_us) {
   frames::ConfigFrame config = config_;
   config.t_us = now_us;
   (void)telemetry_.offer(frames::ConfigFrame::id(), &config, sizeof config, now_us);

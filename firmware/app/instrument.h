@@ -32,6 +32,10 @@ class Instrument {
   void boot();
   // One turn of the main loop, the sleep at its end included.
   void step();
+  // Whether a row may be flown: `lend` is to give memory for it before the next turn, and to take
+  // it back (null) where none may.
+  bool wants_row_memory() const { return inputs_.wants_memory(); }
+  void lend(RowMemory* memory) { inputs_.lend(memory, outlet_, turn_us_); }
 
   Recorder& recorder() { return recorder_; }
   const PilotLink& pilot() const { return pilot_; }
@@ -73,6 +77,7 @@ class Instrument {
   uint16_t loop_max_us_ = 0;
   uint8_t counted_turn_ = 0;
   uint8_t slot_ = 0;          // of step_slow()
+  bool learned_ = false;      // in the last turn that made no frame
   uint8_t put_off_ = 0;       // turns for which the frame `system` waits; 0: it is not due
   core::SupplyWatch supply_;  // the self-test
 };

@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "app/row_learning.h"
 #include "app/telemetry.h"
 #include "app/usb_channels.h"
 #include "core/byte_ring.h"
@@ -24,10 +25,17 @@ class Outlet {
     (void)telemetry_.offer(Frame::id(), &frame, sizeof frame, frame.t_us);
   }
 
+  // The row that begins, into the log: the radio takes no card.
+  void put_row(const core::InputMemory& memory) {
+    ++frames_;
+    if (logging_) (void)ring_.push(frames::CardFrame::id(), &memory, memory.t_us);
+  }
+
   // One envelope at most: the receiver must not wait for two.
   void put(const frames::IdentFrame& frame) {
     ++frames_;
     if (logging_) (void)ring_.push(frame);
+    if (learning_ != nullptr) learning_->see(frame);
     const uint8_t id = frames::IdentFrame::id();
     if (telemetry_.offer(id, &frame, sizeof frame, frame.t_us)) return;
     if (!logging_) usb_.offer(frame);
@@ -81,6 +89,9 @@ class Outlet {
   uint8_t dropped() const { return static_cast<uint8_t>(ring_.dropped()); }  // and round again
   bool quiet() const { return ring_.free() > ring_.capacity() / 2; }  // room for what can wait
 
+  // Who learns of the identification frames, while a row may be flown; else null.
+  void teach(RowLearning* learning) { learning_ = learning; }
+
   // Events wait between sessions only, so in one their memory is lent to the test input: to be
   // asked for at each use, null while it is theirs.
   core::InputMemory* lend() { return logging_ && waiting_count_ == 0 ? &input_memory_ : nullptr; }
@@ -96,6 +107,7 @@ class Outlet {
     frames::EventFrame waiting_[kWaiting] = {};
     core::InputMemory input_memory_;
   };
+  RowLearning* learning_ = nullptr;
   uint8_t waiting_count_ = 0;
   uint8_t frames_ = 0;
   bool logging_ = false;

@@ -93,7 +93,7 @@ bool Panel::show_input(TestInputs& inputs, uint32_t now_us) {
     tone_us_ = now_us;
   }
   if (inputs.running()) {
-    const bool on = alarm(now_us);
+    const bool on = alarm(now_us) || inputs.learned_enough();
     hal::set_led(on);
     hal::set_buzzer(on);
     return true;

@@ -3,8 +3,8 @@
 // the work on the card goes on, else groups of flashes that say what is wrong. Buzzer: one long
 // tone at the start, two at the end, groups of beeps with the flashes, quick beeps while the
 // throttle is above idle and nothing can be recorded. A test input: quick flashes and chirps while
-// it runs, then quick beeps: 1 done, 2 pilot, 4 receiver or relay, 5 a limit left, 6 a sensor,
-// 7 recorder, loop, supply or row; 3: the card is enabled.
+// it runs, one tone once it has taught enough, then quick beeps: 1 done, 2 pilot, 4 receiver or
+// relay, 5 a limit left, 6 a sensor, 7 recorder, loop, supply or row; 3: the card is enabled.
 #pragma once
 
 #include <stdint.h>

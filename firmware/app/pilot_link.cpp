@@ -1,6 +1,5 @@
 #include "app/pilot_link.h"
 
-#include "hal/clock.h"
 #include "hal/panel.h"
 #include "hal/pulse_capture.h"
 #include "hal/relay.h"
@@ -33,12 +32,13 @@ void PilotLink::step(const frames::ConfigFrame& config,
   poll_receiver(outlet, now_us);
   uint16_t rest_us = drive_.drive() == frames::Drive::kMegaHolding ? kHoldingRestUs : kRestUs;
   // A frame and a half of silence ends an input at once: looked for each 2 ms.
-  const uint8_t now_2ms = static_cast<uint8_t>(now_us >> kSilenceShift);
+  const uint8_t now_2ms =
+      static_cast<uint8_t>(static_cast<uint16_t>(now_us >> 8U) >> kSilenceShift);
   if (running && now_2ms != silence_2ms_) {
     silence_2ms_ = now_2ms;
+    look_for_silence();
     const uint16_t frame_us = decoder_.frame_us();
-    const bool silent = decoder_.oldest_us(hal::now_ticks()) > frame_us + frame_us / 2U;
-    if (silent) rest_us = 0;
+    if (silent_us_ > frame_us + frame_us / 2U) rest_us = 0;
   }
   if (now_us - decided_us_ >= rest_us || decoder_.changes() != decided_changes_) {
     decided_us_ = now_us;
@@ -69,7 +69,9 @@ void PilotLink::decide(const frames::ConfigFrame& config,
   channels_ = core::map_channels(decoder_, config);
   if (!drive_.relay()) look_at_contact(now_us);
   drive_.update(channels_, config, self_test_passed && !contact_stuck_, now_us);
-  inputs.decide(channels_, decoder_, drive_.drive(), self_test_passed, config, outlet, now_us);
+  if (inputs.enabled() && !inputs.running()) look_for_silence();
+  inputs.decide(
+      channels_, decoder_, silent_us_, drive_.drive(), self_test_passed, config, outlet, now_us);
   send(inputs, outlet);
   report(outlet, now_us);
 }

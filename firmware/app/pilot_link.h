@@ -10,6 +10,7 @@
 #include "core/rc_decoder.h"
 #include "core/recording.h"
 #include "core/relay_watch.h"
+#include "hal/clock.h"
 
 namespace app {
 
@@ -46,8 +47,8 @@ class PilotLink {
  private:
   static constexpr uint16_t kPollUs = 3500;  // pulses that stay away show within this
   static constexpr uint16_t kRestUs = 10000;
-  static constexpr uint16_t kInputPollUs = 2000;  // while an input runs
-  static constexpr uint8_t kSilenceShift = 11;
+  static constexpr uint16_t kInputPollUs = 2000;    // while an input runs
+  static constexpr uint8_t kSilenceShift = 3;       // of 256 us
   static constexpr uint32_t kReleaseUs = 200000UL;  // by then a contact is open again
   static constexpr uint16_t kHoldingRestUs = 1000;  // a hold ends on time
 
@@ -60,6 +61,10 @@ class PilotLink {
               Outlet& outlet,
               uint32_t now_us);
   void report(Outlet& outlet, uint32_t now_us);
+  void look_for_silence() {
+    const uint32_t oldest_us = decoder_.oldest_us(hal::now_ticks());
+    silent_us_ = static_cast<uint16_t>(oldest_us > UINT16_MAX ? UINT16_MAX : oldest_us);
+  }
 
   core::RcDecoder decoder_;
   core::DriveControl drive_;
@@ -74,6 +79,7 @@ class PilotLink {
   frames::Drive told_drive_ = frames::Drive::kDirectBoot;
   uint8_t told_missing_ = (1U << core::kChannels) - 1;
   uint8_t decided_changes_ = 0;
+  uint16_t silent_us_ = 0;  // the oldest pulse, as looked for last
   uint8_t silence_2ms_ = 0;
   bool stormy_ = false;
   bool toggled_ = false;  // a heartbeat edge may hold the relay

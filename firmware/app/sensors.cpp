@@ -208,12 +208,9 @@ void Sensors::step_baro(Outlet& outlet, uint32_t now_us) {
   switch (barometer_.poll(now_us)) {
     case drivers::BaroEvent::kNone:
       return;
-    case drivers::BaroEvent::kFound: {
-      outlet.event(frames::Event::kBaroFound, barometer_.chip_id(), now_us);
-      frames::BaroCoefficientsFrame words;
-      if (coefficients(&words, now_us)) outlet.put(words);
+    case drivers::BaroEvent::kFound:
+      tell_baro(outlet, now_us);
       return;
-    }
     case drivers::BaroEvent::kLost:
       outlet.event(frames::Event::kBaroLost, static_cast<uint32_t>(barometer_.status()), now_us);
       return;
@@ -255,6 +252,13 @@ void Sensors::gps_heard(const frames::GpsFrame& frame, Outlet& outlet, uint32_t 
   outlet.put(frame);
 }
 
+// Apart, so that its frame stands on the stack for as long as it is made.
+__attribute__((noinline)) void Sensors::tell_baro(Outlet& outlet, uint32_t now_us) const {
+  outlet.event(frames::Event::kBaroFound, barometer_.chip_id(), now_us);
+  frames::BaroCoefficientsFrame words;
+  if (coefficients(&words, now_us)) outlet.put(words);
+}
+
 uint32_t Sensors::fat_date() const {
   return date_week_ == frames::kGpsWeekInvalid ? 0 : core::fat_time(date_week_, date_itow_ms_);
 }
@@ -289,6 +293,14 @@ void Sensors::airborne_inputs(core::AirborneInputs* out) const {
 }
 
 void Sensors::input_readings(core::InputReadings* out, uint32_t now_us) const {
+  imu_readings(out);
+  scan_readings(out);
+  baro_readings(out);
+  gps_readings(out);
+  ages(out, now_us);
+}
+
+void Sensors::imu_readings(core::InputReadings* out) const {
   const core::ImuSample& sample = imu_.sample();
   out->rates[0] = sample.p;
   out->rates[1] = sample.q;
@@ -301,7 +313,9 @@ void Sensors::input_readings(core::InputReadings* out, uint32_t now_us) const {
   // Of an original packet neither scale nor age is known.
   out->imu = imu_present_ && !sample.original && sample.unsaturated &&
              (sample.flags & frames::kImuFlagsAttitudeValid) != 0;
-  out->imu_age_us = age_us(sample.start_us, now_us);
+}
+
+void Sensors::scan_readings(core::InputReadings* out) const {
   out->alpha[0] = ident_.alpha_a;
   out->alpha[1] = ident_.alpha_b;
   out->beta[0] = ident_.beta_a;
@@ -310,17 +324,27 @@ void Sensors::input_readings(core::InputReadings* out, uint32_t now_us) const {
   out->pitot[1] = ident_.dp_b;
   out->valid = analog_;
   out->rail = rail_;
-  out->scan_age_us = age_us(ident_.t_us, now_us);
-  const frames::BaroFrame& baro = barometer_.frame();
-  out->static_pressure = barometer_.present() ? baro.static_pressure : 0;
-  out->baro_age_us = age_us(baro.t_us, now_us);
+}
+
+void Sensors::baro_readings(core::InputReadings* out) const {
+  out->static_pressure = barometer_.present() ? barometer_.frame().static_pressure : 0;
+}
+
+void Sensors::gps_readings(core::InputReadings* out) const {
   const frames::GpsFrame& gps = gps_.frame();
   out->latitude = gps.latitude;
   out->longitude = gps.longitude;
   out->gps = gps_present_ && gps.fix >= static_cast<uint8_t>(frames::GpsFix::kFix2d) &&
              gps.latitude != frames::kGpsLatitudeInvalid &&
              gps.longitude != frames::kGpsLongitudeInvalid;
-  out->gps_age_us = age_us(gps_heard_us_, now_us);
+}
+
+// Of what is not there any more as old as can be.
+void Sensors::ages(core::InputReadings* out, uint32_t now_us) const {
+  out->imu_age_us = imu_present_ ? age_us(imu_.sample().start_us, now_us) : UINT32_MAX;
+  out->scan_age_us = age_us(ident_.t_us, now_us);
+  out->baro_age_us = barometer_.present() ? age_us(barometer_.frame().t_us, now_us) : UINT32_MAX;
+  out->gps_age_us = gps_present_ ? age_us(gps_heard_us_, now_us) : UINT32_MAX;
 }
 
 void Sensors::put_health(frames::SystemFrame* out) {

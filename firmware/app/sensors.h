@@ -42,6 +42,16 @@ class Sensors {
   uint16_t rail() const { return rail_; }
   // What tells of flying or the ground; the receiver's part is left to the caller.
   void input_readings(core::InputReadings* out, uint32_t now_us) const;
+  // Parts of it, and the counts by which their news show.
+  void imu_readings(core::InputReadings* out) const;
+  void scan_readings(core::InputReadings* out) const;
+  void baro_readings(core::InputReadings* out) const;
+  void gps_readings(core::InputReadings* out) const;
+  void ages(core::InputReadings* out, uint32_t now_us) const;
+  uint8_t scans() const {
+    return static_cast<uint8_t>(scanning_ ? ident_.count - 1U : ident_.count);
+  }
+  uint16_t gps_heard_us() const { return static_cast<uint16_t>(gps_heard_us_); }  // low half
   void airborne_inputs(core::AirborneInputs* out) const;
 
  private:
@@ -52,6 +62,7 @@ class Sensors {
   void begin_ident(const PilotLink& pilot, uint32_t t_us, bool imu_triggered);
   void finish_ident(Outlet& outlet);
   void step_baro(Outlet& outlet, uint32_t now_us);
+  void tell_baro(Outlet& outlet, uint32_t now_us) const;
   void step_gps(const frames::ConfigFrame& config, Outlet& outlet, uint32_t now_us);
   void gps_heard(const frames::GpsFrame& frame, Outlet& outlet, uint32_t now_us);
   void hear(uint8_t bit) {

@@ -32,7 +32,9 @@ void Telemetry::start(const frames::ConfigFrame& config, uint32_t now_us) {
 }
 
 bool Telemetry::offer(uint8_t id, const void* fields, uint8_t size, uint32_t now_us) {
-  if (mode_ != frames::Telemetry::kFrames || id >= kKinds) return false;
+  if (mode_ != frames::Telemetry::kFrames || (id >= kKinds && id != frames::kLearnedId)) {
+    return false;
+  }
   const uint16_t now_ms = to_ms(now_us);
   static_assert(sizeof kLeastMs == sizeof last_ms_, "a time for each kind with a rate");
   const bool paced = id < kPaced;

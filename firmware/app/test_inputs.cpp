@@ -21,10 +21,6 @@ using frames::InputEnd;
 
 namespace {
 
-constexpr uint8_t kOthersOffset = offsetof(CardHead, airspeed_input);
-constexpr uint8_t kImuOffset = offsetof(CardHead, phi_max);
-constexpr uint8_t kMoreOffset = offsetof(CardHead, height_min_pa);
-constexpr uint8_t kEndOffset = offsetof(CardHead, servo_min_us);
 constexpr uint8_t kLeastRateHz = 100;  // slower frames tell of a limit too late
 constexpr uint16_t kWatchUs = 5000;    // ages grow without any news
 constexpr uint8_t kPaShift = 4;
@@ -59,11 +55,6 @@ uint8_t beeps_of(InputEnd why) {
   }
 }
 
-// Of the head the fields from an offset to another; the rest is left as it is.
-void read_limits(CardHead* head, uint8_t from, uint8_t to) {
-  read_card(from, reinterpret_cast<uint8_t*>(head) + from, static_cast<uint8_t>(to - from));
-}
-
 }  // namespace
 
 void TestInputs::unload() {
@@ -95,20 +86,11 @@ void TestInputs::look(const Pilot& pilot,
   facts.place = core::switch_place(
       channels.width_ticks[core::kSwitch], config.switch_mega_min_us, armed_min_us_);
   if (!command_.running()) {
-    const bool before = command_.uses_memory();
-    const bool triggered =
-        command_.trigger(facts.place, pilot.drive == frames::Drive::kMega, now_us);
-    InputMemory* const memory = outlet.lend();
-    if (command_.uses_memory() && !before) {
-      // Nothing is known of the sensors yet.
-      outside_ = InputEnd::kSensorLost;
-      if (memory != nullptr) memory->watch_start(now_us);
-    }
-    if (!triggered) return;
+    if (!command_.trigger(facts.place, pilot.drive == frames::Drive::kMega, now_us)) return;
   }
   facts.frame_us = pilot.decoder->frame_us();
-  facts.silent_us = pilot.decoder->oldest_us(hal::now_ticks());
-  facts.stick_us = card_u16(offsetof(CardHead, stick_us));
+  facts.silent_us = pilot.silent_us;
+  facts.stick_us = memory_ == nullptr ? uint16_t{0} : memory_->watch.limits.stick_us;
   facts.dropped = outlet.dropped();
   facts.contact = hal::relay_engaged();
   facts.button = hal::button_pressed();
@@ -116,29 +98,35 @@ void TestInputs::look(const Pilot& pilot,
                         static_cast<uint32_t>(config.throttle_idle_max_us) * core::kTicksPerUs;
   facts.supply = pilot.supply_good;
   InputMemory* const memory = outlet.lend();
-  facts.records = memory != nullptr && config.rate_hz >= kLeastRateHz;
+  facts.records = memory != nullptr && memory_ != nullptr && config.rate_hz >= kLeastRateHz;
   if (!command_.running()) {
-    begin(memory, facts, outlet, now_us);
+    begin(memory, facts, config.rate_hz, outlet, now_us);
     return;
   }
   InputEnd why = memory == nullptr ? InputEnd::kRecorder : command_.keeps(*memory, facts, now_us);
   if (why == InputEnd::kButton) button_spent_ = true;
   if (why == InputEnd::kDone && !command_.over(*memory, now_us)) {
-    command_.steer(*memory, card_u16(offsetof(CardHead, rate_max_usps)), now_us);
+    command_.steer(*memory, now_us);
     return;
   }
   finish(why, outlet, now_us);
 }
 
-void TestInputs::begin(InputMemory* memory,
-                       const InputFacts& facts,
-                       Outlet& outlet,
-                       uint32_t now_us) {
+// Apart for what stands on the stack: no other look needs it.
+__attribute__((noinline)) void TestInputs::begin(InputMemory* memory,
+                                                 const InputFacts& facts,
+                                                 uint16_t rate_hz,
+                                                 Outlet& outlet,
+                                                 uint32_t now_us) {
   InputEnd why = InputCommand::passes(facts);
   if (why == InputEnd::kDone && !facts.contact) why = InputEnd::kRelay;
-  if (why == InputEnd::kDone) why = outside_;
+  if (why == InputEnd::kDone) why = memory_->watch.outside();
   if (why == InputEnd::kDone && !travel_.shown()) why = InputEnd::kTravel;
-  if (why == InputEnd::kDone) why = load_row(memory);
+  // Its memory may have been the events' since it was judged.
+  if (why == InputEnd::kDone &&
+      (memory_->judged != CardFault::kNone || !core::row_whole(memory->row))) {
+    why = InputEnd::kRowDamaged;
+  }
   const uint8_t row = command_.row();
   if (why != InputEnd::kDone) {
     command_.refuse();
@@ -146,16 +134,40 @@ void TestInputs::begin(InputMemory* memory,
     outlet.event(Event::kInputRefused, row | static_cast<uint32_t>(why) << 8, now_us);
     return;
   }
+  memory->rate_max_usps = card_u16(offsetof(CardHead, rate_max_usps));
   command_.start(*memory, facts, now_us);
-  frames::CardFrame frame;
-  frame.t_us = now_us;
-  frame.part = static_cast<uint8_t>(frames::kCardHeadParts + row);
-  memcpy(frame.bytes, &memory->row, sizeof frame.bytes);
-  outlet.put(frame);
-  outlet.event(Event::kInputStart, row | card_hash() << 8, now_us);
+  memory_->learning.start(row, rate_hz);
+  memory->t_us = now_us;
+  memory->part = static_cast<uint8_t>(frames::kCardHeadParts + row);
+  memory_->told = false;
 }
 
-InputEnd TestInputs::load_row(InputMemory* memory) const {
+// The row and its start, in the turn behind it: a look at its trigger is long enough.
+__attribute__((noinline)) bool TestInputs::tell_start(Outlet& outlet) {
+  InputMemory* const memory = outlet.lend();
+  memory_->told = true;
+  if (memory == nullptr) return true;
+  outlet.put_row(*memory);
+  outlet.event(Event::kInputStart, command_.row() | card_hash() << 8, memory->t_us);
+  return true;
+}
+
+void TestInputs::lend(RowMemory* memory, Outlet& outlet, uint32_t now_us) {
+  memory_ = memory;
+  outlet.teach(memory == nullptr ? nullptr : &memory->learning);
+  if (memory == nullptr) return;
+  core::InputWatch& watch = memory->watch;
+  read_card(core::kInputLimitsOffset, &watch.limits, sizeof watch.limits);
+  watch.start(now_us);
+  memory->learning.stop();
+  memory->judged = CardFault::kNotValid;
+  bound_pulses();
+}
+
+// The row that the next trigger flies, ahead of it: together they took 0.6 ms.
+__attribute__((noinline)) bool TestInputs::judge(Outlet& outlet) {
+  InputMemory* const memory = outlet.lend();
+  if (memory == nullptr) return false;
   core::RowLimits limits;
   for (uint8_t axis = 0; axis < core::kCardAxes; ++axis) {
     limits.amplitude_max_us[axis] =
@@ -163,46 +175,80 @@ InputEnd TestInputs::load_row(InputMemory* memory) const {
   }
   limits.frequency_max_chz = card_u16(offsetof(CardHead, frequency_max_chz));
   read_card_row(command_.row(), &memory->row);
-  return core::judge_row(memory->row, limits) == CardFault::kNone ? InputEnd::kDone
-                                                                  : InputEnd::kRowDamaged;
+  memory_->judged = core::judge_row(memory->row, limits);
+  return true;
 }
 
 bool TestInputs::watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t now_us) {
-  InputMemory* const memory = outlet.lend();
-  if (memory == nullptr) {
+  if (memory_ == nullptr || outlet.lend() == nullptr) {
     if (!command_.running()) return false;
     finish(InputEnd::kRecorder, outlet, now_us);
     return true;
   }
-  const uint8_t frames = outlet.frames();
-  const uint8_t seq = sensors.imu().seq;
-  const uint16_t now = static_cast<uint16_t>(now_us);
-  const bool news = frames != memory->frames_seen || seq != memory->imu_seq;
-  if (!news && static_cast<uint16_t>(now - memory->watched_us) < kWatchUs) return false;
-  // Frames come each 10 or 5 ms, and tell of all but the packets.
-  const bool others = frames != memory->frames_seen;
-  memory->frames_seen = frames;
-  memory->imu_seq = seq;
-  memory->watched_us = now;
-  CardHead limits;
-  core::InputReadings in;
-  sensors.input_readings(&in, hal::now_us());
-  read_limits(&limits, kImuOffset, kMoreOffset);
-  InputEnd why = core::judge_imu(limits, in);
-  if (others) {
-    read_limits(&limits, kOthersOffset, kImuOffset);
-    read_limits(&limits, kMoreOffset, kEndOffset);
-    memory->motion.look(limits, in, now_us);
-    outside_ = core::judge_others(limits, in, home_, memory->motion, now_us);
-  }
-  if (why == InputEnd::kDone) why = outside_;
-  outside_ = why;
-  if (why == InputEnd::kDone || !command_.running()) return false;
-  finish(outside_, outlet, now_us);
+  core::InputWatch& watch = memory_->watch;
+  if (!news(sensors, watch, now_us)) return false;
+  see(sensors, watch, now_us);
+  if (!command_.running()) return false;
+  const InputEnd why = watch.outside();
+  if (why == InputEnd::kDone) return false;
+  finish(why, outlet, now_us);
   return true;
 }
 
+// Of any sensor, or it is time to ask whether one has ceased.
+bool TestInputs::news(const Sensors& sensors,
+                      const core::InputWatch& watch,
+                      uint32_t now_us) const {
+  return sensors.imu().seq != watch.imu || sensors.scans() != watch.scan ||
+         static_cast<uint16_t>(static_cast<uint16_t>(now_us) - watch.looked_us) >= kWatchUs ||
+         static_cast<uint16_t>(sensors.baro().t_us) != watch.baro_us ||
+         sensors.gps_heard_us() != watch.gps_us;
+}
+
+// Each sensor is looked at on its own news, so that what comes seldom costs little; that one ceased
+// is seen with each scan, and each 5 ms where none comes.
+void TestInputs::see(const Sensors& sensors, core::InputWatch& watch, uint32_t now_us) const {
+  using core::InputWatch;
+  core::InputReadings in;
+  const uint8_t imu = sensors.imu().seq;
+  if (imu != watch.imu) {
+    watch.imu = imu;
+    sensors.imu_readings(&in);
+    watch.motion.see_imu(in, now_us);
+    watch.found[InputWatch::kImu] = core::judge_imu(watch.limits, in);
+  }
+  const uint16_t baro_us = static_cast<uint16_t>(sensors.baro().t_us);
+  if (baro_us != watch.baro_us) {
+    watch.baro_us = baro_us;
+    sensors.baro_readings(&in);
+    watch.motion.see_baro(in, now_us);
+    watch.found[InputWatch::kBaro] = core::judge_baro(watch.limits, in, home_);
+  }
+  const uint16_t gps_us = sensors.gps_heard_us();
+  if (gps_us != watch.gps_us) {
+    watch.gps_us = gps_us;
+    sensors.gps_readings(&in);
+    watch.motion.see_gps(in, now_us);
+    watch.found[InputWatch::kGps] = core::judge_gps(watch.limits, in, home_);
+  }
+  const uint8_t scan = sensors.scans();
+  const uint16_t now = static_cast<uint16_t>(now_us);
+  const bool scanned = scan != watch.scan;
+  if (!scanned && static_cast<uint16_t>(now - watch.looked_us) < kWatchUs) return;
+  if (scanned) {
+    watch.scan = scan;
+    sensors.scan_readings(&in);
+    watch.motion.see_scan(watch.limits, in, now_us);
+    watch.found[InputWatch::kScan] = core::judge_scan(watch.limits, in);
+  }
+  watch.looked_us = now;
+  watch.motion.age(now_us);
+  sensors.ages(&in, now_us);
+  watch.found[InputWatch::kHeard] = core::judge_heard(watch.limits, in, watch.motion, now_us);
+}
+
 void TestInputs::finish(InputEnd why, Outlet& outlet, uint32_t now_us) {
+  if (memory_ != nullptr && !memory_->told) tell_start(outlet);
   const uint32_t ms = (now_us - command_.since_us()) / 1000U;
   const uint8_t row = command_.row();
   command_.end(rows_);
@@ -210,24 +256,31 @@ void TestInputs::finish(InputEnd why, Outlet& outlet, uint32_t now_us) {
   outlet.event(Event::kInputEnd, row | static_cast<uint32_t>(why) << 8 | ms << 16, now_us);
 }
 
-uint16_t TestInputs::added(uint8_t servo, uint16_t base_ticks, Outlet& outlet) const {
-  const InputMemory* const memory = outlet.lend();
-  if (servo >= core::kCardAxes || memory == nullptr || base_ticks == 0) return base_ticks;
-  const int16_t deflection = memory->applied_ticks[servo];
-  if (deflection == 0) return base_ticks;
-  const uint16_t offset = static_cast<uint16_t>(2U * servo);
-  if (deflection > 0) {
+void TestInputs::bound_pulses() {
+  for (uint8_t axis = 0; axis < core::kCardAxes; ++axis) {
+    const uint16_t offset = static_cast<uint16_t>(2U * axis);
+    const uint16_t least = static_cast<uint16_t>(
+        card_u16(static_cast<uint16_t>(offsetof(CardHead, servo_min_us) + offset)) *
+        core::kTicksPerUs);
     const uint16_t most = static_cast<uint16_t>(
         card_u16(static_cast<uint16_t>(offsetof(CardHead, servo_max_us) + offset)) *
         core::kTicksPerUs);
-    const uint16_t shown = travel_.most_ticks(servo);
-    return core::add_up_to(base_ticks, deflection, shown < most ? shown : most);
+    const uint16_t shown_least = travel_.least_ticks(axis);
+    const uint16_t shown_most = travel_.most_ticks(axis);
+    memory_->least_ticks[axis] = shown_least > least ? shown_least : least;
+    memory_->most_ticks[axis] = shown_most < most ? shown_most : most;
   }
-  const uint16_t least = static_cast<uint16_t>(
-      card_u16(static_cast<uint16_t>(offsetof(CardHead, servo_min_us) + offset)) *
-      core::kTicksPerUs);
-  const uint16_t shown = travel_.least_ticks(servo);
-  return core::add_down_to(base_ticks, deflection, shown > least ? shown : least);
+}
+
+uint16_t TestInputs::added(uint8_t servo, uint16_t base_ticks, Outlet& outlet) const {
+  const InputMemory* const memory = outlet.lend();
+  if (servo >= core::kCardAxes || memory == nullptr || memory_ == nullptr || base_ticks == 0) {
+    return base_ticks;
+  }
+  const int16_t deflection = memory->applied_ticks[servo];
+  if (deflection == 0) return base_ticks;
+  return deflection > 0 ? core::add_up_to(base_ticks, deflection, memory_->most_ticks[servo])
+                        : core::add_down_to(base_ticks, deflection, memory_->least_ticks[servo]);
 }
 
 // Throttle idle, switch at direct, aileron and rudder held at their ends: nobody flies so, and
@@ -279,7 +332,7 @@ void TestInputs::tell_card(Outlet& outlet, uint32_t now_us) {
     told_ = 0;
     return;
   }
-  const uint8_t all = static_cast<uint8_t>(kConfigFrames + frames::kCardHeadParts + rows_);
+  const uint8_t all = static_cast<uint8_t>(kConfigFrames + card_parts());
   if (told_ >= all || running() || !outlet.quiet()) return;
   if (told_ < kConfigFrames) {
     outlet.put(frames::InputConfigFrame{now_us, armed_min_us_});

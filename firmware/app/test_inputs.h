@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "app/outlet.h"
+#include "app/row_memory.h"
 #include "core/airborne.h"
 #include "core/input_command.h"
 #include "core/rc_decoder.h"
@@ -27,13 +28,14 @@ class TestInputs {
   // Behind each decision of the drive, before its pulses go out.
   void decide(const core::RcChannels& channels,
               const core::RcDecoder& decoder,
+              uint16_t silent_us,
               frames::Drive drive,
               bool supply_good,
               const frames::ConfigFrame& config,
               Outlet& outlet,
               uint32_t now_us) {
     if (command_.enabled()) {
-      look({&channels, &decoder, drive, supply_good}, config, outlet, now_us);
+      look({&channels, &decoder, silent_us, drive, supply_good}, config, outlet, now_us);
     }
   }
   // What goes out where the drive lets `base_ticks` through.
@@ -53,6 +55,21 @@ class TestInputs {
                  uint32_t now_us);
 
   bool running() const { return command_.running(); }
+  // In a turn of the main loop of its own. False: there was nothing to do.
+  bool learn(Outlet& outlet, uint32_t now_us) {
+    if (memory_ == nullptr) return false;
+    if (command_.running()) {
+      return memory_->told ? memory_->learning.step(outlet, now_us) : tell_start(outlet);
+    }
+    return memory_->judged == frames::CardFault::kNotValid && judge(outlet);
+  }
+  // Of the row that is flown all is known that its card wants.
+  bool learned_enough() const {
+    return command_.running() && memory_ != nullptr && memory_->learning.enough();
+  }
+  // Whether a row may be flown: `lend` is to give memory for it, null where none may.
+  bool wants_memory() const { return command_.uses_memory(); }
+  void lend(RowMemory* memory, Outlet& outlet, uint32_t now_us);
   // A press that ended an input does nothing else.
   bool button(bool pressed) {
     button_spent_ = button_spent_ && pressed;
@@ -73,28 +90,40 @@ class TestInputs {
   struct Pilot {
     const core::RcChannels* channels;
     const core::RcDecoder* decoder;
+    uint16_t silent_us;
     frames::Drive drive;
     bool supply_good;
   };
 
-  void look(const Pilot& pilot, const frames::ConfigFrame& config, Outlet& outlet, uint32_t now_us);
+  // By their names a test on the chip finds the slices of an input.
+  __attribute__((noinline)) void look(const Pilot& pilot,
+                                      const frames::ConfigFrame& config,
+                                      Outlet& outlet,
+                                      uint32_t now_us);
   void begin(core::InputMemory* memory,
              const core::InputFacts& facts,
+             uint16_t rate_hz,
              Outlet& outlet,
              uint32_t now_us);
-  frames::InputEnd load_row(core::InputMemory* memory) const;
+  bool judge(Outlet& outlet);
+  bool tell_start(Outlet& outlet);
+  bool news(const Sensors& sensors, const core::InputWatch& watch, uint32_t now_us) const;
+  __attribute__((noinline)) void see(const Sensors& sensors,
+                                     core::InputWatch& watch,
+                                     uint32_t now_us) const;
   bool watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t now_us);
   void finish(frames::InputEnd why, Outlet& outlet, uint32_t now_us);
   void enable(const Sensors& sensors, Outlet& outlet, uint32_t now_us);
   void tell_card(Outlet& outlet, uint32_t now_us);
+  void bound_pulses();
   uint16_t added(uint8_t servo, uint16_t base_ticks, Outlet& outlet) const;
 
+  RowMemory* memory_ = nullptr;
   core::InputHome home_;
   core::InputCommand command_;
   core::StickTravel travel_;
   core::HeldSign sign_;
   uint16_t armed_min_us_ = 0;
-  frames::InputEnd outside_ = frames::InputEnd::kSensorLost;  // kDone: all limits hold
   uint8_t rows_ = 0;
   uint8_t told_ = 0;  // frames of the card that this session has
   uint8_t beeps_ = 0;

@@ -42,7 +42,7 @@ bool servos_good(const CardHead& head) {
 }
 
 bool reserved_is_zero(const CardHead& head) {
-  uint8_t bits = head.reserved_1;
+  uint8_t bits = 0;
   for (uint8_t i = 0; i < sizeof head.reserved_2; ++i) {
     bits = static_cast<uint8_t>(bits | head.reserved_2[i]);
   }
@@ -59,7 +59,8 @@ bool limits_good(const CardHead& head) {
          head.distance_max_m <= frames::kCardMostDistanceM && within(head.still_ms, 100, 2000) &&
          within(head.stick_us, 10, 200) && servos_good(head) &&
          within(head.rate_max_usps, 100, 60000U) &&
-         within(head.frequency_max_chz, 1, frames::kCardMostFrequencyChz) && reserved_is_zero(head);
+         within(head.frequency_max_chz, 1, frames::kCardMostFrequencyChz) &&
+         head.learned_axes <= frames::kCardMostAxes && reserved_is_zero(head);
 }
 
 // `parts` of the fastest period in duration_ms: its frequency in 0.01 Hz is 50000 * parts / T.
@@ -143,9 +144,13 @@ CardFault judge_head(const CardHead& head, const char* aircraft) {
   return limits_good(head) ? CardFault::kNone : CardFault::kLimits;
 }
 
-CardFault judge_row(const CardRow& row, const RowLimits& limits) {
+bool row_whole(const CardRow& row) {
   const uint8_t* const bytes = reinterpret_cast<const uint8_t*>(&row);
-  if (crc16(kCrc16Start, bytes, offsetof(CardRow, crc)) != row.crc) return CardFault::kRowCrc;
+  return crc16(kCrc16Start, bytes, offsetof(CardRow, crc)) == row.crc;
+}
+
+CardFault judge_row(const CardRow& row, const RowLimits& limits) {
+  if (!row_whole(row)) return CardFault::kRowCrc;
   const CardShape shape = static_cast<CardShape>(row.shape);
   if (row.shape < static_cast<uint8_t>(CardShape::kPulse) ||
       row.shape > static_cast<uint8_t>(CardShape::kMultisine) ||

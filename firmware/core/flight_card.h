@@ -12,7 +12,8 @@ using CardHead = frames::CardHeadLayout;
 using CardRow = frames::CardRowLayout;
 
 constexpr uint8_t kCardAxes = 3;  // aileron, elevator, rudder: the servos but the throttle
-constexpr uint8_t kCardParts = frames::kCardHeadParts + frames::kCardMostRows;
+constexpr uint8_t kCardParts =
+    frames::kCardHeadParts + frames::kCardMostRows + frames::kCardMostAxes * frames::kCardAxisParts;
 constexpr uint16_t kCardFieldsBytes = offsetof(CardHead, crc);
 
 // What of the head limits its rows.
@@ -25,6 +26,11 @@ RowLimits row_limits(const CardHead& head);
 
 // Everything but the hash. `aircraft` has the 16 bytes of the setting.
 frames::CardFault judge_head(const CardHead& head, const char* aircraft);
+// Of a row what it has learned: none of the card's axes, or one of them.
+inline bool axis_of_row_good(uint8_t axis_of_row, uint8_t learned_axes) {
+  return axis_of_row <= learned_axes;
+}
+bool row_whole(const CardRow& row);  // its CRC-16 holds
 // Its CRC-16 too.
 frames::CardFault judge_row(const CardRow& row, const RowLimits& limits);
 

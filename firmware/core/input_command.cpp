@@ -8,7 +8,7 @@ namespace {
 
 using frames::InputEnd;
 
-constexpr uint32_t kUsPerMs = 1000;
+constexpr uint16_t kUsPerMs = 1000;
 // 2^32 / 500 000, cut off: ticks of 0.5 us at a rate in us per second, as a product. A division
 // takes 600 cycles.
 constexpr uint16_t kRateShare = static_cast<uint16_t>((1ULL << 32U) * kTicksPerUs / 1000000U);
@@ -92,6 +92,8 @@ void InputCommand::start(InputMemory& memory, const InputFacts& facts, uint32_t 
   memory.frame_us = facts.frame_us;
   memory.looked_us = static_cast<uint16_t>(now_us);
   memory.steered_us = static_cast<uint16_t>(now_us);
+  memory.elapsed_ms = 0;
+  memory.turns = turns_per_ms(memory.row);
   memory.dropped = facts.dropped;
   memory.open_looks = 0;
   go(State::kRunning, now_us);
@@ -121,16 +123,23 @@ bool InputCommand::over(const InputMemory& memory, uint32_t now_us) const {
   return now_us - since_us_ >= row_ms * kUsPerMs;
 }
 
-void InputCommand::steer(InputMemory& memory, uint16_t rate_max_usps, uint32_t now_us) const {
-  const uint16_t rest_us = static_cast<uint16_t>(static_cast<uint16_t>(now_us) - memory.steered_us);
+void InputCommand::steer(InputMemory& memory, uint32_t now_us) const {
+  uint16_t rest_us = static_cast<uint16_t>(static_cast<uint16_t>(now_us) - memory.steered_us);
   if (rest_us < kSteerUs) return;
-  memory.steered_us = static_cast<uint16_t>(now_us);
-  const uint16_t most = ticks_at(rate_max_usps, rest_us);
-  const uint32_t since_ms = (now_us - since_us_) / kUsPerMs;
-  const bool quiet = since_ms < memory.row.quiet_ms;
-  if (quiet) return;
+  // Counted in whole milliseconds: the time since the trigger is no division of 32 bits.
+  uint16_t passed_us = 0;
+  for (; rest_us >= kUsPerMs; rest_us = static_cast<uint16_t>(rest_us - kUsPerMs)) {
+    passed_us = static_cast<uint16_t>(passed_us + kUsPerMs);
+    ++memory.elapsed_ms;
+  }
+  memory.steered_us = static_cast<uint16_t>(memory.steered_us + passed_us);
+  if (memory.elapsed_ms < memory.row.quiet_ms) return;
+  const uint16_t most = ticks_at(memory.rate_max_usps, passed_us);
   int16_t target[kCardAxes];
-  deflect(memory.row, static_cast<uint16_t>(since_ms - memory.row.quiet_ms), target);
+  deflect(memory.row,
+          memory.turns,
+          static_cast<uint16_t>(memory.elapsed_ms - memory.row.quiet_ms),
+          target);
   for (uint8_t axis = 0; axis < kCardAxes; ++axis) {
     memory.applied_ticks[axis] = towards(memory.applied_ticks[axis], target[axis], most);
   }

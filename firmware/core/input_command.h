@@ -6,7 +6,6 @@
 
 #include "core/drive.h"
 #include "core/flight_card.h"
-#include "core/input_watch.h"
 #include "core/stick_travel.h"
 
 namespace core {
@@ -21,26 +20,26 @@ SwitchPlace switch_place(uint16_t width_ticks,
 
 // What an input needs while it runs, and only then: lent memory (app/outlet.h).
 struct InputMemory {
+  // As the frame `card` tells it.
+  uint32_t t_us;
+  uint8_t part;
   CardRow row;
-  InputMotion motion;
   uint16_t stick_ticks[kServos];     // at the trigger
   int16_t applied_ticks[kCardAxes];  // deflection in force
   uint16_t frame_us;                 // of the receiver, at the trigger
   uint16_t looked_us;                // low half of the last look's time
-  uint16_t steered_us;               // of the last deflections
+  uint16_t steered_us;               // of the last deflections, a whole ms behind the trigger
   uint8_t dropped;                   // low byte of the frames dropped, at the trigger
   uint8_t open_looks;                // in a row at an open contact
-  uint16_t watched_us;               // the sensors, low half
-  uint8_t frames_seen;               // of the recorder, counted, when they were watched last
-  uint8_t imu_seq;
-
-  void watch_start(uint32_t now_us) {
-    motion.start(now_us);
-    watched_us = static_cast<uint16_t>(now_us);
-    frames_seen = 0;
-    imu_seq = 0;
-  }
+  uint16_t rate_max_usps;            // of the card
+  uint16_t elapsed_ms;               // since the trigger, when last steered
+  uint32_t turns;                    // turns_per_ms()
 };
+
+static_assert(offsetof(InputMemory, part) == offsetof(frames::CardFrame, part) &&
+                  offsetof(InputMemory, row) == offsetof(frames::CardFrame, bytes) &&
+                  sizeof(CardRow) == sizeof(frames::CardFrame::bytes),
+              "a frame without another copy of the row");
 
 // What is known at a look, beside the sensors.
 struct InputFacts {
@@ -48,7 +47,7 @@ struct InputFacts {
   frames::Drive drive;
   SwitchPlace place;
   uint16_t frame_us;   // 0: not known
-  uint32_t silent_us;  // since the oldest of the five channels' last accepted pulses rose
+  uint16_t silent_us;  // since the oldest of the five channels' last accepted pulses rose
   uint16_t stick_us;   // of the card
   uint8_t dropped;
   bool contact;  // the relay's, closed
@@ -97,7 +96,7 @@ class InputCommand {
   frames::InputEnd keeps(InputMemory& memory, const InputFacts& facts, uint32_t now_us) const;
   bool over(const InputMemory& memory, uint32_t now_us) const;
   // The deflections for now, if it is time: towards the shape, no faster than the card's rate.
-  void steer(InputMemory& memory, uint16_t rate_max_usps, uint32_t now_us) const;
+  void steer(InputMemory& memory, uint32_t now_us) const;
   // Ends at once; the next trigger flies the row behind. `rows`: of the card.
   void end(uint8_t rows);
   uint32_t since_us() const { return since_us_; }  // of a running input: its trigger

@@ -6,16 +6,18 @@ namespace {
 using frames::InputEnd;
 
 constexpr uint8_t kNone = 255;
-constexpr uint8_t kMoveShift = 14;  // 16.384 ms
-constexpr uint8_t kStale = 0xFE;    // 4.16 s ago: as long as it is counted
+constexpr uint16_t kStepsPerMs = 4000;  // of 16.384 ms, in 1/65536: none beyond a time is in it
+constexpr uint8_t kStale = 0xFE;        // 4.16 s ago: as long as it is counted
 constexpr uint8_t kPaShift = 4;
 
 uint8_t low(uint32_t value) {
   return static_cast<uint8_t>(value ^ value >> 8);
 }
 
+// now_us / 2^14 in whole bytes and a short shift: by 14 it is a loop of 100 cycles.
 uint8_t now_steps(uint32_t now_us) {
-  return static_cast<uint8_t>(now_us >> kMoveShift);
+  const uint16_t middle = static_cast<uint16_t>(now_us >> 8U);
+  return static_cast<uint8_t>(static_cast<uint16_t>(middle << 2U) >> 8U);
 }
 
 bool inside(uint16_t value, uint16_t least, uint16_t most) {
@@ -36,47 +38,16 @@ bool usable(const InputReadings& in, uint8_t input) {
   return (in.valid >> input & 1U) != 0;
 }
 
-struct Judge {
-  const InputReadings& in;
-  const InputMotion& motion;
-  uint16_t still_ms;
-  uint32_t now_us;
-
-  InputEnd watched(uint8_t sensor) const {
-    const uint16_t still =
-        static_cast<uint16_t>(still_ms + (sensor == InputMotion::kGps ? kInputGpsMoreMs : 0U));
-    return motion.moves(sensor, still, now_us) ? InputEnd::kDone : InputEnd::kSensorStill;
-  }
-
-  InputEnd analog_input(uint8_t sensor,
-                        const uint16_t* pair,
-                        uint8_t input,
-                        uint16_t least,
-                        uint16_t most,
-                        InputEnd left) const {
-    if (input == kNone) return InputEnd::kDone;
-    if (in.scan_age_us > kInputScanAgeUs || !usable(in, input)) return InputEnd::kSensorLost;
-    if (!inside(analog(pair, input), least, most)) return left;
-    return watched(sensor);
-  }
-
-  InputEnd height(const CardHead& limits, const InputHome& home) const {
-    if (in.static_pressure == 0 || in.baro_age_us > kInputBaroAgeUs) return InputEnd::kSensorLost;
-    const int32_t drop_pa = static_cast<int32_t>(home.pressure_2pa) * 2 -
-                            static_cast<int32_t>(in.static_pressure >> kPaShift);
-    if (drop_pa < limits.height_min_pa || drop_pa > limits.height_max_pa) return InputEnd::kHeight;
-    return watched(InputMotion::kBaro);
-  }
-
-  InputEnd distance(const CardHead& limits, const InputHome& home) const {
-    if (limits.distance_max_m == 0) return InputEnd::kDone;
-    if (!in.gps || in.gps_age_us > kInputGpsAgeUs) return InputEnd::kSensorLost;
-    if (!within_distance(home, in.latitude, in.longitude, limits.distance_max_m)) {
-      return InputEnd::kDistance;
-    }
-    return watched(InputMotion::kGps);
-  }
-};
+InputEnd judge_analog(const InputReadings& in,
+                      const uint16_t* pair,
+                      uint8_t input,
+                      uint16_t least,
+                      uint16_t most,
+                      InputEnd left) {
+  if (input == kNone) return InputEnd::kDone;
+  if (!usable(in, input)) return InputEnd::kSensorLost;
+  return inside(analog(pair, input), least, most) ? InputEnd::kDone : left;
+}
 
 // Metres of a difference of 1e-7 deg along a meridian: 0.011139 for 0.011132, without a division;
 // far beyond 3 km it stays far.
@@ -97,37 +68,51 @@ void InputMotion::start(uint32_t now_us) {
   }
 }
 
-void InputMotion::look(const CardHead& limits, const InputReadings& in, uint32_t now_us) {
+void InputMotion::see(uint8_t sensor, uint8_t seen, uint32_t now_us) {
+  if (seen == value[sensor]) return;
+  value[sensor] = seen;
+  moved[sensor] = now_steps(now_us);
+}
+
+void InputMotion::see_imu(const InputReadings& in, uint32_t now_us) {
   uint16_t imu = 0;
   for (uint8_t i = 0; i < 3; ++i) {
     imu = static_cast<uint16_t>(imu * 3U + static_cast<uint16_t>(in.rates[i]) +
                                 static_cast<uint16_t>(in.force[i]));
   }
-  const uint8_t seen[kSensors] = {
-      low(imu),
-      low(analog(in.pitot, limits.airspeed_input)),
-      low(analog(in.alpha, limits.alpha_input)),
-      low(analog(in.beta, limits.beta_input)),
-      low(in.static_pressure),
-      low(static_cast<uint32_t>(in.latitude) * 3U + static_cast<uint32_t>(in.longitude))};
+  see(kImu, low(imu), now_us);
+}
+
+void InputMotion::see_scan(const InputLimits& limits, const InputReadings& in, uint32_t now_us) {
+  see(kAirspeed, low(analog(in.pitot, limits.airspeed_input)), now_us);
+  see(kAlpha, low(analog(in.alpha, limits.alpha_input)), now_us);
+  see(kBeta, low(analog(in.beta, limits.beta_input)), now_us);
+}
+
+void InputMotion::see_baro(const InputReadings& in, uint32_t now_us) {
+  see(kBaro, low(in.static_pressure), now_us);
+}
+
+void InputMotion::see_gps(const InputReadings& in, uint32_t now_us) {
+  see(kGps,
+      low(static_cast<uint32_t>(in.latitude) * 3U + static_cast<uint32_t>(in.longitude)),
+      now_us);
+}
+
+void InputMotion::age(uint32_t now_us) {
   const uint8_t now = now_steps(now_us);
-  for (uint8_t i = 0; i < kSensors; ++i) {
-    if (seen[i] != value[i]) {
-      value[i] = seen[i];
-      moved[i] = now;
-    } else if (static_cast<uint8_t>(now - moved[i]) > kStale) {
-      moved[i] = static_cast<uint8_t>(now - kStale);
-    }
+  for (uint8_t& at : moved) {
+    if (static_cast<uint8_t>(now - at) > kStale) at = static_cast<uint8_t>(now - kStale);
   }
 }
 
 bool InputMotion::moves(uint8_t sensor, uint16_t still_ms, uint32_t now_us) const {
   const uint8_t steps = static_cast<uint8_t>(now_steps(now_us) - moved[sensor]);
-  return static_cast<uint32_t>(steps) << kMoveShift <= static_cast<uint32_t>(still_ms) * 1000U;
+  return steps <= static_cast<uint32_t>(still_ms) * kStepsPerMs >> 16U;
 }
 
-InputEnd judge_imu(const CardHead& limits, const InputReadings& in) {
-  if (!in.imu || in.imu_age_us > kInputImuAgeUs) return InputEnd::kSensorLost;
+InputEnd judge_imu(const InputLimits& limits, const InputReadings& in) {
+  if (!in.imu) return InputEnd::kSensorLost;
   if (size_of(in.phi) > limits.phi_max) return InputEnd::kBank;
   if (in.theta < limits.theta_min || in.theta > limits.theta_max) return InputEnd::kPitch;
   if (size_of(in.rates[0]) > limits.p_max || size_of(in.rates[1]) > limits.q_max ||
@@ -138,40 +123,68 @@ InputEnd judge_imu(const CardHead& limits, const InputReadings& in) {
                                                                     : InputEnd::kDone;
 }
 
-InputEnd judge_others(const CardHead& limits,
-                      const InputReadings& in,
-                      const InputHome& home,
-                      const InputMotion& motion,
-                      uint32_t now_us) {
-  const Judge judge = {in, motion, limits.still_ms, now_us};
-  InputEnd why = judge.watched(InputMotion::kImu);
+InputEnd judge_scan(const InputLimits& limits, const InputReadings& in) {
+  InputEnd why = judge_analog(
+      in, in.pitot, limits.airspeed_input, limits.dp_min, limits.dp_max, InputEnd::kAirspeed);
   if (why != InputEnd::kDone) return why;
-  why = judge.analog_input(InputMotion::kAirspeed,
-                           in.pitot,
-                           limits.airspeed_input,
-                           limits.dp_min,
-                           limits.dp_max,
-                           InputEnd::kAirspeed);
+  why = judge_analog(
+      in, in.alpha, limits.alpha_input, limits.alpha_min, limits.alpha_max, InputEnd::kAlpha);
   if (why != InputEnd::kDone) return why;
-  why = judge.analog_input(InputMotion::kAlpha,
-                           in.alpha,
-                           limits.alpha_input,
-                           limits.alpha_min,
-                           limits.alpha_max,
-                           InputEnd::kAlpha);
-  if (why != InputEnd::kDone) return why;
-  why = judge.analog_input(InputMotion::kBeta,
-                           in.beta,
-                           limits.beta_input,
-                           limits.beta_min,
-                           limits.beta_max,
-                           InputEnd::kBeta);
-  if (why != InputEnd::kDone) return why;
-  why = judge.height(limits, home);
-  if (why != InputEnd::kDone) return why;
-  why = judge.distance(limits, home);
+  why = judge_analog(
+      in, in.beta, limits.beta_input, limits.beta_min, limits.beta_max, InputEnd::kBeta);
   if (why != InputEnd::kDone) return why;
   return limits.rail_min != 0 && in.rail < limits.rail_min ? InputEnd::kSupply : InputEnd::kDone;
+}
+
+InputEnd judge_baro(const InputLimits& limits, const InputReadings& in, const InputHome& home) {
+  if (in.static_pressure == 0) return InputEnd::kSensorLost;
+  const int32_t drop_pa = static_cast<int32_t>(home.pressure_2pa) * 2 -
+                          static_cast<int32_t>(in.static_pressure >> kPaShift);
+  return drop_pa < limits.height_min_pa || drop_pa > limits.height_max_pa ? InputEnd::kHeight
+                                                                          : InputEnd::kDone;
+}
+
+InputEnd judge_gps(const InputLimits& limits, const InputReadings& in, const InputHome& home) {
+  if (limits.distance_max_m == 0) return InputEnd::kDone;
+  if (!in.gps) return InputEnd::kSensorLost;
+  return within_distance(home, in.latitude, in.longitude, limits.distance_max_m)
+             ? InputEnd::kDone
+             : InputEnd::kDistance;
+}
+
+InputEnd judge_heard(const InputLimits& limits,
+                     const InputReadings& in,
+                     const InputMotion& motion,
+                     uint32_t now_us) {
+  const bool airspeed = limits.airspeed_input != kNone;
+  const bool alpha = limits.alpha_input != kNone;
+  const bool beta = limits.beta_input != kNone;
+  const bool gps = limits.distance_max_m != 0;
+  if (in.imu_age_us > kInputImuAgeUs || in.baro_age_us > kInputBaroAgeUs ||
+      ((airspeed || alpha || beta) && in.scan_age_us > kInputScanAgeUs) ||
+      (gps && in.gps_age_us > kInputGpsAgeUs)) {
+    return InputEnd::kSensorLost;
+  }
+  const auto moves = [&](uint8_t sensor) { return motion.moves(sensor, limits.still_ms, now_us); };
+  const uint16_t gps_ms = static_cast<uint16_t>(limits.still_ms + kInputGpsMoreMs);
+  const bool all = moves(InputMotion::kImu) && moves(InputMotion::kBaro) &&
+                   (!airspeed || moves(InputMotion::kAirspeed)) &&
+                   (!alpha || moves(InputMotion::kAlpha)) && (!beta || moves(InputMotion::kBeta)) &&
+                   (!gps || motion.moves(InputMotion::kGps, gps_ms, now_us));
+  return all ? InputEnd::kDone : InputEnd::kSensorStill;
+}
+
+void InputWatch::start(uint32_t now_us) {
+  motion.start(now_us);
+  for (InputEnd& part : found) part = InputEnd::kSensorLost;
+  looked_us = static_cast<uint16_t>(now_us);
+}
+
+InputEnd InputWatch::outside() const {
+  for (const InputEnd part : found) {
+    if (part != InputEnd::kDone) return part;
+  }
+  return InputEnd::kDone;
 }
 
 // Bhaskara's (32400 - 4 d^2) / (32400 + d^2), within 0.0017; of the degree nearer to the equator,

@@ -71,8 +71,8 @@ uint16_t times_upper(uint32_t turns, uint8_t harmonic) {
 }
 
 // All axes in one pass: each component is one axis's.
-void multisine(const CardRow& row, uint16_t t_ms, int16_t* ticks) {
-  const uint32_t base = 0xFFFFFFFFU / row.duration_ms * t_ms;
+void multisine(const CardRow& row, uint32_t turns, uint16_t t_ms, int16_t* ticks) {
+  const uint32_t base = turns * t_ms;
   int32_t sums[kCardAxes] = {};
   for (uint8_t i = 0; i < sizeof row.components && row.components[i] != 0;
        i = static_cast<uint8_t>(i + 3U)) {
@@ -104,7 +104,11 @@ int16_t sin14(uint16_t phase) {
   return phase >= 2U * kQuarter ? static_cast<int16_t>(-value) : value;
 }
 
-void deflect(const CardRow& row, uint16_t t_ms, int16_t* ticks) {
+uint32_t turns_per_ms(const CardRow& row) {
+  return 0xFFFFFFFFU / row.duration_ms;
+}
+
+void deflect(const CardRow& row, uint32_t turns, uint16_t t_ms, int16_t* ticks) {
   for (uint8_t axis = 0; axis < kCardAxes; ++axis) {
     const bool over = t_ms >= row.duration_ms;
     ticks[axis] = over ? int16_t{0} : static_cast<int16_t>(row.amplitude_us[axis] * kTicks);
@@ -127,7 +131,7 @@ void deflect(const CardRow& row, uint16_t t_ms, int16_t* ticks) {
       return;
     }
     case CardShape::kMultisine:
-      multisine(row, t_ms, ticks);
+      multisine(row, turns, t_ms, ticks);
       return;
   }
   if (up) return;

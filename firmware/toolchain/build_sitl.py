@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 LIBRARY = ROOT / "build" / "sitl" / "libsitl.so"
-ROOMS = ("core", "drivers", "storage", "app", "boards/sitl")
+ROOMS = ("core", "core/learning", "drivers", "storage", "app", "boards/sitl")
 
 INCLUDES = ("-Ifirmware", "-Iprotocol")
 COMMON = ("-O2", "-g1", "-fPIC")

@@ -11,11 +11,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from host.sysid.estimators.onboard_sums import PITCH, ROLL, YAW, AxisCard
+
 ROOT = Path(__file__).resolve().parents[2]
 VALID_AT, CARD_AT, VALID = 1024, 1040, 0xC5  # app/card_store.h
 EEPROM_BYTES = 4096
 PULSE, DOUBLET, THREE_TWO_ONE_ONE, SWEEP, MULTISINE = range(1, 6)
-FORMATS = {"u8": "B", "char": "s", "u16": "H", "i16": "h", "u32": "I"}
+FORMATS = {"u8": "B", "char": "s", "u16": "H", "i16": "h", "u32": "I", "f32": "f"}
 
 # What the aircraft of these flights may do: wide where a flight does not ask for less.
 HEAD: dict[str, Any] = {
@@ -49,7 +51,8 @@ def _packed(name: str, values: dict[str, Any]) -> bytes:
         if base == "char":
             out += struct.pack(f"<{count}s", value)
         else:
-            numbers = value if isinstance(value, Sequence) else [value] * count
+            numbers = list(value) if isinstance(value, Sequence) else [value] * count
+            numbers += [0] * (count - len(numbers))
             out += struct.pack(f"<{count}{FORMATS[base]}", *numbers)
     return out
 
@@ -60,10 +63,33 @@ def row(**changed: Any) -> bytes:
     return body + struct.pack("<H", binascii.crc_hqx(body, 0xFFFF))
 
 
-def card(rows: Sequence[bytes], **changed: Any) -> bytes:
-    """Return a whole card with its hash."""
-    head = _packed("card_head", HEAD | {"rows": len(rows)} | changed)[:-4]
-    rest = bytes(48) + b"".join(rows)
+def axis_parts(learned: AxisCard) -> bytes:
+    """Return the two parts of an axis that is learned."""
+    values = {
+        "axis": (PITCH, ROLL, YAW).index(learned.axis),
+        "harmonic_count": len(learned.harmonics),
+        "harmonics": learned.harmonics,
+        "told": sum(1 << k for k, percent in enumerate(learned.wanted_percent) if percent),
+        "advance_s": learned.advance_s,
+        "curvature_s2": learned.curvature_s2,
+        "lever": learned.lever,
+        "product": learned.product,
+    }
+    worth = {name: getattr(learned, name) for name in ("gain", "tolerance", "wanted_percent")}
+    return _packed("card_axis", values) + _packed("card_worth", worth)
+
+
+def card(
+    rows: Sequence[bytes],
+    axes: Sequence[AxisCard] = (),
+    axis_of_row: Sequence[int] = (),
+    **changed: Any,
+) -> bytes:
+    """Return a whole card with its hash; `axis_of_row` counts `axes` from 1, 0 is none."""
+    counts = {"rows": len(rows), "learned_axes": len(axes)}
+    head = _packed("card_head", HEAD | counts | changed)[:-4]
+    rest = _packed("card_learning", {"axis_of_row": axis_of_row or (0,)})
+    rest += b"".join(rows) + b"".join(axis_parts(axis) for axis in axes)
     return head + struct.pack("<I", zlib.crc32(head + rest)) + rest
 
 

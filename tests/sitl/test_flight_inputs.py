@@ -142,7 +142,7 @@ def test_a_trigger_outside_the_limits_is_refused(
     limit: dict[str, int], why: int, tmp_path: Path
 ) -> None:
     flight = calm()
-    bench = flown(flight, cards.eeprom_with(cards.card(ROWS, **limit)))
+    bench = flown(flight, cards.eeprom_with(cards.card(ROWS, (), (), **limit)))
     ((_, refused),) = events(bench, tmp_path, INPUT_REFUSED)
     assert refused == why << 8
     assert deflected(bench.sitl.pulses(), flight, 0.0).size == 0

@@ -17,6 +17,8 @@ using sitl::World;
 using sitl::world;
 
 std::unique_ptr<app::Instrument> instrument;
+app::RowMemory row_memory;  // on the Mega's stack
+bool row_memory_lent = false;
 uint32_t file_blocks = 0;
 
 void boot(uint8_t source) {
@@ -26,6 +28,7 @@ void boot(uint8_t source) {
   w.booted_at = w.now;
   w.reset_source = source;
   instrument.reset(new app::Instrument);
+  row_memory_lent = false;
   if (file_blocks != 0) instrument->recorder().set_file_blocks(file_blocks);
   instrument->boot();
 }
@@ -201,7 +204,12 @@ void sitl_run_until(int64_t at) {
     w.now = std::max(w.now, at);
     return;
   }
-  while (w.now < at) instrument->step();
+  while (w.now < at) {
+    instrument->step();
+    const bool wanted = instrument->wants_row_memory();
+    if (wanted != row_memory_lent) instrument->lend(wanted ? &row_memory : nullptr);
+    row_memory_lent = wanted;
+  }
 }
 
 void sitl_state(SitlState* state) {

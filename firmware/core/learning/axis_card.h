@@ -2,7 +2,10 @@
 // ratio of counts is worth. `host.planning.learning_card` makes it from aircraft and calibration.
 #pragma once
 
+#include <stddef.h>
 #include <stdint.h>
+
+#include "generated/frames.h"
 
 namespace core {
 
@@ -12,10 +15,13 @@ enum class LearningAxis : uint8_t { kPitch, kRoll, kYaw };
 
 constexpr uint8_t kMostSignals = 5;
 constexpr uint8_t kMostHarmonics = 10;
+// Complex: ten harmonics of pitch's three signals, six of the five of roll and yaw; 240 B.
+constexpr uint8_t kMostSums = 30;
 // Of angle and surfaces; rates are the clock that the others are late against.
 constexpr uint8_t kMostAdvances = 3;
 
-struct AxisCard {
+// The bytes of the flight card's part `card_axis`.
+struct __attribute__((packed)) AxisCard {
   LearningAxis axis;
   uint8_t harmonic_count;
   uint8_t harmonics[kMostHarmonics];  // times 50 / 512 Hz
@@ -29,6 +35,13 @@ struct AxisCard {
   float product;
 };
 
+static_assert(sizeof(AxisCard) == offsetof(frames::CardAxisLayout, reserved) &&
+                  offsetof(AxisCard, told) == offsetof(frames::CardAxisLayout, told) &&
+                  offsetof(AxisCard, curvature_s2) ==
+                      offsetof(frames::CardAxisLayout, curvature_s2) &&
+                  offsetof(AxisCard, product) == offsetof(frames::CardAxisLayout, product),
+              "as the card has it");
+
 // What a ratio of counts is worth: asked for behind a solve, so it may stay in the EEPROM until
 // then.
 struct DerivativeWorth {
@@ -39,6 +52,20 @@ struct DerivativeWorth {
 
 inline uint8_t signals_of(LearningAxis axis) {
   return axis == LearningAxis::kPitch ? 3 : 5;
+}
+// Of the harmonics and signals there is memory for all, and each bit of `told` has a signal.
+inline bool axis_good(const AxisCard& card) {
+  if (static_cast<uint8_t>(card.axis) > static_cast<uint8_t>(LearningAxis::kYaw)) return false;
+  const uint8_t signals = signals_of(card.axis);
+  return card.harmonic_count != 0 && card.harmonic_count <= kMostHarmonics &&
+         card.harmonic_count * signals <= kMostSums && card.told >> signals == 0;
+}
+// The first of an axis's derivatives; the others follow as its signals do.
+inline uint8_t first_derivative(LearningAxis axis) {
+  const frames::Derivative first = axis == LearningAxis::kPitch  ? frames::Derivative::kCmAlpha
+                                   : axis == LearningAxis::kRoll ? frames::Derivative::kClBeta
+                                                                 : frames::Derivative::kCnBeta;
+  return static_cast<uint8_t>(first);
 }
 // The rate whose acceleration is the moment, and the one that turns with the angle.
 inline uint8_t moment_rate(LearningAxis axis) {

@@ -89,6 +89,14 @@ uint8_t place(uint8_t row, uint8_t column) {
 
 }  // namespace
 
+int32_t millionths(float value) {
+  constexpr float kMost = 2147.0F;
+  constexpr int32_t kMostMillionths = 2147000000;
+  if (value >= kMost) return kMostMillionths;
+  if (!(value > -kMost)) return -kMostMillionths;
+  return static_cast<int32_t>(value * 1e6F);
+}
+
 float* EquationError::entry(uint8_t row, uint8_t column) {
   return &entries_[place(row, column)];
 }

@@ -24,6 +24,9 @@ struct LearnedDerivative {
   bool enough;       // at most the wanted share of the estimate
 };
 
+// For the log: up to 2147 to either side, further is cut; no number is the least of them.
+int32_t millionths(float value);
+
 class EquationError {
  public:
   // Begins a solve; a result that was there is gone.

@@ -52,8 +52,7 @@ bool FourierSums::start(const AxisCard& card) {
   count_ = 0;
   signals_ = signals_of(card.axis);
   memset(sums_, 0, sizeof(sums_));
-  return card.harmonic_count != 0 && card.harmonic_count <= kMostHarmonics &&
-         card.harmonic_count * signals_ <= kMostSums;
+  return axis_good(card);
 }
 
 bool FourierSums::take(const AxisCard& card, const int16_t* values) {

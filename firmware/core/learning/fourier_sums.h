@@ -12,8 +12,6 @@ namespace core {
 constexpr uint8_t kSampleHz = 50;
 // 60 s. |value| <= 2^15 and |factor| <= 2^12, so |share| <= 2^19 and |sum| <= 3000 * 2^19 < 2^31.
 constexpr uint16_t kMostSamples = 60 * kSampleHz;
-// Complex: ten harmonics of pitch's three signals, six of the five of roll and yaw; 240 B.
-constexpr uint8_t kMostSums = 30;
 
 struct ComplexSum {
   int32_t re;

@@ -140,7 +140,8 @@ TEST_CASE("each limit of the head at its edge and behind it") {
   HEAD_SAYS(rate_max_usps, 60001U, no)
   HEAD_SAYS(frequency_max_chz, 0, no)
   HEAD_SAYS(frequency_max_chz, 501, no)
-  HEAD_SAYS(reserved_1, 1, no)
+  HEAD_SAYS(learned_axes, 3, yes)
+  HEAD_SAYS(learned_axes, 4, no)
   HEAD_SAYS(reserved_2[5], 1, no)
 }
 

@@ -33,6 +33,7 @@ struct Bench {
     memory.row.quiet_ms = 100;
     memory.row.duration_ms = 1000;
     memory.row.amplitude_us[1] = 100;
+    memory.rate_max_usps = kRateUsps;
     facts.drive = frames::Drive::kMega;
     facts.place = SwitchPlace::kOther;
     facts.frame_us = 20000;
@@ -57,7 +58,7 @@ struct Bench {
     }
     const InputEnd why = command.keeps(memory, facts, now_us);
     if (why == InputEnd::kDone && !command.over(memory, now_us)) {
-      command.steer(memory, kRateUsps, now_us);
+      command.steer(memory, now_us);
       return;
     }
     ended = why;

@@ -11,7 +11,7 @@ using core::InputReadings;
 using frames::InputEnd;
 
 struct Bench {
-  core::CardHead limits = {};
+  core::InputLimits limits = {};
   InputReadings in = {};
   core::InputHome home;
   InputMotion motion;
@@ -68,13 +68,22 @@ struct Bench {
       if (!still[InputMotion::kBeta]) in.beta[0] = static_cast<uint16_t>(2048 + turn);
       if (!still[InputMotion::kBaro]) in.static_pressure = 16UL * 99000UL + turn;
       if (!still[InputMotion::kGps]) in.latitude = home.latitude + turn;
-      motion.look(limits, in, now_us);
+      motion.see_imu(in, now_us);
+      motion.see_scan(limits, in, now_us);
+      motion.see_baro(in, now_us);
+      motion.see_gps(in, now_us);
+      motion.age(now_us);
     }
   }
   int judge() const {
-    const InputEnd imu = core::judge_imu(limits, in);
-    const InputEnd others = core::judge_others(limits, in, home, motion, now_us);
-    return static_cast<int>(imu != InputEnd::kDone ? imu : others);
+    core::InputWatch watch;
+    watch.start(now_us);
+    watch.found[core::InputWatch::kImu] = core::judge_imu(limits, in);
+    watch.found[core::InputWatch::kScan] = core::judge_scan(limits, in);
+    watch.found[core::InputWatch::kBaro] = core::judge_baro(limits, in, home);
+    watch.found[core::InputWatch::kGps] = core::judge_gps(limits, in, home);
+    watch.found[core::InputWatch::kHeard] = core::judge_heard(limits, in, motion, now_us);
+    return static_cast<int>(watch.outside());
   }
 };
 
@@ -164,6 +173,30 @@ TEST_CASE("at the start nothing has moved yet") {
   Bench bench;
   bench.motion.start(bench.now_us);
   CHECK_EQ(bench.judge(), static_cast<int>(InputEnd::kSensorStill));
+}
+
+TEST_CASE("until every part has been looked at nothing holds") {
+  core::InputWatch watch;
+  watch.start(5);
+  for (InputEnd& part : watch.found) {
+    CHECK_EQ(static_cast<int>(watch.outside()), static_cast<int>(InputEnd::kSensorLost));
+    part = InputEnd::kDone;
+  }
+  CHECK_EQ(static_cast<int>(watch.outside()), 0);
+  watch.found[core::InputWatch::kGps] = InputEnd::kDistance;
+  CHECK_EQ(static_cast<int>(watch.outside()), static_cast<int>(InputEnd::kDistance));
+}
+
+TEST_CASE("a sensor that nobody looks at does not come round while its time is kept") {
+  Bench bench;
+  bench.motion.see_gps(bench.in, bench.now_us);
+  for (uint16_t n = 0; n < 2000; ++n) {
+    bench.now_us += 5000;
+    bench.motion.age(bench.now_us);
+    const bool moves = bench.motion.moves(InputMotion::kGps, 1500, bench.now_us);
+    if (n < 290) CHECK(moves);
+    if (n > 305) CHECK(!moves);
+  }
 }
 
 TEST_CASE("distances: metres, the cosine of the latitude, and far away") {

@@ -95,5 +95,19 @@ TEST_CASE("a card that wants more sums than there are is refused") {
   card.harmonic_count = 11;
   CHECK(!sums.start(card));
   card.harmonic_count = 10;
+  CHECK(!sums.start(card));  // a derivative that pitch has not
+  card.told = 7;
   CHECK(sums.start(card));
+  card.axis = static_cast<core::LearningAxis>(3);
+  CHECK(!sums.start(card));
+}
+
+TEST_CASE("what the log takes: millionths, cut at both ends") {
+  CHECK_EQ(core::millionths(0.0F), 0);
+  CHECK_EQ(core::millionths(-1.5F), -1500000);
+  CHECK_EQ(core::millionths(0.25F), 250000);
+  CHECK_EQ(core::millionths(2147.0F), 2147000000);
+  CHECK_EQ(core::millionths(3e30F), 2147000000);
+  CHECK_EQ(core::millionths(-3e30F), -2147000000);
+  CHECK_EQ(core::millionths(__builtin_nanf("")), -2147000000);
 }

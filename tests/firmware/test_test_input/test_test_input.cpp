@@ -23,7 +23,7 @@ CardRow row_of(CardShape shape, uint16_t duration_ms, int16_t amplitude_us) {
 
 int16_t of_axis(const CardRow& row, uint8_t axis, uint16_t t_ms) {
   int16_t ticks[core::kCardAxes];
-  core::deflect(row, t_ms, ticks);
+  core::deflect(row, core::turns_per_ms(row), t_ms, ticks);
   return ticks[axis];
 }
 
