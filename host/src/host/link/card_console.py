@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from host.link.serial import DeviceError
-from host.wire.flight_card import number, parts
+from host.wire.flight_card import body_parts, number, parts
 from host.wire.framing import EnvelopeReader, envelope
 from host.wire.schema_text import packed_schema
 
@@ -197,8 +197,8 @@ class CardConsole:
         rows = head[3]
         if not 1 <= rows <= number("card_most_rows"):
             raise CardError(f"{self._link.device}: its card says {rows} rows, expected 1 to 32")
-        body = b""
-        for k in range(rows):
+        body, behind = b"", body_parts(head)
+        for k in range(behind):
             body += self.must("read", heads + k).data
-            progress((k + 1) / rows)
+            progress((k + 1) / behind)
         return head + body

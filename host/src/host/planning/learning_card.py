@@ -7,8 +7,9 @@ how far the instrument may be wrong is reckoned here, before the flight, for one
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from host.physical.calibration import Calibration, load_calibration
 from host.physical.channels import constant_delay_us
 from host.sysid.estimators.onboard_sums import (
     PITCH,
+    ROLL,
     SAMPLE_HZ,
     SIGNALS,
     TURN_STEPS,
@@ -116,6 +118,26 @@ def learning_card(
         tolerance=tuple(_tolerances(aircraft, axis, airframe, sensors, at, gains).tolist()),
         wanted_percent=ENOUGH_PERCENT[axis],
     )
+
+
+def learning_parts(card: AxisCard) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return `card_axis` and `card_worth` of the flight card's file (wire/flight_card.py)."""
+
+    def padded(values: Sequence[float], size: int) -> list[float]:
+        return [*values, *[0] * (size - len(values))]
+
+    axis = {
+        "axis": (PITCH, ROLL, YAW).index(card.axis),
+        "harmonic_count": len(card.harmonics),
+        "harmonics": padded(card.harmonics, 10),
+        "told": sum(1 << k for k, percent in enumerate(card.wanted_percent) if percent),
+        "advance_s": padded(card.advance_s, 3),
+        "curvature_s2": padded(card.curvature_s2, 3),
+        "lever": card.lever,
+        "product": card.product,
+    }
+    worth = {n: padded(getattr(card, n), 5) for n in ("gain", "tolerance", "wanted_percent")}
+    return axis, worth
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from host.wire.schema_text import packed_schema
 
 LONGEST_FILE = 48 * 64  # longer than any good card
 HEAD, LEARNING, ROW = "card_head", "card_learning", "card_row"
+AXIS, WORTH = "card_axis", "card_worth"
 AXES = ("aileron", "elevator", "rudder")
 SHAPES = ("pulse", "doublet", "three_two_one_one", "sweep", "multisine")
 # Highest frequency of a shape in units of 1/duration, times 100000 (flight-card.md).
@@ -29,6 +30,8 @@ FREQUENCY = {"pulse": 50_000, "doublet": 100_000, "three_two_one_one": 350_000}
 MOST_SHARES = 252  # of an axis; each is of 64
 TRAVEL_US = (800, 2200)
 NONE = 255
+# Of an axis that is learned: firmware/core/learning/axis_card.h.
+YAW, PITCH_SIGNALS, MOST_SIGNALS, MOST_SUMS = 2, 3, 5, 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +60,7 @@ def number(name: str) -> int:
 
 @cache
 def fields(layout: str) -> tuple[Field, ...]:
-    """Return the fields of `HEAD`, `LEARNING` or `ROW`."""
+    """Return the fields of `HEAD`, `LEARNING`, `ROW`, `AXIS` or `WORTH`."""
     return tuple(
         Field(name=name, type=kind, unit=unit, scale=float(scale))
         for name, kind, unit, scale in _table()["layouts"][layout]["fields"]
@@ -75,20 +78,32 @@ def scale(layout: str, name: str) -> float:
     return {field.name: field.scale for field in fields(layout)}[name]
 
 
-def card_bytes(head: Mapping[str, object], rows: Sequence[Mapping[str, object]]) -> bytes:
+def card_bytes(
+    head: Mapping[str, object],
+    rows: Sequence[Mapping[str, object]],
+    axes: Sequence[tuple[Mapping[str, object], Mapping[str, object]]] = (),
+    axis_of_row: Sequence[int] = (),
+) -> bytes:
     """Return a card's file with its counts, constants and checks put in.
 
     Parameters
     ----------
     head, rows : mapping
         Raw numbers by field; what is left out is 0.
+    axes : sequence of (mapping, mapping)
+        `AXIS` and `WORTH` of what the logger learns in flight.
+    axis_of_row : sequence of int
+        Which of them while each row is flown, from 1; 0: none.
     """
     always = _table()["layouts"][HEAD]["always"]
-    first = _packed(HEAD, {**head, **always, "rows": len(rows)})
-    body = bytes(number("card_part_bytes"))
+    counts = {"rows": len(rows), "learned_axes": len(axes)}
+    first = _packed(HEAD, {**counts, **head, **always, "rows": len(rows)})
+    named = [*axis_of_row, *[0] * (number("card_most_rows") - len(axis_of_row))]
+    body = _packed(LEARNING, {"axis_of_row": named})
     for row in rows:
         bare = _packed(ROW, row)[:-2]
         body += bare + crc16(bare).to_bytes(2, "little")
+    body += b"".join(_packed(AXIS, axis) + _packed(WORTH, worth) for axis, worth in axes)
     return first[:-4] + zlib.crc32(first[:-4] + body).to_bytes(4, "little") + body
 
 
@@ -107,10 +122,16 @@ def parts(data: bytes) -> list[bytes]:
 
 def read_card(data: bytes) -> CardFile:
     """Return a card in numbers; ask `card_faults` first."""
-    heads, size = number("card_head_parts"), number("card_part_bytes")
+    heads = number("card_head_parts")
     head = _numbers(HEAD, data)
-    rows = [_numbers(ROW, part) for part in parts(data[heads * size :])]
+    rows = [_numbers(ROW, part) for part in parts(data)[heads : heads + head["rows"]]]
     return CardFile(head, tuple(rows))
+
+
+def body_parts(head: bytes) -> int:
+    """Return how many parts follow the first three: the rows, and two of each learned axis."""
+    found = _numbers(HEAD, head)
+    return int(found["rows"]) + number("card_axis_parts") * int(found["learned_axes"])
 
 
 def read_row(part: bytes) -> dict[str, Any]:
@@ -132,12 +153,16 @@ def card_faults(data: bytes) -> list[str]:
         Of a file.
     """
     size, heads, most = (number(f"card_{n}") for n in ("part_bytes", "head_parts", "most_rows"))
-    rows = len(data) // size - heads
-    if len(data) % size or not 1 <= rows <= most:
+    learned = number("card_axis_parts") * number("card_most_axes")
+    found = len(data) // size - heads
+    if len(data) % size or not 1 <= found <= most + learned:
         return [
-            f"{len(data)} bytes, expected {size} times {heads + 1} to {heads + most}:"
-            " the head and 1 to 32 rows"
+            f"{len(data)} bytes, expected {size} times {heads + 1} to {heads + most + learned}:"
+            " the head, 1 to 32 rows, two parts of each axis that is learned"
         ]
+    rows = found - number("card_axis_parts") * _numbers(HEAD, data)["learned_axes"]
+    if not 1 <= rows <= most:
+        return [f"{found} parts behind the head and {found - rows} of them of learned axes"]
     always = _table()["layouts"][HEAD]["always"]
     card = read_card(data)
     head = card.head
@@ -152,8 +177,27 @@ def card_faults(data: bytes) -> list[str]:
     check = zlib.crc32(data[: body - 4] + data[body:])
     if head["crc"] != check or check == 0:
         wrong.append(f"CRC-32 is {head['crc']:08x}, expected {check:08x}: a byte was changed")
-    return [*wrong, *_limit_faults(head), *(x for k, row in enumerate(card.rows)
+    wrong += [*_limit_faults(head), *_learning_faults(data, rows, head["learned_axes"])]
+    return [*wrong, *(x for k, row in enumerate(card.rows)
             for x in _row_faults(k + 1, row, head, data[(heads + k) * size :][:size]))]  # fmt: skip
+
+
+def _learning_faults(data: bytes, rows: int, axes: int) -> Iterator[str]:
+    if axes > number("card_most_axes"):
+        yield f"learned_axes is {axes}, expected 0 to {number('card_most_axes')}"
+    heads = number("card_head_parts")
+    named = _numbers(LEARNING, parts(data)[heads - 1])["axis_of_row"][:rows]
+    for place, axis in enumerate(named):
+        if axis > axes:
+            yield f"row {place + 1}: learns axis {axis}, expected 0 to {axes}"
+    for n, part in enumerate(parts(data)[heads + rows :: number("card_axis_parts")]):
+        axis = _numbers(AXIS, part)
+        signals = MOST_SIGNALS if axis["axis"] else PITCH_SIGNALS
+        if axis["axis"] > YAW or axis["told"] >> signals:
+            yield f"learned axis {n + 1}: axis {axis['axis']}, told {axis['told']:05b}"
+        count, most = axis["harmonic_count"], min(len(axis["harmonics"]), MOST_SUMS // signals)
+        if not 1 <= count <= most:
+            yield f"learned axis {n + 1}: {count} harmonics, expected 1 to {most}"
 
 
 def _limit_faults(head: Mapping[str, Any]) -> Iterator[str]:

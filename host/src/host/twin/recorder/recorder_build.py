@@ -28,7 +28,7 @@ from host.resources import CLONE, PACKED, user_cache
 Progress = Callable[[str, float], None]
 
 # Those of firmware/toolchain/build_sitl.py, which a test compares.
-ROOMS = ("core", "drivers", "storage", "app", "boards/sitl")
+ROOMS = ("core", "core/learning", "drivers", "storage", "app", "boards/sitl")
 HEADERS = ("hal", "generated")
 STANDARD = "-std=gnu++14"
 INCLUDES = ("-Ifirmware", "-Iprotocol")
