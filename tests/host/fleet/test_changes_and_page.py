@@ -11,6 +11,7 @@ from host.aircraft.prior.prior_file import read_prior
 from host.arrays import Array
 from host.fleet.flight_task import IDENTIFIED, SET_ASIDE
 from host.fleet.pages.aircraft_changes import AircraftHistory, change_lines, histories
+from host.fleet.pages.fleet_figures import drift_figure
 from host.fleet.pages.fleet_page import fleet_page
 from host.fleet.pages.type_prior import type_prior
 from host.fleet.statistics.changes import ChangeTest
@@ -145,6 +146,19 @@ def test_the_page_shows_everything_and_runs_nothing(
         assert shown.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
         assert [one for one in shown.requests if not one.startswith("data:")] == [path.as_uri()]
         assert shown.console_errors == []
+
+
+def test_an_aircraft_whose_findings_leave_no_derivative_still_has_its_page() -> None:
+    flights = [
+        replace(f, watched={"rudder_lag_s": (0.02, 1e-3)}, left_out=frozenset(USUAL))
+        if f.aircraft == "N1" else f
+        for f in drawn(4, 5)
+    ]  # fmt: skip
+    model = type_model("trainer", flights)
+    found = histories(model)
+    one = next(h for h in found if h.aircraft == "N1")
+    assert one.names == ("rudder_lag_s",)
+    assert drift_figure(model, one) is not None
 
 
 def test_the_prior_is_what_identify_reads(

@@ -14,6 +14,7 @@ from host.fleet.statistics.loaded_flight import LoadedFlight
 from host.fleet.statistics.type_model import TypeModel
 from host.fleet.statistics.watched_quantities import flight_spread, with_watched
 
+_TOLD_SHARE = 0.75  # of flights: those that do not tell every quantity are not tested
 _MOST_MOVED = 3  # of the quantities that a line names
 
 
@@ -65,8 +66,9 @@ def _flown(model: TypeModel, aircraft: str) -> list[LoadedFlight]:
 
 
 def _told_by_all(flights: Sequence[LoadedFlight], names: Sequence[str]) -> tuple[str, ...]:
-    """Return the quantities that nine of ten flights tell."""
-    return tuple(n for n in names if sum(f.tells(n) for f in flights) >= 0.9 * len(flights))
+    """Return the quantities that most flights tell; a finding may speak against some flights."""
+    least = _TOLD_SHARE * len(flights)
+    return tuple(n for n in names if sum(f.tells(n) for f in flights) >= least)
 
 
 def _alarms(

@@ -101,6 +101,6 @@ def _shown(model: TypeModel, one: AircraftHistory) -> list[str]:
         if n in one.names
     }
     moved = [one.names[k] for k in one.alarms[-1].moved] if one.alarms else []
-    best = [*moved, *sorted(share, key=share.__getitem__)]
+    best = [*moved, *sorted(share, key=share.__getitem__), *one.names]
     chosen = set(list(dict.fromkeys(best))[:_MOST_DRIFTS])
     return [n for n in one.names if n in chosen]
