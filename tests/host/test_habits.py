@@ -12,6 +12,8 @@ from host.cli import main, verbs
 from host.colours import coloured, painted
 from host.progress import stage, watched
 from host.terminal import bar
+from host.twin.outcome.compare import Deviation
+from host.twin.outcome.outcome_summary import deviation_lines
 
 from tests.host.test_original_rows import APPENDIX
 from tests.protocol.flights import simple_log
@@ -82,6 +84,15 @@ def test_a_wrong_argument_is_one_line_with_the_near_word(
     err = capsys.readouterr().err
     assert said in err and err.count("\n") == 1
     assert err.endswith("--help says more\n")
+
+
+def test_simulate_says_degrees_where_its_files_hold_radians() -> None:
+    head, row, last = deviation_lines(
+        [Deviation("alpha_rad", 0.01, 0.002, 0.03, 0.015), Deviation("qbar_pa", 2.0, 1.0, 1.0, 1.0)]
+    )
+    assert "mean and spread" in head
+    assert row.split() == ["alpha_deg", "+0.5730", "0.1146", "1.7189", "0.8594"]
+    assert last.split()[:2] == ["qbar_pa", "+2.0000"] and "BEYOND" in last
 
 
 def test_colours_are_for_terminals_that_want_them(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -458,6 +458,6 @@ def test_spikes_and_dropouts_count_as_missing(
     columns, notes = read(tmp_path / "x.csv")
     np.testing.assert_allclose(columns["q_radps"], flight["q_radps"], atol=1e-3)
     assert any(n.startswith("q_radps: 1 value far out") for n in notes)
-    assert any("alpha_rad stands still at 0 for 0.60 s from 20 s" in n for n in notes)
+    assert any("alpha_rad stands still at 0 deg for 0.60 s from 20 s" in n for n in notes)
     assert any(n.startswith("beta_rad: 31 values far out") for n in notes)
     assert any("missing within the flight" in n and "beta_rad" in n for n in notes)

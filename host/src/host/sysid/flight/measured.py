@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
+from host.people_units import people_name
 from host.sysid.flight.column_sampling import FEWEST, Sampling, sampling_of
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.maneuver_detection import FLYING_SHARE
@@ -116,9 +117,17 @@ def _stuck_finding(
     return Finding(
         "stuck-sensor",
         (name,),
-        f"{name} stands still at {columns[name][first]:.4g} for {t[end - 1] - t[first]:.2f} s from"
+        f"{name} stands still at {_level(name, columns[name][first])} for"
+        f" {t[end - 1] - t[first]:.2f} s from"
         f" {t[first]:.6g} s while it must move{more}",
         ("a dropout that the logger filled", "a sensor that sticks"),
         "counts as missing there; maneuvers over it are left out",
         closed=True,
     )
+
+
+def _level(name: str, value: float) -> str:
+    """Return a value as a person reads it: angles in degrees."""
+    called, scale = people_name(name)
+    unit = {"deg": " deg", "degps": " deg/s"}.get(called.rpartition("_")[2], "")
+    return f"{scale * value:.4g}{unit}"

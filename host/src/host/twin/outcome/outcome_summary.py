@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from host.errors import CheckError
+from host.people_units import people_name
 from host.twin.faults import without_recorder
+from host.twin.outcome.compare import Deviation
 from host.twin.outcome.flight_outcome import Outcome
 from host.twin.recorder import sitl
 from host.twin.testcard import cards
@@ -55,7 +58,7 @@ def lines(outcome: Outcome, firmware: str) -> list[str]:
         f"  {_times_real_time(outcome, firmware):.0f} times real time on one core, loading and"
         f" picture apart ({stages})"
     )
-    return [*found, *_recorded(outcome), *_deviations(outcome)] + [
+    return [*found, *_recorded(outcome), *deviation_lines(outcome.deviations)] + [
         f"  wrote {path}" for path in outcome.files
     ]
 
@@ -92,18 +95,19 @@ def _recorded(outcome: Outcome) -> list[str]:
     return found
 
 
-def _deviations(outcome: Outcome) -> list[str]:
-    if not outcome.deviations:
+def deviation_lines(deviations: Sequence[Deviation]) -> list[str]:
+    """Return how far the decoded log is from the truth, angles in degrees; nothing of none."""
+    if not deviations:
         return []
-    return [
-        "  decoded log against the truth, in flight (mean and spread of the error, limits):",
-        *(
-            f"    {d.column:14s} {d.mean:+9.4f} {d.spread:8.4f}"
-            f"   {d.mean_limit:8.4f} {d.spread_limit:8.4f}"
+    lines = ["  decoded log against the truth, in flight (mean and spread of the error, limits):"]
+    for d in deviations:
+        name, scale = people_name(d.column)
+        lines.append(
+            f"    {name:14s} {scale * d.mean:+9.4f} {scale * d.spread:8.4f}"
+            f"   {scale * d.mean_limit:8.4f} {scale * d.spread_limit:8.4f}"
             + ("" if d.within else "  BEYOND ITS ERROR MODEL")
-            for d in outcome.deviations
-        ),
-    ]
+        )
+    return lines
 
 
 def _duration_s(outcome: Outcome) -> float:
