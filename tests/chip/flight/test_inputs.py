@@ -58,6 +58,7 @@ FORK_S = TRIGGER_S + 0.5
 FAULT_S = FORK_S + 0.4
 NEAR_TICKS = 8  # a width measured on the chip is 2.6 us off at most
 PLAIN_S = 0.025
+SENSE_S = 0.045
 
 
 @pytest.fixture(scope="module")
@@ -263,3 +264,19 @@ def test_plain_pulses_behind_a_fault_of_the_board(
         return wrong(running, FAULT_S + behind_s)
 
     assert in_fork(fly) == []
+
+
+def test_plain_pulses_within_45_ms_of_a_contact_that_opens(running: InputRig) -> None:
+    """Its sense line at 24 instants, spread over two looks and two servo pulses."""
+
+    def fly(at_s: float) -> tuple[list[str], float]:
+        running.run_to(at_s)
+        running.chip.drive("PH6", True)  # the sense line, as if the contact opened
+        running.run_to(at_s + 0.2)
+        late = deflected(running.pulses(), running.flight, at_s, near=NEAR_TICKS)
+        last_s = float(late.max()) / TICKS_PER_S - at_s if late.size else 0.0
+        return wrong(running, at_s, SENSE_S), last_s
+
+    found = [in_fork(lambda at_s=FAULT_S + 0.0017 * k: fly(at_s)) for k in range(24)]
+    print(f"last deflected pulse begins {1000 * max(s for _, s in found):.1f} ms behind it at most")
+    assert [said for said, _ in found if said] == []
