@@ -21,12 +21,15 @@ BUILT_FROM = ("firmware", "protocol", "platformio.ini", "platformio.local.ini")
 pytestmark = pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
 
 RAM_LIMIT_BYTES = 6600
-FLASH_LIMIT_BYTES = 120_000  # 253 952 are there; more than this is a mistake
+# 253 952 are there; more than this is a mistake. 10 500 are what a row teaches, with its floats.
+FLASH_LIMIT_BYTES = 130_000
 STACK_LEFT_BYTES = 1200
 
 HEAP = re.compile(r"^(malloc|free|realloc|calloc|__malloc_\w+|__brkval|_Zn[wa]\w*|_Zd[la]\w*)$")
 FLOAT_TEXT = re.compile(r"^(vfprintf|vsnprintf|sprintf|printf|dtostre|dtostrf|__ftoa\w*|strtod)$")
 FLOAT_MATH = re.compile(r"^__(add|sub|mul|div|cmp|le|ge|float\w*|fix\w*)sf\w*$")
+# Who may reckon in floats: once a second, beside the recording path (core/learning).
+LEARNING = re.compile(r"EquationError|RowLearning|^__\w*sf\w*$|^__fp_\w+$|^(square|sqrt)\w*$")
 DIVISION = re.compile(r"__(u?div|u?mod)\w+")
 
 
@@ -37,7 +40,7 @@ def symbols(flight_elf: Path) -> set[str]:
     return {line.split()[-1] for line in done.stdout.splitlines()}
 
 
-@pytest.mark.parametrize("refused", [HEAP, FLOAT_TEXT, FLOAT_MATH])
+@pytest.mark.parametrize("refused", [HEAP, FLOAT_TEXT])
 def test_image_is_free_of(symbols: set[str], refused: re.Pattern[str]) -> None:
     assert "main" in symbols
     assert [name for name in symbols if refused.match(name)] == []
@@ -51,9 +54,10 @@ def test_image_keeps_its_budget(flight_elf: Path) -> None:
     assert text + data <= FLASH_LIMIT_BYTES
 
 
-def test_interrupts_never_divide(flight_elf: Path) -> None:
+def calls_of(elf: Path) -> dict[str, set[str]]:
+    """Give who calls or jumps to whom, by linked names."""
     done = subprocess.run(
-        ["avr-objdump", "-d", "--no-show-raw-insn", str(flight_elf)],
+        ["avr-objdump", "-d", "--no-show-raw-insn", str(elf)],
         capture_output=True,
         text=True,
         check=True,
@@ -69,6 +73,18 @@ def test_interrupts_never_divide(flight_elf: Path) -> None:
             target = re.search(r"\b(?:r?call|r?jmp)\b.*<([^+>]+)>", line)
             if target:
                 calls[name].add(target[1])
+    return calls
+
+
+def test_only_the_learning_reckons_in_floats(flight_elf: Path) -> None:
+    calls = calls_of(flight_elf)
+    users = {name for name, called in calls.items() if any(map(FLOAT_MATH.match, called))}
+    assert any("RowLearning" in name for name in users)
+    assert [name for name in users if not LEARNING.search(name)] == []
+
+
+def test_interrupts_never_divide(flight_elf: Path) -> None:
+    calls = calls_of(flight_elf)
     vectors = [name for name in calls if re.match(r"^__vector_(\d+|nested_\w+|imu_\w+)$", name)]
     assert len(vectors) >= 10
     seen: set[str] = set()
