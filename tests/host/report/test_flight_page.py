@@ -9,6 +9,7 @@ from host.cli import main
 from host.report.flight_page import flight_page
 from host.report.flight_reading import Wanted, read_flight
 from host.report.shown_flight import Happening, ShownFlight
+from host.report.strip_figure import overview_figure
 
 from tests.browser.chromium import PHONE, Chromium
 from tests.host.report.flights import PLANTED
@@ -82,3 +83,12 @@ def test_a_loss_whose_time_nobody_knows_is_listed_and_no_folder_is_told() -> Non
     assert "1 lost range: shown as a gap" in text
     assert "<h2>Losses</h2><p>none</p>" not in text and "<td></td><td>" in text
     assert str(PX4.parent) not in text.partition("<details")[0]
+
+
+def test_names_stand_above_their_strip(flight: ShownFlight) -> None:
+    """The frame ran through their underscores."""
+    figure = overview_figure(flight)
+    figure.draw_without_rendering()
+    for axis in figure.axes:
+        name, frame = axis.get_legend().get_window_extent(), axis.get_window_extent()
+        assert name.y0 >= frame.y1 - 0.5

@@ -116,7 +116,7 @@ def _drawn(
             axis.plot(drawn_s, values, color=colour, linewidth=0.7, label=channel.name)
         _shaded(axis, flight, (t_s[0], t_s[-1]))
         axis.set_ylabel(strip[0].unit or strip[0].name)
-        axis.legend(loc="lower left", bbox_to_anchor=(0.0, 0.96), fontsize=6, ncols=len(strip),
+        axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=6, ncols=len(strip),
                     frameon=False, borderaxespad=0.0)  # fmt: skip
         axis.grid(color="#e5e7eb", linewidth=0.5)
     axes[-1].set_xlabel("t, s")
