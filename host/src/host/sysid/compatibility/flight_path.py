@@ -32,6 +32,8 @@ INERTIAL = (
 FLOW = ("alpha_scale", "alpha_zero_rad", "beta_scale", "beta_zero_rad")
 PITOT = ("pitot_scale", "pitot_zero_pa")
 DELAYS = ("vane_delay_s", "pitot_delay_s")
+# Of the beta vanes behind the alpha vanes; half of it on either side of the vanes' delay.
+DELAY_DIFFERENCE = "beta_delay_difference_s"
 PLACES = ("vane_x_m", "vane_z_m")  # errors of the vanes' position from the IMU
 WITH_GPS = ("gps_delay_s", "wind_north_mps", "wind_east_mps")
 START = ("north_mps", "east_mps", "down_mps", "turn_north_rad", "turn_east_rad", "turn_down_rad")
@@ -232,6 +234,7 @@ class PathProblem:
         alpha_scale, alpha_zero, beta_scale, beta_zero = self._value(local, FLOW)
         scale, zero = self._value(local, PITOT)
         vane_delay, pitot_delay = self._value(local, DELAYS)
+        (difference,) = self._value(local, (DELAY_DIFFERENCE,))
         # Angles refer to the measured airspeed, which has longitudinal gusts (3 % of speed) in it.
         least = LEAST_SPEED_MPS**2
         square_speed = np.maximum(s.airspeed_mps**2 - 2.0 * zero / s.density_kgpm3, least) / (
@@ -252,9 +255,9 @@ class PathProblem:
         result.append((delayed, slope))
         arm_x, arm_z = self._value(local, PLACES) + s.vane_m
         by_x, by_z = rates[:, [1, 2]] * [-1.0, 1.0] / u[:, None], -rates[:, 0] / u
-        for across, gain, offset, name in (
-            (2, alpha_scale, alpha_zero, "alpha"),
-            (1, beta_scale, beta_zero, "beta"),
+        for across, gain, offset, name, side in (
+            (2, alpha_scale, alpha_zero, "alpha", -0.5),
+            (1, beta_scale, beta_zero, "beta", 0.5),
         ):
             if f"{name}_rad" not in self.model.outputs:
                 continue
@@ -264,9 +267,10 @@ class PathProblem:
                 angle = angle + arm_z * by_z
             sensed = (1.0 + gain) * angle + offset
             # A vane is of second order: beyond its delay tau it has (tau^2/2 - 1/omega^2) s^2.
-            curvature_s2 = 0.5 * vane_delay**2 - s.vane_s2 if s.vane_s2 else 0.0
+            delay_s = vane_delay + side * difference
+            curvature_s2 = 0.5 * delay_s**2 - s.vane_s2 if s.vane_s2 else 0.0
             sensed = sensed + curvature_s2 * np.gradient(np.gradient(sensed, s.dt_s), s.dt_s)
-            delayed, change = self._late(sensed, vane_delay, s.dt_s)
+            delayed, change = self._late(sensed, delay_s, s.dt_s)
             forward, sideways = self._mean(u), mean_flow[:, across]
             part = (1.0 + gain) / (forward**2 + sideways**2)
             in_plane = np.einsum("ni,nik->nk", mean_flow[:, 1:], x[:, 1:]) / forward[:, None]
@@ -281,6 +285,7 @@ class PathProblem:
             if across == 1:
                 self._add(slope, "vane_z_m", (1.0 + gain) * self._mean(by_z))
             self._add(slope, "vane_delay_s", change)
+            self._add(slope, DELAY_DIFFERENCE, side * change)
             result.append((delayed, slope))
         return result
 

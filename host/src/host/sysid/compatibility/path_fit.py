@@ -15,7 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.compatibility.flight_path import AIR, DELAYS, FLOW, GPS, PITOT, PLACES, PathProblem
+from host.sysid.compatibility.flight_path import (
+    AIR,
+    DELAY_DIFFERENCE,
+    DELAYS,
+    FLOW,
+    GPS,
+    PITOT,
+    PLACES,
+    PathProblem,
+)
 from host.sysid.identification_error import IdentificationError
 from host.sysid.numerics.ar_noise import ArNoise, fit_ar, lagged_moments
 
@@ -32,7 +41,7 @@ PLAIN_ITERATIONS = 25  # most of these iterations; a step is halved until the co
 HALVINGS = 5
 PLAIN_STEP_LIMIT = 3.0  # of a standard error: they end
 AIR_PRIOR_WEIGHT = 1e4  # times the prior precision
-AIR_ERRORS = (*FLOW, *PITOT, *DELAYS, *PLACES)
+AIR_ERRORS = (*FLOW, *PITOT, *DELAYS, DELAY_DIFFERENCE, *PLACES)
 STEP_LIMIT = 0.05  # of a standard error: convergence
 DRIFT_POWERS = 4  # constants to cubics do not correlate with gusts either
 RIDGE = 1e-10  # of a column's power: a surface that never moved has none

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -9,9 +10,15 @@ import numpy as np
 
 from host.aircraft.mass_properties import AirframeData
 from host.arrays import Array, BoolArray
-from host.instrument.deviations import SensorErrorModel, deviations, unknown_sensors
+from host.instrument.deviations import (
+    SensorErrorModel,
+    deviations,
+    unknown_sensors,
+    vane_delay_s,
+)
 from host.sysid.compatibility.flight_path import (
     AIR,
+    DELAY_DIFFERENCE,
     DELAYS,
     FLOW,
     GPS,
@@ -36,7 +43,7 @@ BLOCK_S = 0.05  # samples are averaged over this: the motion of a trainer is far
 SEGMENT_S = 12.0
 SHORT_SEGMENT_S = 6.0  # without GPS nothing holds the path for longer
 # Without GPS a tilt of the IMU, a bias of an accelerometer and the attitude look alike.
-WITHOUT_GPS = (*INERTIAL[0:3], *FLOW, *DELAYS)
+WITHOUT_GPS = (*INERTIAL[0:3], *FLOW, *DELAYS, DELAY_DIFFERENCE)
 MOST_SEGMENTS = 8
 LEAST_EXCITATION = 0.1  # of the most excited segment: initial value of each axis
 QUADRANTS = 4  # of heading: wind and pitot scale need them
@@ -135,12 +142,14 @@ def prior(
     }
     result |= {name: (0.0, known[name]) for name in (*FLOW, *PITOT)}
     result |= dict(zip(DELAYS, (VANE_DELAY_S, (i.pitot_lag_s, i.pitot_lag_s)), strict=True))
+    # As two pairs differ: as the places of the vanes it turned up, up to five deviations of them.
+    result[DELAY_DIFFERENCE] = (0.0, math.sqrt(2.0) * vane_delay_s(i, VANE_DELAY_S[0]))
     # Both were measured from the same point, so the position of the CG does not matter.
     place = float(np.hypot(sd["imu_x_m"], sd["vane_x_m"]))
     result |= dict.fromkeys(PLACES, (0.0, place))
     wind = (0.0, WIND_SD_MPS)
     result |= dict(zip(WITH_GPS, (GPS_DELAY_S, wind, wind), strict=True))
-    of_vanes = () if vanes else (*FLOW, DELAYS[0], *PLACES)
+    of_vanes = () if vanes else (*FLOW, DELAYS[0], DELAY_DIFFERENCE, *PLACES)
     return {n: (float(mean), float(own)) for n, (mean, own) in result.items() if n not in of_vanes}
 
 
