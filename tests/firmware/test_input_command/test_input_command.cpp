@@ -284,6 +284,21 @@ TEST_CASE("the deflection follows the shape no faster than the rate") {
   CHECK_EQ(before, -200);
 }
 
+TEST_CASE("a row begins with nothing of the one before it") {
+  Bench bench;
+  for (int16_t& ticks : bench.memory.applied_ticks) ticks = 77;
+  bench.memory.open_looks = 1;
+  bench.memory.elapsed_ms = 900;
+  bench.run(SwitchPlace::kMega, 600);
+  while (!bench.command.running()) bench.run(SwitchPlace::kArmed, 5);
+  for (const int16_t ticks : bench.memory.applied_ticks) CHECK_EQ(ticks, 0);
+  CHECK_EQ(bench.memory.open_looks, 0);
+  CHECK_EQ(bench.memory.elapsed_ms, 0);
+  bench.facts.contact = false;
+  bench.look();
+  CHECK(bench.command.running());
+}
+
 TEST_CASE("in its quiet time nothing is deflected") {
   Bench bench;
   bench.run(SwitchPlace::kMega, 600);

@@ -221,6 +221,62 @@ TEST_CASE("distances: metres, the cosine of the latitude, and far away") {
   CHECK(!core::within_distance(home, home.latitude, -1799999999, 3000));  // the date line: refused
 }
 
+TEST_CASE("far to the east is far, where its square comes round too") {
+  core::InputHome home;
+  home.cosine = core::home_cosine(home.latitude);
+  CHECK(!core::within_distance(home, 0, 5883520, 3000));  // 65536 m
+  CHECK(!core::within_distance(home, 5883520, 0, 3000));
+  CHECK(core::within_distance(home, 0, -26900, 300));
+  CHECK(!core::within_distance(home, 0, -27100, 300));
+}
+
+TEST_CASE("nothing has moved at the start, whatever the time is") {
+  InputMotion motion;
+  for (uint32_t now_us = 0; now_us < 5000000U; now_us += 16000) {
+    motion.start(now_us);
+    for (uint8_t sensor = 0; sensor < InputMotion::kSensors; ++sensor) {
+      CHECK(!motion.moves(sensor, 2000, now_us));
+    }
+  }
+}
+
+TEST_CASE("a value that moves by any power of two has moved") {
+  for (uint8_t bit = 0; bit < 16; ++bit) {
+    Bench bench;
+    bench.still[InputMotion::kBaro] = true;
+    bench.run(600);
+    CHECK(!bench.motion.moves(InputMotion::kBaro, 500, bench.now_us));
+    bench.in.static_pressure ^= uint32_t{1} << bit;
+    bench.motion.see_baro(bench.in, bench.now_us);
+    CHECK(bench.motion.moves(InputMotion::kBaro, 500, bench.now_us));
+  }
+}
+
+TEST_CASE("a stick is at its end within 32 us, and each axis must be moved") {
+  for (uint8_t held = 0; held < core::kCardAxes; ++held) {
+    core::StickTravel travel;
+    core::RcChannels rc = {{3001, 2992, 3000, 2200, 2200}, 0x1F, 0x1F};
+    travel.look(rc);
+    CHECK_EQ(travel.least_ticks(0), 3008);
+    CHECK_EQ(travel.most_ticks(1), 2992);
+    CHECK_EQ(travel.most_ticks(2), 3008);
+    for (uint16_t n = 0; n < 200; ++n) {
+      for (uint8_t i = 0; i < core::kCardAxes; ++i) {
+        rc.width_ticks[i] = i == held ? uint16_t{2992} : n < 100 ? uint16_t{2400} : uint16_t{3600};
+      }
+      travel.look(rc);
+    }
+    CHECK(!travel.shown());
+    const uint8_t moved = held == 0 ? 1 : 0;
+    const uint16_t least = travel.least_ticks(moved);
+    const uint16_t most = travel.most_ticks(moved);
+    CHECK(travel.at_end(moved, static_cast<uint16_t>(least + 64)));
+    CHECK(!travel.at_end(moved, static_cast<uint16_t>(least + 65)));
+    CHECK(travel.at_end(moved, static_cast<uint16_t>(most - 64)));
+    CHECK(!travel.at_end(moved, static_cast<uint16_t>(most - 65)));
+  }
+}
+
 TEST_CASE("travel is shown slowly, and one spoilt pulse adds one step") {
   core::StickTravel travel;
   core::RcChannels rc = {{3000, 3000, 3000, 2200, 2200}, 0x1F, 0x1F};

@@ -50,6 +50,13 @@ TEST_CASE("the sine is within 3 of 16384 everywhere, and odd") {
   CHECK_EQ(core::sin14(49152U), -16384);
 }
 
+TEST_CASE("each value of the table is the nearest, as the page says") {
+  for (uint16_t i = 0; i <= 64; ++i) {
+    const double exact = 16384.0 * sin(kTurn * i / 256.0);
+    CHECK(near(core::sin14(static_cast<uint16_t>(i << 8)), exact, 0.5));
+  }
+}
+
 TEST_CASE("a pulse stands for its time and no longer") {
   const CardRow row = row_of(CardShape::kPulse, 500, -70);
   CHECK_EQ(at(row, 0), -140);

@@ -175,7 +175,7 @@ RECEIVER = (
 SUPPLY = (
     Fault("21", "supply sags to 4.4 V", "logged, values kept, released",
           lambda r: sag(r, 4.4), lambda r: sag(r, 5.0), events=("drive_changed",), engaged=False,
-          check=sag_is_logged),
+          fault_s=3.5, check=sag_is_logged),  # three measurements, one a second, whatever the phase
     Fault("21", "supply dips to 4.0 V for 100 ms", "brown-out reset, resumes in 2 s",
           brown_out, lossless=False, events=("reset",), engaged=False, resets=True,
           check=came_back("brown_out")),
