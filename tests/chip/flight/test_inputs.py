@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from copy import deepcopy
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -277,6 +278,6 @@ def test_plain_pulses_within_45_ms_of_a_contact_that_opens(running: InputRig) ->
         last_s = float(late.max()) / TICKS_PER_S - at_s if late.size else 0.0
         return wrong(running, at_s, SENSE_S), last_s
 
-    found = [in_fork(lambda at_s=FAULT_S + 0.0017 * k: fly(at_s)) for k in range(24)]
+    found = [in_fork(partial(fly, FAULT_S + 0.0017 * k)) for k in range(24)]
     print(f"last deflected pulse begins {1000 * max(s for _, s in found):.1f} ms behind it at most")
     assert [said for said, _ in found if said] == []
