@@ -80,7 +80,7 @@ def test_one_point_alone_tells_less_than_three_of_it(card: Card, promised: Predi
     shares: list[float] = []
     [alone] = promise_points(card, 0.3, flights=1, progress=shares.append)
     assert (alone.kind, alone.axes, alone.amplitudes) == ("3211", ("elevator",), (3.0,))
-    assert [w.name for w in alone.widths] == ["M_alpha", "M_q", "M_de"]
+    assert [w.name for w in alone.widths] == ["Cm_alpha", "Cm_q", "Cm_de"]
     assert not alone.failures
     assert alone.recorded  # sensors alone promised half of what a log gives of N_r
     assert shares == [1.0]
@@ -99,7 +99,7 @@ def test_without_a_compiler_points_are_promised_by_the_sensors_alone(
     monkeypatch.setattr("host.planning.point_widths.predict_widths", known)
     [alone] = promise_points(card, 0.3, flights=1)
     assert not alone.recorded
-    assert [w.name for w in alone.widths] == ["M_alpha", "M_q", "M_de"]
+    assert [w.name for w in alone.widths] == ["Cm_alpha", "Cm_q", "Cm_de"]
 
 
 def test_the_verb_prints_them_beside_the_bound(

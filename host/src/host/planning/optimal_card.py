@@ -235,9 +235,17 @@ def standard_card(aircraft: Aircraft, airspeed_mps: float = 0.0, repeat: int = 1
         Segment("3211", axes=(axis,), amplitudes=(3.0,), width_s=width, before_s=QUIET_S)
         for axis, width in mode_widths_s(aircraft, speed).items()
     ]
-    scaled = within_limits(_card(aircraft, speed, points), _fleet(aircraft)).segments[1:-1]
     title = f"{aircraft.title}: 3-2-1-1 on each axis"
-    return replace(_card(aircraft, speed, list(scaled) * repeat), title=title)
+    scaled = limited_points(aircraft, speed, points)
+    return replace(_card(aircraft, speed, scaled * repeat), title=title)
+
+
+def limited_points(
+    aircraft: Aircraft, airspeed_mps: float, points: Sequence[Segment]
+) -> list[Segment]:
+    """Return test points as large as the aircraft and drawn ones of its prior's range allow."""
+    card = _card(aircraft, airspeed_mps, list(points))
+    return list(within_limits(card, _fleet(aircraft)).segments[1:-1])
 
 
 def within_limits(card: Card, fleet: Sequence[Aircraft]) -> Card:

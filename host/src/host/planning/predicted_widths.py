@@ -13,12 +13,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 
 from host.aircraft.mass_properties import airframe_data
 from host.aircraft.powerplant import powerplant
+from host.arrays import Array
 from host.constants import NORMAL_95
-from host.instrument.deviations import sensor_error_model
+from host.instrument.deviations import SensorErrorModel, sensor_error_model
 from host.sysid.answer.parameter_units import parameter_unit
+from host.sysid.coefficients.coefficient_estimator import CoefficientAnswer
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.even_grid import even_arrays
 from host.sysid.flight.foreign_tables import from_frame
@@ -34,6 +37,7 @@ FLIGHTS = 3
 LIGHT_GUSTS_MPS = 0.3  # of a card that names none: a calm morning
 
 Progress = Callable[[float], None]
+Told = Callable[[pd.DataFrame, str], "dict[str, ToldWidth]"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +88,7 @@ class Prediction:
 
 
 @dataclass(frozen=True, slots=True)
-class _Row:
+class ToldWidth:
     """A derivative as one flight tells it."""
 
     unit: str
@@ -100,6 +104,7 @@ def predict_widths(
     flights: int = FLIGHTS,
     first_seed: int = FIRST_SEED,
     chain: str = "gps",
+    told: Told | None = None,
     progress: Progress | None = None,
 ) -> Prediction:
     """Fly a card virtually and say what identification will state.
@@ -114,6 +119,8 @@ def predict_widths(
     first_seed : int
     chain : str
         As `virtual_flight` takes it: ``sitl`` is the recorder, ``gps`` needs no compiler.
+    told : callable, optional
+        What one flight's table tells, of an aircraft by name or file; `linear_widths` without.
     progress : callable, optional
         Called with the share that is done.
 
@@ -128,52 +135,77 @@ def predict_widths(
     """
     gusts = gusts_mps if gusts_mps is not None else card.air.turbulence_mps or LIGHT_GUSTS_MPS
     windy = replace(card, air=replace(card.air, turbulence_mps=gusts), faults=())
-    told: dict[str, list[_Row]] = {}
+    found: dict[str, list[ToldWidth]] = {}
     failures: list[str] = []
     for number in range(flights):
+        flight = virtual_flight(windy, first_seed + number, chain=chain)
         try:
-            answers = _identified(windy, first_seed + number, chain)
+            rows = (told or linear_widths)(flight.table, windy.aircraft)
         except IdentificationError as error:
             failures.append(str(error))
-            answers = []
-        for answer in answers:
-            for name, row in _rows(answer).items():
-                told.setdefault(name, []).append(row)
+            rows = {}
+        for name, row in rows.items():
+            found.setdefault(name, []).append(row)
         if progress is not None:
             progress((number + 1) / flights)
     widths = [
         PredictedWidth(
             name,
-            rows[0].unit,
-            statistics.median(row.value for row in rows),
-            statistics.median(row.half_width for row in rows),
-            statistics.median(row.noise_share for row in rows),
-            len(rows),
+            each[0].unit,
+            statistics.median(row.value for row in each),
+            statistics.median(row.half_width for row in each),
+            statistics.median(row.noise_share for row in each),
+            len(each),
         )
-        for name, rows in told.items()
+        for name, each in found.items()
     ]
     return Prediction(gusts, tuple(widths), tuple(dict.fromkeys(failures)))
 
 
-def _identified(card: Card, seed: int, chain: str) -> list[Answer]:
-    """Return the linear answers of one flight, as `host identify` gives them.
+def linear_widths(table: pd.DataFrame, aircraft: str) -> dict[str, ToldWidth]:
+    """Return what the default linear method tells of one flight, as `host identify` does.
 
     With GPS, as every log has it: without, vanes' delays stay as open as their calibration left
     them and the clock's scale too, and M_q of the demo card was promised to 14 % in place of 9.
+
+    Raises
+    ------
+    IdentificationError
+        It tells nothing.
     """
-    found = from_frame(virtual_flight(card, seed, chain=chain).table)
-    columns, _ = even_arrays(found.columns)
-    airframe = airframe_data(card.aircraft)
-    instrument = sensor_error_model(card.aircraft).recorded(recording_of_table(found.columns, {}))
-    return identify(
+    columns, instrument = flown_columns(table, aircraft)
+    airframe = airframe_data(aircraft)
+    answers = identify(
         columns,
         airframe=airframe,
         compatibility=reconstruct(columns, airframe, instrument),
-        powerplant=powerplant(card.aircraft),
+        powerplant=powerplant(aircraft),
     )
+    return {name: row for answer in answers for name, row in _rows(answer).items()}
 
 
-def _rows(answer: Answer) -> dict[str, _Row]:
+def coefficient_widths(answer: CoefficientAnswer) -> dict[str, ToldWidth]:
+    """Return every coefficient of an answer, and how much of its variance more data take away."""
+    fit, found = answer.fit, {}
+    count = len(fit.derivatives)
+    errors = fit.covariance[count:, count:]
+    for k, d in enumerate(fit.derivatives):
+        by_errors = fit.covariance[k, count:]
+        systematic = float(by_errors @ np.linalg.lstsq(errors, by_errors, rcond=None)[0])
+        noise = 1.0 - systematic / max(float(fit.covariance[k, k]), 1e-300)
+        found[d.name] = ToldWidth("1", d.value, d.half_width, max(noise, 0.0))
+    return found
+
+
+def flown_columns(table: pd.DataFrame, aircraft: str) -> tuple[dict[str, Array], SensorErrorModel]:
+    """Return the table of a virtual flight on an even grid, and the errors of who recorded it."""
+    found = from_frame(table)
+    columns, _ = even_arrays(found.columns)
+    recording = recording_of_table(found.columns, {})
+    return columns, sensor_error_model(aircraft).recorded(recording)
+
+
+def _rows(answer: Answer) -> dict[str, ToldWidth]:
     """Return every derivative and coefficient of an answer."""
     result, rows = answer.result, {}
     halves, variances = result.half_width(), result.standard_error**2
@@ -182,8 +214,8 @@ def _rows(answer: Answer) -> dict[str, _Row]:
         k = result.index(name)
         share = float(noise[k] / variances[k]) if variances[k] > 0.0 else 1.0
         unit = parameter_unit(answer.model, name)
-        rows[name] = _Row(unit, result.value(name), float(halves[k]), share)
+        rows[name] = ToldWidth(unit, result.value(name), float(halves[k]), share)
     for one in answer.coefficients:
         share = (NORMAL_95 * one.fit_error / one.half_width) ** 2 if one.half_width > 0.0 else 1.0
-        rows[one.name] = _Row("1", one.value, one.half_width, share)
+        rows[one.name] = ToldWidth("1", one.value, one.half_width, share)
     return rows

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from host.live.test_point.wanted_input import RESPONSE_S
+from host.planning.next_point import INPUT_NAMES, in_words
 from host.planning.point_widths import told_by
+from host.planning.wanted_input import RESPONSE_S
 from host.twin.testcard.cards import Card, Segment, length_s
 
 AGAIN_S = 3.0  # more than before a new point: trim again, think
-NAMES = {"3211": "3-2-1-1"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +35,7 @@ class CardPoint:
     @property
     def text(self) -> str:
         """In the words of the knee board."""
-        s = self.segment
-        sizes = "/".join(f"{a:g}" for a in s.amplitudes)
-        unit = "" if "throttle" in s.axes else " deg"
-        length = f", steps of {s.width_s:g} s" if s.width_s else f", {s.duration_s:g} s"
-        return f"{' and '.join(s.axes)} {NAMES.get(s.kind, s.kind)}, {sizes}{unit}{length}"
+        return in_words(self.segment)
 
 
 def card_points(card: Card) -> list[CardPoint]:
@@ -62,7 +58,7 @@ def card_points(card: Card) -> list[CardPoint]:
 def _words(s: Segment) -> str:
     if s.kind == "turn":
         return f"turn of {s.duration_s:g} s"
-    return f"{' and '.join(s.axes)} {NAMES.get(s.kind, s.kind)}"
+    return f"{' and '.join(s.axes)} {INPUT_NAMES.get(s.kind, s.kind)}"
 
 
 class CardProgress:

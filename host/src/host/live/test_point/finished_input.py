@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from host.arrays import Array
-from host.live.test_point.wanted_input import RESPONSE_S, SURFACES, input_length_s
+from host.planning.wanted_input import RESPONSE_S, SURFACES, input_length_s
 from host.sysid.flight.maneuver_detection import (
     FLYING_SHARE,
     LEAST_EDGE_RAD,

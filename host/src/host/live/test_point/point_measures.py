@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.arrays import Array
-from host.live.test_point.aircraft_response import STEP_S, AircraftResponse
-from host.live.test_point.wanted_input import RESPONSE_S, SURFACES, input_length_s, wanted_surfaces
+from host.planning.aircraft_response import STEP_S, AircraftResponse
 from host.planning.point_widths import told_by
-from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver
+from host.planning.wanted_input import RESPONSE_S, SURFACES, input_length_s, wanted_surfaces
+from host.sysid.flight.maneuver_detection import FLYING_SHARE, LEAST_EDGE_RAD, DetectedManeuver
 from host.twin.testcard.cards import Segment
 
 TRIM_S = 1.0  # before the input, which is where the surfaces' trim is read
@@ -35,6 +35,8 @@ class PointMeasures:
         It is one of the card's, or one of these moved by half of what is wanted.
     amplitude : float
         Largest deflection over the wanted one.
+    edge : float
+        The same over the least step that `host maneuvers` takes for one of an input.
     length : float
         Of the input over the wanted one.
     deviations : (k,) array
@@ -59,6 +61,7 @@ class PointMeasures:
     axis: str
     axis_wanted: bool
     amplitude: float
+    edge: float
     length: float
     deviations: Array
     unquiet: float
@@ -109,6 +112,7 @@ def measure(
         axis=most,
         axis_wanted=most in own or amplitude > 0.5,
         amplitude=amplitude,
+        edge=amplitude * size / LEAST_EDGE_RAD,
         length=(found.input_end_s - found.start_s) / input_length_s(wanted),
         deviations=response.deviations(names, alone) / response.deviations(names, asked),
         unquiet=_rms(rate[before] - rate[before].mean())

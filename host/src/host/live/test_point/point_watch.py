@@ -9,15 +9,16 @@ from typing import Any
 
 from host.aircraft.linear_aircraft import load
 from host.live.live_sample import LiveUpdate
-from host.live.test_point.aircraft_response import AircraftResponse
-from host.live.test_point.card_progress import NAMES, CardPoint, CardProgress
+from host.live.test_point.card_progress import CardPoint, CardProgress
 from host.live.test_point.finished_input import finished_inputs
 from host.live.test_point.point_measures import measure
 from host.live.test_point.point_verdict import judge_point
 from host.live.test_point.recent_flight import RecentFlight
-from host.live.test_point.wanted_input import RESPONSE_S
 from host.live.test_point.weak_input import weak_input
+from host.planning.aircraft_response import AircraftResponse
+from host.planning.next_point import INPUT_NAMES
 from host.planning.predicted_widths import LIGHT_GUSTS_MPS
+from host.planning.wanted_input import RESPONSE_S
 from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver
 from host.twin.testcard.cards import Card
 
@@ -96,13 +97,14 @@ class PointWatch:
             columns, item, point.segment, self._response, self._gusts_mps, self._since_s
         )
         verdict = judge_point(measures, point.segment)
+        shape = INPUT_NAMES.get(item.kind, item.kind)
         self._since_s = item.input_end_s + RESPONSE_S
         self.verdicts.append(
             {
                 "number": next(self._number),
                 "point": point.number,
                 "what": point.text,
-                "flown": f"{item.axis.removesuffix('_rad')} {NAMES.get(item.kind, item.kind)}",
+                "flown": f"{item.axis.removesuffix('_rad')} {shape}",
                 "start_s": round(item.start_s, 2),
                 "end_s": round(item.input_end_s + RESPONSE_S, 2),
                 "said_s": round(now_s, 2),

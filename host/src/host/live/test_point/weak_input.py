@@ -10,8 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from host.arrays import Array
-from host.live.test_point.aircraft_response import STEP_S, AircraftResponse
-from host.live.test_point.wanted_input import (
+from host.planning.aircraft_response import STEP_S, AircraftResponse
+from host.planning.wanted_input import (
     RESPONSE_S,
     SURFACES,
     input_length_s,

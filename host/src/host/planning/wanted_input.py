@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from host.aircraft.airframe import Array
-from host.live.test_point.aircraft_response import STEP_S, AircraftResponse
+from host.planning.aircraft_response import STEP_S, AircraftResponse
 from host.twin.testcard.cards import Segment
 from host.twin.testcard.input_shapes import (
     STEPS,

@@ -8,25 +8,31 @@ the model is needed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from scipy.linalg import expm
+from scipy.signal import butter, lfilter
 
 from host.aircraft.air import atmosphere
 from host.aircraft.air import density_kgpm3 as density_at
 from host.aircraft.file import Aircraft
 from host.aircraft.linearisation import linearise, modes
+from host.aircraft.mode_names import DUTCH_ROLL, SHORT_PERIOD
 from host.aircraft.trim import solve
 from host.arrays import Array
 
 STEP_S = 0.01
+# Gusts are slow: motion slower than this share of the mode's frequency drowns in them.
+FAST_SHARE = 0.3
+SLOW_HZ = 0.5
 _SURFACES = {"longitudinal": ("elevator",), "lateral": ("aileron", "rudder")}
 # Rows of the equations of motion -> motion, and columns of what multiplies their derivatives.
 _ROWS = {
-    "M": ("longitudinal", ("alpha", "q", "de")),
-    "L": ("lateral", ("beta", "p", "r", "da", "dr")),
-    "N": ("lateral", ("beta", "p", "r", "da", "dr")),
+    "CL": ("longitudinal", ("alpha", "q", "de")),
+    "Cm": ("longitudinal", ("alpha", "q", "de")),
+    "Cl": ("lateral", ("beta", "p", "r", "da", "dr")),
+    "Cn": ("lateral", ("beta", "p", "r", "da", "dr")),
 }
 _LEAST_RAD = 1e-4  # of a regressor: without any movement nothing is known, but not infinitely so
 
@@ -54,10 +60,20 @@ class AircraftResponse:
         self.airspeed_mps = airspeed_mps
         self.servo_radps = float(frame.servo_bandwidth_radps)
         self.modes = {mode.name: mode for mode in modes(linear)}
+        self._fast = {
+            name: butter(2, FAST_SHARE * self._mode_hz(mode) * 2.0 * STEP_S, "high")
+            for name, mode in (("longitudinal", SHORT_PERIOD), ("lateral", DUTCH_ROLL))
+        }
         self._steps = {
             "longitudinal": _discrete(linear.longitudinal_a, linear.longitudinal_b),
             "lateral": _discrete(linear.lateral_a, linear.lateral_b),
         }
+
+    def _mode_hz(self, name: str) -> float:
+        """Return a mode's frequency; a slow one where the aircraft does not oscillate so."""
+        if name not in self.modes:
+            return SLOW_HZ
+        return max(self.modes[name].frequency_radps / (2.0 * np.pi), SLOW_HZ)
 
     def motion(self, name: str, surfaces: Mapping[str, Array]) -> dict[str, Array]:
         """Return the motion that deflections from the trim cause.
@@ -88,21 +104,46 @@ class AircraftResponse:
         Parameters
         ----------
         names : tuple of str
-            Such as ``M_q``.
+            Such as ``Cm_q``.
         surfaces : dict
             As `motion` takes them.
         """
-        found = []
-        for name in names:
-            row, _, of = name.partition("_")
+        of = self.information({name.partition("_")[0] for name in names}, surfaces)
+        return deviations(names, of)
+
+    def information(self, rows: Iterable[str], surfaces: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the information matrix of each equation's derivatives for unit noise.
+
+        Parameters
+        ----------
+        rows : iterable of str
+            Such as ``Cm``; that of several inputs is the sum.
+        surfaces : dict
+            As `motion` takes them.
+        """
+        moved: dict[str, dict[str, Array]] = {}
+        found: dict[str, Array] = {}
+        for row in rows:
             motion, columns = _ROWS[row]
-            moved = self.motion(motion, surfaces)
-            x = np.stack([moved[one] for one in columns], axis=1)
-            x -= x.mean(axis=0)  # each point has a constant of its own
-            information = x.T @ x * STEP_S + np.eye(len(columns)) * _LEAST_RAD**2
-            at = columns.index(of)
-            found.append(float(np.sqrt(np.linalg.inv(information)[at, at])))
-        return np.array(found)
+            if motion not in moved:
+                moved[motion] = self.motion(motion, surfaces)
+            x = np.stack([moved[motion][one] for one in columns], axis=1)
+            b, a = self._fast[motion]
+            x = lfilter(b, a, x - x[0], axis=0)
+            found[row] = np.asarray(x.T @ x * STEP_S)
+        return found
+
+
+def deviations(names: Sequence[str], information: Mapping[str, Array]) -> Array:
+    """Return the standard deviation of each derivative, of information by equation."""
+    found = []
+    for name in names:
+        row, _, of = name.partition("_")
+        columns = _ROWS[row][1]
+        at = columns.index(of)
+        least = np.eye(len(columns)) * _LEAST_RAD**2
+        found.append(float(np.sqrt(np.linalg.inv(information[row] + least)[at, at])))
+    return np.array(found)
 
 
 def _discrete(a: Array, b: Array) -> tuple[Array, Array]:
