@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from host.live.estimates import flight_estimate
+from host.live.estimates.estimate_worker import EstimateWorker
 from host.live.estimates.flight_estimate import FlightEstimator
+from host.live.estimates.wanted_widths import WANTED_PERCENT
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
@@ -41,6 +44,14 @@ def test_the_page_says_what_identify_says_later(flight: RadioFlight, tmp_path: P
     both = by.at(recording)
     assert len(both.points) == 2
     assert both.values["Cm_alpha"][1] < one.values["Cm_alpha"][1]
+    # What the next point is chosen by: what was flown, and what of a width more of it takes away.
+    [point] = one.flown
+    assert (point.kind, point.axes) == ("3211", ("elevator",))
+    assert point.amplitudes[0] == pytest.approx(3.0, abs=0.8)
+    width, half = one.known["Cm_alpha"], one.values["Cm_alpha"]
+    assert width.percent == pytest.approx(abs(100.0 * half[1] / half[0]))
+    assert 0.3 * width.percent < width.tolerance_percent < width.percent
+    assert both.known["Cm_alpha"].noise_percent < 0.9 * width.noise_percent
     found = host.identify(
         recording, aircraft=AIRCRAFT, calibration=calibration, models="coefficients"
     )
@@ -48,6 +59,28 @@ def test_the_page_says_what_identify_says_later(flight: RadioFlight, tmp_path: P
     assert list(both.values) == [c.name for c in later]
     for c in later:
         assert both.values[c.name] == pytest.approx((c.value, c.half_width))
+
+
+def test_the_process_that_estimates_names_the_next_point(
+    flight: RadioFlight, tmp_path: Path
+) -> None:
+    recording, calibration = tmp_path / "live.radio", tmp_path / "calibration.toml"
+    calibration.write_text(flight.calibration, encoding="utf-8")
+    first, _ = after_each_point(flight.sent, flight.truth, 3.8)
+    recording.write_bytes(first)
+    worker = EstimateWorker(AIRCRAFT, calibration, WANTED_PERCENT)
+    worker.start()
+    try:
+        while True:  # it knows what to choose from after some seconds, and estimates before
+            worker.ask(recording)
+            while (found := worker.answer()) is None:
+                time.sleep(0.02)
+            if found.next_point is not None:
+                break
+    finally:
+        worker.close()
+    assert found.next_point.segment.axes == ("aileron",)
+    assert {"Cl_p", "Cn_dr"} <= set(found.next_point.wanting)
 
 
 def test_a_test_point_under_way_is_in_the_estimate_and_named(

@@ -12,6 +12,8 @@ from host.errors import UsageError
 from host.live.estimates.estimate_worker import Answered, EstimateWorker
 from host.live.estimates.live_estimates import LiveEstimates, live_estimates
 from host.live.estimates.wanted_widths import WANTED_PERCENT, wanted_widths
+from host.planning.next_point import NextPoint
+from host.twin.testcard.cards import Segment
 
 
 @dataclass
@@ -22,6 +24,7 @@ class Pretended:
     values: dict[str, tuple[float, float]]
     now_s: float = 0.0
     busy: bool = False
+    next_point: NextPoint | None = None
     asked: list[tuple[float, int]] = field(default_factory=list)
 
     def ask(self, recording: Path) -> None:
@@ -32,7 +35,9 @@ class Pretended:
         if not self.busy or self.now_s < self.asked[-1][0] + self.takes_s:
             return None
         self.busy = False
-        return Answered(self.now_s, ("3-2-1-1",), "", self.values, "", self.takes_s)
+        return Answered(
+            self.now_s, ("3-2-1-1",), "", self.values, "", self.takes_s, self.next_point
+        )
 
     def close(self) -> None:
         self.busy = False
@@ -78,6 +83,24 @@ def test_a_derivative_is_known_well_enough_at_the_wanted_width() -> None:
         worker.now_s += 0.2
     # A test point flown badly widens, and then it is not enough any more.
     assert found.as_json()["enough"] == 1
+    found.close()
+
+
+def test_what_to_fly_next_is_told_as_long_as_something_is_missing() -> None:
+    worker = Pretended(0.1, {"Cm_alpha": (-1.4, 0.2)})
+    doublet = Segment("doublet", axes=("aileron",), amplitudes=(6.5,), width_s=0.3)
+    worker.next_point = NextPoint(doublet, ("Cl_p", "Cl_da"), 2, 11.8)
+    found = received(worker, 20.0)
+    assert found.as_json()["next"] == {
+        "text": "aileron doublet, 6.5 deg, steps of 0.3 s", "for": ["Cl_p", "Cl_da"],
+        "points": 2, "seconds": 12,
+    }  # fmt: skip
+    worker.next_point = None
+    while worker.now_s < 30.0:
+        found.take(bytes(400))
+        found.tick()
+        worker.now_s += 0.2
+    assert found.as_json()["next"] is None
     found.close()
 
 

@@ -10,13 +10,17 @@ import contextlib
 import os
 import signal
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from host.errors import HostError
+
+if TYPE_CHECKING:
+    from host.planning.next_point import NextPoint, NextPoints
 
 _ONE_THREAD = "OPENBLAS_NUM_THREADS"  # the matrices are small: threads only wait for each other
 _NICER = 5
@@ -39,6 +43,8 @@ class Answered:
         Why there is no estimate.
     used_s : float
         Processor time.
+    next_point : NextPoint or None
+        What to fly next; None if nothing is needed, or nothing would help.
     """
 
     until_s: float
@@ -47,6 +53,7 @@ class Answered:
     values: dict[str, tuple[float, float]]
     why_not: str
     used_s: float
+    next_point: NextPoint | None = None
 
 
 class EstimateWorker:
@@ -57,10 +64,17 @@ class EstimateWorker:
     aircraft : str
         Name or file.
     calibration : Path, optional
+    wanted : mapping of str to float, optional
+        Half-widths in per cent; the next test point is chosen for them.
     """
 
-    def __init__(self, aircraft: str, calibration: Path | None) -> None:
-        self._given = (aircraft, calibration)
+    def __init__(
+        self,
+        aircraft: str,
+        calibration: Path | None,
+        wanted: Mapping[str, float] | None = None,
+    ) -> None:
+        self._given = (aircraft, calibration, dict(wanted or {}))
         self._process: Any = None
         self._ours: Connection | None = None
         self.busy = False
@@ -106,20 +120,26 @@ class EstimateWorker:
         self._ours = None
 
 
-def _estimate_for_ever(asked: Connection, aircraft: str, calibration: Path | None) -> None:
+def _estimate_for_ever(
+    asked: Connection, aircraft: str, calibration: Path | None, wanted: dict[str, float]
+) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's
     if hasattr(os, "nice"):
         os.nice(_NICER)
     from host.live.estimates.flight_estimate import FlightEstimator
 
-    by = None
+    by = points = None
+    tried = not wanted
     with contextlib.suppress(EOFError, OSError):  # the parent has gone
         while True:
+            if not tried and not asked.poll():  # seconds of work: nobody waits for an estimate
+                points, tried = _next_points(aircraft), True
             recording = asked.recv()
             began = time.process_time()
             try:
                 by = by or FlightEstimator(aircraft, calibration)
                 found = by.at(recording)
+                chosen = points.best(found.known, found.flown, wanted) if points else None
             except HostError as error:
                 asked.send(_nothing(str(error), began))
             except Exception as error:  # of ours: told, and the next portion is tried
@@ -133,8 +153,20 @@ def _estimate_for_ever(asked: Connection, aircraft: str, calibration: Path | Non
                         found.values,
                         found.why_not,
                         time.process_time() - began,
+                        chosen,
                     )
                 )
+
+
+def _next_points(aircraft: str) -> NextPoints | None:
+    """Return who chooses the next point; None where the file has no aerodynamics to plan by."""
+    from host.aircraft.linear_aircraft import load
+    from host.planning.next_point import NextPoints
+
+    try:
+        return NextPoints(load(aircraft))
+    except HostError:
+        return None
 
 
 def _nothing(why: str, began: float) -> Answered:

@@ -7,13 +7,16 @@ says is what the same command says later of the same data.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
 from host.log import read_log
+from host.planning.next_point import INPUT_NAMES, KnownWidth
+from host.planning.predicted_widths import ToldWidth, coefficient_widths
 from host.sysid.coefficients.coefficient_estimator import (
     CoefficientAnswer,
     CoefficientEstimator,
@@ -26,6 +29,8 @@ from host.sysid.flight.reconstructed_flight import maneuver_name, reconstruct_fl
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import AircraftData, aircraft_data
 from host.sysid.pipeline.surface_travel import with_surface_angles
+from host.twin.testcard.cards import Segment
+from host.twin.testcard.input_shapes import STEPS
 
 # What a surface does is told once it was flown: from a stick that was only held its interval held
 # the truth in 3 of 11.
@@ -48,6 +53,10 @@ class FlightEstimate:
         The one being flown; empty if none.
     values : dict of str to (float, float)
         Estimate and half-width of its 95 % interval.
+    known : dict of str to KnownWidth
+        The same in per cent, and what of it no test point makes smaller.
+    flown : tuple of Segment
+        The completed test points as they were flown.
     answer : CoefficientAnswer or None
         All of it; None before anything can be told.
     why_not : str
@@ -60,6 +69,8 @@ class FlightEstimate:
     values: dict[str, tuple[float, float]]
     answer: CoefficientAnswer | None = None
     why_not: str = ""
+    known: dict[str, KnownWidth] = field(default_factory=dict)
+    flown: tuple[Segment, ...] = ()
 
 
 class FlightEstimator:
@@ -108,16 +119,24 @@ class FlightEstimator:
         columns = surface_positions(columns, instrument)
         until_s = float(columns["t_s"][-1])
         found = [m for m in detect_maneuvers(columns) if m.axis != "throttle"]
-        points, under_way = _points(found, until_s - _SETTLED_S)
+        done, under_way = _points(found, until_s - _SETTLED_S)
         answers, why_not = self._answers(columns, found, read, instrument)
-        values = {
-            c.name: (float(c.value), float(c.half_width))
+        told = {
+            name: width
             for answer in answers
-            for c in answer.coefficients
-            if _AXIS_OF.get(c.name.rpartition("_")[2], "") in _moved(answer)
+            for name, width in coefficient_widths(answer).items()
+            if _AXIS_OF.get(name.rpartition("_")[2], "") in _moved(answer)
         }
-        best = answers[0] if answers else None
-        return FlightEstimate(until_s, points, under_way, values, best, why_not)
+        return FlightEstimate(
+            until_s,
+            tuple(maneuver_name(one) for one in done),
+            under_way,
+            {name: (float(w.value), float(w.half_width)) for name, w in told.items()},
+            answers[0] if answers else None,
+            why_not,
+            {name: _known(w) for name, w in told.items() if w.value},
+            tuple(_as_flown(one) for one in done),
+        )
 
     def _answers(
         self,
@@ -174,8 +193,25 @@ def _moved(answer: CoefficientAnswer) -> set[str]:
     return {"", *(m.axis for m in answer.used if m.input_end_s - m.start_s > _INPUT_S)}
 
 
-def _points(found: list[DetectedManeuver], until_s: float) -> tuple[tuple[str, ...], str]:
-    """Return the names of completed test points and of the one being flown, if any.
+def _known(width: ToldWidth) -> KnownWidth:
+    percent = 100.0 * abs(width.half_width / width.value)
+    return KnownWidth(percent, percent * math.sqrt(max(1.0 - width.noise_share, 0.0)))
+
+
+def _as_flown(one: DetectedManeuver) -> Segment:
+    """Return a test point that was found as a card would have it."""
+    kind = next((k for k in STEPS if INPUT_NAMES.get(k, k) == one.kind), "doublet")
+    units = sum(length for _, length in STEPS[kind])
+    return Segment(
+        kind,
+        axes=(one.axis.removesuffix("_rad"),),
+        amplitudes=(round(math.degrees(one.amplitude), 1),),
+        width_s=round((one.input_end_s - one.start_s) / units, 2),
+    )
+
+
+def _points(found: list[DetectedManeuver], until_s: float) -> tuple[list[DetectedManeuver], str]:
+    """Return completed test points and the name of the one being flown, if any.
 
     A test point that a gap divided is one: its parts have the amplitude of the whole.
     """
@@ -184,5 +220,4 @@ def _points(found: list[DetectedManeuver], until_s: float) -> tuple[tuple[str, .
         parts.setdefault((one.axis, one.amplitude), []).append(one)
     done = [p for p in parts.values() if p[-1].end_s < until_s]
     open_ones = [p for p in parts.values() if p[-1].end_s >= until_s]
-    named = tuple(maneuver_name(p[0]) for p in done)
-    return named, maneuver_name(open_ones[-1][0]) if open_ones else ""
+    return [p[0] for p in done], maneuver_name(open_ones[-1][0]) if open_ones else ""

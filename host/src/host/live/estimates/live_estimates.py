@@ -10,11 +10,14 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from host.aircraft.file import load_measured
 from host.live.estimates.estimate_worker import Answered, EstimateWorker
 from host.live.estimates.wanted_widths import wanted_widths
+
+if TYPE_CHECKING:
+    from host.planning.next_point import NextPoint
 
 _LEAST_S = 1.0  # between two estimates
 _REST = 5.0  # times what the last one took: a load of a sixth
@@ -48,7 +51,7 @@ def live_estimates(
     place = Path(own.name)
     if calibration:
         (place / "calibration.toml").write_text(calibration, encoding="utf-8")
-    worker = EstimateWorker(aircraft, place / "calibration.toml" if calibration else None)
+    worker = EstimateWorker(aircraft, place / "calibration.toml" if calibration else None, percent)
     worker.start()
     return LiveEstimates(worker, percent, recording, own)
 
@@ -147,6 +150,7 @@ class LiveEstimates:
             "points": list(last.points) if last else [],
             "under_way": last.under_way if last else "",
             "why_not": last.why_not if last else "",
+            "next": _next(last.next_point) if last else None,
             "load_percent": round(100.0 * self._used_s / elapsed_s, 1) if elapsed_s > 1.0 else None,
         }
 
@@ -176,3 +180,17 @@ class LiveEstimates:
             "wanted_percent": percent,
             "enough": reached is not None and reached <= percent,
         }
+
+
+def _next(point: NextPoint | None) -> dict[str, Any] | None:
+    """Return what to fly next: words, for which derivatives, how much is left by and by."""
+    if point is None:
+        return None
+    from host.planning.next_point import in_words
+
+    return {
+        "text": in_words(point.segment),
+        "for": list(point.wanting),
+        "points": point.points,
+        "seconds": round(point.seconds),
+    }

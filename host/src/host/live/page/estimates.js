@@ -50,6 +50,14 @@ function said(estimates) {
   return estimates.until_s === null ? "waiting for a test point" : `${points}${open}, to ${estimates.until_s.toFixed(0)} s`;
 }
 
+// What to fly next for what is still missing, as far as one can tell now.
+function nextWords(next) {
+  if (!next) return "";
+  const left = next.points === 1 ? "the last one" : `about ${next.points} points, ${next.seconds} s`;
+  const names = next.for.map((name) => name.replace("_", " ")).join(", ");
+  return `next: ${next.text} (${left}; for ${names})`;
+}
+
 let enough = 0;
 
 // Shows the estimates; returns true when one more derivative is known well enough.
@@ -60,6 +68,8 @@ export function showEstimates(estimates) {
   byId("estimates-rows").replaceChildren(...estimates.rows.map(line));
   const words = said(estimates);
   if (byId("estimates-said").textContent !== words) byId("estimates-said").textContent = byId("estimates-said").title = words;
+  const next = nextWords(estimates.next);
+  if (byId("estimates-next").textContent !== next) byId("estimates-next").textContent = next;
   const more = estimates.enough > enough;
   enough = estimates.enough;
   return more;
