@@ -117,12 +117,21 @@ def test_flaperons_and_two_motors() -> None:
 
 
 def test_an_output_stands_until_the_next_pulse() -> None:
-    """Of every second pulse of 50 Hz the one between is on the line, and each one stands."""
+    """Of every second pulse of 50 Hz the one between is on the curve, and each one stands."""
     t = np.arange(0.0, 1.0, 0.04)
     rows, values = held_output(Signal(t, np.where(t < 0.5, 0.0, 1.0), "C2"), 0.02)
     assert values[rows < 0.48 + 0.0199].max() == 0.0
     assert values[(rows > 0.5001) & (rows < 0.5199)] == pytest.approx(0.5)
     assert values[rows > 0.5201].min() == 1.0
+
+
+def test_pulses_between_records_keep_a_motion_of_3_hz() -> None:
+    """A line for every second pulse would be 7 % of it too small at its top."""
+    t = np.arange(0.0, 2.0, 0.04)
+    rows, values = held_output(Signal(t, np.sin(6.0 * np.pi * t), "C2"), 0.02)
+    between = (np.round(rows / 0.005) % 8 == 4) & (rows > 0.1) & (rows < 1.9)
+    assert between.sum() > 40
+    np.testing.assert_allclose(values[between], np.sin(6.0 * np.pi * rows[between]), atol=0.02)
 
 
 def test_times_that_cannot_be() -> None:

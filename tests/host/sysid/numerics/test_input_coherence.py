@@ -1,10 +1,13 @@
 """What inputs drive beside a model is told from noise of any colour, and false alarms are few."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from host.sysid.estimators.method_registry import fit
 from host.sysid.models.maneuver import Maneuver
 from host.sysid.models.state_space_model import LinearModel
+from host.sysid.numerics.ar_noise import autocovariance
 from host.sysid.numerics.input_coherence import InputCoherence, block_means, input_coherence
 from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
 from host.sysid.numerics.output_error import minimise
@@ -60,6 +63,25 @@ def test_the_noise_beside_the_inputs_is_that_of_a_right_model() -> None:
     right, wrong = (coherence_of(record(1, "white", lag_s=lag_s)) for lag_s in (0.0, 0.3))
     assert max(n.order for n in right.noise) <= 2
     assert np.all(wrong.innovation_variance < 2.0 * right.innovation_variance)
+
+
+def test_a_sensor_slower_than_the_rows_keeps_its_noise() -> None:
+    """Every fourth sample of q alone was measured, a line between: as noisy as the whole column."""
+    full = record(1, "AR(1) 0.9")
+    rows = np.arange(full.samples)
+    seen = np.ones(full.outputs.shape, dtype=bool)
+    q = navion_structured().outputs.index("q_radps")
+    seen[:, q] = rows % 4 == 0
+    y = full.outputs.copy()
+    y[:, q] = np.interp(rows, rows[::4], y[::4, q])
+    deviations = []
+    for maneuver in (full, replace(full, outputs=y, sampled=seen)):
+        problem = OutputProblem(navion_structured(), [maneuver])
+        found = minimise(problem, np.concatenate([navion_structured().start, np.zeros(4)]))
+        one = input_coherence(problem, found.responses, found.theta, block_s=0.2)
+        memory = autocovariance(one.noise[q].coefficient, 1)[0]
+        deviations.append(float(np.sqrt(one.innovation_variance[q] * memory)))
+    assert 0.7 < deviations[1] / deviations[0] < 1.6
 
 
 def test_output_error_widens_by_what_its_noise_had_explained() -> None:

@@ -98,6 +98,24 @@ def inflate_by_coherence(
     )
 
 
+def widened_to(result: FitResult, variance: Array) -> FitResult:
+    """Return the result with no parameter of its model known better than these variances say.
+
+    Parameters
+    ----------
+    result : FitResult
+    variance : Array, shape (>= P,)
+        Of the model's parameters first.
+    """
+    count = len(result.model.parameter_names)
+    own = np.diag(result.covariance)[:count]
+    factor = np.ones(len(result.covariance))
+    factor[:count] = np.sqrt(
+        np.maximum(np.where(own > 0.0, variance[:count] / np.maximum(own, 1e-300), 1.0), 1.0)
+    )
+    return replace(result, covariance=result.covariance * np.outer(factor, factor))
+
+
 def _lines(
     result: FitResult, found: InputCoherence, factor: Array, excess: NoiseExcess | None
 ) -> list[str]:

@@ -186,9 +186,11 @@ def coloured_output_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array
         for j, variance in enumerate(fit.optimum.variance):
             seen = problem.seen(number, j)
             residual, slope = fit.optimum.residuals[number][j], response.sensitivities[j]
-            part = coloured_score_covariance(residual[seen], slope[seen])
+            if seen is not None:
+                residual, slope = residual[seen], slope[seen]
+            part = coloured_score_covariance(residual, slope)
             if unseen[j] > 0.0:
-                part += unseen[j] * slope[seen].T @ slope[seen]
+                part += unseen[j] * slope.T @ slope
             part /= variance**2
             score_covariance[np.ix_(columns, columns)] += part
     result = white @ score_covariance @ white

@@ -135,7 +135,7 @@ class _Profile:
                 continue
             self.fits[delay_s] = found
             far = (delay_s - self.prior.mean[0]) / self.prior.sd[0]
-            self.costs[delay_s] = _cost(found, data[0].dt_s) + 0.5 * far**2
+            self.costs[delay_s] = _cost(found, data) + 0.5 * far**2
 
     @property
     def best(self) -> float:
@@ -219,7 +219,7 @@ def _least(profile: _Profile, step: float) -> tuple[float, float, float, float]:
         step /= STEP_SHRINKS
 
 
-def _cost(found: FitResult, dt_s: float) -> float:
+def _cost(found: FitResult, data: Sequence[Maneuver]) -> float:
     """Return minus the logarithm of the likelihood of a fit, but for a constant.
 
     Of output error in noise with a memory, estimated beside; innovations are white.
@@ -227,14 +227,20 @@ def _cost(found: FitResult, dt_s: float) -> float:
     if found.residual_kind == "innovation":
         residuals = np.concatenate(found.residuals)
         return 0.5 * len(residuals) * float(np.linalg.slogdet(np.cov(residuals.T))[1])
-    block = block_length(dt_s, AR_STEP_S)
-    left = [block_means(r, block) for r in found.residuals]
     motion = np.std(np.concatenate(found.residuals) + np.concatenate(found.fitted), axis=0)
-    count = sum(len(r) - AR_ORDER for r in left)
-    none = [np.zeros((len(r), 0)) for r in left]
     total = 0.0
-    for j in range(left[0].shape[1]):
-        moments = lagged_moments([r[:, j] for r in left], none, AR_ORDER)
+    for j in range(len(motion)):
+        left = [
+            block_means(
+                r[:, j : j + 1],
+                block_length(m.dt_s, AR_STEP_S),
+                None if m.sampled is None else m.sampled[:, j],
+            )[:, 0]
+            for r, m in zip(found.residuals, data, strict=True)
+        ]
+        count = sum(len(r) - AR_ORDER for r in left)
+        none = [np.zeros((len(r), 0)) for r in left]
+        moments = lagged_moments(left, none, AR_ORDER)
         moments += count * (LACK * motion[j]) ** 2 * np.eye(AR_ORDER + 1)
         try:
             _, innovation = fit_ar(moments, AR_ORDER)

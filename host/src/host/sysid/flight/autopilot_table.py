@@ -50,6 +50,6 @@ def _slow_outputs(flight: AutopilotFlight) -> list[Finding]:
             tuple(f"{name}_rad" for name in slow),
             f"outputs are logged more slowly than servos get them ({rates}): when a surface moved"
             " is known to a part of a step only",
-            done="what lies between two records is drawn on their line",
+            done="what lies between two records is drawn on a curve through four",
         )
     ]

@@ -26,7 +26,7 @@ from host.sysid.aerodynamics.coefficient_table import (
 from host.sysid.compatibility.reconstruction import Compatibility
 from host.sysid.compatibility.sensor_corrections import corrections
 from host.sysid.compatibility.sensor_dynamics import IMU_DELAY, SERVO_DELAY
-from host.sysid.estimators.coherence_inflation import inflate_by_coherence
+from host.sysid.estimators.coherence_inflation import inflate_by_coherence, widened_to
 from host.sysid.estimators.filter_error_gust import (
     GustFit,
     fit_with_gust,
@@ -99,6 +99,7 @@ from host.sysid.models.state_space_model import DelayGroup, LinearModel
 from host.sysid.models.templates import Trim
 from host.sysid.numerics.input_coherence import input_coherence
 from host.sysid.numerics.maneuver_agreement import inflate_covariance, maneuver_agreement
+from host.sysid.numerics.score_variance import white_fit_variance
 
 
 class NoManeuverError(IdentificationError):
@@ -106,6 +107,7 @@ class NoManeuverError(IdentificationError):
 
 
 FREE = ("output", "innovation")  # residuals of methods that simulate
+WHITE = "output error (white)"  # its noise is judged beside what the inputs drive
 WEAK_GRADE = 0.2
 
 
@@ -278,6 +280,16 @@ class LinearEstimator:
         if free is not None:
             coherence = input_coherence(free.problem, free.responses, free.theta)
             excess = excess_over_noise_model(free, statistical, e.trim.airspeed_mps)
+            if statistical.method == WHITE:
+                statistical = widened_to(
+                    statistical,
+                    white_fit_variance(
+                        free.problem,
+                        free.responses,
+                        coherence.noise,
+                        coherence.innovation_variance,
+                    ),
+                )
         statistical = inflate_by_coherence(statistical, coherence, excess)
         shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
         carriers = [m.flight.compatibility for m in e.used]

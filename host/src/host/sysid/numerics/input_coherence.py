@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from host.arrays import Array
+from host.arrays import Array, BoolArray
 from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
@@ -226,8 +226,10 @@ def input_coherence(
             WhitenedOutput(
                 slopes=w.slopes,
                 signatures=[
-                    block_means(s.columns[j], block_length(m.dt_s, block_s))
-                    for s, m in zip(found, problem.maneuvers, strict=True)
+                    block_means(
+                        s.columns[j], block_length(m.dt_s, block_s), problem.seen(number, j)
+                    )
+                    for number, (s, m) in enumerate(zip(found, problem.maneuvers, strict=True))
                 ],
                 residuals=w.residuals,
                 noise=noise[j],
@@ -262,18 +264,19 @@ def _data(problem: OutputProblem, responses: Sequence[Response], block_s: float)
         for m, r in zip(problem.maneuvers, responses, strict=True)
     ]
     blocks = [block_length(m.dt_s, block_s) for m in problem.maneuvers]
-    added = [block_means(Z, block) for Z, block in zip(added, blocks, strict=True)]
     found = []
     for j in range(len(model.outputs)):
-        slopes, residuals = [], []
+        slopes, residuals, extra = [], [], []
         for number, (response, block) in enumerate(zip(responses, blocks, strict=True)):
-            own = block_means(response.sensitivities[j], block)
+            seen = problem.seen(number, j)
+            own = block_means(response.sensitivities[j], block, seen)
             whole = np.zeros((len(own), size))
             whole[:, problem.columns(number)] = own
             slopes.append(whole)
             left = problem.residual(number, response.y)[j]
-            residuals.append(block_means(left[:, None], block)[:, 0])
-        found.append(_Data(residuals, slopes, added))
+            residuals.append(block_means(left[:, None], block, seen)[:, 0])
+            extra.append(block_means(added[number], block, seen))
+        found.append(_Data(residuals, slopes, extra))
     return found
 
 
@@ -282,10 +285,18 @@ def block_length(dt_s: float, block_s: float = BLOCK_S) -> int:
     return max(1, round(block_s / dt_s))
 
 
-def block_means(values: Array, block: int) -> Array:
-    """Return the means of successive blocks of samples, (samples // block, columns)."""
+def block_means(values: Array, block: int, seen: BoolArray | None = None) -> Array:
+    """Return the means of successive blocks of samples, (samples // block, columns).
+
+    Of those `seen` alone, (samples,), where it is given: of a sensor that is slower than the rows a
+    mean with what it did not measure as zero says a part of its noise. Zero where nothing was seen.
+    """
     count = len(values) // block
-    return np.asarray(values[: count * block].reshape(count, block, -1).mean(axis=1))
+    blocks = values[: count * block].reshape(count, block, -1)
+    if seen is None or block == 1:
+        return np.asarray(blocks.mean(axis=1))
+    weight = seen[: count * block].reshape(count, block, 1)
+    return np.asarray((blocks * weight).sum(axis=1) / np.maximum(weight.sum(axis=1), 1))
 
 
 def _whitened(data: _Data, noise: ArNoise) -> _Data:

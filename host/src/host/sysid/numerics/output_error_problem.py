@@ -201,10 +201,10 @@ class OutputProblem:
             result[missing] = 0.0
         return np.asarray(result)
 
-    def seen(self, maneuver: int, output: int) -> BoolArray | slice:
-        """Return at which samples of a maneuver an output was measured."""
+    def seen(self, maneuver: int, output: int) -> BoolArray | None:
+        """Return at which samples of a maneuver an output was measured; None: at all."""
         missing = self._parts[maneuver].missing
-        return slice(None) if missing is None else ~missing[output]
+        return None if missing is None else ~missing[output]
 
     def first_guess(self) -> Array:
         """Return start values: the model's, and first measured samples as initial states."""

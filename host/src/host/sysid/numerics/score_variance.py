@@ -12,11 +12,63 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from host.arrays import Array
-from host.sysid.numerics.ar_noise import ArNoise
-from host.sysid.numerics.coloured_residuals import coloured_score_covariance
+from host.sysid.numerics.ar_noise import ArNoise, autocovariance
+from host.sysid.numerics.coloured_residuals import (
+    coloured_score_covariance,
+    correlated_score_covariance,
+)
 from host.sysid.numerics.information_inverse import covariance_from_information
 from host.sysid.numerics.input_coherence import block_length, block_means
 from host.sysid.numerics.output_error_problem import OutputProblem, Response
+
+LONGEST_LAG = 200  # of an autocorrelation that counts, means
+# Of a noise's power over that of what is left: more has a record without noise alone.
+MOST_POWER = 4.0
+
+
+def white_fit_variance(
+    problem: OutputProblem,
+    responses: Sequence[Response],
+    noise: Sequence[ArNoise],
+    innovation_variance: Array,
+) -> Array:
+    """Return the variance of each parameter of white output error in noise with a memory.
+
+    M^-1 (sum S' R S + P) M^-1 with R of the noise, not of the residuals: these lack what the
+    parameters took, slow gusts most (M_q of two maneuvers in 0.5 m/s: 38 of 50 intervals held).
+
+    Parameters
+    ----------
+    problem : OutputProblem
+    responses : sequence of Response
+        At the estimate.
+    noise : sequence of ArNoise
+        Of the block means of each output, by restricted likelihood.
+    innovation_variance : Array, shape (p,)
+
+    Returns
+    -------
+    Array, shape (P,)
+    """
+    residuals = [problem.residual(k, r.y) for k, r in enumerate(responses)]
+    squares = np.sum([np.sum(r**2, axis=1) for r in residuals], axis=0)
+    variance = np.maximum(squares / problem.counts, problem.least_variance)
+    total = np.diag(problem.prior_precision)
+    score = total.copy()
+    for number, (response, m) in enumerate(zip(responses, problem.maneuvers, strict=True)):
+        own, block = problem.columns(number), block_length(m.dt_s)
+        for j, memory in enumerate(noise):
+            seen = problem.seen(number, j)
+            J = block_means(response.sensitivities[j], block, seen)
+            # Samples that one mean stands for, in units of their variance.
+            weight = (m.samples if seen is None else int(seen.sum())) / len(J) / variance[j]
+            lags = min(len(J) - 1, LONGEST_LAG)
+            R = innovation_variance[j] * autocovariance(memory.coefficient, lags)[: lags + 1]
+            R *= min(1.0, MOST_POWER * variance[j] / R[0])
+            total[np.ix_(own, own)] += weight * J.T @ J
+            score[np.ix_(own, own)] += weight**2 * correlated_score_covariance(R, J)
+    inverse = covariance_from_information(total)
+    return np.asarray(np.diag(inverse @ score @ inverse))
 
 
 def variance_ratio(
