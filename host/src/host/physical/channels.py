@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from host.physical.calibration import Calibration, Line
 from host.physical.columns import ANALOGUE, ATTITUDE, INERTIAL, PULSES
-from host.physical.sampling import ConstantDelay, Interpolator, usual_interval_us
+from host.physical.sampling import SLOW_US, ConstantDelay, Interpolator, usual_interval_us
 from host.wire.schema import Field, Schema
 
 Array = NDArray[np.float64]
@@ -187,7 +187,7 @@ class ChannelMaker:
         delay = self.delay_us(field)
         if late is None or delay == 0.0:
             return value
-        if 0.0 < -delay <= late.shortest_us:
+        if 0.0 < -delay <= late.shortest_us and self._interval_us <= SLOW_US:
             return late(value, -delay)
         return Interpolator(rows.t_us - delay, rows.t_us, self._interval_us)(value)
 

@@ -2,6 +2,8 @@
 
 Linear between the two samples around the instant; no value where one of the two is invalid, or
 where they lie further apart than 1.5 times the usual interval (a sample between them is missing).
+Of slow rows (the radio's 20 a second) a cubic through four samples: a line takes 4 % off a motion
+of 2.7 Hz at 20 Hz and a delay of 7 ms, and as much off the derivatives that are fitted to it.
 """
 
 from __future__ import annotations
@@ -12,6 +14,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 GAP_FACTOR = 1.5
+SLOW_US = 30_000.0  # between rows: faster ones lose less than 0.5 % to a line at 3 Hz
+_UNEVEN = 0.25  # of the usual interval: such neighbours are no samples of an even row
 
 
 class Interpolator:
@@ -37,6 +41,7 @@ class Interpolator:
         self._rows = len(rows_us)
         self._index: NDArray[np.intp] | None = None
         self._exact = False
+        self._sampled_us = sampled_us if SLOW_US < interval_us < np.inf else None
         limit_us = GAP_FACTOR * interval_us
         if len(sampled_us) < 2:
             self._weight = np.full(self._rows, np.nan)
@@ -48,7 +53,7 @@ class Interpolator:
         if self._exact:
             return
         step = np.diff(sampled_us)
-        if len(sampled_us) == self._rows:
+        if len(sampled_us) == self._rows and self._sampled_us is None:
             shift = self._fixed_shift(sampled_us, rows_us)
             if shift is not None:
                 self._shift = shift
@@ -106,6 +111,8 @@ class Interpolator:
         np.subtract(values[self._index + 1], low, out=out)
         out *= self._weight
         out += low
+        if self._sampled_us is not None:
+            out += bend(self._sampled_us, values, self._index, self._weight)
         return out
 
     @staticmethod
@@ -155,6 +162,39 @@ class ConstantDelay:
         np.subtract(values[1:], core, out=core)
         out[:1] = np.nan
         return out
+
+
+def bend(sampled: Array, values: Array, index: NDArray[np.intp], weight: Array) -> Array:
+    """Return what a cubic through the four samples around adds to the line between two of them.
+
+    Where the samples are uneven or one has no value the parabola through three, else nothing.
+
+    Parameters
+    ----------
+    sampled : Array, shape (n,)
+        Instants, in any unit.
+    values : Array, shape (n,)
+    index : NDArray, shape (m,)
+        Of the sample before each instant wanted.
+    weight : Array, shape (m,)
+        Of the sample behind it, 0 to 1.
+
+    Returns
+    -------
+    Array, shape (m,)
+    """
+    if len(values) < 3:
+        return np.zeros(len(index))
+    step = np.diff(sampled)
+    usual = float(np.median(step))
+    even = np.abs(step - usual) < _UNEVEN * usual
+    curve = np.full(len(values), np.nan)
+    curve[1:-1] = np.where(even[1:] & even[:-1], np.diff(values, n=2), np.nan)
+    before, behind = curve[index], curve[np.minimum(index + 1, len(values) - 1)]
+    before = np.where(np.isfinite(before), before, behind)
+    behind = np.where(np.isfinite(behind), behind, before)
+    more = -weight * (1.0 - weight) / 6.0 * ((2.0 - weight) * before + (1.0 + weight) * behind)
+    return np.where(np.isfinite(more), more, 0.0)
 
 
 def usual_interval_us(sampled_us: Array) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.arrays import Array, BoolArray, IntArray
+from host.physical.sampling import GAP_FACTOR, SLOW_US, bend
 from host.sysid.flight.column_sampling import sampled_name
 from host.sysid.flight.foreign_tables import from_frame
 from host.sysid.identification_error import IdentificationError
@@ -192,6 +193,8 @@ def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
         if name in ANGLES:
             series = _unwrapped(name, series, notes)
         result[name] = np.interp(grid, own.t, series)
+        if dt_s * 1e6 > SLOW_US and name in FITTED and own.step_s <= 1.5 * dt_s:
+            result[name] += _bent(grid, own, series)
         if steps.get(name, 0.0) > 1.5 * dt_s:
             result[sampled_name(name)] = _at_instants(grid, own.t)
         if name in FITTED and len(own.t) < len(rows.t):
@@ -214,6 +217,15 @@ def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     if bridged.any():
         result[BRIDGED] = bridged.astype(np.float64)
     return result
+
+
+def _bent(grid: Array, own: _Instants, series: Array) -> Array:
+    """Return what a curve through slow samples adds to the lines between them."""
+    t = np.asarray(own.t, np.float64)
+    index = np.clip(np.searchsorted(t, grid, side="right") - 1, 0, len(t) - 2)
+    weight = np.clip((grid - t[index]) / own.gaps[index], 0.0, 1.0)
+    more = bend(t, np.asarray(series, np.float64), index, weight)
+    return np.where(own.gaps[index] < GAP_FACTOR * own.step_s, more, 0.0)
 
 
 def _unwrapped(name: str, series: Array, notes: list[str]) -> Array:
