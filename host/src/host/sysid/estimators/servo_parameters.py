@@ -242,10 +242,7 @@ def _cost(found: FitResult, data: Sequence[Maneuver]) -> float:
         none = [np.zeros((len(r), 0)) for r in left]
         moments = lagged_moments(left, none, AR_ORDER)
         moments += count * (LACK * motion[j]) ** 2 * np.eye(AR_ORDER + 1)
-        try:
-            _, innovation = fit_ar(moments, AR_ORDER)
-        except np.linalg.LinAlgError:  # nothing is left, or a straight line
-            innovation = float(moments[0, 0])
+        _, innovation = fit_ar(moments, AR_ORDER)
         total += 0.5 * count * float(np.log(max(innovation / count, 1e-300)))
     return total
 

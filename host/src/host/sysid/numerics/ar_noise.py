@@ -182,13 +182,17 @@ def lagged_moments(
 def fit_ar(moments: Array, order: int) -> tuple[Array, float]:
     """Return AR coefficients and the sum of squared innovations from lagged moments.
 
-    The coefficients solve the normal equations (Yule-Walker equations of the moments).
+    The coefficients solve the normal equations (Yule-Walker equations of the moments). Of a
+    residual that is rounding alone, or a straight line, they are singular: it counts as white.
     """
     if order == 0:
         return np.zeros(0), float(moments[0, 0])
     block = moments[1 : order + 1, 1 : order + 1]
     right = moments[1 : order + 1, 0]
-    coefficient = stabilise(np.linalg.solve(block, right))
+    try:
+        coefficient = stabilise(np.linalg.solve(block, right))
+    except np.linalg.LinAlgError:
+        return np.zeros(order), float(moments[0, 0])
     innovation = float(
         moments[0, 0] - 2.0 * coefficient @ right + coefficient @ block @ coefficient
     )

@@ -23,7 +23,10 @@ from scipy import special
 
 from host.arrays import Array, BoolArray
 from host.sysid.numerics.ar_noise import ArNoise, choose_order, fit_ar, lagged_moments
-from host.sysid.numerics.information_inverse import covariance_from_information
+from host.sysid.numerics.information_inverse import (
+    covariance_from_information,
+    identified_inverse,
+)
 from host.sysid.numerics.input_regressors import input_regressors, lag_knots_s
 from host.sysid.numerics.model_error_signatures import model_error_signatures
 from host.sysid.numerics.output_error_problem import OutputProblem, Response
@@ -158,7 +161,7 @@ class _Fitted:
 
     @classmethod
     def of(cls, total: Array, score: Array) -> _Fitted:
-        inverse = covariance_from_information(total)
+        inverse = identified_inverse(total)
         value, vector = np.linalg.eigh(inverse)
         return cls(inverse, vector * np.sqrt(np.maximum(value, 0.0)), score)
 
