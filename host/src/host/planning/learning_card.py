@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from host.aircraft.air import atmosphere, density_kgpm3
 from host.aircraft.file import load
 from host.aircraft.linearisation import linearise
 from host.aircraft.mass_properties import AirframeData, airframe_data
@@ -31,6 +32,7 @@ from host.sysid.estimators.onboard_sums import (
     YAW,
     AxisCard,
 )
+from host.twin.testcard.cards import Card
 from host.wire.schema_text import packed_schema
 
 # Evenly over the band that a 3-2-1-1 or a multisine of a small aircraft fills, 0.3 to 3.8 Hz.
@@ -43,6 +45,7 @@ NAMES: Mapping[str, tuple[str, ...]] = {
     axis: tuple(f"{row}_{signal}" for signal in SIGNALS[axis])
     for axis, row in ((PITCH, "Cm"), ("roll", "Cl"), (YAW, "Cn"))
 }
+TURNS = {"elevator": PITCH, "aileron": ROLL, "rudder": YAW}  # a surface and what it moves
 DLPF_100_HZ = 3
 PACKET_AGE_S = 0.5e-3  # of a sample of our own IMU firmware at the scan
 # How far a pilot's airspeed is from the card's, and how far the friction's part of a delay.
@@ -118,6 +121,36 @@ def learning_card(
         tolerance=tuple(_tolerances(aircraft, axis, airframe, sensors, at, gains).tolist()),
         wanted_percent=ENOUGH_PERCENT[axis],
     )
+
+
+def learned_axes(
+    aircraft: str, card: Card, calibration: Calibration | None = None
+) -> list[AxisCard]:
+    """Return what the logger needs to learn the axes that a card moves.
+
+    Parameters
+    ----------
+    aircraft : str
+        Name or file, with coefficients.
+    card : Card
+    calibration : Calibration, optional
+        Of the instrument; the default one without.
+    """
+    plane = load(aircraft)
+    speed = card.flight.airspeed_mps or plane.scalar("trim.airspeed_mps")
+    air = atmosphere(card.flight.field_pressure_pa, card.flight.field_temperature_degc)
+    density = density_kgpm3(air, card.flight.height_m)
+    moved = {TURNS[surface] for s in card.segments for surface in s.axes if surface in TURNS}
+    return [
+        learning_card(
+            aircraft,
+            axis,
+            LearningCondition(speed, density, TEN_HARMONICS if axis == PITCH else SIX_HARMONICS),
+            calibration,
+        )
+        for axis in (PITCH, ROLL, YAW)
+        if axis in moved
+    ]
 
 
 def learning_parts(card: AxisCard) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -7,6 +7,7 @@ the vanes the counts of the sensors that the logger watches (protocol/flight-car
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,8 @@ from host.aircraft.trim import solve
 from host.constants import GRAVITY_MPS2
 from host.errors import UsageError
 from host.physical.calibration import Calibration
+from host.planning.learning_card import TURNS, learning_parts
+from host.sysid.estimators.onboard_sums import AxisCard
 from host.twin.testcard.cards import Card, Segment, input_s
 from host.wire.flight_card import AXES, HEAD, TRAVEL_US, card_bytes, card_faults, number, scale
 from host.wire.schema_text import packed_schema
@@ -53,7 +56,11 @@ class LoggerCardError(UsageError):
 
 
 def logger_card(
-    card: Card, aircraft: Aircraft, calibration: Calibration, envelope: Envelope | None = None
+    card: Card,
+    aircraft: Aircraft,
+    calibration: Calibration,
+    envelope: Envelope | None = None,
+    learned: Sequence[AxisCard] = (),
 ) -> bytes:
     """Return the file of a card, good by `host.wire.flight_card.card_faults`.
 
@@ -65,6 +72,8 @@ def logger_card(
     calibration : Calibration
         Of the instrument that flies it.
     envelope : Envelope, optional
+    learned : sequence of AxisCard
+        What the logger learns in flight (`learned_axes`): a row teaches the first axis it moves.
 
     Raises
     ------
@@ -81,7 +90,13 @@ def logger_card(
         )
     rows = [_row(f"{card.name}: input {k + 1}", s, calibration, around.amplitude_share)
             for k, s in enumerate(points)]  # fmt: skip
-    data = card_bytes(_head(card, aircraft, calibration, around, rows), rows)
+    taught = {one.axis: k + 1 for k, one in enumerate(learned)}
+    data = card_bytes(
+        _head(card, aircraft, calibration, around, rows),
+        rows,
+        [learning_parts(one) for one in learned],
+        [next((taught[TURNS[a]] for a in s.axes if TURNS[a] in taught), 0) for s in points],
+    )
     wrong = card_faults(data)
     if wrong:
         raise LoggerCardError(f"{card.name}: {'; '.join(wrong)}")

@@ -212,6 +212,7 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
     """Write the file that `host card write` puts into the logger."""
     from host.aircraft.linear_aircraft import load
     from host.physical.calibration import load_calibration
+    from host.planning.learning_card import learned_axes
     from host.planning.logger_card import Envelope, logger_card
     from host.sysid.answer.atomic_files import atomic_write, check_destination
     from host.wire.card_text import card_lines
@@ -226,9 +227,11 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
             "host: pulses of the default calibration: calibrate the servos before this card flies",
             file=sys.stderr,
         )
-    data = logger_card(
-        card, load(card.aircraft), calibration, Envelope(amplitude_share=args.amplitude)
-    )
+    plane = load(card.aircraft)
+    # Of a linear aircraft nobody knows inertia and coefficients apart.
+    learned = [] if plane.straight is not None else learned_axes(card.aircraft, card, calibration)
+    envelope = Envelope(amplitude_share=args.amplitude)
+    data = logger_card(card, plane, calibration, envelope, learned)
     with atomic_write(args.logger_card) as part:
         part.write_bytes(data)
     print("\n".join(card_lines(read_card(data))))
