@@ -1,6 +1,7 @@
 // No slice of the inputs lasts 0.3 ms: the costliest of each kind, in cycles of the simulated chip.
 #include "check.h"
 #include "core/input_command.h"
+#include "core/input_watch.h"
 #include "core/test_input.h"
 
 #ifdef __AVR__
