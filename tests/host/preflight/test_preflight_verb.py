@@ -57,6 +57,7 @@ def test_a_fault_is_no_go_with_exit_code_6_and_its_reason(
         ((), 2, "which aircraft? --aircraft mine.toml"),
         (("sim:walk/surface_reversd",), 2, "did you mean surface_reversed?"),
         (("sim:walks", "--aircraft", "ultrastick25e"), 2, "practised with sim:walk"),
+        (("sim:wlk",), 2, "practised with sim:walk"),
         (("sim:walk", "--without", "relais"), 2, "did you mean relay?"),
         (("missing.radio", "--aircraft", "ultrastick25e"), 2, "missing.radio"),
         (("sim:walk", "--aircraft", "nothing.toml"), 2, "nothing.toml"),

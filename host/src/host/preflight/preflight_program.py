@@ -23,7 +23,7 @@ from host.preflight.preflight_screen import PreflightScreen
 from host.preflight.preflight_sheet import SUFFIX, sheet_document, write_sheet
 from host.terminal import command_line
 
-WALK = "sim:walk"
+SIMULATED = "sim:"
 PRACTISED = "ultrastick25e"  # of a virtual walk where no aircraft is named
 
 
@@ -88,7 +88,7 @@ def run_preflight(
     left_out(request.without)
     aircraft = load(request.aircraft)
     live = request.live
-    if live.source is not None and live.source.startswith(WALK):
+    if live.source is not None and live.source.startswith(SIMULATED):
         from host.preflight.walk_source import walk_source
 
         live.opened = walk_source(live.source, aircraft, live.seed)

@@ -86,11 +86,11 @@ def run(args: argparse.Namespace) -> int:
 def _aircraft(args: argparse.Namespace) -> str:
     """Return the aircraft's name or file; a virtual walk has one of its own."""
     from host.errors import UsageError
-    from host.preflight.preflight_program import PRACTISED, WALK
+    from host.preflight.preflight_program import PRACTISED, SIMULATED
 
     if args.aircraft:
         return str(args.aircraft)
-    if (args.source or "").startswith(WALK) or args.list:
+    if (args.source or "").startswith(SIMULATED) or args.list:
         return PRACTISED
     raise UsageError(
         "which aircraft? --aircraft mine.toml: its travels are looked at; or practise with"
