@@ -1,4 +1,4 @@
-"""Every link of a page leads to a file of this tree, every folder that a page names is there."""
+"""Every link of a page leads to a file of this tree; every study's page has the same headings."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 CODE = re.compile(r"```.*?```", re.DOTALL)
+HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
+STUDY_HEADINGS = ["Question", "Method", "Result", "What does not hold", "Command"]
 
 
 def pages(root: Path) -> list[Path]:
@@ -47,3 +49,26 @@ def test_dead_link_is_seen(tmp_path: Path) -> None:
     )
     (tmp_path / "there.md").touch()
     assert list(dead_links(page)) == ["README.md: gone.svg", "README.md: code"]
+
+
+def test_studies_pages_have_the_same_headings_and_are_listed() -> None:
+    folder = ROOT / "host" / "studies"
+    listed = set(LINK.findall((folder / "README.md").read_text(encoding="utf-8")))
+    studies = [page for page in sorted(folder.glob("*.md")) if page.name != "README.md"]
+    assert len(studies) > 20
+    assert {page.name for page in studies} - listed == set()
+    headings = {p.name: HEADING.findall(p.read_text(encoding="utf-8")) for p in studies}
+    assert {name: h for name, h in headings.items() if h != STUDY_HEADINGS} == {}
+
+
+def test_a_verbs_page_is_two_clicks_from_the_readme() -> None:
+    seen = ROOT / "README.md"
+    first = [ROOT / t for t in LINK.findall(seen.read_text(encoding="utf-8")) if t.endswith(".md")]
+    near = {page.resolve() for page in first}
+    for page in first:
+        targets = LINK.findall(page.read_text(encoding="utf-8"))
+        near |= {(page.parent / t.split("#")[0]).resolve() for t in targets if ".md" in t}
+    text = {page: page.read_text(encoding="utf-8") for page in near if page.is_file()}
+    verbs = (ROOT / "host" / "src" / "host" / "verbs").glob("[!_]*.py")
+    lost = [v.stem for v in verbs if not any(f"host {v.stem}" in t for t in text.values())]
+    assert lost == []
