@@ -31,7 +31,7 @@ from studies import (
     windows,
 )
 from studies.inputs import SHAPES
-from studies.report import write
+from studies.study_table import write
 
 # runs of each study: (small, full)
 ITERATION_COUNT = (20_000, ITERATIONS)

@@ -24,7 +24,7 @@ from host.fleet.statistics.reference_cg import Place
 from host.fleet.statistics.type_model import TypeModel
 from host.fleet.tasks.task_cluster import ClusterOptions
 from host.twin.flight.fly import fly
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors.local_flow import air_data

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from studies import fleet_changes, fleet_truth
-from studies.report import Table
+from studies.study_table import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from studies.coefficients import NETWORK, CoefficientTally
-from studies.report import Cell, Table
+from studies.study_table import Cell, Table
 from studies.thesis_flights import Case, Figures, lines
 
 WILD = 0.15

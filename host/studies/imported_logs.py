@@ -16,8 +16,8 @@ from host.sysid.identification_error import IdentificationError
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.autopilot_logs import NAMES, write_autopilot_log
 from host.twin.outcome.autopilot_outputs import AIRFRAMES
-from host.twin.outcome.instrument import calibration
 from host.twin.outcome.truth_files import maneuvers
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors.local_flow import AirData, air_data

@@ -24,7 +24,7 @@ from host.planning.logger_card import Envelope, logger_card
 from host.sysid.estimators.onboard_sums import AxisCard
 from host.twin.flight.fly import FlightRecord
 from host.twin.outcome import truth_files
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.logger_flight import logger_flight
 from host.twin.recorder.stimuli import Stimuli

@@ -41,7 +41,7 @@ from host.sysid.estimators.onboard_sums import (
 from host.sysid.flight.flight_tables import FlightColumns, read_flight_columns
 from host.twin.flight.fly import fly
 from host.twin.outcome import compare, truth_files
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors.local_flow import air_data

@@ -33,7 +33,7 @@ from host.planning.point_widths import (
 )
 from host.sysid.identification_error import IdentificationError
 from host.twin.flight.fly import FlightRecord
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.sitl_radio import radio
 from host.twin.recorder.stimuli import stimuli

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from host.twin.flight.fly import FlightRecord, fly
-from host.twin.outcome.instrument import calibration
 from host.twin.outcome.truth_files import maneuvers
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.sitl_radio import Sent, radio
 from host.twin.recorder.stimuli import Stimuli, stimuli

@@ -12,7 +12,7 @@ from studies.coverage import Coverage
 from studies.imported_logs import Told, rows
 from studies.methods import Score
 from studies.refusal import Agreement, Repeated, agreement_text
-from studies.report import Table
+from studies.study_table import Table
 from studies.thesis import HopfieldRun
 from studies.turbulence import GustCase
 from studies.windows import LIMIT_WHOLE, Compared

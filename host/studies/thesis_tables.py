@@ -34,7 +34,7 @@ from host.sysid.models.state_space_model import LinearModel, free_model
 
 from studies.aircraft import INPUTS, STATES, TABLE_31_A
 from studies.inputs import SHAPES
-from studies.report import Table, write
+from studies.study_table import Table, write
 from studies.thesis import thesis_data, truth_31
 
 if TYPE_CHECKING:

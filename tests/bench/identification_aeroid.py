@@ -25,6 +25,7 @@ import aeroid
 import numpy as np
 from host.aircraft.mass_properties import AirframeData, airframe_data
 from host.arrays import Array
+from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.sysid.flight.maneuver_detection import DetectedManeuver
 from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import aircraft_data
@@ -33,11 +34,9 @@ from host.sysid.pipeline.reading_options import ReadingOptions
 from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
-Told = dict[str, tuple[float, float]]
-GRAVITY_MPS2 = 9.80665
+Intervals = dict[str, tuple[float, float]]
 RATE_HZ = 50.0
 BEFORE_S, BEHIND_S = 0.5, 1.5
-NORMAL_95 = 1.96
 LONGITUDINAL = {
     "CL_0": 0.3, "CL_alpha": 4.5, "CL_de": 0.3, "Cm_0": 0.05, "Cm_alpha": -1.0, "Cm_q": -10.0,
     "Cm_de": -1.0,
@@ -53,14 +52,14 @@ LATERAL_INPUTS = (
 )  # fmt: skip
 
 
-def by_aeroid(path: Path, aircraft: str, limit_s: int) -> tuple[Told, float]:
+def by_aeroid(path: Path, aircraft: str, limit_s: int) -> tuple[Intervals, float]:
     """Return what a process of its own found within its processor time, and that time, s.
 
     An axis that AeroID refused, or did not end, is not in it.
     """
     command = [sys.executable, __file__, str(path), aircraft, str(limit_s)]
     done = subprocess.run(command, capture_output=True, text=True)
-    found: Told = {}
+    found: Intervals = {}
     took_s = 0.0
     for line in done.stdout.splitlines():
         one = json.loads(line)
@@ -126,7 +125,7 @@ def _fitted(
     cut: Mapping[str, Float],
     outputs: Sequence[str],
     start: Mapping[str, float],
-) -> Told:
+) -> Intervals:
     names = list(model.parameters)
     data = aeroid.FlightData(
         cut["t_s"] - cut["t_s"][0],

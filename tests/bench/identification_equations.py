@@ -15,6 +15,7 @@ from importlib.resources import files
 
 import numpy as np
 from host.arrays import Array
+from host.constants import GRAVITY_MPS2
 from host.files.user_text import parse_toml
 from host.sysid import Maneuver, fit
 from host.sysid.identification_error import IdentificationError
@@ -58,7 +59,7 @@ def record(model: NonlinearModel) -> Maneuver:
 
 def by_hand(theta: Array, inputs: Array) -> Array:
     """Return the outputs, (samples, 6), as numpy and scipy compute them."""
-    m, iyy, area, chord, rho, g = 1.943, 0.0722, 0.32, 0.25, 1.225, 9.80665
+    m, iyy, area, chord, rho, g = 1.943, 0.0722, 0.32, 0.25, 1.225, GRAVITY_MPS2
     CL_0, CL_alpha, CL_q, CL_de, CD_0, induced, Cm_0, Cm_alpha, Cm_q, Cm_de = theta[:10]
     t = np.arange(len(inputs)) * DT_S
 

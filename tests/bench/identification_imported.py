@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
+from host.constants import NORMAL_95
 from host.sysid.flight.flight_tables import read_flight_columns
 from host.sysid.numerics.differentiation import local_polynomial
 from host.sysid.pipeline.aircraft_data import aircraft_data
@@ -86,7 +87,7 @@ def least_squares(path: Path) -> Told:
         inverse = np.linalg.inv(x.T @ x)
         estimate = inverse @ x.T @ y
         variance = float(np.sum((y - x @ estimate) ** 2)) / (len(y) - x.shape[1])
-        half = 1.96 * np.sqrt(variance * np.diag(inverse))
+        half = NORMAL_95 * np.sqrt(variance * np.diag(inverse))
         found |= {
             n: (float(a), float(b)) for n, a, b in zip(names, estimate, half, strict=True) if n
         }

@@ -209,9 +209,9 @@ def verb_breaches(root: Path) -> Iterator[str]:
 
 
 def basename_breaches(root: Path) -> Iterator[str]:
-    """Yield a line for every file of the host package whose name another room has too."""
+    """Yield a line for every file of package and studies whose name another room has too."""
     first: dict[str, Path] = {}
-    for path in _files(root / "host" / "src" / "host", {".py"}):
+    for path in _files(root / "host", {".py"}):
         if path.name in COMMON_NAMES:
             continue
         if path.name in first:
@@ -223,7 +223,7 @@ def basename_breaches(root: Path) -> Iterator[str]:
 
 def constant_breaches(root: Path) -> Iterator[str]:
     """Yield a line for every number that `host.constants` has, typed again."""
-    for path in _files(root / "host", {".py"}):
+    for path in _files(root / "host", {".py"}) + _files(root / "tests" / "bench", {".py"}):
         name = str(path.relative_to(root))
         if name == CONSTANTS:
             continue
@@ -322,6 +322,7 @@ PLANTED = [
     (constant_breaches, "host/src/host/sysid/answer/verdict.py", "x = f'{1.0 * 57.29578:.1f}'"),
     (constant_breaches, "host/src/host/sysid/answer/verdict.py", "half = -1.959964 * 0.1"),
     (constant_breaches, "host/studies/coefficients.py", "half = 1.96 * 0.1"),
+    (constant_breaches, "tests/bench/identification.py", "half = 1.96 * 0.1"),
     (constant_breaches, "host/src/host/aircraft/air.py", "turn = 180 / np.pi"),
     (constant_breaches, "host/src/host/aircraft/air.py", "turn = math.pi / 180.0"),
     (include_breaches, "firmware/core/relay.h", '#include "hal/relay.h"'),
@@ -441,8 +442,11 @@ def test_a_name_that_two_rooms_have_is_found(tmp_path: Path) -> None:
         for name in ("__init__.py", "fit.py"):
             (tmp_path / "host/src/host/sysid" / room).mkdir(parents=True, exist_ok=True)
             (tmp_path / "host/src/host/sysid" / room / name).touch()
-    [found] = basename_breaches(tmp_path)
-    assert found.startswith("host/src/host/sysid/models/fit.py: host/src/host/sysid/coefficients/")
+    (tmp_path / "host/studies").mkdir()
+    (tmp_path / "host/studies/fit.py").touch()
+    inside, study = basename_breaches(tmp_path)
+    assert inside.startswith("host/src/host/sysid/models/fit.py: host/src/host/sysid/coefficients/")
+    assert study.startswith("host/studies/fit.py: host/src/host/sysid/coefficients/")
 
 
 ALLOWED = [

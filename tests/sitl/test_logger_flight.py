@@ -17,7 +17,7 @@ from host.physical.calibration import calibration_of_text
 from host.planning.logger_card import Envelope, logger_card
 from host.twin.flight.fly import FlightRecord
 from host.twin.outcome.compare import true_times
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.logger_flight import logger_flight
 from host.twin.recorder.stimuli import Stimuli

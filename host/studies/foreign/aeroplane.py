@@ -15,7 +15,7 @@ from host.constants import GRAVITY_MPS2
 from numpy.typing import NDArray
 from scipy.optimize import fsolve
 
-from studies.foreign.air import Gusts, at
+from studies.foreign.gust_field import Gusts, at
 
 DENSITY_KGPM3 = 1.2
 SERVO_RADPS, SERVO_LIMIT_RADPS = 40.0, 5.0

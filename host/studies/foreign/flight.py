@@ -9,7 +9,7 @@ from host.constants import GRAVITY_MPS2
 from numpy.typing import NDArray
 
 from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER, motion, trimmed
-from studies.foreign.air import gusts
+from studies.foreign.gust_field import gusts
 
 STEP_S, SUBSTEPS = 0.01, 2
 SPEED_MPS, HEIGHT_M = 18.0, 60.0

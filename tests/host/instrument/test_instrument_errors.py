@@ -22,7 +22,7 @@ from host.sysid.compatibility.path_preparation import prior
 from host.sysid.flight.flight_tables import FlightColumns
 from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.twin.flight.draws import DRAWN, draw
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 
 NAME = "ultrastick25e"
 

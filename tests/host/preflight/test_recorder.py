@@ -9,7 +9,7 @@ from host.preflight.check_list import Wanted
 from host.preflight.guided_list import Preflight
 from host.twin.flight.fly import fly
 from host.twin.ground.ground_faults import GROUND_FAULTS
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.sitl_library import Sitl
 from host.twin.recorder.sitl_radio import radio

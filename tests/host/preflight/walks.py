@@ -16,7 +16,7 @@ from host.preflight.guided_list import Preflight
 from host.twin.ground.ground_faults import GROUND_FAULTS, GroundFault, broken_walk
 from host.twin.ground.ground_instrument import START_US, GroundFrames, ground_frames
 from host.twin.ground.ground_walk import STEP_S, GroundWalk, ground_walk
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder.recorded_walk import Prepare, recorded_walk
 
 

@@ -9,8 +9,8 @@ from host.sysid.answer.trust_rules import doubts_of
 from host.sysid.flight.linear_estimator import identify
 from studies import independent
 from studies.foreign.aeroplane import DENSITY_KGPM3, TRAINER
-from studies.foreign.air import SAMPLES, STEP_M, gusts
 from studies.foreign.flight import COLUMNS, Air, derivatives, fly
+from studies.foreign.gust_field import SAMPLES, STEP_M, gusts
 from studies.foreign.instrument import drawn_file, with_sensor_errors
 
 

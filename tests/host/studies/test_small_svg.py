@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 from matplotlib.figure import Figure
-from studies.report import small_svg
+from studies.study_table import small_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 

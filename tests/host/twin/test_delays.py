@@ -20,7 +20,7 @@ from host.log import FlightLog, read_log
 from host.physical.channels import constant_delay_us
 from host.twin.flight.draws import delay_s
 from host.twin.flight.fly import STEP_S, FlightRecord, fly
-from host.twin.outcome import compare, instrument
+from host.twin.outcome import compare, virtual_calibration
 from host.twin.outcome.truth_files import summary
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
@@ -72,7 +72,7 @@ class Flown:
         given = stimuli(self.record, self.data)
         recording = sitl.record(given, rate_hz=100, aircraft="x")
         (folder / "flight.bin").write_bytes(recording.log)
-        calibration = instrument.calibration(self.record.aircraft)
+        calibration = virtual_calibration.calibration(self.record.aircraft)
         (folder / "calibration.toml").write_text(calibration)
         self.log: FlightLog = read_log(
             folder / "flight.bin", calibration=folder / "calibration.toml"

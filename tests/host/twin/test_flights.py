@@ -13,7 +13,7 @@ from host.aircraft.attitude import euler
 from host.aircraft.local_derivatives import local_derivatives
 from host.twin.flight.fly import NEUTRAL_US, THROW_US, fly
 from host.twin.flight.pilot import schedule
-from host.twin.outcome import thesis
+from host.twin.outcome import original_logger
 from host.twin.outcome.truth_files import maneuvers, series, write
 from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
@@ -264,7 +264,7 @@ def test_local_derivatives_explain_the_flown_moment() -> None:
 def test_thesis_rows_have_its_faults() -> None:
     card = cards.load("thesis_flight2")
     record = fly(card, seed=1)
-    printed = thesis.rows(record, air_data(record))
+    printed = original_logger.rows(record, air_data(record))
     assert np.diff(printed["t_s"]).mean() == pytest.approx(0.05, rel=0.02)
     # Each half of an IMU sample comes every other row.
     same = (np.diff(printed["AN1"]) == 0.0).mean()
@@ -300,18 +300,18 @@ def test_thesis_altitude_locks_on_a_field_above_100_m() -> None:
     card = cards.load("thesis_flight2")
     high = replace(card, flight=replace(card.flight, field_pressure_pa=99_000.0))
     record = fly(high, seed=1)
-    locked = thesis.rows(record, air_data(record))["altitude"]
+    locked = original_logger.rows(record, air_data(record))["altitude"]
     assert locked.nunique() == 1
     assert locked[0] == pytest.approx(-195.0, abs=15.0)  # minus the height of the field, for ever
     low = fly(card, seed=1)
-    assert thesis.rows(low, air_data(low))["altitude"].nunique() > 10
+    assert original_logger.rows(low, air_data(low))["altitude"].nunique() > 10
 
 
 def test_vane_expression_overflows_as_the_printed_row_shows() -> None:
     # ADC 507, 514, 521, 523 are -737, -713, -690, -683 in the thesis's own sample row.
-    printed = thesis.overflowed_vane(np.array([507.0, 514.0, 521.0, 523.0]))
+    printed = original_logger.overflowed_vane(np.array([507.0, 514.0, 521.0, 523.0]))
     assert printed.tolist() == [-737.0, -713.0, -690.0, -683.0]
-    assert thesis.overflowed_vane(np.array([364.0, 365.0])).tolist() == [1213.0, -1210.0]
+    assert original_logger.overflowed_vane(np.array([364.0, 365.0])).tolist() == [1213.0, -1210.0]
 
 
 def test_pulses_carry_the_sticks(tmp_path: Path) -> None:

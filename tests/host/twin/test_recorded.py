@@ -11,7 +11,7 @@ import pytest
 from host.log import FlightLog, read_log
 from host.twin.faults import FOREVER_S, Fault
 from host.twin.flight.fly import FlightRecord, fly
-from host.twin.outcome import compare, instrument
+from host.twin.outcome import compare, virtual_calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.fat32 import SECTOR, CardImageError, CardReader, format_card
 from host.twin.recorder.stimuli import SAMPLE_STEP_TICKS, Stimuli, stimuli
@@ -42,7 +42,7 @@ def flown(library: Path, tmp_path_factory: pytest.TempPathFactory) -> Flown:
     recording = sitl.record(given, rate_hz=100, aircraft=record.aircraft.name, seed=11)
     folder = tmp_path_factory.mktemp("recorded")
     (folder / "flight.bin").write_bytes(recording.log)
-    (folder / "calibration.toml").write_text(instrument.calibration(record.aircraft))
+    (folder / "calibration.toml").write_text(virtual_calibration.calibration(record.aircraft))
     log = read_log(folder / "flight.bin", calibration=folder / "calibration.toml")
     return Flown(record, data, given, recording, log)
 

@@ -9,7 +9,7 @@ from typing import Self
 
 from host.live.live_sources import Tell
 from host.twin.flight.fly import FlightRecord, fly
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.recorder_build import recorder_library
 from host.twin.recorder.sitl_radio import radio

@@ -13,7 +13,7 @@ from host.near_names import like
 from host.twin.ground.ground_faults import GROUND_FAULTS, GroundFault, broken_walk
 from host.twin.ground.ground_instrument import START_US, ground_frames
 from host.twin.ground.ground_walk import STEP_S, ground_walk
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 
 WALK = "sim:walk"
 

@@ -13,8 +13,8 @@ from host.errors import UsageError
 from host.instrument.instrument_errors import InstrumentErrors
 from host.log import read_log
 from host.twin.flight.fly import FlightRecord, fly
-from host.twin.outcome import compare, ideal, thesis, truth_files
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome import compare, ideal, original_logger, truth_files
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors.local_flow import air_data
@@ -94,7 +94,7 @@ def virtual_flight(
         if chain == "gps":
             table = table.assign(**ideal.gps_columns(record))
     elif chain == "thesis":
-        table = thesis.table(thesis.rows(record, data))
+        table = original_logger.table(original_logger.rows(record, data))
     else:
         recording = sitl.record(
             stimuli(record, data),

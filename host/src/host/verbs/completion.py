@@ -68,7 +68,7 @@ def known_names() -> dict[str, list[str]]:
     from host.aircraft.file import names as aircraft
     from host.sysid.flight.linear_model import AXIS_OF
     from host.sysid.flight.shipped_maps import shipped_maps
-    from host.sysid.models.shipped_models import shipped_models
+    from host.sysid.models.thesis_models import shipped_models
     from host.sysid.pipeline.requested_models import COEFFICIENTS, known_methods
     from host.twin.testcard.cards import names as cards
 

@@ -12,8 +12,8 @@ from host.sysid.flight.free_simulation import frozen_at
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.equation_file import KIND as EQUATIONS
 from host.sysid.models.model_file import read_model
-from host.sysid.models.shipped_models import model_path
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
+from host.sysid.models.thesis_models import model_path
 from host.sysid.models.toml_document import read_document
 from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.sysid.pipeline.aircraft_motion import aircraft_models

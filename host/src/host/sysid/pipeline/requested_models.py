@@ -17,8 +17,8 @@ from host.sysid.estimators.method_registry import methods as single_methods
 from host.sysid.flight.linear_model import AXIS_OF, DEFAULT_METHOD, STAGED
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.model_file import read_model
-from host.sysid.models.shipped_models import model_path, shipped_lines, shipped_models
 from host.sysid.models.state_space_model import CONSTANT, LinearModel
+from host.sysid.models.thesis_models import model_path, shipped_lines, shipped_models
 from host.sysid.pipeline.arguments import listed
 
 COEFFICIENTS = "coefficients"

@@ -14,9 +14,9 @@ from host.aircraft.file import Aircraft
 from host.errors import UsageError
 from host.log import read_log
 from host.twin.flight.fly import FlightRecord, fly
-from host.twin.outcome import compare, ideal, picture, thesis, truth_files
+from host.twin.outcome import compare, ideal, original_logger, picture, truth_files
 from host.twin.outcome.autopilot_logs import write_autopilot_log
-from host.twin.outcome.instrument import calibration
+from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import avr, sitl, stimuli
 from host.twin.recorder.logger_flight import logger_flight
 from host.twin.sensors.imu import Imu
@@ -274,7 +274,8 @@ def _thesis(record: FlightRecord, data: AirData, folder: Path) -> tuple[pd.DataF
         # The same flight, at the rate of the thesis's second one.
         slow = replace(record.card, flight=replace(record.card.flight, rate_hz=20.0))
         record = replace(record, card=slow)
-    printed = thesis.rows(record, data)
+    printed = original_logger.rows(record, data)
     path = folder / "flight.thesis.txt"
-    thesis.write_rows(printed, path, paired=record.card.flight.rate_hz >= thesis.PAIRED_HZ)
-    return thesis.table(printed), [path]
+    paired = record.card.flight.rate_hz >= original_logger.PAIRED_HZ
+    original_logger.write_rows(printed, path, paired=paired)
+    return original_logger.table(printed), [path]

@@ -8,7 +8,7 @@ import pytest
 from host.cli import main
 from host.sysid.flight.derived_columns import derived_columns
 from host.sysid.models.model_file import read_model
-from host.sysid.models.shipped_models import FOLDER, model_path, shipped_lines, shipped_models
+from host.sysid.models.thesis_models import FOLDER, model_path, shipped_lines, shipped_models
 from host.sysid.pipeline.requested_models import requested_models
 
 PUBLISHED = [name for name in shipped_models() if re.search("eq5|table", name)]

@@ -1,4 +1,4 @@
-"""The calibration file of the virtual instrument: what the host is told, with its uncertainty.
+"""The calibration file of the virtual instrument: what the host reads, with its uncertainty.
 
 Zeros and slopes are the nominal ones; the flight's own errors (`draws`) are not in it.
 """
@@ -83,12 +83,12 @@ def calibration(aircraft: Aircraft, errors: InstrumentErrors | None = None) -> s
             "channel": channels,
             "pulse": pulses,
             "imu": imu,
-            "error": {e.name: _table(e) for e in errors if _is_told(e)},
+            "error": {e.name: _table(e) for e in errors if _is_stated(e)},
         }
     )
 
 
-def _is_told(error: NamedError) -> bool:
+def _is_stated(error: NamedError) -> bool:
     """Return whether neither a line nor the aircraft file says all of an error."""
     if error.aircraft_file:
         return False
