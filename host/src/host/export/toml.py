@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -32,7 +33,7 @@ def _table(table: Mapping[str, Plain], path: str) -> list[str]:
         if isinstance(value, Mapping) or _is_tables(value):
             deep.append((key, value))
         else:
-            lines.append(f"{key} = {_value(value)}")
+            lines.append(f"{key} = {toml_value(value)}")
     for key, value in deep:
         name = f"{path}.{key}" if path else key
         if isinstance(value, Mapping):
@@ -52,7 +53,8 @@ def _is_tables(value: Plain) -> bool:
     )
 
 
-def _value(value: Plain) -> str:
+def toml_value(value: Plain) -> str:
+    """Return a number, a string or a list of them as TOML."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, np.generic):
@@ -62,8 +64,12 @@ def _value(value: Plain) -> str:
     if isinstance(value, (int, float)):
         return repr(value)
     if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-        return f'"{escaped}"'
+        return json.dumps(value, ensure_ascii=False)  # what JSON escapes, TOML does the same way
     if isinstance(value, Sequence):
-        return "[" + ", ".join(_value(x) for x in value) + "]"
+        return "[" + ", ".join(toml_value(x) for x in value) + "]"
     raise TypeError(f"{type(value).__name__} cannot be written as TOML")
+
+
+def toml_number(value: float) -> str:
+    """Return a number as TOML with a point: a float whatever it was."""
+    return repr(float(value))  # numpy's numbers call themselves np.float64(...)

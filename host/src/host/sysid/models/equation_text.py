@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from host.export.toml import toml_number, toml_value
 from host.sysid.models.equation_file import KIND
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.model_constants import OWN
 from host.sysid.models.nonlinear_model import NonlinearModel
-from host.sysid.models.state_space_model import Parameter
+from host.sysid.models.state_space_model import DelayGroup, Parameter
 
 
 def equation_text(model: NonlinearModel, result: FitResult | None = None) -> str:
@@ -26,26 +26,26 @@ def equation_text(model: NonlinearModel, result: FitResult | None = None) -> str
     e = model.source
     lines = [
         f'kind = "{KIND}"',
-        f"name = {_text(model.name)}",
-        f"inputs = {_list(e.inputs[: e.controls])}",
-        f"columns = {_list(e.inputs[e.controls :])}",
+        f"name = {toml_value(model.name)}",
+        f"inputs = {toml_value(e.inputs[: e.controls])}",
+        f"columns = {toml_value(e.inputs[e.controls :])}",
         f'hold = "{model.hold}"',
         f"initial_states = {_starts(model)}",
-        f"state_biases = {_list(model.state_biases)}",
-        f"output_biases = {_list(model.output_biases)}",
-        f"process_noise = {_list(model.process_noise)}",
+        f"state_biases = {toml_value(model.state_biases)}",
+        f"output_biases = {toml_value(model.output_biases)}",
+        f"process_noise = {toml_value(model.process_noise)}",
     ]
     if model.known_noise:
-        pairs = ", ".join(f"{k} = {_plain(v)}" for k, v in model.known_noise)
+        pairs = ", ".join(f"{k} = {toml_number(v)}" for k, v in model.known_noise)
         lines.append(f"noise = {{ {pairs} }}")
-    lines += _section("constants", {k: _plain(v) for k, v in e.constants})
+    lines += _section("constants", {k: toml_number(v) for k, v in e.constants})
     for name, texts in (
         ("definitions", e.definitions),
         ("rates", e.rates),
         ("outputs", e.outputs),
         ("starts", e.starts),
     ):
-        lines += _section(name, {k: _text(v) for k, v in texts})
+        lines += _section(name, {k: toml_value(v) for k, v in texts})
     lines.append("[parameters]")
     values = {} if result is None else dict(zip(result.names, result.estimate, strict=True))
     lines += [_parameter(p, values.get(p.name, p.start), each=False) for p in model.parameters]
@@ -55,30 +55,38 @@ def equation_text(model: NonlinearModel, result: FitResult | None = None) -> str
         lines += _section(f"tables.{name}", points)
     if result is not None:
         half = result.half_width()
-        told = {
-            _text(n): f"[{_plain(v)}, {_plain(h)}]"
+        parts = {
+            toml_value(n): f"[{toml_number(v)}, {toml_number(h)}]"
             for n, v, h in zip(result.names, result.estimate, half, strict=True)
         }
-        lines += _section("fit", {"method": _text(result.method), **told})
-    for delay in model.delays:
-        lines += [
-            "[[delays]]",
-            f"name = {_text(delay.name)}",
-            f"outputs = {_list(delay.outputs)}",
-            f"prior_sd_s = {_plain(delay.prior_sd_s)}",
-            f"limit_s = {_plain(delay.limit_s)}",
-        ]
+        lines += _section("fit", {"method": toml_value(result.method), **parts})
+    lines += delay_lines(model.delays)
     return "\n".join(lines) + "\n"
 
 
+def delay_lines(delays: Iterable[DelayGroup]) -> list[str]:
+    """Return the tables of a model's delays."""
+    return [
+        line
+        for delay in delays
+        for line in (
+            "[[delays]]",
+            f"name = {toml_value(delay.name)}",
+            f"outputs = {toml_value(delay.outputs)}",
+            f"prior_sd_s = {toml_number(delay.prior_sd_s)}",
+            f"limit_s = {toml_number(delay.limit_s)}",
+        )
+    ]
+
+
 def _parameter(parameter: Parameter, start: float, *, each: bool) -> str:
-    parts = [f"start = {_plain(start)}"]
+    parts = [f"start = {toml_number(start)}"]
     for key in ("lower", "upper", "prior_sd"):
         value = getattr(parameter, key)
         if np.isfinite(value):
-            parts.append(f"{key} = {_plain(value)}")
+            parts.append(f"{key} = {toml_number(value)}")
     if parameter.unit:
-        parts.append(f"unit = {_text(parameter.unit)}")
+        parts.append(f"unit = {toml_value(parameter.unit)}")
     if each:
         parts.append("each_record = true")
     return f"{parameter.name} = {{ {', '.join(parts)} }}"
@@ -86,8 +94,8 @@ def _parameter(parameter: Parameter, start: float, *, each: bool) -> str:
 
 def _starts(model: NonlinearModel) -> str:
     pairs = [f'{s} = "{OWN}"' for s in model.initial_states]
-    pairs += [f"{s} = {_plain(v)}" for s, v in model.known_starts]
-    pairs += [f"{s} = {_text(p)}" for s, p in model.shared_starts]
+    pairs += [f"{s} = {toml_number(v)}" for s, v in model.known_starts]
+    pairs += [f"{s} = {toml_value(p)}" for s, p in model.shared_starts]
     return f"{{ {', '.join(pairs)} }}"
 
 
@@ -97,17 +105,5 @@ def _section(name: str, values: Mapping[str, str]) -> list[str]:
     return [f"[{name}]", *(f"{key} = {value}" for key, value in values.items())]
 
 
-def _list(names: Iterable[str]) -> str:
-    return f"[{', '.join(_text(n) for n in names)}]"
-
-
 def _numbers(values: Iterable[float]) -> str:
-    return f"[{', '.join(_plain(v) for v in values)}]"
-
-
-def _plain(value: float) -> str:
-    return repr(float(value))  # numpy's numbers call themselves np.float64(...)
-
-
-def _text(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)  # what JSON escapes, TOML does the same way
+    return f"[{', '.join(toml_number(v) for v in values)}]"
