@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -188,15 +188,44 @@ def _run(
                 )
             residuals.append(e)
             white.append(whitened)
+    return filter_result(
+        "unscented Kalman filter" if unscented else "extended Kalman filter",
+        (model, names, joint[n:], P[n:, n:]),
+        maneuvers,
+        (residuals, white),
+        {"noise_deviation": deviation, "process": intensity},
+    )
+
+
+def filter_result(
+    method: str,
+    estimated: tuple[LinearModel, tuple[str, ...], Array, Array],
+    maneuvers: Sequence[Maneuver],
+    innovations: tuple[Sequence[Array], Sequence[Array]],
+    details: Mapping[str, float | Array],
+) -> FitResult:
+    """Return the result of a Kalman filter, its covariance inflated by the coloured innovations.
+
+    Parameters
+    ----------
+    method : str
+    estimated : tuple
+        Model, names, estimate (n,), covariance for white innovations (n, n).
+    maneuvers : sequence of Maneuver
+    innovations : tuple of sequences of Array
+        Of each maneuver: in the units of the outputs and whitened, (samples, p).
+    details : mapping
+    """
+    model, names, estimate, covariance = estimated
+    residuals, white = innovations
     excess = innovation_inflation(white)
-    covariance = excess * P[n:, n:]
     return FitResult(
-        method="unscented Kalman filter" if unscented else "extended Kalman filter",
+        method=method,
         model=model,
         names=names,
-        estimate=joint[n:],
-        covariance=covariance,
-        covariance_white=P[n:, n:],
+        estimate=estimate,
+        covariance=excess * covariance,
+        covariance_white=covariance,
         degrees_of_freedom=np.full(len(names), np.inf),
         residuals=tuple(residuals),
         fitted=tuple(m.outputs - e for m, e in zip(maneuvers, residuals, strict=True)),
@@ -205,11 +234,7 @@ def _run(
         iterations=PASSES,
         converged=True,
         warnings=inflation_lines(excess),
-        details={
-            "noise_deviation": deviation,
-            "process": intensity,
-            "innovation_inflation": excess,
-        },
+        details={**details, "innovation_inflation": excess},
     )
 
 

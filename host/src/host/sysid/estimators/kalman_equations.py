@@ -12,8 +12,7 @@ from host.sysid.estimators.kalman import (
     INITIAL_RELATIVE_SD,
     PASSES,
     PROCESS_SHARE,
-    inflation_lines,
-    innovation_inflation,
+    filter_result,
     noise_deviation,
 )
 from host.sysid.identification_error import IdentificationError
@@ -100,29 +99,14 @@ def fit_extended_equations(
             shared, known = z[n : n + common], P[n : n + common, n : n + common].copy()
             residuals.append(e)
             white.append(unit)
-    excess = innovation_inflation(white)
     theta = guess.copy()
     theta[:common] = shared
-    return FitResult(
-        method="extended Kalman filter",
-        model=problem.model_at(theta),
-        names=layout.names,
-        estimate=z[n:],
-        covariance=excess * P[n:, n:],
-        covariance_white=P[n:, n:],
-        degrees_of_freedom=np.full(len(layout.names), np.inf),
-        residuals=tuple(residuals),
-        fitted=tuple(m.outputs - e for m, e in zip(maneuvers, residuals, strict=True)),
-        residual_kind="innovation",
-        noise_covariance=np.atleast_2d(np.cov(np.vstack(residuals).T)),
-        iterations=PASSES,
-        converged=True,
-        warnings=inflation_lines(excess),
-        details={
-            "noise_deviation": deviation,
-            "process": np.sqrt(intensity),
-            "innovation_inflation": excess,
-        },
+    return filter_result(
+        "extended Kalman filter",
+        (problem.model_at(theta), layout.names, z[n:], P[n:, n:]),
+        maneuvers,
+        (residuals, white),
+        {"noise_deviation": deviation, "process": np.sqrt(intensity)},
     )
 
 

@@ -7,7 +7,6 @@ what the logger itself makes of it (events, counters, marks of validity) is its 
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -158,19 +157,16 @@ def _gps(gps: Any, offset: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
 
 
 def _messages(row: Any) -> bytes:
-    itow_ms, height_mm = int(row["itow_ms"]), int(row["height"])
-    place = int(row["longitude"]), int(row["latitude"])
-    accuracy_mm = 10 * int(row["h_accuracy"])
-    posllh = struct.pack("<IiiiiII", itow_ms, *place, height_mm, height_mm, accuracy_mm, 4000)
-    speed = int(row["ground_speed"])
-    velned = struct.pack("<IiiiIIiII", itow_ms, speed, 0, 0, speed, speed, 0, 30, 50_000)
-    fixed = int(row["fix"]) == packed_schema().number("gps_fix", "fix_3d")
-    fix, flags = (3, 0x0D) if fixed else (0, 0)
-    sol = struct.pack(
-        "<IihBBiiiIiiiIHBBI", itow_ms, 0, ubx.WEEK, fix, flags, 0, 0, 0, 250, 0, 0, 0, 30, 150, 0,
-        int(row["satellites"]), 0,
-    )  # fmt: skip
-    return ubx.packet(0x02, posllh) + ubx.packet(0x12, velned) + ubx.packet(0x06, sol)
+    height_mm, speed = int(row["height"]), int(row["ground_speed"])
+    return ubx.solution(
+        int(row["itow_ms"]),
+        (int(row["longitude"]), int(row["latitude"])),
+        (height_mm, height_mm),
+        (speed, 0, 0, speed, speed),
+        accuracy_mm=10 * int(row["h_accuracy"]),
+        fixed=int(row["fix"]) == packed_schema().number("gps_fix", "fix_3d"),
+        satellites=int(row["satellites"]),
+    )
 
 
 def _pressure(baro: Any, grid_s: Array, offset: int) -> Array:

@@ -141,17 +141,49 @@ def _messages(
     height_mm = round((-spot[2] + 20.0) * 1000.0)
     ground = math.hypot(speed[0], speed[1])
     course = math.degrees(math.atan2(speed[1], speed[0])) % 360.0
-    posllh = struct.pack(
-        "<IiiiiII", itow_ms, round(longitude * 1e7), round(latitude * 1e7),
-        height_mm + round(GEOID_M * 1000.0), height_mm, 2500, 4000,
-    )  # fmt: skip
-    velned = struct.pack(
-        "<IiiiIIiII", itow_ms, *(round(v * 100.0) for v in speed),
-        round(float(np.linalg.norm(speed)) * 100.0), round(ground * 100.0), round(course * 1e5),
-        30, 50_000,
-    )  # fmt: skip
-    fix, flags = (0, 0) if "gps_no_fix" in kinds else (3, 0x0D)
-    sol = struct.pack(
-        "<IihBBiiiIiiiIHBBI", itow_ms, 0, week, fix, flags, 0, 0, 0, 250, 0, 0, 0, 30, 150, 0, 9, 0
+    return solution(
+        itow_ms,
+        (round(longitude * 1e7), round(latitude * 1e7)),
+        (height_mm + round(GEOID_M * 1000.0), height_mm),
+        tuple(round(v * 100.0) for v in (*speed, float(np.linalg.norm(speed)), ground)),
+        course_1e5deg=round(course * 1e5),
+        week=week,
+        fixed="gps_no_fix" not in kinds,
     )
+
+
+def solution(
+    itow_ms: int,
+    place_1e7deg: tuple[int, int],
+    heights_mm: tuple[int, int],
+    speeds_cmps: tuple[int, ...],
+    *,
+    course_1e5deg: int = 0,
+    accuracy_mm: int = 2500,
+    week: int = WEEK,
+    fixed: bool = True,
+    satellites: int = 9,
+) -> bytes:
+    """Return the three messages of a solution: NAV-POSLLH, NAV-VELNED and NAV-SOL.
+
+    Parameters
+    ----------
+    itow_ms : int
+    place_1e7deg : tuple of int
+        Longitude and latitude.
+    heights_mm : tuple of int
+        Above the ellipsoid, and above mean sea level.
+    speeds_cmps : tuple of int
+        North, east, down, in space, over ground.
+    course_1e5deg, accuracy_mm, week : int
+    fixed : bool
+    satellites : int
+    """
+    posllh = struct.pack("<IiiiiII", itow_ms, *place_1e7deg, *heights_mm, accuracy_mm, 4000)
+    velned = struct.pack("<IiiiIIiII", itow_ms, *speeds_cmps, course_1e5deg, 30, 50_000)
+    fix, flags = (3, 0x0D) if fixed else (0, 0)
+    sol = struct.pack(
+        "<IihBBiiiIiiiIHBBI",
+        itow_ms, 0, week, fix, flags, 0, 0, 0, 250, 0, 0, 0, 30, 150, 0, satellites, 0,
+    )  # fmt: skip
     return packet(0x02, posllh) + packet(0x12, velned) + packet(0x06, sol)
