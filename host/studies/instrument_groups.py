@@ -71,7 +71,7 @@ def _shifted(names: tuple[str, ...], by: float) -> Callable[[Columns], dict[str,
 
 # What the data tell themselves: three or ten deviations of it put into the columns, and why nothing
 # moves.
-TOLD: dict[str, tuple[Callable[[Columns], dict[str, Array]], str]] = {
+DATA_INFORMED: dict[str, tuple[Callable[[Columns], dict[str, Array]], str]] = {
     "gyro bias": (
         _shifted(("p_radps", "q_radps", "r_radps"), 3.0 * 0.005),
         "every maneuver has constants of its own, and attitude tells the rest",
@@ -169,7 +169,7 @@ def shift_with(flown: Flown, group: str) -> tuple[float, str]:
     columns, airframe = flown[0], airframe_data(AIRCRAFT)
     data = flown[1].scaled(10.0, *GROUPS[group])
     usual = answers(columns, airframe, data)
-    there = answers(TOLD[group][0](columns), airframe, data)
+    there = answers(DATA_INFORMED[group][0](columns), airframe, data)
     return max((abs(there[n][0] - v) / h, n) for n, (v, h) in usual.items())
 
 
@@ -207,12 +207,12 @@ def _why(flown: Flown, r: Reach, settled: str) -> str:
     """Return why a group moves no interval."""
     if settled:
         return f"; {settled}"
-    if r.group not in TOLD:
+    if r.group not in DATA_INFORMED:
         return "; MOVES NOTHING"
     moved, name = shift_with(flown, r.group)
     return (
         f"; told by the data: many deviations in them move {name} by {moved:.2f} half-widths:"
-        f" {TOLD[r.group][1]}"
+        f" {DATA_INFORMED[r.group][1]}"
     )
 
 

@@ -20,7 +20,7 @@ from host.aircraft.powerplant import powerplant
 from host.constants import NORMAL_95
 from host.instrument.deviations import sensor_error_model
 from host.planning.optimal_card import optimal_card, standard_card
-from host.planning.prior_range import drawn
+from host.planning.prior_range import random_aircraft
 from host.sysid.answer.truth_comparison import true_coefficients
 from host.sysid.compatibility.reconstruction import reconstruct
 from host.sysid.flight.even_grid import even_arrays
@@ -80,7 +80,7 @@ def rows_of(name: str, seed: int) -> list[dict[str, object]]:
     """Fly one card with one drawn aircraft, and identify it as the verb does."""
     card = cards()[name]
     card = replace(card, pilot=hand_of(seed)) if name == HAND else card
-    flight = virtual_flight(card, seed, chain="gps", aircraft=drawn(load(AIRCRAFT), seed))
+    flight = virtual_flight(card, seed, chain="gps", aircraft=random_aircraft(load(AIRCRAFT), seed))
     table = from_frame(flight.table)
     columns, _ = even_arrays(table.columns)
     airframe = airframe_data(AIRCRAFT)

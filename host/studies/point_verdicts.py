@@ -25,11 +25,11 @@ from host.live.test_point.point_watch import PointWatch
 from host.physical.calibration import calibration_of_text
 from host.planning.card_planning import design
 from host.planning.point_widths import (
-    point_alone,
+    point_derivatives,
     promise_points,
+    single_point_card,
+    single_point_widths,
     test_points,
-    told_by,
-    widths_alone,
 )
 from host.sysid.identification_error import IdentificationError
 from host.twin.flight.fly import FlightRecord
@@ -73,7 +73,7 @@ def points() -> tuple[Card, tuple[Segment, ...]]:
 def promised(point: Segment) -> dict[str, float]:
     """Return the half-widths that a point alone is promised to give."""
     card, _ = points()
-    [found] = promise_points(point_alone(card, point), GUSTS_MPS, flights=PROMISE_FLIGHTS)
+    [found] = promise_points(single_point_card(card, point), GUSTS_MPS, flights=PROMISE_FLIGHTS)
     return {w.name: w.half_width for w in found.widths}
 
 
@@ -93,7 +93,7 @@ def drawn(card: Card, point: Segment, kind: str, seed: int) -> Card:
         pilot = replace(pilot, breaks_off=1.0)
     elif kind == "gusty":
         gusts = rng.uniform(1.0, 2.5)
-    flown = point_alone(card, point)
+    flown = single_point_card(card, point)
     return replace(flown, air=replace(card.air, turbulence_mps=gusts), pilot=pilot)
 
 
@@ -106,7 +106,9 @@ def flight(seed: int) -> Iterator[dict[str, object]]:
     flown = drawn(card, point, kind, seed)
     made = virtual_flight(flown, seed)
     ratios = _ratios(flown, made.table, point)
-    wanted = replace(point_alone(card, point), air=replace(card.air, turbulence_mps=GUSTS_MPS))
+    wanted = replace(
+        single_point_card(card, point), air=replace(card.air, turbulence_mps=GUSTS_MPS)
+    )
     sent = _sent(made.record)
     for lost in LOST:
         verdict = judged(wanted, made.record, sent, lost, seed)
@@ -127,12 +129,14 @@ def flight(seed: int) -> Iterator[dict[str, object]]:
 def _ratios(flown: Card, table: pd.DataFrame, point: Segment) -> Array:
     """Return the half-widths of the wanted derivatives over the promised ones."""
     try:
-        found = widths_alone(point, table, flown.aircraft)
+        found = single_point_widths(point, table, flown.aircraft)
     except IdentificationError:
         found = {}
     own = promised(point)
-    widths = [found[n].half_width if n in found else math.inf for n in told_by(point)]
-    return np.array([min(w / own[n], NEVER) for n, w in zip(told_by(point), widths, strict=True)])
+    widths = [found[n].half_width if n in found else math.inf for n in point_derivatives(point)]
+    return np.array(
+        [min(w / own[n], NEVER) for n, w in zip(point_derivatives(point), widths, strict=True)]
+    )
 
 
 def _sent(record: FlightRecord) -> list[tuple[float, bytes]]:

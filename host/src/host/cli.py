@@ -99,9 +99,9 @@ def _interrupts_noted(seen: list[int]) -> Iterator[None]:
         if what.exc_type is KeyboardInterrupt:
             threading.Timer(_AGAIN_S, _thread.interrupt_main).start()
         else:
-            told(what)
+            previous_hook(what)
 
-    before, told = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    before, previous_hook = signal.getsignal(signal.SIGINT), sys.unraisablehook
     ours = threading.current_thread() is threading.main_thread() and callable(before)
     if ours:
         sys.unraisablehook = unraisable
@@ -111,7 +111,7 @@ def _interrupts_noted(seen: list[int]) -> Iterator[None]:
     finally:
         if ours:
             signal.signal(signal.SIGINT, before)
-            sys.unraisablehook = told
+            sys.unraisablehook = previous_hook
 
 
 def _interrupted() -> int:

@@ -144,7 +144,7 @@ def compiled_part(function: Callable[Arguments, Result]) -> Kernel[Arguments, Re
 
 
 _preferred = False
-_told = False  # that kernels are being compiled
+_announced = False  # that kernels are being compiled
 
 
 def prefer_machine_code() -> None:
@@ -318,10 +318,10 @@ def _say_slow() -> None:
 
 def _say_compiling(what: str) -> None:
     """Say it once in a process; what comes behind is a stage of the work."""
-    global _told
+    global _announced
     stage(f"compiling {what}")
-    if not _told:
-        _told = True
+    if not _announced:
+        _announced = True
         _say(f"a first run compiles its kernels and keeps them for the next ({what}, comes first)")
 
 

@@ -21,7 +21,7 @@ class _Watch:
 
     def __init__(self) -> None:
         self.stage = ""
-        self.drawn_s = 0.0
+        self.shown_s = 0.0
 
 
 _watch = _Watch()
@@ -52,7 +52,7 @@ def watched(verb: str, *, shown: bool) -> Iterator[None]:
     def look() -> None:
         while not over.wait(_TICK_S):
             now_s = time.monotonic()
-            if now_s - began_s > _PATIENCE_S and now_s - _watch.drawn_s > _PATIENCE_S:
+            if now_s - began_s > _PATIENCE_S and now_s - _watch.shown_s > _PATIENCE_S:
                 bar.draw(f"{verb}  {_watch.stage:s}  {now_s - began_s:.0f} s")
 
     watcher = threading.Thread(target=look, daemon=True)
@@ -95,6 +95,6 @@ def progress_bar(label: str, size_bytes: int) -> Callable[[int, int], None] | No
 def draw_share(label: str, share: float) -> None:
     """Draw a bar if somebody watches; the next line that is printed takes its place."""
     if sys.stderr.isatty():
-        _watch.drawn_s = time.monotonic()
+        _watch.shown_s = time.monotonic()
         filled = round(share * _WIDTH)
         bar.draw(f"{label:8s} [{'#' * filled}{'.' * (_WIDTH - filled)}] {share:4.0%}")

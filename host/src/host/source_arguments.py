@@ -50,6 +50,18 @@ def add_row_rate(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_data_choices(parser: argparse.ArgumentParser) -> None:
+    """Add what of a flight's data a model is fitted to or run over."""
+    parser.add_argument("--maneuver", type=int, action="append", metavar="N",
+                        help="use only maneuver N of `host maneuvers`; repeatable")  # fmt: skip
+    parser.add_argument("--no-corrections", action="store_true",
+                        help="leave the sensor errors that were estimated in the data")  # fmt: skip
+    parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
+                        " whatever this check of the data finds; repeatable")  # fmt: skip
+    add_row_rate(parser)
+    add_sensor(parser)
+
+
 def hexadecimal(text: str) -> int:
     """Return the number behind hexadecimal digits; argparse names this function in its error."""
     return int(text, 16)

@@ -38,14 +38,14 @@ def test_a_flight_without_vanes_has_the_coefficients_and_intervals_of_identify(
     path = write("ulog", tmp_path)
     row = flight_row(task(path))
     found = host.identify(path, aircraft=AIRCRAFT)
-    told = {c.name: c for answer in found.linear for c in answer.coefficients}
+    coefficients = {c.name: c for answer in found.linear for c in answer.coefficients}
     assert row["models"] == [answer.template for answer in found.linear]
-    assert row["parameters"] == list(told)
-    count = len(told)
+    assert row["parameters"] == list(coefficients)
+    count = len(coefficients)
     own = np.reshape(row["own_covariance"], (count, count))
     loadings = np.reshape(row["loadings"], (-1, count))
     half = NORMAL_95 * np.sqrt(np.diag(own + loadings.T @ loadings))
-    for k, (name, one) in enumerate(told.items()):
+    for k, (name, one) in enumerate(coefficients.items()):
         assert row["estimates"][k] == pytest.approx(one.value), name
         assert half[k] == pytest.approx(one.half_width, rel=1e-3), name
         assert own[k, k] > 0.0

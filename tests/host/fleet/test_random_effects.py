@@ -124,8 +124,8 @@ def test_errors_of_as_many_calibrations_as_aircraft_average_out_and_are_no_sprea
 def test_loadings_that_go_with_the_estimate_do_not_draw_the_mean_down() -> None:
     rng = np.random.default_rng(6)
     values = 10.0 + rng.standard_normal(40)
-    told = [flight(f"N{k % 10}", v, "the type", 0.2 * v) for k, v in enumerate(values.tolist())]
-    found = fleet_estimates(told, "Cm_q")
+    flights = [flight(f"N{k % 10}", v, "the type", 0.2 * v) for k, v in enumerate(values.tolist())]
+    found = fleet_estimates(flights, "Cm_q")
     kept = type_effect(found).mean
     raw = type_effect(replace(found, shared=0.2 * found.value[:, None])).mean
     assert raw.value < values.mean() - 0.5  # Peelle's puzzle

@@ -21,7 +21,7 @@ from host.resources import resource
 from host.sysid.compatibility.path_preparation import prior
 from host.sysid.flight.flight_tables import FlightColumns
 from host.sysid.pipeline.aircraft_data import aircraft_data
-from host.twin.flight.draws import DRAWN, draw
+from host.twin.flight.draws import DRAWN_ERRORS, draw
 from host.twin.outcome.virtual_calibration import calibration
 
 NAME = "ultrastick25e"
@@ -170,7 +170,7 @@ def test_the_twin_draws_what_the_file_says_and_writes_what_it_drew_from(tmp_path
     wide = instrument_errors(plane).scaled(3.0)
     once = draw(plane, np.random.default_rng(1), tolerances=True)
     thrice = draw(plane, np.random.default_rng(1), tolerances=True, errors=wide)
-    for name, *_ in DRAWN:
+    for name, *_ in DRAWN_ERRORS:
         assert thrice.vector(name) == pytest.approx(3.0 * once.vector(name)), name
     path = tmp_path / "written.toml"
     path.write_text(calibration(plane, wide), encoding="utf-8")
@@ -191,6 +191,6 @@ def test_what_is_constant_of_an_instrument_stays_from_flight_to_flight() -> None
         )
         for flight in (1, 2)
     )
-    for name, of, *_ in DRAWN:
+    for name, of, *_ in DRAWN_ERRORS:
         same = np.array_equal(first.vector(name), second.vector(name))
         assert same == (errors[of].drawn == "instrument"), name

@@ -35,8 +35,8 @@ def test_a_flight_that_told_nothing_yet_begins_with_every_axis_once(points: Next
     assert first is not None
     assert (first.segment.axes, first.points) == (("elevator",), 3)
     assert set(first.wanting) == set(WANTED)
-    told = {"Cm_alpha": KnownWidth(9.0, 5.0), "Cm_q": KnownWidth(30.0, 5.0)}
-    second = points.best(told, [first.segment], WANTED)
+    known_widths = {"Cm_alpha": KnownWidth(9.0, 5.0), "Cm_q": KnownWidth(30.0, 5.0)}
+    second = points.best(known_widths, [first.segment], WANTED)
     assert second is not None
     assert second.segment.axes == ("aileron",)
     assert second.points > 2  # rudder, and the elevator again
@@ -67,8 +67,8 @@ def test_nothing_is_flown_for_what_only_tolerances_leave_open(points: NextPoints
 
 
 def test_other_coefficients_of_an_estimate_are_no_matter(points: NextPoints) -> None:
-    told = known() | {"CD_alpha2": KnownWidth(80.0, 1.0)}
-    assert points.best(told, flown(points), WANTED) is None
+    known_widths = known() | {"CD_alpha2": KnownWidth(80.0, 1.0)}
+    assert points.best(known_widths, flown(points), WANTED) is None
 
 
 def test_points_keep_the_excursions_of_the_standard_card(points: NextPoints) -> None:

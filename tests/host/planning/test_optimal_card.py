@@ -19,7 +19,7 @@ from host.planning.optimal_card import (
     prior_of,
     standard_card,
 )
-from host.planning.prior_range import drawn
+from host.planning.prior_range import random_aircraft
 from host.planning.tone_design import powers, relative_variances
 from host.planning.tone_information import tone_table
 from host.twin.flight.fly import fly
@@ -55,7 +55,7 @@ def test_all_axes_move_at_once_on_harmonics_of_their_own(found: OptimalCard) -> 
 def test_drawn_aircraft_keep_the_excursions(aircraft: Aircraft, found: OptimalCard) -> None:
     worst = 0.0
     for k in range(3):
-        record = fly(exact(found.card), aircraft=drawn(aircraft, FIRST_DRAW + k))
+        record = fly(exact(found.card), aircraft=random_aircraft(aircraft, FIRST_DRAW + k))
         data = air_data(record)
         point = point_of(record, data, found.card.segments[1], record.schedule.windows[0])
         shares = [getattr(point, name) / limit for name, limit in TARGET_EXCURSIONS.items()]
@@ -87,17 +87,17 @@ def test_information_is_that_of_a_regression_on_simulated_sines(aircraft: Aircra
 
 def test_draws_follow_what_the_prior_says(aircraft: Aircraft) -> None:
     shares = [
-        drawn(aircraft, seed).vectors["aerodynamics.cm_q"][0]
+        random_aircraft(aircraft, seed).vectors["aerodynamics.cm_q"][0]
         / aircraft.vectors["aerodynamics.cm_q"][0]
         for seed in range(200)
     ]
     assert np.std(shares) == pytest.approx(prior_range.SHARES["q"], rel=0.2)
-    told = Aircraft(
+    aircraft = Aircraft(
         "x", "x", aircraft.scalars, aircraft.vectors,
         {"aerodynamics.cm_q": "identified, default: -11 +- 1.1 (95 %)"},
     )  # fmt: skip
-    assert prior_range.share(told, "cm_q") == pytest.approx(0.1 / 1.96, rel=0.01)
-    assert prior_range.share(told, "cn_p") == prior_range.CROSS_SHARE
+    assert prior_range.share(aircraft, "cm_q") == pytest.approx(0.1 / 1.96, rel=0.01)
+    assert prior_range.share(aircraft, "cn_p") == prior_range.CROSS_SHARE
 
 
 def test_a_prior_file_takes_the_place_of_the_aircrafts_own(

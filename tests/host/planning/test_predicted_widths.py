@@ -76,7 +76,9 @@ def test_a_flight_of_other_gusts_and_tolerances_keeps_the_promise(
     assert not set(widths) & {"L_p", "Cl_p"}
 
 
-def test_one_point_alone_tells_less_than_three_of_it(card: Card, promised: Prediction) -> None:
+def test_one_single_point_card_tells_less_than_three_of_it(
+    card: Card, promised: Prediction
+) -> None:
     shares: list[float] = []
     [alone] = promise_points(card, 0.3, flights=1, progress=shares.append)
     assert (alone.kind, alone.axes, alone.amplitudes) == ("3211", ("elevator",), (3.0,))

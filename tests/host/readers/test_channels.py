@@ -14,7 +14,7 @@ from host.readers.autopilot_log import AutopilotLog, Messages
 from host.readers.dataflash_binary import read_records
 from host.readers.flown_tests import flown_tests
 from host.readers.held_outputs import held_output
-from host.readers.plausible_times import plausible
+from host.readers.plausible_times import plausible_times
 from host.readers.px4_channels import px4_channels
 from host.readers.px4_outputs import allocated_surfaces
 from host.readers.px4_pulses import controls_of_pulses
@@ -140,7 +140,7 @@ def test_times_that_cannot_be() -> None:
     t = np.cumsum(rng.uniform(0.01, 0.03, 400))
     wrong = t.copy()
     wrong[[50, 51, 200]] = [9e9, t[51] + 1e4, t[200] - 3.0]
-    kept, many = plausible(wrong)
+    kept, many = plausible_times(wrong)
     assert many == 3
     assert not kept[[50, 51, 200]].any()
 

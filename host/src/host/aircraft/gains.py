@@ -87,8 +87,8 @@ def from_dimensional(
         if name not in derivatives:
             continue
         row, _, label = name.partition("_")
-        together = [f"{d}_{label}" for d in (MOMENTS if row in MOMENTS else (row,))]
-        matrix = [[gains[d][coefficient_name(c)] for c in together] for d in together]
-        solved = np.linalg.solve(matrix, [derivatives.get(d, 0.0) for d in together])
-        found[coefficient_name(name)] = float(solved[together.index(name)])
+        coupled = [f"{d}_{label}" for d in (MOMENTS if row in MOMENTS else (row,))]
+        matrix = [[gains[d][coefficient_name(c)] for c in coupled] for d in coupled]
+        solved = np.linalg.solve(matrix, [derivatives.get(d, 0.0) for d in coupled])
+        found[coefficient_name(name)] = float(solved[coupled.index(name)])
     return found

@@ -61,8 +61,8 @@ def load(source: str | Path) -> Aircraft:
               "lateral_b": (4, 2)}  # fmt: skip
     matrices = {name: _matrix(source, document, name, shape) for name, shape in shapes.items()}
     alpha = math.atan2(numbers["w_mps"], numbers["u_mps"])
-    pull = matrices["longitudinal_a"][0, 3], matrices["lateral_a"][0, 3]
-    for found, sign in zip(pull, (-1.0, 1.0), strict=True):
+    gravity_terms = matrices["longitudinal_a"][0, 3], matrices["lateral_a"][0, 3]
+    for found, sign in zip(gravity_terms, (-1.0, 1.0), strict=True):
         expected = sign * GRAVITY_MPS2 * math.cos(alpha)
         if abs(found - expected) > GRAVITY_TOLERANCE * GRAVITY_MPS2:
             raise AircraftError(

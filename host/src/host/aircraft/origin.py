@@ -41,7 +41,7 @@ def aircraft_origin(source: str | Path) -> str:
     return f"{name}: coefficients of {said.partition(';')[0].partition(',')[0][:80]}"
 
 
-def tell_aircraft(names: Iterable[str | None]) -> None:
+def announce_aircraft(names: Iterable[str | None]) -> None:
     """Say on stderr of each aircraft named what it is; saved models and None are left out.
 
     Raises

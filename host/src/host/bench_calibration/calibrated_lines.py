@@ -52,10 +52,12 @@ def calibrated_lines(
             found.append(Calibrated(channel, None, early))
             continue
         # A pressure that was held to see a leak is no point of the line.
-        drawn = [p for p in points if not (channel in p.change and p.duration_s >= _LEAK_S)]
-        fit = fit_line(subject, channel, drawn, density_kgpm3=density_kgpm3)
+        fitted_points = [p for p in points if not (channel in p.change and p.duration_s >= _LEAK_S)]
+        fit = fit_line(subject, channel, fitted_points, density_kgpm3=density_kgpm3)
         found.append(
-            Calibrated(channel, fit, doubt(subject, fit, points), _short(subject, drawn, fit))
+            Calibrated(
+                channel, fit, doubt(subject, fit, points), _short(subject, fitted_points, fit)
+            )
         )
     return found
 

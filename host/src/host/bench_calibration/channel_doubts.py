@@ -19,7 +19,7 @@ from host.bench_calibration.line_fit import LineFit
 Array = NDArray[np.float64]
 BEYOND = 6.0  # standard deviations
 _STILL = 0.2  # of the range that is expected: the channel does not follow
-_FOLLOWS = 0.5
+_RESPONSE_SHARE = 0.5
 _LONG_HOLD_S = 20.0
 _LEAST_POSITIONS = 5
 _MAD_TO_SIGMA = 1.4826
@@ -35,7 +35,7 @@ def doubt_before_fit(subject: Subject, channel: str, points: Sequence[Held]) -> 
     others = {c: _span(points, c) for c in subject.channels if c != channel}
     moved = max(others, key=lambda c: others[c], default="")
     unit = UNITS[subject.table]
-    if moved and others[moved] >= _FOLLOWS * expected:
+    if moved and others[moved] >= _RESPONSE_SHARE * expected:
         return (
             f"{channel} and {moved} are swapped: {channel} was moved, {moved} went through"
             f" {others[moved]:.0f} {unit} and {channel} through {span:.0f}; change their plugs"

@@ -24,7 +24,7 @@ from host.files.user_text import shown
 
 Array = NDArray[np.float64]
 RATES = ("p", "q", "r")
-_FOLLOWS = 0.5  # of the angle: less is another axis
+_RESPONSE_SHARE = 0.5  # of the angle: less is another axis
 _OPPOSITE = -0.5
 
 
@@ -109,7 +109,7 @@ def _line(subject: Subject, axis: int, rests: Sequence[Rest], turns: Sequence[Tu
     seen = np.array([(np.array(t.rates_radps) - _zeros(rests)) * t.seconds for t in own])
     followed = seen[:, axis] @ angle / (angle @ angle)
     other = _other_axis(seen, angle, axis)
-    if abs(followed) < _FOLLOWS or followed < 0.0:
+    if abs(followed) < _RESPONSE_SHARE or followed < 0.0:
         return Calibrated(channel, None, _axis_doubt(channel, followed, other))
     zero_sigma = _zero_sigma(rest, still, len(numbers))
     left = seen[:, axis] - followed * angle
@@ -174,7 +174,7 @@ def _axis_doubt(channel: str, followed: float, other: tuple[int, float]) -> str:
     name, share = RATES[other[0]], other[1]
     if followed < _OPPOSITE:
         return f"gyro {channel} turns the wrong way: the IMU is mounted turned round, or the turn"
-    if abs(share) > _FOLLOWS:
+    if abs(share) > _RESPONSE_SHARE:
         return (
             f"gyros {channel} and {name} are swapped: the turn about {channel}'s axis was seen by"
             f" {name}; look at how the IMU is mounted"

@@ -71,7 +71,7 @@ class MavlinkBridge:
         self._began_s = time.monotonic()
         self._fast_s = self._slow_s = -math.inf
         self._row: dict[str, float] = {}
-        self._told = 0
+        self._sent_events = 0
         session.stream.subscribe(self._take)
 
     def close(self) -> None:
@@ -174,8 +174,8 @@ class MavlinkBridge:
             if math.isfinite(self._row.get(column, math.nan)):
                 self._send("named_value_float", boot_ms, name.encode(), self._row[column])
         for event in state["events"]:
-            if event["number"] > self._told:
-                self._told = event["number"]
+            if event["number"] > self._sent_events:
+                self._sent_events = event["number"]
                 text = event["text"].encode("ascii", "replace")[:50]
                 self._send("statustext", dialect.MAV_SEVERITY_NOTICE, text)
 

@@ -89,7 +89,7 @@ class ReplaySource:
 
     def _timed(self, log: FlightLog) -> Iterator[tuple[float, bytes]]:
         """Yield seconds since the first row and an envelope, in order."""
-        told = envelope(bytes([SCHEMA_HASH_ID]) + log.schema.hash.to_bytes(4, "little"))
+        hash_envelope = envelope(bytes([SCHEMA_HASH_ID]) + log.schema.hash.to_bytes(4, "little"))
         next_hash_s = -math.inf
         for session in log.sessions:
             slow = {name: session.slow(name) for name in log.schema.by_name if name != "ident"}
@@ -106,7 +106,7 @@ class ReplaySource:
                     for at_s, frame in chunk:
                         if at_s + session.offset_s >= next_hash_s:
                             next_hash_s = at_s + session.offset_s + _HASH_S
-                            yield at_s + session.offset_s, told
+                            yield at_s + session.offset_s, hash_envelope
                         yield at_s + session.offset_s, envelope(frame)
                     first_s = end_s
 

@@ -17,7 +17,7 @@ from host.original.rows import OriginalRows
 Array = NDArray[np.float64]
 
 GIVEN, GPS, UNKNOWN = "given", "GPS", "unknown"
-STRETCHES = 8
+SEGMENTS = 8
 FEWEST_ROWS = 10  # of a stretch: a GPS of the time says something new every fourth row
 LEAST_WAY_M = 20.0  # of a stretch, in the mean: positions are printed to 1 m
 MOST_SHARE = 0.15  # half-width over rate from which on it tells no time
@@ -101,7 +101,7 @@ def _ways(rows: OriginalRows) -> tuple[Array, Array] | None:
     fix, latitude, longitude, course, speed = (rows.values[label] for label in wanted)
     good = (fix > 0.0) & np.isfinite(latitude + longitude + course + speed)
     flown = good & (speed > SLOWEST_MPS)
-    if np.count_nonzero(flown) < STRETCHES * FEWEST_ROWS:
+    if np.count_nonzero(flown) < SEGMENTS * FEWEST_ROWS:
         return None
     first, last = np.flatnonzero(flown)[[0, -1]]
     at = np.arange(first, last + 1)
@@ -117,7 +117,7 @@ def _ways(rows: OriginalRows) -> tuple[Array, Array] | None:
     velocity = [
         np.interp(at, known, speed[known] * part) for part in (np.cos(angle), np.sin(angle))
     ]
-    ends = np.linspace(0, len(at) - 1, STRETCHES + 1).astype(int)
+    ends = np.linspace(0, len(at) - 1, SEGMENTS + 1).astype(int)
     way = np.column_stack([np.diff(north[ends]), np.diff(east[ends])])
     cumulative = [np.concatenate([[0.0], np.cumsum(v[:-1])]) for v in velocity]
     sums = np.column_stack([np.diff(c[ends]) for c in cumulative])

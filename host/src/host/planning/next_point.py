@@ -29,7 +29,7 @@ KINDS = {"3211": (1.0,), "doublet": (1.0, 1.7)}  # units of `mode_widths_s`
 MOST_AHEAD = 12  # points looked ahead
 INPUT_NAMES = {"3211": "3-2-1-1"}
 # Which axis tells of a derivative that nothing is known of yet.
-FIRST_TOLD_BY = {
+EXCITING_AXIS = {
     "CL_alpha": "elevator", "Cm_alpha": "elevator", "Cm_q": "elevator", "Cm_de": "elevator",
     "Cl_p": "aileron", "Cl_da": "aileron",
     "Cn_beta": "rudder", "Cn_r": "rudder", "Cn_dr": "rudder",
@@ -105,7 +105,7 @@ class NextPoints:
         speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")
         self._response = AircraftResponse(aircraft, speed)
         self._card = Card(name="next", title="", aircraft=aircraft.name, segments=())
-        self._told: dict[Segment, dict[str, Array]] = {}
+        self._information_of: dict[Segment, dict[str, Array]] = {}
         limited = limited_points(aircraft, speed, _shapes(aircraft, speed))
         self.candidates = [_for_a_hand(s) for s in limited]
 
@@ -134,15 +134,15 @@ class NextPoints:
         ]
         if not wanting:
             return None
-        told = [self._information(s) for s in flown]
-        noise = self._noise_of_a_point(known, told)
+        matrices = [self._information(s) for s in flown]
+        noise = self._noise_of_a_point(known, matrices)
         ahead: list[Segment] = []
         while len(ahead) < MOST_AHEAD:
-            excess = self._excess(known, noise, told, wanted_percent, wanting)
+            excess = self._excess(known, noise, matrices, wanted_percent, wanting)
             if excess <= 0.0 and not self._axes_left(unknown, ahead):
                 break
-            ahead.append(self._choose(known, noise, told, wanted_percent, wanting, ahead))
-            told.append(self._information(ahead[-1]))
+            ahead.append(self._choose(known, noise, matrices, wanted_percent, wanting, ahead))
+            matrices.append(self._information(ahead[-1]))
         if not ahead:
             return None
         seconds = sum(self._length_s(s) for s in ahead)
@@ -152,7 +152,7 @@ class NextPoints:
         self,
         known: Mapping[str, KnownWidth],
         noise: Mapping[str, float],
-        told: Sequence[dict[str, Array]],
+        matrices: Sequence[dict[str, Array]],
         wanted: Mapping[str, float],
         wanting: Sequence[str],
         ahead: Sequence[Segment],
@@ -160,14 +160,14 @@ class NextPoints:
         """Return the candidate that takes most of the excess in a second."""
         left = self._axes_left([n for n in wanting if n not in known], ahead)
         some = [s for s in self.candidates if not left or s.axes[0] == left[0]]
-        before = self._excess(known, noise, told, wanted, wanting)
+        before = self._excess(known, noise, matrices, wanted, wanting)
 
         def gain(s: Segment) -> float:
             if left:  # nothing is known of it: the most information in a second
-                own = [n for n in wanting if FIRST_TOLD_BY.get(n) == left[0]]
+                own = [n for n in wanting if EXCITING_AXIS.get(n) == left[0]]
                 size = deviations(own, self._information(s)) if own else np.ones(1)
                 return -float(np.sum(np.log(size))) - 0.5 * len(size) * math.log(self._length_s(s))
-            after = self._excess(known, noise, [*told, self._information(s)], wanted, wanting)
+            after = self._excess(known, noise, [*matrices, self._information(s)], wanted, wanting)
             return (before - after) / self._length_s(s)
 
         return max(some, key=gain)
@@ -175,41 +175,41 @@ class NextPoints:
     def _axes_left(self, unknown: Sequence[str], ahead: Sequence[Segment]) -> list[str]:
         """Return the axes whose derivatives nobody knows, and that no point ahead flies."""
         moved = {axis for s in ahead for axis in s.axes}
-        needed = {FIRST_TOLD_BY.get(name, "") for name in unknown}
+        needed = {EXCITING_AXIS.get(name, "") for name in unknown}
         return [axis for axis in AXES if axis in needed and axis not in moved]
 
     def _noise_of_a_point(
-        self, known: Mapping[str, KnownWidth], told: Sequence[dict[str, Array]]
+        self, known: Mapping[str, KnownWidth], matrices: Sequence[dict[str, Array]]
     ) -> dict[str, float]:
         """Return the noise of each known derivative for unit deviation, per cent."""
-        if not told:
+        if not matrices:
             return {}
         names = list(known)
-        each = deviations(names, _sum(told))
+        each = deviations(names, _sum(matrices))
         return {n: known[n].noise_percent / float(d) for n, d in zip(names, each, strict=True)}
 
     def _excess(
         self,
         known: Mapping[str, KnownWidth],
         noise: Mapping[str, float],
-        told: Sequence[dict[str, Array]],
+        matrices: Sequence[dict[str, Array]],
         wanted: Mapping[str, float],
         wanting: Sequence[str],
     ) -> float:
         """Return how far the widths are from the wanted ones: sum of logarithms."""
         names = [n for n in wanting if n in noise]
-        if not names or not told:
+        if not names or not matrices:
             return 0.0
-        each = deviations(names, _sum(told))
+        each = deviations(names, _sum(matrices))
         widths = [math.hypot(noise[n] * d, known[n].tolerance_percent)
                   for n, d in zip(names, each, strict=True)]  # fmt: skip
         return sum(max(math.log(w / wanted[n]), 0.0) for n, w in zip(names, widths, strict=True))
 
     def _information(self, s: Segment) -> dict[str, Array]:
-        if s not in self._told:
+        if s not in self._information_of:
             surfaces = wanted_surfaces(s, self._response)
-            self._told[s] = self._response.information(("CL", "Cm", "Cl", "Cn"), surfaces)
-        return self._told[s]
+            self._information_of[s] = self._response.information(("CL", "Cm", "Cl", "Cn"), surfaces)
+        return self._information_of[s]
 
     def _length_s(self, s: Segment) -> float:
         return float(length_s(self._card, s))
@@ -220,8 +220,8 @@ def _for_a_hand(s: Segment) -> Segment:
     return replace(s, amplitudes=tuple(max(math.floor(10.0 * a) / 10.0, 0.1) for a in s.amplitudes))
 
 
-def _sum(told: Sequence[dict[str, Array]]) -> dict[str, Array]:
-    return {row: np.sum([one[row] for one in told], axis=0) for row in told[0]}
+def _sum(matrices: Sequence[dict[str, Array]]) -> dict[str, Array]:
+    return {row: np.sum([one[row] for one in matrices], axis=0) for row in matrices[0]}
 
 
 def _shapes(aircraft: Aircraft, airspeed_mps: float) -> list[Segment]:

@@ -28,7 +28,7 @@ from host.planning.card_planning import (
     mode_widths_s,
     point_of,
 )
-from host.planning.prior_range import drawn, with_prior
+from host.planning.prior_range import random_aircraft, with_prior
 from host.planning.tone_design import phases, powers, relative_variances
 from host.planning.tone_information import BLOCKS, ToneTable, tone_table
 from host.twin.flight.fly import fly
@@ -162,7 +162,7 @@ class _Block:
 
 def _fleet(aircraft: Aircraft) -> list[Aircraft]:
     """Return the aircraft and some of its prior's range."""
-    return [aircraft, *(drawn(aircraft, FIRST_DRAW + k) for k in range(AIRCRAFT - 1))]
+    return [aircraft, *(random_aircraft(aircraft, FIRST_DRAW + k) for k in range(AIRCRAFT - 1))]
 
 
 def _tones(

@@ -22,9 +22,9 @@ from host.errors import UsageError
 from host.planning.predicted_widths import (
     FIRST_SEED,
     FLIGHTS,
+    FlightWidth,
     PredictedWidth,
     Progress,
-    ToldWidth,
     coefficient_widths,
     flown_columns,
     predict_widths,
@@ -35,7 +35,7 @@ from host.sysid.flight.maneuver_detection import detect_maneuvers
 from host.twin.testcard.cards import Card, Segment
 
 # What an input on an axis is flown for: damping, stiffness and control of the mode it excites.
-TOLD_BY = {
+AXIS_DERIVATIVES = {
     "elevator": ("Cm_alpha", "Cm_q", "Cm_de"),
     "aileron": ("Cl_p", "Cl_da"),
     "rudder": ("Cn_beta", "Cn_r", "Cn_dr"),
@@ -58,7 +58,7 @@ class PointPromise:
     width_s : float
         Of a step of the input.
     widths : tuple of PredictedWidth
-        Of the derivatives in `TOLD_BY` of its axes; medians of some flights.
+        Of the derivatives in `AXIS_DERIVATIVES` of its axes; medians of some flights.
     failures : tuple of str
         Why a flight gave no answer.
     recorded : bool
@@ -79,19 +79,21 @@ def test_points(card: Card) -> list[Segment]:
     return [s for s in card.segments if s.kind not in ("trim", "turn")]
 
 
-def point_alone(card: Card, point: Segment) -> Card:
+def single_point_card(card: Card, point: Segment) -> Card:
     """Return the card with one test point and rest about it."""
     rest = [Segment("trim", duration_s=s) for s in (TRIM_BEFORE_S, TRIM_BEHIND_S)]
     return replace(card, segments=(rest[0], point, rest[1]), faults=())
 
 
-def told_by(point: Segment) -> tuple[str, ...]:
+def point_derivatives(point: Segment) -> tuple[str, ...]:
     """Return the derivatives that a test point is flown for."""
-    return tuple(name for axis in point.axes for name in TOLD_BY[axis])
+    return tuple(name for axis in point.axes for name in AXIS_DERIVATIVES[axis])
 
 
-def widths_alone(point: Segment, table: pd.DataFrame, aircraft: str) -> dict[str, ToldWidth]:
-    """Return what a flight of one test point tells of the derivatives that it is flown for.
+def single_point_widths(
+    point: Segment, table: pd.DataFrame, aircraft: str
+) -> dict[str, FlightWidth]:
+    """Return the intervals of the derivatives that one test point is flown for, from its flight.
 
     Parameters
     ----------
@@ -104,15 +106,15 @@ def widths_alone(point: Segment, table: pd.DataFrame, aircraft: str) -> dict[str
     Raises
     ------
     IdentificationError
-        It tells nothing.
+        No equation can be identified.
     """
     columns, instrument = flown_columns(table, aircraft)
     own = [m for m in detect_maneuvers(columns) if m.axis.removesuffix("_rad") in point.axes]
     answer = identify_coefficients(
         columns, aircraft, windows=own, model=_model_of(point), instrument=instrument
     )
-    told = coefficient_widths(answer)
-    return {name: told[name] for name in told_by(point) if name in told}
+    widths = coefficient_widths(answer)
+    return {name: widths[name] for name in point_derivatives(point) if name in widths}
 
 
 def _model_of(point: Segment) -> CoefficientModel:
@@ -149,7 +151,7 @@ def promise_points(
     list of PointPromise
         In the order of the card; none for a point that no derivative is named for.
     """
-    points = [p for p in dict.fromkeys(test_points(card)) if told_by(p)]
+    points = [p for p in dict.fromkeys(test_points(card)) if point_derivatives(p)]
     return [
         _promised(card, point, gusts_mps, flights, first_seed, _part(progress, k, points))
         for k, point in enumerate(points)
@@ -166,17 +168,17 @@ def _promised(
 ) -> PointPromise:
     # Through the recorder: without it half-widths of N_r were half of those that its log gives, of
     # L_p four fifths.
-    alone = point_alone(card, point)
+    point_card = single_point_card(card, point)
     fly = partial(
-        predict_widths, alone, gusts_mps, flights=flights, first_seed=first_seed,
-        told=partial(widths_alone, point), progress=progress,
+        predict_widths, point_card, gusts_mps, flights=flights, first_seed=first_seed,
+        widths_of=partial(single_point_widths, point), progress=progress,
     )  # fmt: skip
     try:
         found, recorded = fly(chain="sitl"), True
     except UsageError:  # no compiler to build it
         found, recorded = fly(), False
     widths = {w.name: w for w in found.widths}
-    kept = tuple(widths[name] for name in told_by(point) if name in widths)
+    kept = tuple(widths[name] for name in point_derivatives(point) if name in widths)
     return PointPromise(
         point.kind, point.axes, point.amplitudes, point.width_s, kept, found.failures, recorded
     )

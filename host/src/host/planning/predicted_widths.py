@@ -37,12 +37,12 @@ FLIGHTS = 3
 LIGHT_GUSTS_MPS = 0.3  # of a card that names none: a calm morning
 
 Progress = Callable[[float], None]
-Told = Callable[[pd.DataFrame, str], "dict[str, ToldWidth]"]
+WidthsOf = Callable[[pd.DataFrame, str], "dict[str, FlightWidth]"]
 
 
 @dataclass(frozen=True, slots=True)
 class PredictedWidth:
-    """What flights of a card will tell of one derivative.
+    """The interval of one derivative that flights of a card will give.
 
     Attributes
     ----------
@@ -88,8 +88,8 @@ class Prediction:
 
 
 @dataclass(frozen=True, slots=True)
-class ToldWidth:
-    """A derivative as one flight tells it."""
+class FlightWidth:
+    """The interval of one derivative from one flight."""
 
     unit: str
     value: float
@@ -104,7 +104,7 @@ def predict_widths(
     flights: int = FLIGHTS,
     first_seed: int = FIRST_SEED,
     chain: str = "gps",
-    told: Told | None = None,
+    widths_of: WidthsOf | None = None,
     progress: Progress | None = None,
 ) -> Prediction:
     """Fly a card virtually and say what identification will state.
@@ -119,8 +119,9 @@ def predict_widths(
     first_seed : int
     chain : str
         As `virtual_flight` takes it: ``sitl`` is the recorder, ``gps`` needs no compiler.
-    told : callable, optional
-        What one flight's table tells, of an aircraft by name or file; `linear_widths` without.
+    widths_of : callable, optional
+        Returns the intervals of one flight's table and an aircraft (name or file); without:
+        `linear_widths`.
     progress : callable, optional
         Called with the share that is done.
 
@@ -135,12 +136,12 @@ def predict_widths(
     """
     gusts = gusts_mps if gusts_mps is not None else card.air.turbulence_mps or LIGHT_GUSTS_MPS
     windy = replace(card, air=replace(card.air, turbulence_mps=gusts), faults=())
-    found: dict[str, list[ToldWidth]] = {}
+    found: dict[str, list[FlightWidth]] = {}
     failures: list[str] = []
     for number in range(flights):
         flight = virtual_flight(windy, first_seed + number, chain=chain)
         try:
-            rows = (told or linear_widths)(flight.table, windy.aircraft)
+            rows = (widths_of or linear_widths)(flight.table, windy.aircraft)
         except IdentificationError as error:
             failures.append(str(error))
             rows = {}
@@ -162,7 +163,7 @@ def predict_widths(
     return Prediction(gusts, tuple(widths), tuple(dict.fromkeys(failures)))
 
 
-def linear_widths(table: pd.DataFrame, aircraft: str) -> dict[str, ToldWidth]:
+def linear_widths(table: pd.DataFrame, aircraft: str) -> dict[str, FlightWidth]:
     """Return what the default linear method tells of one flight, as `host identify` does.
 
     With GPS, as every log has it: without, vanes' delays stay as open as their calibration left
@@ -184,7 +185,7 @@ def linear_widths(table: pd.DataFrame, aircraft: str) -> dict[str, ToldWidth]:
     return {name: row for answer in answers for name, row in _rows(answer).items()}
 
 
-def coefficient_widths(answer: CoefficientAnswer) -> dict[str, ToldWidth]:
+def coefficient_widths(answer: CoefficientAnswer) -> dict[str, FlightWidth]:
     """Return every coefficient of an answer, and how much of its variance more data take away."""
     fit, found = answer.fit, {}
     count = len(fit.derivatives)
@@ -193,7 +194,7 @@ def coefficient_widths(answer: CoefficientAnswer) -> dict[str, ToldWidth]:
         by_errors = fit.covariance[k, count:]
         systematic = float(by_errors @ np.linalg.lstsq(errors, by_errors, rcond=None)[0])
         noise = 1.0 - systematic / max(float(fit.covariance[k, k]), 1e-300)
-        found[d.name] = ToldWidth("1", d.value, d.half_width, max(noise, 0.0))
+        found[d.name] = FlightWidth("1", d.value, d.half_width, max(noise, 0.0))
     return found
 
 
@@ -205,7 +206,7 @@ def flown_columns(table: pd.DataFrame, aircraft: str) -> tuple[dict[str, Array],
     return columns, sensor_error_model(aircraft).recorded(recording)
 
 
-def _rows(answer: Answer) -> dict[str, ToldWidth]:
+def _rows(answer: Answer) -> dict[str, FlightWidth]:
     """Return every derivative and coefficient of an answer."""
     result, rows = answer.result, {}
     halves, variances = result.half_width(), result.standard_error**2
@@ -214,8 +215,8 @@ def _rows(answer: Answer) -> dict[str, ToldWidth]:
         k = result.index(name)
         share = float(noise[k] / variances[k]) if variances[k] > 0.0 else 1.0
         unit = parameter_unit(answer.model, name)
-        rows[name] = ToldWidth(unit, result.value(name), float(halves[k]), share)
+        rows[name] = FlightWidth(unit, result.value(name), float(halves[k]), share)
     for one in answer.coefficients:
         share = (NORMAL_95 * one.fit_error / one.half_width) ** 2 if one.half_width > 0.0 else 1.0
-        rows[one.name] = ToldWidth("1", one.value, one.half_width, share)
+        rows[one.name] = FlightWidth("1", one.value, one.half_width, share)
     return rows

@@ -50,7 +50,7 @@ def share(aircraft: Aircraft, name: str) -> float:
     return SHARES.get(name.partition("_")[2], 0.0)
 
 
-def drawn(aircraft: Aircraft, seed: int) -> Aircraft:
+def random_aircraft(aircraft: Aircraft, seed: int) -> Aircraft:
     """Return an aircraft of the prior's range.
 
     Parameters
@@ -60,7 +60,7 @@ def drawn(aircraft: Aircraft, seed: int) -> Aircraft:
     """
     rng = np.random.default_rng([seed, 5])
     if aircraft.straight is not None:
-        return replace(aircraft, straight=_drawn_matrices(aircraft.straight, rng))
+        return replace(aircraft, straight=_random_dynamics(aircraft.straight, rng))
     vectors = dict(aircraft.vectors)
     for name in COEFFICIENTS:
         by = 1.0 + np.clip(share(aircraft, name) * rng.standard_normal(), -LARGEST, LARGEST)
@@ -68,7 +68,7 @@ def drawn(aircraft: Aircraft, seed: int) -> Aircraft:
     return replace(aircraft, vectors=vectors)
 
 
-def _drawn_matrices(straight: LinearDynamics, rng: np.random.Generator) -> LinearDynamics:
+def _random_dynamics(straight: LinearDynamics, rng: np.random.Generator) -> LinearDynamics:
     def moved(matrix: Array) -> Array:
         # Row 2 of pitch, rows 1 and 2 of roll and yaw: moments, which turning axes are not in.
         by = 1.0 + np.clip(MATRIX_SHARE * rng.standard_normal(matrix.shape), -LARGEST, LARGEST)

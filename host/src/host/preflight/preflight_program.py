@@ -104,7 +104,7 @@ def run_preflight(
         return walk.close
 
     live.joins.append(join)
-    summary = run_live(live, screen.told, lambda line: None)
+    summary = run_live(live, screen.show_line, lambda line: None)
     walk = done[0]
     return PreflightSummary(walk.preflight.go, walk.sheet, summary)
 
@@ -178,7 +178,7 @@ class _Walk:
         self._session.note("preflight_sheet", go=self.preflight.go, sheet=dumps(document))
         word = "GO" if self.preflight.go else "NO-GO"
         self._session.state.say("preflight", f"{word}: {self.sheet.name}")
-        self._screen.told(f"{word}; the sheet is {self.sheet}")
+        self._screen.show_line(f"{word}; the sheet is {self.sheet}")
         if not self._request.live.page:
             self._session.enough.set()
 

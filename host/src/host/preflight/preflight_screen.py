@@ -77,7 +77,7 @@ class PreflightScreen(Audience):
         self._rows = 0
         self._last: list[str] = []
         self._states: dict[str, str] = {}
-        self._told = False
+        self._end_shown = False
 
     def rows(self, message: bytes) -> None:
         """Not shown."""
@@ -106,8 +106,8 @@ class PreflightScreen(Audience):
                 self._show(f">> {item['title']}: {item['step']}")
             elif before is not None or item["state"] != "waiting":
                 self._changed(item)
-        if said["ended"] and not self._as_json and not self._told:
-            self._told = True
+        if said["ended"] and not self._as_json and not self._end_shown:
+            self._end_shown = True
             self._show("GO" if said["go"] else "NO-GO")
 
     def _changed(self, item: dict[str, Any]) -> None:
@@ -115,7 +115,7 @@ class PreflightScreen(Audience):
             reason = f": {item['reason']}" if item["reason"] else ""
             self._show(f"{_MARKS[item['state']]} {item['title']}{reason}")
 
-    def told(self, text: str) -> None:
+    def show_line(self, text: str) -> None:
         """Say something above the list."""
         lines = self._last
         self._erase()

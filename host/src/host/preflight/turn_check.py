@@ -75,8 +75,8 @@ class TurnCheck(AskedCheck):
             name = RATES[k][0]
             if not self._changed[k]:
                 return f"{name} does not change by a digit: dead axis"
-            felt = k < 2 and self._force[k][1] - self._force[k][0] > self.limit["angle_deg"]
-            if felt:
+            accelerated = k < 2 and self._force[k][1] - self._force[k][0] > self.limit["angle_deg"]
+            if accelerated:
                 return f"{name} saw nothing of {way}, which gravity did: dead axis, or swapped"
             return f"{way} by 20 deg was not seen"
         return self.reason or "the aircraft is not back where it was"

@@ -183,11 +183,11 @@ def _chained(starts: IntArray, length: NDArray[np.uint8], size: int) -> NDArray[
     if not count:
         return kept
     # Nearly all are followed by the next candidate; only where one is not, others are looked at.
-    follows = np.zeros(count, dtype=bool)
+    contiguous = np.zeros(count, dtype=bool)
     for first in range(0, count - 1, _CHUNK_BYTES):
         end = min(first + _CHUNK_BYTES, count - 1)
-        follows[first:end] = np.diff(starts[first : end + 1]) == length[first:end]
-    turns = np.flatnonzero(~follows)
+        contiguous[first:end] = np.diff(starts[first : end + 1]) == length[first:end]
+    turns = np.flatnonzero(~contiguous)
     ends = starts[turns] + length[turns]
     after = np.searchsorted(starts, ends)
     joined = ends == size

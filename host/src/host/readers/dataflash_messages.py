@@ -14,7 +14,7 @@ from host.progress import progress_bar
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
 from host.readers.dataflash_binary import read_records
 from host.readers.dataflash_text import read_text_records
-from host.readers.plausible_times import plausible
+from host.readers.plausible_times import plausible_times
 
 # What is read of a log, and which fields of it (of outputs all).
 _INERTIAL = ("TimeUS", "TimeMS", "I", "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
@@ -123,13 +123,13 @@ def _add(
     which = fields.get(INSTANCE.get(called, ""))
     instances = [number] if which is None else sorted(set(np.unique(which).tolist()))
     for one in instances:
-        alone = which is None or len(instances) == 1
-        mine = np.arange(len(t_s)) if alone else np.flatnonzero(which == one)
-        kept, wrong = plausible(t_s if alone else t_s[mine])
+        single = which is None or len(instances) == 1
+        mine = np.arange(len(t_s)) if single else np.flatnonzero(which == one)
+        kept, wrong = plausible_times(t_s if single else t_s[mine])
         if wrong:
             damage.append(f"{wrong} records of {called} have an impossible time and were left out")
         if kept.any():
-            whole = alone and not wrong  # then nothing is copied: a log may have a gigabyte
+            whole = single and not wrong  # then nothing is copied: a log may have a gigabyte
             rows = slice(None) if whole else mine[kept]
             # Outputs without a pulse are most of RCOU.
             own = {

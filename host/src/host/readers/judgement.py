@@ -157,8 +157,8 @@ def _verdict(needs: Sequence[str], rates: Mapping[str, float], poor: Sequence[st
     slow = [g for g in poor if set(GROUPS[g]) & set(needs)]
     path = {"v_north_mps", "airspeed_mps"} <= rates.keys()
     how = "by the path that GPS tells" if path else "without GPS never under trust"
-    told = "can be told" + ("" if "alpha_rad" in rates else f", no vanes: {how}")
-    return f"poorly: {', '.join(slow)} too slow" if slow else told
+    possible = "can be told" + ("" if "alpha_rad" in rates else f", no vanes: {how}")
+    return f"poorly: {', '.join(slow)} too slow" if slow else possible
 
 
 def _trouble(found: Channels, log: AutopilotLog) -> list[str]:

@@ -138,8 +138,8 @@ def _around_wrong(
             end = at + STAMP_BYTES + length
             wanted = length and int(_heads(view, np.array([at]))[1][0]) in extras
             # What nothing proves, a kind that is not read, counts where the next frame follows it.
-            follows = walked[bisect(walked, at)] if at < walked[-1] else len(data)
-            if length and (_right(view, np.array([at]), extras)[0] if wanted else end == follows):
+            behind = walked[bisect(walked, at)] if at < walked[-1] else len(data)
+            if length and (_right(view, np.array([at]), extras)[0] if wanted else end == behind):
                 kept.append(at)
                 at = end
                 continue

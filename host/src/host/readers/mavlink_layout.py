@@ -53,15 +53,15 @@ def layouts() -> dict[int, Layout]:
     found = {}
     for name in WANTED:
         number = getattr(dialect, f"MAVLINK_MSG_ID_{name}")
-        told = dialect.mavlink_map[number]
-        found[number] = Layout(name, _payload(told), told.crc_extra)
+        message = dialect.mavlink_map[number]
+        found[number] = Layout(name, _payload(message), message.crc_extra)
     return found
 
 
-def _payload(told: Any) -> np.dtype[np.void]:
-    kinds = dict(zip(told.fieldnames, told.fieldtypes, strict=True))
+def _payload(message: Any) -> np.dtype[np.void]:
+    kinds = dict(zip(message.fieldnames, message.fieldtypes, strict=True))
     parts: list[tuple[str, Any] | tuple[str, Any, tuple[int, ...]]] = []
-    for name, many in zip(told.ordered_fieldnames, told.array_lengths, strict=True):
+    for name, many in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
         kind = _TYPES[kinds[name]]
         if kind == "S":
             parts.append((name, f"S{max(many, 1)}"))

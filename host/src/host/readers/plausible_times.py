@@ -10,8 +10,8 @@ NEAR_S, NEAR_STEPS = 1.0, 20.0  # from the median of the five around: beyond, a 
 EARLIEST_S, LONGEST_S = -60.0, 30 * 86400.0  # of a time since boot
 
 
-def plausible(t_s: Array) -> tuple[BoolArray, int]:
-    """Return which of the times (n,) can be, and how many cannot.
+def plausible_times(t_s: Array) -> tuple[BoolArray, int]:
+    """Return which of the times (n,) are possible, and how many are not.
 
     A time far from the median of the five around it was changed: a pause in the log is none, for
     the median lies on the record's own side of it. What then still steps back is left out too.

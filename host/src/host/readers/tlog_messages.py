@@ -18,7 +18,7 @@ from host.progress import progress_bar
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
 from host.readers.mavlink_frames import Frames, frames_of
 from host.readers.mavlink_layout import Layout, layouts
-from host.readers.plausible_times import plausible
+from host.readers.plausible_times import plausible_times
 from host.readers.ulog_messages import BY_MAV_TYPE
 
 AUTOPILOTS = {3: "ardupilot", 12: "px4"}
@@ -219,10 +219,10 @@ def _messages(
         for port in (0,) if ports is None else np.unique(ports).tolist():
             mine = slice(None) if ports is None or len(np.unique(ports)) == 1 else ports == port
             own_s = t_s[mine]
-            kept, wrong = plausible(own_s)
+            kept, wrong = plausible_times(own_s)
             if wrong:
                 damage.append(f"{wrong} messages {name} have an impossible time and were left out")
-            rows = _later(own_s, kept)
+            rows = _increasing_rows(own_s, kept)
             if rows is None:
                 continue
             own = {k: v[mine][rows] for k, v in fields.items()}
@@ -232,7 +232,7 @@ def _messages(
     return found
 
 
-def _later(t_s: Array, kept: BoolArray) -> Any:
+def _increasing_rows(t_s: Array, kept: BoolArray) -> Any:
     """Return the rows kept and later than the one before: all as a slice, a view; None if none."""
     if kept.all() and (np.diff(t_s) > 0.0).all():
         return slice(None) if len(t_s) else None

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from host.files.watched import watched_file
 from host.readers.autopilot_log import AutopilotLog, Messages, NotAutopilotLogError
-from host.readers.plausible_times import plausible
+from host.readers.plausible_times import plausible_times
 from host.readers.ulog_walk import walk
 
 WANTED = (
@@ -130,7 +130,7 @@ def _topic(name: str, data: Mapping[str, NDArray[Any]], damage: list[str]) -> Me
     sampled = data.get("timestamp_sample")
     use = sampled if sampled is not None and (sampled > 0).mean() > 0.9 else stamps
     t_s = np.asarray(use, dtype=np.float64) * 1e-6
-    kept, wrong = plausible(t_s)
+    kept, wrong = plausible_times(t_s)
     if wrong:
         damage.append(f"{wrong} messages of {name} have an impossible time, left out")
     rows = np.flatnonzero(kept)

@@ -26,10 +26,10 @@ def picture(figure: Figure, text: str) -> str:
     """
     import matplotlib as mpl
 
-    drawn = io.StringIO()
+    svg_text = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": "host"}):
-        figure.savefig(drawn, format="svg", metadata={"Date": None})
-    body = base64.b64encode(_ILLEGAL.sub("", drawn.getvalue()).encode("utf-8")).decode("ascii")
+        figure.savefig(svg_text, format="svg", metadata={"Date": None})
+    body = base64.b64encode(_ILLEGAL.sub("", svg_text.getvalue()).encode("utf-8")).decode("ascii")
     about = escaped(text)
     return (
         f'<figure><img alt="{about}" src="data:image/svg+xml;base64,{body}">'

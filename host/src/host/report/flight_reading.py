@@ -209,14 +209,14 @@ def _common_rows(columns: Mapping[str, Array]) -> dict[str, Array]:
         if name == "t_s" or not len(seen):
             continue
         own = t_s[seen]
-        drawn = np.interp(t_s, own, values[seen], left=np.nan, right=np.nan)
+        interpolated = np.interp(t_s, own, values[seen], left=np.nan, right=np.nan)
         steps = np.diff(own)
         usual = float(np.median(steps)) if len(steps) else 0.0
         after = np.clip(np.searchsorted(own, t_s), 1, max(1, len(own) - 1))
         if len(own) > 1:
             between = (t_s > own[after - 1]) & (t_s < own[after])
-            drawn[between & (own[after] - own[after - 1] > max(3.0 * usual, 0.25))] = np.nan
-        out[name] = drawn
+            interpolated[between & (own[after] - own[after - 1] > max(3.0 * usual, 0.25))] = np.nan
+        out[name] = interpolated
     return out
 
 

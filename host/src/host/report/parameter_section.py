@@ -71,7 +71,7 @@ def _derivatives(numbers: JsonNumbers, at: int, label: str) -> str:
 def _coefficients(numbers: JsonNumbers, at: int, label: str, causes: Mapping[str, str]) -> str:
     answer = numbers.document["answers"][at]
     prior = _prior_of(numbers, answer)
-    alone = _SEVERAL if answer["template"] == "coefficients" else _DERIVATIVE
+    usual_cause = _SEVERAL if answer["template"] == "coefficients" else _DERIVATIVE
     rows = []
     for name in answer["coefficients"]:
         place = ("answers", at, "coefficients", name)
@@ -81,7 +81,7 @@ def _coefficients(numbers: JsonNumbers, at: int, label: str, causes: Mapping[str
             numbers.html(*place, "half_width", digits=2),
             numbers.html("prior", prior, name, "prior") if prior else "",
             numbers.html("truth", label, name, "truth"),
-            escaped(causes.get(name) or alone), _mark(mark.get("mark", "")),
+            escaped(causes.get(name) or usual_cause), _mark(mark.get("mark", "")),
             escaped("; ".join(mark.get("reasons", ()))),
         ])  # fmt: skip
     heads = ["name", "value", "95 % \u00b1", "prior", "truth", "widened most by", "verdict",

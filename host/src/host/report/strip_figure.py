@@ -62,7 +62,7 @@ def write_figure(
     mpl = _matplotlib()
     part = unfinished(target)
     with blamed_on(target), mpl.rc_context({"svg.hashsalt": "host", "font.size": 8}):
-        figure = _drawn(flight, strips, inside)
+        figure = _strip_axes(flight, strips, inside)
         try:
             metadata = {"Date": None} if ending == "svg" else {"Software": None}
             figure.savefig(part, format=ending, dpi=200, metadata=metadata)
@@ -77,7 +77,7 @@ def overview_figure(flight: ShownFlight) -> Any:
     strips = [[known[c] for c in one.channels] for one in strips_of(known) if one.on]
     mpl = _matplotlib()
     with mpl.rc_context({"svg.hashsalt": "host", "font.size": 8}):
-        return _drawn(flight, strips, flight.t_s >= flight.t_s[0], _OVERVIEW_POINTS)
+        return _strip_axes(flight, strips, flight.t_s >= flight.t_s[0], _OVERVIEW_POINTS)
 
 
 def _wanted(known: dict[str, Channel], names: tuple[str, ...]) -> list[list[str]]:
@@ -102,7 +102,7 @@ def _matplotlib() -> Any:
     return mpl
 
 
-def _drawn(
+def _strip_axes(
     flight: ShownFlight, strips: list[list[Channel]], inside: Any, points: int = _MOST_POINTS
 ) -> Any:
     from matplotlib.figure import Figure
@@ -112,8 +112,8 @@ def _drawn(
     axes = figure.subplots(len(strips), 1, sharex=True, squeeze=False)[:, 0]
     for axis, strip in zip(axes, strips, strict=True):
         for colour, channel in zip(_COLOURS, strip, strict=False):
-            drawn_s, values = _thinned(t_s, channel.values[inside], points)
-            axis.plot(drawn_s, values, color=colour, linewidth=0.7, label=channel.name)
+            shown_s, values = _min_max_decimated(t_s, channel.values[inside], points)
+            axis.plot(shown_s, values, color=colour, linewidth=0.7, label=channel.name)
         _shaded(axis, flight, (t_s[0], t_s[-1]))
         axis.set_ylabel(strip[0].unit or strip[0].name)
         axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=6, ncols=len(strip),
@@ -124,7 +124,7 @@ def _drawn(
     return figure
 
 
-def _thinned(t_s: Array, values: Array, points: int) -> tuple[Array, Array]:
+def _min_max_decimated(t_s: Array, values: Array, points: int) -> tuple[Array, Array]:
     if len(t_s) <= points:
         return t_s, values
     own = buckets(t_s, points // 2)

@@ -51,8 +51,8 @@ def strips_of(names: Collection[str]) -> list[Strip]:
         there = tuple(one for one in wanted if one in names)
         whole = len(there) == len(wanted)
         if there and (name not in found or (whole and len(found[name].channels) < 2)):
-            alone = len(there) < len(wanted) and ("pair" in name or wanted[0].endswith("_a_deg"))
-            if name not in found and not alone:
+            single = len(there) < len(wanted) and ("pair" in name or wanted[0].endswith("_a_deg"))
+            if name not in found and not single:
                 found[name] = Strip(name, there, on)
     if not any(strip.on for strip in found.values()):
         for name in list(names)[:4]:

@@ -158,11 +158,11 @@ class Fault:
 def without_recorder(faults: Sequence[Fault]) -> list[Fault]:
     """Return those that change nothing where no recorder flies along: the others are in the
     aircraft, its vanes, pitots and pots."""
-    felt = ("motor_cut", "receiver_lost", "receiver_failsafe")
+    outside = ("motor_cut", "receiver_lost", "receiver_failsafe")
     return [
         fault
         for fault in faults
-        if fault.kind not in felt and fault.kind.split("_")[0] not in ("vane", "pot", "pitot")
+        if fault.kind not in outside and fault.kind.split("_")[0] not in ("vane", "pot", "pitot")
     ]
 
 

@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
 
     from host.aircraft.aircraft_ranges import AIRSPEED, ALPHA_DEG, DENSITY
     from host.aircraft.file import load_measured
-    from host.aircraft.origin import tell_aircraft
+    from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode, UsageError
     from host.sysid.answer.conversion_table import (
         FlightCondition,
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     done = convert(
         args.source, args.aircraft, FlightCondition(args.airspeed, alpha_rad, args.density)
     )
-    tell_aircraft([args.aircraft])
+    announce_aircraft([args.aircraft])
     for doubt in load_measured(args.aircraft).doubts:
         print(f"host: {doubt}", file=sys.stderr)
     if args.json:

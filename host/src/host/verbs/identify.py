@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import StorePlaced, of_each, stretches_of_each
-from host.source_arguments import add_row_rate, add_sensor
+from host.source_arguments import add_data_choices
 
 if TYPE_CHECKING:
     from host.sysid.answer.output_files import OutputPaths
@@ -74,14 +74,7 @@ def _add_data(parser: argparse.ArgumentParser) -> None:
                         " in it, in place of the maneuvers found; repeatable")  # fmt: skip
     parser.add_argument("--to", dest="ends", action=StorePlaced, const=1, type=float, metavar="S",
                         default=[], help="end of it")  # fmt: skip
-    parser.add_argument("--maneuver", type=int, action="append", metavar="N",
-                        help="use only maneuver N of `host maneuvers`; repeatable")  # fmt: skip
-    parser.add_argument("--no-corrections", action="store_true",
-                        help="leave sensor errors that the flight tells in the data")  # fmt: skip
-    parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
-                        " whatever this check of the data finds; repeatable")  # fmt: skip
-    add_row_rate(parser)
-    add_sensor(parser)
+    add_data_choices(parser)
     parser.add_argument("--no-delays", action="store_true",
                         help="estimate no delay of a sensor")  # fmt: skip
 
@@ -123,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     """Identify and print the answer: words first, then numbers."""
-    from host.aircraft.origin import tell_aircraft
+    from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode
     from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import check_outputs
@@ -163,7 +156,7 @@ def _run(args: argparse.Namespace) -> int:
         prior=args.prior,
         method_options=read_options(args.method_option or ()),
     )
-    tell_aircraft([args.aircraft])
+    announce_aircraft([args.aircraft])
     if args.json:
         text = option_words(found.to_json())
         # What was written is said before the answer, so that no answer follows an error.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # A derivative whose predicted half-width is above this is named.
 WEAK_PERCENT = 20.0
 BY_TOLERANCES = "by tolerances, not by the card"
-NOT_TOLD_PERCENT = 100.0  # from here on the sign is open too
+NO_SIGN_PERCENT = 100.0  # from here on the sign is open too
 MOST_FLIGHTS = 100
 MOST_GUSTS_MPS = 5.0
 COEFFICIENTS = (
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
     """Judge or design a card and print it; return an exit code."""
     try:
         from host.aircraft.aircraft_ranges import AIRSPEED
-        from host.aircraft.origin import tell_aircraft
+        from host.aircraft.origin import announce_aircraft
         from host.export.toml import dumps
         from host.planning import card_planning as planning
         from host.twin.testcard import cards
@@ -153,9 +153,9 @@ def run(args: argparse.Namespace) -> int:
     if args.logger_card is not None:
         _write_logger_card(card, args)
     plan = planning.judge(card)
-    tell_aircraft([args.aircraft])
+    announce_aircraft([args.aircraft])
     prediction = _predicted(card, args) if args.flights else None
-    alone = _alone(card, args) if args.flights and args.alone else []
+    alone = _single_points(card, args) if args.flights and args.alone else []
     for doubt in plan.aircraft.doubts:
         print(f"host: {doubt}", file=sys.stderr)
     if args.json:
@@ -176,7 +176,7 @@ def run(args: argparse.Namespace) -> int:
         return ExitCode.OK
     _print(plan)
     _print_intervals(plan, prediction)
-    _print_alone(alone)
+    _print_single_points(alone)
     if args.save is not None:
         print(f"wrote {args.save}; fly it with: {command_line('host', 'simulate', args.save)}")
     return ExitCode.OK
@@ -191,8 +191,8 @@ def _optimal(args: argparse.Namespace) -> Card:
         raise UsageError(
             "--optimal designs a card, --prior goes with it: leave the card's name out"
         )
-    if not 0.1 <= args.want <= NOT_TOLD_PERCENT:
-        raise UsageError(f"--want is {args.want:g} %, expected 0.1 to {NOT_TOLD_PERCENT:g}")
+    if not 0.1 <= args.want <= NO_SIGN_PERCENT:
+        raise UsageError(f"--want is {args.want:g} %, expected 0.1 to {NO_SIGN_PERCENT:g}")
     source = args.aircraft or "ultrastick25e"
     aircraft = load(source)
     if args.prior is not None:
@@ -296,7 +296,7 @@ def _predicted(card: Card, args: argparse.Namespace) -> Prediction:
     return found
 
 
-def _alone(card: Card, args: argparse.Namespace) -> list[PointPromise]:
+def _single_points(card: Card, args: argparse.Namespace) -> list[PointPromise]:
     """Fly each different test point by itself."""
     from host.planning.point_widths import promise_points
     from host.progress import draw_share
@@ -312,8 +312,8 @@ def _alone(card: Card, args: argparse.Namespace) -> list[PointPromise]:
     return found
 
 
-def _print_alone(alone: list[PointPromise]) -> None:
-    """Print what each test point alone will tell."""
+def _print_single_points(alone: list[PointPromise]) -> None:
+    """Print the half-widths that each test point alone will give."""
     if alone:
         by = "through the recorder"
         if not all(point.recorded for point in alone):
@@ -321,8 +321,8 @@ def _print_alone(alone: list[PointPromise]) -> None:
         print(f"\n  One test point alone, {by}, the same gusts and tolerances:")
     for point in alone:
         size = "/".join(f"{a:g}" for a in point.amplitudes)
-        told = ", ".join(f"{w.name} {w.percent:.0f} %" for w in point.widths) or "nothing"
-        print(f"    {point.kind} {'+'.join(point.axes)}, {size} deg: {told}".rstrip())
+        widths_text = ", ".join(f"{w.name} {w.percent:.0f} %" for w in point.widths) or "nothing"
+        print(f"    {point.kind} {'+'.join(point.axes)}, {size} deg: {widths_text}".rstrip())
         for text in point.failures:
             print(f"      {text}")
 
@@ -357,7 +357,7 @@ def _print_intervals(plan: Plan, prediction: Prediction | None) -> None:
     for name, value, half, percent, best in rows:
         bound = f"  at best {best.percent:5.1f} %" if best is not None else 17 * " "
         weak = f"  weak: {_remedy(widths.get(name))}" if percent > WEAK_PERCENT else ""
-        share = f"{percent:5.1f} %" if percent < NOT_TOLD_PERCENT else "no sign"
+        share = f"{percent:5.1f} %" if percent < NO_SIGN_PERCENT else "no sign"
         line = f"    {name:8s} {value:+10.4g} +- {half:8.2g}  ({share})"
         print(f"{line}{bound if prediction is not None else ''}{weak}".rstrip())
     if any(_remedy(widths.get(name)) == BY_TOLERANCES for name, _, _, percent, _ in rows

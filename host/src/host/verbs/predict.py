@@ -10,7 +10,7 @@ from typing import Any
 
 from host.decode.newest_flight import source_or_newest
 from host.placed_arguments import StorePlaced, of_each, stretches_of_each
-from host.source_arguments import add_row_rate, add_sensor
+from host.source_arguments import add_data_choices
 
 
 def add_parser(subparsers: Any) -> None:
@@ -36,14 +36,7 @@ def add_parser(subparsers: Any) -> None:
                         const=0, default=[], help="start of a stretch")  # fmt: skip
     parser.add_argument("--to", dest="ends", type=float, metavar="S", action=StorePlaced,
                         const=1, default=[], help="end of it")  # fmt: skip
-    parser.add_argument("--maneuver", type=int, action="append", metavar="N",
-                        help="use only maneuver N of `host maneuvers`; repeatable")  # fmt: skip
-    parser.add_argument("--no-corrections", action="store_true",
-                        help="leave sensor errors that the flight tells in the data")  # fmt: skip
-    parser.add_argument("--accept", action="append", metavar="CHECK", help="use columns as they are"
-                        " whatever this check of the data finds; repeatable")  # fmt: skip
-    add_row_rate(parser)
-    add_sensor(parser)
+    add_data_choices(parser)
     parser.add_argument("--no-constants", action="store_true",
                         help="fit nothing: start from the trim before each input")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -54,7 +47,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Predict and print; messages name options where the library names arguments."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from host.aircraft.origin import tell_aircraft
+    from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode
     from host.readers.autopilot_flight import chosen_sensors
     from host.sysid.answer.output_files import OutputPaths, check_outputs
@@ -86,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
             row_rate_hz=args.row_rate,
             constants=not args.no_constants,
         )
-        tell_aircraft([args.aircraft])
+        announce_aircraft([args.aircraft])
         print(option_words(found.to_json() if args.json else found.to_text()))
         if args.plots is not None:
             written = found.plot().save(args.plots)

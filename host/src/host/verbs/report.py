@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the report, say where and the verdict; return the exit code."""
     # The matrices are small: threads of BLAS only wait for each other (28 s against 5 measured).
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from host.aircraft.origin import tell_aircraft
+    from host.aircraft.origin import announce_aircraft
     from host.errors import ExitCode
     from host.readers.autopilot_flight import chosen_sensors
     from host.report.reporting import ReportRequest, write_report
@@ -145,7 +145,7 @@ def run(args: argparse.Namespace) -> int:
         target, found = write_report(request)
     except IdentificationError as error:
         raise IdentificationError(option_words(str(error))) from error
-    tell_aircraft([args.aircraft])
+    announce_aircraft([args.aircraft])
     print(found.to_json() if args.json else option_words("\n".join(map(shown, found.verdict))))
     size = target.stat().st_size / 1e6
     print(f"wrote {shown(str(target))} ({size:.2f} MB)", file=sys.stderr)

@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     card = cards.load(args.card)
     if args.seed < 0:
         raise UsageError(f"seed is {args.seed}, expected 0 or more")
-    from host.aircraft.origin import tell_aircraft
+    from host.aircraft.origin import announce_aircraft
     from host.planning.identified_aircraft import is_model, named_aircraft
 
     if args.firmware == "sitl":
@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
         if error.filename is None and error.errno is not None:  # a write, which names no file
             error.filename = f"{args.output}: not all files of the flight were written"
         raise
-    tell_aircraft(name for name in args.aircraft if not is_model(name))
+    announce_aircraft(name for name in args.aircraft if not is_model(name))
     for doubt in outcome.record.aircraft.doubts:
         print(f"host: {doubt}", file=sys.stderr)
     if outcome.missing:

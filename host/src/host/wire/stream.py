@@ -115,8 +115,8 @@ def read_stream(path: Path, *, texts: Collection[bytes] = (), limit_bytes: int =
     kind = octets[place + HEAD_BYTES]
     hashes = _hashes(data, place, length, kind)
     # Cut off before its first hash, which comes every 5 s: the head of the capture knows.
-    told = zlib.crc32(next(iter(texts))) if texts else 0
-    which = _schema_of(hashes, len(place), told)
+    first_hash = zlib.crc32(next(iter(texts))) if texts else 0
+    which = _schema_of(hashes, len(place), first_hash)
     known = _known(path, which, texts)
     fits = np.zeros(len(place), bool)
     for number, schema in known.items():
@@ -238,17 +238,17 @@ def _hashes(
     data: bytes, place: NDArray[np.int64], length: NDArray[np.uint8], kind: NDArray[np.uint8]
 ) -> list[tuple[int, int]]:
     """Return envelope number and value of each hash of a schema."""
-    told = np.flatnonzero((kind == SCHEMA_HASH_ID) & (length == _HASH_BYTES)).tolist()
-    starts = (place[told] + HEAD_BYTES + 1).tolist()
+    rows = np.flatnonzero((kind == SCHEMA_HASH_ID) & (length == _HASH_BYTES)).tolist()
+    starts = (place[rows] + HEAD_BYTES + 1).tolist()
     return [
         (number, int.from_bytes(data[start : start + 4], "little"))
-        for number, start in zip(told, starts, strict=True)
+        for number, start in zip(rows, starts, strict=True)
     ]
 
 
-def _schema_of(hashes: list[tuple[int, int]], count: int, told: int) -> NDArray[np.uint32]:
-    """Return the hash that each of `count` envelopes follows; `told` where the stream has none."""
-    which = np.full(count, told, np.uint32)
+def _schema_of(hashes: list[tuple[int, int]], count: int, first_hash: int) -> NDArray[np.uint32]:
+    """Return the schema hash of each of `count` envelopes; `first_hash` where there is none."""
+    which = np.full(count, first_hash, np.uint32)
     for at, (number, value) in enumerate(hashes):
         which[number if at else 0 :] = value
     return which

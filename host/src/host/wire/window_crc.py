@@ -43,7 +43,9 @@ def sealed(buffer: memoryview | bytes, starts: NDArray[np.int64]) -> NDArray[np.
         np.bitwise_xor(sums[place], adds[place].take(columns[place]), out=sums[place + 1])
     chunk, offset = np.divmod(starts, BLOCK_BYTES)
     head = sums[BLOCK_BYTES, chunk] ^ sums[offset, chunk]
-    return np.asarray(_carried(head, carry) ^ sums[offset, chunk + 1] == wanted[offset], np.bool_)
+    return np.asarray(
+        _advance_register(head, carry) ^ sums[offset, chunk + 1] == wanted[offset], np.bool_
+    )
 
 
 @lru_cache(maxsize=1)
@@ -73,7 +75,8 @@ def _one_zero(register: _Words, step: _Words) -> _Words:
     return np.asarray(step[register & np.uint32(0xFF)] ^ (register >> np.uint32(8)), np.uint32)
 
 
-def _carried(register: _Words, carry: _Words) -> _Words:
+def _advance_register(register: _Words, carry: _Words) -> _Words:
+    """Return CRC registers behind one more chunk of zeros."""
     by_byte = np.ascontiguousarray(register, "<u4").view(np.uint8).reshape(-1, 4)
     out = carry[0].take(by_byte[:, 0])
     for byte in (1, 2, 3):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from host.aircraft.mass_properties import Condition
 from host.sysid.answer.estimate_lines import model_lines
-from host.sysid.answer.trust_rules import uncarried_states
+from host.sysid.answer.trust_rules import unpredicted_states
 from host.sysid.answer.verdict import verdict_lines
 from host.sysid.estimators.method_registry import fit
 from host.sysid.flight.linear_answer import Answer
@@ -65,7 +65,7 @@ def test_what_is_not_predicted_is_not_trusted(answer: Answer) -> None:
     speed = answer.model.states[0]
     failing = SignalFit(speed, 0.0, 0.8, 0.5, 0.0, 0.0)
     lost = replace(answer, result=sure, validation=(failing,), modes=modes(sure))
-    assert list(uncarried_states(lost)) == [speed]
+    assert list(unpredicted_states(lost)) == [speed]
     lines = verdict_lines([lost], [])
     trusted = next(line for line in lines if "trust" in line).split(":  ")[1].split(", ")
     told = next(line for line in lines if "whatever the interval" in line)

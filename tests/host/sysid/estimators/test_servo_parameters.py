@@ -14,7 +14,7 @@ from host.instrument.recording import Recording
 from host.instrument.servo_prior import ServoPrior, servo_prior
 from host.sysid.compatibility.servo_response import behind_servos
 from host.sysid.estimators.method_registry import fit
-from host.sysid.estimators.servo_parameters import ServoEstimate, carried_servo, estimate_servo
+from host.sysid.estimators.servo_parameters import ServoEstimate, considered_servo, estimate_servo
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
 from host.sysid.models.maneuver import Maneuver
@@ -89,8 +89,8 @@ def test_the_delay_moves_with_the_commands_and_pitch_damping_stays() -> None:
     first, fitted = found[0]
     half = fitted.half_width()
     assert abs(first.setting[0] - LATE[0]) < first.numbers[0].half_width
-    assert first.numbers[0].told
-    assert not first.numbers[1].told
+    assert first.numbers[0].data_informed
+    assert not first.numbers[1].data_informed
     for (servo, other), shift in zip(found, (0.0, 0.02, 0.04, 0.06), strict=True):
         assert servo.setting[0] - first.setting[0] == pytest.approx(shift, abs=0.004)
         k = fitted.index("M_q")
@@ -140,10 +140,10 @@ def test_a_servo_that_is_not_estimated_is_carried() -> None:
     def white(m: LinearModel, data: object, _: FitResult | None) -> FitResult:
         return fit("output-error-white", m, data, multiple_starts=False)  # type: ignore[arg-type]
 
-    carried = carried_servo(model, behind, ["elevator_rad"], WIDE, white)
+    considered = considered_servo(model, behind, ["elevator_rad"], WIDE, white)
     assert seen
-    assert carried.setting == WIDE.mean
-    assert np.all(np.diag(carried.covariance) > 0.0)
+    assert considered.setting == WIDE.mean
+    assert np.all(np.diag(considered.covariance) > 0.0)
 
 
 def test_the_servos_of_others_are_known_less() -> None:
@@ -173,7 +173,7 @@ def test_the_commands_of_a_real_flight_have_their_lag() -> None:
     ]  # fmt: skip
     servos = [a.servo for a in answers]
     assert servos[0] is not None and servos[1] is not None
-    assert servos[0].numbers[0].told
+    assert servos[0].numbers[0].data_informed
     assert servos[1].setting[0] - servos[0].setting[0] == pytest.approx(0.04, abs=0.005)
     k = answers[0].result.index("M_q")
     moved = answers[1].result.estimate[k] - answers[0].result.estimate[k]

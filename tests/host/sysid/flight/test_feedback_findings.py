@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from host.cli import main
-from host.sysid.answer.coefficient_rules import follows_states
-from host.sysid.answer.feedback_pairs import alike_derivatives, told_together
+from host.sysid.answer.coefficient_rules import input_feedback
+from host.sysid.answer.feedback_pairs import alike_derivatives, combined_derivatives
 from host.sysid.answer.marks import CAREFUL, TRUSTED
 from host.sysid.answer.trust_rules import Evidence
 from host.sysid.answer.verdict import verdict_of
@@ -153,13 +153,13 @@ def test_an_attitude_that_no_force_depends_on_takes_nothing(answer: Answer) -> N
 
 def test_what_the_pair_does_together_is_told(answer: Answer) -> None:
     law = Feedback("rudder_rad", ("r_radps",), (0.4,))
-    [line] = told_together(answer, [Finding("feedback", (), "", feedback=law)])
+    [line] = combined_derivatives(answer, [Finding("feedback", (), "", feedback=law)])
     [part] = [x for x in line.split(": ")[1].split(", ") if x.startswith("N_r + 0.4 N_dr = ")]
     value, half = (float(x) for x in part.split(" = ")[1].split(" +- "))
     assert value == pytest.approx(-2.2 - 0.4 * 28.0, abs=1.5 * half)
     assert half < 0.1 * abs(value)
     filtered = replace(law, filtered=True)
-    assert told_together(answer, [Finding("feedback", (), "", feedback=filtered)]) == []
+    assert combined_derivatives(answer, [Finding("feedback", (), "", feedback=filtered)]) == []
 
 
 def test_it_is_in_json_and_exits_0(tmp_path: object, capsys: pytest.CaptureFixture[str]) -> None:
@@ -177,5 +177,5 @@ def test_coefficients_of_the_pair_are_doubted_in_equations_that_have_both() -> N
     names = ["CY_beta", "CY_dr", "Cl_p", "Cl_r", "Cl_dr", "Cn_beta", "Cn_r", "Cn_dr", "Cn_da"]
     fitted = SimpleNamespace(derivatives=[SimpleNamespace(name=n) for n in names])
     law = Feedback("rudder_rad", ("r_radps",), (0.4,))
-    [doubt] = follows_states(cast(CoefficientAnswer, SimpleNamespace(fit=fitted)), law)
+    [doubt] = input_feedback(cast(CoefficientAnswer, SimpleNamespace(fit=fitted)), law)
     assert doubt.names == ("Cl_r", "Cl_dr", "Cn_r", "Cn_dr")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import identify
-from host.sysid.flight.prediction_limits import drawn_noise, power_freedom
+from host.sysid.flight.prediction_limits import power_freedom, random_noise
 from host.sysid.numerics.ar_noise import ArNoise, autocovariance
 from studies.wrong_flights import fly
 
@@ -34,8 +34,8 @@ def test_a_hidden_lag_is_more_than_its_gusts_allow() -> None:
 
 def test_drawn_noise_has_the_power_of_its_model() -> None:
     memory = ArNoise.from_coefficient(np.array([0.8]))
-    drawn = drawn_noise(np.random.default_rng(3), memory, 0.5, 400, 200)
-    assert np.mean(drawn**2) == pytest.approx(
+    errors = random_noise(np.random.default_rng(3), memory, 0.5, 400, 200)
+    assert np.mean(errors**2) == pytest.approx(
         0.5 * autocovariance(memory.coefficient, 0)[0], rel=0.05
     )
     assert power_freedom(ArNoise.white(), 400) == 400.0

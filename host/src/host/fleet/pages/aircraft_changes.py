@@ -14,7 +14,7 @@ from host.fleet.statistics.loaded_flight import LoadedFlight
 from host.fleet.statistics.type_model import TypeModel
 from host.fleet.statistics.watched_quantities import flight_spread, with_watched
 
-_TOLD_SHARE = 0.75  # of flights: those that do not tell every quantity are not tested
+_ESTIMATED_SHARE = 0.75  # of flights: a quantity that fewer estimate is not tested
 _MOST_MOVED = 3  # of the quantities that a line names
 
 
@@ -50,8 +50,8 @@ def histories(model: TypeModel) -> list[AircraftHistory]:
     spread = {n: flight_spread(first, n) for n in known}
     found = []
     for aircraft, own in flown.items():
-        names = _told_by_all(own, known)
-        flights = [f for f in own if all(f.tells(n) for n in names)]
+        names = _estimated_by_most(own, known)
+        flights = [f for f in own if all(f.has_estimate(n) for n in names)]
         alarms = []
         if names and len(flights) > BASELINE:
             alarms = _alarms(flights, names, spread, list(flown.values()))
@@ -65,10 +65,10 @@ def _flown(model: TypeModel, aircraft: str) -> list[LoadedFlight]:
     return sorted(own, key=lambda f: (f.date, f.label))
 
 
-def _told_by_all(flights: Sequence[LoadedFlight], names: Sequence[str]) -> tuple[str, ...]:
-    """Return the quantities that most flights tell; a finding may speak against some flights."""
-    least = _TOLD_SHARE * len(flights)
-    return tuple(n for n in names if sum(f.tells(n) for f in flights) >= least)
+def _estimated_by_most(flights: Sequence[LoadedFlight], names: Sequence[str]) -> tuple[str, ...]:
+    """Return the quantities that most flights estimate; a finding excludes some in a flight."""
+    least = _ESTIMATED_SHARE * len(flights)
+    return tuple(n for n in names if sum(f.has_estimate(n) for f in flights) >= least)
 
 
 def _alarms(
@@ -92,9 +92,9 @@ def _alarms(
 def _first_parts(
     flights: Sequence[LoadedFlight], names: tuple[str, ...]
 ) -> tuple[list[Array], list[Array]]:
-    """Return the first flights of an aircraft that tell these quantities."""
-    told = [_part(f, names) for f in flights[:BASELINE] if all(f.tells(n) for n in names)]
-    return [v for v, _ in told], [c for _, c in told]
+    """Return the estimates of the first flights of an aircraft that have all these quantities."""
+    parts = [_part(f, names) for f in flights[:BASELINE] if all(f.has_estimate(n) for n in names)]
+    return [v for v, _ in parts], [c for _, c in parts]
 
 
 def _part(flight: LoadedFlight, names: tuple[str, ...]) -> tuple[Array, Array]:

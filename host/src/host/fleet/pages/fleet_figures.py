@@ -32,8 +32,8 @@ def funnel_figure(model: TypeModel, name: str) -> Figure:
     effect = model.effects[name]
     figure = Figure(figsize=(5.2, 3.6), layout="constrained")
     axes = figure.subplots()
-    told = [f for f in model.flights if f.tells(name)]
-    deviation = np.array([math.sqrt(f.total_variance(name)) for f in told])
+    flights = [f for f in model.flights if f.has_estimate(name)]
+    deviation = np.array([math.sqrt(f.total_variance(name)) for f in flights])
     widths = np.linspace(0.0, 1.1 * float(deviation.max()), 60)
     within = 0.0 if math.isnan(effect.within.value) else effect.within.value
     reach = NORMAL_95 * np.hypot(widths, math.hypot(within, effect.between.value))
@@ -43,8 +43,8 @@ def funnel_figure(model: TypeModel, name: str) -> Figure:
     axes.axvspan(effect.mean.lower, effect.mean.upper, color="#c7d2fe", zorder=0)
     axes.axvline(middle, color="#111827", lw=1)
     for number, aircraft in enumerate(model.aircraft):
-        own = [k for k, f in enumerate(told) if f.aircraft == aircraft]
-        values = [told[k].values[told[k].names.index(name)] for k in own]
+        own = [k for k, f in enumerate(flights) if f.aircraft == aircraft]
+        values = [flights[k].values[flights[k].names.index(name)] for k in own]
         turn = number // len(_COLOURS) % len(_MARKS)
         axes.plot(
             values,

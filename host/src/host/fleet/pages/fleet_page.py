@@ -82,8 +82,8 @@ def _effects(model: TypeModel) -> str:
     ]
     said = "<p>Spreads are standard deviations with 95 % intervals. Errors that all flights share"
     said += " are in the mean's interval and do not average out.</p>"
-    if model.alone:
-        said += f"<p>Told by one aircraft only: {escaped(', '.join(model.alone))}.</p>"
+    if model.single_aircraft:
+        said += f"<p>Told by one aircraft only: {escaped(', '.join(model.single_aircraft))}.</p>"
     return table(heads, rows) + said
 
 

@@ -34,8 +34,8 @@ def type_lines(model: TypeModel) -> list[str]:
             if differing else "none"
         )
     ]  # fmt: skip
-    if model.alone:
-        lines.append(f"told by one aircraft only: {', '.join(model.alone)}")
+    if model.single_aircraft:
+        lines.append(f"told by one aircraft only: {', '.join(model.single_aircraft)}")
     return lines
 
 
@@ -59,7 +59,7 @@ def type_document(model: TypeModel) -> dict[str, Any]:
         "cg_m": None if model.cg_m is None else list(model.cg_m),
         "alpha_rad": model.alpha_rad(),
         "airspeed_mps": float(np.median(model.conditions("airspeed_mps"))),
-        "told_by_one_aircraft": list(model.alone),
+        "told_by_one_aircraft": list(model.single_aircraft),
         "derivatives": {
             name: {
                 "mean": _ends(e.mean),

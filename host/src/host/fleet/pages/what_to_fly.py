@@ -28,8 +28,8 @@ def advice_lines(model: TypeModel) -> list[str]:
     for name in sorted(wide, key=wide.__getitem__, reverse=True)[:_MOST]:
         share = 100.0 * wide[name]
         lines.append(f"{name}: +- {share:.0f} %: {_cause(model, name, model.effects[name])}")
-    if model.alone:
-        lines.append(f"fly a second aircraft with maneuvers for {', '.join(model.alone)}")
+    if model.single_aircraft:
+        lines.append(f"fly a second aircraft with maneuvers for {', '.join(model.single_aircraft)}")
     return lines or ["nothing: every mean is known to 10 %"]
 
 

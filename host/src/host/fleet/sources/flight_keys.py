@@ -76,9 +76,9 @@ class FleetSources:
         folder = path.rpartition("/")[0].rpartition("/")[2]
         known = {
             "log_id": log_id(path, self.hashes),
-            "type": row.type or _once(self._files, f"type {file}", lambda: _type_of(file)),
+            "type": row.type or _memoized(self._files, f"type {file}", lambda: _type_of(file)),
             "aircraft": row.aircraft or folder or "aircraft",
-            "aircraft_id": _once(self._files, f"aircraft {file}", lambda: _aircraft_id(file)),
+            "aircraft_id": _memoized(self._files, f"aircraft {file}", lambda: _aircraft_id(file)),
             "calibration_id": self._calibration_id(row.calibration),
             "date": row.date,
             "version": f"{__version__}, rows {ROWS}",
@@ -112,7 +112,7 @@ def _check_models(names: Sequence[str]) -> None:
         )
 
 
-def _once(known: dict[str, str], name: str, made: Callable[[], str]) -> str:
+def _memoized(known: dict[str, str], name: str, made: Callable[[], str]) -> str:
     """Return what is made once for each name."""
     if name not in known:
         known[name] = made()

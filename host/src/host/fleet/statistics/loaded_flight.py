@@ -56,8 +56,8 @@ class LoadedFlight:
     conditions: dict[str, float] = field(default_factory=dict)
     watched: dict[str, tuple[float, float]] = field(default_factory=dict)
 
-    def tells(self, name: str) -> bool:
-        """Return whether the flight counts for a derivative."""
+    def has_estimate(self, name: str) -> bool:
+        """Return whether the flight has an estimate of a derivative that counts."""
         return name in self.names and name not in self.left_out
 
     def total_variance(self, name: str) -> float:
@@ -75,21 +75,21 @@ def fleet_estimates(flights: Sequence[LoadedFlight], name: str) -> FleetEstimate
     at: a low estimate has a small one, would be taken for sure, and draw the mean down (Peelle's
     puzzle: D'Agostini, Nuclear Instruments and Methods A 346, 1994).
     """
-    told = sorted((f for f in flights if f.tells(name)), key=lambda f: f.aircraft)
-    at = [f.names.index(name) for f in told]
-    codes = np.unique([f.aircraft for f in told], return_inverse=True)[1].astype(np.int64)
-    value = np.array([f.values[k] for f, k in zip(told, at, strict=True)])
-    variance = np.array([f.own[k, k] for f, k in zip(told, at, strict=True)])
+    own_flights = sorted((f for f in flights if f.has_estimate(name)), key=lambda f: f.aircraft)
+    at = [f.names.index(name) for f in own_flights]
+    codes = np.unique([f.aircraft for f in own_flights], return_inverse=True)[1].astype(np.int64)
+    value = np.array([f.values[k] for f, k in zip(own_flights, at, strict=True)])
+    variance = np.array([f.own[k, k] for f, k in zip(own_flights, at, strict=True)])
     owners: dict[str, set[int]] = {}
-    for flight, code in zip(told, codes.tolist(), strict=True):
+    for flight, code in zip(own_flights, codes.tolist(), strict=True):
         for whose, _ in flight.sources:
             owners.setdefault(whose, set()).add(code)
     common = {whose for whose, aircraft in owners.items() if len(aircraft) > 1}
     rows = [
         {source: float(x) for source, x in zip(f.sources, f.loadings[:, k], strict=True)}
-        for f, k in zip(told, at, strict=True)
+        for f, k in zip(own_flights, at, strict=True)
     ]
-    local, rest = np.zeros((len(told), LOCAL_RANK)), np.zeros(len(told))
+    local, rest = np.zeros((len(own_flights), LOCAL_RANK)), np.zeros(len(own_flights))
     for code in range(int(codes[-1]) + 1 if len(codes) else 0):
         inside = np.flatnonzero(codes == code)
         matrix, uneven = _matrix([rows[i] for i in inside], lambda s: s[0] not in common)

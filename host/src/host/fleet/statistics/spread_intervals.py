@@ -99,25 +99,25 @@ class KnownSpreads:
     within: float | None = None
 
 
-def type_effect(data: FleetEstimates, told: KnownSpreads | None = None) -> TypeEffect:
+def type_effect(data: FleetEstimates, known: KnownSpreads | None = None) -> TypeEffect:
     """Return mean and spreads of one derivative with 95 % intervals.
 
     Parameters
     ----------
     data : FleetEstimates
         Of two aircraft or more.
-    told : KnownSpreads, optional
+    known : KnownSpreads, optional
         Standard deviations not to be estimated; the intervals are then an oracle's.
     """
-    told = told or KnownSpreads()
+    known = known or KnownSpreads()
     between, within = restricted_likelihood(data)
-    between = between if told.between is None else told.between**2
-    within = within if told.within is None else told.within**2
+    between = between if known.between is None else known.between**2
+    within = within if known.within is None else known.within**2
     fit = reduced(data, between, within)
     lone = reduced(replace(data, shared=data.shared[:, :0]), between, within)
     shared = math.sqrt(max(1.0 / fit.information - 1.0 / lone.information, 0.0))
     own = 1.0 / lone.information
-    if told.between is None:
+    if known.between is None:
         split = _between_form(data, between, within)
         own *= split / (data.fleet - 1)
         half = math.hypot(_student(data.fleet - 1) * math.sqrt(own), NORMAL_95 * shared)
@@ -125,13 +125,13 @@ def type_effect(data: FleetEstimates, told: KnownSpreads | None = None) -> TypeE
         half = NORMAL_95 * math.hypot(math.sqrt(own), shared)
     return TypeEffect(
         mean=Interval(fit.mean, fit.mean - half, fit.mean + half),
-        between=_between_interval(data, between, within, told),
-        within=_within_interval(data, within, told),
+        between=_between_interval(data, between, within, known),
+        within=_within_interval(data, within, known),
         mean_deviation=math.sqrt(own),
         shared_deviation=shared,
         aircraft=data.fleet,
         flights=data.flights,
-        differs=_probability_alike(data, within, told),
+        differs=_probability_alike(data, within, known),
     )
 
 
@@ -141,18 +141,18 @@ def _between_form(data: FleetEstimates, between: float, within: float) -> float:
     return max(whole.quadratic - reduced(data, math.inf, within).quadratic, 0.0)
 
 
-def _within_interval(data: FleetEstimates, within: float, told: KnownSpreads) -> Interval:
+def _within_interval(data: FleetEstimates, within: float, known: KnownSpreads) -> Interval:
     """Return the standard deviation between flights, by profile of the restricted likelihood."""
     inside = data.flights - data.fleet
     if inside < 1:
         return Interval(math.nan, 0.0, math.inf)
     middle, scale = math.sqrt(within), math.sqrt(data.grain)
     limit = CHI_SQUARE_95 * (1.0 + 1.0 / inside)
-    best = _profile(data, max(within, _LEAST * data.grain), told)
+    best = _profile(data, max(within, _LEAST * data.grain), known)
 
     def beyond(deviation: float) -> float:
         variance = max(deviation**2, _LEAST * data.grain)
-        return _profile(data, variance, told) - best - limit
+        return _profile(data, variance, known) - best - limit
 
     lower = 0.0
     if beyond(0.0) > 0.0:
@@ -165,10 +165,10 @@ def _within_interval(data: FleetEstimates, within: float, told: KnownSpreads) ->
     return Interval(middle, lower, _root(beyond, middle, upper, scale))
 
 
-def _profile(data: FleetEstimates, within: float, told: KnownSpreads) -> float:
+def _profile(data: FleetEstimates, within: float, known: KnownSpreads) -> float:
     """Return the least deviance over the spread between aircraft."""
-    if told.between is not None:
-        return reduced(data, told.between**2, within).deviance
+    if known.between is not None:
+        return reduced(data, known.between**2, within).deviance
     high = 3.0 * math.sqrt(data.scatter)
     found = optimize.minimize_scalar(
         lambda x: reduced(data, x * x, within).deviance,
@@ -185,13 +185,13 @@ def _root(form: Callable[[float], float], low: float, high: float, scale: float)
 
 
 def _between_interval(
-    data: FleetEstimates, between: float, within: float, told: KnownSpreads
+    data: FleetEstimates, between: float, within: float, known: KnownSpreads
 ) -> Interval:
     """Return the standard deviation between aircraft."""
 
     def surplus(tail: float) -> Callable[[float], float]:
         def form(variance: float) -> float:
-            freedom = MANY if told.within is not None else _denominator(data, variance, within)
+            freedom = MANY if known.within is not None else _denominator(data, variance, within)
             limit = (data.fleet - 1) * float(special.fdtri(data.fleet - 1, freedom, 1.0 - tail))
             return _between_form(data, variance, within) / limit
 
@@ -210,8 +210,8 @@ def _likely_upper(data: FleetEstimates, within: float) -> float:
     return _where(lambda x: limit - reduced(data, x, within).deviance, 0.0, data.grain, 0.0)
 
 
-def _probability_alike(data: FleetEstimates, within: float, told: KnownSpreads) -> float:
-    freedom = MANY if told.within is not None else _denominator(data, 0.0, within)
+def _probability_alike(data: FleetEstimates, within: float, known: KnownSpreads) -> float:
+    freedom = MANY if known.within is not None else _denominator(data, 0.0, within)
     return float(
         special.fdtrc(data.fleet - 1, freedom, _between_form(data, 0.0, within) / (data.fleet - 1))
     )

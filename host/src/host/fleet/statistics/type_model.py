@@ -28,7 +28,7 @@ class TypeModel:
         What each was made from.
     flights : tuple of LoadedFlight
         About the reference CG.
-    alone : tuple of str
+    single_aircraft : tuple of str
         Derivatives that fewer than two aircraft tell.
     cg_m : tuple of float, optional
         What moments are about.
@@ -38,7 +38,7 @@ class TypeModel:
     effects: dict[str, TypeEffect]
     estimates: dict[str, FleetEstimates]
     flights: tuple[LoadedFlight, ...]
-    alone: tuple[str, ...]
+    single_aircraft: tuple[str, ...]
     cg_m: Place | None = None
 
     @property
@@ -71,12 +71,12 @@ def type_model(name: str, flights: Sequence[LoadedFlight], cg_m: Place | None = 
         That CG.
     """
     names = list(dict.fromkeys(n for flight in flights for n in flight.names))
-    effects, estimates, alone = {}, {}, []
+    effects, estimates, single_aircraft = {}, {}, []
     for derivative in names:
-        told = {f.aircraft for f in flights if f.tells(derivative)}
-        if len(told) < FEWEST_AIRCRAFT:
-            alone += [derivative] if told else []
+        aircraft_ids = {f.aircraft for f in flights if f.has_estimate(derivative)}
+        if len(aircraft_ids) < FEWEST_AIRCRAFT:
+            single_aircraft += [derivative] if aircraft_ids else []
             continue
         estimates[derivative] = fleet_estimates(flights, derivative)
         effects[derivative] = type_effect(estimates[derivative])
-    return TypeModel(name, effects, estimates, tuple(flights), tuple(alone), cg_m)
+    return TypeModel(name, effects, estimates, tuple(flights), tuple(single_aircraft), cg_m)

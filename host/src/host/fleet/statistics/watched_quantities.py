@@ -47,6 +47,6 @@ def flight_spread(flights: Sequence[LoadedFlight], name: str) -> float:
         From before any change: an aircraft's first ones.
     name : str
     """
-    if len({f.aircraft for f in flights if f.tells(name)}) < FEWEST_AIRCRAFT:
+    if len({f.aircraft for f in flights if f.has_estimate(name)}) < FEWEST_AIRCRAFT:
         return 0.0
     return float(np.sqrt(restricted_likelihood(fleet_estimates(flights, name))[1]))

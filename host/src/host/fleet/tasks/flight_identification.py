@@ -26,7 +26,7 @@ from host.fleet.tasks.surface_response import surface_quantities
 from host.fleet.tasks.vane_zeros import vane_zeros
 from host.instrument.error_sources import AIRCRAFT_FILE, TYPE
 from host.sysid.answer import trust_rules
-from host.sysid.answer.coefficient_rules import follows_states, open_finding
+from host.sysid.answer.coefficient_rules import input_feedback, open_finding
 from host.sysid.answer.feedback_pairs import feedback_of
 from host.sysid.coefficients.coefficient_fit import CoefficientFit
 from host.sysid.compatibility.sensor_dynamics import SERVO_DELAY
@@ -36,7 +36,7 @@ from host.sysid.pipeline.identification import Identification
 from host.sysid.pipeline.stages import identify
 
 _GPS_EPOCH = datetime(1980, 1, 6, tzinfo=UTC)
-_TOLD = 0.9  # of what was assumed: an estimate nearly as wide says nothing
+_POSTERIOR_PRIOR_RATIO = 0.9  # of what was assumed: an estimate nearly as wide says nothing
 _LEAST_WEEK = 1024  # below, a receiver without almanac counts from its own beginning
 
 Watched = dict[str, tuple[float, float]]
@@ -133,13 +133,13 @@ def _doubted(found: Identification) -> list[str]:
     if found.coefficients:
         answer, laws = found.coefficients, feedback_of(found.findings)
         doubts = open_finding(answer, open_channels(found.findings))
-        doubts += [one for law in laws for one in follows_states(answer, law)]
+        doubts += [one for law in laws for one in input_feedback(answer, law)]
         return sorted({name for doubt in doubts for name in doubt.names})
-    rules = (trust_rules.open_finding, trust_rules.follows_states)
+    rules = (trust_rules.open_finding, trust_rules.input_feedback)
     doubts = [one for a in found.linear for rule in rules for one in rule(a, found.evidence)]
     names = {name for doubt in doubts for name in doubt.names}
-    told = {c.name for answer in found.linear for c in answer.coefficients}
-    return sorted(name for name in told if dimensional_name(name) in names)
+    linear_names = {c.name for answer in found.linear for c in answer.coefficients}
+    return sorted(name for name in linear_names if dimensional_name(name) in names)
 
 
 def _condition(fit: CoefficientFit) -> dict[str, float]:
@@ -185,11 +185,11 @@ def _watched_columns(
     watched = dict(surfaces)
     if found.coefficients is not None:
         fit, own = found.coefficients.fit, np.sqrt(np.diag(parts.own))
-        told = {
+        estimates = {
             n: (float(v), float(d)) for n, v, d in zip(parts.names, parts.values, own, strict=True)
         }
         watched |= vane_zeros(
-            found.flights[0], told, float(fit.condition.drag), load_measured(aircraft_file)
+            found.flights[0], estimates, float(fit.condition.drag), load_measured(aircraft_file)
         )
         watched |= {} if surfaces else _commanded_lag(fit)
     return {
@@ -200,15 +200,15 @@ def _watched_columns(
 
 
 def _commanded_lag(fit: CoefficientFit) -> Watched:
-    """Return by how much usual servos are late, as the data alone say: less what was assumed."""
+    """Return the servos' lag as estimated from the data alone, the prior's information removed."""
     if SERVO_DELAY not in fit.errors:
         return {}
     value, sd = fit.errors[SERVO_DELAY]
     before = fit.error_deviations.get(SERVO_DELAY, 0.0)
-    if not 0.0 < sd < _TOLD * before:
+    if not 0.0 < sd < _POSTERIOR_PRIOR_RATIO * before:
         return {}
-    told = 1.0 / sd**2 - 1.0 / before**2
-    return {f"servo{LAG_S}": (float(value / sd**2 / told), float(told**-0.5))}
+    information = 1.0 / sd**2 - 1.0 / before**2
+    return {f"servo{LAG_S}": (float(value / sd**2 / information), float(information**-0.5))}
 
 
 def _surfaces(path: Path, calibration: str) -> Watched:

@@ -41,12 +41,12 @@ def linear_loadings(answers: Sequence[Answer], errors: InstrumentErrors) -> Load
         Of different axes. Those without coefficients say nothing.
     errors : InstrumentErrors
     """
-    told = [a.coefficient_parts for a in answers if a.coefficient_parts is not None]
-    names = tuple(name for parts in told for name in parts.names)
+    estimated = [a.coefficient_parts for a in answers if a.coefficient_parts is not None]
+    names = tuple(name for parts in estimated for name in parts.names)
     own = np.zeros((len(names), len(names)))
     shifts: dict[str, Array] = {}
     at = 0
-    for parts in told:
+    for parts in estimated:
         here = slice(at, at := at + len(parts.names))
         wider = parts.quantile / NORMAL_95
         own[here, here] = parts.statistical * np.outer(wider, wider)
@@ -55,7 +55,7 @@ def linear_loadings(answers: Sequence[Answer], errors: InstrumentErrors) -> Load
                 shifts.setdefault(error, np.zeros(len(names)))[here] = shift
             else:  # what the model leaves open in this flight, no sensor's
                 own[here, here] += np.outer(shift, shift)
-    values = np.concatenate([parts.values for parts in told]) if told else np.zeros(0)
+    values = np.concatenate([parts.values for parts in estimated]) if estimated else np.zeros(0)
     total = own + sum((np.outer(s, s) for s in shifts.values()), np.zeros_like(own))
     return parted(names, values, total, shifts, errors)
 

@@ -16,7 +16,7 @@ from host.arrays import Array
 from host.instrument.deviations import SensorErrorModel
 from host.log import read_log
 from host.planning.next_point import INPUT_NAMES, KnownWidth
-from host.planning.predicted_widths import ToldWidth, coefficient_widths
+from host.planning.predicted_widths import FlightWidth, coefficient_widths
 from host.sysid.coefficients.coefficient_estimator import (
     CoefficientAnswer,
     CoefficientEstimator,
@@ -121,7 +121,7 @@ class FlightEstimator:
         found = [m for m in detect_maneuvers(columns) if m.axis != "throttle"]
         done, under_way = _points(found, until_s - _SETTLED_S)
         answers, why_not = self._answers(columns, found, read, instrument)
-        told = {
+        widths = {
             name: width
             for answer in answers
             for name, width in coefficient_widths(answer).items()
@@ -131,10 +131,10 @@ class FlightEstimator:
             until_s,
             tuple(maneuver_name(one) for one in done),
             under_way,
-            {name: (float(w.value), float(w.half_width)) for name, w in told.items()},
+            {name: (float(w.value), float(w.half_width)) for name, w in widths.items()},
             answers[0] if answers else None,
             why_not,
-            {name: _known(w) for name, w in told.items() if w.value},
+            {name: _known(w) for name, w in widths.items() if w.value},
             tuple(_as_flown(one) for one in done),
         )
 
@@ -193,7 +193,7 @@ def _moved(answer: CoefficientAnswer) -> set[str]:
     return {"", *(m.axis for m in answer.used if m.input_end_s - m.start_s > _INPUT_S)}
 
 
-def _known(width: ToldWidth) -> KnownWidth:
+def _known(width: FlightWidth) -> KnownWidth:
     percent = 100.0 * abs(width.half_width / width.value)
     return KnownWidth(percent, percent * math.sqrt(max(1.0 - width.noise_share, 0.0)))
 

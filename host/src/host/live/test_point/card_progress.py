@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from host.planning.next_point import INPUT_NAMES, in_words
-from host.planning.point_widths import told_by
+from host.planning.point_widths import point_derivatives
 from host.planning.wanted_input import RESPONSE_S
 from host.twin.testcard.cards import Card, Segment, length_s
 
@@ -43,7 +43,7 @@ def card_points(card: Card) -> list[CardPoint]:
     found: list[CardPoint] = []
     between: list[Segment] = []
     for s in card.segments:
-        if s.kind in ("trim", "turn") or not told_by(s):
+        if s.kind in ("trim", "turn") or not point_derivatives(s):
             between.append(s)
             continue
         rest_s = sum(length_s(card, one) for one in between) + s.before_s

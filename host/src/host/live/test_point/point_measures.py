@@ -10,7 +10,7 @@ import numpy as np
 
 from host.arrays import Array
 from host.planning.aircraft_response import STEP_S, AircraftResponse
-from host.planning.point_widths import told_by
+from host.planning.point_widths import point_derivatives
 from host.planning.wanted_input import RESPONSE_S, SURFACES, input_length_s, wanted_surfaces
 from host.sysid.flight.maneuver_detection import FLYING_SHARE, LEAST_EDGE_RAD, DetectedManeuver
 from host.twin.testcard.cards import Segment
@@ -105,7 +105,7 @@ def measure(
     inside = (t >= found.start_s) & (t <= found.input_end_s + RESPONSE_S)
     rate = columns[_RATE_OF.get(own[0] if own else "elevator", "q_radps")]
     speed = columns["airspeed_mps"]
-    names = told_by(wanted)
+    names = point_derivatives(wanted)
     # Handling on other axes, and a trim that was read wrongly there, tell nothing of this one.
     alone = {axis: moved[axis] if axis in own else 0.0 * moved[axis] for axis in SURFACES}
     return PointMeasures(

@@ -52,12 +52,12 @@ def coefficient_doubts(
         Of surfaces that follow states.
     """
     return [
-        *(one for law in laws for one in follows_states(answer, law)),
+        *(one for law in laws for one in input_feedback(answer, law)),
         *(one for rule in RULES for one in rule(answer, open_channels)),
     ]
 
 
-def follows_states(answer: CoefficientAnswer, law: Feedback) -> list[Doubt]:
+def input_feedback(answer: CoefficientAnswer, law: Feedback) -> list[Doubt]:
     """A surface is a function of states: in one equation their coefficients are alike."""
     own = LEANING[law.surface][1]
     others = [label for s in law.signals for label in LEANING.get(s, ((), ()))[1]]
@@ -121,9 +121,9 @@ def unpredicted(answer: CoefficientAnswer) -> dict[str, str]:
     if found is None:
         return {}
     return {
-        name: f"NRMSE {100.0 * unseen:.1f} %, fitted {100.0 * found.fitted[name]:.1f} %"
-        for name, unseen in found.left_out.items()
-        if unseen > WORSE * found.fitted[name]
+        name: f"NRMSE {100.0 * held_out:.1f} %, fitted {100.0 * found.fitted[name]:.1f} %"
+        for name, held_out in found.left_out.items()
+        if held_out > WORSE * found.fitted[name]
     }
 
 

@@ -10,7 +10,7 @@ from host.sysid.models.model_constants import known_constants
 IN_A_LINE = 4  # maneuvers
 # Half-width over value from which a constant only trades with another: without the bank angle the
 # initial one and the bias of sideslip are the same motion.
-NOT_TOLD = 1e3
+UNDETERMINED_RATIO = 1e3
 
 
 def constant_lines(answer: Answer) -> list[str]:
@@ -21,9 +21,9 @@ def constant_lines(answer: Answer) -> list[str]:
         constant, at, _ = name.partition("@")
         if at:
             value = float(result.estimate[k])
-            told = half[k] < NOT_TOLD * max(abs(value), 1e-3)
+            determined = half[k] < UNDETERMINED_RATIO * max(abs(value), 1e-3)
             shown, factor = people_name(constant)
-            words = f"{factor * value:.4g} +- {factor * half[k]:.2g}" if told else "not told"
+            words = f"{factor * value:.4g} +- {factor * half[k]:.2g}" if determined else "not told"
             found.setdefault(constant, (shown, []))[1].append(words)
     lines = []
     if found:

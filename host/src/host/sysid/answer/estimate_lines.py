@@ -13,7 +13,7 @@ from host.sysid.answer.constant_lines import constant_lines
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.servo_lines import servo_estimate_lines
 from host.sysid.answer.settling_history import settling_lines
-from host.sysid.answer.trust_rules import uncarried_states
+from host.sysid.answer.trust_rules import unpredicted_states
 from host.sysid.flight.linear_answer import Answer
 from host.sysid.flight.linear_estimator import from_zero
 from host.sysid.models.modal_analysis import Mode
@@ -76,7 +76,7 @@ def mode_lines(answer: Answer | CoefficientAnswer) -> list[str]:
     """Return the modes, and of which a state that is not predicted takes a good part."""
     if not isinstance(answer, Answer):
         return [_mode_line(mode) for mode in answer.modes]
-    failing = uncarried_states(answer)
+    failing = unpredicted_states(answer)
     lines = []
     for mode in answer.modes:
         in_it = _participating(answer, mode, list(failing))

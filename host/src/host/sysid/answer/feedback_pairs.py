@@ -33,10 +33,10 @@ def alike_derivatives(model: LinearModel, law: Feedback) -> list[tuple[str, ...]
     return found
 
 
-def told_together(answer: Answer, findings: Iterable[Finding]) -> list[str]:
-    """Return lines with what is known of derivatives that cannot be told apart: their sums.
+def combined_derivatives(answer: Answer, findings: Iterable[Finding]) -> list[str]:
+    """Return lines with the sums of derivatives that a feedback law makes collinear.
 
-    Of a law with a lag or a wash-out there is no such sum.
+    A law with a lag or a wash-out leaves no such sum.
     """
     sums = [
         line

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MEASURED, MODEL, RESIDUAL, REFUSED, TRUTH = "0.7", "C3", "C0", "C3", "black"
+MEASURED, MODEL, RESIDUAL, MARKED, TRUTH = "0.7", "C3", "C0", "C3", "black"
 INPUT, UNSEEN = "C2", "#fdf3dc"
 SHOWN_UNITS = {
     "_radps": ("deg/s", DEG_PER_RAD),
@@ -216,7 +216,7 @@ def interval_bars(bars: Sequence[Bar], title: str) -> Figure:
     axis.axvspan(-TRUSTED, TRUSTED, color="0.93", lw=0.0, zorder=0)
     for position, bar in enumerate(reversed(bars)):
         share = 100.0 * bar.half_width / bar.scale
-        colour = REFUSED if bar.marked else RESIDUAL
+        colour = MARKED if bar.marked else RESIDUAL
         drawn = axis.errorbar(
             0.0, position, xerr=min(share, reach), color=colour,
             fmt="s" if bar.of_row else "o", mfc="white" if bar.of_row else colour, ms=4.5,

@@ -12,7 +12,7 @@ import numpy as np
 from host.sysid.answer.marks import Verdict
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.servo_lines import servo_document
-from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, uncarried_states
+from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence, unpredicted_states
 from host.sysid.answer.verdict import verdict_of
 from host.sysid.coefficients.coefficient_fit import METHOD
 from host.sysid.compatibility.sensor_corrections import correction_document
@@ -117,7 +117,7 @@ def answer_document(
         },
         "servo": servo_document(answer.servo),
         "at_bound": list(answer.at_bound),
-        "unpredicted": list(uncarried_states(answer)),
+        "unpredicted": list(unpredicted_states(answer)),
         "corrections": correction_document(answer.corrections),
         "refused": [
             {
@@ -194,8 +194,8 @@ def _prediction_document(found: CrossValidation | None) -> dict[str, Any] | None
         "by": "leave-one-out in the last step, one-step, measured signals with gusts",
         "windows": list(found.windows),
         "nrmse": {
-            name: {"fitted": found.fitted[name], "unseen": unseen}
-            for name, unseen in found.left_out.items()
+            name: {"fitted": found.fitted[name], "unseen": held_out}
+            for name, held_out in found.left_out.items()
         },
     }
 

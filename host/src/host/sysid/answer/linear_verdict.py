@@ -8,7 +8,7 @@ from math import ceil
 from host.sysid.answer.advised_inputs import advised_input
 from host.sysid.answer.correlated_inputs import correlated_inputs
 from host.sysid.answer.doubt import Doubt, reasons_by_name
-from host.sysid.answer.feedback_pairs import told_together
+from host.sysid.answer.feedback_pairs import combined_derivatives
 from host.sysid.answer.marks import (
     CAREFUL,
     FAIR,
@@ -53,7 +53,7 @@ def linear_verdict(
     lines += _doubt_lines(answer, doubts)
     lines += _identifiability_lines(answer)
     lines += [*_input_lines(answer), *servo_lines(answer.servo)]
-    lines += told_together(answer, evidence.findings)
+    lines += combined_derivatives(answer, evidence.findings)
     lines += _data_lines(answer)
     return Verdict(heading, marks, tuple(lines), _all_reasons(answer, marks, shares, reasons))
 

@@ -59,7 +59,7 @@ def _line(c: Coefficient, expected: float, prior: PriorTable) -> str:
     half = prior.half_widths.get(c.name)
     text = f"{c.name:12s} {c.value:12.4g} {c.half_width:10.2g} {expected:10.4g}"
     if half is not None:
-        value, width = together(c, expected, half)
+        value, width = combined_estimate(c, expected, half)
         text += f" {half:10.2g} {value:10.4g} {width:10.2g}"
     elif prior.half_widths:
         text += 33 * " "
@@ -72,7 +72,7 @@ def _agrees(c: Coefficient, expected: float, half: float | None) -> bool:
     return abs(c.value - expected) <= math.hypot(c.half_width, half or 0.0)
 
 
-def together(c: Coefficient, expected: float, half: float) -> tuple[float, float]:
+def combined_estimate(c: Coefficient, expected: float, half: float) -> tuple[float, float]:
     """Return what flight and prior say together, and its 95 % half-width.
 
     Parameters
@@ -99,7 +99,7 @@ def prior_document(
                 "half_width": c.half_width,
                 "prior": expected[c.name],
                 "inside": _agrees(c, expected[c.name], prior.half_widths.get(c.name)),
-                **_together(c, expected[c.name], prior.half_widths.get(c.name)),
+                **_combined_entries(c, expected[c.name], prior.half_widths.get(c.name)),
             }
             for c in table.coefficients
             if c.name in expected
@@ -107,10 +107,10 @@ def prior_document(
     return found
 
 
-def _together(c: Coefficient, expected: float, half: float | None) -> dict[str, float]:
+def _combined_entries(c: Coefficient, expected: float, half: float | None) -> dict[str, float]:
     if half is None:
         return {}
-    value, width = together(c, expected, half)
+    value, width = combined_estimate(c, expected, half)
     return {"prior_half_width": half, "together": value, "together_half_width": width}
 
 

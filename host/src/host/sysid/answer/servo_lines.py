@@ -12,7 +12,7 @@ def servo_lines(servo: ServoEstimate | None) -> list[str]:
     if servo is None:
         return []
     delay, bandwidth, rate = servo.numbers
-    whose = "told by the data" if delay.told else "not told, as known beforehand"
+    whose = "told by the data" if delay.data_informed else "not told, as known beforehand"
     surfaces = ", ".join(u.removesuffix("_rad") for u in servo.surfaces)
     lines = [
         f"  {surfaces} is a command: the surface comes {1e3 * delay.value:.0f}"
@@ -32,7 +32,7 @@ def servo_estimate_lines(servo: ServoEstimate | None) -> list[str]:
     """Return the servos' numbers as lines of the table of estimates."""
     return [
         f"  {n.name:22s} {n.value:9.4g}  +- {n.half_width:9.3g}  {UNITS[n.name]:7s}"
-        + ("" if n.told else "as known beforehand")
+        + ("" if n.data_informed else "as known beforehand")
         for n in (servo.numbers if servo is not None else ())
     ]
 
@@ -48,7 +48,7 @@ def servo_document(servo: ServoEstimate | None) -> dict[str, object] | None:
                 "value": n.value,
                 "half_width": n.half_width,
                 "prior_half_width": n.prior_half_width,
-                "told": n.told,
+                "told": n.data_informed,
             }
             for n in servo.numbers
         },

@@ -161,7 +161,7 @@ def open_finding(answer: Answer, evidence: Evidence) -> list[Doubt]:
     ]
 
 
-def follows_states(answer: Answer, evidence: Evidence) -> list[Doubt]:
+def input_feedback(answer: Answer, evidence: Evidence) -> list[Doubt]:
     """A surface is a function of states: in one equation their derivatives are alike."""
     return [
         one
@@ -176,7 +176,7 @@ def follows_states(answer: Answer, evidence: Evidence) -> list[Doubt]:
 
 Rule = Callable[[Answer, Evidence], list[Doubt]]
 RULES: tuple[Rule, ...] = (
-    open_finding, follows_states, fit_fails, not_predicted, driven_by_inputs, delay_at_bound,
+    open_finding, input_feedback, fit_fails, not_predicted, driven_by_inputs, delay_at_bound,
     on_a_bound, impossible_sign, methods_disagree, one_input_for_two,
 )  # fmt: skip
 
@@ -200,7 +200,7 @@ def fails(fit: SignalFit) -> bool:
     return not fit.nrmse < FAILS and not (fit.nrmse < WORSE_THAN_NONE and fit.ljung_box_p > WHITE_P)
 
 
-def uncarried_states(answer: Answer) -> dict[str, str]:
+def unpredicted_states(answer: Answer) -> dict[str, str]:
     """Return the states that the model does not carry, and why: for modes that consist of them."""
     found = {f.name: f"{f.name} is not predicted" for f in unpredicted(answer)}
     for group in (*STANDARD_DELAYS, *answer.model.delays):

@@ -30,22 +30,22 @@ def verdict_of(answer: Answer | CoefficientAnswer, evidence: Evidence = NO_EVIDE
     """
     direct, findings = evidence.coefficients, evidence.findings
     if isinstance(answer, Answer):
-        alone = linear_verdict(answer, evidence)
+        own_verdict = linear_verdict(answer, evidence)
         if direct is None:
-            return alone
+            return own_verdict
         there = coefficient_verdict(direct, open_channels(findings), feedback_of(findings))
-        more = disagreements_of_models(answer, direct, alone.marks, there.marks)[0]
-        return linear_verdict(answer, evidence, more) if more else alone
+        more = disagreements_of_models(answer, direct, own_verdict.marks, there.marks)[0]
+        return linear_verdict(answer, evidence, more) if more else own_verdict
     checks = open_channels(findings), feedback_of(findings)
-    alone = coefficient_verdict(answer, *checks)
+    own_verdict = coefficient_verdict(answer, *checks)
     doubts = [
         doubt
         for one in evidence.beside
         for doubt in disagreements_of_models(
-            one, answer, linear_verdict(one, evidence).marks, alone.marks
+            one, answer, linear_verdict(one, evidence).marks, own_verdict.marks
         )[1]
     ]
-    return coefficient_verdict(answer, *checks, doubts) if doubts else alone
+    return coefficient_verdict(answer, *checks, doubts) if doubts else own_verdict
 
 
 def verdict_lines(

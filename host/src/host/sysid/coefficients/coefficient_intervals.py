@@ -129,7 +129,7 @@ def intervals(search: SearchResult) -> CoefficientIntervals:
     problem, final, level_slopes = search.problem, search.final, search.level_slopes
     data, position = search.data, problem.position
     state = np.concatenate([search.theta, np.zeros(final.unknowns.gusts), search.errors])
-    state, covariance, gain_complement, drawn = apply_geometry_prior(
+    state, covariance, gain_complement, arm_shifts = apply_geometry_prior(
         state,
         final.solution.covariance,
         derivatives_of(problem, data, state),
@@ -152,8 +152,9 @@ def intervals(search: SearchResult) -> CoefficientIntervals:
         *maneuver_influence(final, problem.windows, jacobian[: len(values)] @ gain_complement),
     )
     joint[np.diag_indices(len(values))] += agreement.extra_variance
-    told = dict(zip(problem.error_names, (gain_complement @ search.error_shifts).T, strict=True))
-    shifts = {name: jacobian[: len(values)] @ shift for name, shift in (told | drawn).items()}
+    updated = (gain_complement @ search.error_shifts).T
+    state_shifts = dict(zip(problem.error_names, updated, strict=True)) | arm_shifts
+    shifts = {name: jacobian[: len(values)] @ shift for name, shift in state_shifts.items()}
     deviations = np.sqrt(np.maximum(np.diag(covariance)[errors], 0.0))
     pairs = zip(state[errors].tolist(), deviations.tolist(), strict=True)
     return CoefficientIntervals(

@@ -141,10 +141,11 @@ def read_coefficient_model(path: Path) -> CoefficientModel:
                 f" {', '.join(MOMENTS_AND_SIDE)}"
             )
     fitted = [row for row in expected if reported.get(row)]
-    alone = [row for row in nuisance if row not in fitted]
-    if not fitted or alone:
+    nuisance_only = [row for row in nuisance if row not in fitted]
+    if not fitted or nuisance_only:
         raise IdentificationError(
-            f"{path}: no terms for {', '.join(alone or expected)}; [rows] needs one row or more"
+            f"{path}: no terms for {', '.join(nuisance_only or expected)};"
+            " [rows] needs one row or more"
         )
     equations, not_reported = {}, set()
     for row in fitted:

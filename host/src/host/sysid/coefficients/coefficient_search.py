@@ -205,8 +205,8 @@ def _search(problem: FlightProblem, sd: Array) -> SearchResult:
         iterate.noise = residual_spectra(problem.windows, residuals, iterate.noise)
     # Each error is held to be zero with its deviation: what it truly is pulls by its prior alone,
     # whatever noise the data have.
-    pull = np.divide(inverse_variance, 1.0 / sd, out=np.zeros_like(sd), where=sd > 0.0)
-    shifts = -final.solution.inverse[:, final.unknowns.first_error :] * pull
+    prior_weight = np.divide(inverse_variance, 1.0 / sd, out=np.zeros_like(sd), where=sd > 0.0)
+    shifts = -final.solution.inverse[:, final.unknowns.first_error :] * prior_weight
     return SearchResult(
         problem, iterate.theta, iterate.errors, iterate.level_slopes, final, sd, shifts
     )

@@ -90,11 +90,11 @@ def consistency_tests(
 
 def _consistency_test(name: str, own: Sequence[int], z: Array, P: Array) -> ConsistencyTest:
     information, directions = np.linalg.eigh(np.eye(len(own)) - P[np.ix_(own, own)])
-    informed = information > LEAST_INFORMATION
-    count = int(informed.sum())
+    observable = information > LEAST_INFORMATION
+    count = int(observable.sum())
     if not count:
         return ConsistencyTest(name, 0.0, 0, 1.0)
-    statistic = float(np.sum((directions[:, informed].T @ z[own]) ** 2 / information[informed]))
+    statistic = float(np.sum((directions[:, observable].T @ z[own]) ** 2 / information[observable]))
     return ConsistencyTest(
         name, float(np.sqrt(statistic / count)), count, float(special.chdtrc(count, statistic))
     )

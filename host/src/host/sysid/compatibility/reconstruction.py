@@ -159,15 +159,15 @@ def reconstruct(
         k = problem.common.index(name) if known else None
         deviation = sd if k is None else float(np.sqrt(covariance[k, k]))
         deviation = deviation if gps else min(NO_GPS_INFLATION * deviation, sd)
-        informed = deviation < POSTERIOR_PRIOR_RATIO * sd
+        data_informed = deviation < POSTERIOR_PRIOR_RATIO * sd
         findings.append(
             SensorErrorEstimate(
                 name=name,
                 value=mean if k is None else float(fit.theta[k]),
                 half_width=NORMAL_95 * deviation,
                 prior_half_width=NORMAL_95 * sd,
-                data_informed=informed,
-                reason="" if informed else _reason(name, gps=gps),
+                data_informed=data_informed,
+                reason="" if data_informed else _reason(name, gps=gps),
             )
         )
     squares = np.sum(np.hstack(fit.residuals) ** 2, axis=1)

@@ -176,7 +176,7 @@ def coloured_output_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array
     score_covariance = np.diag(problem.prior_precision)
     # Of a clean column and of a coarse step the residuals do not show the noise that counts.
     squares = np.sum([np.sum(r**2, axis=1) for r in fit.optimum.residuals], axis=0)
-    unseen = np.where(
+    unidentifiable = np.where(
         fit.optimum.variance <= problem.least_variance,
         fit.optimum.variance - squares / problem.counts,
         0.0,
@@ -189,8 +189,8 @@ def coloured_output_covariance(problem: OutputProblem, fit: ArNoiseFit) -> Array
             if seen is not None:
                 residual, slope = residual[seen], slope[seen]
             part = coloured_score_covariance(residual, slope)
-            if unseen[j] > 0.0:
-                part += unseen[j] * slope.T @ slope
+            if unidentifiable[j] > 0.0:
+                part += unidentifiable[j] * slope.T @ slope
             part /= variance**2
             score_covariance[np.ix_(columns, columns)] += part
     result = white @ score_covariance @ white

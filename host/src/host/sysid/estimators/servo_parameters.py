@@ -40,11 +40,11 @@ FINE_S = 0.01  # between the delays about the best, at first
 STEP_SHRINKS = 5.0
 SHORT_STEPS, LEAST_STEP_S = 4.0, 3e-3  # deviations of the delay that the parabola may span
 STILL = 1e-4  # of the motion of the surface: what moves it by less moves nothing
-TOLD = 0.7  # of the prior's deviation: below it the data say it
+POSTERIOR_PRIOR_RATIO = 0.7  # of the prior's deviation: below it the data say it
 # Of the noise of output error: its memory, in means over this long; and what a model lacks at any
 # frequency, over the motion: whitened, calm air's small errors of the model would tell the delay.
 AR_ORDER, AR_STEP_S, LACK = 8, 0.02, 0.02
-ALIKE = 0.9  # correlation of a derivative with the servo: they cannot be told apart
+COLLINEAR = 0.9  # correlation of a derivative with the servo: they cannot be told apart
 
 # The third argument is a fit behind servos not far from these, to start from, or None.
 Fit = Callable[[LinearModel, Sequence[Maneuver], FitResult | None], FitResult]
@@ -53,14 +53,14 @@ Behind = Callable[[tuple[float, float, float]], Sequence[Maneuver]]
 
 @dataclass(frozen=True, slots=True)
 class ServoNumber:
-    """One number of the servos: value, 95 % half-width, that of the prior, told by the data or
-    not."""
+    """One number of the servos with its 95 % half-width, that of the prior, and whether the data
+    inform it."""
 
     name: str
     value: float
     half_width: float
     prior_half_width: float
-    told: bool
+    data_informed: bool
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class ServoEstimate:
     @property
     def alike(self) -> tuple[str, ...]:
         """Parameters that cannot be told apart from the servo."""
-        return tuple(n for n, r in self.correlation.items() if r > ALIKE)
+        return tuple(n for n, r in self.correlation.items() if r > COLLINEAR)
 
     def added_to(self, result: FitResult) -> FitResult:
         """Return a fit behind these servos with their uncertainty in its covariance."""
@@ -190,7 +190,7 @@ def estimate_servo(
     slope = apart / (2.0 * step)
     shifts = [np.append(slope * sd, sd)]
     for k in (1, 2):
-        shifts += _carried(profile, best, k, count)
+        shifts += _servo_shift(profile, best, k, count)
     return _estimate(model, tuple(commanded), delay, prior, at, np.stack(shifts))
 
 
@@ -257,7 +257,7 @@ def _colour(found: FitResult) -> float:
     return float(np.sqrt(max(np.median(ratio), 1.0))) if len(ratio) else 1.0
 
 
-def _carried(profile: _Profile, delay_s: float, k: int, count: int) -> list[Array]:
+def _servo_shift(profile: _Profile, delay_s: float, k: int, count: int) -> list[Array]:
     """Return the shift of parameters and delay for one deviation of bandwidth or rate limit.
 
     With the bandwidth the delay moves so that their sum stays: the data see little else.
@@ -281,11 +281,11 @@ def _carried(profile: _Profile, delay_s: float, k: int, count: int) -> list[Arra
     return [np.append(moved, other[0] - usual[0])]
 
 
-def carried_servo(
+def considered_servo(
     model: LinearModel, behind: Behind, commanded: Sequence[str], prior: ServoPrior, fit: Fit
 ) -> ServoEstimate:
-    """Return the servos as the prior has them, what they leave open carried: consider parameters,
-    one shift of the estimate for one deviation of each."""
+    """Return the servos at their prior mean as consider parameters: not estimated, their deviations
+    in the covariance by one shift of the estimate each."""
     count = len(model.parameters)
     first = fit(model, behind(prior.mean), None)
     shifts = []
@@ -316,7 +316,7 @@ def _estimate(
             value,
             NORMAL_95 * sd[k],
             NORMAL_95 * prior.sd[k],
-            told=bool(sd[k] < TOLD * prior.sd[k]),
+            data_informed=bool(sd[k] < POSTERIOR_PRIOR_RATIO * prior.sd[k]),
         )
         for k, (name, value) in enumerate(zip(SERVO, (delay_s, *prior.mean[1:]), strict=True))
     )

@@ -13,11 +13,11 @@ from host.sysid.estimators.method_registry import fit
 from host.sysid.estimators.servo_parameters import (
     Fit,
     ServoEstimate,
-    carried_servo,
+    considered_servo,
     estimate_servo,
 )
 from host.sysid.estimators.start_values import start_values_of
-from host.sysid.flight.first_departures import without
+from host.sysid.flight.first_departures import remove_departures
 from host.sysid.flight.reconstructed_flight import FlownManeuver, ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.fit_result import FitResult
@@ -29,7 +29,7 @@ def servo_of(
     model: LinearModel,
     used: Sequence[FlownManeuver],
     airspeed_mps: float | None,
-    departed: Sequence[Array],
+    departures: Sequence[Array],
 ) -> tuple[ServoEstimate | None, str]:
     """Return the servos of the commanded inputs of a model, and a remark; None without any.
 
@@ -42,7 +42,7 @@ def servo_of(
         Those of the fit.
     airspeed_mps : float or None
         Of the trim where the gust is a state; None: output error.
-    departed : sequence of Array
+    departures : sequence of Array
         What departures from the trim do to the outputs of each maneuver: without them.
     """
     flights = {id(m.flight): m.flight for m in used}.values()
@@ -60,7 +60,7 @@ def servo_of(
     )
 
     def behind(values: tuple[float, float, float]) -> list[Maneuver]:
-        return without([m.cut(plain) for m in brought_behind(used, values)], departed)
+        return remove_departures([m.cut(plain) for m in brought_behind(used, values)], departures)
 
     remark = ""
     if airspeed_mps is not None:
@@ -72,8 +72,8 @@ def servo_of(
     try:
         return estimate_servo(plain, behind, commanded, prior, _white, _white), remark
     except IdentificationError as error:
-        carried = carried_servo(plain, behind, commanded, prior, _white)
-        return carried, f"the servos were not estimated ({error}): carried as they usually are"
+        considered = considered_servo(plain, behind, commanded, prior, _white)
+        return considered, f"the servos were not estimated ({error}): carried as they usually are"
 
 
 def _white(model: LinearModel, data: Sequence[Maneuver], near: FitResult | None) -> FitResult:

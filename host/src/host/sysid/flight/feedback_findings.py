@@ -19,7 +19,7 @@ FOLLOWED = {
     "aileron_rad": LATERAL,
     "rudder_rad": LATERAL,
 }
-TOGETHER = {"aileron_rad": ("rudder_rad",), "rudder_rad": ("aileron_rad",)}
+COUPLED_SURFACES = {"aileron_rad": ("rudder_rad",), "rudder_rad": ("aileron_rad",)}
 # No force depends on these: what follows them alone is as good as a pilot's input.
 ATTITUDE = ("phi_rad", "theta_rad", "psi_rad", "altitude_m")
 # Which way a law moves a surface that is to hold the aircraft. An aircraft that answers slow inputs
@@ -36,7 +36,7 @@ LABEL = {
 }  # fmt: skip
 CAUSES = {"rudder_rad": ("a yaw damper", "an autopilot"), "": ("an autopilot", "a stabiliser")}
 STILL_RAD = 1e-3  # a surface that moves less moves nothing
-LAG_TOLD_S = 0.05  # a shorter one cannot be told from a delay
+LEAST_LAG_S = 0.05  # a shorter one cannot be told from a delay
 
 
 def feedback_findings(
@@ -81,13 +81,13 @@ def _finding(
         f"{letter}_{LABEL[n]} {'-' if gain < 0.0 else '+'} {abs(gain):.2g} {letter}_{own}"
         for n, gain in zip(aerodynamic.signals, aerodynamic.gains, strict=True)
     ]
-    told = "what they do together" if filtered else " and ".join(sums)
+    determined = "what they do together" if filtered else " and ".join(sums)
     return Finding(
         "feedback",
         (),
         f"{said}: {', '.join(alike[:-1])} and {alike[-1]} cannot be told apart",
         causes,
-        f"only {told} is told of them; all others are judged as ever",
+        f"only {determined} is told of them; all others are judged as ever",
         feedback=Feedback(surface, aerodynamic.signals, aerodynamic.gains, filtered),
     )
 
@@ -99,7 +99,7 @@ def _law(
     names: Sequence[str],
 ) -> FeedbackLaw | None:
     t, moved = columns["t_s"], columns[surface]
-    axes = (surface, *TOGETHER.get(surface, ()))
+    axes = (surface, *COUPLED_SURFACES.get(surface, ()))
     inside = np.zeros(len(t), dtype=bool)
     for item in maneuvers:
         if item.given or item.axis in axes:
@@ -117,12 +117,12 @@ def _law(
 
 def law_words(law: FeedbackLaw) -> str:
     """Return what is followed, how late, through what, and how well."""
-    late_s = law.delay_s + (0.0 if law.lag_s >= LAG_TOLD_S else law.lag_s)
+    late_s = law.delay_s + (0.0 if law.lag_s >= LEAST_LAG_S else law.lag_s)
     filters = _filters(law)
     through = f" through {' and '.join(filters)}" if filters else ""
     return f"follows {' and '.join(law.signals)} at {1e3 * late_s:.0f} ms{through}, R2 {law.r2:.2f}"
 
 
 def _filters(law: FeedbackLaw) -> list[str]:
-    lag = [f"a lag of {law.lag_s:.2g} s"] if law.lag_s >= LAG_TOLD_S else []
+    lag = [f"a lag of {law.lag_s:.2g} s"] if law.lag_s >= LEAST_LAG_S else []
     return lag + ([f"a wash-out of {law.washout_s:.2g} s"] if np.isfinite(law.washout_s) else [])

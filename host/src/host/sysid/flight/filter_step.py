@@ -41,10 +41,10 @@ def others_recorded(maneuvers: Sequence[FlownManeuver]) -> bool:
     return all(m.flight.maker == FOREIGN for m in maneuvers)
 
 
-def rolling_gust_told(maneuvers: Sequence[FlownManeuver]) -> bool:
-    """Return whether a filter can tell air that rolls from dynamics of the sensors.
+def rolling_gust_identifiable(maneuvers: Sequence[FlownManeuver]) -> bool:
+    """Return whether a filter can separate a rolling gust from the dynamics of the sensors.
 
-    Of our own log without an aircraft file nobody says where its sensors are and how slow.
+    Our own log without an aircraft file does not say where its sensors are and how slow.
     """
     return sensors_known(maneuvers) or others_recorded(maneuvers)
 

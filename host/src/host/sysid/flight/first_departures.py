@@ -29,7 +29,9 @@ DepartureOf = Callable[
 def first_departures(
     model: LinearModel, used: Sequence[FlownManeuver], departure_of: DepartureOf
 ) -> list[Array]:
-    """Return what departures do to the outputs of each maneuver, (samples, p); zero if not known.
+    """Return the part of the outputs that departures from the trim cause, (samples, p) each.
+
+    Zero where no fit is found.
 
     Parameters
     ----------
@@ -49,8 +51,8 @@ def first_departures(
     return [m.outputs - s.outputs for m, s in zip(data, still, strict=True)]
 
 
-def without(maneuvers: Sequence[Maneuver], departed: Sequence[Array]) -> list[Maneuver]:
-    """Return maneuvers as if nothing had departed."""
+def remove_departures(maneuvers: Sequence[Maneuver], departures: Sequence[Array]) -> list[Maneuver]:
+    """Return maneuvers with the departures subtracted from their outputs."""
     return [
-        replace(m, outputs=m.outputs - gone) for m, gone in zip(maneuvers, departed, strict=True)
+        replace(m, outputs=m.outputs - gone) for m, gone in zip(maneuvers, departures, strict=True)
     ]

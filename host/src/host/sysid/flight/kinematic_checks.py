@@ -52,7 +52,7 @@ class Identity:
     rate: Array
     parts: dict[str, Array]
     beside: tuple[Array, ...] = ()
-    follows: float = 0.0
+    explained_share: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,8 @@ def _unrelated(law: Identity) -> Finding | None:
     power = float(rate @ rate)
     left = _without(law.rate, np.column_stack([own, *law.parts.values()]))
     moved = min(float(np.std(law.rate)), max(float(np.std(v)) for v in law.parts.values()))
-    if moved <= QUIET_RADPS or power == 0.0 or float(left @ left) <= (1.0 - law.follows) * power:
+    unexplained = float(left @ left)
+    if moved <= QUIET_RADPS or power == 0.0 or unexplained <= (1.0 - law.explained_share) * power:
         return None
     names = list(law.parts)
     return Finding(
@@ -194,7 +195,7 @@ def _fast(m: Mapping[str, Array]) -> Iterator[Identity]:
     )
     for name, rate, part, beside in laws:
         if name in m and rate in m:
-            yield _law(name, m, {rate: part}, (beside,), follows=ANGLE_EXPLAINED)
+            yield _law(name, m, {rate: part}, (beside,), explained_share=ANGLE_EXPLAINED)
     yield from _wind_angles(m, phi, theta, alpha, beta, (p, q, r))
 
 
@@ -221,7 +222,7 @@ def _wind_angles(
             down = m["az_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.cos(phi)
             lift = (np.cos(alpha) * down - np.sin(alpha) * along) / speed
             parts = {"q_radps": pitch, "az_mps2 over airspeed_mps": lift}
-            yield _law("alpha_rad", m, parts, follows=WIND_ANGLE_EXPLAINED)
+            yield _law("alpha_rad", m, parts, explained_share=WIND_ANGLE_EXPLAINED)
         else:
             made = (alpha, m.get("elevator_rad", zero))
             yield _law("alpha_rad", m, {"q_radps": pitch}, made)
@@ -229,7 +230,7 @@ def _wind_angles(
         if known and "ay_mps2" in m:
             side = (m["ay_mps2"] + GRAVITY_MPS2 * np.cos(theta) * np.sin(phi)) / speed
             parts = {"r_radps": yaw, "ay_mps2 over airspeed_mps": side}
-            yield _law("beta_rad", m, parts, follows=WIND_ANGLE_EXPLAINED)
+            yield _law("beta_rad", m, parts, explained_share=WIND_ANGLE_EXPLAINED)
         else:
             yield _law("beta_rad", m, {"r_radps": yaw}, (beta, phi, m.get("rudder_rad", zero)))
 
@@ -253,17 +254,17 @@ def _law(
     beside: tuple[Array, ...] = (),
     *,
     known: Array | None = None,
-    follows: float = 0.0,
+    explained_share: float = 0.0,
 ) -> Identity:
     """Return the identity over each step: a difference on the left, an integral on the right."""
     step_s = np.diff(m["t_s"])
-    calm = step_s < 1.5 * float(np.median(step_s))  # between two stretches of flight is a jump
-    calm = calm[:-2] & calm[1:-1] & calm[2:]
+    even = step_s < 1.5 * float(np.median(step_s))  # between two stretches of flight is a jump
+    even = even[:-2] & even[1:-1] & even[2:]
 
     def over(x: Array) -> Array:
         """Average over a step by the cubic through four points."""
-        return np.asarray((13.0 * (x[1:-2] + x[2:-1]) - x[:-3] - x[3:]) / 24.0)[calm]
+        return np.asarray((13.0 * (x[1:-2] + x[2:-1]) - x[:-3] - x[3:]) / 24.0)[even]
 
-    rate = (np.diff(m[name]) / step_s)[1:-1][calm] - (0.0 if known is None else over(known))
+    rate = (np.diff(m[name]) / step_s)[1:-1][even] - (0.0 if known is None else over(known))
     here = {k: over(v) for k, v in parts.items()}
-    return Identity(name, rate, here, tuple(over(b) for b in beside), follows)
+    return Identity(name, rate, here, tuple(over(b) for b in beside), explained_share)

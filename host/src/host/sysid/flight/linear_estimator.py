@@ -41,11 +41,11 @@ from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.filter_step import (
     feels_roll,
-    rolling_gust_told,
+    rolling_gust_identifiable,
     sensors_known,
     with_filter_step,
 )
-from host.sysid.flight.first_departures import first_departures, without
+from host.sysid.flight.first_departures import first_departures, remove_departures
 from host.sysid.flight.free_simulation import (
     fits_of,
     free_responses,
@@ -149,7 +149,7 @@ class LinearEstimator:
             If there is no such maneuver, a column is missing, or the fit does not come about.
         """
         used, held = self._maneuvers(flights)
-        trim, condition = trim_of(_together(used))
+        trim, condition = trim_of(_maneuver_columns(used))
         model, method, remarks = self._model(used, trim)
         gusty = (
             method == GUST
@@ -157,8 +157,8 @@ class LinearEstimator:
             and trim.known
             and bool(set(model.states) & set(VANES))
         )
-        departed = self._first_departures(model, used, trim)
-        servo, remark = servo_of(model, used, trim.airspeed_mps if gusty else None, departed)
+        departures = self._first_departures(model, used, trim)
+        servo, remark = servo_of(model, used, trim.airspeed_mps if gusty else None, departures)
         if servo is not None:
             remarks += (remark,) if remark else ()
             used, held = brought_behind(used, servo.setting), brought_behind(held, servo.setting)
@@ -183,12 +183,12 @@ class LinearEstimator:
             model, remarks = found.model, (*remarks, *by.remarks)
         else:
             single = "output-error-white" if method == GUST else method
-            calm: dict[str, object] = (
+            single_start: dict[str, object] = (
                 {"multiple_starts": False} if single.startswith("output-error") else {}
             )
-            fitted = without(data, departed)
-            found = fit(single, model, fitted, **{**calm, **self.options})
-            both = list(zip(found.fitted, departed, strict=True))
+            fitted = remove_departures(data, departures)
+            found = fit(single, model, fitted, **{**single_start, **self.options})
+            both = list(zip(found.fitted, departures, strict=True))
             if all(y.shape == gone.shape for y, gone in both):  # of frequencies they are others
                 found = replace(found, fitted=tuple(y + gone for y, gone in both))
         # The start of a gust filter that was lost may have run away: M_alpha -57 000 of one point.
@@ -217,7 +217,7 @@ class LinearEstimator:
     def _first_departures(
         self, model: LinearModel, used: Sequence[FlownManeuver], trim: Trim
     ) -> list[Array]:
-        """Return them where an angle is hidden, else nothing: with vanes a filter finds them."""
+        """Return the departures (`first_departures`) where an angle is hidden; zeros with vanes."""
         hidden = any(m.flight.angles is not None for m in used)
         bare = replace(model, delays=())
 
@@ -239,7 +239,7 @@ class LinearEstimator:
         trim: Trim,
         spin: tuple[float, float],
     ) -> tuple[GustFit, list[Maneuver], list[Maneuver]]:
-        """Fit with the gust what a first such fit says is left without departures from the trim.
+        """Fit with the gust as a state, departures from the trim removed at a first such fit.
 
         One step behind the fit does not do: in calm air the IMU seemed 0.3 ms late by what the
         drag polar does to ax, and M_q was 1.8 % off. Nor does output error in front of it: in
@@ -254,10 +254,10 @@ class LinearEstimator:
         rough = fit_with_gust(bare, data, trim.airspeed_mps, roughly=True).result
         at_trim, before = list(data), None
         if rough.residual_kind == "innovation":
-            departed = correct_trim_departure(rough, data, cuts, self.airframe, trim, spin)
-            before = rough if departed is None else departed.corrected(rough)
-            if departed is not None:
-                at_trim = departed.removed_from(data, before.estimate)
+            departure = correct_trim_departure(rough, data, cuts, self.airframe, trim, spin)
+            before = rough if departure is None else departure.corrected(rough)
+            if departure is not None:
+                at_trim = departure.removed_from(data, before.estimate)
         staged = fit_with_gust(model, at_trim, trim.airspeed_mps, before)
         delays_s = {name: value for name, (value, _) in staged.delays.items()}
         measured = [advance_outputs(m, model, delays_s) for m in data]
@@ -298,8 +298,8 @@ class LinearEstimator:
             moved = systematic_error_shifts(statistical, e.maneuvers, e.cuts, known, e.trim)
             # Of servos that were estimated the covariance has what they leave open, and the IMU's
             # delay with it: all outputs later are all inputs earlier.
-            told = () if e.servo is None else (SERVO_DELAY, IMU_DELAY)
-            shifts += tuple(s for s in moved if s.error not in told)
+            estimated = () if e.servo is None else (SERVO_DELAY, IMU_DELAY)
+            shifts += tuple(s for s in moved if s.error not in estimated)
         # Of an instrument that is known surfaces are measured: they move between samples. Delays
         # that were estimated have taken up half a sample, and their intervals count it.
         if self.own is not None or not (e.delays or sensors_known(e.used)):
@@ -332,7 +332,7 @@ class LinearEstimator:
         at_trim = (
             held_out
             if e.departure is None
-            else e.departure.removed_from_unseen(
+            else e.departure.removed_from_held_out(
                 held_out, [m.departing() for m in e.held_out], total.estimate
             )
         )
@@ -447,7 +447,7 @@ class LinearEstimator:
             # A filter takes the line between two values of a slow sensor for measurements.
             evenly = not any(m.cut(model).held for m in used)
             # Of our own log laterally only where its sensors are known (`filter_step`).
-            rolls = feels_roll(model) and rolling_gust_told(used)
+            rolls = feels_roll(model) and rolling_gust_identifiable(used)
             vane = "beta_rad" if rolls else "alpha_rad"
             measured = vane in model.states and vane in model.outputs
             gust = measured and trim.known and evenly
@@ -557,7 +557,7 @@ def from_zero(coefficient: Coefficient) -> bool:
     return abs(coefficient.value) > coefficient.half_width
 
 
-def _together(used: Sequence[FlownManeuver]) -> dict[str, Array]:
+def _maneuver_columns(used: Sequence[FlownManeuver]) -> dict[str, Array]:
     """Return the corrected columns within the maneuvers, every sample once."""
     kept: dict[str, list[Array]] = {}
     flights = list({id(m.flight): m.flight for m in used}.values())

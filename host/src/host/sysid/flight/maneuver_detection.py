@@ -117,9 +117,9 @@ def _of_record(columns: Mapping[str, Array], flying: BoolArray) -> list[Detected
         found += _find_axis(axis, t, series, flying)
     found.sort(key=lambda f: f.start_s)
     found = _bounded(found, float(t[-1]))
-    told = logged_inputs(columns, surfaces)
-    if told:
-        found = _told_windows(told, found, float(t[-1]))
+    logged = logged_inputs(columns, surfaces)
+    if logged:
+        found = _with_logged_windows(logged, found, float(t[-1]))
     if "bridged" in columns:
         measured = ~(np.asarray(columns["bridged"]) > 0.0)
         found = [part for f in found for part in _parts(f, t, measured)]
@@ -147,7 +147,7 @@ def _find_axis(axis: str, t: Array, series: Array, flying: BoolArray) -> list[De
     dt_s = float(np.median(np.diff(t)))
     lag = max(1, round(LAG_S / dt_s))
     groups = _edges(axis, t, series, flying, lag)
-    groups = _held_together(groups, t, series, lag)
+    groups = _join_held(groups, t, series, lag)
     slow = sustained_inputs(t, series, flying, SLOW[axis == "throttle"])
     result = []
     for first, last in _united(groups, slow, series, lag):
@@ -173,7 +173,7 @@ def _edges(
     return [(int(group[0]), int(group[-1])) for group in groups]
 
 
-def _held_together(
+def _join_held(
     groups: list[tuple[int, int]], t: Array, series: Array, lag: int
 ) -> list[tuple[int, int]]:
     """Join edges between which the surface is held away from where it was: a slow 3-2-1-1."""
@@ -358,13 +358,13 @@ def _bounded(found: list[DetectedManeuver], last_s: float) -> list[DetectedManeu
     return result
 
 
-def _told_windows(
-    told: Mapping[tuple[str, float, float], tuple[str, float]],
+def _with_logged_windows(
+    logged: Mapping[tuple[str, float, float], tuple[str, float]],
     found: list[DetectedManeuver],
     last_s: float,
 ) -> list[DetectedManeuver]:
     """Return the inputs that the logger flew with their exact windows, and others beside them."""
-    spans = [(start_s, end_s) for _, start_s, end_s in told]
+    spans = [(start_s, end_s) for _, start_s, end_s in logged]
     others = [
         item
         for item in found
@@ -381,7 +381,7 @@ def _told_windows(
             amplitude=amplitude,
             edges=0,
         )
-        for (axis, start_s, end_s), (kind, amplitude) in told.items()
+        for (axis, start_s, end_s), (kind, amplitude) in logged.items()
     ]
     return sorted([*exact, *others], key=lambda f: f.start_s)
 

@@ -64,14 +64,14 @@ def excess_over_noise_model(
         block = block_length(maneuver.dt_s)
         left = block_means((problem.measured(number) - response.y).T, block)
         slopes = np.stack([block_means(J[:, count:], block) for J in response.sensitivities])
-        drawn = _drawn_errors(rng, wide, result, process, maneuver.dt_s, block, len(left))
-        for j, errors in enumerate(drawn[:, :, :AR_DRAWS]):
+        errors_drawn = _random_errors(rng, wide, result, process, maneuver.dt_s, block, len(left))
+        for j, errors in enumerate(errors_drawn[:, :, :AR_DRAWS]):
             none = [np.zeros((len(errors), 0))] * AR_DRAWS
             moments[j] += lagged_moments(list(errors.T), none, HIGHEST_ORDER)
-        weight = 1.0 / np.maximum(np.mean(drawn**2, axis=(1, 2)), 1e-300)
-        drawn -= slopes @ weighted_fit(drawn, slopes, weight)
+        weight = 1.0 / np.maximum(np.mean(errors_drawn**2, axis=(1, 2)), 1e-300)
+        errors_drawn -= slopes @ weighted_fit(errors_drawn, slopes, weight)
         observed += np.sum(left**2, axis=0)
-        squares += np.sum(drawn**2, axis=1).T
+        squares += np.sum(errors_drawn**2, axis=1).T
         samples += len(left)
     observed, squares = observed / samples, squares / samples
     mean, spread = np.mean(squares, axis=0), np.maximum(np.var(squares, axis=0), 1e-300)
@@ -91,7 +91,7 @@ def excess_over_noise_model(
     return NoiseExcess(power, variance_ratio(problem, responses, noise, variance, power))
 
 
-def _drawn_errors(
+def _random_errors(
     rng: np.random.Generator,
     wide: LinearModel,
     result: FitResult,

@@ -113,26 +113,27 @@ class OneStep:
             shares = np.zeros((len(changed), self.length))
             return Step(shares, np.zeros(count), np.zeros((count, count)), none)
         beside = [self.residuals(one, trim, changed) for one in extended]
-        pull = np.zeros((len(changed), len(self.inverse)))
+        score = np.zeros((len(changed), len(self.inverse)))
         link = np.zeros((len(changed), len(self.inverse), count))
         normal, right = np.diag(np.asarray(prior_sd, dtype=np.float64) ** -2.0), np.zeros(count)
         for k, (r, before) in enumerate(zip(here, self.reference, strict=True)):
             own, J = self.columns[k], self.slopes[k]
-            pull[k, own] = -(J.T @ (r - before))
+            score[k, own] = -(J.T @ (r - before))
             if count:
                 by = np.column_stack([r - r if b is None else b[k] - r for b in beside])
                 link[k, own] = J.T @ by
                 normal += by.T @ by
                 right -= by.T @ r
-        step = pull @ self.inverse
+        step = score @ self.inverse
         added, covariance = np.zeros(count), np.zeros((count, count))
-        follows = -np.einsum("kij,il->klj", link, self.inverse)
+        consider_sensitivity = -np.einsum("kij,il->klj", link, self.inverse)
         if count:
             whole = link.sum(axis=0)
             covariance = np.linalg.pinv(normal - whole.T @ self.inverse @ whole, hermitian=True)
             added = covariance @ (right - whole.T @ step.sum(axis=0))
-            step = step + follows @ added
-        return Step(self._placed(step), added, covariance, self._placed(follows.sum(axis=0).T))
+            step = step + consider_sensitivity @ added
+        sensitivity = self._placed(consider_sensitivity.sum(axis=0).T)
+        return Step(self._placed(step), added, covariance, sensitivity)
 
     def _placed(self, unknowns: Array) -> Array:
         """Return rows of all unknowns as rows of the estimate."""

@@ -108,15 +108,15 @@ def largest_rms(
         if slopes is None:
             return np.full(outputs, np.inf)
         means = slopes.shape[1]
-        drawn = np.stack(
+        errors = np.stack(
             [
-                drawn_noise(rng, memory, variance, means, DRAWS)
+                random_noise(rng, memory, variance, means, DRAWS)
                 for memory, variance in zip(noise.noise, noise.innovation_variance, strict=True)
             ]
         )  # (p, means, draws)
-        drawn *= scale[:, None, :]
-        drawn += slopes[:, :, :count] @ parameters.T
-        left = _without_constants(drawn, slopes[:, :, count:], np.mean(drawn**2, axis=(1, 2)))
+        errors *= scale[:, None, :]
+        errors += slopes[:, :, :count] @ parameters.T
+        left = _without_constants(errors, slopes[:, :, count:], np.mean(errors**2, axis=(1, 2)))
         squares += np.sum(left**2, axis=1).T
         samples += means
     squares /= samples
@@ -136,7 +136,7 @@ def power_freedom(memory: ArNoise, samples: int) -> float:
     return max(samples / (1.0 + 2.0 * float(rho @ rho)), 2.0)
 
 
-def drawn_noise(
+def random_noise(
     rng: np.random.Generator, memory: ArNoise, variance: float, samples: int, draws: int
 ) -> Array:
     """Return stationary AR noise of an innovation variance, (samples, draws)."""

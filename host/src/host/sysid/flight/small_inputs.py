@@ -40,5 +40,5 @@ def whole_flight(columns: Mapping[str, Array]) -> tuple[list[DetectedManeuver], 
         ("small inputs", "a flight without test points", "surfaces in another unit"),
         f"all of it, {t[first]:.6g} to {t[last]:.6g} s, is fitted as one stretch",
     )
-    stretch = float(t[first]), float(t[last])
-    return select_maneuvers(columns, stretches=[stretch]), [finding]
+    interval_s = float(t[first]), float(t[last])
+    return select_maneuvers(columns, stretches=[interval_s]), [finding]

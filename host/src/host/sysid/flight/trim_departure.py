@@ -99,13 +99,13 @@ class Departure:
         """
         return self._removed(self.maneuvers, maneuvers, estimate)
 
-    def removed_from_unseen(
+    def removed_from_held_out(
         self,
         maneuvers: Sequence[Maneuver],
         cuts: Sequence[Mapping[str, Array]],
         estimate: Array,
     ) -> list[Maneuver]:
-        """Return maneuvers that were not fitted as if nothing had departed.
+        """Return maneuvers that were not fitted, departures from the trim removed.
 
         `cuts` holds all columns of each.
         """
@@ -116,7 +116,7 @@ class Departure:
         return self._removed(wide, maneuvers, estimate)
 
     def _removed(
-        self, departed: Sequence[Maneuver], maneuvers: Sequence[Maneuver], estimate: Array
+        self, departing: Sequence[Maneuver], maneuvers: Sequence[Maneuver], estimate: Array
     ) -> list[Maneuver]:
         if not maneuvers:
             return []
@@ -127,9 +127,9 @@ class Departure:
                     [own.inputs, np.zeros_like(wide.inputs[:, own.inputs.shape[1] :])]
                 ),
             )
-            for wide, own in zip(departed, maneuvers, strict=True)
+            for wide, own in zip(departing, maneuvers, strict=True)
         ]
-        problems = [OutputProblem(self.model, data) for data in (departed, trimmed)]
+        problems = [OutputProblem(self.model, data) for data in (departing, trimmed)]
         theta = problems[0].first_guess()
         theta[: problems[0].n_common] = estimate[: problems[0].n_common]
         there, here = (problem.outputs(theta) for problem in problems)

@@ -87,9 +87,9 @@ def _readings(columns: Mapping[str, Array], findings: Sequence[Finding]) -> Iter
         ("angles, rates and surfaces", (*ANGLES, *RATES, *SURFACES).__contains__),
     )
     for words, belongs in groups:
-        together = tuple(k for k in columns if belongs(k))
-        if len(together) > 1 and set(together) & set(names):
-            yield Reading(together, f"{words} in degrees", RAD_PER_DEG)
+        joint = tuple(k for k in columns if belongs(k))
+        if len(joint) > 1 and set(joint) & set(names):
+            yield Reading(joint, f"{words} in degrees", RAD_PER_DEG)
     forces = tuple(k for k in FORCES if k in columns)
     if set(forces) & set(names):
         for unit, factor in UNITS["mps2"].items():

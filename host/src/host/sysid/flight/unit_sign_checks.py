@@ -55,7 +55,7 @@ def check(columns: Mapping[str, Array]) -> list[Finding]:
     means = block_means(flown, max(1, round(BLOCK_S / dt_s)))
     if len(means["t_s"]) >= FEWEST:
         findings += [*_forces(means), *_surfaces(means)]
-    return _once([*findings, *consistent(flown, dt_s)])
+    return _unique_findings([*findings, *consistent(flown, dt_s)])
 
 
 def airborne(columns: Mapping[str, Array]) -> tuple[dict[str, Array], float]:
@@ -69,7 +69,7 @@ def airborne(columns: Mapping[str, Array]) -> tuple[dict[str, Array], float]:
     return {k: v[flying] for k, v in columns.items()}, dt_s
 
 
-def _once(findings: list[Finding]) -> list[Finding]:
+def _unique_findings(findings: list[Finding]) -> list[Finding]:
     """Return the first finding of each check about the same columns."""
     return list({(f.check, f.channels): f for f in reversed(findings)}.values())[::-1]
 

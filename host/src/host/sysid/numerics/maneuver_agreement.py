@@ -52,8 +52,8 @@ class ManeuverAgreement:
         """Variance that the scatter adds, for normal quantiles, (P,): 0 where maneuvers agree."""
         inflated = self.factor > 1.0
         freedom = np.where(inflated, np.maximum(self.maneuvers - 1.0, 1.0), np.inf)
-        stretch = special.stdtrit(freedom, 0.975) / special.ndtri(0.975)
-        return np.where(inflated, ((self.factor * stretch) ** 2 - 1.0) * self.variance, 0.0)
+        quantile_ratio = special.stdtrit(freedom, 0.975) / special.ndtri(0.975)
+        return np.where(inflated, ((self.factor * quantile_ratio) ** 2 - 1.0) * self.variance, 0.0)
 
 
 def maneuver_influence(

@@ -22,14 +22,14 @@ from host.arrays import Array, IntArray
 MOST_ROWS = 500  # that are compared; more tell no more of a few numbers
 FEWEST_ROWS = 40
 STEP_S, LONGEST_S = 0.02, 0.4  # of the delays tried
-LATER = 2  # steps: from here on a signal answers the input
+RESPONSE_STEPS = 2  # steps: from here on a signal answers the input
 LAGS_S = (0.0, 0.1, 0.3)  # shorter ones are a delay
 WASHOUTS_S = (np.inf, 4.0, 2.0, 1.0, 0.5)
 WORTH = 0.7  # of what is left unexplained: a further signal must leave no more
 FILTER_WORTH = 0.5  # the same of a filter
 MOST_SIGNALS = 4
 HOPELESS = 0.4  # R2 of all signals at their best delay, without a filter
-FOLLOWS = 0.9  # R2 from which an input is a function of the signals
+FEEDBACK_R2 = 0.9  # R2 from which an input is a function of the signals
 BETTER = 0.6  # of what later signals leave unexplained: earlier ones must leave no more
 LEAST_DECAY = 1e-3  # of a filter's state at the start of a record
 RIDGE = 1e-10  # of a signal's power
@@ -98,10 +98,10 @@ def feedback_law(
     if np.max(_r2(record.products(NO_FILTER, steps), everything)) < HOPELESS:
         return None
     shapes = [(lag, wash) for lag in LAGS_S for wash in WASHOUTS_S]
-    before = _simplest(record, dict.fromkeys(shapes, steps), FOLLOWS)
-    if before.r2 < FOLLOWS:
+    before = _simplest(record, dict.fromkeys(shapes, steps), FEEDBACK_R2)
+    if before.r2 < FEEDBACK_R2:
         return None
-    after = _simplest(record, {shape: -shape[0] - steps[LATER:] for shape in shapes})
+    after = _simplest(record, {shape: -shape[0] - steps[RESPONSE_STEPS:] for shape in shapes})
     if 1.0 - before.r2 > BETTER * (1.0 - after.r2):
         return None
     return _refined(record, before, tuple(signals))

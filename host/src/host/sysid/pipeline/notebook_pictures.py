@@ -53,7 +53,7 @@ class Pictures(Mapping[str, "Figure"]):
 
 
 def _image(name: str, figure: Figure) -> str:
-    drawn = io.BytesIO()
-    figure.savefig(drawn, format="svg")
-    text = base64.b64encode(drawn.getvalue()).decode("ascii")
+    svg_bytes = io.BytesIO()
+    figure.savefig(svg_bytes, format="svg")
+    text = base64.b64encode(svg_bytes.getvalue()).decode("ascii")
     return f'<img alt="{escaped(name)}" src="data:image/svg+xml;base64,{text}"/>'

@@ -26,7 +26,7 @@ VANES = ("alpha_a", "alpha_b", "beta_a", "beta_b")
 PITOTS = ("dp_a", "dp_b")
 POTS = ("pot_elevator", "pot_aileron_left", "pot_aileron_right", "pot_rudder")
 # What is drawn, in this order: its error, whose, how often for each (x, y, z), in which unit.
-DRAWN: tuple[tuple[str, str, tuple[str, ...], int, float], ...] = (
+DRAWN_ERRORS: tuple[tuple[str, str, tuple[str, ...], int, float], ...] = (
     ("mass_share", "mass_share", (), 0, 1.0),
     ("inertia_share", "inertia_share", ("x", "y", "z"), 1, 1.0),
     ("cg_m", "cg_m", ("x", "y", "z"), 1, 1.0),
@@ -152,11 +152,11 @@ def draw(
     errors = errors or instrument_errors(aircraft)
     scale = 1.0 if tolerances else 0.0
     values: dict[str, Array] = {}
-    for name, of, sensors, size, unit in DRAWN:
+    for name, of, sensors, size, unit in DRAWN_ERRORS:
         error = errors[of]
-        value = _drawn(rng, error, sensors, size, unit)
+        value = _random_values(rng, error, sensors, size, unit)
         if of_instrument is not None:
-            constant = _drawn(of_instrument, error, sensors, size, unit)
+            constant = _random_values(of_instrument, error, sensors, size, unit)
             value = constant if error.drawn == "instrument" else value
         values[name] = np.asarray(scale * value)
     for group in nominal:
@@ -165,7 +165,7 @@ def draw(
     return Draws(values, errors)
 
 
-def _drawn(
+def _random_values(
     rng: np.random.Generator, error: NamedError, sensors: Sequence[str], size: int, unit: float
 ) -> Array:
     """Return one number, one per sensor, or x, y, z of one sensor."""
@@ -177,9 +177,9 @@ def _drawn(
         value = rng.uniform(-width, width, shape)
     else:
         value = width * rng.standard_normal(shape)
-    together = [k for k, s in enumerate(own) if s in error.shared]
-    if size == 1 and together:
-        value[together] = value[together[0]] / width[together[0]] * width[together]
+    common = [k for k, s in enumerate(own) if s in error.shared]
+    if size == 1 and common:
+        value[common] = value[common[0]] / width[common[0]] * width[common]
     return np.asarray(value)
 
 

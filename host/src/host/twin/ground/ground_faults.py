@@ -201,14 +201,14 @@ def _imu_tilted(walk: GroundWalk) -> str:
 
 
 def _imu_frozen(walk: GroundWalk, frames: GroundFrames) -> str:
-    first = _later(walk)
+    first = _row_after_rest(walk)
     for name in ("p", "q", "r", "ax", "ay", "az"):
         frames.ident[name][first:] = frames.ident[name][first]
     return "imu"
 
 
 def _imu_off(walk: GroundWalk, frames: GroundFrames) -> str:
-    first = _later(walk)
+    first = _row_after_rest(walk)
     for name in ("p", "q", "r", "ax", "ay", "az"):
         frames.ident[name][first:] = -32768
     return "imu"
@@ -224,7 +224,7 @@ def _imu_damaged(walk: GroundWalk, frames: GroundFrames) -> str:
 
 
 def _imu_restarts(walk: GroundWalk, frames: GroundFrames) -> str:
-    first = _later(walk)
+    first = _row_after_rest(walk)
     for name in ("p", "q", "r", "ax", "ay", "az"):
         frames.ident[name][first : first + 6] = -32768
     return _event(walk, frames, "imu_restarted", 0, "imu", at_s=first * STEP_S)
@@ -398,7 +398,7 @@ def _gps_far(walk: GroundWalk, frames: GroundFrames) -> str:
 
 def _gps_frozen(walk: GroundWalk, frames: GroundFrames) -> str:
     gps = frames.slow["gps"]
-    first = _later(walk) // 4
+    first = _row_after_rest(walk) // 4
     gps["itow_ms"][first:] = gps["itow_ms"][first]
     return "gps"
 
@@ -412,7 +412,7 @@ def _gps_garbage(walk: GroundWalk, frames: GroundFrames) -> str:
 def _silent(name: str, item: str, *, late: bool) -> Callable[[GroundWalk, GroundFrames], str]:
     def spoil(walk: GroundWalk, frames: GroundFrames) -> str:
         rows = frames.slow[name]
-        frames.slow[name] = rows[: _later(walk) // 4 if late else 0]
+        frames.slow[name] = rows[: _row_after_rest(walk) // 4 if late else 0]
         return item
 
     return spoil
@@ -446,10 +446,10 @@ def _card_errors(walk: GroundWalk, frames: GroundFrames) -> str:
 
 
 def _card_pulled(walk: GroundWalk, frames: GroundFrames) -> str:
-    first = _later(walk)
-    later = first // 20
+    first = _row_after_rest(walk)
+    fault_row = first // 20
     bit = np.uint8(0xFF ^ frames.schema.bit("sensors", "card"))
-    frames.slow["system"]["sensors"][later:] &= bit
+    frames.slow["system"]["sensors"][fault_row:] &= bit
     return _event(walk, frames, "card_removed", 0, "card", at_s=first * STEP_S - 0.5)
 
 
@@ -459,7 +459,7 @@ def _other_aircraft(walk: GroundWalk, frames: GroundFrames) -> str:
 
 
 def _reset(walk: GroundWalk, frames: GroundFrames) -> str:
-    first = _later(walk) // 20
+    first = _row_after_rest(walk) // 20
     frames.slow["system"]["uptime_s"][first:] = np.arange(len(frames.slow["system"]) - first)
     return "logger"
 
@@ -486,7 +486,7 @@ def _radio_bursts(walk: GroundWalk, frames: GroundFrames) -> str:
     return "radio"
 
 
-def _later(walk: GroundWalk) -> int:
+def _row_after_rest(walk: GroundWalk) -> int:
     """Return a row behind the aircraft's rest, before the radio's turn."""
     return int(walk.rng.integers(walk.rows("imu_turned").stop, walk.rows("supply").start))
 

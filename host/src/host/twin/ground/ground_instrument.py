@@ -50,8 +50,11 @@ class GroundFrames:
 
     def timed(self) -> list[tuple[int, bytes]]:
         """Return time (us) and envelope of everything the radio brings, in order."""
-        told = envelope(bytes([SCHEMA_HASH_ID]) + self.schema.hash.to_bytes(4, "little"))
-        parts = [(START_US + at, told) for at in range(0, len(self.ident) * 50_000, HASH_EVERY_US)]
+        schema_frame = envelope(bytes([SCHEMA_HASH_ID]) + self.schema.hash.to_bytes(4, "little"))
+        parts = [
+            (START_US + at, schema_frame)
+            for at in range(0, len(self.ident) * 50_000, HASH_EVERY_US)
+        ]
         offset = int(self.ident["t_us"][0]) - START_US  # a clock that wraps in the walk
         for rows in (self.ident[self.kept], *self.slow.values()):
             times = ((rows["t_us"].astype(np.int64) - offset) % (1 << 32)).tolist()

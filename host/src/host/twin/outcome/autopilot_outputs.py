@@ -79,8 +79,8 @@ def demands(record: FlightRecord, at_s: Array, airframe: str) -> dict[str, Array
     share = {}
     for column, axis in enumerate(RECEIVER):
         # A servo moves when its pulse has ended: that is the output of then.
-        told = record.pulse_starts_s + ends_s[:, column]
-        row = np.maximum(np.searchsorted(told, at_s, side="right") - 1, 0)
+        latched_s = record.pulse_starts_s + ends_s[:, column]
+        row = np.maximum(np.searchsorted(latched_s, at_s, side="right") - 1, 0)
         share[axis] = record.pulses_us[row, column]
     return {
         "roll": (share["aileron"] - NEUTRAL_US) / THROW_US,

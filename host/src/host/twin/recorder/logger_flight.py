@@ -197,10 +197,10 @@ def _with_windows(flown: FlightRecord, rows: list[LoggedInput], card: CardFile) 
         row = card.rows[one.row]
         start_s = (one.start_us + 1000.0 * row["quiet_ms"]) / per_s
         end_s = one.end_us / per_s
-        later_s = rows[n + 1].start_us / per_s if n + 1 < len(rows) else float(flown.t_s[-1])
+        next_start_s = rows[n + 1].start_us / per_s if n + 1 < len(rows) else float(flown.t_s[-1])
         if end_s <= start_s:
             continue
         axes = tuple(a for a, size in zip(AXES, row["amplitude_us"], strict=True) if size)
-        tail_s = min(end_s + WINDOW_TAIL_S, later_s)
+        tail_s = min(end_s + WINDOW_TAIL_S, next_start_s)
         windows.append(Window(names[row["shape"]], axes, start_s, end_s, tail_s, end_s))
     return replace(flown, schedule=replace(flown.schedule, windows=windows))

@@ -180,12 +180,12 @@ def _record(
 
     # The pilot pulls the battery; at the bench the next power-on closes the file.
     sitl.power_cut(seed & 0xFFFFFFFF)
-    later = end + TICKS_PER_S
-    sitl.run_until(later)
-    sitl.set_analog(later, SAMPLE_STEP_TICKS, still_analog(given)[None, :])
-    sitl.add_edges(*_idle_receiver(later, later + round(CLOSE_S * TICKS_PER_S)))
+    close_start = end + TICKS_PER_S
+    sitl.run_until(close_start)
+    sitl.set_analog(close_start, SAMPLE_STEP_TICKS, still_analog(given)[None, :])
+    sitl.add_edges(*_idle_receiver(close_start, close_start + round(CLOSE_S * TICKS_PER_S)))
     sitl.power_on()
-    sitl.run_until(later + round(CLOSE_S * TICKS_PER_S))
+    sitl.run_until(close_start + round(CLOSE_S * TICKS_PER_S))
 
     log, name = file_of(image, faults)
     if not log:

@@ -143,7 +143,7 @@ def complementary(
 
 
 @compiled_fast
-def felt(
+def sensed_motion(
     states: Array,
     force_cg: Array,
     angular: Array,
@@ -157,7 +157,8 @@ def felt(
     gyro_noise: float,
     accel_noise: float,
 ) -> tuple[Array, Array]:
-    """Return what gyro and accelerometer feel before their filter, (n, 3) each.
+    """Return angular rate and specific force at gyro and accelerometer before their filter, (n, 3)
+    each.
 
     Specific force at `place` (3,) from the CG: f + omega' x r + omega x (omega x r); both then
     turned by the misalignment `tilt` (3, 3), scaled, biased and made noisy (`noise` (n, 6),
@@ -210,7 +211,7 @@ def imu(
         place = record.aircraft.vector("sensors.imu_m") + draws.vector("imu_m") - record.frame.cg_m
     noise = rng.standard_normal((n, 6))
     band = math.sqrt(0.5 / STEP_S) if switches.noise else 0.0  # white up to half the sampling rate
-    rates, force = felt(
+    rates, force = sensed_motion(
         record.states,
         record.specific_force_mps2,
         record.angular_acceleration_radps2,

@@ -171,8 +171,8 @@ def _damage(
     for i in np.flatnonzero(hit).tolist():
         p = packets[i]
         if fault.kind == "imu_repeated":
-            later = round(REPEATED_AFTER_S * TICKS_PER_S)
-            twice.append(replace(p, start=p.start + later, end=p.end + later))
+            delay_ticks = round(REPEATED_AFTER_S * TICKS_PER_S)
+            twice.append(replace(p, start=p.start + delay_ticks, end=p.end + delay_ticks))
         elif fault.kind == "imu_short":
             size = int(rng.integers(1, len(p.data)))
             end = p.start + round((size + 1) * BYTE_S * TICKS_PER_S)
