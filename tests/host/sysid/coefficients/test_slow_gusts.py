@@ -154,3 +154,25 @@ def test_thrust_follows_the_airspeed_it_is_corrected_to() -> None:
     )
     assert thrust(AIRSPEED_MPS, 1.03 * air) - still == pytest.approx(0.03 * by_density, rel=0.05)
     assert by_speed < -0.1
+
+
+def test_maneuvers_of_all_axes_at_one_time_meet_one_gust() -> None:
+    """As multisines on three axes: the vertical gust of both is the same, and can be inverted."""
+    at = np.arange(600)
+    blocks = [
+        window_transform(at, STEP_S, Window(0.0, 12.0, longitudinal), FORCES)
+        for longitudinal in (True, False)
+    ]
+    known = np.linalg.inv(gust_information(blocks, SIGMA, AIRSPEED_MPS, STEP_S))
+    of = [
+        gust
+        for block in blocks
+        for name in block.equations
+        if name in GUST_TERMS
+        for _, _, gust in GUST_TERMS[name]
+    ]
+    first, last = (of.index("w"), len(of) - 1 - of[::-1].index("w"))
+    assert first < last
+    shapes = [slice(k * LEGENDRE_TERMS, (k + 1) * LEGENDRE_TERMS) for k in (first, last)]
+    own, across = known[shapes[0], shapes[0]], known[shapes[0], shapes[1]]
+    np.testing.assert_allclose(across, own, rtol=1e-3, atol=1e-3 * own.max())

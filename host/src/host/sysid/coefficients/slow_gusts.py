@@ -23,6 +23,9 @@ LENGTH_M = {"u": 260.0, "w": 100.0}
 # Above V/L the spectrum of a Dryden gust's rate is flat: this many sigma^2 V/L.
 RATE_SPECTRUM = {"u": 2.0, "w": 3.0}
 GRID = 30  # points of a maneuver at which the gust's covariance is formed
+# Maneuvers of two axes at one time meet the same gust: no covariance with an inverse says so. They
+# may differ by a thousandth of its standard deviation.
+OWN_SHARE = 1e-6
 # Of each kinematic equation: rate, sign, gust component. A slow side gust is negligible.
 GUST_TERMS = {
     "u": (("q", -1.0, "w"),),
@@ -114,7 +117,9 @@ def gust_information(
                 correlation = np.exp(-lag) * (1.0 - 0.5 * lag if gust == "w" else 1.0)
                 found[i, :, j] = strength[gust] ** 2 * inverse @ correlation @ inverse.T
     size = len(of) * LEGENDRE_TERMS
-    return np.asarray(np.linalg.inv(found.reshape(size, size)), dtype=np.float64)
+    covariance = found.reshape(size, size)
+    covariance[np.diag_indices(size)] *= 1.0 + OWN_SHARE
+    return np.asarray(np.linalg.inv(covariance), dtype=np.float64)
 
 
 def _keys(windows: Sequence[WindowTransform]) -> list[EquationKey]:
