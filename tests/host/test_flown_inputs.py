@@ -9,10 +9,12 @@ import pytest
 from host.arrays import Array
 from host.log import FlightLog
 from host.log.flown_inputs import FlownInput, flown_inputs
+from host.log.quality import judge
 from host.sysid.flight.flight_tables import read_columns
 from host.sysid.flight.logged_inputs import input_columns
 from host.sysid.flight.maneuver_detection import detect_maneuvers
 from host.wire.flight_card import card_bytes, parts
+from host.wire.schema_text import packed_schema
 
 from tests.host.logs import START_US, even, flight, read, written
 from tests.host.test_flight_card import DOUBLET, HEAD, MULTISINE
@@ -120,3 +122,18 @@ def test_a_lost_row_is_given_to_the_surfaces_that_moved() -> None:
     lost = FlownInput(3, 5.0, 9.0, "unknown", "unknown", (0.0, 0.0, 0.0))
     [found] = detect_maneuvers(columns | input_columns(t_s, [lost]))
     assert (found.axis, found.kind) == ("rudder_rad", "multistep")
+
+
+def test_what_an_input_moves_is_no_jump_of_a_servo(tmp_path: Path) -> None:
+    """A pulse that leaves for 50 ms while the stick rests, in a row and behind it."""
+    flown = flight(12.0)
+    even(flown[0])
+    ident = flown[0].rows
+    ident["rc_elevator"] = ident["servo_elevator"] = 3000
+    ident["valid"] |= 1 << packed_schema().bits["valid"].index("mega_drives")
+    for at_s in (4.5, 9.0):
+        ident["servo_elevator"][round(100 * at_s) : round(100 * at_s) + 5] += 100
+    events = _events(("input_start", 4_000_000, 1), ("input_end", 7_250_000, _end(1, "done", 3250)))
+    card = _parts(card_bytes(HEAD, [DOUBLET, MULTISINE]))
+    [session] = read(tmp_path, written(*flown, card, events)).sessions
+    assert judge(session).servo_jumps == {"elevator": [pytest.approx(8.99, abs=0.02)]}

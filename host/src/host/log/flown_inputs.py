@@ -56,18 +56,20 @@ def flown_inputs(log: FlightLog) -> list[FlownInput]:
     ----------
     log : FlightLog
     """
-    if "event" not in log.schema.by_name or "input_start" not in log.schema.enums.get("event", {}):
+    return [one for session in log.sessions for one in inputs_of_session(session)]
+
+
+def inputs_of_session(session: Session) -> list[FlownInput]:
+    """Return the inputs of one session, as `flown_inputs` does of all."""
+    schema = session.store.schema
+    if "event" not in schema.by_name or "input_start" not in schema.enums.get("event", {}):
         return []
-    return [one for session in log.sessions for one in _of_session(log, session)]
-
-
-def _of_session(log: FlightLog, session: Session) -> list[FlownInput]:
     events, t_us = session.slow("event")
-    codes = log.schema.enums["event"]
+    codes = schema.enums["event"]
     begins, ends = codes["input_start"], codes["input_end"]
     rows = _rows(session)
-    reasons = {value: name for name, value in log.schema.enums["input_end"].items()}
-    shapes = {value: name for name, value in log.schema.enums["card_shape"].items()}
+    reasons = {value: name for name, value in schema.enums["input_end"].items()}
+    shapes = {value: name for name, value in schema.enums["card_shape"].items()}
     found: list[FlownInput] = []
     begun: tuple[int, float] | None = None
 

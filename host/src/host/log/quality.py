@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from host.log.servo_jumps import servo_jumps
+from host.log.flown_inputs import inputs_of_session
+from host.log.servo_jumps import LONGEST_S, servo_jumps
 from host.physical.calibration import Line
 from host.physical.channels import END_OF_RANGE as IMU_END
 from host.physical.columns import ANALOGUE, INERTIAL
@@ -129,6 +130,7 @@ class _JumpWatch:
         self._drives = session.store.schema.bit("valid", "mega_drives")
         self._frame = session.store.schema.by_name["ident"]
         self._before: tuple[Array, NDArray[Any]] | None = None
+        self._inputs = inputs_of_session(session)
         self.found: dict[str, list[float]] = {}
 
     def add(self, t_us: Array, data: NDArray[Any]) -> None:
@@ -145,7 +147,9 @@ class _JumpWatch:
             )
             for at_s in servo_jumps(t_s, servo, stick, drives & (servo > 0.0)).tolist():
                 own = self.found.setdefault(name, [])
-                if not own or at_s > own[-1]:  # not the one seen with the piece before
+                if own and at_s <= own[-1]:
+                    continue  # seen with the piece before
+                if not any(i.start_s - LONGEST_S <= at_s <= i.end_s for i in self._inputs):
                     own.append(at_s)
         keep = int(np.searchsorted(t_s, t_s[-1] - _KEPT_S))
         self._before = t_us[keep:], data[keep:]

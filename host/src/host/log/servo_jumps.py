@@ -1,8 +1,8 @@
 """Servo pulses that leave and come back at once while the stick stands still.
 
-The thesis's servos twitched about once in ten seconds with nobody at the stick (5.1.4). A test
-input of the recorder moves a servo without the stick too, but it holds: what counts is a pulse that
-is back within 0.15 s.
+The thesis's servos twitched about once in ten seconds with nobody at the stick (5.1.4). What counts
+is a pulse that is back within 0.15 s. A test input that the recorder flies moves servos without the
+stick too, a multisine as fast: who counts leaves its time out.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 LEAST_US = 20.0  # of pulse, about 2 deg of a surface; receivers jitter by 2
 STILL_US = 8.0  # the stick's pulse from row to row
-LONGEST_S = 0.15  # away; a pulse of a test input holds 0.3 s and more
+LONGEST_S = 0.15  # away
 LOOKED_BACK_S = 0.1  # the servo may follow the stick this much later
 
 
