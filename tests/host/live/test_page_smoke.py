@@ -72,6 +72,29 @@ ESTIMATES = """(async () => {
 })()"""
 
 
+# What the logger learns: no card, a card, a row that teaches, the same told no more.
+LEARNING = """(async () => {
+  const { showLearning } = await import("./learning.js");
+  const box = document.getElementById("logger-box");
+  const row = (name, value, half_width, ground) => ({ name, value, half_width, ground, row: 2,
+    axis: "<b>pitch", after_s: 5.02, t_s: 70, enough: half_width !== null && half_width < 1 });
+  const rows = [row("Cm_alpha", -1.62, 0.17, { value: -1.52, half_width: 0.1 }),
+    row("Cm_q", -10.1, 19, null), row("Cm_de", -1.27, null, null)];
+  const seen = (card, age_s, told) => {
+    showLearning({ card, age_s, rows: told });
+    const cell = box.querySelector("td");
+    return { hidden: box.hidden, text: document.getElementById("logger-text").innerText,
+      colour: cell ? getComputedStyle(cell).color : "" };
+  };
+  document.body.classList.remove("old");
+  const before = [seen(false, null, []), seen(true, null, [])];
+  const now = seen(true, 0.4, rows);
+  const lines = [...box.querySelectorAll("tbody tr")].map((line) => line.innerText.split("\\t"));
+  const past = seen(true, 8.2, rows);
+  return { before, now, lines, past, markup: box.querySelectorAll("b").length };
+})()"""
+
+
 def planted(seconds: float) -> bytes:
     """Return a stream whose board and aircraft names are markup."""
     parts = sent(seconds)
@@ -131,6 +154,19 @@ def look(live: ServedPage, folder: Path) -> None:
         assert "-" in told["lines"][2], told
         assert told["foot"] == "1 test point, in rudder doublet, to 42 s"
         assert told["markup"] == 0
+        learning = page.evaluate(LEARNING)
+        assert [one["hidden"] for one in learning["before"]] == [True, False]
+        assert learning["before"][1]["text"] == "no row has taught yet"
+        assert learning["now"]["text"] == "<b>pitch, row 2, 5 s"
+        assert learning["lines"] == [
+            ["Cm alpha", "-1.62", "± 10.5 %", "-1.52", "± 6.6 %", "enough"],
+            ["Cm q", "-10.1", "no sign", "-", "", ""],
+            ["Cm de", "?", "", "-", "", ""],
+        ]
+        assert learning["past"]["text"] == "<b>pitch, row 2, 5 s; 8 s ago"
+        assert learning["now"]["colour"] == "rgb(0, 0, 0)"
+        assert learning["past"]["colour"] == "rgb(154, 154, 154)"
+        assert learning["markup"] == 0
         drawn = page.evaluate(REDRAWS)
         assert drawn["often"] < 12 * 60 / 2, drawn  # of 12 plots and 60 redraws
         assert drawn["off"] < 0.01 * drawn["inked"], drawn  # rows that are added stand in place

@@ -19,6 +19,7 @@ from host.live.live_track import LiveTrack
 from host.live.servo_watch import ServoWatch
 from host.live.slow_readings import slow_reading
 from host.text import shown
+from host.wire.schema import Schema
 
 _EVENTS = 40
 _OLD_S = 3.0  # frames `system` come every second
@@ -91,6 +92,8 @@ class FlightState:
     def _take(self, update: LiveUpdate) -> None:
         for text in update.told:
             self.say("warning", text)
+        for frame in update.slow:
+            self._input(frame)  # before the rows that it moves
         for surface in self.servos.add(update):
             self.say("servo", f"{surface} servo jumped, its stick did not move")
         if len(update):
@@ -114,8 +117,19 @@ class FlightState:
     def _event(self, frame: SlowFrame) -> None:
         schema = self._stream.schema
         if schema is not None:
-            word = schema.word("event", int(frame.row["code"])).replace("_", " ")
-            self.say("aircraft", f"{word} ({int(frame.row['arg'])})")
+            word, arg = schema.word("event", int(frame.row["code"])), int(frame.row["arg"])
+            self.say("aircraft", _event_words(schema, word, arg))
+
+    def _input(self, frame: SlowFrame) -> None:
+        """Tell who counts jumps what the logger itself moves."""
+        schema = self._stream.schema
+        if schema is None or frame.name != "event":
+            return
+        word = schema.word("event", int(frame.row["code"]))
+        if word == "input_start":
+            self.servos.input_starts(frame.t_s)
+        elif word == "input_end":
+            self.servos.input_ends(frame.t_s)
 
     def _written(self, blocks: int) -> None:
         """Note when the number of blocks on the card last grew."""
@@ -172,3 +186,15 @@ class FlightState:
             if frame is not None:
                 out[field] = shown(bytes(frame.row[field]).rstrip(b"\0"))
         return out
+
+
+def _event_words(schema: Schema, word: str, arg: int) -> str:
+    """Return an event of the aircraft as people read it; rows count from 1, as on the card."""
+    row, reason = (arg & 255) + 1, schema.word("input_end", arg >> 8 & 255).replace("_", " ")
+    inputs = {
+        "card_enabled": f"card {arg:08x} enabled",
+        "input_start": f"row {row} begins",
+        "input_end": f"row {row} ends: {reason}",
+        "input_refused": f"row {row} refused: {reason}",
+    }
+    return inputs.get(word, f"{word.replace('_', ' ')} ({arg})")

@@ -25,12 +25,14 @@ from host.live.live_sources import (
     udp_source,
 )
 from host.live.live_stream import LiveStream
+from host.live.logger_learning import LoggerLearning
 from host.live.mavlink_bridge import MavlinkBridge
 from host.live.plotjuggler_bridge import PlotJugglerBridge
 from host.live.replay import RADIO_RATE_HZ, replay_source
 from host.live.udp_place import udp_place
 from host.log.capture_head import SUFFIX, CaptureHead
 from host.physical.calibration import Calibration, calibration_of_text, load_calibration
+from host.wire.flight_card import card_file
 from host.wire.schema_text import packed_schema
 
 if TYPE_CHECKING:
@@ -66,6 +68,7 @@ class LiveRequest:
     aircraft: str | None = None
     wanted: str | None = None
     card: str | None = None
+    flight_card: Path | None = None
     seed: int = 0
     opened: Source | None = None  # in place of what `source` names
     joins: list[Join] = field(default_factory=list)
@@ -95,16 +98,20 @@ class LiveSummary:
 def open_source(request: LiveRequest, tell: Callable[[str], None]) -> Source:
     """Return what the request names; raises HostError in one line."""
     text = request.source
+    virtual = text is not None and text.startswith("sim:")
+    if request.flight_card is not None and not virtual:
+        raise UsageError("--flight-card goes with sim:CARD: a real logger has its card in itself")
     if text is not None and text.startswith("replay:"):
         return replay_source(text.removeprefix("replay:"), request.rate_hz)
-    if text is not None and text.startswith("sim:"):
+    if text is not None and virtual:
         try:
             from host.live.simulated_source import SimulatedSource
         except ImportError as error:
             raise UsageError(
                 f"a virtual flight needs {error.name}: {install_hint(error.name)}"
             ) from None
-        return SimulatedSource(text.removeprefix("sim:"), request.seed).open(tell)
+        own = b"" if request.flight_card is None else card_file(request.flight_card)
+        return SimulatedSource(text.removeprefix("sim:"), request.seed, own).open(tell)
     if text is not None and text.startswith("udp:"):
         return udp_source(text)
     if text is not None and is_file_like(text):
@@ -155,11 +162,13 @@ def run_live(
         known = own or request.calibration is not None
         estimates = _estimates(request, session, calibration.text if known else "")
         _test_points(request, session)
+        learning = _learning(request, session, estimates, tell, show)
         try:
             with contextlib.suppress(KeyboardInterrupt):
                 asyncio.run(_serve(request, session, tell))
         finally:
             session.stop()
+            learning.close()
             for last in leave:
                 last()
             if estimates is not None:
@@ -195,6 +204,23 @@ def _estimates(
     capture = session.capture.path if session.capture else None
     found = live_estimates(aircraft, request.wanted, capture, calibration)
     session.listeners["estimates"] = found
+    return found
+
+
+def _learning(
+    request: LiveRequest,
+    session: LiveSession,
+    estimates: LiveEstimates | None,
+    tell: Callable[[str], None],
+    show: Callable[[str], None],
+) -> LoggerLearning:
+    """Let the session tell what the logger learns by itself."""
+    found = LoggerLearning(session.stream, tell)
+    if estimates is not None:
+        found.ground = estimates.value
+    if request.json:
+        found.show = lambda row: show(json.dumps({"type": "learned"} | row))
+    session.listeners["logger"] = found
     return found
 
 

@@ -1,4 +1,7 @@
-"""Servo jumps as they come: what the log's own rule finds in the last rows."""
+"""Servo jumps as they come: what the log's own rule finds in the last rows.
+
+While the logger flies a row of its card it moves servos and nobody's stick: that is no jump.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.live.live_sample import LiveUpdate
-from host.log.servo_jumps import servo_jumps
+from host.log.servo_jumps import LONGEST_S, servo_jumps
+from host.wire.flight_card import number
 
 SURFACES = ("elevator", "aileron", "rudder", "throttle")
 _KEPT_S = 1.5  # a jump is back within 0.15 s, and 0.1 s before it is looked at
@@ -22,6 +26,15 @@ class ServoWatch:
         self._looked_s = -np.inf
         self._rows: dict[str, NDArray[np.float64]] = {}
         self._drives: NDArray[np.bool_] = np.empty(0, bool)
+        self._input_s = (-np.inf, -np.inf)  # of the last row flown by the logger
+
+    def input_starts(self, t_s: float) -> None:
+        """Take the begin of a row; lost its end, it ends where the longest does."""
+        self._input_s = t_s, t_s + 1e-3 * number("card_longest_ms")
+
+    def input_ends(self, t_s: float) -> None:
+        """Take the end of a row."""
+        self._input_s = self._input_s[0], t_s
 
     def add(self, update: LiveUpdate) -> list[str]:
         """Take more rows; return the surface of each jump found."""
@@ -52,7 +65,9 @@ class ServoWatch:
             self._rows[f"rc_{surface}_us"],
             self._drives,
         )
-        new = at_s[at_s > self._counted_s[surface]]
+        first_s, last_s = self._input_s
+        flown = (at_s >= first_s - LONGEST_S) & (at_s <= last_s)
+        new = at_s[(at_s > self._counted_s[surface]) & ~flown]
         if len(new):
             self._counted_s[surface] = float(new[-1])
             self.jumps[surface] += len(new)

@@ -11,6 +11,7 @@ from host.live.live_sources import Tell
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
+from host.twin.recorder.logger_flight import logger_flight
 from host.twin.recorder.recorder_build import recorder_library
 from host.twin.recorder.sitl_radio import radio
 from host.twin.recorder.stimuli import Stimuli, stimuli
@@ -27,10 +28,13 @@ class SimulatedSource:
     card : str
         Name or file, as `host simulate` takes it.
     seed : int
+    flight_card : bytes
+        In the logger's EEPROM: it flies the inputs of the card itself; empty for none.
     """
 
     card: str
     seed: int = 0
+    flight_card: bytes = b""
     baud: int = 0
     recorded: bool = False
 
@@ -49,16 +53,32 @@ class SimulatedSource:
         Raises
         ------
         HostError
-            If the card cannot be flown, or there is no recorder.
+            If the card cannot be flown, the flight card is not of it, or there is no recorder.
         """
         card = cards.load(self.card)
         recorder_library()
         tell(f"flying {self.card} (a few seconds)")
-        record = fly(card, seed=self.seed)
+        if self.flight_card:
+            record, given, _ = logger_flight(
+                self.flight_card, card, seed=self.seed, recorder=self._recorded
+            )
+        else:
+            record = fly(card, seed=self.seed)
+            given = stimuli(record, air_data(record))
         self.calibration_text = calibration(record.aircraft, record.draws.errors)
         self.aircraft = record.aircraft.name
-        self._flight = record, stimuli(record, air_data(record))
+        self._flight = record, given
         return self
+
+    def _recorded(self, record: FlightRecord, given: Stimuli) -> sitl.Recording:
+        """Let the recorder live through a round of a flight whose inputs it flies."""
+        return sitl.record(
+            given,
+            rate_hz=sitl.recorder_rate_hz(record.card.flight.rate_hz),
+            aircraft=record.aircraft.name,
+            seed=self.seed,
+            flight_card=self.flight_card,
+        )
 
     def portions(self, tell: Tell) -> Iterator[bytes]:
         """Yield what the radio sends, in real time."""
@@ -68,7 +88,9 @@ class SimulatedSource:
         record, given = self._flight
         rate_hz = sitl.recorder_rate_hz(record.card.flight.rate_hz)
         start_s = time.monotonic()
-        for sent in radio(given, rate_hz=rate_hz, aircraft=record.aircraft.name):
+        for sent in radio(
+            given, rate_hz=rate_hz, aircraft=record.aircraft.name, flight_card=self.flight_card
+        ):
             wait_s = start_s + sent.t_s - time.monotonic()
             if wait_s > 0.0:
                 time.sleep(wait_s)

@@ -54,11 +54,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _good(path: Path) -> bytes | None:
     """Return a good card; None behind what is wrong with it."""
-    from host.files.regular import regular_file
-    from host.wire.flight_card import LONGEST_FILE, card_faults
+    from host.wire.flight_card import card_faults, card_file
 
-    regular_file(path, UsageError)
-    data = path.read_bytes()[: LONGEST_FILE + 1]
+    data = card_file(path)
     wrong = card_faults(data)
     for text in wrong:
         print(f"host: {path}: {text}", file=sys.stderr)

@@ -73,10 +73,13 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--card", metavar="CARD",
                         help="that is flown (host plan): each test point gets a verdict, and what"
                         " is next a countdown")  # fmt: skip
+    parser.add_argument("--flight-card", type=Path, metavar="FILE",
+                        help="of sim:CARD (host plan CARD --card FILE): the logger flies its inputs"
+                        " itself, and tells what it learns")  # fmt: skip
     parser.add_argument(
         "--json",
         action="store_true",
-        help="print the state once a second, and every verdict, as JSON",
+        help="print the state once a second, and every verdict and what the logger learns, as JSON",
     )
 
 
@@ -103,6 +106,7 @@ def run(args: argparse.Namespace) -> int:
         aircraft=args.aircraft,
         wanted=args.wanted,
         card=args.card,
+        flight_card=args.flight_card,
     )
     if args.preflight is not None:
         from host.preflight.preflight_sheet import shown_sheet

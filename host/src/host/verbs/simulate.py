@@ -78,6 +78,7 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(f"seed is {args.seed}, expected 0 or more")
     from host.aircraft.origin import announce_aircraft
     from host.planning.identified_aircraft import is_model, named_aircraft
+    from host.wire.flight_card import card_file
 
     if args.firmware == "sitl":
         recorder_library(draw_share)
@@ -92,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
             both=args.both,
             logs=args.to,
             airframe=args.outputs,
-            flight_card=_flight_card(args.flight_card),
+            flight_card=b"" if args.flight_card is None else card_file(args.flight_card),
             progress=draw_share,
         )
     except OSError as error:
@@ -111,17 +112,6 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join(outcome_summary.lines(outcome, args.firmware)))
     outcome_summary.check(outcome)
     return ExitCode.OK
-
-
-def _flight_card(path: Path | None) -> bytes:
-    """Return the file's bytes, none without one."""
-    if path is None:
-        return b""
-    from host.files.regular import regular_file
-    from host.wire.flight_card import LONGEST_FILE
-
-    with regular_file(path).open("rb") as file:
-        return file.read(LONGEST_FILE + 1)
 
 
 def _list(*, as_json: bool) -> int:

@@ -11,16 +11,18 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from host.files.regular import regular_file
 from host.resources import resource
 from host.wire.framing import crc16
 from host.wire.schema import Field
 from host.wire.schema_text import packed_schema
 
-LONGEST_FILE = 48 * 64  # longer than any good card
+_LONGEST_FILE = 48 * 64  # longer than any good card
 HEAD, LEARNING, ROW = "card_head", "card_learning", "card_row"
 AXIS, WORTH = "card_axis", "card_worth"
 AXES = ("aileron", "elevator", "rudder")
@@ -76,6 +78,18 @@ def dtype(layout: str) -> np.dtype[Any]:
 def scale(layout: str, name: str) -> float:
     """Return one raw step of a field in its unit."""
     return {field.name: field.scale for field in fields(layout)}[name]
+
+
+def card_file(path: Path) -> bytes:
+    """Return a file's bytes, of no more than shows that it is no card; ask `card_faults` next.
+
+    Raises
+    ------
+    UsageError
+        There is no such file.
+    """
+    with regular_file(path).open("rb") as file:
+        return file.read(_LONGEST_FILE + 1)
 
 
 def card_bytes(

@@ -154,6 +154,10 @@ class LiveEstimates:
             "load_percent": round(100.0 * self._used_s / elapsed_s, 1) if elapsed_s > 1.0 else None,
         }
 
+    def value(self, name: str) -> tuple[float, float] | None:
+        """Return the newest estimate and half-width of a derivative, None before there is one."""
+        return self._values.get(name)
+
     def close(self) -> None:
         """End the process, and forget a replay's bytes."""
         self._worker.close()

@@ -3,6 +3,7 @@
 import { connect } from "./connection.js";
 import { showEstimates } from "./estimates.js";
 import { History } from "./history.js";
+import { showLearning } from "./learning.js";
 import { showAge, showState } from "./panel.js";
 import { Plan } from "./plan.js";
 import { Plots } from "./plots.js";
@@ -49,6 +50,7 @@ const server = connect({
     showState(said);
     preflight.show(said.preflight);
     if (showEstimates(said.estimates)) sound.play([660, 880]);
+    showLearning(said.logger ?? { card: false, age_s: null, rows: [] });
     verdict.show(said.test_point ?? null);
     const marks = said.events.filter((event) => event.kind === "mark").length;
     if (marks > marked) sound.play([660]);

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from host.twin.recorder import sitl
+from host.twin.recorder.flight_card_line import eeprom_with_card
 from host.twin.recorder.recorder_build import recorder_library
 from host.twin.recorder.sitl_library import Port, Sitl
 from host.twin.recorder.stimuli import Stimuli
@@ -31,7 +32,12 @@ class Sent:
 
 
 def radio(
-    given: Stimuli, *, rate_hz: int, aircraft: str, step_s: float = _STEP_S
+    given: Stimuli,
+    *,
+    rate_hz: int,
+    aircraft: str,
+    flight_card: bytes = b"",
+    step_s: float = _STEP_S,
 ) -> Iterator[Sent]:
     """Let the recorder live through a flight and yield what it sends, portion by portion.
 
@@ -42,6 +48,8 @@ def radio(
         One of `sitl.RATES_HZ`.
     aircraft : str
         Name for the log's configuration.
+    flight_card : bytes
+        In its EEPROM; empty for none.
     step_s : float
         Simulated time between two portions.
 
@@ -65,6 +73,8 @@ def radio(
     try:
         instrument.insert_card(image, sitl.CARD_ID)
         sitl.configure(instrument, rate_hz, aircraft)
+        if flight_card:
+            instrument.set_eeprom(eeprom_with_card(instrument.eeprom(), flight_card))
         sitl.give(instrument, given, given.duration)
         instrument.power_on()
         sent = 0
