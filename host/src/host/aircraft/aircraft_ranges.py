@@ -25,6 +25,7 @@ _PLACE_M = Quantity("m", -100.0, 100.0, _PLACE)
 _TOLERANCE = Quantity("", 0.0, 0.5, _SHARE)
 _TOLERANCE_M = Quantity("m", 0.0, 5.0, "a place that is known to less is not known")
 _TORQUE = Quantity("N m", 0.0, 1e6, "largest turboprops 1e5 N m")
+UNKNOWN_ANGLE_RAD = 1.6  # a tolerance that says nothing
 # Of a flight condition.
 AIRSPEED = Quantity("m/s", 0.5, 2000.0, _SPEED)
 DENSITY = Quantity("kg/m3", 1e-3, 10.0, "from 50 km to wind tunnels under pressure")
@@ -48,6 +49,12 @@ RANGES: Mapping[str, Quantity] = {
     "geometry.elevator_arm_m": Quantity("m", -100.0, 100.0, _PLACE),
     "geometry.rudder_arm_m": Quantity("m", -100.0, 100.0, _PLACE),
     "geometry.arm_tolerance": _TOLERANCE,
+    "geometry.ground_pitch_rad": Quantity(
+        "rad", -0.8, 0.8, "tail-draggers stand at 0.15 to 0.3; in degrees it would be larger"
+    ),
+    "geometry.ground_pitch_tolerance_rad": Quantity(
+        "rad", 0.0, UNKNOWN_ANGLE_RAD, "an inclinometer 0.003, a runway 0.01", above=True
+    ),
     "trim.airspeed_mps": AIRSPEED,
     "trim.minimum_airspeed_mps": AIRSPEED,
     "trim.maximum_airspeed_mps": AIRSPEED,

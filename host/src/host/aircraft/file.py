@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from host.aircraft.aircraft_ranges import RANGES
+from host.aircraft.aircraft_ranges import RANGES, UNKNOWN_ANGLE_RAD
 from host.aircraft.airframe import COEFFICIENTS, Airframe, Array
 from host.aircraft.dimension_file import from_dimensions, is_dimensions
 from host.aircraft.linear_dynamics import LinearDynamics
@@ -52,8 +52,11 @@ _VECTORS: Mapping[str, tuple[str, ...]] = {
 
 # May be left out of a file: what it then counts as.
 _OPTIONAL: Mapping[str, Mapping[str, float]] = {
-    "geometry": {"elevator_arm_m": 0.0, "rudder_arm_m": 0.0, "arm_tolerance": 0.10},
-}
+    "geometry": {
+        "elevator_arm_m": 0.0, "rudder_arm_m": 0.0, "arm_tolerance": 0.10,
+        "ground_pitch_rad": 0.0, "ground_pitch_tolerance_rad": UNKNOWN_ANGLE_RAD,
+    },
+}  # fmt: skip
 
 # What is known before the first flight: enough to identify an aircraft, not to fly it here.
 MEASURED = ("mass", "geometry", "trim", "sensors")

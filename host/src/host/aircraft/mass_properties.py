@@ -5,10 +5,12 @@ The file's reader has checked every number: whatever is wrong with one is said t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from host.aircraft.aircraft_ranges import UNKNOWN_ANGLE_RAD
 from host.aircraft.file import load_measured
 from host.arrays import Array
 
@@ -22,7 +24,8 @@ class AirframeData:
 
     Positions are in metres from the CG, x forward, y right, z down; relative numbers are standard
     deviations. `upwash` is the share by which the vanes over-read. Arms reach from the nominal CG
-    back to where a tail surface's control force acts; 0 is not known.
+    back to where a tail surface's control force acts; 0 is not known. `ground_pitch_rad` is that of
+    the x axis while it stands on its wheels; of an infinite deviation nobody measured it.
     """
 
     name: str
@@ -43,6 +46,8 @@ class AirframeData:
     elevator_arm_m: float = 0.0
     rudder_arm_m: float = 0.0
     arm_share: float = 0.06
+    ground_pitch_rad: float = 0.0
+    ground_pitch_sd_rad: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +68,7 @@ def airframe_data(source: str) -> AirframeData:
     """
     loaded = load_measured(source)
     number, vector, cg = loaded.scalar, loaded.vector, loaded.vector("mass.cg_m")
+    standing_rad = number("geometry.ground_pitch_tolerance_rad")
     return AirframeData(
         name=loaded.title,
         mass_kg=number("mass.mass_kg"),
@@ -82,6 +88,10 @@ def airframe_data(source: str) -> AirframeData:
         elevator_arm_m=number("geometry.elevator_arm_m"),
         rudder_arm_m=number("geometry.rudder_arm_m"),
         arm_share=number("geometry.arm_tolerance") * RECTANGLE,
+        ground_pitch_rad=number("geometry.ground_pitch_rad"),
+        ground_pitch_sd_rad=(
+            standing_rad * RECTANGLE if standing_rad < UNKNOWN_ANGLE_RAD else math.inf
+        ),
     )
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.aircraft.aircraft_ranges import UNKNOWN_ANGLE_RAD
 from host.aircraft.airframe import Array
 from host.constants import GRAVITY_MPS2
 
@@ -107,6 +108,12 @@ def impossible(s: Mapping[str, float], v: Mapping[str, Array]) -> Iterator[str]:
     )  # a measured aircraft has the middle one only
     if low is not None and high is not None and mid is not None and not low <= mid <= high:
         yield f"trim: airspeeds {low:g}, {mid:g}, {high:g} m/s are not minimum, trim, maximum"
+    standing = s["geometry.ground_pitch_rad"]
+    if standing and s["geometry.ground_pitch_tolerance_rad"] >= UNKNOWN_ANGLE_RAD:
+        yield (
+            f"geometry.ground_pitch_rad is {standing:g} rad without ground_pitch_tolerance_rad:"
+            " say how well it was measured"
+        )
 
 
 def doubts(s: Mapping[str, float], v: Mapping[str, Array]) -> Iterator[str]:

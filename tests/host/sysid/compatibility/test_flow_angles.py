@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -85,6 +86,15 @@ def test_angles_are_those_of_the_air(prepared: PreparedFlight) -> None:
         assert float(np.sqrt(np.mean(error**2))) < min(1.5, 3.0 * told), name
     assert any("angles of attack and sideslip are reconstructed" in n for n in prepared.notes)
     assert agreement["wind_north_mps"].data_informed
+
+
+def test_the_path_of_a_short_flight_is_found(tmp_path: Path) -> None:
+    """At 50 Hz and without turns full steps go round about the bank and never end."""
+    found = prepare(write("dataflash", tmp_path), ReadingOptions(), aircraft_data(AIRCRAFT))
+    assert found.agreement is not None
+    assert found.flight.angles is not None
+    errors = _errors_deg(found.flight.angles, found.flight.corrected["t_s"])
+    assert float(errors["alpha"].std()) < 0.6
 
 
 def test_a_wrong_sign_of_lift_is_seen(prepared: PreparedFlight) -> None:

@@ -46,6 +46,10 @@ STEP_LIMIT = 0.05  # of a standard error: convergence
 DRIFT_POWERS = 4  # constants to cubics do not correlate with gusts either
 RIDGE = 1e-10  # of a column's power: a surface that never moved has none
 LARGEST_STEP = 4.0  # in prior deviations
+# Steps that go round and do not shrink are shortened: curvature that the equations leave out turned
+# a flight of 49 s about its bank, each time by 1.2 of the step before.
+SHRINKS = 0.8  # over two steps
+SHORTER, SHORTEST = 0.5, 0.125  # of a step
 
 
 @dataclass(frozen=True)
@@ -90,6 +94,7 @@ def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int)
     instruments: dict[int, list[Array]] = {}
     air_unknowns = [k for k, name in enumerate(problem.names) if name in AIR_ERRORS]
     converged, near = False, False
+    length, sizes = 1.0, [np.inf, np.inf]
     iteration = 0
     origin, least_cost, halvings = theta, np.inf, 0
     constrained, adapt_from = bool(patience), max(patience, ADAPT_FROM)
@@ -149,10 +154,13 @@ def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int)
         step = inverse @ g
         with np.errstate(divide="ignore"):
             most = LARGEST_STEP / np.sqrt(problem.prior_precision)
-        theta = theta + np.clip(step, -most, most)
-        iteration += 1
         error_size = np.sqrt(np.maximum(np.abs(np.diag(inverse)), 1e-300))
         largest = float(np.max(np.abs(step) / error_size))
+        if iteration > adapt_from + 2 and largest > SHRINKS * sizes[-2]:
+            length = max(SHORTER * length, SHORTEST)
+        sizes.append(largest)
+        theta = theta + length * np.clip(step, -most, most)
+        iteration += 1
         near = largest < PLAIN_STEP_LIMIT
         converged = largest < STEP_LIMIT and not constrained and iteration > adapt_from + 1
 

@@ -14,6 +14,7 @@ from host.instrument.deviations import unknown_sensors
 from host.instrument.error_labels import recording_notes
 from host.instrument.servo_prior import servo_prior
 from host.sysid.compatibility.flow_angles import reconstruct_flow_angles
+from host.sysid.compatibility.ground_attitude import told_at_standstill
 from host.sysid.compatibility.reconstruction import (
     Compatibility,
     NoAgreementError,
@@ -92,6 +93,9 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
     try:
         agreement = reconstruct(columns, known.airframe if known else None, instrument, sensors)
         agreement = agreement if how.delays else without_estimated_delays(agreement)
+        if known is not None:
+            agreement, standing = told_at_standstill(agreement, columns, known.airframe)
+            notes += standing
         findings += calibration_findings(agreement)
     except NoAgreementError as error:
         findings.append(disagreement(error, columns))
