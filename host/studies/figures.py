@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from studies.accuracy import Accuracy
 from studies.coverage import Coverage
-from studies.imported_logs import Told
+from studies.imported_logs import Estimate
 from studies.methods import Score
 from studies.refusal import SURE, Agreement
 from studies.thesis import HopfieldRun
@@ -207,7 +207,7 @@ def windows_figure(cases: Sequence[Compared]) -> Figure:
     return figure
 
 
-def imported_figure(found: Sequence[Told]) -> Figure:
+def imported_figure(found: Sequence[Estimate]) -> Figure:
     """Draw the error of every coefficient over its half-width, by the log it came from."""
     figure = Figure(figsize=(9, 4.6))
     axis = figure.subplots()

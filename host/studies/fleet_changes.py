@@ -41,7 +41,7 @@ COMMANDS = {"servo_lag_s": (0.02, 2e-3)}
 CHORD_OVER_SPAN = 0.2
 FLEET = 12  # aircraft
 SPREAD = 0.5  # between flights, of the deviation of one flight's estimate
-LATER = 3  # flights within which an alarm shall come
+WITHIN = 3  # flights within which an alarm shall come
 SHIFTS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 5.0)
 ASKED = 3.5  # from there on an alarm shall come in 90 %
 
@@ -72,7 +72,7 @@ class Watched:
         """Return the patterns of all causes."""
         return cause_patterns(tuple(self.usual), self.usual, CHORD_OVER_SPAN)
 
-    def drawn(self, rng: np.random.Generator, flights: int) -> Array:
+    def random_estimates(self, rng: np.random.Generator, flights: int) -> Array:
         """Return what flights of an unchanged aircraft say, (flights, P)."""
         noise = rng.standard_normal((flights, len(self.usual)))
         return np.array(list(self.usual.values())) + noise @ np.linalg.cholesky(self.full).T
@@ -126,7 +126,7 @@ def unchanged(kind: Watched, aircraft: int, seed: int, size: int = FLEET) -> lis
     """Return fleets of `size` with the first flights of so many aircraft in all."""
     rng, fleets = np.random.default_rng(seed), []
     for _ in range(-(-aircraft // size)):
-        first = [kind.drawn(rng, BASELINE) for _ in range(size)]
+        first = [kind.random_estimates(rng, BASELINE) for _ in range(size)]
         fleets.append((first, kind.test(first)))
     return fleets
 
@@ -138,7 +138,7 @@ def power(kind: Watched, fleets: Sequence[Fleet], cause: str, shift: float, seed
     alarmed = named = count = 0
     for first, test in fleets:
         for own in first:
-            values = [*own, *(kind.drawn(rng, LATER) + size * shape)]
+            values = [*own, *(kind.random_estimates(rng, WITHIN) + size * shape)]
             found = test.alarms(values, [kind.own] * len(values))
             alarmed += bool(found)
             named += bool(found) and found[0].cause == cause
@@ -151,7 +151,7 @@ def false_alarms(kind: Watched, fleets: Sequence[Fleet], flights: int, seed: int
     rng, alarms, count = np.random.default_rng(seed), 0, 0
     for first, test in fleets:
         for own in first:
-            values = [*own, *kind.drawn(rng, flights)]
+            values = [*own, *kind.random_estimates(rng, flights)]
             found = test.alarms(values, [kind.own] * len(values))
             alarms += _beginnings([a.flight for a in found])
             count += flights
@@ -175,7 +175,7 @@ def table(kind: Watched, aircraft: int, seed: int) -> Iterator[str]:
         )
     for cause, change in {CG: 0.05, f"{THROW} elevator": 0.15}.items():
         yield f"{cause} by {100 * change:g} %: {change / one_deviation(kind, cause):.1f} sd"
-    yield f"alarm within {LATER} flights, of these the cause named first ({aircraft} aircraft)"
+    yield f"alarm within {WITHIN} flights, of these the cause named first ({aircraft} aircraft)"
     yield "cause                     " + "".join(f" {s:8.1f} sd " for s in SHIFTS)
     fleets = unchanged(kind, aircraft, seed)
     for cause in kind.patterns():

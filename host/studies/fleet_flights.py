@@ -36,7 +36,7 @@ from studies.flights import PRINCIPAL
 
 FIRST_SEED = 25_000
 FLEETS, AIRCRAFT, FLIGHTS = 3, 12, 8
-DRAWN = 400  # aircraft that say what is true of the type
+TRUTH_AIRCRAFT = 400  # aircraft that say what is true of the type
 SAID = ("mean", "between", "within")
 CARD = Path(__file__).with_name("fleet_card.toml")
 COLUMNS = (
@@ -57,8 +57,8 @@ def fly_fleet(folder: Path, fleet: int, aircraft: int, flights: int) -> None:
         own.mkdir(parents=True, exist_ok=True)
         (folder / f"{name}.toml").write_text(dumps(one.document), encoding="utf-8")
         errors = fleet_errors(one.plane)
-        told = f"# instrument of {name}\n" + calibration(one.plane, errors)
-        (folder / f"{name}.calibration.toml").write_text(told, encoding="utf-8")
+        text = f"# instrument of {name}\n" + calibration(one.plane, errors)
+        (folder / f"{name}.calibration.toml").write_text(text, encoding="utf-8")
         lines.append(f"logs/{name},{name},{TYPE},{name}.toml,{name}.calibration.toml")
         for flight in range(flights):
             path = own / f"flight{flight}.bin"
@@ -103,7 +103,7 @@ def rows_of(
     fleet: int, model: TypeModel, cg_m: Place, set_aside: int
 ) -> Iterator[dict[str, object]]:
     """Yield each principal derivative beside what was drawn."""
-    truth = population(DRAWN, FIRST_SEED - 1, cg_m)
+    truth = population(TRUTH_AIRCRAFT, FIRST_SEED - 1, cg_m)
     for name in PRINCIPAL:
         if name not in model.effects:
             continue
@@ -137,8 +137,8 @@ def table(rows: Sequence[dict[str, str]]) -> Iterator[str]:
         yield (
             f"{name:10s}" + "".join(f"{c:>14s}" for c in cells) + f"{100 * np.mean(inside):12.1f} %"
         )
-    told = "  ".join(f"{what} {a} of {b}" for what, (a, b) in counts.items())
-    yield f"all: {told}; of new aircraft {100 * np.mean(shares):.1f} % are inside"
+    text = "  ".join(f"{what} {a} of {b}" for what, (a, b) in counts.items())
+    yield f"all: {text}; of new aircraft {100 * np.mean(shares):.1f} % are inside"
 
 
 def _inside(row: dict[str, float]) -> float:

@@ -21,12 +21,12 @@ def truth_rows(fleets: int) -> Rows:
     found: Rows = []
     seeds = range(fleet_truth.FIRST_SEED, fleet_truth.FIRST_SEED + fleets)
     for cell in fleet_truth.cells():
-        drawn = [fleet_truth.row_of(cell, seed, oracle=False) for seed in seeds]
+        fleet_rows = [fleet_truth.row_of(cell, seed, oracle=False) for seed in seeds]
         held = [
-            100.0 * float(np.mean([int(str(r[f"{q}_holds"])) for r in drawn]))
+            100.0 * float(np.mean([int(str(r[f"{q}_holds"])) for r in fleet_rows]))
             for q in fleet_truth.QUANTITIES
         ]
-        zero = [float(str(r["between_lower"])) == 0.0 for r in drawn]
+        zero = [float(str(r["between_lower"])) == 0.0 for r in fleet_rows]
         found.append((cell.name, fleets, *held, 100.0 * float(np.mean(zero))))
     return found
 

@@ -62,7 +62,7 @@ def cells() -> list[Cell]:
     return [Cell(a, f, r) for a in AIRCRAFT for f in FLIGHTS for r in RATIOS]
 
 
-def drawn(cell: Cell, seed: int) -> FleetEstimates:
+def random_fleet(cell: Cell, seed: int) -> FleetEstimates:
     """Return a fleet whose truth is known."""
     rng = np.random.default_rng((seed, cell.aircraft, cell.flights, int(10 * cell.ratio)))
     count = cell.aircraft * cell.flights
@@ -78,11 +78,11 @@ def drawn(cell: Cell, seed: int) -> FleetEstimates:
 
 def row_of(cell: Cell, seed: int, *, oracle: bool = True) -> dict[str, object]:
     """Return which intervals of one fleet hold, and how wide an oracle's are."""
-    data = drawn(cell, seed)
+    data = random_fleet(cell, seed)
     found = type_effect(data)
     truth = dict(zip(QUANTITIES, (MEAN, cell.ratio, 1.0), strict=True))
     row: dict[str, object] = {"cell": cell.name, "seed": seed}
-    told: Mapping[str, TypeEffect] = (
+    oracle_effects: Mapping[str, TypeEffect] = (
         {}
         if not oracle
         else {
@@ -95,7 +95,7 @@ def row_of(cell: Cell, seed: int, *, oracle: bool = True) -> dict[str, object]:
         interval = getattr(found, name)
         row[f"{name}_holds"] = int(interval.holds(truth[name]))
         row[f"{name}_width"] = interval.width
-        row[f"{name}_oracle"] = getattr(told[name], name).width if oracle else ""
+        row[f"{name}_oracle"] = getattr(oracle_effects[name], name).width if oracle else ""
     return row | {"between_lower": found.between.lower, "within_lower": found.within.lower}
 
 

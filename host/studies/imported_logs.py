@@ -37,7 +37,7 @@ OWN = "own log, vanes"
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Estimate:
     """One coefficient of one flight from one log: truth, estimate and 95 % half-width."""
 
     source: str
@@ -52,13 +52,13 @@ class Told:
         """Whether the interval holds the truth."""
         return abs(self.value - self.true) <= self.half_width
 
-    def agrees(self, other: Told) -> bool:
+    def agrees(self, other: Estimate) -> bool:
         """Whether two estimates differ by less than their joint interval."""
         joint = float(np.hypot(self.half_width, other.half_width))
         return abs(self.value - other.value) <= joint
 
 
-def study(seeds: range) -> Iterator[Told]:
+def study(seeds: range) -> Iterator[Estimate]:
     """Fly, write, import and identify; yield every coefficient that was told."""
     for seed in seeds:
         record = fly(load("demo"), seed=seed)
@@ -67,11 +67,11 @@ def study(seeds: range) -> Iterator[Told]:
         with tempfile.TemporaryDirectory() as folder:
             stem = Path(folder) / "flight"
             own, by = own_log(record, data, stem)
-            yield from _told(OWN, seed, own, true, by)
+            yield from _estimates(OWN, seed, own, true, by)
             for kind in NAMES:
                 for airframe in AIRFRAMES:
                     path = write_autopilot_log(kind, record, data, stem, airframe=airframe)
-                    yield from _told(f"{kind}, {airframe}", seed, path, true, None)
+                    yield from _estimates(f"{kind}, {airframe}", seed, path, true, None)
 
 
 def own_log(record: FlightRecord, data: AirData, stem: Path) -> tuple[Path, Path]:
@@ -101,23 +101,23 @@ def truth(record: FlightRecord, data: AirData) -> dict[str, float]:
     return found
 
 
-def _told(
+def _estimates(
     source: str, seed: int, path: Path, true: dict[str, float], by: Path | None
-) -> Iterator[Told]:
+) -> Iterator[Estimate]:
     try:
         answer = host.identify(path, aircraft=AIRCRAFT, models=MODELS, calibration=by)
     except IdentificationError:
         return
     table = answer.table.reset_index()
-    told = dict(zip(table["name"], zip(table["value"], table["half_width"], strict=True),
+    intervals = dict(zip(table["name"], zip(table["value"], table["half_width"], strict=True),
                     strict=True))  # fmt: skip
     for name, value in true.items():
-        if name in told:
-            estimate, half_width = told[name]
-            yield Told(source, seed, name, value, float(estimate), float(half_width))
+        if name in intervals:
+            estimate, half_width = intervals[name]
+            yield Estimate(source, seed, name, value, float(estimate), float(half_width))
 
 
-def rows(found: list[Told]) -> list[tuple[str | int | float, ...]]:
+def rows(found: list[Estimate]) -> list[tuple[str | int | float, ...]]:
     """Return a row for each source: how much was told, held, agrees, how wide and how wrong."""
     own = {(t.seed, t.name): t for t in found if t.source == OWN}
     result: list[tuple[str | int | float, ...]] = []

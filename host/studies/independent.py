@@ -102,8 +102,8 @@ def with_instrument(
             models=DIRECT if analysis == DIRECT else axis,
         )
     direct = answer.coefficients
-    told = answer.linear[0].coefficients if direct is None else direct.fit.derivatives
-    known = {c.name: c for c in told}
+    derivatives_found = answer.linear[0].coefficients if direct is None else direct.fit.derivatives
+    known = {c.name: c for c in derivatives_found}
     for name in COEFFICIENTS[axis]:
         if name in known:
             yield name, float(getattr(TRAINER, name)), known[name].value, known[name].half_width

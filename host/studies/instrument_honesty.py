@@ -156,10 +156,10 @@ def lines(rows: Sequence[Row]) -> list[str]:
             hit = [abs(miss) <= half for n, miss, half in pairs if n == derivative]
             result.append(f"  {derivative:9s} {100 * np.mean(hit):5.1f} %")
         for group in sorted({g for row in own for g in row["check"]}):
-            told = [row["check"][group] for row in own if group in row["check"]]
-            times = np.array([t for t, n, _ in told if n])
+            tests = [row["check"][group] for row in own if group in row["check"]]
+            times = np.array([t for t, n, _ in tests if n])
             if len(times):
-                alarms = np.mean([p < 0.01 for _, n, p in told if n])
+                alarms = np.mean([p < 0.01 for _, n, p in tests if n])
                 rms = np.sqrt(np.mean(times**2))
                 result.append(
                     f"  {group:18s} told in {len(times)} flights, rms {rms:.2f} times the file's,"

@@ -82,22 +82,22 @@ def flown(seed: int) -> Iterator[dict[str, object]]:
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "flight.bin"
         log.write_bytes(recording.log)
-        told = read_log(log).frames["learned"]
+        learned = read_log(log).frames["learned"]
     for place, axis in enumerate(axes):
-        yield from _of_row(seed, place, axis, told, windows)
+        yield from _of_row(seed, place, axis, learned, windows)
 
 
 def _of_row(
     seed: int,
     place: int,
     axis: AxisCard,
-    told: NDArray[np.void],
+    learned: NDArray[np.void],
     windows: Sequence[Mapping[str, object]],
 ) -> Iterator[dict[str, object]]:
     codes = packed_schema().enums["derivative"]
     moved = {"pitch": "elevator", "roll": "aileron", "yaw": "rudder"}[axis.axis]
     truth = next((w["derivatives"] for w in windows if w["axes"] == [moved]), None)
-    of = told[told["row"] == place]
+    of = learned[learned["row"] == place]
     for name in NAMES[axis.axis]:
         own = of[of["derivative"] == codes[name.lower()]]
         if len(own) and isinstance(truth, Mapping):

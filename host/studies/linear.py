@@ -47,13 +47,13 @@ def study(card: str, seeds: range, method: str = DEFAULT_METHOD) -> tuple[Tally,
     -------
     coefficients, derivatives : Tally
     """
-    told, printed = Tally(), Tally()
+    estimated, printed = Tally(), Tally()
     for seed in seeds:
-        add(virtual_flight(card, seed), method, told, printed)
-    return told, printed
+        add(virtual_flight(card, seed), method, estimated, printed)
+    return estimated, printed
 
 
-def add(flight: VirtualFlight, method: str, told: Tally, printed: Tally) -> None:
+def add(flight: VirtualFlight, method: str, estimated: Tally, printed: Tally) -> None:
     """Count one flight, its answers as `host identify` gives them."""
     columns, _ = even_columns(flight.table)
     airframe, maneuvers = airframe_data(AIRCRAFT), list(flight.maneuvers)
@@ -67,7 +67,7 @@ def add(flight: VirtualFlight, method: str, told: Tally, printed: Tally) -> None
             powerplant=powerplant(AIRCRAFT),
         )
     except IdentificationError:
-        told.failed += 1
+        estimated.failed += 1
         return
     frame = flight.record.frame
     flown = (frame.mass_kg, frame.ixx_kgm2, frame.iyy_kgm2, frame.izz_kgm2, frame.ixz_kgm2)
@@ -76,7 +76,7 @@ def add(flight: VirtualFlight, method: str, told: Tally, printed: Tally) -> None
         doubted = {r.name for r in answer.identifiability_flags}
         for c in answer.coefficients:
             truth, flagged = local[c.name], not from_zero(c)
-            told.add(
+            estimated.add(
                 c.name, truth, c.value, c.half_width, flagged=flagged, size=_size(c.name, local)
             )
         half = answer.result.half_width()
@@ -149,11 +149,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--method", default=DEFAULT_METHOD)
     options = parser.parse_args(arguments)
     seeds = range(options.first, options.first + options.flights)
-    told, printed = study(options.card, seeds, options.method)
+    estimated, printed = study(options.card, seeds, options.method)
     lines = [
-        f"{options.card}: seeds {seeds.start} to {seeds.stop - 1}, {told.failed} fits failed",
+        f"{options.card}: seeds {seeds.start} to {seeds.stop - 1}, {estimated.failed} fits failed",
         "coefficients",
-        *told.lines(),
+        *estimated.lines(),
         "derivatives",
         *printed.lines(),
     ]

@@ -170,10 +170,10 @@ def _files(flight: Flown, folder: Path) -> tuple[Path, Path]:
     return log, text
 
 
-def learned(told: AxisCard, samples: NDArray[np.int64], *, double: bool) -> dict[int, Learned]:
+def learned(card: AxisCard, samples: NDArray[np.int64], *, double: bool) -> dict[int, Learned]:
     """Return the answer of every solve that ended, by the second at which it began."""
-    sums = FourierSums(told, exact=double)
-    solver = EquationError(told, sums, double=double)
+    sums = FourierSums(card, exact=double)
+    solver = EquationError(card, sums, double=double)
     found: dict[int, Learned] = {}
     work, began = None, 0
     for sample in samples:

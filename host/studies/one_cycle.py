@@ -56,11 +56,11 @@ def rows_of(seed: int) -> Iterator[dict[str, object]]:
         ):
             log = Path(place) / f"{rate_hz}.bin"
             log.write_bytes(data)
-            told_s, told, names = _history(log, calibration)
+            history_s, history, names = _history(log, calibration)
             for cycles in CYCLES:
-                at = int(np.argmin(np.abs(told_s - LEAD_S - cycles * period_s)))
+                at = int(np.argmin(np.abs(history_s - LEAD_S - cycles * period_s)))
                 for name in ("M_alpha", "M_q"):
-                    value = float(told[at, names.index(name)])
+                    value = float(history[at, names.index(name)])
                     row = (seed, rate_hz, cycles, name, true[name], value)
                     yield dict(zip(COLUMNS, row, strict=True))
 
@@ -86,8 +86,8 @@ def _history(log: Path, calibration: Path) -> tuple[np.ndarray, np.ndarray, tupl
         name="3-2-1-1",
     )
     result = fit_recursive_fourier(model, [maneuver], limits_hz=BAND_HZ, every_s=EVERY_S)
-    told = (np.asarray(result.details[key]) for key in ("history_s", "history"))
-    return next(told), next(told), result.names
+    history = (np.asarray(result.details[key]) for key in ("history_s", "history"))
+    return next(history), next(history), result.names
 
 
 def table(rows: Sequence[dict[str, str]]) -> list[str]:

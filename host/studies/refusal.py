@@ -205,7 +205,7 @@ class Repeated:
         listed = len(first.expected)
         lost = Counter(name for c in self.checks for name in c.missed)
         worst = ", ".join(f"{name} {count}" for name, count in lost.most_common(3)) or "none"
-        told = runs * (len(first.names) - listed)
+        identifiable = runs * (len(first.names) - listed)
         false = [
             sum(len(c.false(grade)) for c in self.checks)
             for grade in (NOT_IDENTIFIABLE, WEAKLY_IDENTIFIABLE)
@@ -218,7 +218,7 @@ class Repeated:
             f" whole list in one of the two grades on {sum(not c.missed for c in self.checks)},"
             f" names {runs * listed - lost.total()} of {runs * listed}, most often missed: {worst};"
             f" false names: {false[0]} '{NOT_IDENTIFIABLE}',"
-            f" {false[1]} '{WEAKLY_IDENTIFIABLE}' of {told}"
+            f" {false[1]} '{WEAKLY_IDENTIFIABLE}' of {identifiable}"
         )
 
 
@@ -282,8 +282,8 @@ class Agreement:
 
     def false(self, grade: str) -> tuple[int, int]:
         """Names of a grade below their bound at the truth, and all such parameters."""
-        told = sum(len(c.names) - len(c.expected) for c in self.checks)
-        return sum(len(c.false(grade)) for c in self.checks), told
+        identifiable = sum(len(c.names) - len(c.expected) for c in self.checks)
+        return sum(len(c.false(grade)) for c in self.checks), identifiable
 
     @property
     def clear(self) -> tuple[RefusalCheck, ...]:

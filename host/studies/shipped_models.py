@@ -49,7 +49,7 @@ NOISE = {
 }  # fmt: skip
 AXES = {"longitudinal": ("elevator",), "lateral": ("aileron", "rudder")}
 # Errors of flight-path reconstruction that these maneuvers tell, and what they are drawn with.
-DRAWN = {
+ERROR_SD = {
     "p_bias_radps": 0.01, "q_bias_radps": 0.01, "r_bias_radps": 0.01, "alpha_scale": 0.1,
     "beta_scale": 0.1,
 }  # fmt: skip
@@ -98,7 +98,7 @@ def rows_of(model: str, air_mps: float, seed: int, method: str | None) -> list[d
     """Fly and fit once; a fit without an answer leaves a row that says why."""
     rng = np.random.default_rng([seed, 18])
     path = model == "flight_path"
-    errors = {n: sd * rng.standard_normal() for n, sd in DRAWN.items()} if path else {}
+    errors = {n: sd * rng.standard_normal() for n, sd in ERROR_SD.items()} if path else {}
     table, maneuvers = flown(air_mps, seed, errors)
     cell: dict[str, object] = {"model": model, "air_mps": air_mps, "seed": seed}
     density = float(np.mean([m["condition"]["density_kgpm3"] for m in maneuvers]))

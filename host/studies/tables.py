@@ -9,7 +9,7 @@ from host.sysid.models.diagnostics import GRADES
 
 from studies.accuracy import Accuracy
 from studies.coverage import Coverage
-from studies.imported_logs import Told, rows
+from studies.imported_logs import Estimate, rows
 from studies.methods import Score
 from studies.refusal import Agreement, Repeated, agreement_text
 from studies.study_table import Table
@@ -187,7 +187,7 @@ def windows_table(cases: Sequence[Compared]) -> Table:
     )  # fmt: skip
 
 
-def imported_table(found: Sequence[Told]) -> Table:
+def imported_table(found: Sequence[Estimate]) -> Table:
     """Return what each log of the same flights tells, a row per format and airframe."""
     return Table(
         "The same flights as our logger, PX4 and ArduPilot had logged them",

@@ -68,8 +68,8 @@ class Figures:
 
     `per_state_percent` is the mean over states of sum |error| over sum |measured|; `nrmse` the mean
     of rms(error) over the standard deviation; both of free simulation on the fitted window.
-    `nothing_percent` is the program's figure of states that stay at their means, `unseen` the NRMSE
-    on another maneuver of the axis, `frequency_error` relative, nan without an oscillation.
+    `nothing_percent` is the program's figure of states that stay at their means, `held_out` the
+    NRMSE on another maneuver of the axis, `frequency_error` relative, nan without an oscillation.
     """
 
     program_percent: float
@@ -77,7 +77,7 @@ class Figures:
     per_state_percent: float
     nrmse: float
     nothing_percent: float
-    unseen: float
+    held_out: float
     unstable: bool
     frequency_error: float
 
@@ -114,11 +114,11 @@ def re_enact(case: Case, seed: int) -> Figures:
         simulated = np.full_like(measured, np.inf)
     still = np.broadcast_to(measured.mean(axis=0), measured.shape)
     rest = [m for m in starts if m is not chosen[0]]
-    unseen = float("nan")
+    held_out = float("nan")
     if rest:
         other = cut(columns, model, float(rest[-1]["start_s"]), case.rows)
         run = free_run(model, other, beta)
-        unseen = float("inf") if run is None else nrmse(other.outputs, run)
+        held_out = float("inf") if run is None else nrmse(other.outputs, run)
     poles = np.linalg.eigvals(model.matrices(beta)[0])
     pairs = sorted((abs(s) for s in poles if s.imag > 0.0), reverse=True)
     true = np.mean([m["modes"][case.mode] for m in starts if case.mode in m["modes"]], axis=0)
@@ -129,7 +129,7 @@ def re_enact(case: Case, seed: int) -> Figures:
         per_state_percent=program * case.rows / len(case.states),
         nrmse=nrmse(measured, simulated),
         nothing_percent=thesis_program_error_percent(measured, still),
-        unseen=unseen,
+        held_out=held_out,
         unstable=bool(np.any(poles.real > 0.05)),
         frequency_error=pairs[0] / float(true[0]) - 1.0 if pairs else float("nan"),
     )
@@ -187,7 +187,7 @@ def lines(case: Case, figures: Sequence[Figures], ours: Sequence[tuple[float, fl
     swings = [abs(x.frequency_error) for x in f if not np.isnan(x.frequency_error)]
     mode = case.mode.replace("_", " ")
     own = [abs(b) for _, b in ours if not np.isnan(b)]
-    unseen = [100.0 * x.unseen for x in f if not np.isnan(x.unseen)]
+    held_out = [100.0 * x.held_out for x in f if not np.isnan(x.held_out)]
     printed = case.printed_percent
     return [
         f"{case.name} ({case.rows} rows, {len(f)} seeds; medians)",
@@ -197,7 +197,7 @@ def lines(case: Case, figures: Sequence[Figures], ours: Sequence[tuple[float, fl
         f"  per state, not divided by the rows: {median([x.per_state_percent for x in f]):.0f} %"
         f" (thesis {printed * case.rows / len(case.states):.0f} %)",
         f"  NRMSE {100.0 * median([x.nrmse for x in f]):.0f} %"
-        + (f", on another maneuver {median(unseen):.0f} %" if unseen else ""),
+        + (f", on another maneuver {median(held_out):.0f} %" if held_out else ""),
         f"  {mode} found in {len(swings)} of {len(f)}"
         + (f", its frequency off by {100.0 * median(swings):.0f} %" if swings else "")
         + f"; the model is unstable in {sum(x.unstable for x in f)}",

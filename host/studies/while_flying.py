@@ -70,8 +70,8 @@ def rows_of(air: str, seed: int, with_default: bool) -> Iterator[dict[str, objec
         if air == "gusts":
             (folder / "card.bin").write_bytes(flight.card_log(seed))
             for kind in ("card", "default") if with_default else ("card",):
-                later = {"air": air, "seed": seed, "loss": 0.0, "kind": kind, "points": 0}
-                yield from _later(later, flight, folder)
+                after = {"air": air, "seed": seed, "loss": 0.0, "kind": kind, "points": 0}
+                yield from _after_landing(after, flight, folder)
 
 
 def _rows(
@@ -98,7 +98,7 @@ def _rows(
             yield head | dict(zip(COLUMNS[5:], values, strict=True))
 
 
-def _later(
+def _after_landing(
     head: dict[str, object], flight: RadioFlight, folder: Path
 ) -> Iterator[dict[str, object]]:
     """Yield the answer of the whole flight: the coefficients' or the default's."""
@@ -128,13 +128,13 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
         own = [r for r in rows if r["air"] == "gusts" and r["loss"] == loss and r["name"] in NAMES]
         live = [r for r in own if r["kind"] == "live"]
         every = [r for r in rows if r["air"] == "gusts" and r["name"] in NAMES]
-        later = {(r["kind"], r["seed"], r["name"]): r for r in every if r["kind"] != "live"}
+        after = {(r["kind"], r["seed"], r["name"]): r for r in every if r["kind"] != "live"}
         if not live:
             continue
         held = [_held(r) for r in live]
         agree = {
             kind: [
-                _agrees(r, later[k]) for r in live if (k := (kind, r["seed"], r["name"])) in later
+                _agrees(r, after[k]) for r in live if (k := (kind, r["seed"], r["name"])) in after
             ]
             for kind in ("card", "default")
         }
@@ -169,9 +169,9 @@ def _held(row: dict[str, str]) -> bool:
     return abs(float(row["estimate"]) - float(row["true"])) <= float(row["half_width"])
 
 
-def _agrees(row: dict[str, str], later: dict[str, str]) -> bool:
-    apart = abs(float(row["estimate"]) - float(later["estimate"]))
-    return bool(apart <= np.hypot(float(row["half_width"]), float(later["half_width"])))
+def _agrees(row: dict[str, str], after: dict[str, str]) -> bool:
+    apart = abs(float(row["estimate"]) - float(after["estimate"]))
+    return bool(apart <= np.hypot(float(row["half_width"]), float(after["half_width"])))
 
 
 def _share(found: Sequence[bool]) -> str:

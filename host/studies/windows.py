@@ -126,9 +126,9 @@ def test_input(case: Case, rng: np.random.Generator) -> Array:
     }.get(case.shape.split()[0])
     if parts is not None:
         pattern = [(lead_s, 0.0)] + [(n * unit_s, s * size) for n, s in parts]
-        drawn = steps(pattern, dt_s, case.duration_s + LEAD_S)
-        once = np.asarray(drawn[round(LEAD_S / dt_s) :, 0])
-        return once - np.roll(once, len(once) // 2) if case.shape.endswith("twice") else once
+        motion = steps(pattern, dt_s, case.duration_s + LEAD_S)
+        cut = np.asarray(motion[round(LEAD_S / dt_s) :, 0])
+        return cut - np.roll(cut, len(cut) // 2) if case.shape.endswith("twice") else cut
     t = dt_s * np.arange(round(case.duration_s / dt_s))
     lines = np.arange(2, 41) / 20.0  # Hz, over 20 s
     phase = rng.uniform(0.0, 2.0 * np.pi, len(lines))
@@ -219,8 +219,8 @@ def twin_row(card: str, seed: int) -> Row:
             except IdentificationError:
                 row[label] += [None] * len(names)
                 continue
-            told = {c.name: (c.value, c.half_width) for c in answer.coefficients}
-            row[label] += [_entry(*told[name], local[name]) for name in names]
+            intervals = {c.name: (c.value, c.half_width) for c in answer.coefficients}
+            row[label] += [_entry(*intervals[name], local[name]) for name in names]
     return row
 
 

@@ -1,7 +1,7 @@
 """The damage table: six damages on our log, a ULog and a DataFlash log of the same flight.
 
 `kept` is the share of the clean decode's rows that came back, `wrong` the rows returned as good
-that the clean decode does not have, `told` whether the decoder said that something was lost.
+that the clean decode does not have, `admitted` whether the decoder said that something was lost.
 Rows are rows of every topic, message or frame, compared with all their values.
 """
 
@@ -27,7 +27,7 @@ class Reading:
     """All rows of a log and whether its decoder admits a loss; `error` names an exception."""
 
     rows: Rows
-    told: bool
+    admitted: bool
     error: str = ""
 
 
@@ -38,15 +38,15 @@ class Outcome:
     kept_median: float
     kept_worst: float
     wrong: int
-    told: int
+    admitted: int
     seeds: int
     error: str
 
     def text(self) -> str:
         """Return the cell of the table."""
-        told = f"told {self.told}/{self.seeds}"
+        admitted = f"admitted {self.admitted}/{self.seeds}"
         error = f" {self.error}" if self.error else ""
-        return f"{self.kept_median:8.3f} {self.kept_worst:8.3f} {self.wrong:6d}  {told}{error}"
+        return f"{self.kept_median:8.3f} {self.kept_worst:8.3f} {self.wrong:6d}  {admitted}{error}"
 
 
 def truncated(data: bytes, rng: np.random.Generator) -> bytes:
@@ -110,14 +110,14 @@ def read_ours(path: Path) -> Reading:
     try:
         log = read_log(path)
     except NotALogError:
-        return Reading(Counter(), told=True)
+        return Reading(Counter(), admitted=True)
     rows: Rows = Counter()
     for name in log.frames:
         frames = log.frames[name]
         size = frames.dtype.itemsize
         data = frames.tobytes()
         rows.update((name, data[at : at + size]) for at in range(0, len(data), size))
-    return Reading(rows, told=log.complete != "complete" or log.loss.any)
+    return Reading(rows, admitted=log.complete != "complete" or log.loss.any)
 
 
 def read_ulog(path: Path) -> Reading:
@@ -127,14 +127,14 @@ def read_ulog(path: Path) -> Reading:
     try:
         log = ULog(str(path))
     except Exception as error:  # whatever it raises is its answer
-        return Reading(Counter(), told=True, error=type(error).__name__)
+        return Reading(Counter(), admitted=True, error=type(error).__name__)
     rows: Rows = Counter()
     for topic in log.data_list:
         columns = list(topic.data.values())
         table = np.rec.fromarrays(columns)
         data, size = table.tobytes(), table.dtype.itemsize
         rows.update((topic.name, data[at : at + size]) for at in range(0, len(data), size))
-    return Reading(rows, told=bool(log.file_corruption))
+    return Reading(rows, admitted=bool(log.file_corruption))
 
 
 def read_dataflash(path: Path) -> Reading:
@@ -151,8 +151,8 @@ def read_dataflash(path: Path) -> Reading:
                     rows[(message.fmt.name, repr(message._elements).encode())] += 1
         except Exception as raised:  # whatever it raises is its answer
             error = type(raised).__name__
-        told = bool(error) or os.fstat(said.fileno()).st_size > 0
-    return Reading(rows, told=told, error=error)
+        admitted = bool(error) or os.fstat(said.fileno()).st_size > 0
+    return Reading(rows, admitted=admitted, error=error)
 
 
 def outcome(read: Callable[[Path], Reading], clean: bytes, damage: str, seeds: int) -> Outcome:
@@ -167,15 +167,17 @@ def outcome(read: Callable[[Path], Reading], clean: bytes, damage: str, seeds: i
 
         truth = reading(clean).rows
         total = truth.total()
-        kept, wrong, told, errors = [], 0, 0, set()
+        kept, wrong, admitted, errors = [], 0, 0, set()
         for seed in range(seeds):
             found = reading(DAMAGES[damage](clean, np.random.default_rng(seed)))
             good = (found.rows & truth).total()
             kept.append(100.0 * good / total)
             wrong += found.rows.total() - good
-            told += found.told
+            admitted += found.admitted
             errors |= {found.error} if found.error else set()
-    return Outcome(statistics.median(kept), min(kept), wrong, told, seeds, " ".join(sorted(errors)))
+    return Outcome(
+        statistics.median(kept), min(kept), wrong, admitted, seeds, " ".join(sorted(errors))
+    )
 
 
 @contextlib.contextmanager

@@ -63,7 +63,7 @@ def by_aeroid(path: Path, aircraft: str, limit_s: int) -> tuple[Intervals, float
     took_s = 0.0
     for line in done.stdout.splitlines():
         one = json.loads(line)
-        found |= {n: (value, half) for n, (value, half) in one["told"].items()}
+        found |= {n: (value, half) for n, (value, half) in one["intervals"].items()}
         took_s = one["took_s"]
     return found, took_s if done.returncode == 0 else float(limit_s)
 
@@ -89,11 +89,14 @@ def _print_axes(path: Path, aircraft: str) -> None:
         cut = _means(columns, (*inputs, *outputs), first, last)
         build = _longitudinal if axes == ("elevator_rad",) else _lateral
         try:
-            told = _fitted(build(frame), cut, outputs, start)
+            intervals = _fitted(build(frame), cut, outputs, start)
         except (aeroid.IdentificationError, IdentificationError):
-            told = {}
+            intervals = {}
         took_s = time.process_time() - begin_s
-        print(json.dumps({"told": told, "took_s": took_s, "stretch_s": last - first}), flush=True)
+        print(
+            json.dumps({"intervals": intervals, "took_s": took_s, "stretch_s": last - first}),
+            flush=True,
+        )
 
 
 def _sharpest(found: Sequence[DetectedManeuver], axis: str) -> list[DetectedManeuver]:

@@ -105,8 +105,8 @@ def main() -> int:
     ours = fit("output-error-white", model, [data])
     ours_s = time.process_time() - begin
     problem = output_problem(model, [data])
-    told = np.flatnonzero(problem.prior_precision)
-    root = np.sqrt(problem.prior_precision[told])
+    with_prior = np.flatnonzero(problem.prior_precision)
+    root = np.sqrt(problem.prior_precision[with_prior])
     deviation = np.array(list(NOISE.values()))
 
     first, bound = problem.first_guess(), np.sqrt(np.diag(ours.covariance_white))
@@ -114,7 +114,7 @@ def main() -> int:
     def residual(z: Array) -> Array:
         theta = first + bound * z  # the peer is told how large a parameter's step should be
         left = (by_hand(theta, data.inputs) - data.outputs) / deviation
-        return np.concatenate([left.ravel(), root * (theta - problem.prior_mean)[told]])
+        return np.concatenate([left.ravel(), root * (theta - problem.prior_mean)[with_prior]])
 
     def slopes(z: Array) -> Array:
         here = residual(z)

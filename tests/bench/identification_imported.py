@@ -129,12 +129,12 @@ def main(arguments: list[str] | None = None) -> int:
                              ("AeroID, a stretch", aeroid_stretch)):  # fmt: skip
                 if by is aeroid_stretch and number >= options.aeroid:
                     continue
-                told, took = by(path)
+                intervals, took = by(path)
                 seconds.setdefault(name, []).append(took)
                 asked[name] = asked.get(name, 0) + len(true)
                 results.setdefault(name, []).extend(
-                    (abs(told[n][0] / v - 1.0), abs(told[n][0] - v) <= told[n][1])
-                    for n, v in true.items() if n in told
+                    (abs(intervals[n][0] / v - 1.0), abs(intervals[n][0] - v) <= intervals[n][1])
+                    for n, v in true.items() if n in intervals
                 )  # fmt: skip
     for name, rows in results.items():
         error = np.median([one for one, _ in rows]) if rows else float("nan")

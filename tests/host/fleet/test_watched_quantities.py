@@ -82,7 +82,7 @@ def test_a_throw_shows_in_the_slope_where_a_pot_measures_and_in_derivatives_wher
 def test_changes_of_every_kind_are_named(cause: str, size: float, said: str) -> None:
     kind = Watched()
     rng = np.random.default_rng(22_950)
-    values = kind.drawn(rng, BASELINE + 3)
+    values = kind.random_estimates(rng, BASELINE + 3)
     values[BASELINE:] += size * kind.patterns()[cause]
     test = ChangeTest(kind.patterns(), np.zeros(len(kind.usual)))
     last = test.alarms(list(values), [kind.full] * len(values))[-1]

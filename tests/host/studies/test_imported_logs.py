@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from studies.imported_logs import OWN, Told, rows
+from studies.imported_logs import OWN, Estimate, rows
 
 
 def test_rows_count_what_is_held_and_what_agrees() -> None:
     found = [
-        Told(OWN, 1, "Cm_q", -10.0, -10.5, 1.0),
-        Told(OWN, 1, "Cl_p", -0.4, -0.5, 0.05),
-        Told("ulog, vtail", 1, "Cm_q", -10.0, -11.5, 2.0),
-        Told("ulog, vtail", 1, "Cl_p", -0.4, -0.6, 0.05),
+        Estimate(OWN, 1, "Cm_q", -10.0, -10.5, 1.0),
+        Estimate(OWN, 1, "Cl_p", -0.4, -0.5, 0.05),
+        Estimate("ulog, vtail", 1, "Cm_q", -10.0, -11.5, 2.0),
+        Estimate("ulog, vtail", 1, "Cl_p", -0.4, -0.6, 0.05),
     ]
     own, theirs = rows(found)
     assert own[:4] == (OWN, 2, 50.0, 100.0)

@@ -53,10 +53,10 @@ def test_a_short_period_without_a_vane_is_explained_while_airspeed_varies() -> N
     base = without_outputs(template("short-period", trim), ("alpha_rad",))
     base = replace(base, output_biases=("q_radps",))
     wide = VaryingModel(base, "short-period", trim, None)
-    departed = wide.maneuver(c, DT_S)
-    plain = replace(departed, inputs=departed.inputs[:, :1])
+    varying = wide.maneuver(c, DT_S)
+    plain = replace(varying, inputs=varying.inputs[:, :1])
     left = []
-    for model, maneuver in ((base, plain), (wide.model, departed)):
+    for model, maneuver in ((base, plain), (wide.model, varying)):
         residuals = fit("output-error-white", model, [maneuver]).residuals[0]
         left.append(np.std(residuals, axis=0) / np.std(maneuver.outputs, axis=0))
     assert np.all(left[1] < np.array([0.6, 0.2]) * left[0])  # q, az

@@ -253,8 +253,14 @@ def test_json_has_one_document_and_no_nan(flight: Path, capsys: pytest.CaptureFi
     assert main(["identify", str(flight), *QUICK, *beside, "--prior", str(prior), "--json"]) == 0
     document = json.loads(capsys.readouterr().out, parse_constant=refuse)
     assert document["answers"][0]["parameters"]["M_alpha"]["unit"] == "1/s2"
-    (told,) = document["truth"].values()
-    assert told["Cm_alpha"].keys() >= {"value", "half_width", "truth", "relative_error", "inside"}
+    (truth,) = document["truth"].values()
+    assert truth["Cm_alpha"].keys() >= {
+        "value",
+        "half_width",
+        "truth",
+        "relative_error",
+        "inside",
+    }
     (expected,) = document["prior"].values()
     assert expected["Cm_alpha"]["prior"] == -1.6
 

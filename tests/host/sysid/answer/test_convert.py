@@ -121,9 +121,9 @@ def test_what_cannot_be_converted_is_one_line(
     path = tmp_path / "own.toml"
     path.write_bytes(content)
     assert main(["convert", str(path), "--aircraft", NAME]) == 2
-    told = capsys.readouterr().err
-    assert message in told
-    assert told.count("\n") == 1
+    printed = capsys.readouterr().err
+    assert message in printed
+    assert printed.count("\n") == 1
 
 
 @pytest.mark.parametrize("option", [("--airspeed", "-3"), ("--density", "nan"), ("--alpha", "90")])

@@ -214,6 +214,6 @@ def test_every_reason_is_in_the_words_and_in_the_document(right: Answer) -> None
     marks = answer_document(right, lines, evidence)["marks"]
     assert set(marks) == set(verdict_of(right).marks)
     assert all(entry["reasons"] for entry in marks.values())
-    told = marks["M_de"]["reasons"][-1]
+    reason = marks["M_de"]["reasons"][-1]
     assert marks["M_de"]["mark"] == "do not rely on"
-    assert any(line.endswith(told) and "M_de" in line for line in lines)
+    assert any(line.endswith(reason) and "M_de" in line for line in lines)

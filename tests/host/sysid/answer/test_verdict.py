@@ -68,12 +68,12 @@ def test_what_is_not_predicted_is_not_trusted(answer: Answer) -> None:
     assert list(unpredicted_states(lost)) == [speed]
     lines = verdict_lines([lost], [])
     trusted = next(line for line in lines if "trust" in line).split(":  ")[1].split(", ")
-    told = next(line for line in lines if "whatever the interval" in line)
+    reason = next(line for line in lines if "whatever the interval" in line)
     row = {t.parameter for t in answer.model.terms if t.row == 0 and t.matrix in "AB"}
     column = {t.parameter for t in answer.model.terms if t.column == 0 and t.matrix == "A"}
     assert row | column
     assert not (row | column) & set(trusted)
-    assert all(name in told for name in row | column)
+    assert all(name in reason for name in row | column)
     assert set(trusted) <= set(names) - row - column
     marked = [line for line in model_lines(lost) if "not to be relied on" in line]
     assert [line.split(":")[0].strip() for line in marked] == ["phugoid"]

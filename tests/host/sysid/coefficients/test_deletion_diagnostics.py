@@ -131,11 +131,11 @@ def test_maneuvers_of_one_aircraft_agree_as_often_as_chance_says() -> None:
     p = []
     for seed in range(200):
         blocks, last = problem(seed, (1.0, 1.0, 0.8, 1.2), bias=0.0)
-        pull, share, variance = maneuver_influence(last, blocks, np.eye(2, last.unknowns.count))
+        shift, share, variance = maneuver_influence(last, blocks, np.eye(2, last.unknowns.count))
         # Spectra of this problem are five times its noise: 0.18 of 1 by variance.
         level = 2.0 * 0.3**2 / 2.0 * np.mean(2.0 / np.interp(blocks[0].frequency_hz, *NOISE["Cm"]))
-        p += scatter_test(("Cm_alpha", "Cm_q"), pull, share, level * variance).p_value.tolist()
-        np.testing.assert_allclose(pull.sum(axis=0), 0.0, atol=0.02)
+        p += scatter_test(("Cm_alpha", "Cm_q"), shift, share, level * variance).p_value.tolist()
+        np.testing.assert_allclose(shift.sum(axis=0), 0.0, atol=0.02)
     assert 0.40 < np.mean(np.array(p) < 0.5) < 0.60
     assert 0.05 < np.mean(np.array(p) < 0.1) < 0.17
 

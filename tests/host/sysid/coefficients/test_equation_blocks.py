@@ -85,14 +85,14 @@ def test_sums_over_blocks_solve_the_whole_matrix() -> None:
     n, considered, sd = unknowns.count, np.array([unknowns.first_error]), np.array([0.1])
     prior = np.diag(np.r_[np.zeros(TERMS), np.full(n - TERMS, 4.0)])
     prior[considered, considered] = 1e30
-    pull = np.r_[np.zeros(TERMS), np.full(n - TERMS, 0.2)]
+    gradient = np.r_[np.zeros(TERMS), np.full(n - TERMS, 0.2)]
     found = solve_normal_equations(
-        accumulate(parts, n), Prior(prior, pull), POSITION, considered, sd
+        accumulate(parts, n), Prior(prior, gradient), POSITION, considered, sd
     )
     A, Z, y = dense(parts, n)
     known, right = np.zeros((A.shape[1],) * 2), Z.T @ y
     known[:n, :n] = prior
-    right[:n] += pull
+    right[:n] += gradient
     scale = 1.0 / np.sqrt(np.abs(np.diag(Z.T @ A + known)))
     both = np.outer(scale, scale)
     inverse = np.linalg.inv((Z.T @ A + known) * both) * both

@@ -97,8 +97,8 @@ def test_intervals_of_pooled_flights_cover() -> None:
         z = rng.standard_normal(2)
         fits = [fit(truth + SHARED @ z + NOISE * rng.standard_normal(2)) for _ in range(3)]
         found = pool_fits(fits)
-        told = found.derivatives
-        inside += [abs(told[k].value - truth[k]) <= told[k].half_width for k in range(2)]
+        pooled = found.derivatives
+        inside += [abs(pooled[k].value - truth[k]) <= pooled[k].half_width for k in range(2)]
     assert (inside / 400.0 > 0.92).all()
     assert (inside / 400.0 < 0.99).all()
 

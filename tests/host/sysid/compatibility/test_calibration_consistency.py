@@ -73,6 +73,6 @@ def test_a_recorded_flight_doubts_a_file_that_claims_a_fifth_and_no_honest_one()
     bold = reconstruct(columns, airframe_data(NAME), sensor_error_model(NAME).scaled(0.2))
     assert bold.calibration_tests[0].rejected
     assert any("claims less than this flight shows" in line for line in compatibility_lines(bold))
-    told = compatibility_document(bold)["calibration"]
-    assert isinstance(told, dict)
-    assert told["all"]["doubted"]
+    consistency = compatibility_document(bold)["calibration"]
+    assert isinstance(consistency, dict)
+    assert consistency["all"]["doubted"]

@@ -86,7 +86,7 @@ def test_slopes_are_those_of_finite_differences() -> None:
     t = np.arange(n)[:, None] * 0.01
     wave = np.sin(2.0 * np.pi * rng.uniform(0.3, 1.0, 6) * t + rng.uniform(0.0, 6.0, 6))
     outputs = (*AIR, HEIGHT, *GPS)
-    stretch = Segment(
+    segment = Segment(
         dt_s=0.01,
         rates=0.5 * wave[:, :3],
         force=3.0 * wave[:, 3:] + [0.5, 0.0, -9.5],
@@ -101,7 +101,7 @@ def test_slopes_are_those_of_finite_differences() -> None:
     columns, _ = flown(1)
     names = prepare_path_problem(columns, AIRFRAME, INSTRUMENT)[0].common
     prior = dict.fromkeys(names, (0.0, 0.01))
-    problem = PathProblem([stretch], outputs, prior, np.full(6, 0.1), block)
+    problem = PathProblem([segment], outputs, prior, np.full(6, 0.1), block)
     theta = problem.prior_mean
     response = problem.respond(theta)
     assert response is not None
@@ -126,7 +126,7 @@ def test_slopes_are_those_of_finite_differences() -> None:
 
 
 def test_errors_of_recorded_flights_are_inside_their_intervals() -> None:
-    inside, told = [], set()
+    inside, informed = [], set()
     for seed in (1, 2, 3):
         _, true = flown(seed)
         found = recorded.reconstructed("survey", seed)
@@ -135,11 +135,16 @@ def test_errors_of_recorded_flights_are_inside_their_intervals() -> None:
             finding = found[name]
             inside.append(abs(finding.value - value) < finding.half_width)
             if finding.data_informed:
-                told.add(name)
+                informed.add(name)
         assert abs(found["vane_delay_s"].value - true["vane_delay_s"]) < 0.003
     assert np.mean(inside) > 0.88
-    assert {f"gyro_bias_{a}_radps" for a in "xyz"} <= told
-    assert {"vane_delay_s", "accel_bias_x_mps2", "wind_north_mps", "wind_east_mps"} <= told
+    assert {f"gyro_bias_{a}_radps" for a in "xyz"} <= informed
+    assert {
+        "vane_delay_s",
+        "accel_bias_x_mps2",
+        "wind_north_mps",
+        "wind_east_mps",
+    } <= informed
 
 
 def late(t: np.ndarray, series: np.ndarray, delay_s: float) -> np.ndarray:
@@ -214,7 +219,7 @@ def test_vanes_ahead_of_the_cg_feel_rotation_as_late_as_the_flow() -> None:
     """Where the drawing has them or found by the fit: the same vane."""
     t = np.arange(200)[:, None] * 0.01
     rates = 0.05 * np.sin(2.0 * np.pi * np.array([0.7, 0.9, 0.5]) * t)
-    stretch = Segment(
+    segment = Segment(
         dt_s=0.01,
         rates=rates,
         force=np.tile([0.98, -0.98, -9.66], (200, 1)),
@@ -227,7 +232,7 @@ def test_vanes_ahead_of_the_cg_feel_rotation_as_late_as_the_flow() -> None:
     )
     prior = {"vane_delay_s": (0.02, 0.01), "vane_x_m": (0.0, 0.1), "vane_z_m": (0.0, 0.1)}
     drawn, found, none = (
-        PathProblem([replace(stretch, vane_m=place)], AIR, prior, np.full(6, 0.1), 2)
+        PathProblem([replace(segment, vane_m=place)], AIR, prior, np.full(6, 0.1), 2)
         for place in ((0.2, 0.1), (0.0, 0.0), (0.0, 0.0))
     )
     theta = found.prior_mean.copy()

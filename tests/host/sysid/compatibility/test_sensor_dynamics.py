@@ -29,7 +29,7 @@ Columns = dict[str, np.ndarray]
 SPEED_MPS = 20.0
 
 
-def told(delay_s: float) -> Compatibility:
+def delayed(delay_s: float) -> Compatibility:
     """Return a reconstruction that told the vanes' delay to half a millisecond."""
     late = SensorErrorEstimate("vane_delay_s", delay_s, 0.0005, 0.02, data_informed=True, reason="")
     pitot = SensorErrorEstimate("pitot_scale", 0.0, 0.03, 0.031, data_informed=False, reason="")
@@ -47,7 +47,7 @@ def still(samples: int, dt_s: float = 0.01) -> Columns:
 
 def test_a_swinging_vane_says_again_what_the_air_said() -> None:
     """The vane of the aircraft file, without friction, at the frequency of a short period."""
-    found = told(0.0)
+    found = delayed(0.0)
     i = found.instrument
     assert i is not None
     i = replace(i, vane_friction_rad=0.0)
@@ -62,7 +62,7 @@ def test_a_swinging_vane_says_again_what_the_air_said() -> None:
     columns["alpha_rad"] = angle
     # At its own place and without upwash only the spring is to be undone.
     plain = AirframeData("a", 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0)
-    back = columns_at_cg(columns, plain, replace(told(lag_s), instrument=i))["alpha_rad"]
+    back = columns_at_cg(columns, plain, replace(delayed(lag_s), instrument=i))["alpha_rad"]
     inside = slice(200, -200)
     late = np.interp(t + lag_s, t, angle)
     assert np.max(np.abs(back - true)[inside]) < 0.01 * 0.05
@@ -70,7 +70,7 @@ def test_a_swinging_vane_says_again_what_the_air_said() -> None:
 
 
 def test_what_stays_open_is_what_tolerances_leave() -> None:
-    found = told(0.007)
+    found = delayed(0.007)
     left = residual_errors(found, still(10))
     assert left["vane_delay_s"] == pytest.approx(0.0005 / 1.96, rel=1e-3)
     assert left["imu_x_m"] == pytest.approx(0.010 / np.sqrt(3.0))
@@ -81,13 +81,16 @@ def test_what_stays_open_is_what_tolerances_leave() -> None:
 
 def test_every_error_that_moves_an_answer_has_words() -> None:
     """A table says 'delay of the vanes', not the name of a variable."""
-    assert {*INSTANTANEOUS_ERRORS, *residual_errors(told(0.007), still(10))} <= ERROR_LABELS.keys()
+    assert {
+        *INSTANTANEOUS_ERRORS,
+        *residual_errors(delayed(0.007), still(10)),
+    } <= ERROR_LABELS.keys()
     assert not any("_" in words for words in ERROR_LABELS.values())
 
 
 def test_a_place_is_felt_by_what_sits_there() -> None:
     """An IMU ahead of its place feels q' x; a CG behind its place moves vanes and IMU alike."""
-    found = told(0.007)
+    found = delayed(0.007)
     columns = still(400)
     t = columns["t_s"]
     columns["q_radps"] = 0.5 * np.sin(4.0 * t)
@@ -134,7 +137,7 @@ def test_one_step_of_filter_error_foretells_the_fit_of_disturbed_data() -> None:
     """A late IMU, a wrong place, a wrong pot; the model has no delay to hide the first in."""
     columns, maneuver, model, result, trim = gusty()
     assert result.residual_kind == "innovation"
-    found = told(0.007)
+    found = delayed(0.007)
     moved = {
         m.error: m for m in systematic_error_shifts(result, [maneuver], [columns], [found], trim)
     }

@@ -24,10 +24,10 @@ def test_factor_is_what_the_errors_scatter_by() -> None:
     rng = np.random.default_rng(11)
     for memory, scatter in ((0.0, 1.0), (0.8, 2.7)):
         runs = [_factor(memory, rng) for _ in range(200)]
-        told = np.sqrt(np.mean([f**2 for f, _ in runs]))
+        stated = np.sqrt(np.mean([f**2 for f, _ in runs]))
         seen = np.sqrt(np.mean([e**2 for _, e in runs]))
         np.testing.assert_allclose(seen, scatter, rtol=0.1)
-        np.testing.assert_allclose(told, seen, rtol=0.15)
+        np.testing.assert_allclose(stated, seen, rtol=0.15)
 
 
 def test_factor_never_narrows() -> None:

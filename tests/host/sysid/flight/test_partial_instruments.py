@@ -189,9 +189,9 @@ def test_delays_that_the_sensors_tell_are_not_taken_out_either() -> None:
         host.identify(flight.table, aircraft="ultrastick25e", models="short-period", delays=delays)
         for delays in (True, False)
     ]
-    told = [[c.name for c in one.linear[0].corrections] for one in both]
-    assert "vane_delay_s" in told[0]
-    assert "vane_delay_s" not in told[1]
+    corrected_names = [[c.name for c in one.linear[0].corrections] for one in both]
+    assert "vane_delay_s" in corrected_names[0]
+    assert "vane_delay_s" not in corrected_names[1]
 
 
 def test_known_constants_of_a_model_file_are_printed(

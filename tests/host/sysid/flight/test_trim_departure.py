@@ -109,19 +109,19 @@ def test_equation_error_gives_the_start_though_places_and_delays_are_free(
     found = windows(maneuvers)
     flown = flown_maneuvers([reconstruct_flight(columns, found)], [found])
     cut = [m.cut(full) for m in flown]
-    told = regression_estimates(full, cut)
-    assert "imu_x_m" not in told
+    estimates = regression_estimates(full, cut)
+    assert "imu_x_m" not in estimates
     airframe, qbar = bare(), float(np.mean(columns["qbar_pa"]))
     about = qbar * airframe.wing_area_m2 * airframe.span_m / airframe.ixx_kgm2 * truth["Cl_da"]
-    assert told["L_da"] == pytest.approx(about, rel=0.15)
+    assert estimates["L_da"] == pytest.approx(about, rel=0.15)
     problem = OutputProblem(full, cut)
     start = dict(zip(problem.names, start_values(problem), strict=True))
-    assert start["L_da"] == told["L_da"]
+    assert start["L_da"] == estimates["L_da"]
     assert start["imu_x_m"] == start["delay_imu_s"] == 0.0
-    led = without_attitude(full, flown)
-    begun = {p.name: p.start for p in led.parameters}
-    assert begun["L_da"] == told["L_da"]
-    assert begun["N_beta"] == told["N_beta"]
+    without = without_attitude(full, flown)
+    begun = {p.name: p.start for p in without.parameters}
+    assert begun["L_da"] == estimates["L_da"]
+    assert begun["N_beta"] == estimates["N_beta"]
     assert begun["imu_z_m"] == 0.0
 
 

@@ -158,8 +158,8 @@ def test_both_grades_reach_the_words_the_table_and_the_document() -> None:
         warning = "do not use" if named.grade == NOT_IDENTIFIABLE else "doubtful,"
         assert f"  {warning} {named.name}: {named.reason}" in text
         assert any(line.split()[0] == named.name and named.grade in line for line in table)
-    told = next(line for line in text if "trust (" in line)
-    assert not set(cannot + doubtful) & {w.strip(",") for w in told.split()}
+    trusted = next(line for line in text if "trust (" in line)
+    assert not set(cannot + doubtful) & {w.strip(",") for w in trusted.split()}
     assert {r["name"]: r["grade"] for r in document["refused"]} == {
         **dict.fromkeys(cannot, NOT_IDENTIFIABLE),
         **dict.fromkeys(doubtful, WEAKLY_IDENTIFIABLE),
