@@ -112,7 +112,7 @@ def truths(maneuvers: Sequence[Mapping[str, Any]]) -> dict[str, float]:
 
 
 def true_delays(flight: VirtualFlight) -> dict[str, float]:
-    """Return what is left of each delay after the nominal one is taken out (s)."""
+    """Return the remainder of each delay after the nominal one is removed (s)."""
     record = flight.record
     dlpf = dlpf_for(record.card.flight.rate_hz)
     nominal_draws = replace(

@@ -73,7 +73,7 @@ class Watched:
         return cause_patterns(tuple(self.usual), self.usual, CHORD_OVER_SPAN)
 
     def random_estimates(self, rng: np.random.Generator, flights: int) -> Array:
-        """Return what flights of an unchanged aircraft say, (flights, P)."""
+        """Return the estimates of flights of an unchanged aircraft, (flights, P)."""
         noise = rng.standard_normal((flights, len(self.usual)))
         return np.array(list(self.usual.values())) + noise @ np.linalg.cholesky(self.full).T
 

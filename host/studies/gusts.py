@@ -132,7 +132,7 @@ def gusty_aircraft(airspeed_mps: float | None = None) -> GustyAircraft:
 
 
 def _entries(base: LinearModel, A: Array, B: Array) -> Array:
-    """Return what each parameter must be for a template to have these matrices."""
+    """Return the parameters that give a template these matrices."""
     values = []
     for parameter in base.parameters:
         term = next(t for t in base.terms if t.parameter == parameter.name and t.matrix in "AB")
@@ -165,7 +165,7 @@ def _with_known_thrust(
 
 
 def spectrum(axis: str, intensity_mps: float) -> Spectrum:
-    """Return what the twin's gusts are to the model of one axis."""
+    """Return the twin's gusts as inputs of the model of one axis."""
     plane = gusty_aircraft()
     V, b = plane.airspeed_mps, plane.airframe.span_m
     t = air.turbulence(Air(turbulence_mps=intensity_mps), HEIGHT_M)

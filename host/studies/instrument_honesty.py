@@ -69,7 +69,7 @@ def every_tolerance(card: str) -> Card:
 
 
 def drawing(expected: Mapping[str, float], seed: int) -> AirframeData:
-    """Return what a drawing says of the aircraft: arms of the tail off by its own tolerance.
+    """Return the aircraft's data with the arms of the tail off by the tolerance of its drawing.
 
     The packaged drawing has the same arms in every flight, the rudder's 6 % shorter than the
     derivatives behind the simulation: an error that no draw makes good.
@@ -84,7 +84,7 @@ def drawing(expected: Mapping[str, float], seed: int) -> AirframeData:
 
 
 def claimed(airframe: AirframeData, factor: float) -> tuple[AirframeData, SensorErrorModel]:
-    """Return what files say that claim a factor of the true deviations."""
+    """Return the files that claim a factor of the true deviations."""
     airframe = replace(
         airframe,
         mass_share=factor * airframe.mass_share,

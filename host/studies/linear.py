@@ -90,7 +90,7 @@ def add(flight: VirtualFlight, method: str, estimated: Tally, printed: Tally) ->
 
 
 def _size(name: str, local: Mapping[str, float]) -> float:
-    """Return what an error is relative to: the rudder's, where the truth is none."""
+    """Return the reference of a relative error: the rudder's value, where the truth is zero."""
     return abs(local[name]) if abs(local[name]) > SMALL else abs(local[f"{name.split('_')[0]}_dr"])
 
 

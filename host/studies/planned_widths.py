@@ -35,7 +35,7 @@ COLUMNS = ("cell", "seed", "name", "true", "estimate", "half_width", "promised")
 
 
 def cells() -> dict[str, Card]:
-    """Return what is flown: a card of ours, and designed ones for two aircraft."""
+    """Return the cards: one of ours, and designed ones for two aircraft."""
     kadet = design("kadetlt40")
     return {
         "demo, 0.3 m/s": load("demo"),

@@ -51,7 +51,7 @@ class RadioFlight:
         return (frame.mass_kg, frame.ixx_kgm2, frame.iyy_kgm2, frame.izz_kgm2, frame.ixz_kgm2)
 
     def card_log(self, seed: int) -> bytes:
-        """Return what the same recorder wrote to its card."""
+        """Return the log that the same recorder wrote to its card."""
         card = self.record.card
         rate = sitl.recorder_rate_hz(card.flight.rate_hz)
         return sitl.record(

@@ -110,7 +110,7 @@ def _replanned(seed: int, folder: Path) -> tuple[list[Segment], bool]:
 def _estimates(
     flight: RadioFlight, folder: Path, *, last: bool = False
 ) -> Iterator[FlightEstimate]:
-    """Yield what the page says after each test point, or after the last alone."""
+    """Yield the estimates on the page after each test point, or after the last alone."""
     (folder / "calibration.toml").write_text(flight.calibration, encoding="utf-8")
     by = FlightEstimator(AIRCRAFT, folder / "calibration.toml")
     received = list(after_each_point(flight.sent, flight.truth, BEHIND_S))

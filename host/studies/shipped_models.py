@@ -56,7 +56,7 @@ ERROR_SD = {
 
 
 def card(air_mps: float) -> Card:
-    """Return what is flown: each input twice, by the aircraft as its file says."""
+    """Return the card: each input twice."""
     calm = load("calm")
     first, *inputs, last = calm.segments
     return replace(

@@ -188,7 +188,7 @@ def windows_table(cases: Sequence[Compared]) -> Table:
 
 
 def imported_table(found: Sequence[Estimate]) -> Table:
-    """Return what each log of the same flights tells, a row per format and airframe."""
+    """Return the estimates from each log of the same flights, a row per format and airframe."""
     return Table(
         "The same flights as our logger, PX4 and ArduPilot had logged them",
         (

@@ -154,7 +154,7 @@ def product(case: Case, seed: int) -> tuple[float, float]:
 
 
 def maneuvers(flight: VirtualFlight) -> list[dict[str, Any]]:
-    """Return what was flown, in the order of time."""
+    """Return the maneuvers in the order of time."""
     return list(flight.maneuvers)
 
 

@@ -107,7 +107,8 @@ class _Axis:
 
 
 def fitted_model(axis: str) -> LinearModel:
-    """Return what filter error fits: coefficients, gusts of unknown intensity and scale."""
+    """Return the model that filter error fits: coefficients, gusts of unknown intensity and
+    scale."""
     plane = gusty_aircraft()
     return gust_model(
         plane.models[axis],
@@ -135,12 +136,12 @@ def true_vector(axis: str, intensity_mps: float) -> Array:
 
 
 def linear_setup(axis: str) -> GustSetup:
-    """Return what is fitted to the linear aircraft."""
+    """Return the model that is fitted to the linear aircraft."""
     return GustSetup(axis, gusty_aircraft().models[axis], fitted_model(axis))
 
 
 def nonlinear_setup(axis: str, airspeed_mps: float) -> GustSetup:
-    """Return what is fitted to the non-linear one: departures from the linear model added.
+    """Return the model that is fitted to the non-linear one: departures from trim added.
 
     Parameters
     ----------

@@ -120,7 +120,7 @@ def _after_landing(
 
 
 def table(rows: Sequence[dict[str, str]]) -> list[str]:
-    """Return what the estimates in gusts come to, a line a loss, and those in still air."""
+    """Return the table: estimates in gusts, a line a loss, and those in still air."""
     lines = [
         "loss  estimates  holds the truth   agrees with later   half-width: live  card  default"
     ]

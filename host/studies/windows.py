@@ -253,7 +253,7 @@ class Compared:
 
 
 def compared(label: str, rows: Sequence[Row]) -> Compared:
-    """Return what the rows of a case say; a flight without an answer counts as failed."""
+    """Return the summary of a case; a flight without an answer counts as failed."""
     good = [r for r in rows if r["whole"] and r["found"] and None not in r["found"] + r["whole"]]
     if not good:
         none = np.full(1, np.nan)

@@ -118,7 +118,7 @@ def answer_to(row: Row, flight: LinearFlight) -> Answer:
 
 
 def noise_free_limit(row: Row) -> dict[str, float]:
-    """Return what the estimator of a row tends to without noise."""
+    """Return the limit of the estimator of an equation without noise."""
     answer = answer_to(row, fly(row.template, row.fault, "white", 0, scale=QUIET))
     return {n: answer.result.value(n) for n in answer.model.parameter_names}
 

@@ -89,7 +89,7 @@ def ratios(s: Mapping[str, float], v: Mapping[str, Array]) -> Iterator[Ratio]:
 
 
 def impossible(s: Mapping[str, float], v: Mapping[str, Array]) -> Iterator[str]:
-    """Yield what no body can have, in words."""
+    """Yield a line for each ratio of sizes and moment of inertia that no body can have."""
     for ratio in ratios(s, v):
         least, most = ratio.possible
         if not least <= ratio.value <= most:
@@ -117,7 +117,7 @@ def impossible(s: Mapping[str, float], v: Mapping[str, Array]) -> Iterator[str]:
 
 
 def doubts(s: Mapping[str, float], v: Mapping[str, Array]) -> Iterator[str]:
-    """Yield what no known aircraft has, in words."""
+    """Yield a line for each ratio of sizes outside the range of known aircraft."""
     for ratio in ratios(s, v):
         least, most = ratio.usual
         if not least <= ratio.value <= most:
@@ -142,5 +142,5 @@ def _excess(moments: Array) -> float:
 
 
 def _inexact(s: Mapping[str, float]) -> float:
-    """Return by how much measured moments may break the inequality: each by its tolerance."""
+    """Return the allowance of the triangle inequality of inertia: the tolerances of the moments."""
     return 2.0 * max(s["mass.inertia_tolerance"], 0.005)

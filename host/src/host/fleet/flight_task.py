@@ -85,7 +85,7 @@ def set_aside(values: dict[str, Any], reason: str) -> dict[str, Any]:
 
 
 def described(values: dict[str, Any]) -> dict[str, Any]:
-    """Return what a row says of its flight whatever came of it."""
+    """Return the columns that a row has whether or not its flight was identified."""
     date = values.get("date") or ""
     return {
         "key": values["key"],

@@ -143,7 +143,7 @@ def instrument_errors(
     defaults: bool = False,
     maker: str = OWN,
 ) -> InstrumentErrors:
-    """Return what an instrument may be wrong by.
+    """Return the standard deviation of every named error of an instrument.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ class LearningCondition:
 def learning_card(
     aircraft: str, axis: str, at: LearningCondition, calibration: Calibration | None = None
 ) -> AxisCard:
-    """Return what the logger needs to learn one axis.
+    """Return the card with which the logger learns one axis.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def learning_card(
 def learned_axes(
     aircraft: str, card: Card, calibration: Calibration | None = None
 ) -> list[AxisCard]:
-    """Return what the logger needs to learn the axes that a card moves.
+    """Return the cards with which the logger learns the axes that a flight card moves.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def _friction_delay_s(sensors: SensorErrorModel, at: LearningCondition) -> float
 
 
 def _per_count(axis: str, calibration: Calibration, sensors: SensorErrorModel) -> list[float]:
-    """Return what a count of each signal is in rad or rad/s, as the logger forms the signals."""
+    """Return the size of one count of each signal in rad or rad/s, as the logger forms them."""
     ident, lines = packed_schema().by_name["ident"], calibration.lines
     result = []
     for signal in SIGNALS[axis]:

@@ -164,7 +164,7 @@ def predict_widths(
 
 
 def linear_widths(table: pd.DataFrame, aircraft: str) -> dict[str, FlightWidth]:
-    """Return what the default linear method tells of one flight, as `host identify` does.
+    """Return the intervals of the default linear method for one flight, as of `host identify`.
 
     With GPS, as every log has it: without, vanes' delays stay as open as their calibration left
     them and the clock's scale too, and M_q of the demo card was promised to 14 % in place of 9.

@@ -80,7 +80,7 @@ def _optimal(tables: Sequence[ToneTable], block: str, allowed: BoolArray) -> Arr
 
 
 def _gradient(information: Array, value: Array, block: str, weights: Array) -> Array:
-    """Return by how much a unit of each tone's power lowers the norm of relative variances.
+    """Return the decrease of the norm of relative variances for a unit of each tone's power.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ class ToneTable:
 def tone_table(
     aircraft: Aircraft, block: str, airspeed_mps: float, gusts_mps: float, frequency_hz: Array
 ) -> ToneTable:
-    """Return what tones on every surface of a block tell and move.
+    """Return information and response of tones on every surface of a block.
 
     Parameters
     ----------

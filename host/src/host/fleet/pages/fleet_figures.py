@@ -62,7 +62,7 @@ def funnel_figure(model: TypeModel, name: str) -> Figure:
 
 
 def drift_figure(model: TypeModel, one: AircraftHistory) -> Figure | None:
-    """Return what an aircraft's flights gave, one after another; None of fewer than three."""
+    """Return a picture of an aircraft's estimates flight by flight; None of fewer than three."""
     from matplotlib.figure import Figure
 
     if len(one.flights) < 3 or not one.names:
@@ -94,7 +94,7 @@ def drift_figure(model: TypeModel, one: AircraftHistory) -> Figure | None:
 
 
 def _shown(model: TypeModel, one: AircraftHistory) -> list[str]:
-    """Return what moved, and the derivatives that flights tell best: there a change is seen."""
+    """Return the quantities that changed, and the best known derivatives, where a change shows."""
     share = {
         n: e.mean_deviation / max(abs(e.mean.value), 1e-300)
         for n, e in model.effects.items()

@@ -40,7 +40,7 @@ def type_lines(model: TypeModel) -> list[str]:
 
 
 def condition_text(model: TypeModel) -> str:
-    """Return what the coefficients hold at: one CG, and the condition that flights have."""
+    """Return the reference of the coefficients: one CG, and the flight condition."""
     alpha = np.degrees(model.conditions("alpha_rad"))
     speed = np.array(model.conditions("airspeed_mps"))
     place = "" if model.cg_m is None else ", ".join(f"{x:.3f}" for x in model.cg_m) + " m"

@@ -34,7 +34,7 @@ def advice_lines(model: TypeModel) -> list[str]:
 
 
 def _cause(model: TypeModel, name: str, effect: TypeEffect) -> str:
-    """Return what most of the mean's variance comes from, as something to do."""
+    """Return the advice against the largest part of the mean's variance."""
     data = model.estimates[name]
     each = data.flights / data.fleet
     own = sum(data.variance.tolist()) / data.flights / each / data.fleet

@@ -92,7 +92,7 @@ def row_of(source: str, rows: list[TableRow]) -> TableRow | None:
 
 
 def serial_of(source: str) -> str:
-    """Return what a log of ours says of itself: serial of its card, name set for its aircraft."""
+    """Return the identity in a log of ours: serial of its card, name set for its aircraft."""
     from host.log.head import describe
 
     if is_address(source):

@@ -113,14 +113,14 @@ def _check_models(names: Sequence[str]) -> None:
 
 
 def _memoized(known: dict[str, str], name: str, made: Callable[[], str]) -> str:
-    """Return what is made once for each name."""
+    """Return the value of a name, made at its first use only."""
     if name not in known:
         known[name] = made()
     return known[name]
 
 
 def _type_of(file: str) -> str:
-    """Return what a type is called whose table says nothing: the name of its aircraft file."""
+    """Return the name of a type that the table does not name: that of its aircraft file."""
     return load_measured(file).name
 
 

@@ -28,7 +28,7 @@ RARE = frozenset(f"{POT} {whose}" for whose in _WHOSE.values())  # a linkage sli
 def cause_patterns(
     names: Sequence[str], usual: Mapping[str, float], chord_over_span: float
 ) -> dict[str, Array]:
-    """Return by how much a change of size 1 moves each quantity, (P,), by cause.
+    """Return the shift of each quantity, (P,), for a change of size 1, by cause.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def _of_input(value: Mapping[str, float], label: str, sign: float) -> dict[str, 
 
 
 def _surface(value: Mapping[str, float], surface: str, label: str) -> dict[str, dict[str, float]]:
-    """Return what a changed throw does, and a changed pot where there is one."""
+    """Return the shifts by a changed throw, and by a changed pot where there is one."""
     slope, whose = f"{surface}{SLOPE}", _WHOSE[surface]
     if slope not in value:
         return {f"{THROW} {whose}": _of_input(value, label, 1.0)}
@@ -80,7 +80,8 @@ def _surface(value: Mapping[str, float], surface: str, label: str) -> dict[str, 
 
 
 def _aft_cg(value: Mapping[str, float], chord_over_span: float) -> dict[str, float]:
-    """Return what a CG one chord further aft does: moments, and rates through alpha and beta."""
+    """Return the shifts by a CG one chord further aft: of moments, and of rates through alpha
+    and beta."""
     moved = {}
     for name in value:
         row, _, label = name.partition("_")

@@ -67,7 +67,7 @@ class LoadedFlight:
 
 
 def fleet_estimates(flights: Sequence[LoadedFlight], name: str) -> FleetEstimates:
-    """Return what all flights that count say of one derivative.
+    """Return the estimates of one derivative from all flights that count.
 
     Errors of a source that only one aircraft's flights have are that aircraft's; others are shared
     by aircraft. Each shifts all its flights by the mean of their loadings, and what a flight's own

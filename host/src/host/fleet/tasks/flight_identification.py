@@ -181,7 +181,7 @@ def _aircraft_columns(source: str) -> dict[str, Any]:
 def _watched_columns(
     found: Identification, parts: LoadedEstimates, aircraft_file: str, surfaces: Watched
 ) -> dict[str, Any]:
-    """Return what no derivative shows (`statistics.watched_quantities`)."""
+    """Return the watched quantities that are no derivatives (`statistics.watched_quantities`)."""
     watched = dict(surfaces)
     if found.coefficients is not None:
         fit, own = found.coefficients.fit, np.sqrt(np.diag(parts.own))
@@ -212,7 +212,7 @@ def _commanded_lag(fit: CoefficientFit) -> Watched:
 
 
 def _surfaces(path: Path, calibration: str) -> Watched:
-    """Return what pots say of surfaces; nothing of logs that are not ours."""
+    """Return throw and lag of the surfaces as their pots measured them; nothing of foreign logs."""
     from host.log import read_log
 
     try:

@@ -203,7 +203,7 @@ def _remote(
 
 
 def address_warnings(address: str) -> list[str]:
-    """Return what is to be said of a scheduler's address before it is used."""
+    """Return the warning about a scheduler's address, before it is used."""
     parts = urlsplit(address)
     if parts.scheme == "tls" or (parts.hostname or "") in _LOCAL:
         return []
@@ -288,7 +288,7 @@ def unreadable(files: list[str]) -> str:
 
 
 def worker_versions() -> dict[str, str]:
-    """Return what must be the same where an answer is to be the same."""
+    """Return the versions of the programs on which an answer depends."""
     from importlib import metadata
 
     from host import __version__

@@ -177,7 +177,7 @@ def coefficients(parts: CoefficientParts) -> tuple[Coefficient, ...]:
 
 
 def _variances(assumed: dict[str, Array], sensed: dict[str, list[Array]]) -> dict[str, Array]:
-    """Return what each cause adds to the variances of all coefficients.
+    """Return the variance of all coefficients by cause.
 
     Errors of the vanes are what upwash allows for: the larger counts.
     """

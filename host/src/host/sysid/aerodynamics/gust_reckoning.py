@@ -58,7 +58,7 @@ def gust_motion(columns: Mapping[str, Array], dt_s: float) -> tuple[Array, Array
 
 
 def turning(columns: Mapping[str, Array], motion: Array) -> dict[str, Array]:
-    """Return what a motion of the air adds to the rates of the flow while the aircraft turns.
+    """Return the part of the flow angles' rates that moving air causes while the aircraft turns.
 
     Parameters
     ----------

@@ -181,7 +181,7 @@ class IdentifiedAircraft:
         return [f"{key}: {origin}" for key, origin in sources.items() if "+-" in origin]
 
     def jsbsim_xml(self) -> str:
-        """Return it as JSBSim's XML."""
+        """Return the aircraft as XML for JSBSim."""
         from host.aircraft.jsbsim_model import aircraft_xml
 
         return _with_header(aircraft_xml(self.loaded, ROTOR_RADPS), self)

@@ -32,7 +32,7 @@ def coefficient_verdict(
     laws: Sequence[Feedback] = (),
     more: Sequence[Doubt] = (),
 ) -> Verdict:
-    """Return what of the coefficients may be relied on.
+    """Return the verdict on each coefficient.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def _doubt_lines(doubts: Sequence[Doubt]) -> list[str]:
 
 
 def _flag_lines(answer: CoefficientAnswer, marks: Mapping[str, str]) -> list[str]:
-    """Return what is too wide, what widens it, and what to do about it."""
+    """Return the coefficients with too wide intervals, their causes and the remedies."""
     lines, advice = [], set()
     for d in answer.fit.derivatives:
         if not d.flagged:

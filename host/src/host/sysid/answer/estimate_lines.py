@@ -119,7 +119,7 @@ def coefficient_lines(answer: CoefficientAnswer) -> list[str]:
 
 
 def _participating(answer: Answer, mode: Mode, states: Sequence[str]) -> list[str]:
-    """Return those of some states that take a good part in a mode."""
+    """Return the states with a large share in a mode, among those given."""
     values, right = np.linalg.eig(answer.result.matrices()[0])
     left = np.linalg.inv(right)
     k = int(np.argmin(np.abs(values - mode.eigenvalue)))

@@ -152,7 +152,7 @@ def histories(
 
 
 def shown(name: str) -> tuple[str, float]:
-    """Return what a signal is called in a picture, and the factor to the unit named there."""
+    """Return the label of a signal in a picture, and the factor to the unit named there."""
     for ending, (unit, scale) in SHOWN_UNITS.items():
         if name.endswith(ending):
             return f"{name.removesuffix(ending)}, {unit}", scale

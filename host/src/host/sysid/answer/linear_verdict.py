@@ -32,7 +32,7 @@ PLACE = "imu_"  # begins the name of a sensor's place: no property of the aircra
 def linear_verdict(
     answer: Answer, evidence: Evidence = NO_EVIDENCE, more: Sequence[Doubt] = ()
 ) -> Verdict:
-    """Return what of a linear model may be relied on, with what stands beside it in evidence.
+    """Return the verdict on each parameter of a linear model, by the evidence given.
 
     `more` are doubts from outside the rules: what coefficients fitted directly say.
     """
@@ -146,7 +146,7 @@ def _doubt_lines(answer: Answer, doubts: Sequence[Doubt]) -> list[str]:
 
 
 def _identifiability_lines(answer: Answer) -> list[str]:
-    """Return what cannot be identified and why, and what to fly to learn it."""
+    """Return the parameters that cannot be identified, the reasons, and what to fly."""
     flags = [r for r in answer.identifiability_flags if not r.name.startswith(PLACE)]
     lines = []
     for flag in flags:
@@ -159,7 +159,7 @@ def _identifiability_lines(answer: Answer) -> list[str]:
 
 
 def _input_lines(answer: Answer) -> list[str]:
-    """Return what is said of inputs that moved together, or not at all."""
+    """Return the remarks on correlated inputs, and on inputs that did not move."""
     lines = [
         f"  {one} and {other} move together: fly them one at a time, without a mixer, or leave"
         " one out of a model of your own"
@@ -176,7 +176,7 @@ def _input_lines(answer: Answer) -> list[str]:
 
 
 def _data_lines(answer: Answer) -> list[str]:
-    """Return what bounds and warnings say, and whether unseen data were predicted."""
+    """Return the lines on bounds, warnings, and prediction of held-out data."""
     lines = [
         f"  {name} is at its bound: no delay of that sensor, but what the model lacks there"
         for name in answer.at_bound

@@ -73,7 +73,7 @@ def _agrees(c: Coefficient, expected: float, half: float | None) -> bool:
 
 
 def combined_estimate(c: Coefficient, expected: float, half: float) -> tuple[float, float]:
-    """Return what flight and prior say together, and its 95 % half-width.
+    """Return the combined estimate of flight and prior, and its 95 % half-width.
 
     Parameters
     ----------

@@ -204,7 +204,8 @@ def truth_report_lines(
 
 
 def small_references(direct: CoefficientAnswer) -> dict[str, float]:
-    """Return what would contribute 5 % of the row, of coefficients that contribute less."""
+    """Return the value that would contribute 5 % of the equation, for coefficients that
+    contribute less."""
     return {d.name: d.reference for d in direct.fit.derivatives if d.reference > abs(d.value)}
 
 

@@ -50,7 +50,7 @@ def flight_terms(
     windows: Sequence[Window],
     powerplant: Powerplant,
 ) -> FlightTerms:
-    """Return what of a model a flight determines.
+    """Return the part of a model that a flight determines.
 
     Parameters
     ----------

@@ -112,7 +112,8 @@ def _state(fit: CoefficientFit) -> Array:
 
 
 def _floor(d: Derivative) -> float:
-    """Return what would contribute 5 % of its equation, where a derivative contributes less."""
+    """Return the value that would contribute 5 % of its equation, where a derivative contributes
+    less."""
     return d.reference if d.reference > abs(d.value) else 0.0
 
 

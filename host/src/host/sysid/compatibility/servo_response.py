@@ -56,7 +56,7 @@ def behind_servos(
 def servo_response(
     command_rad: Array, dt_s: float, bandwidth_hz: float, rate_radps: float
 ) -> Array:
-    """Return what a servo makes of a command that is held from row to row, (n,), rad.
+    """Return the response of a servo to a command that is held from row to row, (n,), rad.
 
     Exact between rows: as fast as it can until the rest decays.
     """

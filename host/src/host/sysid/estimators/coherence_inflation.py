@@ -119,7 +119,7 @@ def widened_to(result: FitResult, variance: Array) -> FitResult:
 def _lines(
     result: FitResult, found: InputCoherence, factor: Array, excess: NoiseExcess | None
 ) -> list[str]:
-    """Return what is wrong and how much wider intervals are, in one line."""
+    """Return the warning: outputs that fail the test, and the inflation of the intervals."""
     widened = ", ".join(
         f"{p.name} {times:.1f}"
         for p, times in zip(result.model.parameters, factor, strict=False)

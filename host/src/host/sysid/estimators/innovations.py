@@ -49,7 +49,7 @@ class Innovations:
     sensitivities: list[Array]
 
     def innovations(self, model: LinearModel, changed: Sequence[Maneuver]) -> list[Array] | None:
-        """Return those of another model and other data, noises and parameters as at the answer.
+        """Return the innovations of another model or other data, noise and parameters as estimated.
 
         None if the filter fails.
         """

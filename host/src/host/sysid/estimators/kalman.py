@@ -118,7 +118,7 @@ def innovation_inflation(white: Sequence[Array]) -> float:
 
 
 def inflation_lines(excess: float) -> tuple[str, ...]:
-    """Return what is said of a variance that was inflated so many times."""
+    """Return the warning about an inflated variance; none below `REPORTED_INFLATION`."""
     if excess <= REPORTED_INFLATION:
         return ()
     return (

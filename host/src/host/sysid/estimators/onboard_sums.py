@@ -125,7 +125,7 @@ class FourierSums:
         return np.asarray(share / 2.0 if self.exact else share >> 1)
 
     def share(self, harmonic: int) -> NDArray[Any]:
-        """Return what the newest sample adds to each signal's sum, (signals, 2)."""
+        """Return the increment of each signal's Fourier sum by the newest sample, (signals, 2)."""
         products = np.outer(self.last, self.turned(harmonic))
         return np.asarray(
             products / 256.0 if self.exact else (products.astype(np.int64) + 128) >> 8

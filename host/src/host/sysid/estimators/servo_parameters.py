@@ -248,7 +248,7 @@ def _cost(found: FitResult, data: Sequence[Maneuver]) -> float:
 
 
 def _colour(found: FitResult) -> float:
-    """Return by how much coloured innovations widen, in the median of the parameters."""
+    """Return the factor by which coloured innovations widen: the median over the parameters."""
     if found.residual_kind != "innovation":
         return 1.0
     count = len(found.model.parameters)

@@ -220,7 +220,7 @@ def even_grid(columns: dict[str, Array], notes: list[str]) -> dict[str, Array]:
 
 
 def _bent(grid: Array, own: _Instants, series: Array) -> Array:
-    """Return what a curve through slow samples adds to the lines between them."""
+    """Return the difference of a curve through slow samples and the lines between them."""
     t = np.asarray(own.t, np.float64)
     index = np.clip(np.searchsorted(t, grid, side="right") - 1, 0, len(t) - 2)
     weight = np.clip((grid - t[index]) / own.gaps[index], 0.0, 1.0)

@@ -116,7 +116,7 @@ def _law(
 
 
 def law_words(law: FeedbackLaw) -> str:
-    """Return what is followed, how late, through what, and how well."""
+    """Return a feedback law in words: signals, delay, filters, R2."""
     late_s = law.delay_s + (0.0 if law.lag_s >= LEAST_LAG_S else law.lag_s)
     filters = _filters(law)
     through = f" through {' and '.join(filters)}" if filters else ""

@@ -197,7 +197,7 @@ def _resolutions(
 
 
 def source_name(source: str | Path | FlightLog | pd.DataFrame) -> str:
-    """Return what a source is called in an answer: where it was read from, or ``table``."""
+    """Return the name of a source in an answer: where it was read from, or ``table``."""
     if isinstance(source, str | Path):
         return str(source)
     return str(getattr(source, "path", "table"))

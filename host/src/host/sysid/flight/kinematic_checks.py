@@ -72,7 +72,7 @@ class Factor:
 
 
 def consistent(flown: Mapping[str, Array], dt_s: float) -> list[Finding]:
-    """Return what does not follow from what it must follow, or not by a factor of one.
+    """Return a finding for each column that breaks a kinematic identity, or keeps it only scaled.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def block_means(flown: Mapping[str, Array], block: int) -> dict[str, Array]:
 
 
 def _unrelated(law: Identity) -> Finding | None:
-    """Return what is to be said of a column that does not follow what turns it."""
+    """Return the finding of a column that does not follow its kinematic identity."""
     own = np.column_stack([np.ones(len(law.rate)), *law.beside])
     rate = _without(law.rate, own)
     power = float(rate @ rate)
@@ -143,7 +143,7 @@ def factors(law: Identity) -> Iterator[Factor]:
 
 
 def _judge(f: Factor) -> Finding | None:
-    """Return what is to be said of a factor; None if it may be one."""
+    """Return the finding of a scale factor; None if it may be one."""
     check, speed = CHECK_OF[f.law.name, f.name], f.law.name == "airspeed_mps"
     channels = _channels(f.law.name, f.name)
     if f.high < 0.0:
@@ -207,7 +207,7 @@ def _wind_angles(
     beta: Array,
     rates: tuple[Array, Array, Array],
 ) -> Iterator[Identity]:
-    """Return what turns the wind angles: rates, and forces where they were measured."""
+    """Return the identities of the wind angles: by rates, and by forces where measured."""
     p, q, r = rates
     pitch = q - beta * (np.cos(alpha) * p + np.sin(alpha) * r)
     yaw = np.sin(alpha) * p - np.cos(alpha) * r

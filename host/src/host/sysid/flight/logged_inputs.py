@@ -24,7 +24,7 @@ MOVED = 0.5  # share of the largest swing: surfaces of a row that the log lost
 
 
 def input_columns(t_s: Array, inputs: Sequence[FlownInput]) -> dict[str, Array]:
-    """Return what the logger flew, on the rows of a table; nothing where it flew nothing.
+    """Return the inputs that the logger flew, on the rows of a table; empty if none.
 
     Parameters
     ----------

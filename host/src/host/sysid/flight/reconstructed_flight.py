@@ -212,7 +212,7 @@ def reconstruct_flight(
 
 
 def maneuver_name(item: DetectedManeuver) -> str:
-    """Return what a maneuver is called in an answer."""
+    """Return the name of a maneuver in an answer."""
     if item.given:
         first, last = item.fit_window()
         return f"stretch from {first:.1f} to {last:.1f} s"

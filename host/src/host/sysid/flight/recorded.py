@@ -29,14 +29,14 @@ MATCHING_SHARE = 0.5  # of the samples
 
 
 def recording_of_log(log: FlightLog) -> Recording:
-    """Return what a log says of itself."""
+    """Return how a log was recorded."""
     commanded = tuple(s for s in SURFACES if log.inputs.get(s) == "commanded")
     half = log.clock_half_width
     return Recording(commanded, None if half is None else half / NORMAL_95)
 
 
 def recording_of_table(columns: Mapping[str, Array], said: Mapping[Any, Any]) -> Recording:
-    """Return what a table shows; `said` is what `FlightLog.table` noted beside it, or nothing."""
+    """Return how a table was recorded; `said` are the notes of `FlightLog.table`, or empty."""
     if "inputs" in said and "clock_half_width" in said:
         half, inputs = said["clock_half_width"], said["inputs"]
         commanded = tuple(s for s in SURFACES if inputs.get(s) == "commanded")

@@ -41,7 +41,7 @@ SURFACES = {
 
 
 def check(columns: Mapping[str, Array]) -> list[Finding]:
-    """Return what looks like a forgotten unit or sign.
+    """Return a finding for each column whose unit or sign looks wrong.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ BESIDE = "maneuvers that differ, motion beside the model"
 def widest_errors(
     fit: FitResult, statistical: FitResult, total: FitResult, shifts: Sequence[ShiftedEstimate]
 ) -> dict[str, str]:
-    """Return what causes most of the variance of each parameter; none where nothing causes a
+    """Return the largest cause of the variance of each parameter; none where nothing causes a
     quarter of it.
 
     Parameters

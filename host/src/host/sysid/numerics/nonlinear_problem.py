@@ -178,7 +178,7 @@ class NonlinearProblem(OutputProblem):
         return self.nonlinear.tangent_at(x, u, theta, own)
 
     def given(self, number: int, theta: Array) -> Given:
-        """Return what the simulation of one maneuver is given at a parameter vector."""
+        """Return the arguments of the simulation of one maneuver at a parameter vector."""
         part = self._parts[number]
         local = np.append(theta[part.index], 0.0)  # an index of -1 reads the last
         inputs = self.maneuvers[number].inputs

@@ -154,7 +154,7 @@ class _Record:
         return values
 
     def _free_decays(self, shape: Shape) -> list[Array]:
-        """Return what a filter's unknown state at the start of the record leaves, orthonormal."""
+        """Return an orthonormal basis of the responses to a filter's unknown initial state."""
         found: list[Array] = []
         for time_s in shape:
             if not 0.0 < time_s < np.inf:
@@ -238,7 +238,7 @@ def _refined(record: _Record, found: _Found, names: Sequence[str]) -> FeedbackLa
 
 
 def _r2(grams: Array, columns: Sequence[int]) -> Array:
-    """Return what some signals explain of the input at each delay."""
+    """Return R2 of the input by some signals, at each delay."""
     at = [1 + k for k in columns]
     own, cross = grams[:, at][:, :, at], grams[:, at, 0]
     scale = np.sqrt(np.maximum(np.diagonal(own, axis1=1, axis2=2), 1e-300))

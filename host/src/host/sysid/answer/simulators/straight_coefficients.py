@@ -77,7 +77,7 @@ class StraightCoefficients:
         return 1.0 / (math.pi * self.aspect_ratio * self.induced)
 
     def head(self, *lines: str) -> list[str]:
-        """Return what every file says first: what it is, its signs, its limits, its intervals."""
+        """Return the head of every file: source, signs, limits, intervals."""
         return [
             f"{self.title}; written by host identify.",
             f"Straight lines about alpha {math.degrees(self.alpha_rad):.2f} deg, elevator"
