@@ -36,7 +36,6 @@ LEAST_US, MOST_US = 1150, 1850  # the travel that the pilot shows
 STILL_UP, PASCAL_UP = 95_372.0, 3.37  # of the datasheet's example; its UP per pascal
 CLIMB_PA = 900.0
 HOME = (247_000_000, 1_210_000_000)
-RAIL = 512.0
 
 
 @dataclass(slots=True)

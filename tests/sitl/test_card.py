@@ -7,7 +7,17 @@ import pytest
 from host.twin.recorder.sitl_library import TICKS_PER_S, CardFault, Level, Recorder, Sitl, Volume
 
 from tests.protocol import oracle
-from tests.sitl.bench import GROUND_S, Bench, causes, events, flight, idle_receiver, missing, spread
+from tests.sitl.bench import (
+    EVENTS,
+    GROUND_S,
+    Bench,
+    causes,
+    events,
+    flight,
+    idle_receiver,
+    missing,
+    spread,
+)
 from tests.sitl.card_image import BLOCK, format_fat32, new_card, read_file
 
 
@@ -48,7 +58,7 @@ def test_session_that_ends_in_a_stall_tells_its_last_losses(tmp_path: Path) -> N
     assert sum(told) == blocks[-1].dropped > 50
     assert log.loss.dropped_frames == sum(told)
     assert causes(log, "session_end") == ["button"]
-    assert int(log.frames["event"]["code"][-1]) == 2
+    assert int(log.frames["event"]["code"][-1]) == EVENTS["session_end"]
     assert log.complete == "complete"
 
 

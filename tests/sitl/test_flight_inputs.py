@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from host.twin.recorder.sitl_library import TICKS_PER_S, Level, Port, Recorder
+from host.wire.schema_text import packed_schema
 
 from tests.protocol import oracle
 from tests.protocol.log_writer import crc16
@@ -32,8 +33,13 @@ from tests.sitl.input_flight import (
 from tests.sitl.input_judge import Trigger, deflected, wrong_pulses
 from tests.sitl.input_shapes import deflection, shape_of
 
-CARD_ENABLED, CARD_REFUSED, INPUT_START, INPUT_END, INPUT_REFUSED = 33, 34, 35, 36, 37
-DONE, STICK, BUTTON, DRIVE, HEIGHT, SENSOR_STILL = 0, 1, 22, 6, 14, 17
+NUMBERS = packed_schema().enums
+CARD_ENABLED, INPUT_START, INPUT_END, INPUT_REFUSED = (
+    NUMBERS["event"][name] for name in ("card_enabled", "input_start", "input_end", "input_refused")
+)
+DONE, BUTTON, HEIGHT, ALPHA = (
+    NUMBERS["input_end"][name] for name in ("done", "button", "height", "alpha")
+)
 SEED = 30_010
 
 
@@ -136,7 +142,7 @@ def test_two_rows_want_two_triggers(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("limit", "why"),
-    [({"height_min_pa": 2000, "height_max_pa": 2400}, HEIGHT), ({"alpha_max": 1900}, 8)],
+    [({"height_min_pa": 2000, "height_max_pa": 2400}, HEIGHT), ({"alpha_max": 1900}, ALPHA)],
 )
 def test_a_trigger_outside_the_limits_is_refused(
     limit: dict[str, int], why: int, tmp_path: Path
@@ -224,8 +230,13 @@ def test_shapes_agree_with_the_page_to_the_tick(tmp_path: Path) -> None:
 
 # ------------------------------------------------------------------------------ the card over USB
 REQUEST, ANSWER = 240, 241
-STATE, ERASE, WRITE, COMMIT, READ = range(1, 6)
-OK, MORE, NO_CARD, RECORDING, RELAY, AIRBORNE, DAMAGED, BAD_REQUEST = range(8)
+STATE, ERASE, WRITE, COMMIT, READ = (
+    NUMBERS["card_command"][name] for name in ("state", "erase", "write", "commit", "read")
+)
+OK, MORE, NO_CARD, RECORDING, RELAY, AIRBORNE, DAMAGED, BAD_REQUEST = (
+    NUMBERS["card_result"][name]
+    for name in ("ok", "more", "no_card", "recording", "relay", "airborne", "damaged", "request")
+)
 
 
 def asked(bench: Bench, command: int, part: int = 0, data: bytes = b"") -> tuple[int, ...]:

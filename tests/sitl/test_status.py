@@ -8,11 +8,12 @@ import pytest
 from host.link.status_line import StatusLine, parse_status
 from host.twin.recorder.sitl_library import TICKS_PER_S, Level, Port
 from host.wire.framing import text_of
+from host.wire.schema_text import packed_schema
 
 from tests.sitl import script as scripted
 from tests.sitl.bench import Bench, flight
 
-SELF_TEST, MEGA = 4, 5
+SELF_TEST, MEGA = (packed_schema().number("drive", n) for n in ("direct_self_test", "mega"))
 REFERENCE_ADDRESS = 4092
 
 

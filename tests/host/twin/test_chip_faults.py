@@ -14,6 +14,7 @@ from host.twin.recorder import avr, sitl
 from host.twin.recorder.stimuli import stimuli
 from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
+from host.wire.schema_text import packed_schema
 
 CARD = {
     "format": 1,
@@ -32,10 +33,15 @@ CARD = {
         {"kind": "brown_out", "at_s": 11.0},
     ],
 }
-# block_skipped, imu_restarted, baro_lost, receiver_lost, reset
-CODES = {4: 1, 10: 1, 11: 1, 15: 1, 18: 2}
-DRIVE, DIRECT, RECEIVER_LOST = 17, 1, 3
-STORM = 26  # the guard against edge storms is in the Mega's interrupt: SITL has none
+NUMBERS = packed_schema().enums
+TIMES = {"block_skipped": 1, "imu_restarted": 1, "baro_lost": 1, "receiver_lost": 1, "reset": 2}
+CODES = {NUMBERS["event"][name]: times for name, times in TIMES.items()}
+DRIVE = NUMBERS["event"]["drive_changed"]
+DIRECT, RECEIVER_LOST = (
+    NUMBERS["drive"][name] for name in ("direct_switch", "direct_receiver_lost")
+)
+# The guard against edge storms is in the Mega's interrupt: SITL has none.
+STORM = NUMBERS["event"]["receiver_storm"]
 
 
 def test_faults_tell_the_same_story_on_the_chip(library: Path, image: Path, tmp_path: Path) -> None:
