@@ -244,7 +244,6 @@ class Compared:
     whole_held: Array
     found_held: Array
     whole_half: Array
-    found_half: Array
 
     @property
     def ratio(self) -> Array:
@@ -257,7 +256,7 @@ def compared(label: str, rows: Sequence[Row]) -> Compared:
     good = [r for r in rows if r["whole"] and r["found"] and None not in r["found"] + r["whole"]]
     if not good:
         none = np.full(1, np.nan)
-        return Compared(label, ("-",), 0, len(rows), len(rows), *[none] * 6)
+        return Compared(label, ("-",), 0, len(rows), len(rows), *[none] * 5)
     whole, found = (np.array([r[k] for r in good]) for k in ("whole", "found"))
     return Compared(
         label,
@@ -270,7 +269,6 @@ def compared(label: str, rows: Sequence[Row]) -> Compared:
         np.mean(whole[..., 1], axis=0),
         np.mean(found[..., 1], axis=0),
         np.median(whole[..., 2], axis=0),
-        np.median(found[..., 2], axis=0),
     )
 
 

@@ -52,10 +52,6 @@ class XBee:
         self._show_cts()
         return self
 
-    def flood(self, data: bytes, *, baud: float) -> None:
-        """Send bytes from the ground to the chip without pause."""
-        self.chip.uart_send(self.port, data, baud=baud)
-
     def _byte(self, byte: int, cycle: int) -> None:
         if len(self._buffer) >= BUFFER_BYTES:
             self.lost += 1

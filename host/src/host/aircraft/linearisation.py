@@ -24,15 +24,12 @@ class Linear:
         States u, w, q, theta; input elevator. SI, radians.
     lateral_a, lateral_b : (4, 4), (4, 2) arrays
         States v, p, r, phi; inputs aileron, rudder.
-    coupling : float
-        Largest entry that joins the two sets (1/s and so on); the rotor's momentum makes it.
     """
 
     longitudinal_a: Array
     longitudinal_b: Array
     lateral_a: Array
     lateral_b: Array
-    coupling: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +88,6 @@ def linearise(frame: Airframe, trim: Trim, width: float = 1e-5) -> Linear:
         longitudinal_b=slopes[np.ix_(lon, [8])],
         lateral_a=slopes[np.ix_(lat, lat)],
         lateral_b=slopes[np.ix_(lat, [9, 10])],
-        coupling=float(
-            max(np.abs(slopes[np.ix_(lon, lat)]).max(), np.abs(slopes[np.ix_(lat, lon)]).max())
-        ),
     )
 
 

@@ -13,7 +13,6 @@ SYNC = b"\xa3\x95"
 HEAD_BYTES = 3
 FMT_KIND = 128
 FMT_BYTES = 89
-LONGEST_RECORD = 255
 # Type and scale of a field by its character.
 FIELDS: dict[str, tuple[str, float]] = {
     "b": ("<i1", 1.0), "B": ("<u1", 1.0), "h": ("<i2", 1.0), "H": ("<u2", 1.0),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 
 from host.preflight.preflight_limits import limits
-from host.preflight.sample import Heard, Sample
+from host.preflight.sample import Sample, SlowReading
 
 
 class State(StrEnum):
@@ -59,7 +59,7 @@ class Check:
     def take(self, sample: Sample) -> None:
         """Take a row."""
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, reading: SlowReading) -> None:
         """Take a slower frame."""
 
     def missing(self) -> str:

@@ -11,7 +11,7 @@ from host.live.live_stream import LiveStream
 from host.preflight.check import Check, State
 from host.preflight.check_list import Wanted, check_list
 from host.preflight.load_checks import RadioCheck
-from host.preflight.sample import Heard, Sample, in_order
+from host.preflight.sample import Sample, SlowReading, in_order
 
 _HINT_S = 8.0  # of a motion that is not seen, until it is said what was seen
 _REST_S = 1.0  # behind a motion that failed before its end, until the next is looked for
@@ -67,7 +67,7 @@ class Preflight:
         if update.lost and isinstance(self.asked, RadioCheck):
             self.asked.lost(update.lost)
         for one in in_order(update, self._stream.schema):
-            if isinstance(one, Heard):
+            if isinstance(one, SlowReading):
                 self._hear(one)
             else:
                 self._look(one)
@@ -75,16 +75,16 @@ class Preflight:
             if check.state != state:
                 self._changed(check)
 
-    def _hear(self, heard: Heard) -> None:
+    def _hear(self, reading: SlowReading) -> None:
         """Hand a slower frame to all that watch, and to the motion asked for."""
-        self.wanted.settings.hear(heard)
-        if heard.name in ("identity", "status"):
-            self.logger = heard.said
+        self.wanted.settings.hear(reading)
+        if reading.name in ("identity", "status"):
+            self.logger = reading.said
         for check in self._watching:
-            check.hear(heard)
+            check.hear(reading)
         if self.asked is not None:
-            self.asked.hear(heard)
-            self._decided(heard.t_s)
+            self.asked.hear(reading)
+            self._decided(reading.t_s)
 
     def _look(self, sample: Sample) -> None:
         """Hand a row to all that watch, and to the motion asked for."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from host.preflight.check import AskedCheck
-from host.preflight.sample import Heard, Sample
+from host.preflight.sample import Sample, SlowReading
 from host.preflight.window import Window, scatter
 
 _STICKS = ("elevator", "aileron", "rudder")
@@ -41,13 +41,13 @@ class SupplyCheck(AskedCheck):
         if self._stirred_s >= self.limit["stir_s"] and len(self._rail) > 2:
             self._judge()
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, reading: SlowReading) -> None:
         """Take both voltages, said once a second."""
-        if heard.name == "event" and heard.said["code"] == "rail low":
-            self.failed(f"the servo rail fell to {heard.said['arg'] / 1000.0:.1f} V")
-        if heard.name != "system":
+        if reading.name == "event" and reading.said["code"] == "rail low":
+            self.failed(f"the servo rail fell to {reading.said['arg'] / 1000.0:.1f} V")
+        if reading.name != "system":
             return
-        rail_v, supply_v = heard.said["rail_v"], heard.said["supply_v"]
+        rail_v, supply_v = reading.said["rail_v"], reading.said["supply_v"]
         if rail_v is None or supply_v is None:
             self.waits("no voltage of the servo rail: its divider on A15, receiver powered?")
         elif not self._stirring:

@@ -7,7 +7,7 @@ from collections import deque
 
 from host.preflight.check import Check
 from host.preflight.preflight_limits import limits
-from host.preflight.sample import Heard, Sample
+from host.preflight.sample import Sample, SlowReading
 
 RECEIVER = ("aileron", "elevator", "rudder", "throttle", "switch")
 
@@ -40,28 +40,28 @@ class LoggerCheck(Check):
         if late and self.state == "waiting":
             self.failed("no settings heard: is its firmware ours, its telemetry set to frames?")
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, reading: SlowReading) -> None:
         """Take settings, events, and the time since power-on."""
-        said = heard.said
-        if heard.name == "system":
+        said = reading.said
+        if reading.name == "system":
             uptime_s = said["uptime_s"]
             if uptime_s is not None and uptime_s < self._uptime_s:
                 self._broken = "it was reset during the preflight: look at its supply"
             self._uptime_s = self._uptime_s if uptime_s is None else uptime_s
-        elif heard.name == "event" and said["code"] == "reset" and self._uptime_s >= 0:
+        elif reading.name == "event" and said["code"] == "reset" and self._uptime_s >= 0:
             self._broken = "it was reset during the preflight: look at its supply"
-        elif heard.name == "event" and said["code"] == "crash":
+        elif reading.name == "event" and said["code"] == "crash":
             self._broken = "its program crashed and began anew: do not fly, send the log"
-        elif heard.name == "event" and said["code"] == "settings default":
+        elif reading.name == "event" and said["code"] == "settings default":
             self._broken = "its stored settings are damaged or of another version: default ones act"
-        elif heard.name == "status" and not self._broken:
+        elif reading.name == "status" and not self._broken:
             self.seen()  # over USB its settings are not said
-        elif heard.name == "config" and said["aircraft"] != self._aircraft:
+        elif reading.name == "config" and said["aircraft"] != self._aircraft:
             self._broken = (
                 f"it is set for {said['aircraft'] or 'no aircraft'}, the aircraft file is"
                 f" {self._aircraft}: firmware/settings.toml"
             )
-        elif heard.name == "config":
+        elif reading.name == "config":
             self.values["rate_hz"] = float(said["rate_hz"])
             if not self._broken:
                 self.seen()
@@ -114,12 +114,15 @@ class ReceiverCheck(Check):
         else:
             self.seen()
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, reading: SlowReading) -> None:
         """Take the count of wrong pulses."""
-        if heard.name == "system":
-            self._glitches.append((heard.t_s, heard.said["rc_glitches"]))
-        elif heard.name == "event" and heard.said["code"] in ("receiver storm", "receiver refused"):
-            word = "a storm of edges" if "storm" in heard.said["code"] else "pulses of no servo"
+        if reading.name == "system":
+            self._glitches.append((reading.t_s, reading.said["rc_glitches"]))
+        elif reading.name == "event" and reading.said["code"] in (
+            "receiver storm",
+            "receiver refused",
+        ):
+            word = "a storm of edges" if "storm" in reading.said["code"] else "pulses of no servo"
             self._odd = f"{word} on its lines: a loose lead, or noise beside it"
             self.failed(self._odd)
 
@@ -142,21 +145,21 @@ class CardCheck(Check):
         self._since_s: float | None = None
         self._status = ""
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, reading: SlowReading) -> None:
         """Take what the logger says of its card."""
-        if heard.name == "status":
-            self._status = heard.said["card"]
-        elif heard.name == "event" and heard.said["code"] in ("card removed", "card error"):
-            self._status = heard.said["code"].replace("card ", "")
-        elif heard.name == "system":
-            self._judge(heard)
+        if reading.name == "status":
+            self._status = reading.said["card"]
+        elif reading.name == "event" and reading.said["code"] in ("card removed", "card error"):
+            self._status = reading.said["code"].replace("card ", "")
+        elif reading.name == "system":
+            self._judge(reading)
 
     def missing(self) -> str:
         """Return what it has seen."""
         return self.reason or "the logger has not said: no frame `system` came"
 
-    def _judge(self, heard: Heard) -> None:
-        said = heard.said
+    def _judge(self, reading: SlowReading) -> None:
+        said = reading.said
         if "card" not in said["sensors"]:
             self._since_s = None
             why = (
@@ -168,8 +171,8 @@ class CardCheck(Check):
             self.failed(f"{said['card_errors']} card errors since power-on: use another card")
         else:
             if self._since_s is None:
-                self._since_s = heard.t_s
-            if heard.t_s - self._since_s >= self.limit["hold_s"]:
+                self._since_s = reading.t_s
+            if reading.t_s - self._since_s >= self.limit["hold_s"]:
                 self.seen()
             elif self.state != "seen":
                 self.waits("seen ready, watched for a moment")

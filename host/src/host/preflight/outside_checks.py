@@ -8,7 +8,7 @@ from typing import Any
 
 from host.preflight.check import Check
 from host.preflight.pilot_settings import PilotSettings
-from host.preflight.sample import Heard, Sample
+from host.preflight.sample import Sample, SlowReading
 
 
 class GpsCheck(Check):
@@ -49,21 +49,21 @@ class GpsCheck(Check):
         else:
             self.failed(f"stale: the same solution for {age_s:.0f} s")
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, reading: SlowReading) -> None:
         """Take a solution, or its count of wrong messages."""
-        if heard.name == "gps":
-            self._solution(heard)
-        elif heard.name == "system":
-            self._garbled(heard)
+        if reading.name == "gps":
+            self._solution(reading)
+        elif reading.name == "system":
+            self._garbled(reading)
 
     def missing(self) -> str:
         """Return what it has seen."""
         return self.reason or "no solution came"
 
-    def _garbled(self, heard: Heard) -> None:
-        count = heard.said["gps_errors"]
+    def _garbled(self, reading: SlowReading) -> None:
+        count = reading.said["gps_errors"]
         if self._errors is not None:
-            span_s = heard.t_s - self._errors[0]
+            span_s = reading.t_s - self._errors[0]
             rate = ((count - self._errors[1]) % 65536) / max(span_s, 1.0)
             self._lead = ""
             if span_s > 2.5 and rate > self.limit["garbled_per_s"]:
@@ -71,14 +71,14 @@ class GpsCheck(Check):
                 self._lead = f"{rate:.0f} of its messages a second are damaged: its lead, its baud"
                 self.failed(self._lead)
         else:
-            self._errors = heard.t_s, count
+            self._errors = reading.t_s, count
 
-    def _solution(self, heard: Heard) -> None:
-        said = heard.said
-        self._heard_s = heard.t_s
+    def _solution(self, reading: SlowReading) -> None:
+        said = reading.said
+        self._heard_s = reading.t_s
         if said["itow_ms"] == self._last_itow:
             return
-        self._last_itow, self._new_s = said["itow_ms"], heard.t_s
+        self._last_itow, self._new_s = said["itow_ms"], reading.t_s
         wrong = self._wrong(said)
         if wrong:
             self._since_s = None
@@ -87,12 +87,12 @@ class GpsCheck(Check):
         if self._lead:
             return
         if self._since_s is None:
-            self._since_s = heard.t_s
+            self._since_s = reading.t_s
         self.values = {
             "satellites": float(said["satellites"]),
             "h_accuracy_m": said["h_accuracy"] or math.nan,
         }
-        if heard.t_s - self._since_s >= self.limit["hold_s"]:
+        if reading.t_s - self._since_s >= self.limit["hold_s"]:
             self.seen()
         elif self.state != "seen":
             self.waits("a fix, watched for a moment")
@@ -135,21 +135,21 @@ class BaroCheck(Check):
             known = "nothing heard of it" if self._heard_s is None else "stale: it went silent"
             self.failed(f"{known} for {age_s:.0f} s: its bus, its plug")
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, reading: SlowReading) -> None:
         """Take a pressure, or its count of errors."""
-        said = heard.said
-        if heard.name == "system":
+        said = reading.said
+        if reading.name == "system":
             if self._errors is None:
-                self._errors = heard.t_s, said["baro_errors"]
-            span_s = heard.t_s - self._errors[0]
+                self._errors = reading.t_s, said["baro_errors"]
+            span_s = reading.t_s - self._errors[0]
             rate = ((said["baro_errors"] - self._errors[1]) % 65536) / max(span_s, 1.0)
             self._bus = ""
             if span_s > 2.5 and rate > self.limit["errors_per_s"]:
                 self._bus = f"{rate:.0f} errors a second on its bus"
                 self.failed(self._bus)
-        if heard.name != "baro":
+        if reading.name != "baro":
             return
-        self._heard_s = heard.t_s
+        self._heard_s = reading.t_s
         self._recent.append(said["raw_pressure"])
         pressure = said["static_pressure"]
         if pressure is None or not self.limit["least_pa"] < pressure < self.limit["most_pa"]:
@@ -160,7 +160,7 @@ class BaroCheck(Check):
             self._since_s = None
             self.failed("stale: its reading repeats to the last digit")
         elif not self._bus:
-            self._fine(heard.t_s, pressure)
+            self._fine(reading.t_s, pressure)
 
     def missing(self) -> str:
         """Return what it has seen."""

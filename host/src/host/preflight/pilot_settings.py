@@ -6,7 +6,7 @@ import tomllib
 from functools import cache
 from typing import Any
 
-from host.preflight.sample import Heard
+from host.preflight.sample import SlowReading
 from host.resources import resource
 
 NO_GPS = "none"
@@ -28,8 +28,6 @@ class PilotSettings:
         Switch at or below is direct, at or above is the Mega; throttle at or below is idle.
     gps : bool
         Whether positions are expected.
-    heard : bool
-        Whether the logger itself said so.
     """
 
     def __init__(self) -> None:
@@ -38,15 +36,13 @@ class PilotSettings:
         self.mega_min_us = float(shipped["switch_mega_min_us"])
         self.idle_max_us = float(shipped["throttle_idle_max_us"])
         self.gps = shipped["gps_source"] != 0
-        self.heard = False
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, reading: SlowReading) -> None:
         """Take the settings of the logger."""
-        if heard.name != "config":
+        if reading.name != "config":
             return
-        said = heard.said
+        said = reading.said
         self.direct_max_us = float(said["switch_direct_max_us"])
         self.mega_min_us = float(said["switch_mega_min_us"])
         self.idle_max_us = float(said["throttle_idle_max_us"])
         self.gps = said["gps_source"] != NO_GPS
-        self.heard = True

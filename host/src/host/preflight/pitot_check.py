@@ -51,7 +51,7 @@ class PitotCheck(AskedCheck):
         if len(self._rest) < 5:
             self._rest.append(pressure)
             return
-        self._follow(sample.t_s, pressure - sum(self._rest) / len(self._rest))
+        self._check_rise(sample.t_s, pressure - sum(self._rest) / len(self._rest))
 
     def missing(self) -> str:
         """Return what it has seen."""
@@ -68,7 +68,7 @@ class PitotCheck(AskedCheck):
             return f"held for {self._longest_s:.1f} s only: pinch the hose, or the tube leaks"
         return f"rose by {most - least:.0f} Pa at most: blocked, leaking, or not blown into"
 
-    def _follow(self, t_s: float, pressure: float) -> None:
+    def _check_rise(self, t_s: float, pressure: float) -> None:
         blow = self.limit["blow_pa"]
         if pressure < -blow:
             self.failed("the pressure fell: the two hoses at its sensor are swapped")

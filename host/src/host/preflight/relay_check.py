@@ -7,7 +7,7 @@ import math
 from host.preflight.check import AskedCheck
 from host.preflight.pilot_settings import PilotSettings
 from host.preflight.preflight_limits import limits
-from host.preflight.sample import Heard, Sample
+from host.preflight.sample import Sample, SlowReading
 
 
 class RelayCheck(AskedCheck):
@@ -34,13 +34,12 @@ class RelayCheck(AskedCheck):
         self._at = ""
         self._since_s = math.nan
         self._phase = 0  # 0 at rest, 1 at Mega, 2 back
-        self._quiet_s = math.nan
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, reading: SlowReading) -> None:
         """Take who drives, and what became of the relay."""
-        if heard.name == "system":
-            self._drive = heard.said["drive"]
-        elif heard.name == "event" and heard.said["code"] == "relay lost":
+        if reading.name == "system":
+            self._drive = reading.said["drive"]
+        elif reading.name == "event" and reading.said["code"] == "relay lost":
             self._lost()
 
     def take(self, sample: Sample) -> None:

@@ -43,7 +43,7 @@ def columns_of(*names: str) -> Callable[[tuple[float, ...]], tuple[float, ...]]:
 
 
 @dataclass(slots=True)
-class Heard:
+class SlowReading:
     """A slower frame in units and words; a status line of the USB line as ``status``.
 
     Attributes
@@ -59,9 +59,9 @@ class Heard:
     said: dict[str, Any] = field(default_factory=dict)
 
 
-def in_order(update: LiveUpdate, schema: Schema | None) -> Iterator[Sample | Heard]:
+def in_order(update: LiveUpdate, schema: Schema | None) -> Iterator[Sample | SlowReading]:
     """Yield what a portion of the stream holds, by time."""
-    found: list[Sample | Heard] = []
+    found: list[Sample | SlowReading] = []
     if len(update):
         columns = [update.rows[name].tolist() for name in LIVE_UNITS]
         drives = update.mega_drives.tolist()
@@ -71,11 +71,12 @@ def in_order(update: LiveUpdate, schema: Schema | None) -> Iterator[Sample | Hea
         ]
     if schema is not None:
         found += [
-            Heard(frame.name, frame.t_s, slow_reading(schema, frame)) for frame in update.slow
+            SlowReading(frame.name, frame.t_s, slow_reading(schema, frame)) for frame in update.slow
         ]
     if update.status is not None:
         t_s = max((one.t_s for one in found), default=0.0)
         found += [
-            Heard(name, t_s, said) for name, said in status_readings(update.status, t_s).items()
+            SlowReading(name, t_s, said)
+            for name, said in status_readings(update.status, t_s).items()
         ]
     return iter(sorted(found, key=lambda one: one.t_s))

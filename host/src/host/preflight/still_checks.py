@@ -8,7 +8,7 @@ from collections import deque
 from host.constants import DEG_PER_RAD, GRAVITY_MPS2
 from host.preflight.check import Check
 from host.preflight.pressures import impact_pa
-from host.preflight.sample import Heard, Sample, columns_of
+from host.preflight.sample import Sample, SlowReading, columns_of
 from host.preflight.window import Window, mean, scatter
 
 RATES = ("p_degps", "q_degps", "r_degps")
@@ -57,19 +57,19 @@ class ImuCheck(Check):
         if self._window.full:
             self._judge(self._window.columns())
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, reading: SlowReading) -> None:
         """Take the counts of the IMU's packets."""
-        if heard.name == "event" and heard.said["code"] in ("imu restarted", "imu lost"):
+        if reading.name == "event" and reading.said["code"] in ("imu restarted", "imu lost"):
             self._odd = (
-                f"{heard.said['code'].replace('imu ', 'it ')} meanwhile: its supply, its plug"
+                f"{reading.said['code'].replace('imu ', 'it ')} meanwhile: its supply, its plug"
             )
             self.failed(self._odd)
-        if heard.name != "system" or self._odd:
+        if reading.name != "system" or self._odd:
             return
-        said = heard.said
+        said = reading.said
         bad = said["imu_bad_packets"] + said["imu_lost"]
-        self._packets.append((heard.t_s, said["imu_packets"], bad))
-        span_s = heard.t_s - self._packets[0][0]
+        self._packets.append((reading.t_s, said["imu_packets"], bad))
+        span_s = reading.t_s - self._packets[0][0]
         if span_s < _PACKETS_S:
             return
         good, wrong = ((self._packets[-1][k] - self._packets[0][k]) % 65536 for k in (1, 2))

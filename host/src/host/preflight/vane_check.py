@@ -38,7 +38,6 @@ class VaneCheck(AskedCheck):
         super().begin()
         self._least = self._most = math.nan
         self._first = 0  # which way it went first
-        self._turned = False
         self._other: dict[str, tuple[float, float]] = {}
         self._valid = False
 

@@ -15,7 +15,7 @@ TELEMETRY = (
     " or WiFi, SRn_RAW_SENS, SRn_EXTRA1 and SRn_RC_CHAN = 50 (n: the link)"
 )
 # ArduPlane LOG_BITMASK.
-IMU_BIT, RC_BIT, FAST_ATTITUDE_BIT, FULL_ATTITUDE_BIT = 1 << 7, 1 << 13, 1 << 0, 1 << 20
+IMU_BIT, RC_BIT, FULL_ATTITUDE_BIT = 1 << 7, 1 << 13, 1 << 20
 # PX4 SDLOG_PROFILE: default set, estimator replay (airspeed and air data), high rate.
 PX4_DEFAULT, PX4_REPLAY, PX4_HIGH_RATE = 1 << 0, 1 << 1, 1 << 4
 

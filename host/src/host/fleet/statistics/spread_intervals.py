@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import optimize, special
 
-from host.arrays import Array
 from host.constants import NORMAL_95
 from host.fleet.statistics.variance_components import (
     FleetEstimates,
@@ -254,8 +253,3 @@ def _where(form: Callable[[float], float], limit: float, scale: float, floor: fl
 
 def _student(freedom: int) -> float:
     return float(special.stdtrit(max(freedom, 1), UPPER))
-
-
-def values_of(intervals: list[Interval]) -> Array:
-    """Return value, lower and upper end of several intervals, (n, 3)."""
-    return np.array([[i.value, i.lower, i.upper] for i in intervals]).reshape(-1, 3)

@@ -18,7 +18,6 @@ TURN_STEPS = 512
 ONE_Q12 = 4096
 MOST_SAMPLES = 60 * SAMPLE_HZ
 MOST_SUMS = 30  # complex
-MOST_HARMONICS = 10
 LEAST_INT16, MOST_INT16 = -(2**15), 2**15 - 1
 PITCH, ROLL, YAW = "pitch", "roll", "yaw"
 # Signals of an axis, in the order of the logger.

@@ -25,7 +25,6 @@ RATES = ("p_radps", "q_radps", "r_radps")
 FORCES = ("ax_mps2", "ay_mps2", "az_mps2")
 POSITIVE = ("airspeed_mps", "qbar_pa", "static_pa", "density_kgpm3", "throttle")
 ALIKE = 0.02  # factors that differ by less are one
-READABLE = ("throttle", "static-pressure", "density")  # ranges that prove a unit without a law
 
 
 @dataclass(frozen=True, slots=True)

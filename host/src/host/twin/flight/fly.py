@@ -117,11 +117,6 @@ class FlightRecord:
         return len(self.t_s) < len(self.schedule.attention)
 
     @property
-    def by_logger(self) -> bool:
-        """Whether the pilot leaves the inputs to the logger."""
-        return bool((self.schedule.switch_us > SWITCH_DIRECT_US).any())
-
-    @property
     def sink_mps(self) -> float:
         """Vertical speed at the last sample, downwards."""
         return float(rotate_to_ned(self.states[-1], *self.states[-1, :3])[2])
