@@ -63,8 +63,8 @@ def fit_table(numbers: JsonNumbers, at: int) -> str:
                 escaped(_KINDS.get(kind, kind)), escaped(people_name(name)[0]),
                 f"{numbers.html(*place, 'nrmse', digits=3, scale=100.0)} %", theil,
             ])  # fmt: skip
-    unseen = (answer.get("unseen") or {}).get("nrmse", {})
-    for name in unseen:
+    one_step_nrmse = (answer.get("unseen") or {}).get("nrmse", {})
+    for name in one_step_nrmse:
         number = numbers.html("answers", at, "unseen", "nrmse", name, "unseen", digits=3, scale=1e2)
         rows.append(["one step, unseen", escaped(people_name(name)[0]), f"{number} %", ""])
     return table(["prediction", "output", "NRMSE", "Theil's U"], rows, (0, 1))

@@ -58,9 +58,9 @@ def _use(item: Any, answers: list[dict[str, Any]]) -> str:
     """Return which models fitted a maneuver, and which kept it to be predicted."""
     name = f"{item.kind} on {item.axis.split('_')[0]} at {item.start_s:.1f} s"
     fitted = [a["template"] for a in answers if any(name in m for m in a["maneuvers"])]
-    unseen = [a["template"] for a in answers if any(name in m for m in a.get("held_out", ()))]
+    held_out_in = [a["template"] for a in answers if any(name in m for m in a.get("held_out", ()))]
     said = [", ".join(dict.fromkeys(fitted))] if fitted else []
-    said += [f"unseen: {', '.join(dict.fromkeys(unseen))}"] if unseen else []
+    said += [f"unseen: {', '.join(dict.fromkeys(held_out_in))}"] if held_out_in else []
     return "; ".join(said)
 
 

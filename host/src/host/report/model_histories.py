@@ -23,12 +23,14 @@ _GAP_S = 0.5
 def caption(answer: Answer) -> str:
     """Return what the lines of `model_histories` are."""
     ahead = "blue: one step ahead; " if _one_step(answer) else ""
-    unseen = (
-        "shaded: unseen maneuvers, free simulation" if answer.unseen else "no maneuver is unseen"
+    held_out_runs = (
+        "shaded: unseen maneuvers, free simulation"
+        if answer.held_out_runs
+        else "no maneuver is unseen"
     )
     return (
         f"grey: measured; {ahead}red: free simulation by the inputs alone; white: fitted;"
-        f" {unseen}; green: the input"
+        f" {held_out_runs}; green: the input"
     )
 
 
@@ -56,7 +58,7 @@ def model_histories(answer: Answer) -> Figure:
         free = answer.simulated[k] if answer.simulated else answer.result.fitted[k]
         _model(axes, t_s, free, outputs, _FREE)
         begin = _measured(axes, t_s, maneuver, outputs, inputs)
-    for maneuver, simulated in answer.unseen:
+    for maneuver, simulated in answer.held_out_runs:
         t_s = begin + maneuver.time_s
         for axis in axes:
             axis.axvspan(t_s[0], t_s[-1], color="0.92", lw=0, zorder=0)

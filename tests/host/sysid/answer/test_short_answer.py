@@ -91,14 +91,14 @@ def test_true_poles_stand_on_the_map() -> None:
 
 def test_what_the_fit_did_not_see_is_shaded(found: host.Identification) -> None:
     t = np.arange(5.0)
-    traces = [Trace(t, t, t), Trace(t + 6.0, t, t, unseen=True)]
+    traces = [Trace(t, t, t), Trace(t + 6.0, t, t, held_out=True)]
     over, under = histories({"q_radps": traces}, "two").axes
     for axis in (over, under):
         shade: Any = axis.patches[0]
         assert shade.get_facecolor() == to_rgba("#fdf3dc")
         assert shade.get_x() == 6.0
     (answer,) = found.linear
-    assert len(answer.unseen) == len(answer.held_out)
+    assert len(answer.held_out_runs) == len(answer.held_out)
 
 
 def test_of_two_methods_each_has_its_modes(found: host.Identification) -> None:

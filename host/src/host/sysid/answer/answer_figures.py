@@ -189,14 +189,14 @@ def _linear_traces(answer: Answer) -> tuple[dict[str, list[Trace]], str]:
             signals[name].append(
                 Trace(t, maneuver.outputs[:, j], outputs[:, j], maneuver.name if j == 0 else "")
             )
-    for maneuver, outputs in answer.unseen:
+    for maneuver, outputs in answer.held_out_runs:
         t = begin + maneuver.time_s
         begin = float(t[-1]) + GAP_S
         for j, name in enumerate(answer.model.outputs):
             title = maneuver.name if j == 0 else ""
             signals[name].append(Trace(t, maneuver.outputs[:, j], outputs[:, j], title, True))
-    unseen = "; shaded: unseen, free simulation" if answer.unseen else ""
-    return signals, f"{'one step' if one_step else 'free simulation'}, fitted data{unseen}"
+    held_out_runs = "; shaded: unseen, free simulation" if answer.held_out_runs else ""
+    return signals, f"{'one step' if one_step else 'free simulation'}, fitted data{held_out_runs}"
 
 
 def _clouds(modes: Sequence[Mode], truth: Mapping[str, complex]) -> list[Cloud]:
@@ -205,9 +205,11 @@ def _clouds(modes: Sequence[Mode], truth: Mapping[str, complex]) -> list[Cloud]:
     clouds = []
     for mode in modes:
         value, vector = np.linalg.eigh(mode.covariance)
-        drawn = (vector * np.sqrt(np.maximum(value, 0.0))) @ rng.standard_normal((2, SCATTER))
+        points = (vector * np.sqrt(np.maximum(value, 0.0))) @ rng.standard_normal((2, SCATTER))
         pole = mode.eigenvalue
         clouds.append(
-            Cloud(mode.name, pole, pole.real + drawn[0], pole.imag + drawn[1], truth.get(mode.name))
+            Cloud(
+                mode.name, pole, pole.real + points[0], pole.imag + points[1], truth.get(mode.name)
+            )
         )
     return clouds

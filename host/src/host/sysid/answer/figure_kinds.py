@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED, MODEL, RESIDUAL, MARKED, TRUTH = "0.7", "C3", "C0", "C3", "black"
-INPUT, UNSEEN = "C2", "#fdf3dc"
+INPUT, HELD_OUT_SHADE = "C2", "#fdf3dc"
 SHOWN_UNITS = {
     "_radps": ("deg/s", DEG_PER_RAD),
     "_rad": ("deg", DEG_PER_RAD),
@@ -43,7 +43,7 @@ class Trace:
     measured: Array
     model: Array
     title: str = ""
-    unseen: bool = False  # held out of the fit
+    held_out: bool = False  # held out of the fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,9 +120,11 @@ def histories(
             over.plot(trace.t_s, measured, color=MEASURED, lw=2.4)
             over.plot(trace.t_s, model, color=MODEL, lw=0.8)
             under.plot(trace.t_s, measured - model, color=RESIDUAL, lw=0.6)
-            if trace.unseen:
+            if trace.held_out:
                 for axis in (over, under):
-                    axis.axvspan(trace.t_s[0], trace.t_s[-1], color=UNSEEN, lw=0.0, zorder=-1)
+                    axis.axvspan(
+                        trace.t_s[0], trace.t_s[-1], color=HELD_OUT_SHADE, lw=0.0, zorder=-1
+                    )
         under.axhline(0.0, color="0.8", lw=0.6, zorder=0)
         over.set_ylabel(label, fontsize=8)
         under.set_ylabel("difference", fontsize=6)
@@ -217,12 +219,12 @@ def interval_bars(bars: Sequence[Bar], title: str) -> Figure:
     for position, bar in enumerate(reversed(bars)):
         share = 100.0 * bar.half_width / bar.scale
         colour = MARKED if bar.marked else RESIDUAL
-        drawn = axis.errorbar(
+        bars_drawn = axis.errorbar(
             0.0, position, xerr=min(share, reach), color=colour,
             fmt="s" if bar.of_row else "o", mfc="white" if bar.of_row else colour, ms=4.5,
         )  # fmt: skip
         if bar.of_row:
-            drawn[2][0].set_linestyle("--")
+            bars_drawn[2][0].set_linestyle("--")
         if share > reach:
             for side in (-reach, reach):
                 axis.plot(side, position, "<" if side < 0.0 else ">", color=colour, ms=5)

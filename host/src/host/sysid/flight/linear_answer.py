@@ -61,7 +61,7 @@ class Answer:
     noise_covariance: Array | None = None  # of the estimate, without systematic errors
     coefficient_parts: CoefficientParts | None = None
     causes: dict[str, str] = field(default_factory=dict)  # what widens each interval most
-    unseen: tuple[
+    held_out_runs: tuple[
         tuple[Maneuver, Array], ...
     ] = ()  # held out, with their outputs by free simulation
 

@@ -336,13 +336,13 @@ class LinearEstimator:
                 held_out, [m.departing() for m in e.held_out], total.estimate
             )
         )
-        unseen = _simulated(frozen, held_out, at_trim)
+        held_out_runs = _simulated(frozen, held_out, at_trim)
         return LinearValidation(
             tuple(simulated),
             fits_of(e.model, e.maneuvers, simulated),
-            fits_of(e.model, held_out, unseen),
-            predictions(e.model, total, intervals.coherence, held_out, unseen),
-            tuple(zip(held_out, unseen, strict=True)),
+            fits_of(e.model, held_out, held_out_runs),
+            predictions(e.model, total, intervals.coherence, held_out, held_out_runs),
+            tuple(zip(held_out, held_out_runs, strict=True)),
         )
 
     def answer(
@@ -378,7 +378,7 @@ class LinearEstimator:
             own_model=self.own is not None,
             coherence=intervals.coherence,
             predictions=validation.predictions,
-            unseen=validation.unseen,
+            held_out_runs=validation.held_out_runs,
             noise_covariance=statistical.covariance,
             causes=widest_errors(e.fit, intervals.statistical, intervals.total, intervals.shifts),
         )

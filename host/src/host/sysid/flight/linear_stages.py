@@ -92,11 +92,11 @@ class LinearValidation:
 
     Departures from the trim are as measured: airspeed and attitude in products with what moves.
     `predictions` sets the error of each output held out beside what noise and covariance allow;
-    `unseen` are the maneuvers held out, with their outputs.
+    `held_out_runs` are the maneuvers held out, with their outputs.
     """
 
     simulated: tuple[Array, ...]
     fits: tuple[SignalFit, ...]
     held_out: tuple[SignalFit, ...]
     predictions: dict[str, Prediction]
-    unseen: tuple[tuple[Maneuver, Array], ...] = ()
+    held_out_runs: tuple[tuple[Maneuver, Array], ...] = ()

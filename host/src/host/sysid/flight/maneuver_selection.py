@@ -22,13 +22,13 @@ FEWEST = 8  # samples, as a maneuver needs
 SHARED_S = 0.1  # windows that overlap by more are one
 TOUCHING_S = 0.1  # nothing moved between windows no further apart
 HELD_OUT_FROM = 3  # maneuvers of an axis, of which one is held out
-Stretch = tuple[float | None, float | None]  # from and to, s; None is the end of the record
+TimeSpan = tuple[float | None, float | None]  # from and to, s; None is the end of the record
 
 
 def select_maneuvers(
     columns: Mapping[str, Array],
     *,
-    stretches: Sequence[Stretch] = (),
+    stretches: Sequence[TimeSpan] = (),
     numbers: Sequence[int] = (),
 ) -> list[DetectedManeuver]:
     """Return the maneuvers the user asked for; all that are found where nothing was asked.
@@ -54,7 +54,7 @@ def select_maneuvers(
         raise IdentificationError(
             "argument maneuvers excludes argument from_s and argument to_s: give one of them"
         )
-    return [item for stretch in stretches for item in _stretch(columns, stretch)]
+    return [item for span in stretches for item in _span_maneuvers(columns, span)]
 
 
 def _numbered(columns: Mapping[str, Array], numbers: Sequence[int]) -> list[DetectedManeuver]:
@@ -66,11 +66,11 @@ def _numbered(columns: Mapping[str, Array], numbers: Sequence[int]) -> list[Dete
     return [found[n - 1] for n in sorted(set(numbers))]
 
 
-def _stretch(columns: Mapping[str, Array], stretch: Stretch) -> list[DetectedManeuver]:
+def _span_maneuvers(columns: Mapping[str, Array], span: TimeSpan) -> list[DetectedManeuver]:
     """Return each part of a stretch between gaps, once for every surface that leads in it."""
     t = columns["t_s"]
-    first = float(t[0]) if stretch[0] is None else stretch[0]
-    last = float(t[-1]) if stretch[1] is None else stretch[1]
+    first = float(t[0]) if span[0] is None else span[0]
+    last = float(t[-1]) if span[1] is None else span[1]
     asked = f"stretch (argument from_s {first:g}, argument to_s {last:g})"
     if not first < last:
         raise IdentificationError(f"{asked}: the start is not before the end")

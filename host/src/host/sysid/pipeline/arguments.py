@@ -13,7 +13,7 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
-from host.sysid.flight.maneuver_selection import Stretch
+from host.sysid.flight.maneuver_selection import TimeSpan
 from host.sysid.identification_error import IdentificationError
 
 
@@ -76,7 +76,7 @@ def of_each_flight(name: str, given: Any, flights: int) -> list[Path | None]:
     return [path_of(name, one) for one in given]
 
 
-def stretches_of(given: Any, flights: int) -> list[tuple[Stretch, ...]]:
+def stretches_of(given: Any, flights: int) -> list[tuple[TimeSpan, ...]]:
     """Return the stretches of each flight.
 
     Parameters
@@ -110,7 +110,7 @@ def stretches_of(given: Any, flights: int) -> list[tuple[Stretch, ...]]:
 
 def chosen_stretches(
     stretches: Any, from_s: Any, to_s: Any, flights: int
-) -> list[tuple[Stretch, ...]]:
+) -> list[tuple[TimeSpan, ...]]:
     """Return the stretches of each flight, given as such or as one for every flight.
 
     Raises
@@ -128,7 +128,7 @@ def chosen_stretches(
     return [(ends,)] * flights
 
 
-def _pairs(given: Any) -> tuple[Stretch, ...] | None:
+def _pairs(given: Any) -> tuple[TimeSpan, ...] | None:
     """Return a pair of times or several as several; None of anything else."""
     if _is_pair(given):
         given = [given]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from host.sysid.flight.data_finding import accepted_checks
-from host.sysid.flight.maneuver_selection import Stretch
+from host.sysid.flight.maneuver_selection import TimeSpan
 from host.sysid.pipeline.arguments import chosen_stretches, listed, numbers_of, of_each_flight
 
 OfEach = str | Path | Sequence[str | Path | None] | None  # one for all flights, or one of each
@@ -45,7 +45,7 @@ class ReadingOptions:
     calibration: Path | None = None
     mapping: Path | None = None
     maneuvers: tuple[int, ...] = ()
-    stretches: tuple[Stretch, ...] = ()
+    stretches: tuple[TimeSpan, ...] = ()
     corrections: bool = True
     delays: bool = True
     also: tuple[str, ...] = ()
