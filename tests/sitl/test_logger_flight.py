@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +12,18 @@ from host.aircraft.airframe import ELEVATOR
 from host.aircraft.linear_aircraft import load
 from host.cli import main
 from host.errors import UsageError
+from host.live.flight_state import FlightState
+from host.live.live_stream import LiveStream
 from host.log import read_log
 from host.log.flown_inputs import FlownInput, flown_inputs
-from host.physical.calibration import calibration_of_text
+from host.physical.calibration import calibration_of_text, load_calibration
 from host.planning.logger_card import Envelope, logger_card
 from host.twin.flight.fly import FlightRecord
 from host.twin.outcome.compare import true_times
 from host.twin.outcome.virtual_calibration import calibration
 from host.twin.recorder import sitl
 from host.twin.recorder.logger_flight import logger_flight
+from host.twin.recorder.sitl_radio import radio
 from host.twin.recorder.stimuli import Stimuli
 from host.twin.testcard.cards import Card, Segment
 from host.twin.testcard.flown_by_logger import flown_by_logger
@@ -61,6 +65,21 @@ def fly(envelope: Envelope, folder: Path) -> tuple[FlightRecord, list[FlownInput
     table = log.table()
     true_s = true_times(record, table, int(log.frames["ident"]["t_us"][0]))
     return record, flown_inputs(log), float((true_s - table["t_s"]).iloc[0])
+
+
+def test_the_radio_of_such_a_flight_tells_its_rows() -> None:
+    """As `host live sim:CARD --flight-card FILE` receives it."""
+    data = flight_card()
+    flown = partial(sitl.record, rate_hz=100, aircraft=load(CARD.aircraft).name, flight_card=data)
+    record, given, _ = logger_flight(
+        data, CARD, seed=SEED + 1, recorder=lambda _, given: flown(given)
+    )
+    stream = LiveStream(load_calibration())
+    state = FlightState(stream)
+    for sent in radio(given, rate_hz=100, aircraft=record.aircraft.name, flight_card=data):
+        stream.feed(sent.data, sent.t_s)
+    said = [event["text"] for event in state.events if event["text"].startswith("row")]
+    assert said == ["row 1 begins", "row 1 ends: done", "row 2 begins", "row 2 ends: done"]
 
 
 def test_the_aircraft_flies_what_the_logger_adds_and_the_host_finds_it(tmp_path: Path) -> None:

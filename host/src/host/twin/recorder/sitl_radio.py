@@ -71,10 +71,10 @@ def radio(
     instrument = Sitl(recorder_library())
     instrument.set_file_blocks(blocks)
     try:
-        instrument.insert_card(image, sitl.CARD_ID)
         sitl.configure(instrument, rate_hz, aircraft)
-        if flight_card:
+        if flight_card:  # before the card is in: a power-on of its own writes it
             instrument.set_eeprom(eeprom_with_card(instrument.eeprom(), flight_card))
+        instrument.insert_card(image, sitl.CARD_ID)
         sitl.give(instrument, given, given.duration)
         instrument.power_on()
         sent = 0
