@@ -108,6 +108,25 @@ def test_a_point_as_the_card_wants_it_is_good_soon_after_its_end(
     assert 0.0 <= said["said_s"] - said["end_s"] <= 0.6
 
 
+TONES = [["elevator", 8, 0.6, 0.1], ["elevator", 14, 0.6, 0.4], ["rudder", 11, 0.9, 0.0]]
+SINES: dict[str, object] = {
+    "kind": "multisine", "axis": ["elevator", "rudder"], "amplitude": [3.0, 3.0],
+    "duration_s": 8.0, "tones": TONES,
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_tones_that_the_card_names_are_what_it_wants(response: AircraftResponse) -> None:
+    """As `host plan --optimal` writes them; flown at half of the amplitude it says so."""
+    card = parse({**CARD, "segment": [{"kind": "trim", "duration_s": 10}, SINES]}, "sines")
+    wanted = card.segments[1]
+    whole = only(watched(card, flown(response, [(START_S, wanted)], seconds=40.0)))
+    assert (whole["good"], whole["flown"]) == (True, "elevator multisine"), whole
+    half = replace(wanted, amplitudes=(1.5, 1.5))
+    said = only(watched(card, flown(response, [(START_S, half)], seconds=40.0)))
+    assert re.search("amplitude (4[5-9]|5[0-5]) % of what is wanted", said["text"]), said
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

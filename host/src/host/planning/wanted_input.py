@@ -15,6 +15,7 @@ from host.twin.testcard.input_shapes import (
     multisine_signal,
     staircase,
     sweep_signal,
+    tone_signal,
 )
 
 SURFACES = ("elevator", "aileron", "rudder")
@@ -57,6 +58,8 @@ def _waves(segment: Segment, t: Array) -> list[Array]:
         switches = np.concatenate([[0.0], np.cumsum(lengths)])
         levels = np.array([sign for sign, _ in STEPS[segment.kind]])
         return [staircase(t, switches, levels, HAND_S)] * many
+    if segment.tones:
+        return [tone_signal(t, length_s, segment.tones_of(axis)) for axis in segment.axes]
     if segment.kind == "multisine":
         sums = multisine(length_s, *band, many)
         return [multisine_signal(t, length_s, f, phase) for f, phase in zip(*sums, strict=True)]

@@ -218,7 +218,7 @@ def _fly_input(
         span = _span(t, begin - 0.1, end + 0.1)
         local = t[span] - start_s
         if s.tones:
-            waves = [tone_signal(local, s.duration_s, _tones_of(s, axis)) for axis in s.axes]
+            waves = [tone_signal(local, s.duration_s, s.tones_of(axis)) for axis in s.axes]
         elif s.kind == "multisine":
             sums = multisine(s.duration_s, s.low_hz, s.high_hz, len(s.axes))
             waves = [
@@ -239,11 +239,6 @@ def _fly_input(
     back = _span(t, again, again + 0.4)
     into.attention[back] = attention + (1.0 - attention) * (t[back] - again) / 0.4
     return begin, end, again
-
-
-def _tones_of(s: Segment, axis: str) -> Array:
-    own = [(tone.harmonic, tone.share, tone.phase_turn) for tone in s.tones if tone.axis == axis]
-    return np.array(own, dtype=np.float64)
 
 
 def _span(t: Array, first_s: float, last_s: float) -> slice:

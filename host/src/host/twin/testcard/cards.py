@@ -7,6 +7,9 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from host.aircraft.air import Air
 from host.errors import UsageError
 from host.files import toml_reader
@@ -117,6 +120,11 @@ class Segment:
     airspeed_mps: float = 0.0
     attention: float = -1.0  # of the pilot during the input; -1: 0 for steps, 0.25 for long inputs
     tones: tuple[Tone, ...] = ()
+
+    def tones_of(self, axis: str) -> NDArray[np.float64]:
+        """Return the tones of one axis (k, 3), as `tone_signal` takes them."""
+        own = [(t.harmonic, t.share, t.phase_turn) for t in self.tones if t.axis == axis]
+        return np.array(own, dtype=np.float64).reshape(-1, 3)
 
 
 @dataclass(frozen=True, slots=True)
