@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from flight.rig import FlightRig
+
+# Whether the card may have made a pulse: its start, its width, the sticks' widths by then; cycles.
+Made = Callable[[int, int, NDArray[np.int64]], bool]
 
 MS = 16_000
 SERVOS = ("aileron", "elevator", "rudder", "throttle")
@@ -33,23 +38,37 @@ def worst_gap_ms(rig: FlightRig, since: int, *, servos: tuple[str, ...] = SERVOS
     return worst / MS
 
 
-def spoiled(rig: FlightRig, since: int, servo: str) -> int:
-    """Pulses at a servo that are not within 5 us of one the receiver sent in the last 120 ms.
+def strange(rig: FlightRig, since: int, servo: str) -> Iterator[tuple[int, int, NDArray[np.int64]]]:
+    """Give pulses at a servo that are not within 5 us of one the receiver sent in the last 120 ms.
 
-    A bouncing contact cuts one pulse into several: pieces less than 3 ms apart count as one.
+    Of each its start and width, and the widths sent by then, all in cycles.
     """
     channel = SERVOS.index(servo)
     sent = np.array([(end - start, end) for c, start, end in rig.receiver.sent if c == channel])
+    pulses = rig.relay.servo_pulses(servo)
+    for start, end in pulses[pulses[:, 0] >= since].tolist():
+        recent = sent[(sent[:, 1] > start - 120 * MS) & (sent[:, 1] < end + MS), 0]
+        if not np.any(np.abs(recent - (end - start)) <= 80):
+            yield start, end - start, recent
+
+
+def nobodys(start: int, width: int, sticks: NDArray[np.int64]) -> bool:
+    """No input may be flown: what is not the pilot's is spoilt."""
+    return False
+
+
+def spoiled(rig: FlightRig, since: int, servo: str, made: Made = nobodys) -> int:
+    """Count pulses at a servo that are neither the pilot's nor, by `made`, the card's.
+
+    A bouncing contact cuts one pulse into several: pieces less than 3 ms apart count as one.
+    """
     count = 0
     last = -MS * 100
-    for start, end in rig.relay.servo_pulses(servo):
-        if start < since:
-            continue
-        recent = sent[(sent[:, 1] > start - 120 * MS) & (sent[:, 1] < end + MS), 0]
-        if np.any(np.abs(recent - (end - start)) <= 80):
+    for start, width, sticks in strange(rig, since, servo):
+        if made(start, width, sticks):
             continue
         count += start - last > 3 * MS
-        last = end
+        last = start + width
     return count
 
 

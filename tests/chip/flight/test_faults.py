@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,8 +11,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
+    from flight.faults.during_input import FlownRow
     from flight.rig import FlightRig
     from simavr_bench.card_journal import CardJournal
+
+    InInput = tuple[FlightRig, CardJournal, FlownRow]
 
 CHOSEN = (
     "card busy 1.2 s",
@@ -43,6 +47,60 @@ def test_fault_in_flight(
 
     fault = next(fault for fault in FAULTS if fault.injected == injected)
     assert in_fork(partial(run_fault, *recording, fault, tmp_path)).wrong == []
+
+
+# While a row of a card is flown: one of each way in which the firmware learns of a fault, and one
+# that it survives.
+DURING_INPUT = (
+    "card busy 1.2 s",
+    "block refused twice",
+    "pressure sensor silent",
+    "IMU dies holding SCL",
+    "all channels lost",
+    "failsafe pulses: switch 920 us",
+    "no conversion ever ends",
+    "watchdog reset",
+    "main loop hangs",
+    "GPS silent",
+)
+
+
+@pytest.fixture(scope="module")
+def in_input(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[InInput]:
+    """A rig in the middle of a row of a card: for children made by in_fork only."""
+    from flight.faults.during_input import input_rig
+
+    found = input_rig(flight_elf, tmp_path_factory.mktemp("in_input"), threshold_volt=0.8)
+    yield found
+    found[0].chip.close()
+
+
+@pytest.mark.parametrize("injected", DURING_INPUT)
+def test_fault_while_a_row_is_flown(in_input: InInput, tmp_path: Path, injected: str) -> None:
+    from flight.faults.rows import FAULTS
+    from flight.faults.run import run_fault
+    from simavr_bench import in_fork
+
+    rig, journal, row = in_input
+    fault = next(fault for fault in FAULTS if fault.injected == injected)
+    assert in_fork(partial(run_fault, rig, journal, fault, tmp_path, row)).wrong == []
+
+
+def test_an_input_that_goes_on_or_is_nobodys_is_said(in_input: InInput, tmp_path: Path) -> None:
+    """A flight without a fault, judged as if one must end its row; then as if none was flown."""
+    from flight.faults.rows import NONE
+    from flight.faults.run import run_fault
+    from simavr_bench import in_fork
+
+    rig, journal, row = in_input
+    none = replace(NONE, injected="IMU silent", fault_s=0.5, after_s=1.0)
+    wrong = in_fork(partial(run_fault, rig, journal, none, tmp_path, row)).wrong
+    assert len(wrong) == 1
+    assert wrong[0].startswith("deflected")
+    wrong = in_fork(partial(run_fault, rig, journal, none, tmp_path)).wrong
+    assert [one.partition(" at ")[2].partition(",")[0] for one in wrong] == [
+        "aileron", "elevator", "rudder",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

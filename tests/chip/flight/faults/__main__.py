@@ -2,6 +2,7 @@
 
     make faults                       the table
     make faults FAULTS="--only IMU"   rows whose text holds this
+    make faults FAULTS="--during-input"   the faults in flight while a row of a card is flown
 
 Simulation only. Every fault starts from the same state, in flight with the Mega driving; the log is
 decoded and the file system checked afterwards; the table is run with the threshold of the relay's
@@ -19,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from flight.faults.boot import run_boots
+from flight.faults.during_input import input_rig
 from flight.faults.model import Fault, Outcome
 from flight.faults.rows import FAULTS
 from flight.faults.run import ready_rig, run_fault
@@ -41,20 +43,28 @@ def line(fault: Fault, seen: Outcome) -> str:
     )
 
 
-def run_table(elf: Path, folder: Path, threshold_volt: float, *, only: str) -> tuple[int, float]:
+def run_table(
+    elf: Path, folder: Path, threshold_volt: float, *, only: str, during_input: bool
+) -> tuple[int, float]:
     """Print every row with one transistor; gives the wrong ones and the lowest gate voltage."""
     print(f"threshold of the relay's transistor {threshold_volt} V")
     head = f"{'injected':31} {'expected':33} {'gap':>4} {'lost':>5} {'back':>6} {'gate':>5}"
     print(f"{'#':3} {head}  seen in the log", flush=True)
-    rig, journal = ready_rig(elf, folder, threshold_volt=threshold_volt)
+    row = None
+    if during_input:
+        rig, journal, row = input_rig(elf, folder, threshold_volt=threshold_volt)
+    else:
+        rig, journal = ready_rig(elf, folder, threshold_volt=threshold_volt)
     bad, gate_volt = 0, float("inf")
     for fault in FAULTS:
         if only not in fault.injected:
             continue
-        seen = in_fork(partial(run_fault, rig, journal, fault, folder))
+        seen = in_fork(partial(run_fault, rig, journal, fault, folder, row))
         bad += bool(seen.wrong)
         gate_volt = float(np.fmin(gate_volt, seen.beats.gate_volt))
         print(line(fault, seen), flush=True)
+    if during_input:  # a card that is swapped is one that was pulled, until the ground
+        return bad, gate_volt
     more, volt = run_swaps(rig, journal, only=only)
     return bad + more, min(gate_volt, volt)
 
@@ -63,6 +73,12 @@ def main() -> int:
     """Print the tables; 0 if every row is as expected, else 6."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--only", default="", help="rows whose text holds this")
+    parser.add_argument(
+        "--during-input", action="store_true", help="while a row of a flight card is flown"
+    )
+    parser.add_argument(
+        "--threshold", type=float, choices=THRESHOLDS_VOLT, help="of one transistor only, V"
+    )
     options = parser.parse_args()
     bad = 0
     volts = []
@@ -72,14 +88,19 @@ def main() -> int:
         folder = Path(name)
         elf = Path(shutil.copy(build_image("mega2560"), folder / "firmware.elf"))
         for threshold_volt in THRESHOLDS_VOLT:
-            wrong, volt = run_table(elf, folder, threshold_volt, only=options.only)
+            if options.threshold not in (None, threshold_volt):
+                continue
+            wrong, volt = run_table(
+                elf, folder, threshold_volt, only=options.only, during_input=options.during_input
+            )
             bad += wrong
             volts.append(volt)
-        print("cards at power-on")
-        bad += run_boots(elf, folder, only=options.only)
-        wrong, volt = run_strange(elf, folder, only=options.only)
-        bad += wrong
-        volts.append(volt)
+        if not options.during_input:
+            print("cards at power-on")
+            bad += run_boots(elf, folder, only=options.only)
+            wrong, volt = run_strange(elf, folder, only=options.only)
+            bad += wrong
+            volts.append(volt)
     print(f"lowest gate voltage {min(volts):.2f} V, limit {LEAST_GATE_VOLT} V")
     print(f"{bad} rows are not as expected")
     return 6 if bad else 0

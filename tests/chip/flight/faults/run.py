@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from flight.cut_flight import FILE_BLOCKS, place_of_file
+from flight.faults.during_input import FlownRow, how_it_ended, judge_input
 from flight.faults.model import CLOCK_LATE_US, Event, Fault, Outcome, Seen, event_names, valid_bit
 from flight.rig import FlightRig, check_card, make_card, take_log
-from flight.servos import LONGEST_GAP_MS, cuts_allowed, spoiled, worst_gap_ms
+from flight.servos import LONGEST_GAP_MS, SERVOS, cuts_allowed, nobodys, spoiled, worst_gap_ms
 from flight.settings import reference_image
 from simavr_bench.card_journal import CardJournal
 
@@ -30,8 +32,13 @@ def ready_rig(
     return rig, journal
 
 
-def run_fault(rig: FlightRig, journal: CardJournal, fault: Fault, folder: Path) -> Outcome:
-    """Fly on from the state of the rig with a fault; only in a child of in_fork."""
+def run_fault(
+    rig: FlightRig, journal: CardJournal, fault: Fault, folder: Path, row: FlownRow | None = None
+) -> Outcome:
+    """Fly on from the state of the rig with a fault; only in a child of in_fork.
+
+    With the row of a card that is being flown, its input is judged beside.
+    """
     import host
 
     begin = rig.chip.cycle
@@ -42,7 +49,7 @@ def run_fault(rig: FlightRig, journal: CardJournal, fault: Fault, folder: Path) 
     rig.chip.run_s(fault.after_s)
     over = rig.chip.cycle
     gap_ms = worst_gap_ms(rig, begin, servos=fault.servos) if fault.servos else float("nan")
-    wrong = _judge_pilot(rig, fault, begin, gap_ms)
+    wrong = _judge_pilot(rig, fault, begin, gap_ms, row)
     beats = rig.beats(may_stop=fault.may_stop)
     wrong += beats.wrong()
     rig.chip.power_off()
@@ -64,16 +71,22 @@ def run_fault(rig: FlightRig, journal: CardJournal, fault: Fault, folder: Path) 
     if fault.recovers and not recovered_s < fault.after_s - 0.2:
         wrong.append("not recovered")
     wrong += fault.check(seen)
-    return Outcome(gap_ms, lost, recovered_s, beats, wrong, _said(seen))
+    if row is not None:
+        wrong += judge_input(seen, fault, row)
+    said = ([] if row is None else [f"input: {how_it_ended(seen, row)}"]) + _said(seen)
+    return Outcome(gap_ms, lost, recovered_s, beats, wrong, said)
 
 
-def _judge_pilot(rig: FlightRig, fault: Fault, begin: int, gap_ms: float) -> list[str]:
+def _judge_pilot(
+    rig: FlightRig, fault: Fault, begin: int, gap_ms: float, row: FlownRow | None
+) -> list[str]:
     wrong = []
     if fault.servos and not gap_ms <= LONGEST_GAP_MS:
         wrong.append(f"gap of {gap_ms:.0f} ms")
     allowed = cuts_allowed(rig, begin)
     for servo in fault.servos:
-        count = spoiled(rig, begin, servo)
+        made = nobodys if row is None else partial(row.made, SERVOS.index(servo))
+        count = spoiled(rig, begin, servo, made)
         if count > allowed:
             wrong.append(f"{count} spoilt pulses at {servo}, allowed {allowed}")
     engaged = rig.relay.engaged
