@@ -46,10 +46,11 @@ constexpr uint8_t kShortAnswer = offsetof(Answer, data);
 constexpr uint8_t kLongestEnvelope = sizeof(Answer) + 1 + core::kEnvelopeOverhead;
 
 void send(const Answer& answer, uint8_t size) {
-  core::send_envelope([](uint8_t byte) { hal::send_byte(hal::Port::kUsb, byte); },
-                      frames::kCardAnswer,
-                      &answer,
-                      size);
+  core::send_envelope(
+      [](const uint8_t* bytes, uint8_t count) { hal::send_bytes(hal::Port::kUsb, bytes, count); },
+      frames::kCardAnswer,
+      &answer,
+      size);
 }
 
 void say(CardCommand command,

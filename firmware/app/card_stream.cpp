@@ -26,6 +26,12 @@ void CardStream::start(uint32_t first_lba) {
 CardStatus CardStream::step(uint32_t now_us) {
   if (block_open_) return next_block(now_us);
   if (!open_) return writer_.due(now_us) ? open(now_us) : CardStatus::kOk;
+  // It has been idle since the last block, and is asked again for the next.
+  if (!programming_ && !writer_.due(now_us)) {
+    busy_from_us_ = now_us;
+    tell_stall(now_us);
+    return CardStatus::kOk;
+  }
   switch (hal::poll_stream()) {
     case CardStatus::kBusy:
       return now_us - busy_from_us_ >= kDeadUs ? failed(CardStatus::kBusy) : CardStatus::kOk;

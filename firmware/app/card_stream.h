@@ -29,7 +29,9 @@ class CardStream {
  private:
   // Hands bytes of a block to the card.
   struct Sink {
-    void put(const uint8_t* bytes, uint16_t size) { hal::put_block(bytes, size); }
+    void put(const uint8_t* bytes, uint16_t size, core::Crc32& crc) {
+      crc.set_state(hal::put_block(bytes, size, crc.state()));
+    }
   };
 
   hal::CardStatus open(uint32_t now_us);

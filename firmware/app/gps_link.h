@@ -13,7 +13,7 @@ class GpsLink {
 
   bool send(const uint8_t* bytes, uint8_t size) {
     if (hal::send_room(hal::Port::kGps) < size) return false;
-    for (uint8_t i = 0; i < size; ++i) hal::send_byte(hal::Port::kGps, bytes[i]);
+    hal::send_bytes(hal::Port::kGps, bytes, size);
     return true;
   }
 };

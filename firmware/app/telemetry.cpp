@@ -61,8 +61,11 @@ bool Telemetry::send(uint8_t id, const void* fields, uint8_t size, uint32_t now_
   const uint8_t total = static_cast<uint8_t>(size + 1 + core::kEnvelopeOverhead);
   if (hal::send_room(hal::Port::kTelemetry) < total) return false;
   if (!budget_.take(total, now_us)) return false;
-  core::send_envelope(
-      [](uint8_t byte) { hal::send_byte(hal::Port::kTelemetry, byte); }, id, fields, size);
+  core::send_envelope([](const uint8_t* bytes,
+                         uint8_t count) { hal::send_bytes(hal::Port::kTelemetry, bytes, count); },
+                      id,
+                      fields,
+                      size);
   return true;
 }
 

@@ -21,7 +21,10 @@ uint16_t to_ms(uint32_t now_us) {
 
 void send(uint8_t id, const void* fields, uint8_t size) {
   core::send_envelope(
-      [](uint8_t byte) { hal::send_byte(hal::Port::kUsb, byte); }, id, fields, size);
+      [](const uint8_t* bytes, uint8_t count) { hal::send_bytes(hal::Port::kUsb, bytes, count); },
+      id,
+      fields,
+      size);
 }
 
 }  // namespace

@@ -22,10 +22,7 @@ void BlockWriter::start(uint32_t file_id,
   identities_due_ = true;
 }
 
-bool BlockWriter::due(uint32_t now_us) {
-  if (due_) {
-    return true;
-  }
+bool BlockWriter::decide(uint32_t now_us) {
   if (!schema_pass() && !finishing_ && now_us - schema_us_ >= kSchemaReturnUs) {
     schema_us_ = now_us;
     schema_offset_ = 0;
@@ -64,7 +61,6 @@ const uint8_t* BlockWriter::next_piece(uint8_t* stage, uint16_t limit, uint16_t&
     put_le(stage, crc_.value());
     size = 4;
   }
-  crc_.add(piece, size);
   position_ = static_cast<uint16_t>(position_ + size);
   return piece;
 }

@@ -27,17 +27,26 @@ class BlockWriter {
   bool drained() const { return finishing_ && !due_ && ring_.used() == 0; }
 
   // Call while the card is idle. True: a block is due; hand it out with `stream`.
-  bool due(uint32_t now_us);
+  __attribute__((always_inline)) bool due(uint32_t now_us) {
+    if (due_) return true;
+    // In most turns nothing is.
+    if (ring_.used() < kBlockPayloadSize && !schema_pass() && !finishing_ &&
+        now_us - schema_us_ < kSchemaReturnUs) {
+      return false;
+    }
+    return decide(now_us);
+  }
 
-  // Hands out at most `limit` bytes to `sink.put(const uint8_t*, uint16_t)`; the first call the
-  // whole header. True when all 512 are out; then call one of the three below.
+  // Hands out at most `limit` bytes to `sink.put(const uint8_t*, uint16_t, Crc32&)`, which adds
+  // them to the CRC; the first call the whole header. True when all 512 are out; then call one of
+  // the three below.
   template <typename Sink>
   bool stream(Sink& sink, uint16_t limit) {
     uint8_t stage[kStage];
     while (position_ < kBlockSize && limit != 0) {
       uint16_t size = 0;
       const uint8_t* piece = next_piece(stage, limit, size);
-      sink.put(piece, size);
+      sink.put(piece, size, crc_);
       limit = size < limit ? static_cast<uint16_t>(limit - size) : 0;
     }
     return position_ >= kBlockSize;
@@ -59,6 +68,7 @@ class BlockWriter {
   static constexpr uint8_t kStage = 32;
   static constexpr uint16_t kSchemaPiece = kBlockPayloadSize - 4;
 
+  bool decide(uint32_t now_us);
   const uint8_t* next_piece(uint8_t* stage, uint16_t limit, uint16_t& size);
   const uint8_t* payload_piece(uint8_t* stage, uint16_t limit, uint16_t& size) const;
 

@@ -16,16 +16,17 @@ constexpr uint8_t kEnvelopeSync1 = 0x5A;
 // longer than 128 bytes. `to` holds size + 6 bytes.
 uint8_t put_envelope(uint8_t* to, uint8_t id, const void* fields, uint8_t size);
 
-// The same, byte by byte to `put(uint8_t)`, without room for it; `size` below kEnvelopeMaxFrame.
+// The same in pieces to `put(const uint8_t*, uint8_t)`, without room for it; `size` below
+// kEnvelopeMaxFrame.
 template <typename Put>
 void send_envelope(Put put, uint8_t id, const void* fields, uint8_t size) {
   const uint8_t head[] = {kEnvelopeSync0, kEnvelopeSync1, static_cast<uint8_t>(size + 1), id};
   const uint8_t* const bytes = static_cast<const uint8_t*>(fields);
   const uint16_t crc = crc16(crc16(kCrc16Start, head + 2, 2), bytes, size);
-  for (const uint8_t byte : head) put(byte);
-  for (uint8_t i = 0; i < size; ++i) put(bytes[i]);
-  put(static_cast<uint8_t>(crc & 0xFFU));
-  put(static_cast<uint8_t>(crc >> 8));
+  const uint8_t tail[] = {static_cast<uint8_t>(crc & 0xFFU), static_cast<uint8_t>(crc >> 8)};
+  put(head, uint8_t{sizeof head});
+  put(bytes, size);
+  put(tail, uint8_t{sizeof tail});
 }
 
 // Feed it every received byte; `frame` is good until the next call of `byte`.

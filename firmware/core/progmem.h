@@ -35,18 +35,6 @@ inline uint16_t flash_u16(const void* at) {
 #endif
 }
 
-inline uint32_t flash_u32(const void* at) {
-#ifdef __AVR__
-  uint32_t value;
-  __asm__("lpm %A0, Z+\n\tlpm %B0, Z+\n\tlpm %C0, Z+\n\tlpm %D0, Z" : "=r"(value), "+z"(at));
-  return value;
-#else
-  uint32_t value;
-  memcpy(&value, at, sizeof(value));
-  return value;
-#endif
-}
-
 inline void flash_copy(void* to, const void* from, uint16_t size) {
   uint8_t* out = static_cast<uint8_t*>(to);
   const uint8_t* in = static_cast<const uint8_t*>(from);

@@ -96,7 +96,7 @@ class SdCard {
       spi_.transfer(0xFF);
       wire_.open_block(Wire::kTokenBlock);
     }
-    wire_.put(from + sent_, kPortion);
+    (void)wire_.put(from + sent_, kPortion, 0);
     sent_ = static_cast<uint16_t>(sent_ + kPortion);
     if (sent_ < 512) {
       return CardStep::kAgain;
@@ -143,7 +143,9 @@ class SdCard {
     spi_.transfer(0xFF);
     wire_.open_block(Wire::kTokenMany);
   }
-  void put(const uint8_t* data, uint16_t size) { wire_.put(data, size); }
+  uint32_t put(const uint8_t* data, uint16_t size, uint32_t crc32) {
+    return wire_.put(data, size, crc32);
+  }
   CardWrite end_block() {
     const CardWrite result = wire_.close_block();
     if (result == CardWrite::kAccepted) {

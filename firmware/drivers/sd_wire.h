@@ -35,6 +35,8 @@ enum class CardWrite : uint8_t {
 
 // Spi: uint8_t transfer(uint8_t)   one byte out and in
 //      void send(uint8_t)          one byte out; may return while it is shifted
+//      uint32_t send_all(const uint8_t*, uint16_t, uint16_t& crc16, uint32_t crc32)
+//                                  many, added to both meanwhile; the second's state behind them
 //      void ask()                  begins a byte in
 //      uint8_t next(), last()      that byte, with another begun or not
 //      void select(), deselect()   chip select low, high
@@ -133,14 +135,9 @@ class SdWire {
     crc_ = core::kCrc16StartCard;
   }
 
-  void put(const uint8_t* data, uint16_t size) {
-    uint16_t crc = crc_;
-    while (size-- != 0) {
-      const uint8_t byte = *data++;
-      spi_.send(byte);
-      crc = core::crc16_add(crc, byte);
-    }
-    crc_ = crc;
+  // Bytes of the block, and a CRC-32 of them for whoever wants one.
+  uint32_t put(const uint8_t* data, uint16_t size, uint32_t crc32) {
+    return spi_.send_all(data, size, crc_, crc32);
   }
   CardWrite close_block() {
     const uint16_t crc = crc_;

@@ -17,8 +17,9 @@ bool take_byte(Port port, uint8_t* byte);
 // Room for bytes to send; the peer's "stop" (CTS) shows as room that does not grow.
 uint16_t send_room(Port port);
 
-// Queues a byte; only when there is room. Main loop only.
+// Queues a byte or some; only when there is room. Main loop only.
 void send_byte(Port port, uint8_t byte);
+void send_bytes(Port port, const uint8_t* bytes, uint8_t size);
 
 // Bytes lost because nobody took them, since boot.
 uint16_t lost_bytes(Port port);

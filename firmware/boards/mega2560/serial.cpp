@@ -18,16 +18,19 @@ class Fifo {
   static constexpr uint8_t kHead = kSize;
   static constexpr uint8_t kTail = kSize + 1;
 
-  bool put(const uint8_t byte) {
-    const uint8_t head = head_;
-    const uint8_t next = after(head);
-    if (next == tail_) {
-      return false;
+  // Those for which there is room.
+  void put(const uint8_t* bytes, uint8_t size) {
+    uint8_t head = head_;
+    for (; size != 0; --size) {
+      const uint8_t next = after(head);
+      if (next == tail_) {
+        break;
+      }
+      bytes_[head] = *bytes++;
+      head = next;
     }
-    bytes_[head] = byte;
     __asm__ __volatile__("" ::: "memory");
-    head_ = next;
-    return true;
+    head_ = head;
   }
 
   bool take(uint8_t* const byte) {
@@ -242,21 +245,25 @@ uint16_t send_room(const Port port) {
 }
 
 void send_byte(const Port port, const uint8_t byte) {
+  send_bytes(port, &byte, 1);
+}
+
+void send_bytes(const Port port, const uint8_t* const bytes, const uint8_t size) {
   switch (port) {
     case Port::kUsb: {
-      g_usb_out.put(byte);
+      g_usb_out.put(bytes, size);
       const avr::InterruptsOff guard;
       UCSR0B |= _BV(UDRIE0);
       break;
     }
     case Port::kGps: {
-      g_gps_out.put(byte);
+      g_gps_out.put(bytes, size);
       const avr::InterruptsOff guard;
       UCSR2B |= _BV(UDRIE0);
       break;
     }
     case Port::kTelemetry: {
-      g_radio_out.put(byte);
+      g_radio_out.put(bytes, size);
       const avr::InterruptsOff guard;
       UCSR3B |= _BV(UDRIE0);
       break;

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "boards/sitl/world.h"
+#include "core/crc.h"
 #include "hal/block_device.h"
 #include "hal/eeprom.h"
 #include "hal/panel.h"
@@ -136,11 +137,15 @@ void open_block() {
   block_filled = 0;
 }
 
-void put_block(const uint8_t* bytes, uint16_t size) {
+uint32_t put_block(const uint8_t* bytes, uint16_t size, uint32_t crc32) {
   world().advance_to(world().now + size * kSpiByteTicks);
   for (uint16_t i = 0; i < size && block_filled < kCardBlockBytes; ++i) {
     block[block_filled++] = bytes[i];
   }
+  core::Crc32 crc;
+  crc.set_state(crc32);
+  crc.add(bytes, size);
+  return crc.state();
 }
 
 CardStatus close_block() {
@@ -176,6 +181,10 @@ void send_byte(Port port, uint8_t byte) {
   sitl::PortModel& to = model(port);
   to.sent.push_back(byte);
   to.drained_at = std::max(to.drained_at, world().now) + byte_ticks(to);
+}
+
+void send_bytes(Port port, const uint8_t* bytes, uint8_t size) {
+  while (size-- != 0) send_byte(port, *bytes++);
 }
 
 uint16_t lost_bytes(Port port) {

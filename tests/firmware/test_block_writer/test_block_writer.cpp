@@ -31,7 +31,8 @@ uint8_t buffer[kRing];
 uint8_t block[core::kBlockSize];
 
 struct Card {
-  void put(const uint8_t* data, uint16_t size) {
+  void put(const uint8_t* data, uint16_t size, core::Crc32& crc) {
+    crc.add(data, size);
     if (at + size <= core::kBlockSize) {
       memcpy(block + at, data, size);
     }

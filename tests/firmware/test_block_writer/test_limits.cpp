@@ -36,7 +36,8 @@ struct Card {
   uint16_t at = 0;
   uint16_t most = 0;  // bytes put at once; header and CRC always go whole
 
-  void put(const uint8_t* data, uint16_t size) {
+  void put(const uint8_t* data, uint16_t size, core::Crc32& crc) {
+    crc.add(data, size);
     most = at != 0 && at != core::kBlockCrcOffset && size > most ? size : most;
     if (at + size <= core::kBlockSize) {
       memcpy(block + at, data, size);

@@ -50,6 +50,16 @@ class ModelCard {
     take(out);
     return reply;
   }
+  uint32_t send_all(const uint8_t* from, uint16_t size, uint16_t& crc16, uint32_t crc32) {
+    core::Crc32 crc;
+    crc.set_state(crc32);
+    crc.add(from, size);
+    for (uint16_t i = 0; i < size; ++i) {
+      crc16 = core::crc16_add(crc16, from[i]);
+      transfer(from[i]);
+    }
+    return crc.state();
+  }
   void send(uint8_t out) { transfer(out); }
   void ask() { asked_ = transfer(0xFF); }
   uint8_t next() {

@@ -140,8 +140,8 @@ uint16_t send_room(hal::Port port) {
   return port == hal::Port::kUsb ? static_cast<uint16_t>(kQueueBytes - g_port->queued) : 0;
 }
 
-void send_byte(hal::Port, uint8_t byte) {
-  g_port->put(byte);
+void send_bytes(hal::Port, const uint8_t* bytes, uint8_t size) {
+  while (size-- != 0) g_port->put(*bytes++);
 }
 
 }  // namespace hal
