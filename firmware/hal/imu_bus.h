@@ -18,6 +18,9 @@ struct ImuPacket {
 // Answers addresses 42, 43 and 27. Once, at boot.
 void start_imu_bus();
 
+// Whether there is one. Main loop only.
+bool imu_packet_waits();
+
 // The oldest packet ended by STOP or repeated START, or nullptr. It stays until
 // release_imu_packet(); two are held, a third is lost and counted. Main loop only.
 const ImuPacket* imu_packet();

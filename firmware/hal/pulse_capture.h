@@ -16,6 +16,9 @@ struct Edge {
 // Arms the inputs. Once, at boot.
 void start_pulse_capture();
 
+// Whether there is one to be taken. Main loop only.
+bool edge_waits();
+
 // Takes the oldest edge; false if there is none. Main loop only, at least every 30 ms, else stamps
 // become ambiguous.
 bool take_edge(Edge* edge);

@@ -35,7 +35,7 @@ uint32_t g_begin_us;
 void end(const TransferStatus status) {
   TWCR = kStop;
   g_status = status;
-  avr::g_awake = true;
+  avr::wake();
 }
 
 void put_next() {
@@ -191,7 +191,7 @@ TransferStatus transfer(uint8_t address, uint8_t* buffer, uint8_t out_size, uint
   while (poll_transfer() == TransferStatus::kBusy) {
     sleep_until_interrupt();
   }
-  avr::g_awake = true;  // something for the main loop may have ended these sleeps
+  avr::wake();  // something for the main loop may have ended these sleeps
   return poll_transfer();
 }
 

@@ -37,11 +37,11 @@ ISR(TIMER1_OVF_vect) {
 
 ISR(TIMER1_COMPA_vect) {
   TIMSK1 = _BV(TOIE1);
-  avr::g_awake = true;
+  avr::wake();
 }
 
 ISR(TIMER0_COMPA_vect) {
-  avr::g_awake = true;
+  avr::wake();
 }
 
 // Late by the time of another interrupt if one runs: 9 us at most, that of TWI.
@@ -50,7 +50,7 @@ ISR(INT0_vect) {
   g_ready_turns = turns_at(ticks);
   g_ready_ticks = ticks;
   ++g_edges;
-  avr::g_awake = true;
+  avr::wake();
 }
 
 namespace arduimu {

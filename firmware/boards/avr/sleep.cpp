@@ -7,12 +7,6 @@
 #include "boards/avr/awake.h"
 #include "hal/system.h"
 
-namespace avr {
-
-volatile bool g_awake = false;
-
-}  // namespace avr
-
 namespace hal {
 
 void feed_watchdog() {
@@ -23,13 +17,13 @@ void sleep_until_interrupt() {
   SMCR = _BV(SE);  // idle
   for (;;) {
     cli();
-    if (avr::g_awake) {
+    if (avr::awake()) {
       break;
     }
     sei();  // takes effect behind the next instruction: no interrupt can slip in between
     sleep_cpu();
   }
-  avr::g_awake = false;
+  avr::fall_asleep();
   sei();
   SMCR = 0;
 }

@@ -5,7 +5,6 @@
 #include <avr/io.h>
 
 #include "boards/avr/awake.h"
-#include "boards/avr/interrupts_off.h"
 #include "boards/mega2560/board.h"
 
 // Counts turns of the timer, 32.768 ms each; 17 bits of it reach now_us(). Shared with the assembly
@@ -21,27 +20,38 @@ volatile Turns clock_turns __attribute__((used, externally_visible));
 namespace {
 
 struct Now {
-  uint16_t ticks;
-  uint16_t turns;
-  uint8_t odd;  // bit 16 of the turns
+  uint32_t ticks;
+  uint8_t odd;  // bit 32 of the ticks
 };
 
+// In assembly: the main loop asks 5000 times a second. Interrupts are off for 14 cycles, as the
+// timer's bytes share TEMP with the receiver's interrupt.
 inline __attribute__((always_inline)) Now now() {
   Now at;
-  bool uncounted;
-  {
-    const avr::InterruptsOff guard;  // the timer's bytes share TEMP with the receiver's interrupt
-    at.ticks = TCNT5;
-    uncounted = (TIFR5 & _BV(TOV5)) != 0;
-    at.turns = clock_turns.low;
-    at.odd = clock_turns.high;
-  }
-  if (uncounted && at.ticks < 0x8000U) {
-    ++at.turns;
-    if (at.turns == 0) {
-      ++at.odd;
-    }
-  }
+  uint8_t flags;
+  __asm__ __volatile__(
+      "in __tmp_reg__, __SREG__ \n\t"
+      "cli \n\t"
+      "lds %A[ticks], %[timer] \n\t"
+      "lds %B[ticks], %[timer]+1 \n\t"
+      "in %[flags], %[timer_flags] \n\t"
+      "lds %C[ticks], clock_turns \n\t"
+      "lds %D[ticks], clock_turns+1 \n\t"
+      "lds %[odd], clock_turns+2 \n\t"
+      "out __SREG__, __tmp_reg__ \n\t"
+      "sbrs %[flags], %[overflow] \n\t"
+      "rjmp 1f \n\t"
+      "sbrc %B[ticks], 7 \n\t"  // it came behind the look at the timer
+      "rjmp 1f \n\t"
+      "subi %C[ticks], 0xFF \n\t"  // not counted yet
+      "sbci %D[ticks], 0xFF \n\t"
+      "sbci %[odd], 0xFF \n\t"
+      "1: \n\t"
+      : [ticks] "=&d"(at.ticks), [odd] "=&d"(at.odd), [flags] "=&r"(flags)
+      : [timer] "n"(_SFR_MEM_ADDR(TCNT5)),
+        [timer_flags] "I"(_SFR_IO_ADDR(TIFR5)),
+        [overflow] "I"(TOV5)
+      : "memory");
   return at;
 }
 
@@ -76,7 +86,7 @@ ISR(TIMER5_OVF_vect, ISR_NAKED) {
 // stormed.
 extern "C" void __vector_millisecond(void) __attribute__((signal, used, externally_visible));
 void __vector_millisecond(void) {
-  avr::g_awake = true;
+  avr::wake();
   mega::tick_pulse_capture();
 }
 
@@ -127,15 +137,19 @@ void start_clock() {
 namespace hal {
 
 uint32_t now_us() {
-  // turns * 32768 + ticks / 2 in whole bytes and one shift: a shift by 15 is a loop of 75 cycles.
-  const Now at = now();
-  const uint32_t half = (uint32_t{at.turns} << 16 | at.ticks) >> 1;
-  return (at.odd & 1U) != 0 ? half | 0x80000000UL : half;
+  Now at = now();
+  __asm__(
+      "lsr %[odd] \n\t"
+      "ror %D[ticks] \n\t"
+      "ror %C[ticks] \n\t"
+      "ror %B[ticks] \n\t"
+      "ror %A[ticks] \n\t"
+      : [ticks] "+r"(at.ticks), [odd] "+r"(at.odd));
+  return at.ticks;
 }
 
 uint32_t now_ticks() {
-  const Now at = now();
-  return uint32_t{at.turns} << 16 | at.ticks;
+  return now().ticks;
 }
 
 }  // namespace hal

@@ -154,12 +154,18 @@ void start_pulse_capture() {
   PCICR |= _BV(PCIE2);
 }
 
+bool edge_waits() {
+  return capture_tail != capture_head;
+}
+
 bool take_edge(Edge* const edge) {
   const uint8_t tail = capture_tail;
   if (tail == capture_head) {
     return false;
   }
-  const volatile Stamp& stamp = capture_stamps[tail / sizeof(Stamp)];
+  // By its offset: its number would be a division.
+  const volatile Stamp& stamp = *reinterpret_cast<const volatile Stamp*>(
+      reinterpret_cast<const volatile uint8_t*>(capture_stamps) + tail);
   edge->at_ticks = stamp.ticks;
   edge->levels = stamp.levels & kLines;
   edge->late = (stamp.levels & kLate) != 0;

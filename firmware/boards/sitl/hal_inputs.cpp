@@ -26,6 +26,10 @@ uint32_t now_ticks() {
 
 void start_pulse_capture() {}
 
+bool edge_waits() {
+  return world().captured_taken != world().captured.size();
+}
+
 bool take_edge(Edge* edge) {
   sitl::World& w = world();
   if (w.captured_taken == w.captured.size()) {
@@ -46,6 +50,10 @@ uint8_t edge_storm() {
 }
 
 void start_imu_bus() {}
+
+bool imu_packet_waits() {
+  return world().held_count > 0;
+}
 
 const ImuPacket* imu_packet() {
   return world().held_count > 0 ? &world().held[0] : nullptr;
