@@ -16,7 +16,7 @@ constexpr uint32_t kSecondUs = 1000000UL;
 // Frame `system` takes 1.7 ms: in a storm of edges it waits for a shorter turn, 0.2 s at most.
 constexpr uint32_t kLongTurnUs = 500;
 constexpr uint8_t kMostPutOff = 20;
-constexpr uint8_t kCountedTurns = 127;  // a prime: no phase of the scan is left out
+constexpr uint8_t kCountedTurns = 251;  // a prime: no phase of the scan is left out
 constexpr uint16_t kShares = 256;
 // Waking for an interrupt and going back to sleep takes 14 cycles, a tenth of what a mean one
 // takes; a turn that counts does not sleep.
@@ -61,7 +61,7 @@ void Instrument::step() {
   const storage::Volume::Job job = recorder_.card_job();
   sensors_.step(config_, pilot_, outlet_, now_us);
   const bool made_frame = outlet_.frames() != frames;
-  if (inputs_.watch(sensors_, outlet_, hal::now_us())) pilot_.send(inputs_, outlet_);
+  if (inputs_.watch(sensors_, outlet_, now_us)) pilot_.send(inputs_, outlet_);
   pilot_.ran(kTaskSensors);
   // A receiver pulse that ends behind the pilot's step, or 0.3 ms before it, waits for the next,
   // and 2 ms is all it may: making a frame takes more than half of that, and so do the slow tasks.
@@ -115,7 +115,7 @@ void Instrument::step() {
 }
 
 // Of the time asleep, without the interrupts in it: their share is known from the turns counted,
-// eight a second, of about four seconds.
+// four a second, of about four seconds.
 uint32_t Instrument::idle_us() {
   if (counted_us_ == 0) return asleep_us_;
   const uint16_t shares = static_cast<uint16_t>(uint32_t{idle_us_} * kShares / counted_us_);

@@ -1,7 +1,6 @@
 #include "app/pilot_link.h"
 
 #include "hal/panel.h"
-#include "hal/pulse_capture.h"
 #include "hal/relay.h"
 #include "hal/servo_output.h"
 #include "hal/system.h"
@@ -14,31 +13,24 @@ void PilotLink::start() {
   lost_edges_ = hal::lost_edges();
 }
 
-void PilotLink::step(const frames::ConfigFrame& config,
+void PilotLink::look(const frames::ConfigFrame& config,
                      bool self_test_passed,
                      TestInputs& inputs,
                      Outlet& outlet,
                      uint32_t now_us) {
-  ran(kTaskPilot);
+  bool polls = due(inputs, now_us);
   hal::Edge edge;
-  const bool running = inputs.running();
-  bool due = decoder_.waiting() || now_us - polled_us_ >= (running ? kInputPollUs : kPollUs);
   while (hal::take_edge(&edge)) {
     decoder_.edge(core::extend_ticks(hal::now_ticks(), edge.at_ticks), edge.levels, edge.late);
-    due = due || decoder_.waiting();
+    polls = polls || decoder_.waiting();
   }
-  if (!due) return;
+  if (!polls) return;
   polled_us_ = now_us;
   poll_receiver(outlet, now_us);
   uint16_t rest_us = drive_.drive() == frames::Drive::kMegaHolding ? kHoldingRestUs : kRestUs;
-  // A frame and a half of silence ends an input at once: looked for each 2 ms.
-  const uint8_t now_2ms =
-      static_cast<uint8_t>(static_cast<uint16_t>(now_us >> 8U) >> kSilenceShift);
-  if (running && now_2ms != silence_2ms_) {
-    silence_2ms_ = now_2ms;
-    look_for_silence();
-    const uint16_t frame_us = decoder_.frame_us();
-    if (silent_us_ > frame_us + frame_us / 2U) rest_us = 0;
+  if (inputs.running() && may_be_silent(now_us)) {
+    look_for_silence(now_us);
+    if (silent_us_ > most_silent_us()) rest_us = 0;
   }
   if (now_us - decided_us_ >= rest_us || decoder_.changes() != decided_changes_) {
     decided_us_ = now_us;
@@ -66,10 +58,10 @@ void PilotLink::decide(const frames::ConfigFrame& config,
                        TestInputs& inputs,
                        Outlet& outlet,
                        uint32_t now_us) {
-  channels_ = core::map_channels(decoder_, config);
+  core::map_channels(decoder_, config, channels_);
   if (!drive_.relay()) look_at_contact(now_us);
   drive_.update(channels_, config, self_test_passed && !contact_stuck_, now_us);
-  if (inputs.enabled() && !inputs.running()) look_for_silence();
+  if (inputs.enabled()) look_for_silence(now_us);
   inputs.decide(
       channels_, decoder_, silent_us_, drive_.drive(), self_test_passed, config, outlet, now_us);
   send(inputs, outlet);

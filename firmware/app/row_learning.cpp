@@ -62,43 +62,38 @@ void RowLearning::keep(const frames::IdentFrame& ident) {
   }
 }
 
-bool RowLearning::step(Outlet& outlet, uint32_t now_us) {
-  if (task_ == Task::kNone) return false;
+void RowLearning::step(Outlet& outlet, uint32_t now_us) {
   if (task_ == Task::kLoad) {
     task_ = load() ? Task::kWait : Task::kNone;
-    return true;
+    return;
   }
   if (due_ != 0) {
     --due_;
     (void)sums_.take(card_, values_);
     slices_ = kSlicesPerSample;
-    return true;
+    return;
   }
   switch (task_) {
     case Task::kWait:
-      if (sums_.count() < solve_count_ + core::kSampleHz) return false;
       solve_count_ = sums_.count();
       solve_us_ = now_us;
       solver_.start(card_);
       task_ = Task::kSolve;
-      return true;
+      return;
     case Task::kSolve:
-      if (slices_ == 0) return false;
       --slices_;
-      if (!solver_.step(card_, sums_)) return true;
+      if (!solver_.step(card_, sums_)) return;
       signal_ = 0;
       all_enough_ = true;
       task_ = Task::kDerive;
-      return true;
+      return;
     case Task::kDerive:
-      // One for each sample: the radio has no room for all at once.
-      if (told_ == static_cast<uint8_t>(sums_.count())) return false;
       told_ = static_cast<uint8_t>(sums_.count());
       derive();
-      return true;
+      return;
     default:
       tell(outlet);
-      return true;
+      return;
   }
 }
 

@@ -27,10 +27,25 @@ class RowLearning {
   void see(const frames::IdentFrame& ident) {
     if (task_ > Task::kLoad && ++frames_ >= every_) keep(ident);
   }
-  // In turns of the main loop that do little else: one sample, one slice of a solve, one derivative
-  // or one frame, each below 0.3 ms. False: there was nothing to do. By its name a test on the chip
-  // finds it.
-  __attribute__((noinline)) bool step(Outlet& outlet, uint32_t now_us);
+  // Whether a step has something to do.
+  bool ready() const {
+    switch (task_) {
+      case Task::kNone:
+        return false;
+      case Task::kWait:
+        return due_ != 0 || sums_.count() >= solve_count_ + core::kSampleHz;
+      case Task::kSolve:
+        return due_ != 0 || slices_ != 0;
+      case Task::kDerive:
+        // One for each sample: the radio has no room for all at once.
+        return due_ != 0 || told_ != static_cast<uint8_t>(sums_.count());
+      default:
+        return true;
+    }
+  }
+  // In turns of the main loop that do little else, where it is ready: one sample, one slice of a
+  // solve, one derivative or one frame, each below 0.3 ms. By its name a test on the chip finds it.
+  __attribute__((noinline)) void step(Outlet& outlet, uint32_t now_us);
   // Every half-width that is wanted is small enough.
   bool enough() const { return enough_; }
 

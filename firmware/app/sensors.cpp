@@ -1,5 +1,6 @@
 #include "app/sensors.h"
 
+#include "core/bytes.h"
 #include "hal/analog_input.h"
 #include "hal/clock.h"
 #include "hal/imu_bus.h"
@@ -51,7 +52,7 @@ void Sensors::step(const frames::ConfigFrame& config,
                    const PilotLink& pilot,
                    Outlet& outlet,
                    uint32_t now_us) {
-  if (hal::imu_packet() != nullptr) {
+  if (hal::imu_packet_waits()) {
     step_imu(pilot, outlet);
     now_us = hal::now_us();  // the packet may be younger than this turn
   }
@@ -65,8 +66,8 @@ void Sensors::step(const frames::ConfigFrame& config,
 // Not in step(): most turns have no packet, and saving its registers took 0.3 % of the chip.
 __attribute__((noinline)) void Sensors::step_imu(const PilotLink& pilot, Outlet& outlet) {
   const uint32_t now_us = hal::now_us();
-  for (const hal::ImuPacket* packet = hal::imu_packet(); packet != nullptr;
-       packet = hal::imu_packet()) {
+  while (hal::imu_packet_waits()) {
+    const hal::ImuPacket* const packet = hal::imu_packet();
     // Of a packet that started a scan a frame is made before the next packet is looked at.
     const bool scan = packet->scan_after_us != 0;
     if (scan && scanning_) finish_ident(outlet);
@@ -179,24 +180,21 @@ void Sensors::begin_ident(const PilotLink& pilot, uint32_t t_us, bool imu_trigge
 
 void Sensors::finish_ident(Outlet& outlet) {
   scanning_ = false;
-  uint16_t sums[hal::kAnalogRail];
-  uint16_t valid = ident_.valid;
-  for (uint8_t slot = 0; slot < hal::kAnalogRail; ++slot) {
-    sums[slot] = hal::scan_sum(slot);
-    // The first ten bits of `valid` are the slots in their order.
-    if (usable(sums[slot])) valid = static_cast<uint16_t>(valid | (1U << slot));
-  }
+  static_assert(offsetof(frames::IdentFrame, pot_rudder) ==
+                    offsetof(frames::IdentFrame, alpha_a) + 2U * (hal::kAnalogRail - 1U),
+                "the fields stand in the order of the slots");
+  uint8_t* field = reinterpret_cast<uint8_t*>(&ident_) + offsetof(frames::IdentFrame, alpha_a);
+  // The first ten bits of `valid` are the slots in their order.
   static_assert(frames::kValidPotRudder == 1U << (hal::kAnalogRail - 1), "slots and bits agree");
-  ident_.alpha_a = sums[0];
-  ident_.alpha_b = sums[1];
-  ident_.beta_a = sums[2];
-  ident_.beta_b = sums[3];
-  ident_.dp_a = sums[4];
-  ident_.dp_b = sums[5];
-  ident_.pot_elevator = sums[6];
-  ident_.pot_aileron_left = sums[7];
-  ident_.pot_aileron_right = sums[8];
-  ident_.pot_rudder = sums[9];
+  uint16_t valid = ident_.valid;
+  uint16_t bit = 1;
+  for (uint8_t slot = 0; slot < hal::kAnalogRail; ++slot) {
+    const uint16_t sum = hal::scan_sum(slot);
+    core::put_le(field, sum);
+    field += sizeof sum;
+    if (usable(sum)) valid = static_cast<uint16_t>(valid | bit);
+    bit = static_cast<uint16_t>(bit << 1);
+  }
   ident_.valid = valid;
   analog_ = valid;
   rail_ = hal::scan_sum(hal::kAnalogRail);

@@ -179,14 +179,15 @@ __attribute__((noinline)) bool TestInputs::judge(Outlet& outlet) {
   return true;
 }
 
-bool TestInputs::watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t now_us) {
+bool TestInputs::watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t turn_us) {
   if (memory_ == nullptr || outlet.lend() == nullptr) {
     if (!command_.running()) return false;
-    finish(InputEnd::kRecorder, outlet, now_us);
+    finish(InputEnd::kRecorder, outlet, hal::now_us());
     return true;
   }
   core::InputWatch& watch = memory_->watch;
-  if (!news(sensors, watch, now_us)) return false;
+  if (!news(sensors, watch, turn_us)) return false;
+  const uint32_t now_us = hal::now_us();
   see(sensors, watch, now_us);
   if (!command_.running()) return false;
   const InputEnd why = watch.outside();
@@ -198,9 +199,9 @@ bool TestInputs::watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t 
 // Of any sensor, or it is time to ask whether one has ceased.
 bool TestInputs::news(const Sensors& sensors,
                       const core::InputWatch& watch,
-                      uint32_t now_us) const {
+                      uint32_t turn_us) const {
   return sensors.imu().seq != watch.imu || sensors.scans() != watch.scan ||
-         static_cast<uint16_t>(static_cast<uint16_t>(now_us) - watch.looked_us) >= kWatchUs ||
+         static_cast<uint16_t>(static_cast<uint16_t>(turn_us) - watch.looked_us) >= kWatchUs ||
          static_cast<uint16_t>(sensors.baro().t_us) != watch.baro_us ||
          sensors.gps_heard_us() != watch.gps_us;
 }

@@ -42,9 +42,10 @@ class TestInputs {
   uint16_t servo_ticks(uint8_t servo, uint16_t base_ticks, Outlet& outlet) const {
     return command_.running() ? added(servo, base_ticks, outlet) : base_ticks;
   }
-  // Behind the sensors' turn. True: an input ended, its pulses are to be plain at once.
-  bool watch(const Sensors& sensors, Outlet& outlet, uint32_t now_us) {
-    return command_.uses_memory() && watch_sensors(sensors, outlet, now_us);
+  // Behind the sensors' turn, which began at `turn_us`. True: an input ended, its pulses are to be
+  // plain at once.
+  bool watch(const Sensors& sensors, Outlet& outlet, uint32_t turn_us) {
+    return command_.uses_memory() && watch_sensors(sensors, outlet, turn_us);
   }
   // Every 10 ms or so: the travel shown, the pilot's sign, the card into the log.
   void step_slow(const PilotLink& pilot,
@@ -59,7 +60,10 @@ class TestInputs {
   bool learn(Outlet& outlet, uint32_t now_us) {
     if (memory_ == nullptr) return false;
     if (command_.running()) {
-      return memory_->told ? memory_->learning.step(outlet, now_us) : tell_start(outlet);
+      if (!memory_->told) return tell_start(outlet);
+      if (!memory_->learning.ready()) return false;
+      memory_->learning.step(outlet, now_us);
+      return true;
     }
     return memory_->judged == frames::CardFault::kNotValid && judge(outlet);
   }
@@ -107,11 +111,11 @@ class TestInputs {
              uint32_t now_us);
   bool judge(Outlet& outlet);
   bool tell_start(Outlet& outlet);
-  bool news(const Sensors& sensors, const core::InputWatch& watch, uint32_t now_us) const;
+  bool news(const Sensors& sensors, const core::InputWatch& watch, uint32_t turn_us) const;
   __attribute__((noinline)) void see(const Sensors& sensors,
                                      core::InputWatch& watch,
                                      uint32_t now_us) const;
-  bool watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t now_us);
+  bool watch_sensors(const Sensors& sensors, Outlet& outlet, uint32_t turn_us);
   void finish(frames::InputEnd why, Outlet& outlet, uint32_t now_us);
   void enable(const Sensors& sensors, Outlet& outlet, uint32_t now_us);
   void tell_card(Outlet& outlet, uint32_t now_us);

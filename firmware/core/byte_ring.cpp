@@ -1,8 +1,23 @@
 #include "core/byte_ring.h"
 
-#include <string.h>
-
 namespace core {
+namespace {
+
+// Four at once: 5 cycles a byte on the AVR, where memcpy takes 8.
+void copy(uint8_t* to, const uint8_t* from, uint16_t size) {
+  uint8_t fours = static_cast<uint8_t>(size / 4U);
+  for (; fours != 0; --fours) {
+    *to++ = *from++;
+    *to++ = *from++;
+    *to++ = *from++;
+    *to++ = *from++;
+  }
+  for (uint8_t rest = size & 3U; rest != 0; --rest) {
+    *to++ = *from++;
+  }
+}
+
+}  // namespace
 
 void ByteRing::clear() {
   open_ = true;
@@ -83,8 +98,11 @@ void ByteRing::append(const void* data, uint16_t size) {
   }
   const uint16_t to_end = static_cast<uint16_t>(capacity_ - at);
   const uint16_t first = size < to_end ? size : to_end;
-  memcpy(buffer_ + at, data, first);
-  memcpy(buffer_, static_cast<const uint8_t*>(data) + first, static_cast<uint16_t>(size - first));
+  const uint8_t* const bytes = static_cast<const uint8_t*>(data);
+  copy(buffer_ + at, bytes, first);
+  if (first < size) {
+    copy(buffer_, bytes + first, static_cast<uint16_t>(size - first));
+  }
   used_ = static_cast<uint16_t>(used_ + size);
 }
 

@@ -18,17 +18,21 @@ uint16_t to_ticks(uint16_t width_us) {
 
 }  // namespace
 
-RcChannels map_channels(const RcDecoder& decoder, const frames::ConfigFrame& config) {
-  const uint8_t inputs[kChannels] = {config.input_aileron,
-                                     config.input_elevator,
-                                     config.input_rudder,
-                                     config.input_throttle,
-                                     config.input_switch};
-  RcChannels rc = {};
+// Where it stands, as it is asked for with every pulse: a result of its own was 0.3 % of the chip.
+void map_channels(const RcDecoder& decoder, const frames::ConfigFrame& config, RcChannels& rc) {
+  using frames::ConfigFrame;
+  static_assert(
+      offsetof(ConfigFrame, input_switch) == offsetof(ConfigFrame, input_aileron) + kChannels - 1,
+      "the inputs stand in the order of the channels");
+  const uint8_t* next =
+      reinterpret_cast<const uint8_t*>(&config) + offsetof(ConfigFrame, input_aileron);
+  rc.fresh = 0;
+  rc.steady = 0;
   uint8_t bit = 1;
   for (uint8_t channel = 0; channel < kChannels; ++channel, bit = static_cast<uint8_t>(bit << 1)) {
-    const uint8_t input = inputs[channel];
+    const uint8_t input = *next++;
     if (input >= kRcInputs) {
+      rc.width_ticks[channel] = 0;
       continue;
     }
     const uint8_t input_bit = flash_u8(&kBitOf[input]);
@@ -40,7 +44,6 @@ RcChannels map_channels(const RcDecoder& decoder, const frames::ConfigFrame& con
       rc.steady = static_cast<uint8_t>(rc.steady | bit);
     }
   }
-  return rc;
 }
 
 DriveControl::Switch DriveControl::read_switch(const RcChannels& rc,

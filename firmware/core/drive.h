@@ -29,7 +29,7 @@ struct RcChannels {
   uint8_t steady;                   // bit per channel
 };
 
-RcChannels map_channels(const RcDecoder& decoder, const frames::ConfigFrame& config);
+void map_channels(const RcDecoder& decoder, const frames::ConfigFrame& config, RcChannels& rc);
 
 class DriveControl {
  public:

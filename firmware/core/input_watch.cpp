@@ -75,12 +75,12 @@ void InputMotion::see(uint8_t sensor, uint8_t seen, uint32_t now_us) {
 }
 
 void InputMotion::see_imu(const InputReadings& in, uint32_t now_us) {
-  uint16_t imu = 0;
-  for (uint8_t i = 0; i < 3; ++i) {
-    imu = static_cast<uint16_t>(imu * 3U + static_cast<uint16_t>(in.rates[i]) +
-                                static_cast<uint16_t>(in.force[i]));
-  }
-  see(kImu, low(imu), now_us);
+  const auto both = [&in](uint8_t i) {
+    return static_cast<uint16_t>(static_cast<uint16_t>(in.rates[i]) +
+                                 static_cast<uint16_t>(in.force[i]));
+  };
+  const uint16_t two = static_cast<uint16_t>(both(0) * 3U + both(1));
+  see(kImu, low(static_cast<uint16_t>(two * 3U + both(2))), now_us);
 }
 
 void InputMotion::see_scan(const InputLimits& limits, const InputReadings& in, uint32_t now_us) {
@@ -106,9 +106,13 @@ void InputMotion::age(uint32_t now_us) {
   }
 }
 
-bool InputMotion::moves(uint8_t sensor, uint16_t still_ms, uint32_t now_us) const {
-  const uint8_t steps = static_cast<uint8_t>(now_steps(now_us) - moved[sensor]);
-  return steps <= static_cast<uint32_t>(still_ms) * kStepsPerMs >> 16U;
+uint8_t InputMotion::steps_of(uint16_t still_ms) {
+  const uint32_t steps = static_cast<uint32_t>(still_ms) * kStepsPerMs >> 16U;
+  return steps > UINT8_MAX ? uint8_t{UINT8_MAX} : static_cast<uint8_t>(steps);
+}
+
+bool InputMotion::moves(uint8_t sensor, uint8_t still_steps, uint32_t now_us) const {
+  return static_cast<uint8_t>(now_steps(now_us) - moved[sensor]) <= still_steps;
 }
 
 InputEnd judge_imu(const InputLimits& limits, const InputReadings& in) {
@@ -165,12 +169,16 @@ InputEnd judge_heard(const InputLimits& limits,
       (gps && in.gps_age_us > kInputGpsAgeUs)) {
     return InputEnd::kSensorLost;
   }
-  const auto moves = [&](uint8_t sensor) { return motion.moves(sensor, limits.still_ms, now_us); };
-  const uint16_t gps_ms = static_cast<uint16_t>(limits.still_ms + kInputGpsMoreMs);
-  const bool all = moves(InputMotion::kImu) && moves(InputMotion::kBaro) &&
-                   (!airspeed || moves(InputMotion::kAirspeed)) &&
-                   (!alpha || moves(InputMotion::kAlpha)) && (!beta || moves(InputMotion::kBeta)) &&
-                   (!gps || motion.moves(InputMotion::kGps, gps_ms, now_us));
+  const uint8_t still = InputMotion::steps_of(limits.still_ms);
+  const auto moves = [&](uint8_t sensor) { return motion.moves(sensor, still, now_us); };
+  const bool all =
+      moves(InputMotion::kImu) && moves(InputMotion::kBaro) &&
+      (!airspeed || moves(InputMotion::kAirspeed)) && (!alpha || moves(InputMotion::kAlpha)) &&
+      (!beta || moves(InputMotion::kBeta)) &&
+      (!gps ||
+       motion.moves(InputMotion::kGps,
+                    InputMotion::steps_of(static_cast<uint16_t>(limits.still_ms + kInputGpsMoreMs)),
+                    now_us));
   return all ? InputEnd::kDone : InputEnd::kSensorStill;
 }
 

@@ -92,8 +92,10 @@ struct InputMotion {
   void see_gps(const InputReadings& in, uint32_t now_us);
   // Once in 4 s at least: no count comes round.
   void age(uint32_t now_us);
-  // Of a sensor that moved within `still_ms`.
-  bool moves(uint8_t sensor, uint16_t still_ms, uint32_t now_us) const;
+  // Whole steps of 16.384 ms in a time, at most 255.
+  static uint8_t steps_of(uint16_t still_ms);
+  // Of a sensor that moved within so many.
+  bool moves(uint8_t sensor, uint8_t still_steps, uint32_t now_us) const;
 
  private:
   void see(uint8_t sensor, uint8_t seen, uint32_t now_us);

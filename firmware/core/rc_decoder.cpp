@@ -9,9 +9,8 @@ constexpr uint32_t kShiftTicks = 4500UL * kTicksPerUs;
 // Early pulses in a row, of all channels, without one frame of a known length between them.
 constexpr uint8_t kMaxEarly = 12;
 
-uint8_t bit_of(uint8_t input) {
-  return static_cast<uint8_t>(1U << input);
-}
+// In 256 ticks, fewer than this are not more than kFreshTicks, whatever their lower bytes.
+constexpr uint16_t kYoung = RcDecoder::kFreshTicks / 256U - 1U;
 
 void set(uint8_t& mask, uint8_t bit, bool on) {
   mask = static_cast<uint8_t>(on ? mask | bit : mask & ~bit);
@@ -29,33 +28,33 @@ void RcDecoder::edge(uint32_t t_ticks, uint8_t levels, bool late) {
     }
     return;
   }
-  const uint8_t changed = levels ^ levels_;
+  uint8_t changed = levels ^ levels_;
   levels_ = levels;
-  // A shift by a variable is a loop on the AVR: the bit goes along.
+  // A shift by a variable is a loop on the AVR: the bit goes along. Mostly one has changed.
   uint8_t bit = 1;
-  for (uint8_t i = 0; i < kRcInputs; ++i, bit = static_cast<uint8_t>(bit << 1)) {
+  for (uint8_t i = 0; changed != 0 && i < kRcInputs; ++i, bit = static_cast<uint8_t>(bit << 1)) {
     if ((changed & bit) == 0) {
       continue;
     }
+    changed = static_cast<uint8_t>(changed ^ bit);
     if ((levels & bit) != 0) {
-      rise(i, t_ticks, late);
+      rise(inputs_[i], bit, t_ticks, late);
     } else {
-      fall(i, t_ticks, late);
+      fall(inputs_[i], bit, t_ticks, late);
     }
   }
 }
 
-void RcDecoder::rise(uint8_t index, uint32_t t_ticks, bool late) {
-  Input& input = inputs_[index];
+void RcDecoder::rise(Input& input, uint8_t bit, uint32_t t_ticks, bool late) {
   const uint32_t low_ticks = t_ticks - input.fall;
   if (input.candidate != 0) {
-    settle(index, low_ticks);
+    settle(input, bit, low_ticks);
   }
   if (!late && low_ticks < kLowBeforeTicks) {
     count_fast(t_ticks - input.rise);
   }
   input.rise = t_ticks;
-  set(trusted_, bit_of(index), !late && low_ticks >= kLowBeforeTicks);
+  set(trusted_, bit, !late && low_ticks >= kLowBeforeTicks);
 }
 
 void RcDecoder::count_fast(uint32_t period_ticks) {
@@ -68,14 +67,13 @@ void RcDecoder::count_fast(uint32_t period_ticks) {
   }
 }
 
-void RcDecoder::fall(uint8_t index, uint32_t t_ticks, bool late) {
-  Input& input = inputs_[index];
+void RcDecoder::fall(Input& input, uint8_t bit, uint32_t t_ticks, bool late) {
   const uint32_t width_ticks = t_ticks - input.rise;
-  const bool trusted = (trusted_ & bit_of(index)) != 0 && !late;
-  set(trusted_, bit_of(index), false);
+  const bool trusted = (trusted_ & bit) != 0 && !late;
+  set(trusted_, bit, false);
   input.fall = t_ticks;
   if (!trusted || width_ticks < kMinWidthTicks || width_ticks > kMaxWidthTicks) {
-    reject(index);
+    reject(input, bit);
     return;
   }
   if (input.width != 0) {
@@ -88,21 +86,19 @@ void RcDecoder::fall(uint8_t index, uint32_t t_ticks, bool late) {
       if (++early_ > kMaxEarly) {
         locked_ = false;
       }
-      reject(index);
+      reject(input, bit);
       return;
     }
   }
   input.candidate = static_cast<uint16_t>(width_ticks);
-  set(waiting_, bit_of(index), true);
+  set(waiting_, bit, true);
 }
 
-void RcDecoder::settle(uint8_t index, uint32_t low_ticks) {
+void RcDecoder::settle(Input& input, uint8_t bit, uint32_t low_ticks) {
   if (low_ticks < kLowAfterTicks) {
-    reject(index);
+    reject(input, bit);
     return;
   }
-  Input& input = inputs_[index];
-  const uint8_t bit = bit_of(index);
   const uint32_t period_ticks = input.rise - input.accepted;
   const bool first_of_frame = (valid_ & static_cast<uint8_t>(bit - 1)) == 0;
   if (input.width != 0 && first_of_frame && period_ticks >= kMinPeriodTicks &&
@@ -134,9 +130,9 @@ void RcDecoder::measure_frame(uint16_t period_us) {
   frame_us_ = static_cast<uint16_t>(frame_us_ + change_us / 8);
 }
 
-void RcDecoder::reject(uint8_t index) {
-  inputs_[index].candidate = 0;
-  set(waiting_, bit_of(index), false);
+void RcDecoder::reject(Input& input, uint8_t bit) {
+  input.candidate = 0;
+  set(waiting_, bit, false);
   if (glitches_ != 0xFFFF) {
     ++glitches_;
   }
@@ -153,16 +149,17 @@ void RcDecoder::gap() {
 
 void RcDecoder::storm() {
   gap();
-  for (uint8_t i = 0; i < kRcInputs; ++i) {
-    lose(i);
+  uint8_t bit = 1;
+  for (Input& input : inputs_) {
+    lose(input, bit);
+    bit = static_cast<uint8_t>(bit << 1);
   }
 }
 
-void RcDecoder::lose(uint8_t index) {
-  const uint8_t bit = bit_of(index);
+void RcDecoder::lose(Input& input, uint8_t bit) {
   ++changes_;
-  inputs_[index].width = 0;
-  inputs_[index].streak = 0;
+  input.width = 0;
+  input.streak = 0;
   set(valid_, bit, false);
   set(fresh_, bit, false);
   set(steady_, bit, false);
@@ -180,15 +177,21 @@ void RcDecoder::poll(uint32_t now_ticks) {
     return;
   }
   aged_ticks_ = now_ticks;
+  const uint16_t now_middle = static_cast<uint16_t>(now_ticks >> 8U);
   uint8_t bit = 1;
   for (uint8_t i = 0; i < kRcInputs; ++i, bit = static_cast<uint8_t>(bit << 1)) {
-    const Input& input = inputs_[i];
+    Input& input = inputs_[i];
     if (input.width == 0) {
+      continue;
+    }
+    // Most are young, which two bytes of each time tell.
+    const uint16_t middle_age = static_cast<uint16_t>(now_middle - middle(input.accepted));
+    if (middle_age < kYoung) {
       continue;
     }
     const uint32_t age_ticks = now_ticks - input.accepted;
     if (age_ticks > kLostTicks) {
-      lose(i);
+      lose(input, bit);
       continue;
     }
     if (age_ticks > kUnsteadyTicks && (steady_ & bit) != 0) {
@@ -209,7 +212,7 @@ void RcDecoder::confirm(uint32_t now_ticks) {
     if ((waiting_ & bit) != 0 && (levels_ & bit) == 0) {
       const uint32_t low_ticks = now_ticks - inputs_[i].fall;
       if (low_ticks >= kLowAfterTicks) {
-        settle(i, low_ticks);
+        settle(inputs_[i], bit, low_ticks);
       }
     }
   }

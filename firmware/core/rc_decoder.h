@@ -11,6 +11,8 @@
 
 #include <stdint.h>
 
+#include "core/bytes.h"
+
 namespace core {
 
 constexpr uint8_t kRcInputs = 5;
@@ -69,7 +71,7 @@ class RcDecoder {
     const uint16_t now = static_cast<uint16_t>(now_ticks >> 8U);
     uint16_t oldest = 0;
     for (const Input& input : inputs_) {
-      const uint16_t age = static_cast<uint16_t>(now - static_cast<uint16_t>(input.accepted >> 8U));
+      const uint16_t age = static_cast<uint16_t>(now - middle(input.accepted));
       if (age > oldest) oldest = age;
     }
     return (static_cast<uint32_t>(oldest) << 8U) / kTicksPerUs;
@@ -87,14 +89,19 @@ class RcDecoder {
     uint8_t streak = 0;
   };
 
-  void rise(uint8_t index, uint32_t t_ticks, bool late);
-  void fall(uint8_t index, uint32_t t_ticks, bool late);
+  // Of a time that lies in memory, in 256 ticks: two bytes of it are read.
+  static uint16_t middle(const uint32_t& ticks) {
+    return get_le<uint16_t>(reinterpret_cast<const uint8_t*>(&ticks) + 1);
+  }
+
+  void rise(Input& input, uint8_t bit, uint32_t t_ticks, bool late);
+  void fall(Input& input, uint8_t bit, uint32_t t_ticks, bool late);
   void count_fast(uint32_t period_ticks);
   void confirm(uint32_t now_ticks);
-  void settle(uint8_t index, uint32_t low_ticks);
+  void settle(Input& input, uint8_t bit, uint32_t low_ticks);
   void measure_frame(uint16_t period_us);
-  void reject(uint8_t index);
-  void lose(uint8_t index);
+  void reject(Input& input, uint8_t bit);
+  void lose(Input& input, uint8_t bit);
 
   Input inputs_[kRcInputs];
   uint32_t aged_ticks_ = 0;  // the last look at all ages

@@ -283,7 +283,8 @@ TEST_CASE("receiver inputs reach the channels that the settings name") {
     decoder.edge(now + 3600, 0b00, false);
     decoder.poll(now + 8000);
   }
-  const core::RcChannels rc = core::map_channels(decoder, config);
+  core::RcChannels rc;
+  core::map_channels(decoder, config, rc);
   CHECK_EQ(rc.width_ticks[core::kAileron], 2400);
   CHECK_EQ(rc.width_ticks[core::kElevator], 3600);
   CHECK_EQ(rc.width_ticks[core::kSwitch], 0);

@@ -280,7 +280,8 @@ TEST_CASE("every input can be every channel, with its width and both its bits") 
     config.input_rudder = input[2];
     config.input_throttle = input[3];
     config.input_switch = input[4];
-    core::RcChannels rc = core::map_channels(decoder, config);
+    core::RcChannels rc;
+    core::map_channels(decoder, config, rc);
     for (uint8_t i = 0; i < core::kChannels; ++i) {
       CHECK_EQ(rc.width_ticks[i], i == core::kRudder ? 0 : 2000 + 400 * input[i]);
     }
@@ -288,7 +289,8 @@ TEST_CASE("every input can be every channel, with its width and both its bits") 
     CHECK_EQ(rc.steady, 0);
     send_frame(decoder, 80000);
     send_frame(decoder, 120000);
-    CHECK_EQ(core::map_channels(decoder, config).steady, 0b1'1011);
+    core::map_channels(decoder, config, rc);
+    CHECK_EQ(rc.steady, 0b1'1011);
     // One input falls silent: its channel is no longer fresh, the others are.
     for (uint32_t at_ticks = 160000; at_ticks < 240000; at_ticks += 40000) {
       const uint8_t quiet = static_cast<uint8_t>(~(1U << shift));
@@ -301,7 +303,7 @@ TEST_CASE("every input can be every channel, with its width and both its bits") 
       decoder.poll(at_ticks + 8000);
     }
     decoder.poll(120000 + core::RcDecoder::kFreshTicks + 4002);
-    rc = core::map_channels(decoder, config);
+    core::map_channels(decoder, config, rc);
     CHECK_EQ(rc.fresh, 0b1'1010);  // the first channel is the quiet one
     CHECK_EQ(rc.steady, 0b1'1011);
   }

@@ -193,7 +193,8 @@ TEST_CASE("a sensor that nobody looks at does not come round while its time is k
   for (uint16_t n = 0; n < 2000; ++n) {
     bench.now_us += 5000;
     bench.motion.age(bench.now_us);
-    const bool moves = bench.motion.moves(InputMotion::kGps, 1500, bench.now_us);
+    const bool moves =
+        bench.motion.moves(InputMotion::kGps, InputMotion::steps_of(1500), bench.now_us);
     if (n < 290) CHECK(moves);
     if (n > 305) CHECK(!moves);
   }
@@ -235,7 +236,7 @@ TEST_CASE("nothing has moved at the start, whatever the time is") {
   for (uint32_t now_us = 0; now_us < 5000000U; now_us += 16000) {
     motion.start(now_us);
     for (uint8_t sensor = 0; sensor < InputMotion::kSensors; ++sensor) {
-      CHECK(!motion.moves(sensor, 2000, now_us));
+      CHECK(!motion.moves(sensor, InputMotion::steps_of(2000), now_us));
     }
   }
 }
@@ -245,10 +246,10 @@ TEST_CASE("a value that moves by any power of two has moved") {
     Bench bench;
     bench.still[InputMotion::kBaro] = true;
     bench.run(600);
-    CHECK(!bench.motion.moves(InputMotion::kBaro, 500, bench.now_us));
+    CHECK(!bench.motion.moves(InputMotion::kBaro, InputMotion::steps_of(500), bench.now_us));
     bench.in.static_pressure ^= uint32_t{1} << bit;
     bench.motion.see_baro(bench.in, bench.now_us);
-    CHECK(bench.motion.moves(InputMotion::kBaro, 500, bench.now_us));
+    CHECK(bench.motion.moves(InputMotion::kBaro, InputMotion::steps_of(500), bench.now_us));
   }
 }
 
