@@ -60,7 +60,6 @@ class InputRig:
         self.outputs = [pin for _, pin in SERVOS.values()]
         self.chip.watch(*self.outputs)
         self.zero = self.chip.cycle
-        self.painted = b""  # what will be stack, once a test has asked for it
         self.chip.power_on()
 
     def run_to(self, at_s: float) -> None:

@@ -11,10 +11,12 @@ from compilers import TESTED
 from devices.ardu_imu import ImuSample, SentSample
 from flight.bench import pulses, signals
 from flight.bench.fly import fly
+from flight.bench.inputs import FRAMES_S, fly_input
 from flight.bench.plan import CYCLES_PER_S, RECEIVERS, STALL_S, ramp, stalls, steps
-from flight.bench.report import flight_rows
+from flight.bench.report import flight_rows, input_rows
 from flight.bench.table import Table
 
+ROW_S = 6.0  # no sine above 5 Hz
 US = 16
 FRAME = 20_000 * US
 
@@ -38,6 +40,21 @@ def test_short_flight_keeps_every_limit(
     assert table.missed == []
     assert len(flight.samples_sent) > 7 * rate_hz
     assert flight.stalls >= 2
+
+
+@pytest.mark.parametrize("flight_elf", TESTED, indirect=True)
+@pytest.mark.parametrize(("rate_hz", "frame_s"), [(100, FRAMES_S[1]), (200, FRAMES_S[0])])
+def test_row_that_teaches_keeps_every_limit(
+    flight_elf: Path, tmp_path: Path, rate_hz: int, frame_s: float
+) -> None:
+    table = Table()
+    figures = fly_input(
+        flight_elf, rate_hz=rate_hz, frame_s=frame_s, duration_s=ROW_S, folder=tmp_path
+    )
+    input_rows(table, figures)
+    assert table.missed == []
+    assert len(figures.width_error_us) > 3 * 45 * ROW_S
+    assert figures.stalls >= 1
 
 
 def channel(seed: int, count: int = 200) -> tuple[np.ndarray, np.ndarray, int]:

@@ -12,12 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flight.bench.inputs import learning_cards
 from flight.faults.program import HANG, NOW_US
 from flight.input_rig import CYCLES_PER_TICK, TICKS_PER_S, InputRig
 from flight.rig import make_card
 from flight.slices import SliceWatch
-from host.planning.learning_card import SIX_HARMONICS, LearningCondition, learning_card
-from host.sysid.estimators.onboard_sums import ROLL
 from simavr_bench import Image, ResetCause
 from simavr_bench.fork import in_fork
 
@@ -39,22 +38,9 @@ from tests.sitl.input_judge import Trigger, deflected, slewed, wrong_pulses
 from tests.sitl.input_shapes import shape_of
 
 ROW = ROWS[4]  # a multisine on three axes: the longest to compute
-ROLL_CARD = learning_card("ultrastick25e", ROLL, LearningCondition(17.0, harmonics=SIX_HARMONICS))
 QUIET_S, LENGTH_S = 0.2, 2.0
 TAUGHT_S = 4.2
 LONGEST_CYCLES = 4800
-# 42 are wanted with what a row teaches; what the image takes, and half a point (README.md).
-MOST_BUSY = 0.475
-LEARNED_HEAD = b"\xa5\x5a\x12\x0f"  # of frame `learned` on the radio
-LEARNING_ROW = cards.row(
-    shape=cards.MULTISINE, axes=7, quiet_ms=200, duration_ms=6000, amplitude_us=(100, -80, 120),
-    components=[
-        byte for k in range(10) for byte in (2 + 3 * k, 25 * k, 64 * (k % 3) + 18)
-    ],
-)  # fmt: skip
-LEARNING_CARD = cards.card([LEARNING_ROW], [ROLL_CARD], [1])
-LEAST_STACK_BYTES = 600
-PAINTED_S, RAM_END = 0.03, 0x2200
 FORK_S = TRIGGER_S + 0.5
 FAULT_S = FORK_S + 0.4
 NEAR_TICKS = 8  # a width measured on the chip is 2.6 us off at most
@@ -113,22 +99,16 @@ def teaching(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iter
     card = make_card(tmp_path_factory.mktemp("teaching") / "card.img")
     flight = input_flight(TRIGGER_S + TAUGHT_S + 1.0, np.random.default_rng(30_021))
     flight.width_us[int((UP_S + 1.0) / flight.frame_s) :, :3] = 1500
-    rig = InputRig(flight_elf, card, flight, cards.eeprom_with(LEARNING_CARD))
-    rig.run_to(PAINTED_S)
-    rig.painted = rig.chip.data(_end(rig), RAM_END - _end(rig))
+    rig = InputRig(flight_elf, card, flight, cards.eeprom_with(learning_cards(6.0)))
     rig.run_to(TRIGGER_S - 1.0)
     yield rig
     rig.chip.close()
 
 
-def _end(rig: InputRig) -> int:
-    return int(rig.chip.symbols["_end"][0]) & 0xFFFF
-
-
 @pytest.mark.parametrize(
     ("name", "least"),
     [("TestInputs3see", 800), ("TestInputs4look", 600), ("TestInputs5judge", 1),
-     ("RowLearning4step", 800)],
+     ("RowLearning4step", 500)],
 )  # fmt: skip
 def test_no_slice_of_an_input_or_of_its_learning_lasts_0p3_ms(
     teaching: InputRig, flight_elf: Path, name: str, least: int
@@ -144,27 +124,6 @@ def test_no_slice_of_an_input_or_of_its_learning_lasts_0p3_ms(
     assert len(lengths) >= least
     print(f"{name}: {len(lengths)} slices, {max(lengths) / 16:.0f} us at most")
     assert max(lengths) < LONGEST_CYCLES
-
-
-def test_load_and_stack_while_a_row_teaches(teaching: InputRig) -> None:
-    """Of the row's 4 s, with what it estimates: told each second, nothing lost."""
-
-    def fly() -> tuple[float, int, int, int]:
-        chip = teaching.chip
-        teaching.run_to(TRIGGER_S + 0.3)
-        chip.clear_statistics()
-        teaching.run_to(TRIGGER_S + TAUGHT_S)
-        told = chip.uart_sent(3).count(LEARNED_HEAD)
-        lost = teaching.replay.card.count().lost
-        untouched = chip.untouched_stack(_end(teaching), teaching.painted)
-        return chip.load_now().busy_fraction, told, lost, untouched
-
-    busy, told, blocks_lost, untouched = in_fork(fly)
-    print(f"load {100 * busy:.1f} %, {untouched} B of stack never touched")
-    assert untouched >= LEAST_STACK_BYTES
-    assert told >= 5
-    assert blocks_lost == 0
-    assert busy < MOST_BUSY
 
 
 def _stick(flight: InputFlight) -> float:

@@ -11,8 +11,9 @@ from pathlib import Path
 from compilers import TESTED
 from disassembly import ImageError
 from flight.bench.fly import FlightError, fly
+from flight.bench.inputs import FRAMES_S, ROW_S, fly_input
 from flight.bench.plan import STALL_S
-from flight.bench.report import flight_rows, image_rows
+from flight.bench.report import flight_rows, image_rows, input_rows
 from flight.bench.table import Table
 from flight.images import build_image
 
@@ -51,6 +52,17 @@ def main() -> int:
                         seed=asked.seed,
                     )
                     flight_rows(table, flight, depth, room_bytes)
+                    for frame_s in FRAMES_S:
+                        input_rows(
+                            table,
+                            fly_input(
+                                elf,
+                                rate_hz=rate_hz,
+                                frame_s=frame_s,
+                                duration_s=ROW_S,
+                                folder=Path(folder),
+                            ),
+                        )
     except (FlightError, ImageError) as error:
         print(f"flight.bench: {error}", file=sys.stderr)
         return 6
