@@ -10,14 +10,15 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 CODE = re.compile(r"```.*?```", re.DOTALL)
+SOURCE = re.compile(r"`([\w/]+\.(?:py|cpp))`")
 HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
 STUDY_HEADINGS = ["Question", "Method", "Result", "What does not hold", "Command"]
 
 
-def pages(root: Path) -> list[Path]:
-    """Pages that git knows or would take."""
+def tracked(root: Path, *patterns: str) -> list[Path]:
+    """Files of such names that git knows or would take."""
     listed = subprocess.run(
-        ["git", "ls-files", "-co", "--exclude-standard", "*.md"],
+        ["git", "ls-files", "-co", "--exclude-standard", *patterns],
         cwd=root,
         capture_output=True,
         text=True,
@@ -37,7 +38,7 @@ def dead_links(page: Path) -> Iterator[str]:
 
 
 def test_links_lead_somewhere() -> None:
-    found = pages(ROOT)
+    found = tracked(ROOT, "*.md")
     assert len(found) > 40
     assert [dead for page in found for dead in dead_links(page)] == []
 
@@ -49,6 +50,21 @@ def test_dead_link_is_seen(tmp_path: Path) -> None:
     )
     (tmp_path / "there.md").touch()
     assert list(dead_links(page)) == ["README.md: gone.svg", "README.md: code"]
+
+
+def test_a_source_that_a_page_names_is_there() -> None:
+    """A page of the package's rooms names its own files bare, those of others with their room."""
+    known = [f"/{path.relative_to(ROOT)}" for path in tracked(ROOT, "*.py", "*.cpp")]
+    lost, count = [], 0
+    for page in tracked(ROOT, "*.md"):
+        room = f"/{page.parent.relative_to(ROOT)}/"
+        inside = [path for path in known if path.startswith(room)]
+        for name in SOURCE.findall(page.read_text(encoding="utf-8")):
+            near = inside if "/src/host/" in room and "/" not in name else known
+            count += 1
+            lost += [] if any(p.endswith(f"/{name}") for p in near) else [(page.name, room, name)]
+    assert count > 200
+    assert lost == []
 
 
 def test_studies_pages_have_the_same_headings_and_are_listed() -> None:

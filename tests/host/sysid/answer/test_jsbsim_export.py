@@ -12,40 +12,18 @@ from host.aircraft.local_derivatives import local_derivatives
 from host.sysid.aerodynamics.coefficient_table import Coefficient, CoefficientTable
 from host.sysid.answer.aircraft_export import save_aircraft
 
+from tests.host.sysid.answer.jsbsim_air import JSBSIM_AIR
+
 # Forces and moments of the air alone, as coefficients, at one condition and a step to either side.
 JSBSIM_SLOPES = """
-import json, math, sys, jsbsim
-fdm = jsbsim.FGFDMExec(sys.argv[1])
-fdm.set_debug_level(0)
-fdm.set_aircraft_path("aircraft")
-assert fdm.load_model("identified")
-FT, LB, V, TILT, HUB, SPIN = 0.3048, 4.4482216152605, 17.0, -0.0523599, 0.297, 0.00012991
-S, b, c = (fdm["metrics/" + k] * FT**n for k, n in (("Sw-sqft", 2), ("bw-ft", 1), ("cbarw-ft", 1)))
-def at(x):
-    alpha, beta, p, q, r, de, da, dr = x
-    p, q, r = p * 2 * V / b, q * 2 * V / c, r * 2 * V / b
-    fdm["ic/h-sl-ft"], fdm["ic/theta-rad"] = 1000.0, 0.0
-    fdm["ic/u-fps"] = V * math.cos(alpha) * math.cos(beta) / FT
-    fdm["ic/v-fps"] = V * math.sin(beta) / FT
-    fdm["ic/w-fps"] = V * math.sin(alpha) * math.cos(beta) / FT
-    fdm["ic/p-rad_sec"], fdm["ic/q-rad_sec"], fdm["ic/r-rad_sec"] = p, q, r
+def controls(de, da, dr):
     fdm["fcs/elevator-pos-rad"], fdm["fcs/left-aileron-pos-rad"] = de, da
     fdm["fcs/rudder-pos-rad"] = dr
-    assert fdm.run_ic()
-    force = fdm["aero/qbar-psf"] * LB / FT**2 * S
-    X, Y, Z = (fdm["forces/fb" + k + "-aero-lbs"] * LB for k in "xyz")
-    L, M, N = (fdm["moments/" + k + "-aero-lbsft"] * LB * FT for k in "lmn")
-    T, D, turn = fdm["rotor/thrust-n"], fdm["rotor/drive-nm"], fdm["rotor/omega"] * SPIN
-    tx, tz = math.cos(TILT), -math.sin(TILT)
-    X, Z, M = X - T * tx, Z - T * tz, M + HUB * tz * T + r * turn * tx - p * turn * tz
-    L, N = L + D * tx + q * turn * tz, N + D * tz - q * turn * tx
-    s, k = math.sin(alpha), math.cos(alpha)
-    return [v / force for v in (X * s - Z * k, -X * k - Z * s, Y, L / b, M / c, N / b)]
 base, slopes = [0.1, 0.0, 0.0, 0.0, 0.0, -0.12, 0.0, 0.0], {}
 names = "alpha", "beta", "p", "q", "r", "de", "da", "dr"
 for k, name in enumerate(names):
     step = [1e-3 * (k == j) for j in range(8)]
-    hi, lo = (at([v + sign * d for v, d in zip(base, step)]) for sign in (1, -1))
+    hi, lo = (air(*(v + sign * d for v, d in zip(base, step))) for sign in (1, -1))
     for row, h, l in zip(("CL", "CD", "CY", "Cl", "Cm", "Cn"), hi, lo):
         slopes[row + "_" + name] = (h - l) / 2e-3
 print(json.dumps(slopes))
@@ -70,7 +48,7 @@ def test_jsbsim_has_the_derivatives_that_were_identified(tmp_path: Path) -> None
     for path in (flown, xml):
         save_aircraft(path, tables, "ultrastick25e")
     done = subprocess.run(
-        [sys.executable, "-c", JSBSIM_SLOPES, str(tmp_path)],
+        [sys.executable, "-c", JSBSIM_AIR + JSBSIM_SLOPES, str(tmp_path), "identified"],
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     theirs = json.loads(done.stdout.splitlines()[-1])

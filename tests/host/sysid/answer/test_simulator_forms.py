@@ -27,6 +27,8 @@ from host.sysid.answer.output_files import OutputPaths, check_outputs
 from host.sysid.answer.simulators.forms import write_form
 from host.sysid.identification_error import IdentificationError
 
+from tests.host.sysid.answer.jsbsim_air import JSBSIM_AIR
+
 ROWS = ("CL", "CD", "CY", "Cl", "Cm", "Cn")
 VALUES = {
     "longitudinal": {"CL_alpha": 4.2, "Cm_alpha": -1.4, "Cm_q": -11.0, "CL_q": 8.0, "Cm_de": -1.3,
@@ -238,35 +240,12 @@ def test_aerosandbox(known: Known, tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 FLIGHTGEAR = """
-import json, math, sys, jsbsim
-fdm = jsbsim.FGFDMExec(sys.argv[1])
-fdm.set_debug_level(0)
-fdm.set_aircraft_path("aircraft")
-assert fdm.load_model("mine")
-FT, LB, V, TILT, HUB, SPIN = 0.3048, 4.4482216152605, 17.0, -0.0523599, 0.297, 0.00012991
-S, b, c = (fdm["metrics/" + k] * FT**n for k, n in (("Sw-sqft", 2), ("bw-ft", 1), ("cbarw-ft", 1)))
-out = []
-for alpha, beta, p, q, r, de, da, dr in json.load(sys.stdin):
-    p, q, r = p * 2 * V / b, q * 2 * V / c, r * 2 * V / b
-    fdm["ic/h-sl-ft"], fdm["ic/theta-rad"] = 1000.0, 0.0
-    fdm["ic/u-fps"] = V * math.cos(alpha) * math.cos(beta) / FT
-    fdm["ic/v-fps"] = V * math.sin(beta) / FT
-    fdm["ic/w-fps"] = V * math.sin(alpha) * math.cos(beta) / FT
-    fdm["ic/p-rad_sec"], fdm["ic/q-rad_sec"], fdm["ic/r-rad_sec"] = p, q, r
+def controls(de, da, dr):
     full = 0.4363323
     fdm["fcs/elevator-cmd-norm"], fdm["fcs/aileron-cmd-norm"] = de / full, da / full
     fdm["fcs/rudder-cmd-norm"] = -dr / full
     fdm["/controls/engines/engine[0]/throttle"] = 0.4
-    assert fdm.run_ic()
-    force = fdm["aero/qbar-psf"] * LB / FT**2 * S
-    X, Y, Z = (fdm["forces/fb" + k + "-aero-lbs"] * LB for k in "xyz")
-    L, M, N = (fdm["moments/" + k + "-aero-lbsft"] * LB * FT for k in "lmn")
-    T, D, turn = fdm["rotor/thrust-n"], fdm["rotor/drive-nm"], fdm["rotor/omega"] * SPIN
-    tx, tz = math.cos(TILT), -math.sin(TILT)
-    X, Z, M = X - T * tx, Z - T * tz, M + HUB * tz * T + r * turn * tx - p * turn * tz
-    L, N = L + D * tx + q * turn * tz, N + D * tz - q * turn * tx
-    s, k = math.sin(alpha), math.cos(alpha)
-    out.append([v / force for v in (X * s - Z * k, -X * k - Z * s, Y, L / b, M / c, N / b)])
+out = [air(*point) for point in json.load(sys.stdin)]
 assert abs(fdm["fcs/throttle-shaft"] - 0.4) < 1e-12
 print(json.dumps(out))
 """
@@ -283,8 +262,8 @@ def test_flightgear(known: Known, tmp_path: Path) -> None:
     assert settings.findtext("sim/aero") == "mine"
     assert "no landing gear" in files[1].read_text(encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-c", FLIGHTGEAR, str(tmp_path)], input=json.dumps(known.points.tolist()),
-        capture_output=True, text=True,
+        [sys.executable, "-c", JSBSIM_AIR + FLIGHTGEAR, str(tmp_path), "mine"],
+        input=json.dumps(known.points.tolist()), capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr + done.stdout
     known.same(np.array(json.loads(done.stdout.splitlines()[-1])), 1e-6)
