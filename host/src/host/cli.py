@@ -230,7 +230,7 @@ def parser_of(parser: argparse.ArgumentParser, verb: str) -> argparse.ArgumentPa
 
 
 def _strange(word: str, parser: argparse.ArgumentParser, verb: str | None) -> str:
-    """Return what to say of an argument that nobody knows."""
+    """Return the error line of an unknown argument."""
     own = parser_of(parser, verb) if verb is not None else parser
     options = [name for action in own._actions for name in action.option_strings]
     name = word.partition("=")[0]

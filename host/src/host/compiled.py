@@ -317,7 +317,7 @@ def _say_slow() -> None:
 
 
 def _say_compiling(what: str) -> None:
-    """Say it once in a process; what comes behind is a stage of the work."""
+    """Announce compilation once in a process; later kernels are stages of the work."""
     global _announced
     stage(f"compiling {what}")
     if not _announced:

@@ -94,7 +94,7 @@ class StorePlaced(argparse.Action):
 
 
 def of_each(option: str, placed: Placed[T], files: int) -> T | list[T | None] | None:
-    """Return what an option says of all files, or of each.
+    """Return the value of an option for all files, or for each.
 
     One value is of all files. As many values as files are theirs in order. Else each is of the file
     before it; one before the first is of those that have none of their own.

@@ -81,7 +81,7 @@ class BenchLog:
         return raw_channel(self.log.schema, self.log.frames["ident"], name)
 
     def magnetic_counts(self) -> Array:
-        """Return what the magnetometer read, counts (n, 3)."""
+        """Return the readings of the magnetometer, counts (n, 3)."""
         rows = self.log.frames.get("mag")
         if rows is None or not len(rows):
             return np.empty((0, 3))

@@ -51,7 +51,7 @@ class Decoded:
         return ExitCode.LOSSES if self.summary["losses"]["ranges"] else ExitCode.OK
 
     def faults(self) -> list[str]:
-        """Return what --strict does not forgive, in words."""
+        """Return the reasons for which --strict fails."""
         found = []
         if self.summary["losses"]["ranges"]:
             found.append(f"{len(self.summary['losses']['ranges'])} lost ranges")
@@ -176,7 +176,7 @@ def pick(source: Path) -> Path:
 
 
 def table_meta(log: FlightLog, summary: dict[str, Any]) -> Meta:
-    """Return what a table says of itself."""
+    """Return the metadata of a table."""
     note = summary["calibration"]
     return Meta(
         units=UNITS,

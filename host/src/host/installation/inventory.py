@@ -73,7 +73,7 @@ class Inventory:
     missing: list[str] = field(default_factory=list)
 
     def document(self) -> dict[str, Any]:
-        """Return it for JSON."""
+        """Return the inventory as plain data."""
         return asdict(self)
 
 
@@ -167,7 +167,7 @@ def _variables() -> list[Setting]:
 
 
 def inventory_lines(found: Inventory) -> list[str]:
-    """Return it in words."""
+    """Return the inventory as lines."""
     lines = [f"{name:<13}{text}" for name, text in found.versions.items()]
     for extra in dict.fromkeys(one.extra for one in found.libraries):
         own = [one for one in found.libraries if one.extra == extra]

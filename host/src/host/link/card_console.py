@@ -42,7 +42,7 @@ class Link(Protocol):
     device: str
 
     def data(self) -> bytes:
-        """Return what has come in, after at most 50 ms."""
+        """Return the bytes received, after at most 50 ms."""
         ...
 
     def send(self, data: bytes) -> None:

@@ -213,7 +213,7 @@ class SerialLink:
         self._port.close()
 
     def data(self) -> bytes:
-        """Return what has come in, after at most 50 ms; empty when nothing has."""
+        """Return the bytes received, after at most 50 ms; empty without any."""
         try:
             return bytes(self._port.read(max(1, int(self._port.in_waiting))))
         except (self._error, OSError) as error:

@@ -104,7 +104,7 @@ def _torn(
 
 
 def _cut(scan: Scan, end: int, t_s: float | None) -> Iterator[Loss]:
-    """Yield what is wrong with a file that is neither closed nor of its full size."""
+    """Yield the losses of a file that is neither closed nor of its full size."""
     behind = scan.blocks.position[scan.blocks.position >= end]
     room = (int(behind.min()) if len(behind) else scan.size_bytes) - end
     if room < BLOCK_BYTES:

@@ -100,7 +100,7 @@ def row_lines(summary: Json) -> list[str]:
 
 
 def row_meta(path: Path, summary: Json) -> Meta:
-    """Return what the table of original rows says of itself."""
+    """Return the metadata of a table of original rows."""
     return Meta(
         units=UNITS,
         texts={column.name: column.text for column in COLUMNS},

@@ -63,7 +63,7 @@ class Check:
         """Take a slower frame."""
 
     def missing(self) -> str:
-        """Return what it waits for, with what it has seen: the reason if the pilot goes on."""
+        """Return why it is not yet passed: the reason on the sheet if the pilot goes on."""
         return self.reason or "not seen"
 
     def seen(self) -> None:

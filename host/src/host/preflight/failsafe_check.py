@@ -55,7 +55,7 @@ class FailsafeCheck(AskedCheck):
             self._on(sample.t_s, lost or missing > 0)
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         if self._judged:
             return "the transmitter did not come back"
         if not self._ever_raised:

@@ -58,7 +58,7 @@ class SupplyCheck(AskedCheck):
             self._supply.append(supply_v)
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         return self.reason or f"sticks were stirred for {self._stirred_s:.0f} s only, all at once"
 
     def _judge(self) -> None:
@@ -130,7 +130,7 @@ class RadioCheck(AskedCheck):
         self._lost += rows
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         return f"{self.reason}; then nothing came" if self.reason else "nothing came"
 
     def _share(self) -> float:

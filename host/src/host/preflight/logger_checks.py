@@ -127,7 +127,7 @@ class ReceiverCheck(Check):
             self.failed(self._odd)
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         return self.reason or "no rows of receiver channels"
 
     def _glitch_rate(self) -> float | None:
@@ -155,7 +155,7 @@ class CardCheck(Check):
             self._judge(reading)
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         return self.reason or "the logger has not said: no frame `system` came"
 
     def _judge(self, reading: SlowReading) -> None:

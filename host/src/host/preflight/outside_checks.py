@@ -57,7 +57,7 @@ class GpsCheck(Check):
             self._garbled(reading)
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         return self.reason or "no solution came"
 
     def _garbled(self, reading: SlowReading) -> None:
@@ -163,7 +163,7 @@ class BaroCheck(Check):
             self._fine(reading.t_s, pressure)
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         return self.reason or "no pressure came"
 
     def _fine(self, t_s: float, pressure_pa: float) -> None:

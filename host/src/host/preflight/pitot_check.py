@@ -54,7 +54,7 @@ class PitotCheck(AskedCheck):
         self._check_rise(sample.t_s, pressure - sum(self._rest) / len(self._rest))
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         least, most = self._span
         if least > most:
             return "no valid value: its voltage is at an end of its range; open or shorted?"

@@ -57,7 +57,7 @@ class RelayCheck(AskedCheck):
             self._release(sample, held_s)
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         if self._at == "none":
             return "no pulses on the switch channel"
         if self._phase == 0 and self._at == "between":

@@ -38,7 +38,7 @@ class Sample:
 
 
 def columns_of(*names: str) -> Callable[[tuple[float, ...]], tuple[float, ...]]:
-    """Return what takes some columns out of the values of a row."""
+    """Return a function that picks some columns from the values of a row."""
     return itemgetter(*(_PLACE[name] for name in names))
 
 
@@ -60,7 +60,7 @@ class SlowReading:
 
 
 def in_order(update: LiveUpdate, schema: Schema | None) -> Iterator[Sample | SlowReading]:
-    """Yield what a portion of the stream holds, by time."""
+    """Yield the samples and slow readings of a portion of the stream, by time."""
     found: list[Sample | SlowReading] = []
     if len(update):
         columns = [update.rows[name].tolist() for name in LIVE_UNITS]

@@ -153,7 +153,7 @@ class GyroZeroCheck(Check):
             self.seen()
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         return self.reason or "no rates came"
 
 
@@ -195,5 +195,5 @@ class RestPressureCheck(Check):
         self.seen()
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         return self.reason or "no pressures came"

@@ -122,7 +122,7 @@ class SurfaceCheck(AskedCheck):
             )
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         own = self._sticks[self._surface]
         if math.isnan(own.rest):
             return f"no pulses on {self._surface}: its lead, or the transmitter"

@@ -66,7 +66,7 @@ class TurnCheck(AskedCheck):
             self._judge()
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         if not self._row:
             return "no valid rates"
         for k, way in enumerate(_WAYS):

@@ -54,7 +54,7 @@ class VaneCheck(AskedCheck):
             self._swapped()
 
     def missing(self) -> str:
-        """Return what it has seen."""
+        """Return why it is not yet passed: the values seen so far."""
         if not self._valid:
             return "no valid value: its voltage is at an end of its range; open or shorted?"
         if self._least == self._most:

@@ -11,7 +11,7 @@ from host.readers.autopilot_log import FORMATS
 
 
 def summarise_autopilot(flight: AutopilotFlight) -> dict[str, Any]:
-    """Return what a log holds and what it is good for, as plain data."""
+    """Return the contents of a log and its judgement, as plain data."""
     log, judgement = flight.log, flight.judgement
     signals = flight.channels.signals
     ends = [s.t_s[k] for s in signals.values() for k in (0, -1)]
@@ -57,7 +57,7 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
 
 
 def autopilot_meta(summary: dict[str, Any]) -> Meta:
-    """Return what a table says of itself."""
+    """Return the metadata of a table."""
     shares = {f"{name}_share": "of full travel" for name in (*SURFACES, "flap")}
     texts = {column.name: column.text for column in COLUMNS}
     texts |= {f"{name}_share": "commanded; sign as of the angle" for name in SURFACES}

@@ -63,7 +63,7 @@ class Judgement:
     rates_hz: dict[str, float]
 
     def document(self) -> dict[str, Any]:
-        """Return it as plain data."""
+        """Return the judgement as plain data."""
         return {
             "refusal": self.refusal or None,
             "rates_hz": self.rates_hz,
@@ -72,7 +72,7 @@ class Judgement:
         }
 
     def table(self) -> list[str]:
-        """Return what can be identified, and what to change, as lines."""
+        """Return lines: what can be identified, and the settings to change."""
         rows = [f"{what:<61}{verdict}" for what, verdict in self.answers]
         rows += [f"next flight: {one}" for one in self.settings]
         return rows

@@ -130,7 +130,7 @@ def _of_log(wanted: Wanted, path: Path) -> ShownFlight:
 
 
 def log_events(log: FlightLog) -> list[Happening]:
-    """Return what the recorder noted, in the time of the table."""
+    """Return the recorder's events, in the time of the table."""
     found = []
     for session in log.sessions:
         data, t_us = session.slow("event")

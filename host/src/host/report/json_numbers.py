@@ -26,7 +26,7 @@ class JsonNumbers:
     file: str = "result"
 
     def value(self, *path: str | int) -> Any:
-        """Return what stands at a place, None where nothing does."""
+        """Return the value at a place of the document, None without one."""
         found: Any = self.document
         for step in path:
             if isinstance(found, dict):

@@ -21,16 +21,16 @@ _GAP_S = 0.5
 
 
 def caption(answer: Answer) -> str:
-    """Return what the lines of `model_histories` are."""
+    """Return the caption of `model_histories`: what each line is."""
     ahead = "blue: one step ahead; " if _one_step(answer) else ""
-    held_out_runs = (
+    shade = (
         "shaded: unseen maneuvers, free simulation"
         if answer.held_out_runs
         else "no maneuver is unseen"
     )
     return (
         f"grey: measured; {ahead}red: free simulation by the inputs alone; white: fitted;"
-        f" {held_out_runs}; green: the input"
+        f" {shade}; green: the input"
     )
 
 

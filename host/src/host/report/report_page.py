@@ -120,7 +120,7 @@ def _section(title: str, content: str) -> str:
 
 
 def _titles(numbers: JsonNumbers) -> list[str]:
-    """Return what each answer is called: its model, and its method where several were asked for."""
+    """Return the name of each answer: its model, and its method where several were asked for."""
     answers = numbers.document["answers"]
     models = [answer["template"] for answer in answers]
     return [

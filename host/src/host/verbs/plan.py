@@ -328,7 +328,7 @@ def _print_single_points(alone: list[PointPromise]) -> None:
 
 
 def _remedy(width: PredictedWidth | None) -> str:
-    """Return what makes a wide interval narrower."""
+    """Return the remedy for a wide interval."""
     if width is not None and width.noise_share < 0.5:
         return BY_TOLERANCES
     return "fly more of it, or larger"

@@ -109,7 +109,7 @@ def _between(data: bytes | bytearray, found: Found) -> bytes:
 
 
 def text_of(data: bytes) -> bytes:
-    """Return what lies between the envelopes of a whole recording: on USB, lines of text."""
+    """Return the bytes between the envelopes of a whole recording: on USB, lines of text."""
     reader = EnvelopeReader()
     reader.feed(data)
     return reader.between

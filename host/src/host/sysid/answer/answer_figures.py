@@ -195,8 +195,8 @@ def _linear_traces(answer: Answer) -> tuple[dict[str, list[Trace]], str]:
         for j, name in enumerate(answer.model.outputs):
             title = maneuver.name if j == 0 else ""
             signals[name].append(Trace(t, maneuver.outputs[:, j], outputs[:, j], title, True))
-    held_out_runs = "; shaded: unseen, free simulation" if answer.held_out_runs else ""
-    return signals, f"{'one step' if one_step else 'free simulation'}, fitted data{held_out_runs}"
+    shade = "; shaded: unseen, free simulation" if answer.held_out_runs else ""
+    return signals, f"{'one step' if one_step else 'free simulation'}, fitted data{shade}"
 
 
 def _clouds(modes: Sequence[Mode], truth: Mapping[str, complex]) -> list[Cloud]:

@@ -261,7 +261,7 @@ class Identification:
         return write_outputs(places, self.linear, self.coefficients, recorded, self.truth)
 
     def __str__(self) -> str:
-        """Return what `host identify` prints."""
+        """Return the text that `host identify` prints."""
         return self.to_text(full=False)
 
     def __repr__(self) -> str:

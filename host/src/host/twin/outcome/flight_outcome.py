@@ -213,7 +213,7 @@ def simulate(
 def _recorder(
     firmware: str, seed: int, flight_card: bytes, progress: Progress
 ) -> Callable[[FlightRecord, stimuli.Stimuli], sitl.Recording]:
-    """Return what lets the firmware live through a flight."""
+    """Return the function that runs the firmware through a flight."""
     live: Callable[..., sitl.Recording] = avr.record
     if firmware == "sitl":
         live = partial(sitl.record, flight_card=flight_card)

@@ -89,7 +89,7 @@ def commands(record: FlightRecord, at_s: Array) -> dict[str, Array]:
 
 
 def measured_table(record: FlightRecord, data: AirData | None = None) -> pd.DataFrame:
-    """Return what the sensors say, in the columns of a decoded log.
+    """Return the measured values of the sensors, in the columns of a decoded log.
 
     Parameters
     ----------

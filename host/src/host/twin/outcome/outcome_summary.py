@@ -78,7 +78,7 @@ def check(outcome: Outcome) -> None:
 
 
 def _recorded(outcome: Outcome) -> list[str]:
-    """Return what is said of the recorder."""
+    """Return the lines about the recorder."""
     card = outcome.record.card
     if outcome.recording is None:
         left = without_recorder(card.faults)

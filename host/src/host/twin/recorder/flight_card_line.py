@@ -23,7 +23,7 @@ class SitlLine:
         return self._sitl.now() / TICKS_PER_S
 
     def data(self) -> bytes:
-        """Return what the instrument sent in the next moment."""
+        """Return the bytes that the instrument sent in the next moment."""
         self._sitl.run_for(STEP_S)
         sent = self._sitl.sent(Port.USB)
         new, self._read = sent[self._read :], len(sent)

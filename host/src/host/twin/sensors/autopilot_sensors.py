@@ -80,7 +80,7 @@ class Senses:
 
 
 def autopilot_senses(record: FlightRecord, data: AirData, rates: Rates) -> Senses:
-    """Return what the sensors of an autopilot say on a flight.
+    """Return the measurements of the sensors of an autopilot on a flight.
 
     Parameters
     ----------

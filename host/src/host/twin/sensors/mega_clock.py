@@ -13,7 +13,7 @@ TICKS_PER_S = 2_000_000
 
 
 def clock_share(record: FlightRecord) -> float:
-    """Return by how much the Mega's clock runs fast."""
+    """Return the share by which the Mega's clock runs fast."""
     return record.draws.scalar("clock_share") if record.card.sensors.clock_error else 0.0
 
 
