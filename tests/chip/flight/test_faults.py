@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from flight.faults.during_input import FlownRow
+    from flight.flown_row import FlownRow
     from flight.rig import FlightRig
     from simavr_bench.card_journal import CardJournal
 
@@ -68,7 +68,7 @@ DURING_INPUT = (
 @pytest.fixture(scope="module")
 def in_input(flight_elf: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[InInput]:
     """A rig in the middle of a row of a card: for children made by in_fork only."""
-    from flight.faults.during_input import input_rig
+    from flight.flown_row import input_rig
 
     found = input_rig(flight_elf, tmp_path_factory.mktemp("in_input"), threshold_volt=0.8)
     yield found

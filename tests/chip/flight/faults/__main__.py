@@ -20,12 +20,12 @@ from pathlib import Path
 
 import numpy as np
 from flight.faults.boot import run_boots
-from flight.faults.during_input import input_rig
 from flight.faults.model import Fault, Outcome
 from flight.faults.rows import FAULTS
 from flight.faults.run import ready_rig, run_fault
 from flight.faults.strange import run_strange
 from flight.faults.swapped import run_swaps
+from flight.flown_row import input_rig
 from flight.images import build_image
 from flight.rig import THRESHOLDS_VOLT
 from simavr_bench import in_fork

@@ -8,51 +8,17 @@ must end an input, none behind `input_end`, none after a reset.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from flight.faults.model import Fault, Seen
-from flight.rig import DIRECT_US, FlightRig, make_card
-from flight.servos import SERVOS, strange
-from flight.settings import reference_image
-from host.planning.learning_card import SIX_HARMONICS, LearningCondition, learning_card
-from host.sysid.estimators.onboard_sums import ROLL
-from host.wire.framing import EnvelopeReader
+from flight.flown_row import GPS_S, FlownRow, deflected
 from host.wire.schema_text import packed_schema
-from numpy.typing import NDArray
-from simavr_bench import Image, cycles
-from simavr_bench.card_journal import CardJournal
-
-from tests.sitl import flight_cards as cards
-from tests.sitl.input_flight import ARMED_US, LEAST_US, MEGA_US, MOST_US
-from tests.sitl.input_judge import slewed
-from tests.sitl.input_shapes import shape_of
-
-QUIET_S, BEFORE_S = 0.2, 1.5  # of the row; flown of it before a fault
-SHOWN_S, SIGN_S = 1.0, 3.4
-GROUND_S = 12.0 + 5.0 * SHOWN_S + SIGN_S
-HIGH_US = 1790.0  # the elevator's stick: 60 us below its end, so that the row is cut there
-CLIMB_UP = 300 * 8  # 900 Pa of the pressure sensor
-MOVES_UP, MOVES_1E7 = 64, 8  # what a sensor that is alive does by itself
-WIDE = {
-    "dp_min": 600, "dp_max": 4000, "alpha_min": 100, "alpha_max": 4000, "beta_min": 100,
-    "beta_max": 4000, "phi_max": 18000, "theta_min": -18000, "theta_max": 18000, "p_max": 32767,
-    "q_max": 32767, "r_max": 32767, "az_min": -32768, "az_max": 32767, "height_max_pa": 6000,
-}  # fmt: skip
-ROW = cards.row(
-    shape=cards.MULTISINE, axes=7, quiet_ms=200, duration_ms=19_000, amplitude_us=(100, -80, 120),
-    components=[byte for k in range(10) for byte in (20 + 4 * k, 25 * k, 64 * (k % 3) + 60)],
-)  # fmt: skip
-LEARNED = learning_card("ultrastick25e", ROLL, LearningCondition(17.0, harmonics=SIX_HARMONICS))
 
 PLAIN_S, SILENT_S = 0.025, 0.030  # the limit; 1.5 frames of the receiver
 STILL_S = 0.5 + 0.016
 RELEASED_S = 0.050
-PACKET_S, SCAN_S, GPS_S, MESSAGE_S = 0.010, 0.010, 0.2, 0.030
+PACKET_S, SCAN_S, MESSAGE_S = 0.010, 0.010, 0.030
 CLOCK_S = 0.010  # the Mega's clock starts so late at most
-SPREAD_MS = 85  # a servo period, whole ticks of the rate, and that clock
-NEAR = 80 * 1.6  # cycles: the relay's own judge takes 5 us, and 3 us of a command's steps
 
 
 def told(*names: str) -> Callable[[Seen], float]:
@@ -127,107 +93,9 @@ MUST_END: dict[str, Callable[[Seen], float]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class FlownRow:
-    """The row that is flown when a fault begins.
-
-    Attributes
-    ----------
-    start : int
-        Cycle of its trigger, by the log's clock.
-    deflection : NDArray[np.float64], shape (ms, 3)
-        Cycles, from the beginning of the shape.
-    """
-
-    start: int
-    deflection: NDArray[np.float64]
-
-    def made(self, channel: int, start: int, width: int, sticks: NDArray[np.int64]) -> bool:
-        """Tell whether a pulse may be a late stick's and what the card asks for about then."""
-        within = 16 * LEAST_US - NEAR <= width <= 16 * MOST_US + NEAR
-        ms = round((start - self.start) / 16e3 - 1e3 * QUIET_S)
-        if channel >= self.deflection.shape[1] or not within or ms < 0:
-            return False
-        asked = self.deflection[max(0, ms - SPREAD_MS) : ms + 2, channel]
-        if not asked.size:
-            return False
-        low, high = min(0.0, asked.min()), max(0.0, asked.max())
-        return bool(np.any((width - sticks >= low - NEAR) & (width - sticks <= high + NEAR)))
-
-
-def input_rig(
-    elf: Path, folder: Path, *, threshold_volt: float | None = None
-) -> tuple[FlightRig, CardJournal, FlownRow]:
-    """Bring a rig into the middle of a row, its card in private pages and journalled."""
-    card = make_card(folder / "empty.img")
-    rig = FlightRig(elf, card, in_place=False, threshold_volt=threshold_volt, ground_s=GROUND_S)
-    own = cards.card([ROW], [LEARNED], [1], **WIDE)
-    rig.chip.load(
-        Image(flash={}, eeprom={cards.VALID_AT: cards.eeprom_with(own)[cards.VALID_AT :]})
-    )
-    rig.chip.load(reference_image(1100))
-    journal = CardJournal(rig.card)
-    _keep_alive(rig)
-    _show(rig)
-    rig.baro.raw_pressure -= CLIMB_UP
-    for width_us, seconds in ((MEGA_US, 0.8), (ARMED_US, 0.3 + QUIET_S + BEFORE_S)):
-        rig.receiver.width_us[4] = width_us
-        rig.chip.run_s(seconds)
-    started_us = _events(rig, "input_start")
-    if len(started_us) != 1:
-        raise AssertionError(f"no input began: {started_us}")
-    shape = 8.0 * slewed(shape_of(ROW), cards.HEAD["rate_max_usps"])
-    return rig, journal, FlownRow(16 * started_us[0], shape)
-
-
-def _keep_alive(rig: FlightRig) -> None:
-    """Let pressure and position move a little, as those of an aircraft do."""
-    baro = rig.baro
-
-    def pressure(cycle: int) -> tuple[int, int]:
-        moved = MOVES_UP * (cycle // cycles(0.1) % 2)
-        raw = baro.raw_pressure
-        return baro.raw_temperature, raw and raw & ~MOVES_UP | moved
-
-    def drift() -> None:
-        rig.gps.longitude_1e7 ^= MOVES_1E7
-        rig.chip.at(rig.chip.cycle + cycles(GPS_S), drift)
-
-    baro.source = pressure
-    drift()
-
-
-def _show(rig: FlightRig) -> None:
-    """Power on, show the sticks' travel, give the sign that enables the card, take off."""
-    width_us = rig.receiver.width_us
-    rig.power_on()
-    rig.chip.run_s(10.0)
-    for place_us in (LEAST_US, 1500.0, MOST_US, 1500.0):
-        width_us[:3] = [float(place_us)] * 3
-        rig.chip.run_s(SHOWN_S)
-    width_us[0], width_us[2] = float(MOST_US), float(LEAST_US)
-    rig.chip.run_s(SIGN_S)
-    width_us[:] = [1500.0, HIGH_US, 1500.0, width_us[3], DIRECT_US]
-    rig.chip.run_s(rig.ground_s - rig.chip.cycle / 16e6 + 1.0)
-    width_us[3] = 1500.0
-    rig.chip.run_s(3.0)
-
-
-def _events(rig: FlightRig, name: str) -> list[int]:
-    """Return the times (us) of an event, by what the radio sent of it."""
-    schema = packed_schema()
-    frame, code = schema.by_name["event"], schema.enums["event"][name]
-    found = []
-    for data in EnvelopeReader().feed(rig.chip.uart_sent(3)):
-        if data[0] == frame.id:
-            row = np.frombuffer(data, frame.dtype)[0]
-            found += [int(row["t_us"])] if int(row["code"]) == code else []
-    return found
-
-
 def judge_input(seen: Seen, fault: Fault, row: FlownRow) -> list[str]:
     """Return what is wrong with the input of a flight with a fault."""
-    starts = deflected(seen, row)
+    starts = deflected(seen.rig, row)
     wrong = [] if np.count_nonzero(starts < seen.begin) >= 50 else ["no input was seen"]
     last_s = (starts.max(initial=0) - seen.begin) / 16e6
     if fault.injected in MUST_END:
@@ -243,21 +111,10 @@ def judge_input(seen: Seen, fault: Fault, row: FlownRow) -> list[str]:
     return wrong
 
 
-def deflected(seen: Seen, row: FlownRow) -> NDArray[np.int64]:
-    """Return the starts (cycles) of pulses at the servos that the card made."""
-    starts = [
-        start
-        for channel, servo in enumerate(SERVOS)
-        for start, width, sticks in strange(seen.rig, row.start, servo)
-        if row.made(channel, start, width, sticks)
-    ]
-    return np.array(starts, dtype=np.int64)
-
-
 def how_it_ended(seen: Seen, row: FlownRow) -> str:
     """Return why, by the log, and when the last deflected pulse began."""
     names = {value: name for name, value in packed_schema().enums["input_end"].items()}
     ends = seen.events_of("input_end")
     why = names.get(ends[0].arg >> 8 & 255, "?") if ends else "no end told"
-    last_ms = (deflected(seen, row).max(initial=0) - seen.begin) / 16e3
+    last_ms = (deflected(seen.rig, row).max(initial=0) - seen.begin) / 16e3
     return f"{why}, last {last_ms:.0f} ms behind"

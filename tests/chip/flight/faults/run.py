@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 from flight.cut_flight import FILE_BLOCKS, place_of_file
-from flight.faults.during_input import FlownRow, how_it_ended, judge_input
+from flight.faults.during_input import how_it_ended, judge_input
 from flight.faults.model import CLOCK_LATE_US, Event, Fault, Outcome, Seen, event_names, valid_bit
+from flight.flown_row import FlownRow
 from flight.rig import FlightRig, check_card, make_card, take_log
 from flight.servos import LONGEST_GAP_MS, SERVOS, cuts_allowed, nobodys, spoiled, worst_gap_ms
 from flight.settings import reference_image
