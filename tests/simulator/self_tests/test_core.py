@@ -260,6 +260,20 @@ def test_marks_and_watched_functions_are_stamped(make_chip: MakeChip) -> None:
     assert calls["cycle"][0] < marks["cycle"][0] < calls["cycle"][0] + 10
 
 
+def test_every_cycle_is_counted_where_its_instruction_stands(make_chip: MakeChip) -> None:
+    chip = make_chip("loops")
+    chip.run_s(0.005)
+    chip.count_cycles()
+    before = chip.load_now().running
+    chip.run_s(0.005)
+    spent = chip.cycles_spent()
+    # Entering interrupts counts where their vectors stand.
+    assert int(spent.sum()) == chip.load_now().running - before
+    first = chip.symbols["main"][0] // 2
+    assert spent[first:].sum() > 0.9 * spent.sum()  # its work stands in main
+    assert np.count_nonzero(spent[:first]) > 0
+
+
 def test_fork_tries_an_ending_and_forgets_it(make_chip: MakeChip) -> None:
     chip = make_chip("marks")
     chip.run_s(0.001)

@@ -133,6 +133,17 @@ void bench_watch_pc(chip* c, uint32_t address, uint32_t number) {
   c->watched_pc[(address & c->avr->flashend) >> 1] = (uint16_t)number;
 }
 
+void bench_count_cycles(chip* c) {
+  const size_t words = (c->avr->flashend + 1) / 2;
+  if (!c->spent) c->spent = malloc(words * sizeof *c->spent);
+  if (!c->spent) abort();
+  memset(c->spent, 0, words * sizeof *c->spent);
+}
+
+const uint64_t* bench_spent(const chip* c) {
+  return c->spent;
+}
+
 size_t bench_log_count(const chip* c) {
   return c->log_count;
 }

@@ -44,6 +44,9 @@ BENCH_API void bench_log_marks(chip* c, bool on);
 BENCH_API void bench_watch_pc(chip* c, uint32_t address,
                               uint32_t number);  // 0: no more
 
+BENCH_API void bench_count_cycles(chip* c);  // per flash word, from now on
+BENCH_API const uint64_t* bench_spent(const chip* c);
+
 BENCH_API size_t bench_log_count(const chip* c);
 BENCH_API const log_record* bench_log(const chip* c);
 BENCH_API void bench_clear_log(chip* c);

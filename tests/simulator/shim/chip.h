@@ -226,6 +226,7 @@ struct chip {
   uint32_t halt_cycles;  // the CPU waits (EEPROM, flash)
   bool log_interrupts, log_marks;
   uint16_t* watched_pc;  // per flash word, 0 or a number; null until one is watched
+  uint64_t* spent;       // cycles per flash word; null until they are counted
   struct owned* owned;
   struct owned_array* owned_arrays;
   uint64_t running_cycles, sleeping_cycles, held_cycles;

@@ -124,6 +124,7 @@ void interrupt_service(chip* c, bool from_sleep) {
     avr->pc += c->model->boot_start;  // IVSEL: vectors of the boot section
   avr->cycle += c->model->entry_cycles + (from_sleep ? 4u : 0u);
   c->running_cycles += avr->cycle - begun;
+  if (c->spent) c->spent[avr->pc >> 1] += avr->cycle - begun;
 
   vector_stats* const s = &c->stats[vector];
   s->count++;

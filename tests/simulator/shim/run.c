@@ -159,6 +159,7 @@ void bench_destroy(chip* c) {
   bus_leave(c);
   chip_free_owned(c);
   free(c->watched_pc);
+  free(c->spent);
   for (int i = 0; i < 16; i++) free(c->adc.channel[i].point);
   uarts_free(c);
   twi_free(c);
@@ -183,8 +184,10 @@ static void execute(chip* c, uint64_t room) {
     const uint16_t number = c->watched_pc[(avr->pc & avr->flashend) >> 1];
     if (number) log_add(c, kLogPc, number, avr->pc);
   }
+  if (c->spent) room = 0;
   avr->run_cycle_count = room;
   const uint64_t before = avr->cycle;
+  const uint32_t at = (avr->pc & avr->flashend) >> 1;
   c->executing = true;
   avr->pc = avr_run_one(avr);
   c->executing = false;
@@ -192,6 +195,7 @@ static void execute(chip* c, uint64_t room) {
   avr->cycle += c->halt_cycles;
   c->halt_cycles = 0;
   c->running_cycles += avr->cycle - before;
+  if (c->spent) c->spent[at] += avr->cycle - before;
   if (avr->state != cpu_Running && avr->state != cpu_Sleeping) {
     // The library stops on a push over the registers; the chip goes on, so do
     // we.

@@ -94,6 +94,8 @@ _SIGNATURES: dict[str, tuple[object, tuple[object, ...]]] = {
     "log_interrupts": (None, (_bool,)),
     "log_marks": (None, (_bool,)),
     "watch_pc": (None, (_u32, _u32)),
+    "count_cycles": (None, ()),
+    "spent": (ct.POINTER(_u64), ()),
     "log_count": (ct.c_size_t, ()),
     "log": (_ptr, ()),
     "clear_log": (None, ()),

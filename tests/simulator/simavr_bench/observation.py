@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes as ct
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simavr_bench.core import Core
 from simavr_bench.log import RECORD, LogKind, Records, select
@@ -67,6 +68,18 @@ class Observation(Core):
         address = self.symbols[symbol][0] if isinstance(symbol, str) else symbol
         self._lib.bench_watch_pc(self.handle, address, self._pc_watches)
         return self._pc_watches
+
+    def count_cycles(self) -> None:
+        """Count the cycles of every instruction from now on; several times slower."""
+        self._lib.bench_count_cycles(self.handle)
+
+    def cycles_spent(self) -> NDArray[np.uint64]:
+        """Cycles since :meth:`count_cycles`, by the word of flash their instruction stands in.
+
+        Entering an interrupt counts where its vector stands.
+        """
+        words = self._flash_size // 2
+        return np.ctypeslib.as_array(self._lib.bench_spent(self.handle), (words,)).copy()
 
     def load_now(self) -> CpuLoad:
         """CPU cycles by state since the start or :meth:`clear_statistics`."""

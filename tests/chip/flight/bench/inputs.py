@@ -29,6 +29,8 @@ from tests.sitl.input_flight import ELEVATOR, TRIGGER_S, UP_S, input_flight
 
 FRAMES_S = (0.020, 0.014)
 ROW_S = 12.0
+SEED = 31_300
+CARD = "inputs.img"
 QUIET_S = 0.2
 BEHIND_S = 2.5  # the last second's estimates are told, the last block is written
 SURFACES = 3
@@ -118,10 +120,10 @@ class CommandWatch:
             self.error_us[servo].append(abs(width_us - begun[1] / TICKS_PER_US))
 
 
-def fly_input(
-    elf: Path, *, rate_hz: int, frame_s: float, duration_s: float, folder: Path, seed: int = 31_300
-) -> InputFigures:
-    """Fly one row at one rate of the log, with one receiver.
+def input_rig(
+    elf: Path, *, rate_hz: int, frame_s: float, duration_s: float, folder: Path, seed: int = SEED
+) -> InputRig:
+    """Return a rig, switched on, whose flight triggers one row.
 
     Parameters
     ----------
@@ -138,7 +140,6 @@ def fly_input(
     seed : int
         Of the flight.
     """
-    card = make_card(folder / "inputs.img")
     flight = input_flight(
         TRIGGER_S + QUIET_S + duration_s + BEHIND_S, np.random.default_rng(seed), frame_s
     )
@@ -146,7 +147,16 @@ def fly_input(
     eeprom = bytearray(cards.eeprom_with(learning_cards(duration_s)))
     for address, piece in settings_image(rate_hz=rate_hz).eeprom.items():
         eeprom[address : address + len(piece)] = piece
-    rig = InputRig(elf, card, flight, bytes(eeprom))
+    return InputRig(elf, make_card(folder / CARD), flight, bytes(eeprom))
+
+
+def fly_input(
+    elf: Path, *, rate_hz: int, frame_s: float, duration_s: float, folder: Path, seed: int = SEED
+) -> InputFigures:
+    """Fly one row at one rate of the log, with one receiver; arguments as of :func:`input_rig`."""
+    rig = input_rig(
+        elf, rate_hz=rate_hz, frame_s=frame_s, duration_s=duration_s, folder=folder, seed=seed
+    )
     chip = rig.chip
     stack = int(chip.symbols["_end"][0]) & 0xFFFF
     rig.run_to(PAINTED_S)
@@ -164,12 +174,12 @@ def fly_input(
     load, end = chip.load_now(), chip.cycle
     errors = np.concatenate([np.array(of_servo) for of_servo in watch.error_us])
     deflected_us = float(np.ptp(watch.width_us[ELEVATOR]))
-    rig.run_to(flight.seconds)
+    rig.run_to(rig.flight.seconds)
     told, untouched = chip.uart_sent(3).count(LEARNED_HEAD), chip.untouched_stack(stack, painted)
     chip.power_off()
     chip.close()
-    check_card(card)
-    log = host.read_log(take_log(card, folder / "inputs.bin"))
+    check_card(folder / CARD)
+    log = host.read_log(take_log(folder / CARD, folder / "inputs.bin"))
     events = log.frames["event"]
     ended = events["arg"][events["code"] == packed_schema().number("event", "input_end")]
     return InputFigures(
