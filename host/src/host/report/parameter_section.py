@@ -75,7 +75,8 @@ def _coefficients(numbers: JsonNumbers, at: int, label: str, causes: Mapping[str
     rows = []
     for name in answer["coefficients"]:
         place = ("answers", at, "coefficients", name)
-        mark = answer["marks"].get(name, {}) if answer["template"] == "coefficients" else {}
+        direct = answer["template"] == "coefficients"
+        mark = answer["marks"].get(name, {}) if direct else answer["coefficients"][name]
         rows.append([
             escaped(name), numbers.html(*place, "value"),
             numbers.html(*place, "half_width", digits=2),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.marks import Verdict
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.servo_lines import servo_document
@@ -84,11 +85,13 @@ def answer_document(
     result = answer.result
     half = result.half_width()
     A, B, C, D = result.matrices()
+    verdict = verdict_of(answer, evidence)
+    converted = converted_marks(answer, verdict.marks)
     return {
         "template": answer.template,
         "method": result.method,
         "verdict": list(lines),
-        "marks": _mark_document(verdict_of(answer, evidence)),
+        "marks": _mark_document(verdict),
         "converged": result.converged,
         "warnings": list(result.warnings),
         "airspeed_mps": answer.condition.airspeed_mps,
@@ -130,7 +133,12 @@ def answer_document(
             for r in answer.identifiability_flags
         ],
         "coefficients": {
-            c.name: {"value": c.value, "half_width": c.half_width, "fit_error": c.fit_error}
+            c.name: {
+                "value": c.value,
+                "half_width": c.half_width,
+                "fit_error": c.fit_error,
+                "mark": converted.get(c.name, ""),
+            }
             for c in answer.coefficients
         },
         "modes": mode_document(answer.modes),

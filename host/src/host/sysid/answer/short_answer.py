@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from host.aircraft.gains import dimensional_name
 from host.constants import DEG_PER_RAD
+from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.estimate_lines import mode_lines
 from host.sysid.answer.marks import SMALL
 from host.sysid.answer.parameter_units import parameter_unit
@@ -60,7 +62,9 @@ def _linear_rows(answer: Answer, evidence: Evidence) -> Iterator[str]:
     result, marks = answer.result, verdict_of(answer, evidence).marks
     half = result.half_width()
     size = reference_values(answer.model, answer.maneuvers, result.estimate)
+    converted = converted_marks(answer, marks)
     beside = {c.name: f"{c.name:9s}{c.value:9.4g} +- {c.half_width:.2g}"
+              + _if_worse(converted.get(c.name, ""), marks.get(dimensional_name(c.name), ""))
               for c in answer.coefficients}  # fmt: skip
     left = dict(beside)
     for k, p in enumerate(answer.model.parameters):
@@ -76,6 +80,11 @@ def _linear_rows(answer: Answer, evidence: Evidence) -> Iterator[str]:
             marks.get(p.name, ""), beside.get(name, ""),
         )  # fmt: skip
     yield from (f"{'':64s}{text}" for text in left.values())
+
+
+def _if_worse(mark: str, of_derivative: str) -> str:
+    """Return a coefficient's mark where the row's is not its own."""
+    return "" if mark == of_derivative else f", {mark}"
 
 
 def _direct_rows(answer: CoefficientAnswer, evidence: Evidence) -> Iterator[str]:

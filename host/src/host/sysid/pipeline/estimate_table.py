@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+from host.sysid.answer.converted_marks import converted_marks
 from host.sysid.answer.mat_file import labels
 from host.sysid.answer.parameter_units import parameter_unit
 from host.sysid.answer.trust_rules import NO_EVIDENCE, Evidence
@@ -83,9 +84,10 @@ def _linear_rows(answer: Answer, evidence: Evidence) -> Iterator[tuple[str, tupl
         k = result.index(d.name)
         value, width = float(result.estimate[k]), float(half[k])
         yield d.name, (value, width, "s", _share(value, width), "", "")
+    converted = converted_marks(answer, marks)
     for c in answer.coefficients:
-        share = _share(c.value, c.half_width)
-        yield c.name, (c.value, c.half_width, PLAIN, share, "", c.widened_by)
+        share, mark = _share(c.value, c.half_width), converted.get(c.name, "")
+        yield c.name, (c.value, c.half_width, PLAIN, share, mark, c.widened_by)
 
 
 def _direct_rows(

@@ -1,0 +1,46 @@
+"""A coefficient that a derivative became is marked by itself: mass, inertia and pressure are in its
+interval too, so that it may be wider than the derivative, and it is never better known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from host.aircraft.gains import dimensional_name
+from host.sysid.aerodynamics.coefficient_table import Coefficient
+from host.sysid.answer.marks import (
+    CAREFUL,
+    FAIR,
+    MARKS,
+    SMALL,
+    TRUST,
+    TRUSTED,
+    UNSURE,
+)
+from host.sysid.flight.linear_answer import Answer
+
+
+def converted_marks(answer: Answer, marks: Mapping[str, str]) -> dict[str, str]:
+    """Return the mark of each coefficient of a linear answer: the worse of its derivative's and of
+    what its own 95 % half-width allows.
+
+    Parameters
+    ----------
+    answer : Answer
+    marks : mapping
+        Of the derivatives, by `verdict_of`; a coefficient whose derivative has none has none.
+    """
+    found = {}
+    for c in answer.coefficients:
+        behind = marks.get(dimensional_name(c.name), "")
+        if behind:
+            found[c.name] = (
+                behind if behind == SMALL else max(behind, _by_width(c), key=MARKS.index)
+            )
+    return found
+
+
+def _by_width(c: Coefficient) -> str:
+    share = c.half_width / max(abs(c.value), 1e-300)
+    if share <= TRUST:
+        return TRUSTED
+    return CAREFUL if share <= FAIR else UNSURE

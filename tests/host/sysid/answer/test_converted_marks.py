@@ -1,0 +1,66 @@
+"""A coefficient stands no better than its derivative, nor than its own interval allows."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import product
+
+import pytest
+from host.sysid.aerodynamics.coefficient_table import Coefficient
+from host.sysid.answer.converted_marks import converted_marks
+from host.sysid.answer.json_document import answer_document, json_text
+from host.sysid.answer.marks import CAREFUL, MARKS, SMALL, TRUSTED, UNSURE
+from host.sysid.answer.short_answer import short_table
+from host.sysid.answer.trust_rules import NO_EVIDENCE
+from host.sysid.flight.linear_answer import Answer
+from host.sysid.flight.linear_estimator import identify
+from host.sysid.pipeline.estimate_table import estimate_table
+from studies.wrong_flights import fly
+
+WIDTHS = (0.0, 0.05, 0.0999, 0.1001, 0.3, 0.31, 2.0)
+
+
+@pytest.fixture(scope="module")
+def answer() -> Answer:
+    flight = fly("short-period", "none", "white", 1)
+    [found] = identify(
+        flight.columns, names=("short-period",), method="output-error",
+        windows=flight.windows, user_model=flight.model,
+    )  # fmt: skip
+    return found
+
+
+def _with(answer: Answer, share: float, name: str = "Cm_q") -> Answer:
+    return replace(answer, coefficients=(Coefficient(name, -10.0, 0.1, 10.0 * share),))
+
+
+@pytest.mark.parametrize(("mark", "share"), [*product(MARKS, WIDTHS)])
+def test_it_is_the_worse_of_both(answer: Answer, mark: str, share: float) -> None:
+    (found,) = converted_marks(_with(answer, share), {"M_q": mark}).values()
+    assert MARKS.index(found) >= MARKS.index(mark)
+    if share > 0.1:
+        assert found != TRUSTED
+    if share > 0.3:
+        assert found not in (TRUSTED, CAREFUL)
+    if mark == SMALL:  # judged against its row
+        assert found == SMALL
+    if share <= 0.1:
+        assert found == mark
+
+
+def test_without_a_mark_of_the_derivative_there_is_none(answer: Answer) -> None:
+    assert converted_marks(_with(answer, 0.01), {}) == {}
+
+
+@pytest.mark.parametrize(("share", "mark"), [(0.05, TRUSTED), (0.15, CAREFUL), (0.4, UNSURE)])
+def test_table_json_and_screen_say_it(answer: Answer, share: float, mark: str) -> None:
+    """Of a derivative under trust, whose coefficient mass and inertia widen."""
+    wide = _with(answer, share)
+    table = estimate_table([wide], None)
+    assert table.loc[(wide.template, "M_q"), "verdict"] == TRUSTED
+    assert table.loc[(wide.template, "Cm_q"), "verdict"] == mark
+    document = json.loads(json_text(answer_document(wide, [])))
+    assert document["coefficients"]["Cm_q"]["mark"] == mark
+    (row,) = [line for line in short_table([wide], None, NO_EVIDENCE) if "Cm_q" in line]
+    assert row.endswith(f", {mark}") is (mark != TRUSTED)
