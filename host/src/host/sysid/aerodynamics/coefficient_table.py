@@ -130,7 +130,9 @@ def coefficient_parts(
         assumed[QBAR] = -value * dynamic_pressure_share(
             errors or standard_errors(), condition.qbar_pa
         )
-    of_flow_angle = np.array([name.endswith(("_alpha", "_beta")) for name in names])
+    # An angle that is told by accelerations saw no vane, and no upwash.
+    seen = [f"_{y.removesuffix('_rad')}" for y in ANGLES if y in result.model.outputs]
+    of_flow_angle = np.array([name.endswith(tuple(seen)) for name in names])
     assumed[VANE] = np.asarray(of_flow_angle * value * airframe.upwash * airframe.upwash_share)
     sensed = []
     for m in shifts:
@@ -192,6 +194,7 @@ def _variances(assumed: dict[str, Array], sensed: dict[str, list[Array]]) -> dic
 
 PERTURBATION = 1e-4  # share by which a mass property is changed for its sensitivity
 QBAR, VANE = "dynamic pressure", "vanes"
+ANGLES = ("alpha_rad", "beta_rad")
 SHARED = {"pitot_scale": QBAR, "pitot_zero_pa": QBAR, "alpha_scale": VANE, "beta_scale": VANE}
 
 

@@ -273,13 +273,14 @@ class LinearEstimator:
         """Return the covariance from noise and repeats, and from every systematic error."""
         e = estimate
         fit_at_trim = e.fit if e.departure is None else e.departure.corrected(e.fit)
-        statistical = inflate_covariance(fit_at_trim, maneuver_agreement(fit_at_trim))
+        statistical = fit_at_trim
         # Airspeed that varied is known: what it does is no model error.
         free = free_responses(e.model, e.estimate, e.at_trim(e.estimate))
         coherence = excess = None
         if free is not None:
             coherence = input_coherence(free.problem, free.responses, free.theta)
             excess = excess_over_noise_model(free, statistical, e.trim.airspeed_mps)
+            # Before maneuvers are compared: by noise without memory a gust made them disagree.
             if statistical.method == WHITE:
                 statistical = widened_to(
                     statistical,
@@ -290,6 +291,7 @@ class LinearEstimator:
                         coherence.innovation_variance,
                     ),
                 )
+        statistical = inflate_covariance(statistical, maneuver_agreement(statistical))
         statistical = inflate_by_coherence(statistical, coherence, excess)
         shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
         carriers = [m.flight.compatibility for m in e.used]
