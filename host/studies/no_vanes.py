@@ -2,8 +2,9 @@
 own logs with vanes.
 
 Each flight of the card `demo` is flown once with all tolerances drawn, in calm air or in gusts. Its
-own log has vanes; the log that a PX4 plane would have written has none. One row a number goes to a
-file that a later run continues.
+own log has vanes; the log that a PX4 plane would have written has none. Before the launch it stands
+at a pitch that an inclinometer told to `INCLINOMETER_RAD`; angles are reconstructed without that
+too. One row a number goes to a file that a later run continues.
 """
 
 from __future__ import annotations
@@ -17,11 +18,24 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from host.aircraft.file import load_measured, read_document
+from host.aircraft.mass_properties import RECTANGLE
 from host.arrays import Array
 from host.compiled import prefer_machine_code
+from host.export.toml import dumps
+from host.instrument.instrument_errors import (
+    InstrumentErrors,
+    instrument_errors,
+    standard_errors,
+)
+from host.instrument.recording import AUTOPILOT
 from host.sysid.answer.marks import CAREFUL, TRUSTED
+from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
+from host.sysid.pipeline.aircraft_data import aircraft_data
+from host.sysid.pipeline.flight_preparation import prepare
 from host.sysid.pipeline.identification import Identification
+from host.sysid.pipeline.reading_options import ReadingOptions
 from host.twin.flight.fly import FlightRecord, fly
 from host.twin.outcome.autopilot_logs import write_autopilot_log
 from host.twin.outcome.ideal import true_table
@@ -29,19 +43,17 @@ from host.twin.sensors.local_flow import AirData, air_data
 from host.twin.testcard.cards import load
 
 import host
-from studies.imported_logs import AIRCRAFT, MODELS, own_log, truth
+from studies.imported_logs import AIRCRAFT, AXIS, MODELS, own_log, truth
 from studies.stored_rows import Row, flown_rows
 
 FIRST_SEED = 440  # 400, 401 and 420-425 were looked at
-WITH_VANES = 6  # flights of each cell whose own log is identified too
+WITH_VANES = 16  # flights of each cell whose own log is identified too
 TURBULENCE_MPS = (0.0, 0.5)
 SETTLED_S = 5.0  # behind the launch
-# The coefficient of each row and the derivative whose mark it has.
-TWIN = {
-    "CL_alpha": "Z_alpha", "Cm_alpha": "M_alpha", "Cm_q": "M_q", "Cm_de": "M_de", "Cl_p": "L_p",
-    "Cl_da": "L_da", "Cn_beta": "N_beta", "Cn_r": "N_r", "Cn_dr": "N_dr",
-}  # fmt: skip
+STANDS_S = 1.0
+INCLINOMETER_RAD = np.radians(0.25)  # one deviation: of the instrument and of the ground
 ANGLES = {"alpha": 1, "beta": 2}  # and the axis that the IMU's tilt turns them about
+OPEN = ", tilt open"  # behind an angle: nobody measured how the aircraft stands
 # Of an angle: rms, mean and told deviation of its error, tilt of the IMU, deg.
 COLUMNS = (
     "seed", "turbulence_mps", "name", "true", "estimate", "half_width", "mark", "with_vanes",
@@ -52,29 +64,66 @@ COLUMNS = (
 def rows_of(seed: int, turbulence_mps: float, *, beside: bool = False) -> Iterator[Row]:
     """Fly, hide the vanes, reconstruct and identify; `beside` identifies the own log too."""
     card = load("demo")
-    card = replace(card, air=replace(card.air, turbulence_mps=turbulence_mps))
-    record = fly(card, seed=seed)
+    card = replace(
+        card,
+        air=replace(card.air, turbulence_mps=turbulence_mps),
+        sensors=replace(card.sensors, servo_tolerance=True),
+    )
+    record = fly(card, seed=seed, errors=_of_an_autopilot())
     data = air_data(record)
     key: dict[str, object] = {"seed": seed, "turbulence_mps": turbulence_mps}
     with tempfile.TemporaryDirectory() as folder:
         stem = Path(folder) / "flight"
         path = write_autopilot_log("ulog", record, data, stem, airframe="conventional")
+        standing = stem.with_suffix(".toml")
+        standing.write_text(dumps(_standing(record, data)), encoding="utf-8")
         try:
-            found = host.identify(path, aircraft=AIRCRAFT, models=MODELS)
+            found = host.identify(path, aircraft=standing, models=MODELS)
         except IdentificationError as error:
             yield {**key, "name": "refused", "mark": str(error)[:80]}
             return
+        bare = prepare(path, ReadingOptions(), aircraft_data(AIRCRAFT))
         vanes = {}
         if beside:
-            own, by = own_log(record, data, stem)
+            # The same flight of our own instrument: an autopilot's errors are not ours.
+            ours = fly(card, seed=seed)
+            own, by = own_log(ours, air_data(ours), stem)
             answer = host.identify(own, aircraft=AIRCRAFT, models=MODELS, calibration=by)
             vanes = _half_widths(answer)
-    yield from ({**key, **row} for row in _angles(record, data, found))
+    for flight, kind in ((found.flights[0], ""), (bare.flight, OPEN)):
+        yield from ({**key, **row} for row in _angles(record, data, flight, kind))
     yield from ({**key, **row} for row in _told(truth(record, data), found, vanes))
 
 
-def _angles(record: FlightRecord, data: AirData, found: Identification) -> Iterator[Row]:
-    [flight] = found.flights
+def _of_an_autopilot() -> InstrumentErrors:
+    """Return what its sensors are drawn from: what identification allows for, but for two.
+
+    The servos' delay stays within a receiver's frame, and gyros are zeroed at start-up: what an
+    autopilot's own estimator has learned of them by the launch the twin's would not know.
+    """
+    errors = instrument_errors(load_measured(AIRCRAFT), maker=AUTOPILOT)
+    ours = {name: standard_errors()[name] for name in ("servo_delay_s", "gyro_bias_radps")}
+    return InstrumentErrors({**errors.named, **ours})
+
+
+def _standing(record: FlightRecord, data: AirData) -> dict[str, object]:
+    """Return the aircraft file with the pitch at which it stands, as it was measured."""
+    true, document = true_table(record, data), dict(read_document(AIRCRAFT))
+    pitch = float(np.interp(STANDS_S, true["t_s"], true["theta_rad"]))
+    off = float(np.random.default_rng([record.seed, 21]).normal(0.0, INCLINOMETER_RAD))
+    geometry = document["geometry"]
+    assert isinstance(geometry, dict)
+    geometry = {
+        **geometry,
+        "ground_pitch_rad": pitch + off,
+        "ground_pitch_tolerance_rad": INCLINOMETER_RAD / RECTANGLE,
+    }
+    return {**document, "geometry": geometry}
+
+
+def _angles(
+    record: FlightRecord, data: AirData, flight: ReconstructedFlight, kind: str
+) -> Iterator[Row]:
     if flight.angles is None:
         return
     true, t = true_table(record, data), flight.corrected["t_s"]
@@ -85,7 +134,7 @@ def _angles(record: FlightRecord, data: AirData, found: Identification) -> Itera
         angle = getattr(flight.angles, f"{name}_rad")
         error = np.degrees(angle - np.interp(t, true["t_s"], true[f"{name}_rad"]))[aloft]
         yield {
-            "name": name, "rms_deg": float(np.sqrt(np.mean(error**2))),
+            "name": name + kind, "rms_deg": float(np.sqrt(np.mean(error**2))),
             "mean_deg": float(error.mean()),
             "told_deg": float(np.degrees(getattr(flight.angles, f"{name}_sd_rad"))),
             "tilt_deg": float(tilt[axis]),
@@ -100,7 +149,7 @@ def _told(true: dict[str, float], found: Identification, vanes: dict[str, float]
         if name in half:
             yield {
                 "name": name, "true": expected, "estimate": value[name], "half_width": half[name],
-                "mark": marks[TWIN[name]], "with_vanes": vanes.get(name, ""),
+                "mark": marks[name], "with_vanes": vanes.get(name, ""),
             }  # fmt: skip
 
 
@@ -116,8 +165,9 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
         " | told sd |"
     ]
     cells = [[r for r in rows if float(r["turbulence_mps"]) == t] for t in TURBULENCE_MPS]
+    every = [*ANGLES, *(name + OPEN for name in ANGLES)]
     for turbulence, (cell, name) in zip(
-        np.repeat(TURBULENCE_MPS, len(ANGLES)), product(cells, ANGLES), strict=True
+        np.repeat(TURBULENCE_MPS, len(every)), product(cells, every), strict=True
     ):
         if own := [r for r in cell if r["name"] == name]:
             numbers = " | ".join(f"{x:.2f}" for x in _angle_numbers(own))
@@ -128,7 +178,7 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
     )
     for turbulence, cell in zip(TURBULENCE_MPS, cells, strict=True):
         held = total = sure = 0
-        for name in TWIN:
+        for name in AXIS:
             if not (own := [r for r in cell if r["name"] == name]):
                 continue
             error, half, within = _errors(own)
@@ -146,7 +196,7 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
         wide = sum(
             r["mark"] == TRUSTED and float(r["half_width"]) > 0.1 * abs(float(r["estimate"]))
             for r in cell
-            if r["name"] in TWIN
+            if r["name"] in AXIS
         )
         if total:
             lines.append(

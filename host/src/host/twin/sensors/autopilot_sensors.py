@@ -13,6 +13,7 @@ import numpy as np
 from host.aircraft.airframe import DOWN, NORTH, Q0, Q3, Array, U
 from host.aircraft.attitude import to_body
 from host.physical.airdata import STANDARD_PRESSURE_PA
+from host.twin.flight.draws import PITOT_PA_PER_COUNT
 from host.twin.flight.fly import STEP_S, FlightRecord
 from host.twin.sensors.filters import delayed, first_order
 from host.twin.sensors.imu import imu
@@ -102,6 +103,7 @@ def autopilot_senses(record: FlightRecord, data: AirData, rates: Rates) -> Sense
     pressure = first_order(0.5 * data.density_kgpm3 * along**2, late["dp_a"], STEP_S)
     scale = 1.0 + float(record.draws.vector("pitot_scale_share")[0])
     differential = scale * delayed(record.t_s, pressure, 0.0, airspeed_s)
+    differential += PITOT_PA_PER_COUNT * float(record.draws.vector("pitot_drift_count")[0])
     differential += noisy * PITOT_NOISE_PA * rng.standard_normal(len(airspeed_s))
     indicated = np.sqrt(2.0 * np.maximum(differential, 0.0) / SEA_LEVEL_DENSITY_KGPM3)
     static = delayed(record.t_s, data.static_pa, 0.0, baro_s) + record.draws.scalar(
