@@ -47,7 +47,7 @@ from studies.imported_logs import AIRCRAFT, AXIS, MODELS, own_log, truth
 from studies.stored_rows import Row, flown_rows
 
 FIRST_SEED = 440  # 400, 401 and 420-425 were looked at
-WITH_VANES = 16  # flights of each cell whose own log is identified too
+WITH_VANES = 8  # flights of each cell whose own log is identified too
 TURBULENCE_MPS = (0.0, 0.5)
 SETTLED_S = 5.0  # behind the launch
 STANDS_S = 1.0
