@@ -56,7 +56,6 @@ class ImuReceiver {
   ImuResult own_packet(const uint8_t* bytes, uint8_t size, uint32_t start_us);
   ImuResult original_first(const uint8_t* bytes, uint32_t start_us);
   ImuResult original_second(const uint8_t* bytes, uint32_t start_us);
-  void count_gap(uint8_t seq, uint32_t start_us);
   void take_aux(uint8_t kind, const uint8_t* aux);
 
   ImuSample sample_;

@@ -135,10 +135,4 @@ int16_t sin_q15(int16_t angle_cdeg) {
   return static_cast<int16_t>(negative != second ? -value : value);
 }
 
-int16_t cos_q15(int16_t angle_cdeg) {
-  const int16_t size =
-      static_cast<int16_t>(angle_cdeg < 0 ? -int32_t{angle_cdeg} : int32_t{angle_cdeg});
-  return sin_q15(static_cast<int16_t>(kQuarter - size));
-}
-
 }  // namespace core

@@ -18,8 +18,7 @@ uint16_t square_root(uint32_t value);
 // included, where the larger of the two is 2^20 or more.
 int16_t atan2_cdeg(int32_t y, int32_t x);
 
-// 32767 times sine and cosine of an angle in 0.01 deg, off by 7 at most.
+// 32767 times the sine of an angle in 0.01 deg, off by 7 at most.
 int16_t sin_q15(int16_t angle_cdeg);
-int16_t cos_q15(int16_t angle_cdeg);
 
 }  // namespace core
