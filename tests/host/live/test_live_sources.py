@@ -256,7 +256,7 @@ def test_an_unknown_schema_is_recorded_and_told_once(tmp_path: Path) -> None:
     told = envelope(b"\0\xef\xbe\xad\xde")
     (tmp_path / "in.radio").write_bytes(b"")
     stream = LiveStream(load_calibration())
-    said = [text for _ in range(3) for text in stream.feed(told, 0.0).told]
+    said = [text for _ in range(3) for text in stream.feed(told, 0.0).messages]
     assert len(said) == 1
     assert "deadbeef" in said[0]
 

@@ -50,8 +50,8 @@ class FlightState:
 
     def received(self, size_bytes: int, update: LiveUpdate) -> None:
         """Count a portion of the stream for the link budget."""
-        heard = len(update) > 0 or bool(update.slow)
-        self.link.add(time.monotonic(), size_bytes, len(update), update.lost, heard)
+        received = len(update) > 0 or bool(update.slow)
+        self.link.add(time.monotonic(), size_bytes, len(update), update.lost, received)
 
     def say(self, kind: str, text: str) -> dict[str, Any]:
         """Add an event of the ground: a mark, a line that went away."""
@@ -90,7 +90,7 @@ class FlightState:
         }
 
     def _take(self, update: LiveUpdate) -> None:
-        for text in update.told:
+        for text in update.messages:
             self.say("warning", text)
         for frame in update.slow:
             self._input(frame)  # before the rows that it moves

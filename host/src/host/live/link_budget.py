@@ -41,11 +41,11 @@ class LinkBudget:
         self._first_s: float | None = None
         self._heard_s: float | None = None
 
-    def add(self, now_s: float, size_bytes: int, rows: int, lost: int, heard: bool) -> None:
-        """Count a portion; `heard` if anything in it could be decoded."""
+    def add(self, now_s: float, size_bytes: int, rows: int, lost: int, received: bool) -> None:
+        """Count a portion; `received` if anything in it could be decoded."""
         self._first_s = now_s if self._first_s is None else self._first_s
         self._portions.append((now_s, size_bytes, rows, lost))
-        if heard:
+        if received:
             self._heard_s = now_s
 
     def at(self, now_s: float) -> LinkState:

@@ -268,7 +268,7 @@ async def _serve(request: LiveRequest, session: LiveSession, tell: Callable[[str
             runner = await _page(request, session, tell)
         session.start()
         await _until_ended(session, tell, forever=request.page)
-        await _until_told(session)
+        await _until_estimated(session)
     finally:
         if runner is not None:
             await runner.cleanup()
@@ -293,7 +293,7 @@ async def _until_ended(session: LiveSession, tell: Callable[[str], None], *, for
             tell(_silence(session))
 
 
-async def _until_told(session: LiveSession) -> None:
+async def _until_estimated(session: LiveSession) -> None:
     """Wait for the last estimates of a source that has ended: a recording played fast."""
     loop = asyncio.get_running_loop()
     end_s = loop.time() + _LAST_S

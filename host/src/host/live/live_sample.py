@@ -67,7 +67,7 @@ class LiveUpdate:
     slow : list of SlowFrame
     arrived_s : float
         When the portion was read, on the clock of `time.time`.
-    told : list of str
+    messages : list of str
         What a person should know.
     status : StatusLine or None
         The newest status line in it: USB has one a second, the radio none.
@@ -78,7 +78,7 @@ class LiveUpdate:
     lost: int
     slow: list[SlowFrame]
     arrived_s: float
-    told: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
     status: StatusLine | None = None
 
     def __len__(self) -> int:

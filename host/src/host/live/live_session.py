@@ -176,7 +176,7 @@ class LiveSession:
         self.state.received(len(data), update)
         for listener in self.listeners.values():
             listener.take(data)
-        for text in update.told:
+        for text in update.messages:
             self._noted("warning", text)
             self._tell(text)
         if len(update) and self.audiences:

@@ -79,7 +79,7 @@ class LiveStream:
         return 0 if self._text.rows else self._reader.skipped - self._text_bytes
 
     @property
-    def heard(self) -> bool:
+    def received(self) -> bool:
         """True once anything was understood, or waits for the hash of its schema."""
         return bool(self.rows or self.frames or self._waiting or self._refused)
 
@@ -101,16 +101,16 @@ class LiveStream:
         arrived_s : float
             On the clock of `time.time`.
         """
-        told: list[str] = []
+        messages: list[str] = []
         frames: list[bytes] = []
         for frame in self._reader.feed(data):
             if frame[0] == SCHEMA_HASH_ID:
-                frames += self._schema_named(frame, told)
+                frames += self._schema_named(frame, messages)
             elif self.schema is None:
                 self._waiting.append(frame)
             elif self._is_new(frame):
                 frames.append(frame)
-        update = replace(self._decoded(frames, arrived_s, told), status=self._status())
+        update = replace(self._decoded(frames, arrived_s, messages), status=self._status())
         if self._reader.skipped and not self.frames:
             text = self._text.feed(data, arrived_s)
             if text is not None:
@@ -129,7 +129,7 @@ class LiveStream:
         found = [parse_status(line) for line in self._lines.feed(text)]
         return next(filter(None, reversed(found)), None)
 
-    def _schema_named(self, frame: bytes, told: list[str]) -> list[bytes]:
+    def _schema_named(self, frame: bytes, messages: list[str]) -> list[bytes]:
         """Take the hash of the schema; return the frames that waited for it."""
         value = int.from_bytes(frame[1:5], "little")
         if self.schema is not None and self.schema.hash == value:
@@ -138,7 +138,7 @@ class LiveStream:
         if text is None:
             if value not in self._refused:
                 self._refused.add(value)
-                told.append(
+                messages.append(
                     f"telemetry of schema {value:08x}, which this program does not know: it is"
                     " recorded and not shown; install the host tool of that firmware"
                 )
@@ -160,7 +160,9 @@ class LiveStream:
         recent.append(frame)
         return True
 
-    def _decoded(self, frames: Sequence[bytes], arrived_s: float, told: list[str]) -> LiveUpdate:
+    def _decoded(
+        self, frames: Sequence[bytes], arrived_s: float, messages: list[str]
+    ) -> LiveUpdate:
         schema = self.schema
         slow: list[SlowFrame] = []
         idents: list[bytes] = []
@@ -185,7 +187,7 @@ class LiveStream:
         self.rows += len(idents)
         self.lost += lost
         rows, drives = self._rows(idents, times)
-        return LiveUpdate(rows, drives, lost, slow, arrived_s, told)
+        return LiveUpdate(rows, drives, lost, slow, arrived_s, messages)
 
     def _seconds(self, t_us: int) -> float:
         """Return a frame's time since the first one; a reset of the Mega does not turn it back."""

@@ -10,7 +10,7 @@ from host.wire.schema import Schema
 
 _EARTH_M = 6_371_000.0
 _LEAST_SPEED_MPS = 8.0  # below it the airspeed says nothing
-_CARRIED_MPS = 4.0  # over ground: slower it stands, is carried, or hovers against the wind
+_LEAST_GROUND_MPS = 4.0  # over ground: slower it stands, is carried, or hovers against the wind
 _MEMORY_S = 20.0  # of the wind's running mean: a circle of a trainer
 _GPS_S = 0.2
 _KEPT = 6000  # positions: 20 min at 5 Hz; then every second of the older half goes
@@ -58,7 +58,7 @@ class LiveTrack:
         self._wind(value["v_east"], value["v_north"], airspeed_mps, theta, psi)
 
     def _wind(self, east: float, north: float, speed: float, theta: float, psi: float) -> None:
-        flies = speed > _LEAST_SPEED_MPS and math.hypot(east, north) > _CARRIED_MPS
+        flies = speed > _LEAST_SPEED_MPS and math.hypot(east, north) > _LEAST_GROUND_MPS
         if not (flies and math.isfinite(theta) and math.isfinite(psi)):
             return
         level = speed * math.cos(theta)

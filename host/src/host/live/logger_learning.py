@@ -54,7 +54,7 @@ class LoggerLearning:
         self._rows: dict[str, dict[str, Any]] = {}
         self._solved: list[dict[str, Any]] = []  # of the solve that is being told
         self._solve_us = 0  # when it began
-        self._now_s = self._told_s = 0.0  # of the last row, and of it when a derivative was told
+        self._now_s = self._row_s = 0.0  # of the last row, and of it when a derivative was told
         self._heard_s: float | None = None
         stream.subscribe(self._hear)
 
@@ -84,7 +84,7 @@ class LoggerLearning:
 
     def close(self) -> None:
         """Tell what was heard of a last solve."""
-        self._told()
+        self._end_solve()
 
     def _beside(self, row: dict[str, Any]) -> dict[str, Any]:
         ground = self.ground(row["name"])
@@ -101,8 +101,8 @@ class LoggerLearning:
                 self._card = self._card or self._word("event", frame, "code") in _CARD_EVENTS
             elif frame.name == "learned":
                 self._learned(frame)
-        if not 0.0 <= self._now_s - self._told_s <= _SOLVED_S:
-            self._told()
+        if not 0.0 <= self._now_s - self._row_s <= _SOLVED_S:
+            self._end_solve()
 
     def _word(self, table: str, frame: SlowFrame, field: str) -> str:
         schema = self._stream.schema
@@ -129,14 +129,14 @@ class LoggerLearning:
         }
         began_us = int(frame.row["t_us"])
         if self._solve_us != began_us:
-            self._told()
-        self._solve_us, self._told_s = began_us, self._now_s
+            self._end_solve()
+        self._solve_us, self._row_s = began_us, self._now_s
         self._card, self._heard_s = True, self._clock()
         self._solved.append(row)
         self._rows[name] = row
         self.show(self._beside(row))
 
-    def _told(self) -> None:
+    def _end_solve(self) -> None:
         """Tell a solve in one line."""
         solved, self._solved = self._solved, []
         if not solved:

@@ -17,7 +17,7 @@ from host.sysid.compatibility.ground_attitude import (
     BIAS,
     TILT,
     standstill,
-    told_at_standstill,
+    update_by_standstill,
 )
 from host.sysid.compatibility.reconstruction import Compatibility, SensorErrorEstimate
 from host.sysid.pipeline.aircraft_data import aircraft_data
@@ -69,7 +69,7 @@ def _airframe(pitch_rad: float = STANDS_RAD, sd_rad: float = SD_RAD) -> Airframe
 
 def test_tilt_is_that_of_least_squares() -> None:
     """Tilt and bias with what the flight says of them, and their sum as the standstill shows it."""
-    told, notes = told_at_standstill(_found(), _columns(), _airframe())
+    told, notes = update_by_standstill(_found(), _columns(), _airframe())
     rows = np.array(
         [[1.0 / 0.02, 0.0], [0.0, 1.0 / 0.04], [1.0, 1.0 / GRAVITY_MPS2] / np.array(SD_RAD)]
     )
@@ -86,7 +86,7 @@ def test_tilt_is_that_of_least_squares() -> None:
 
 def test_without_a_measured_attitude_nothing_changes() -> None:
     found = _found()
-    assert told_at_standstill(found, _columns(), airframe_data(AIRCRAFT)) == (found, ())
+    assert update_by_standstill(found, _columns(), airframe_data(AIRCRAFT)) == (found, ())
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_without_a_measured_attitude_nothing_changes() -> None:
 )  # fmt: skip
 def test_what_is_no_standstill_on_wheels_is_not_used(columns: dict[str, Array], words: str) -> None:
     found = _found()
-    told, notes = told_at_standstill(found, columns, _airframe())
+    told, notes = update_by_standstill(found, columns, _airframe())
     assert told is found
     assert words in notes[0]
 

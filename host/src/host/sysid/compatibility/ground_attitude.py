@@ -29,19 +29,19 @@ DOUBTED = 4.0  # deviations of what IMU and inclinometer allow: it did not stand
 NEEDED = ("t_s", *(f"{a}_radps" for a in "pqr"), *(f"a{a}_mps2" for a in "xyz"), "airspeed_mps")
 
 
-def told_at_standstill(
+def update_by_standstill(
     found: Compatibility, columns: Mapping[str, Array], airframe: AirframeData
 ) -> tuple[Compatibility, tuple[str, ...]]:
-    """Return the check with the IMU's tilt about y as the standstill tells it, and notes.
+    """Update tilt about y and bias of the IMU by the standstill; also return notes.
 
     Parameters
     ----------
     found : Compatibility
-        What the flight says of tilt and bias.
+        With tilt and bias as estimated from the flight.
     columns : mapping of (n,) Array
         SI on an even grid, as decoded.
     airframe : AirframeData
-        Says at which pitch it stands, and how well that is known; unchanged where it does not.
+        With the pitch at which it stands and its deviation; without them `found` is unchanged.
     """
     sd = airframe.ground_pitch_sd_rad
     if not np.isfinite(sd):
@@ -65,19 +65,19 @@ def told_at_standstill(
     if abs(np.arctan2(across, -down)) > LEVEL_RAD or abs(off) > DOUBTED * allowed:
         return found, (f"{said}: it did not stand on its wheels, or the file is wrong; not used",)
     gain = parts**2 / allowed**2
-    told = {}
+    changed = {}
     for one, share, slope in zip((tilt, bias), gain.tolist(), by.tolist(), strict=True):
         half = one.half_width * float(np.sqrt(1.0 - share))
-        informed = one.data_informed or half < POSTERIOR_PRIOR_RATIO * one.prior_half_width
-        told[one.name] = replace(
+        data_informed = one.data_informed or half < POSTERIOR_PRIOR_RATIO * one.prior_half_width
+        changed[one.name] = replace(
             one,
             value=one.value + share * off / slope,
             half_width=half,
-            data_informed=informed,
-            reason="" if informed else one.reason,
+            data_informed=data_informed,
+            reason="" if data_informed else one.reason,
         )
-    updated = replace(found, findings=tuple(told.get(f.name, f) for f in found.findings))
-    within, known = np.degrees(NORMAL_95 * sd), np.degrees(told[TILT].half_width)
+    updated = replace(found, findings=tuple(changed.get(f.name, f) for f in found.findings))
+    within, known = np.degrees(NORMAL_95 * sd), np.degrees(changed[TILT].half_width)
     return updated, (f"{said} +- {within:.1f}: its tilt is known to {known:.1f} deg (95 %)",)
 
 

@@ -113,12 +113,12 @@ def estimate_delays(
         half = first.half_width()
         delays = {d.name: (0.0, float(half[first.index(d.name)])) for d in groups}
         return DelayEstimate(delays, estimate, _added_covariance(first, list(values), count))
-    told = _with_hold_error(found, groups, HOLD_SHARE * dt_s)
-    half = NORMAL_95 * told.standard_error
+    widened = _with_hold_error(found, groups, HOLD_SHARE * dt_s)
+    half = NORMAL_95 * widened.standard_error
     gust_mps = gust_deviation_mps(found, airspeed_mps)
     counted = HOLD_SHARE * dt_s * gust_mps / float(np.hypot(gust_mps, CALM_MPS))
     return DelayEstimate(
-        {n: (v, float(half[told.index(n)])) for n, v in values.items()},
+        {n: (v, float(half[widened.index(n)])) for n, v in values.items()},
         estimate,
         _added_covariance(_with_hold_error(found, groups, counted), list(values), count),
     )

@@ -15,7 +15,7 @@ from host.sysid.flight.data_finding import Finding
 from host.sysid.identification_error import IdentificationError
 from host.sysid.models.state_space_model import LinearModel, without_outputs
 
-TOLD_BY = {"alpha_rad": "az_mps2", "beta_rad": "ay_mps2"}
+ACCELEROMETER_OF = {"alpha_rad": "az_mps2", "beta_rad": "ay_mps2"}
 WORDS = {"alpha_rad": "the angle of attack", "beta_rad": "the sideslip"}
 # These have no derivative that only the level of the angle tells, as drag is.
 MODELS = ("short-period", "dutch-roll", "lateral")
@@ -31,16 +31,16 @@ def without_vanes(
     IdentificationError
         If it cannot do without.
     """
-    hidden = [y for y in model.outputs if y in TOLD_BY and y not in columns]
+    hidden = [y for y in model.outputs if y in ACCELEROMETER_OF and y not in columns]
     if not hidden:
         return model, ()
     words = " and ".join(WORDS[y] for y in hidden)
-    able = [y for y in hidden if TOLD_BY[y] in model.outputs]
+    able = [y for y in hidden if ACCELEROMETER_OF[y] in model.outputs]
     if model.name not in MODELS or able != hidden:
         raise IdentificationError(
             f"without vanes {words} was not measured, and {model.name} cannot be told"
         )
-    across = {TOLD_BY[y] for y in hidden}
+    across = {ACCELEROMETER_OF[y] for y in hidden}
     reduced = without_outputs(model, hidden)
     reduced = replace(
         reduced, output_biases=tuple(y for y in reduced.output_biases if y not in across)
@@ -51,9 +51,9 @@ def without_vanes(
     )
 
 
-def uncarried_finding(columns: Collection[str]) -> Finding:
-    """Return the finding that no error of an instrument is in the intervals of a flight, so that
-    nothing of it is under "trust"."""
+def no_instrument_errors_finding(columns: Collection[str]) -> Finding:
+    """Return the finding that intervals of a flight count no error of the instrument: nothing of
+    it comes under "trust"."""
     names = ("p_radps", "q_radps", "r_radps", "elevator_rad", "aileron_rad", "rudder_rad")
     return Finding(
         "instrument-errors",
@@ -65,11 +65,10 @@ def uncarried_finding(columns: Collection[str]) -> Finding:
 
 
 def no_vanes_finding(columns: Collection[str], *, reconstructed: bool = False) -> list[Finding]:
-    """Return a finding where an angle is missing and may be told otherwise, so that nothing of it
-    is under "trust": not where the path is reconstructed, its errors in every interval."""
-    told = "airspeed_mps" in columns
-    missing = tuple(y for y, by in TOLD_BY.items() if told and y not in columns and by in columns)
-    if not missing:
+    """Return a finding where no vane measured an angle that accelerometers observe: nothing of it
+    comes under "trust", except where the path is reconstructed, its errors in every interval."""
+    missing = tuple(y for y, by in ACCELEROMETER_OF.items() if y not in columns and by in columns)
+    if not missing or "airspeed_mps" not in columns:
         return []
     return [
         Finding(

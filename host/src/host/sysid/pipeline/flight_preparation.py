@@ -14,7 +14,7 @@ from host.instrument.deviations import unknown_sensors
 from host.instrument.error_labels import recording_notes
 from host.instrument.servo_prior import servo_prior
 from host.sysid.compatibility.flow_angles import reconstruct_flow_angles
-from host.sysid.compatibility.ground_attitude import told_at_standstill
+from host.sysid.compatibility.ground_attitude import update_by_standstill
 from host.sysid.compatibility.reconstruction import (
     Compatibility,
     NoAgreementError,
@@ -26,7 +26,7 @@ from host.sysid.flight.agreement_findings import calibration_findings, disagreem
 from host.sysid.flight.data_finding import Finding
 from host.sysid.flight.feedback_findings import feedback_findings
 from host.sysid.flight.flight_tables import read_flight_columns, source_name
-from host.sysid.flight.hidden_angles import no_vanes_finding, uncarried_finding
+from host.sysid.flight.hidden_angles import no_instrument_errors_finding, no_vanes_finding
 from host.sysid.flight.maneuver_selection import select_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight, reconstruct_flight
 from host.sysid.flight.small_inputs import whole_flight
@@ -94,16 +94,16 @@ def prepare(source: Source, how: ReadingOptions, known: AircraftData | None) -> 
         agreement = reconstruct(columns, known.airframe if known else None, instrument, sensors)
         agreement = agreement if how.delays else without_estimated_delays(agreement)
         if known is not None:
-            agreement, standing = told_at_standstill(agreement, columns, known.airframe)
+            agreement, standing = update_by_standstill(agreement, columns, known.airframe)
             notes += standing
         findings += calibration_findings(agreement)
     except NoAgreementError as error:
         findings.append(disagreement(error, columns))
     except IdentificationError as error:
         notes.append(str(error))
-        findings += [uncarried_finding(columns)] if read.shares else []
-    told = agreement is not None and known is not None
-    findings += no_vanes_finding(columns, reconstructed=told)
+        findings += [no_instrument_errors_finding(columns)] if read.shares else []
+    reconstructed = agreement is not None and known is not None
+    findings += no_vanes_finding(columns, reconstructed=reconstructed)
     findings = [
         f.accept() if f.check in how.accept and (f.channels or f.feedback) else f for f in findings
     ]
