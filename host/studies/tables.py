@@ -198,6 +198,5 @@ def imported_table(found: Sequence[Estimate]) -> Table:
         tuple(rows(list(found))),
         "Nine principal coefficients of each flight (eight with elevons). Held: the 95 % interval"
         " holds the truth. Agrees: differs from our own log's by less than the joint interval."
-        " Imports have no vanes, and no error of an instrument in their intervals: nothing of them"
-        " is under trust.",
+        " Imports have no vanes; errors of their sensors and servos are in every interval.",
     )  # fmt: skip
