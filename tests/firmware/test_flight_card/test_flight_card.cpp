@@ -87,10 +87,11 @@ CardFault judged(const CardHead& head) {
 TEST_CASE("a good head, and who wrote it"){
     HEAD_SAYS(rows, 1, CardFault::kNone) HEAD_SAYS(rows, 32, CardFault::kNone)
         HEAD_SAYS(rows, 0, CardFault::kRows) HEAD_SAYS(rows, 33, CardFault::kRows)
-            HEAD_SAYS(magic, 0x4347, CardFault::kMagic)
-                HEAD_SAYS(version, 2, CardFault::kOtherVersion)
-                    HEAD_SAYS(aircraft[15], 'x', CardFault::kAircraft)
-                        HEAD_SAYS(aircraft[0], 'U', CardFault::kAircraft)}
+            HEAD_SAYS(magic, 0x4347, CardFault::kMagic) HEAD_SAYS(magic, 0x4345, CardFault::kMagic)
+                HEAD_SAYS(version, 0, CardFault::kOtherVersion)
+                    HEAD_SAYS(version, 2, CardFault::kOtherVersion)
+                        HEAD_SAYS(aircraft[15], 'x', CardFault::kAircraft)
+                            HEAD_SAYS(aircraft[0], 'U', CardFault::kAircraft)}
 
 TEST_CASE("each limit of the head at its edge and behind it") {
   const CardFault no = CardFault::kLimits;
@@ -143,6 +144,40 @@ TEST_CASE("each limit of the head at its edge and behind it") {
   HEAD_SAYS(learned_axes, 3, yes)
   HEAD_SAYS(learned_axes, 4, no)
   HEAD_SAYS(reserved_2[5], 1, no)
+  HEAD_SAYS(reserved_2[0], 1, no)
+  HEAD_SAYS(beta_input, 2, yes)
+  HEAD_SAYS(beta_input, 4, no)
+  HEAD_SAYS(theta_max, 3000, yes)
+  HEAD_SAYS(az_max, 3000, yes)
+  HEAD_SAYS(p_max, 32767, yes)
+  HEAD_SAYS(q_max, 32767, yes)
+  HEAD_SAYS(still_ms, 2000, yes)
+  HEAD_SAYS(stick_us, 10, yes)
+  HEAD_SAYS(rate_max_usps, 100, yes)
+  HEAD_SAYS(frequency_max_chz, 1, yes)
+}
+
+TEST_CASE("axes that do not exist, none at all, and each alone") {
+  ROW_SAYS(CardShape::kDoublet, row.axes = 10, CardFault::kRowAxes)
+  ROW_SAYS(CardShape::kDoublet, row.axes = 8; row.amplitude_us[1] = 0, CardFault::kRowAxes)
+  ROW_SAYS(CardShape::kDoublet, row.axes = 0; row.amplitude_us[1] = 0, CardFault::kRowAxes)
+  ROW_SAYS(CardShape::kDoublet, row.axes = 1; row.amplitude_us[0] = 10;
+           row.amplitude_us[1] = 0, CardFault::kNone)
+  ROW_SAYS(CardShape::kDoublet, row.axes = 4; row.amplitude_us[2] = 10;
+           row.amplitude_us[1] = 0, CardFault::kNone)
+}
+
+TEST_CASE("a pulse is half a period, and a card may allow less than 5 Hz") {
+  CardRow row = good_row(CardShape::kPulse);
+  core::RowLimits limits = core::row_limits(good_head());
+  limits.frequency_max_chz = 100;
+  const uint16_t durations_ms[] = {499, 500};
+  for (const uint16_t duration_ms : durations_ms) {
+    row.duration_ms = duration_ms;
+    row.crc = core::crc16(core::kCrc16Start, &row, offsetof(CardRow, crc));
+    const CardFault said = core::judge_row(row, limits);
+    CHECK((said == (duration_ms < 500 ? CardFault::kRowFrequency : CardFault::kNone)));
+  }
 }
 
 TEST_CASE("good rows of every shape, and a bit that fell") {
@@ -152,6 +187,7 @@ TEST_CASE("good rows of every shape, and a bit that fell") {
   ROW_SAYS(CardShape::kPulse, row.shape = 0, CardFault::kRowShape)
   ROW_SAYS(CardShape::kPulse, row.shape = 6, CardFault::kRowShape)
   ROW_SAYS(CardShape::kPulse, row.components[29] = 1, CardFault::kRowShape)
+  ROW_SAYS(CardShape::kPulse, row.components[0] = 1, CardFault::kRowShape)
   CardRow row = good_row(CardShape::kDoublet);
   row.crc = core::crc16(core::kCrc16Start, &row, offsetof(CardRow, crc));
   uint8_t* const bytes = reinterpret_cast<uint8_t*>(&row);
@@ -206,9 +242,28 @@ TEST_CASE("no shape is faster than the card allows"){
                                              row.components[0] = 11,
                                              CardFault::kRowFrequency)}
 
+TEST_CASE("a sweep's ends are above 0, each for itself") {
+  const CardShape sweep = CardShape::kSweep;
+  ROW_SAYS(sweep, row.first_chz = 1, CardFault::kNone)
+  ROW_SAYS(sweep, row.last_chz = 1, CardFault::kNone)
+  ROW_SAYS(sweep, row.last_chz = 0, CardFault::kRowFrequency)
+}
+
 TEST_CASE("the components of a multisine") {
   const CardShape sine = CardShape::kMultisine;
   const CardFault no = CardFault::kRowComponents;
+  ROW_SAYS(sine, row.components[2] = 1 << 6 | 1, CardFault::kNone)
+  ROW_SAYS(sine, row.components[2] = 1 << 6 | 32, CardFault::kNone)
+  ROW_SAYS(sine, row.components[3] = 1; row.components[5] = 1 << 6, no)  // a second without share
+  for (uint8_t last = 27; last <= 28; ++last) {
+    ROW_SAYS(
+        sine,
+        for (uint8_t i = 0; i < 30; i = uint8_t(i + 3)) {
+          row.components[i] = 1;
+          row.components[i + 2] = uint8_t(1 << 6 | (i == 27 ? last : 25));
+        },
+        last == 27 ? CardFault::kNone : no)
+  }
   ROW_SAYS(sine, row.components[2] = 0 << 6 | 30, no)  // an axis that the row has not
   ROW_SAYS(sine, row.components[2] = 3 << 6 | 30, no)
   ROW_SAYS(sine, row.components[2] = 1 << 6, no)              // no share

@@ -229,6 +229,9 @@ TEST_CASE("each reason ends it in the look that knows it") {
       {[](Bench& b) { b.facts.frame_us = 0; }, InputEnd::kFrameTime},
       {[](Bench& b) { b.facts.frame_us = 22501; }, InputEnd::kFrameTime},
       {[](Bench& b) { b.facts.frame_us = 17499; }, InputEnd::kFrameTime},
+      {[](Bench& b) { b.facts.frame_us = 9000; }, InputEnd::kFrameTime},
+      {[](Bench& b) { b.facts.frame_us = 41000; }, InputEnd::kFrameTime},
+      {[](Bench& b) { b.facts.drive = frames::Drive::kDirectSelfTest; }, InputEnd::kDrive},
       {[](Bench& b) { b.facts.drive = frames::Drive::kMegaHolding; }, InputEnd::kDrive},
       {[](Bench& b) { b.facts.drive = frames::Drive::kDirectRelay; }, InputEnd::kDrive},
       {[](Bench& b) { b.facts.supply = false; }, InputEnd::kSupply},
@@ -246,6 +249,94 @@ TEST_CASE("each reason ends it in the look that knows it") {
     CHECK(!bench.command.running());
     CHECK_EQ(static_cast<int>(bench.ended), static_cast<int>(one.why));
   }
+}
+
+TEST_CASE("times count whatever the looks are, from zero on and where the clock comes round") {
+  Bench early;
+  early.now_us = 0;
+  const auto looks = [&](SwitchPlace place, uint32_t until_us) {
+    early.facts.place = place;
+    while (early.now_us < until_us) early.look(7000);
+  };
+  looks(SwitchPlace::kMega, 600000);
+  CHECK(early.is(State::kReady));
+  looks(SwitchPlace::kArmed, 1000000);
+  CHECK(early.is(State::kRunning));
+  looks(SwitchPlace::kArmed, 2400000);
+  CHECK(early.is(State::kSpent));
+  Bench late;
+  late.now_us = 0xFFFFFFFFU - 800000U;  // armed 0.2 s before
+  late.run(SwitchPlace::kMega, 600);
+  late.run(SwitchPlace::kArmed, 310);
+  CHECK(late.is(State::kRunning));
+}
+
+TEST_CASE("a switch that was elsewhere on its way from Mega triggers nothing") {
+  Bench bench;
+  bench.run(SwitchPlace::kMega, 600);
+  bench.run(SwitchPlace::kOther, 5);
+  CHECK(bench.is(State::kWaiting));
+  bench.run(SwitchPlace::kArmed, 1000);
+  CHECK_EQ(bench.starts, 0);
+}
+
+TEST_CASE("a row that runs is triggered by nothing") {
+  Bench bench;
+  bench.fly();
+  CHECK(!bench.command.trigger(SwitchPlace::kArmed, true, bench.now_us));
+  CHECK(bench.command.running());
+}
+
+TEST_CASE("what was dropped before the trigger ends nothing, a count that came round does") {
+  Bench bench;
+  bench.facts.dropped = 7;
+  bench.fly();
+  bench.look();
+  REQUIRE(bench.command.running());
+  bench.facts.dropped = 3;
+  bench.look();
+  CHECK_EQ(static_cast<int>(bench.ended), static_cast<int>(InputEnd::kDropped));
+}
+
+TEST_CASE("steered in whole milliseconds, each counted once, at the rate and no faster") {
+  Bench bench;
+  bench.memory.row.quiet_ms = 30;
+  bench.memory.row.axes = 7;
+  for (uint8_t axis = 0; axis < core::kCardAxes; ++axis) bench.memory.row.amplitude_us[axis] = 200;
+  bench.facts.rc = &bench.rc;
+  const uint32_t from_us = 65000;
+  bench.command.start(bench.memory, bench.facts, from_us);
+  CHECK_EQ(bench.memory.turns, core::turns_per_ms(bench.memory.row));
+  const auto steer = [&](uint32_t behind_us) {
+    bench.command.steer(bench.memory, from_us + behind_us);
+    return static_cast<uint16_t>(bench.memory.steered_us - from_us);
+  };
+  CHECK_EQ(steer(InputCommand::kSteerUs - 1), 0);
+  CHECK_EQ(steer(InputCommand::kSteerUs), 15000);
+  CHECK_EQ(bench.memory.elapsed_ms, 15);
+  CHECK_EQ(bench.memory.applied_ticks[0], 0);
+  CHECK_EQ(steer(30999), 30000);  // its quiet time is over
+  CHECK_EQ(bench.memory.elapsed_ms, 30);
+  for (const int16_t ticks : bench.memory.applied_ticks) {
+    CHECK(ticks <= 120);  // 15 ms of 4000 us/s
+    CHECK(ticks >= 119);
+  }
+  CHECK_EQ(steer(31999), 30000);
+  for (uint8_t n = 3; n < 20; ++n) {
+    CHECK_EQ(steer(15000UL * n), static_cast<uint16_t>(15000UL * n));
+    CHECK_EQ(bench.memory.elapsed_ms, 15 * n);
+  }
+  CHECK(!bench.command.over(bench.memory, from_us + 1029999UL));
+  CHECK(bench.command.over(bench.memory, from_us + 1030000UL));
+}
+
+TEST_CASE("behind the last row comes the first, of a shorter card too") {
+  InputCommand command;
+  command.end(3);
+  command.end(3);
+  CHECK_EQ(command.row(), 2);
+  command.end(1);
+  CHECK_EQ(command.row(), 0);
 }
 
 TEST_CASE("what is within its tolerance ends nothing") {

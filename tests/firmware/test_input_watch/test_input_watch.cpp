@@ -129,6 +129,48 @@ TEST_CASE("each limit one step behind its edge"){
                                             SAYS_IN(bench.in.latitude += 30000, kDistance)
                                                 SAYS_IN(bench.in.rail = 999, kSupply)}
 
+TEST_CASE("edges that stand for one side, and a look that just came") {
+  SAYS_IN(bench.in.phi = -1, kDone)
+  SAYS_IN(bench.in.rates[1] = 12000, kDone)
+  SAYS_IN(bench.in.rates[1] = 5, kDone)
+  SAYS_IN(bench.in.rates[2] = 11000, kDone)
+  SAYS_IN(bench.in.scan_age_us = 100000, kDone)
+  SAYS_IN(bench.in.baro_age_us = 1, kDone)
+  SAYS_IN(bench.in.baro_age_us = 150000, kDone)
+  SAYS_IN(bench.in.gps_age_us = 1000000, kDone)
+  SAYS_IN(bench.limits.rail_min = 1; bench.in.rail = 0, kSupply)
+  // Below the place where the card was enabled, the card's height as high as can be written.
+  SAYS_IN(bench.limits.height_max_pa = 65535U; bench.home.pressure_2pa = 25000;
+          bench.in.static_pressure = 16UL * 51000UL, kHeight)
+}
+
+TEST_CASE("what the card does not name may stand still and be old") {
+  for (uint8_t sensor = InputMotion::kAirspeed; sensor <= InputMotion::kGps; ++sensor) {
+    if (sensor == InputMotion::kBaro) continue;  // height is always watched
+    Bench bench;
+    if (sensor == InputMotion::kAirspeed) bench.limits.airspeed_input = 255;
+    if (sensor == InputMotion::kAlpha) bench.limits.alpha_input = 255;
+    if (sensor == InputMotion::kBeta) bench.limits.beta_input = 255;
+    if (sensor == InputMotion::kGps) {
+      bench.limits.distance_max_m = 0;
+      bench.in.gps_age_us = 5000000;
+    }
+    bench.still[sensor] = true;
+    bench.run(3000);
+    CHECK_EQ(bench.judge(), 0);
+  }
+  const uint8_t one_of[][3] = {{4, 255, 255}, {255, 1, 255}, {255, 255, 2}, {255, 255, 255}};
+  for (const auto& inputs : one_of) {
+    Bench bench;
+    bench.limits.airspeed_input = inputs[0];
+    bench.limits.alpha_input = inputs[1];
+    bench.limits.beta_input = inputs[2];
+    bench.in.scan_age_us = 100001;
+    const bool none = &inputs == &one_of[3];
+    CHECK_EQ(bench.judge(), none ? 0 : static_cast<int>(InputEnd::kSensorLost));
+  }
+}
+
 TEST_CASE("what the card does not name is not watched") {
   SAYS_IN(bench.in.pitot[1] = 0, kDone)
   SAYS_IN(bench.in.alpha[0] = 0, kDone)
@@ -253,6 +295,112 @@ TEST_CASE("a value that moves by any power of two has moved") {
   }
 }
 
+TEST_CASE("values that move together, and against each other, have moved") {
+  struct Step {
+    int16_t rates[3];
+    int16_t force;
+  };
+  const Step steps[] = {
+      {{1, -1, 0}, 0}, {{1, 1, 0}, 0}, {{3, 0, 0}, 0}, {{0, 0, 1}, 0}, {{1, 0, 0}, 1}};
+  for (const Step& step : steps) {
+    Bench bench;
+    bench.still[InputMotion::kImu] = true;
+    bench.run(600);
+    CHECK(!bench.motion.moves(InputMotion::kImu, InputMotion::steps_of(500), bench.now_us));
+    for (uint8_t i = 0; i < 3; ++i) {
+      bench.in.rates[i] = static_cast<int16_t>(bench.in.rates[i] + step.rates[i]);
+    }
+    bench.in.force[0] = static_cast<int16_t>(bench.in.force[0] + step.force);
+    bench.motion.see_imu(bench.in, bench.now_us);
+    CHECK(bench.motion.moves(InputMotion::kImu, InputMotion::steps_of(500), bench.now_us));
+  }
+  const int32_t places[][4] = {{0, 1000000000, 0, 1},
+                               {10, 1000000000, 0, 1},
+                               {250000000, 1210000000, 1, -1},
+                               {250000000, 1210000000, 1, 1},
+                               {250000000, 1210000000, 3, 0},
+                               {250000000, 1210000000, 1, 3}};
+  for (const auto& place : places) {
+    Bench bench;
+    bench.still[InputMotion::kGps] = true;
+    bench.in.latitude = place[0];
+    bench.in.longitude = place[1];
+    bench.run(1600);
+    CHECK(!bench.motion.moves(InputMotion::kGps, InputMotion::steps_of(1500), bench.now_us));
+    bench.in.latitude += place[2];
+    bench.in.longitude += place[3];
+    bench.motion.see_gps(bench.in, bench.now_us);
+    CHECK(bench.motion.moves(InputMotion::kGps, InputMotion::steps_of(1500), bench.now_us));
+  }
+}
+
+TEST_CASE("a sensor may stand still for the whole steps of 16 ms within the card's time") {
+  InputMotion motion;
+  InputReadings in = {};
+  motion.start(0);
+  in.static_pressure = 77;
+  motion.see_baro(in, 0);
+  const auto moves = [&](uint16_t still_ms, uint32_t steps) {
+    return motion.moves(InputMotion::kBaro, InputMotion::steps_of(still_ms), steps << 14);
+  };
+  CHECK(moves(819, 49));
+  CHECK(!moves(819, 50));
+  CHECK(moves(1016, 62));
+  CHECK(!moves(1016, 63));
+  CHECK_EQ(InputMotion::steps_of(4161), 253);
+  CHECK_EQ(InputMotion::steps_of(4195), 255);
+  CHECK_EQ(InputMotion::steps_of(65535U), 255);
+}
+
+TEST_CASE("a watch begins with nothing of what its memory was lent to") {
+  core::InputWatch watch;
+  const uint32_t now_us = 0x12345678;
+  for (uint8_t i = 0; i < InputMotion::kSensors; ++i) {
+    watch.motion.value[i] = 0x55;
+    watch.motion.moved[i] = static_cast<uint8_t>(now_us >> 14);
+  }
+  watch.start(now_us);
+  CHECK_EQ(watch.looked_us, 0x5678);
+  InputReadings in = {};  // of nought, as what is there at the start
+  watch.motion.see_gps(in, now_us);
+  for (uint8_t i = 0; i < InputMotion::kSensors; ++i) {
+    CHECK(!watch.motion.moves(i, InputMotion::steps_of(2000), now_us));
+  }
+}
+
+TEST_CASE("a distance at its very limit is within, and one that comes round in 32 bits is far") {
+  core::InputHome home;
+  home.cosine = core::home_cosine(home.latitude);
+  CHECK_EQ(home.cosine, 255);
+  CHECK(core::within_distance(home, 35920, 0, 400));
+  CHECK(core::within_distance(home, 0, 35920, 400));
+  CHECK(!core::within_distance(home, 36000, 0, 400));
+  CHECK(core::within_distance(home, -1, -1, 1));
+  CHECK(!core::within_distance(home, 94136272, 0, 3000));  // 9.4 deg
+}
+
+TEST_CASE(
+    "the cosine is that of the degree nearer to the equator, none at the pole and behind it") {
+  CHECK_EQ(core::home_cosine(599999990), core::home_cosine(590000000));
+  CHECK(core::home_cosine(600000000) < core::home_cosine(590000000));
+  CHECK_EQ(core::home_cosine(900000000), 0);
+  CHECK_EQ(core::home_cosine(INT32_MAX), 0);
+}
+
+TEST_CASE("200 us of travel are enough, 8 less are not") {
+  const uint16_t ends[] = {2800, 2784};
+  for (const uint16_t most_ticks : ends) {
+    core::StickTravel travel;
+    core::RcChannels rc = {{2600, 2600, 2600, 2200, 2200}, 0x1F, 0x1F};
+    const uint16_t places[] = {2400, most_ticks};
+    for (const uint16_t place : places) {
+      for (uint8_t i = 0; i < core::kCardAxes; ++i) rc.width_ticks[i] = place;
+      for (uint8_t n = 0; n < 60; ++n) travel.look(rc);
+    }
+    CHECK_EQ(travel.shown(), most_ticks == 2800);
+  }
+}
+
 TEST_CASE("a stick is at its end within 32 us, and each axis must be moved") {
   for (uint8_t held = 0; held < core::kCardAxes; ++held) {
     core::StickTravel travel;
@@ -287,6 +435,12 @@ TEST_CASE("travel is shown slowly, and one spoilt pulse adds one step") {
   rc.width_ticks[0] = 4400;
   travel.look(rc);
   CHECK_EQ(travel.most_ticks(0) - travel.least_ticks(0), 16);
+  const uint16_t most = travel.most_ticks(0);
+  const uint16_t least = travel.least_ticks(0);
+  rc.width_ticks[0] = 1700;
+  travel.look(rc);
+  CHECK_EQ(travel.least_ticks(0), least - 16);
+  CHECK_EQ(travel.most_ticks(0), most);
   rc.width_ticks[0] = 3000;
   for (uint8_t side = 0; side < 2; ++side) {
     for (uint8_t i = 0; i < 3; ++i) rc.width_ticks[i] = side != 0 ? 3391 : 2609;

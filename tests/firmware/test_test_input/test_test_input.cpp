@@ -76,6 +76,16 @@ TEST_CASE("a doublet turns in its middle, of an odd length too") {
   CHECK_EQ(at(row, 1001), 0);
 }
 
+TEST_CASE("a doublet of an even length turns at its half, on every axis") {
+  CardRow row = row_of(CardShape::kDoublet, 1000, 100);
+  row.amplitude_us[0] = 30;
+  row.amplitude_us[2] = -40;
+  CHECK_EQ(at(row, 499), 200);
+  CHECK_EQ(at(row, 500), -200);
+  CHECK_EQ(of_axis(row, 0, 500), -60);
+  CHECK_EQ(of_axis(row, 2, 500), 80);
+}
+
 TEST_CASE("3-2-1-1 has its four parts") {
   const CardRow row = row_of(CardShape::kThreeTwoOneOne, 7000, 50);
   const uint16_t edges[] = {0, 3000, 5000, 6000, 7000};
@@ -121,6 +131,61 @@ TEST_CASE("a multisine is the sum of its sines, each axis its own") {
     CHECK(near(of_axis(row, 0, t), -240.0 * sum[0], 2.0));
     CHECK_EQ(of_axis(row, 2, t), 0);
   }
+}
+
+TEST_CASE("a sweep moves every axis of its row") {
+  CardRow row = row_of(CardShape::kSweep, 4000, 100);
+  row.amplitude_us[0] = 100;
+  row.amplitude_us[2] = -100;
+  row.first_chz = row.last_chz = 50;
+  CHECK(at(row, 500) >= 199);  // a quarter of its turn
+  for (uint16_t t_ms = 0; t_ms < 4000; t_ms = static_cast<uint16_t>(t_ms + 250)) {
+    CHECK_EQ(of_axis(row, 0, t_ms), at(row, t_ms));
+    CHECK_EQ(of_axis(row, 2, t_ms), -at(row, t_ms));
+  }
+}
+
+TEST_CASE("a multisine is, to the tick, what the page writes in whole numbers") {
+  Random random(4712);
+  for (uint16_t n = 0; n < 120; ++n) {
+    CardRow row = row_of(CardShape::kMultisine,
+                         static_cast<uint16_t>(100 + random.below(19901)),
+                         static_cast<int16_t>(random.below(1001) - 500));
+    const uint8_t used = static_cast<uint8_t>(1 + random.below(4));
+    for (uint8_t i = 0; i < used; ++i) {
+      row.components[3 * i] = static_cast<uint8_t>(n % 3 == 0 ? 1 : 1 + random.below(100));
+      row.components[3 * i + 1] = random.byte();
+      row.components[3 * i + 2] = static_cast<uint8_t>(1 << 6 | random.below(64));
+    }
+    row.components[3 * used + 1] = 100;
+    row.components[3 * used + 2] = 1 << 6 | 63;  // behind the last: no harmonic, no sine
+    const uint64_t a_ms = 4294967295ULL / row.duration_ms;
+    for (uint8_t k = 0; k < 20; ++k) {
+      const uint16_t t_ms = random.below(row.duration_ms);
+      int64_t sum = 0;
+      for (uint8_t i = 0; i < used; ++i) {
+        const uint64_t turn = row.components[3 * i] * (t_ms * a_ms) +
+                              (static_cast<uint64_t>(row.components[3 * i + 1]) << 24);
+        const uint16_t phase = static_cast<uint16_t>((turn & 0xFFFFFFFFU) >> 16);
+        sum += int64_t{core::sin14(phase)} * (row.components[3 * i + 2] & 63);
+      }
+      const int64_t most = 2 * int64_t{row.amplitude_us[1]};
+      int64_t wanted = sum / 16 * most / 65536;
+      const int64_t size = most < 0 ? -most : most;
+      if (wanted > size) wanted = size;
+      if (wanted < -size) wanted = -size;
+      CHECK_EQ(at(row, t_ms), wanted);
+    }
+  }
+}
+
+TEST_CASE("the least of a sine is nothing") {
+  CardRow row = row_of(CardShape::kMultisine, 65535U, 500);
+  row.components[0] = 1;
+  row.components[1] = 128;
+  row.components[2] = 1 << 6 | 1;
+  CHECK_EQ(core::sin14(32769U), -1);
+  CHECK_EQ(at(row, 1), 0);
 }
 
 TEST_CASE("no row deflects more than its amplitude, at any time") {
