@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -56,14 +57,28 @@ def test_flight_states_its_load_and_never_rests_long(make_rig: MakeRig, tmp_path
     assert 1e6 / np.diff(t_us).mean() == pytest.approx(25.0, abs=0.2)
 
 
-def test_no_task_keeps_the_receiver_waiting(make_rig: MakeRig) -> None:
+def looks_for_edges(elf: Path) -> list[int]:
+    """Return where the main loop asks whether the receiver's interrupt has stored an edge."""
+    listing = subprocess.run(
+        ["avr-objdump", "-d", str(elf)], capture_output=True, text=True, check=True
+    ).stdout
+    found, inside = [], ""
+    for line in listing.splitlines():
+        if line.endswith(">:"):
+            inside = line
+        elif "<capture_tail>" in line and "\tlds\t" in line and "__vector" not in inside:
+            found.append(int(line.split(":", 1)[0], 16))
+    return found
+
+
+def test_no_task_keeps_the_receiver_waiting(make_rig: MakeRig, flight_elf: Path) -> None:
     """From one look at the receiver to the next, the second's frame of health in between."""
     from simavr_bench import LogKind
 
     rig = make_rig(imu_hz=200.0)
     rig.take_off()
-    for name in [name for name in rig.chip.symbols if "9PilotLink4step" in name]:
-        rig.chip.watch_pc(name)
+    for address in looks_for_edges(flight_elf):
+        rig.chip.watch_pc(address)
     rig.chip.run_s(5.0)
     looks = rig.chip.records(LogKind.PC)["cycle"].astype(np.int64)
     assert len(looks) > 5000

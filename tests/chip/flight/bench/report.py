@@ -27,7 +27,7 @@ import host
 RAM_LIMIT_BYTES = 6600
 FLASH_LIMIT_BYTES = 253_952
 UNTOUCHED_BYTES = 600
-CPU_LIMIT_PERCENT = {100: 39.0, 200: 47.0}  # no flight card is enabled
+CPU_LIMIT_PERCENT = {100: 32.0, 200: 39.0}  # no flight card is enabled
 INPUT_CPU_LIMIT_PERCENT = {100: 42.0, 200: 50.0}  # while a row of three axes teaches one
 PULSE_P99_US, PULSE_MAX_US = 2.0, 4.0
 OUTPUT_US = 1.0
