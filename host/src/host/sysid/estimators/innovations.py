@@ -56,6 +56,7 @@ class Innovations:
         if isinstance(model, NonlinearModel):
             filtered = EquationFilterProblem(model, changed, self.process).evaluate(self.theta)
             return None if filtered is None else filtered.scaled
+        # e = y - C x_predicted (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5).
         point = FilterProblem(model, changed, self.process).evaluate(self.theta)
         return None if point is None else point.e
 

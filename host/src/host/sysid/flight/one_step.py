@@ -1,7 +1,7 @@
 """One Gauss-Newton step of an estimate's own method, for other data or another model.
 
 Residuals are those of the method: innovations of filter error, outputs of output error, both
-whitened. No fit is repeated.
+whitened. No fit is repeated (one-step estimators: van der Vaart, Asymptotic Statistics, sec. 5.7).
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ class Step:
     Attributes
     ----------
     shares : Array, shape (maneuvers, P)
-        By how much each maneuver moves the estimate.
+        Shift of the estimate by each maneuver.
     added : Array, shape (k,)
         Values of the further parameters.
     covariance : Array, shape (k, k)
     by_added : Array, shape (k, P)
-        By how much the estimate moves with each.
+        Sensitivity of the estimate to each.
     """
 
     shares: Array
@@ -48,7 +48,7 @@ class Step:
 
 @dataclass(frozen=True)
 class OneStep:
-    """What a step about an answer rests on.
+    """Residuals, slopes and information at an answer, for one step about it.
 
     Attributes
     ----------
@@ -126,6 +126,8 @@ class OneStep:
                 right -= by.T @ r
         step = score @ self.inverse
         added, covariance = np.zeros(count), np.zeros((count, count))
+        # Minus inverse times cross information: the consider sensitivity (Tapley, Schutz & Born,
+        # Statistical Orbit Determination, ch. 6).
         consider_sensitivity = -np.einsum("kij,il->klj", link, self.inverse)
         if count:
             whole = link.sum(axis=0)
