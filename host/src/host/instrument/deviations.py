@@ -18,7 +18,7 @@ from host.instrument.instrument_errors import (
     standard_errors,
     usual_errors,
 )
-from host.instrument.recording import OWN, Recording
+from host.instrument.recording import FOREIGN, OWN, Recording
 from host.physical.calibration import Calibration
 
 LEAST_LAG_S = 1e-5  # of an IMU that nothing filtered
@@ -61,9 +61,14 @@ class SensorErrorModel:
         return usual_servo.BANDWIDTH_HZ, usual_servo.RATE_LIMIT_RADPS
 
     def recorded(self, recording: Recording) -> SensorErrorModel:
-        """Return the same for a flight recorded so, with the low-pass that its IMU had."""
+        """Return the same for a flight recorded so, with the low-pass that its IMU had.
+
+        Of a table of others nobody says one: it is not taken out of the columns.
+        """
         if recording.imu_lag_s is None:
-            return replace(self, recording=recording)
+            of_others = recording.maker == FOREIGN
+            known_hz = math.inf if of_others else self.imu_bandwidth_hz
+            return replace(self, recording=recording, imu_bandwidth_hz=known_hz)
         lag_s = max(recording.imu_lag_s, LEAST_LAG_S)
         return replace(self, recording=recording, imu_bandwidth_hz=1.0 / (2.0 * math.pi * lag_s))
 
@@ -169,7 +174,10 @@ def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str
         "imu_delay_s": imu_delay_s(instrument),
         "alpha_lag_share": lag_share["alpha"],
         "beta_lag_share": lag_share["beta"],
-        "pitot_delay_s": e["delay_share"].of_mean("dp_a", "dp_b") * instrument.pitot_lag_s,
+        "pitot_delay_s": max(  # a lag of 0 is not known exactly either
+            e["delay_share"].of_mean("dp_a", "dp_b") * instrument.pitot_lag_s,
+            e["delay_least_s"].of_mean("dp_a", "dp_b"),
+        ),
         "friction_share": e["vane_friction_share"].of_mean(),
         **surface_deviations(instrument),
         "thrust_share": e["thrust_share"].of_mean(),

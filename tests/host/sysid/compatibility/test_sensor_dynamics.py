@@ -7,7 +7,9 @@ import pytest
 from host.aircraft.mass_properties import AirframeData
 from host.instrument.deviations import sensor_error_model
 from host.instrument.error_labels import ERROR_LABELS
+from host.instrument.recording import AUTOPILOT, FOREIGN, Recording
 from host.sysid import Maneuver
+from host.sysid.compatibility.path_preparation import compensate_lowpass
 from host.sysid.compatibility.reconstruction import Compatibility, SensorErrorEstimate
 from host.sysid.compatibility.sensor_corrections import INSTANTANEOUS_ERRORS
 from host.sysid.compatibility.sensor_dynamics import (
@@ -67,6 +69,18 @@ def test_a_swinging_vane_says_again_what_the_air_said() -> None:
     late = np.interp(t + lag_s, t, angle)
     assert np.max(np.abs(back - true)[inside]) < 0.01 * 0.05
     assert np.max(np.abs(late - true)[inside]) > 0.02 * 0.05
+
+
+def test_only_columns_of_an_imu_that_is_known_are_sharpened() -> None:
+    """With our low-pass taken out of a table of others L_p and L_da were 10 % too large."""
+    ours, dt_s = sensor_error_model("ultrastick25e"), 0.01
+    signal = np.sin(40.0 * dt_s * np.arange(200))
+    assert np.max(np.abs(compensate_lowpass(signal, ours, dt_s))) > 1.02
+    others = ours.recorded(Recording(maker=FOREIGN))
+    np.testing.assert_array_equal(compensate_lowpass(signal, others, dt_s), signal)
+    assert others.imu_bandwidth_hz == np.inf
+    told = ours.recorded(Recording(maker=AUTOPILOT, imu_lag_s=0.005))
+    assert np.max(np.abs(compensate_lowpass(signal, told, dt_s))) > 1.02
 
 
 def test_what_stays_open_is_what_tolerances_leave() -> None:

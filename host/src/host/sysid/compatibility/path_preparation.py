@@ -16,6 +16,7 @@ from host.instrument.deviations import (
     unknown_sensors,
     vane_delay_s,
 )
+from host.instrument.recording import FOREIGN
 from host.sysid.compatibility.flight_path import (
     AIR,
     DELAY_DIFFERENCE,
@@ -141,7 +142,8 @@ def prior(
         "pitot_zero_pa": sd["pitot_drift_pa"],
     }
     result |= {name: (0.0, known[name]) for name in (*FLOW, *PITOT)}
-    result |= dict(zip(DELAYS, (VANE_DELAY_S, (i.pitot_lag_s, i.pitot_lag_s)), strict=True))
+    pitot = (i.pitot_lag_s, max(i.pitot_lag_s, sd["pitot_delay_s"]))
+    result |= dict(zip(DELAYS, (VANE_DELAY_S, pitot), strict=True))
     # As two pairs differ: as the places of the vanes it turned up, up to five deviations of them.
     result[DELAY_DIFFERENCE] = (0.0, math.sqrt(2.0) * vane_delay_s(i, VANE_DELAY_S[0]))
     # Both were measured from the same point, so the position of the CG does not matter.
@@ -172,7 +174,13 @@ def compensate_friction(
 
 
 def compensate_lowpass(signal: Array, i: SensorErrorModel, dt_s: float) -> Array:
-    """Return an inertial signal with low-pass and interpolation inverted to second order."""
+    """Return an inertial signal with low-pass and interpolation inverted to second order.
+
+    Tables of others have neither: sharpened all the same, L_p and L_da were 10 % too large where
+    the air rolls.
+    """
+    if i.recording.maker == FOREIGN:
+        return signal
     lost_s2 = 0.5 / (2.0 * np.pi * i.imu_bandwidth_hz) ** 2 + dt_s**2 / 12.0
     return np.asarray(signal - lost_s2 * np.gradient(np.gradient(signal, dt_s), dt_s))
 
