@@ -9,6 +9,7 @@ later run continues.
 from __future__ import annotations
 
 import argparse
+import functools
 import itertools
 import sys
 import tempfile
@@ -67,16 +68,21 @@ def rows_of(
     cell: str, air: Air, seed: int, axis: str, analysis: str = DIMENSIONAL
 ) -> list[dict[str, object]]:
     """Fly and identify one axis; no estimate where the answer is refused."""
-    measured, _ = fly(air, seed)
     key: dict[str, object] = {"cell": cell, "seed": seed}
     try:
         if analysis == DIMENSIONAL:
-            found = list(dimensional(measured, axis))
+            found = list(dimensional(flown(air, seed), axis))
         else:
-            found = list(with_instrument(measured, seed, axis, analysis))
+            found = list(with_instrument(air, seed, axis, analysis))
     except IdentificationError:
         return [dict.fromkeys(COLUMNS, "") | key | {"name": "refused"}]
     return [key | dict(zip(COLUMNS[2:], one, strict=True)) for one in found]
+
+
+@functools.lru_cache(maxsize=len(cells()))
+def flown(air: Air, seed: int) -> Columns:
+    """Return one flight as measured; kept for the analyses that follow."""
+    return fly(air, seed)[0]
 
 
 def dimensional(measured: Columns, axis: str) -> Iterator[tuple[str, float, float, float]]:
@@ -89,24 +95,37 @@ def dimensional(measured: Columns, axis: str) -> Iterator[tuple[str, float, floa
 
 
 def with_instrument(
-    measured: Columns, seed: int, axis: str, analysis: str
+    air: Air, seed: int, axis: str, analysis: str
 ) -> Iterator[tuple[str, float, float, float]]:
     """Return the same of coefficients, all errors of the instrument drawn."""
-    rng = np.random.default_rng([DRAW, seed])
-    table = pd.DataFrame(with_sensor_errors(measured, rng))
+    answer = answer_with_file(air, seed)
+    direct = answer.coefficients
+    known: dict[str, tuple[float, float]] = {}
+    if analysis != DIRECT:
+        mine = [c for one in answer.linear if one.template == axis for c in one.coefficients]
+        known = {c.name: (c.value, c.half_width) for c in mine}
+    elif direct is not None:
+        known = {c.name: (c.value, c.half_width) for c in direct.fit.derivatives}
+    if not known:
+        raise IdentificationError(f"no answer of {analysis} for {axis}")
+    for name in COEFFICIENTS[axis]:
+        if name in known:
+            yield name, float(getattr(TRAINER, name)), *known[name]
+
+
+@functools.lru_cache(maxsize=len(cells()))
+def answer_with_file(air: Air, seed: int) -> host.Identification:
+    """Return the linear answers and that of ``coefficients`` of one flight."""
+    number = list(cells().values()).index(air)  # each cell has an instrument of its own
+    rng = np.random.default_rng([DRAW, seed, number])
+    table = pd.DataFrame(with_sensor_errors(flown(air, seed), rng))
     with tempfile.TemporaryDirectory() as folder:
-        answer = host.identify(
+        return host.identify(
             table,
             aircraft=drawn_file(Path(folder), rng),
             calibration=SENSORS_FILE,
-            models=DIRECT if analysis == DIRECT else axis,
+            models=(*NAMES, DIRECT),
         )
-    direct = answer.coefficients
-    derivatives_found = answer.linear[0].coefficients if direct is None else direct.fit.derivatives
-    known = {c.name: c for c in derivatives_found}
-    for name in COEFFICIENTS[axis]:
-        if name in known:
-            yield name, float(getattr(TRAINER, name)), known[name].value, known[name].half_width
 
 
 def table(rows: Sequence[dict[str, str]]) -> list[str]:

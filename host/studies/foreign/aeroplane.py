@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from host.constants import GRAVITY_MPS2
@@ -18,6 +19,7 @@ from scipy.optimize import fsolve
 from studies.foreign.gust_field import Gusts, at
 
 DENSITY_KGPM3 = 1.2
+Speed = TypeVar("Speed", float, NDArray[np.float64])
 SERVO_RADPS, SERVO_LIMIT_RADPS = 40.0, 5.0
 
 
@@ -73,7 +75,7 @@ def trimmed(speed_mps: float) -> tuple[float, float, float]:
         alpha, de, throttle = (float(v) for v in x)
         CL = a.CL_0 + a.CL_alpha * alpha + a.CL_de * de
         CD = a.CD_0 + a.CD_CL2 * CL**2
-        thrust = a.static_thrust * throttle * (1.0 - speed_mps / a.pitch_speed)
+        thrust = thrust_n(throttle, speed_mps)
         weight = a.mass * GRAVITY_MPS2
         return [
             force * (CL * math.sin(alpha) - CD * math.cos(alpha))
@@ -85,6 +87,11 @@ def trimmed(speed_mps: float) -> tuple[float, float, float]:
 
     alpha, de, throttle = fsolve(left, np.array([0.05, 0.0, 0.4]))
     return float(alpha), float(de), float(throttle)
+
+
+def thrust_n(throttle: float, airspeed_mps: Speed) -> Speed:
+    """Return thrust along x: it falls with the airspeed."""
+    return TRAINER.static_thrust * throttle * (1.0 - airspeed_mps / TRAINER.pitch_speed)
 
 
 @dataclass(frozen=True)
@@ -112,7 +119,7 @@ def motion(
     Parameters
     ----------
     x : list of float
-        u v w p q r phi theta psi, way through the air, height, both gusts as the tail meets them,
+        u v w p q r phi theta psi, way through the air, height, gusts as the tail meets them (3),
         elevator, aileron, rudder.
     command : tuple of float
         Of the three servos.
@@ -124,15 +131,17 @@ def motion(
         The air pitches, yaws and rolls (MIL-F-8785C, 3.7.5); else gusts act on a point.
     """
     a = TRAINER
-    u, v, w, p, q, r, phi, theta, psi, way, _, w_tail, v_tail, de, da, dr = x
+    u, v, w, p, q, r, phi, theta, psi, way, _, *tail, de, da, dr = x
     cf, sf, ct, st = math.cos(phi), math.sin(phi), math.cos(theta), math.sin(theta)
     gust = (at(air.u, way), at(air.v, way), at(air.w, way))
     reach = 4.0 * a.span / math.pi
     p_air = at(air.p, way) if spread else 0.0
-    q_air, r_air = (
-        ((gust[2] - w_tail) / reach, -(gust[1] - v_tail) / reach) if spread else (0.0, 0.0)
-    )
-    gu, gv, gw = gust if turns else _to_body(gust, phi, theta, psi)
+    along, side, down = (now - before for now, before in zip(gust, tail, strict=True))
+    gu, gv, gw = gust
+    if not turns:  # the air turns about the aircraft's axes, wherever it heads
+        gu, gv, gw = _to_body(gust, phi, theta, psi)
+        _, side, down = _to_body((along, side, down), phi, theta, psi)
+    q_air, r_air = (down / reach, -side / reach) if spread else (0.0, 0.0)
     ua, va, wa = u - gu, v - gv, w - gw
     V = math.sqrt(ua * ua + va * va + wa * wa)
     alpha, beta = math.atan2(wa, ua), math.asin(va / V)
@@ -143,9 +152,7 @@ def motion(
     CD = a.CD_0 + a.CD_CL2 * CL * CL
     CY = a.CY_beta * beta + a.CY_p * ps + a.CY_r * rs + a.CY_dr * dr
     ca, sa = math.cos(alpha), math.sin(alpha)
-    ax = (
-        force * (CL * sa - CD * ca) + a.static_thrust * throttle * (1.0 - V / a.pitch_speed)
-    ) / a.mass
+    ax = (force * (CL * sa - CD * ca) + thrust_n(throttle, V)) / a.mass
     ay = force * CY / a.mass
     az = -force * (CD * sa + CL * ca) / a.mass
     roll = (
@@ -176,8 +183,7 @@ def motion(
         turning / ct,
         V,
         u * st - v * sf * ct - w * cf * ct,
-        (gust[2] - w_tail) * V / reach,
-        (gust[1] - v_tail) * V / reach,
+        *((now - before) * V / reach for now, before in zip(gust, tail, strict=True)),
         *(
             max(-SERVO_LIMIT_RADPS, min(SERVO_LIMIT_RADPS, SERVO_RADPS * (wanted - at_now)))
             for wanted, at_now in zip(command, (de, da, dr), strict=True)

@@ -54,7 +54,7 @@ def fly(
     field = gusts(rng, air.intensity_mps, air.form, TRAINER.span if air.spread else None)
     alpha, de, throttle = trimmed(SPEED_MPS)
     x = [SPEED_MPS * np.cos(alpha), 0.0, SPEED_MPS * np.sin(alpha), *[0.0] * 4, alpha, 0.0, 0.0]
-    x = [float(value) for value in (*x, HEIGHT_M, 0.0, 0.0, de, 0.0, 0.0)]
+    x = [float(value) for value in (*x, HEIGHT_M, *[0.0] * 3, de, 0.0, 0.0)]
     step = STEP_S / SUBSTEPS
     rows = []
     for sample in range(round(DURATION_S / STEP_S)):
@@ -67,7 +67,7 @@ def fly(
             return motion(state, wanted, throttle, field, turns=air.turns, spread=air.spread).rates
 
         now = motion(x, command, throttle, field, turns=air.turns, spread=air.spread)
-        rows.append((t, now.airspeed, now.alpha, now.beta, *x[3:9], *now.force, *x[13:16], x[10]))
+        rows.append((t, now.airspeed, now.alpha, now.beta, *x[3:9], *now.force, *x[14:17], x[10]))
         for _ in range(SUBSTEPS):
             a = rates(x)
             b = rates([s + 0.5 * step * k for s, k in zip(x, a, strict=True)])

@@ -11,7 +11,8 @@ from host.export.toml import dumps
 from host.physical.calibration import load_calibration
 from numpy.typing import NDArray
 
-from studies.foreign.aeroplane import DENSITY_KGPM3
+from studies.foreign.aeroplane import DENSITY_KGPM3, thrust_n, trimmed
+from studies.foreign.flight import SPEED_MPS
 
 Columns = dict[str, NDArray[np.float64]]
 TRAINER_FILE, SENSORS_FILE = (Path(__file__).with_name(f"{n}.toml") for n in ("trainer", "sensors"))
@@ -20,7 +21,7 @@ PLACES = ("imu_m", "vane_a_m", "vane_b_m", "pitot_a_m", "pitot_b_m")
 
 
 def with_sensor_errors(measured: Columns, rng: np.random.Generator) -> Columns:
-    """Return columns as these sensors tell them, and the density."""
+    """Return columns as these sensors tell them, thrust by the airspeed they tell, and density."""
     sd = {name: float(table["sigma"]) for name, table in _errors().items() if "sigma" in table}
     found = dict(measured)
 
@@ -47,6 +48,8 @@ def with_sensor_errors(measured: Columns, rng: np.random.Generator) -> Columns:
         zero = float(np.mean([drawn("pot_zero_rad") for _ in range(pots)]))
         found[name] = measured[name] * slope + zero
     density = DENSITY_KGPM3 * (1.0 + drawn("density_share"))
+    _, _, throttle = trimmed(SPEED_MPS)  # where it stays
+    found["thrust_n"] = thrust_n(throttle, found["airspeed_mps"])
     found["density_kgpm3"] = np.full(len(measured["t_s"]), density)
     return found
 
