@@ -36,6 +36,7 @@ from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.gust_model import VANES
 from host.sysid.estimators.gust_penetration import without_gust_penetration
 from host.sysid.estimators.method_registry import fit, refuse_unless_finite
+from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
 from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
@@ -275,7 +276,8 @@ class LinearEstimator:
         fit_at_trim = e.fit if e.departure is None else e.departure.corrected(e.fit)
         statistical = fit_at_trim
         # Airspeed that varied is known: what it does is no model error.
-        free = free_responses(e.model, e.estimate, e.at_trim(e.estimate))
+        at_trim = e.at_trim(e.estimate)
+        free = free_responses(e.model, e.estimate, at_trim)
         coherence = excess = None
         if free is not None:
             coherence = input_coherence(free.problem, free.responses, free.theta)
@@ -293,6 +295,8 @@ class LinearEstimator:
                 )
         statistical = inflate_covariance(statistical, maneuver_agreement(statistical))
         statistical = inflate_by_coherence(statistical, coherence, excess)
+        absent = missing_control(e.fit, at_trim, e.trim.airspeed_mps)
+        statistical = widened_by_missing_control(statistical, absent)
         shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
         carriers = [m.flight.compatibility for m in e.used]
         known = [c for c in carriers if c is not None]

@@ -1,0 +1,159 @@
+"""Do the inputs act where the model says that they do not? A score test beside gust and noise.
+
+Without the lift of an elevator the gust filter takes what az lacks for moving air, and air moves q:
+M_q was 10 % off, known to 3 %. A free simulation cannot tell, for the gust is all that it leaves;
+the filter's innovations can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import special
+
+from host.arrays import Array
+from host.sysid.estimators.gust_model import gust_model
+from host.sysid.estimators.innovations import PROCESS
+from host.sysid.models.consider_covariance import consider_covariance
+from host.sysid.models.fit_result import FitResult
+from host.sysid.models.maneuver import Maneuver
+from host.sysid.models.nonlinear_model import NonlinearModel
+from host.sysid.models.state_space_model import LinearModel, Parameter, Term
+from host.sysid.numerics.coloured_residuals import coloured_score_covariance
+from host.sysid.numerics.filter_problem import FilterProblem
+from host.sysid.numerics.filter_scoring import (
+    fisher_scoring,
+    total_information,
+    whitened_innovation_sensitivities,
+)
+from host.sysid.numerics.information_inverse import identified_inverse
+
+SIGNIFICANCE = 0.01  # of right models are said to lack an effect of their inputs
+
+
+@dataclass(frozen=True)
+class MissingControl:
+    """Effects of inputs that a model lacks, and what their absence does to its parameters.
+
+    Attributes
+    ----------
+    where : tuple of str
+        Inputs and equations, those first that stand out most.
+    shift : Array, shape (P,)
+        By how much each parameter of the model is off.
+    """
+
+    where: tuple[str, ...]
+    shift: Array
+
+
+def missing_control(
+    result: FitResult, maneuvers: Sequence[Maneuver], airspeed_mps: float
+) -> MissingControl | None:
+    """Return what the inputs do beside the model; None where they do nothing, or of other methods.
+
+    The entries of B and D that are empty are added to the model. Their joint score is compared with
+    its covariance (Lagrange multipliers; Engle, Handbook of Econometrics II, 1984, ch. 13), which
+    counts that innovations may be coloured. Their one-step estimate says how far parameters moved.
+
+    Parameters
+    ----------
+    result : FitResult
+        Of filter error, on its model without gust states.
+    maneuvers : sequence of Maneuver
+        As fitted.
+    airspeed_mps : float
+        Of the trim, for the gust's time scale.
+    """
+    base = result.model
+    process = tuple(n.removeprefix(PROCESS) for n in result.names if n.startswith(PROCESS))
+    if not process or result.residual_kind != "innovation" or isinstance(base, NonlinearModel):
+        return None
+    added = _absent_entries(base)
+    if not added:
+        return None
+    wide = base if set(process) <= set(base.states) else gust_model(base, airspeed_mps)
+    names = [f"absent {k}" for k in range(len(added))]
+    wide = replace(
+        wide,
+        terms=(
+            *wide.terms,
+            *(Term(m, row, column, n) for n, (m, row, column) in zip(names, added, strict=True)),
+        ),
+        parameters=(*wide.parameters, *(Parameter(n, 0.0) for n in names)),
+    )
+    first, count = len(base.parameters), len(added)
+    theta = np.insert(result.estimate, first, np.zeros(count))
+    problem = FilterProblem(wide, maneuvers, process)
+    point = problem.evaluate(theta)
+    if point is None:
+        return None
+    information, score = total_information(
+        problem.output_problem, theta, *fisher_scoring(problem, theta, point)
+    )
+    coloured = np.zeros_like(information)
+    slopes = whitened_innovation_sensitivities(problem, theta, point)
+    for e, maneuver, J in zip(point.e, maneuvers, slopes, strict=True):
+        white = e @ point.gains[maneuver.dt_s].whitener.T
+        for j in range(white.shape[1]):
+            coloured += coloured_score_covariance(white[:, j], J[:, j])
+    new = np.zeros(len(theta), dtype=bool)
+    new[first : first + count] = True
+    # Freed of what the parameters of the model, and of its noise, could still take.
+    moved = -identified_inverse(information[np.ix_(~new, ~new)]) @ information[np.ix_(~new, new)]
+    freed = np.zeros((len(theta), count))
+    freed[new], freed[~new] = np.eye(count), moved
+    inner, outer = (freed.T @ m @ freed for m in (information, coloured))
+    right = freed.T @ score
+    sizes = np.sqrt(np.maximum(np.diag(inner), 1e-300))
+    effect = identified_inverse(inner / np.outer(sizes, sizes)) / np.outer(sizes, sizes) @ right
+    # The larger of both covariances along the score: no narrower than the filter's own.
+    excess = float(right @ identified_inverse(inner) @ outer @ identified_inverse(inner) @ right)
+    power = float(right @ effect)
+    excess = max(excess / max(power, 1e-300), 1.0)
+    if special.chdtrc(count, power / excess) >= SIGNIFICANCE:
+        return None
+    order = np.argsort(-np.abs(effect) * sizes)
+    said = [_said(base, *added[k]) for k in order if abs(effect[k]) * sizes[k] > 2.0]
+    return MissingControl(tuple(said), (moved @ effect)[:first])
+
+
+def widened_by_missing_control(result: FitResult, found: MissingControl | None) -> FitResult:
+    """Return the result with intervals that hold what the absent effects moved, and a line."""
+    if found is None:
+        return result
+    covariance, count = result.covariance.copy(), len(found.shift)
+    own = np.diag(covariance)[:count] > 0.0
+    covariance[:count, :count] += consider_covariance((found.shift * own)[None])
+    where = ", ".join(found.where) or "the outputs"
+    line = f"the inputs act where the model has no effect of theirs ({where}): intervals widened"
+    return replace(result, covariance=covariance, warnings=(*result.warnings, line))
+
+
+def _absent_entries(model: LinearModel) -> list[tuple[str, int, int]]:
+    """Return matrix, row and column of the effects of inputs that a model has not.
+
+    Asked for are equations with parameters of their own: kinematics needs no input.
+    """
+    there = {(t.matrix, t.row, t.column) for t in model.terms if t.matrix in "BD"}
+    found = []
+    for matrix, free, known, rows in (
+        ("B", "A", model.B, model.states),
+        ("D", "C", model.D, model.outputs),
+    ):
+        open_rows = {t.row for t in model.terms if t.matrix == free and t.gain != 0.0}
+        found += [
+            (matrix, row, column)
+            for row in sorted(open_rows)
+            for column in range(len(model.inputs))
+            if (matrix, row, column) not in there and known[row, column] == 0.0
+            if not (matrix == "D" and rows[row] in model.states)
+        ]
+    return found
+
+
+def _said(model: LinearModel, matrix: str, row: int, column: int) -> str:
+    name = f"{model.states[row]}'" if matrix == "B" else model.outputs[row]
+    return f"{model.inputs[column]} on {name}"
