@@ -34,7 +34,10 @@ from host.sysid.estimators.filter_error_gust import (
 )
 from host.sysid.estimators.gust_delays import advance_outputs
 from host.sysid.estimators.gust_model import VANES
-from host.sysid.estimators.gust_penetration import without_gust_penetration
+from host.sysid.estimators.gust_penetration import (
+    with_unknown_roll_lag,
+    without_gust_penetration,
+)
 from host.sysid.estimators.method_registry import fit, refuse_unless_finite
 from host.sysid.estimators.missing_control import missing_control, widened_by_missing_control
 from host.sysid.estimators.users_model import fit_by_evidence, fit_users_model
@@ -42,6 +45,7 @@ from host.sysid.flight.commanded_surfaces import brought_behind, servo_of
 from host.sysid.flight.estimator import answer_of
 from host.sysid.flight.filter_step import (
     feels_roll,
+    others_recorded,
     rolling_gust_identifiable,
     sensors_known,
     with_filter_step,
@@ -297,6 +301,9 @@ class LinearEstimator:
         statistical = inflate_by_coherence(statistical, coherence, excess)
         absent = missing_control(e.fit, at_trim, e.trim.airspeed_mps)
         statistical = widened_by_missing_control(statistical, absent)
+        # Our own log is fitted in means, which lean less on what the gust is between samples.
+        if others_recorded(e.used):
+            statistical = with_unknown_roll_lag(statistical)
         shifts: tuple[ShiftedEstimate, ...] = () if e.departure is None else e.departure.remainders
         carriers = [m.flight.compatibility for m in e.used]
         known = [c for c in carriers if c is not None]
