@@ -141,7 +141,7 @@ def test_a_process_that_dies_costs_an_answer_and_nothing_else(tmp_path: Path) ->
     worker.start()
     try:
         worker.ask(tmp_path / "noise.radio")
-        worker._process.kill()
+        worker._process._process.kill()
         assert "ended" in answered(worker).why_not
         worker.ask(tmp_path / "noise.radio")
         assert answered(worker).why_not  # in one line: noise is no log

@@ -6,24 +6,18 @@ and a mistake in it costs an answer, not the recording.
 
 from __future__ import annotations
 
-import contextlib
-import os
-import signal
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from host.errors import HostError
+from host.live.worker_process import WorkerEndedError, WorkerProcess
 
 if TYPE_CHECKING:
     from host.planning.next_point import NextPoint, NextPoints
-
-_ONE_THREAD = "OPENBLAS_NUM_THREADS"  # the matrices are small: threads only wait for each other
-_NICER = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,88 +68,67 @@ class EstimateWorker:
         calibration: Path | None,
         wanted: Mapping[str, float] | None = None,
     ) -> None:
-        self._given = (aircraft, calibration, dict(wanted or {}))
-        self._process: Any = None
-        self._ours: Connection | None = None
+        given = (aircraft, calibration, dict(wanted or {}))
+        self._process = WorkerProcess("estimates", _estimate_for_ever, *given)
         self.busy = False
 
     def start(self) -> None:
         """Start the process; it takes some seconds to know everything that it needs."""
-        os.environ.setdefault(_ONE_THREAD, "1")
-        context = get_context("spawn")
-        self._ours, theirs = context.Pipe()
-        self._process = context.Process(
-            target=_estimate_for_ever, args=(theirs, *self._given), daemon=True, name="estimates"
-        )
         self._process.start()
-        theirs.close()
 
     def ask(self, recording: Path) -> None:
         """Ask for an estimate from all that is in a file now."""
-        if self._ours is None or not self._process.is_alive():
-            self.start()
-        assert self._ours is not None
-        self._ours.send(recording)
+        self._process.ask(recording)
         self.busy = True
 
     def answer(self) -> Answered | None:
         """Return an answer if there is one; a process that died answers with that."""
-        if not self.busy or self._ours is None:
+        if not self.busy:
             return None
         try:
-            if not self._ours.poll():
-                return None
-            found: Answered = self._ours.recv()
-        except (EOFError, OSError):
-            self._ours = None
+            found: Answered | None = self._process.answer()
+        except WorkerEndedError:
             found = Answered(0.0, (), "", {}, "the estimating process ended; started again", 0.0)
-        self.busy = False
+        self.busy = found is None
         return found
 
     def close(self) -> None:
         """End the process."""
-        if self._process is not None and self._process.is_alive():
-            self._process.terminate()
-            self._process.join(timeout=2.0)
-        self._ours = None
+        self._process.close()
 
 
 def _estimate_for_ever(
     asked: Connection, aircraft: str, calibration: Path | None, wanted: dict[str, float]
 ) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's
-    if hasattr(os, "nice"):
-        os.nice(_NICER)
     from host.live.estimates.flight_estimate import FlightEstimator
 
     by = points = None
     tried = not wanted
-    with contextlib.suppress(EOFError, OSError):  # the parent has gone
-        while True:
-            if not tried and not asked.poll():  # seconds of work: nobody waits for an estimate
-                points, tried = _next_points(aircraft), True
-            recording = asked.recv()
-            began = time.process_time()
-            try:
-                by = by or FlightEstimator(aircraft, calibration)
-                found = by.at(recording)
-                chosen = points.best(found.known, found.flown, wanted) if points else None
-            except HostError as error:
-                asked.send(_nothing(str(error), began))
-            except Exception as error:  # of ours: told, and the next portion is tried
-                asked.send(_nothing(f"internal error: {type(error).__name__}: {error}", began))
-            else:
-                asked.send(
-                    Answered(
-                        found.until_s,
-                        found.points,
-                        found.under_way,
-                        found.values,
-                        found.why_not,
-                        time.process_time() - began,
-                        chosen,
-                    )
+    while True:
+        if not tried and not asked.poll():  # seconds of work: nobody waits for an estimate
+            points, tried = _next_points(aircraft), True
+        recording = asked.recv()
+        began = time.process_time()
+        try:
+            by = by or FlightEstimator(aircraft, calibration)
+            found = by.at(recording)
+            chosen = points.best(found.known, found.flown, wanted) if points else None
+        except HostError as error:
+            asked.send(_nothing(str(error), began))
+        except Exception as error:  # of ours: told, and the next portion is tried
+            asked.send(_nothing(f"internal error: {type(error).__name__}: {error}", began))
+        else:
+            asked.send(
+                Answered(
+                    found.until_s,
+                    found.points,
+                    found.under_way,
+                    found.values,
+                    found.why_not,
+                    time.process_time() - began,
+                    chosen,
                 )
+            )
 
 
 def _next_points(aircraft: str) -> NextPoints | None:
