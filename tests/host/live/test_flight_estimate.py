@@ -11,6 +11,7 @@ from host.live.estimates import flight_estimate
 from host.live.estimates.estimate_worker import EstimateWorker
 from host.live.estimates.flight_estimate import FlightEstimator
 from host.live.estimates.wanted_widths import WANTED_PERCENT
+from host.live.test_point.point_estimate import PointEstimator
 from host.sysid.flight.maneuver_detection import DetectedManeuver, detect_maneuvers
 from host.sysid.flight.reconstructed_flight import ReconstructedFlight
 from host.sysid.identification_error import IdentificationError
@@ -81,6 +82,22 @@ def test_the_process_that_estimates_names_the_next_point(
         worker.close()
     assert found.next_point.segment.axes == ("aileron",)
     assert {"Cl_p", "Cn_dr"} <= set(found.next_point.wanting)
+
+
+def test_a_point_alone_is_estimated_from_the_last_seconds(flight: RadioFlight) -> None:
+    card = load("demo")
+    point = card.segments[1]
+    first, second = after_each_point(flight.sent, flight.truth, 3.8)
+    by = PointEstimator(card, flight.calibration)
+    last_s = flight.truth[1]["input_end_s"] + 3.8 - flight.truth[1]["start_s"] + 1.0
+    one = by.estimate(point, second, last_s)
+    assert one.promised == ()  # not reckoned yet
+    assert set(one.half_widths) == {"Cm_alpha", "Cm_q", "Cm_de"}
+    # What was flown before the last seconds is another point, and would narrow it.
+    both = by.estimate(point, second, 60.0)
+    assert all(both.half_widths[name] < 0.95 * one.half_widths[name] for name in one.half_widths)
+    assert by.estimate(point, b"noise", last_s).half_widths == {}
+    assert by.estimate(point, first[:3000], last_s).half_widths == {}
 
 
 def test_a_test_point_under_way_is_in_the_estimate_and_named(

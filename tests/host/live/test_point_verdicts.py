@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
-from dataclasses import replace
+import signal
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +16,14 @@ from host.aircraft.linear_aircraft import load
 from host.live.live_program import _JsonLines
 from host.live.live_sample import LIVE_UNITS, Array, LiveUpdate
 from host.live.test_point.card_progress import CardProgress, card_points
+from host.live.test_point.point_estimate import PointEstimate
 from host.live.test_point.point_measures import PointMeasures
 from host.live.test_point.point_verdict import judge_point
 from host.live.test_point.point_watch import PointWatch
+from host.live.test_point.point_worker import PointWorker
 from host.planning.aircraft_response import STEP_S, AircraftResponse
+from host.planning.point_widths import point_derivatives
+from host.planning.predicted_widths import PredictedWidth
 from host.planning.wanted_input import RESPONSE_S, wanted_surfaces
 from host.twin.testcard.cards import Card, Segment, parse
 
@@ -78,15 +84,58 @@ def flown(
     return rows
 
 
-def watched(card: Card, rows: dict[str, Array], *, lost: slice | None = None) -> PointWatch:
+@dataclass
+class Pretended:
+    """Who estimates, on a clock that it turns itself: an answer takes a while."""
+
+    found: PointEstimate
+    takes_s: float = 0.2
+    now_s: float = 0.0
+    asked: list[tuple[Segment, bytes, float]] = field(default_factory=list)
+    closed: bool = False
+    _asked_s: float = 0.0
+
+    def clock(self) -> float:
+        self.now_s += 0.02
+        return self.now_s
+
+    def ask(self, point: Segment, data: bytes, last_s: float) -> None:
+        self.asked.append((point, data, last_s))
+        self._asked_s = self.now_s
+
+    def answer(self, timeout_s: float = 0.0) -> PointEstimate | None:
+        self.now_s += min(timeout_s, self.takes_s)
+        return self.found if self.now_s >= self._asked_s + self.takes_s else None
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def estimate_of(point: Segment, width: float) -> PointEstimate:
+    """Return that a point gave half-widths so many times the promised ones."""
+    names = point_derivatives(point)
+    promised = tuple(PredictedWidth(name, "1", 1.0, 0.1, 0.5, 11) for name in names)
+    return PointEstimate(promised, dict.fromkeys(names, 0.1 * width))
+
+
+def watched(
+    card: Card,
+    rows: dict[str, Array],
+    *,
+    lost: slice | None = None,
+    estimates: Pretended | None = None,
+) -> PointWatch:
     """Return who judged the rows, which came one by one."""
-    watch = PointWatch(card)
+    clock = estimates.clock if estimates else float
+    watch = PointWatch(card, estimates=estimates, clock=clock)
     come = np.ones(len(rows["t_s"]), bool)
     if lost is not None:
         come[lost] = False
     for at in np.flatnonzero(come):
         row = {name: column[at : at + 1] for name, column in rows.items()}
         watch.hear(LiveUpdate(row, np.ones(1, bool), 0, [], 0.0))
+        watch.take(b"row %d" % at)
+        watch.tick()
     return watch
 
 
@@ -175,6 +224,67 @@ def test_a_point_that_only_moved_too_softly_is_told_so(card: Card) -> None:
     assert judge_point(replace(flown, deviations=np.array([1.1, 1.0])), card.segments[1]).good
     late = judge_point(replace(flown, length=2.5), card.segments[1])
     assert late.text == "repeat: 150 % too long: shorter steps"
+
+
+def test_a_point_is_estimated_from_the_last_seconds_and_judged_by_both(
+    card: Card, response: AircraftResponse
+) -> None:
+    wanted = card.segments[1]
+    rows = flown(response, [(START_S, wanted)])
+    by = Pretended(estimate_of(wanted, 1.6))
+    watch = watched(card, rows, estimates=by)
+    said = only(watch)
+    assert (said["good"], said["estimated"]) == (False, True)
+    assert said["text"] == "repeat: half-widths 1.3 times the promised ones"
+    [(point, data, last_s)] = by.asked
+    assert point == wanted
+    assert last_s == pytest.approx(1.2 + RESPONSE_S + 1.0, abs=0.7)
+    assert data.startswith(b"row 0")
+    assert data.endswith(b"row %d" % round(20.0 * (START_S + last_s - 1.0)))
+    assert said["said_s"] - said["end_s"] <= 2.0
+    assert only(watched(card, rows, estimates=Pretended(estimate_of(wanted, 1.2))))["good"]
+    watch.close()
+    assert by.closed
+
+
+def test_an_estimate_that_does_not_come_holds_nobody_up(
+    card: Card, response: AircraftResponse
+) -> None:
+    rows = flown(response, [(START_S, card.segments[1])], seconds=50.0)
+    by = Pretended(estimate_of(card.segments[1], 9.0), takes_s=1e9)
+    said = only(watched(card, rows, estimates=by))
+    assert (said["good"], said["estimated"]) == (True, False)
+
+
+def test_a_line_over_rows_that_are_missing_makes_no_point_bad(card: Card) -> None:
+    wanted = card.segments[1]
+    flown = PointMeasures(
+        axis="aileron", axis_wanted=True, amplitude=1.0, edge=2.5, length=1.0, unquiet=0.0,
+        others=0.0, deviations=np.array([1.5, 1.5]), corrected=0.0, airspeed=0.0,
+        airspeed_change=0.0, gusts=1.0, lost=0.1,
+    )  # fmt: skip
+    assert judge_point(flown, wanted, estimate_of(wanted, 4.0)).good
+    assert not judge_point(replace(flown, lost=0.0), wanted, estimate_of(wanted, 4.0)).good
+    narrow = judge_point(flown, wanted, estimate_of(wanted, 0.8))
+    assert narrow.score > judge_point(flown, wanted, estimate_of(wanted, 4.0)).score
+
+
+def test_nobody_waits_for_the_process_that_estimates_points_and_it_may_die(card: Card) -> None:
+    worker = PointWorker(card, "")
+    try:
+        os.kill(worker._process._process.pid, signal.SIGSTOP)
+        worker.ask(card.segments[1], bytes(1 << 20), 5.0)  # more than a pipe holds
+        assert worker.answer() is None
+        worker._process._process.kill()
+        while (found := worker.answer(1.0)) is None:
+            pass
+        assert found == PointEstimate()
+        worker.ask(card.segments[1], b"noise", 5.0)  # another process
+        while (found := worker.answer(1.0)) is None:
+            pass
+        assert found.half_widths == {}
+    finally:
+        worker.close()
 
 
 def test_gusts_of_the_card_are_no_matter_and_others_are(

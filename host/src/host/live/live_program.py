@@ -12,10 +12,12 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from host.aircraft.file import load_measured
 from host.errors import UsageError
 from host.extras import install_hint
 from host.link.serial import DeviceError
 from host.live.estimates.live_estimates import LiveEstimates, live_estimates
+from host.live.estimates.wanted_widths import wanted_widths
 from host.live.ground_capture import GroundCapture, new_capture_path, utc_now
 from host.live.live_session import Audience, LiveSession
 from host.live.live_sources import (
@@ -38,7 +40,10 @@ from host.wire.schema_text import packed_schema
 if TYPE_CHECKING:
     from aiohttp import web
 
-PORT = 8050
+    from host.live.test_point.point_watch import PointWatch
+
+PORT, MOST_PORT = 8050, 65535
+MOST_BAUD = 10_000_000
 _TRIES = 10
 _POLL_S = 0.1
 _LAST_S = 60.0  # for the last estimates, where nothing else is waited for
@@ -119,6 +124,25 @@ def open_source(request: LiveRequest, tell: Callable[[str], None]) -> Source:
     return port_source(text, request.baud, tell)
 
 
+def _check(request: LiveRequest) -> None:
+    """Refuse a wrong argument before a device is opened and a file is made."""
+    for option, number, most in (
+        ("--port", request.port, MOST_PORT), ("--baud", request.baud, MOST_BAUD),
+    ):  # fmt: skip
+        if number is not None and not 0 < number <= most:
+            raise UsageError(f"{option} {number}: expected 1 to {most}")
+    for option, place in (("--mavlink", request.mavlink), ("--plotjuggler", request.plotjuggler)):
+        if place is not None:
+            udp_place(option, place)
+    wanted_widths(request.wanted)
+    if request.aircraft:
+        load_measured(request.aircraft)
+    if request.card is not None:
+        from host.twin.testcard import cards
+
+        cards.load(request.card)
+
+
 def run_live(
     request: LiveRequest, tell: Callable[[str], None], show: Callable[[str], None]
 ) -> LiveSummary:
@@ -137,14 +161,12 @@ def run_live(
     HostError
         In one line: no device, a busy port, a wrong file, a missing extra.
     """
+    _check(request)
     calibration = load_calibration(request.calibration)
     source = request.opened or open_source(request, tell)
     own = getattr(source, "calibration_text", "")  # of a virtual instrument
     if own and request.calibration is None:
         calibration = calibration_of_text(own, Path(source.name))
-    for option, place in (("--mavlink", request.mavlink), ("--plotjuggler", request.plotjuggler)):
-        if place is not None:
-            udp_place(option, place)
     texts = [packed_schema().text]
     capture = _capture(request, source, calibration)
     with capture if capture is not None else contextlib.nullcontext():
@@ -161,7 +183,7 @@ def run_live(
             session.audiences.append(_JsonLines(show))
         known = own or request.calibration is not None
         estimates = _estimates(request, session, calibration.text if known else "")
-        _test_points(request, session)
+        watch = _test_points(request, session, calibration)
         learning = _learning(request, session, estimates, tell, show)
         try:
             with contextlib.suppress(KeyboardInterrupt):
@@ -171,8 +193,9 @@ def run_live(
             learning.close()
             for last in leave:
                 last()
-            if estimates is not None:
-                estimates.close()
+            for listener in (estimates, watch):
+                if listener is not None:
+                    listener.close()
             if bridge is not None:
                 bridge.close()
     if session.error is not None:
@@ -224,19 +247,24 @@ def _learning(
     return found
 
 
-def _test_points(request: LiveRequest, session: LiveSession) -> None:
+def _test_points(
+    request: LiveRequest, session: LiveSession, calibration: Calibration
+) -> PointWatch | None:
     """Let the points of the card be judged that is named, or that a virtual flight flies."""
     name, source = request.card, "" if request.opened else request.source or ""
     if name is None and source.startswith("sim:"):
         name = source.removeprefix("sim:")
     if name is None:
-        return
+        return None
     from host.live.test_point.point_watch import PointWatch
+    from host.live.test_point.point_worker import PointWorker
     from host.twin.testcard import cards
 
-    watch = PointWatch(cards.load(name), session.judged)
+    card = cards.load(name)
+    watch = PointWatch(card, session.judged, PointWorker(card, calibration.text))
     session.stream.subscribe(watch.hear)
     session.listeners["test_point"] = watch
+    return watch
 
 
 def _capture(

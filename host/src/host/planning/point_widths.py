@@ -12,6 +12,7 @@ equation needs an aileron: a rudder alone is told by those of side force and yaw
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -91,7 +92,7 @@ def point_derivatives(point: Segment) -> tuple[str, ...]:
 
 
 def single_point_widths(
-    point: Segment, table: pd.DataFrame, aircraft: str
+    point: Segment, table: pd.DataFrame, aircraft: str, last_s: float = math.inf
 ) -> dict[str, FlightWidth]:
     """Return the intervals of the derivatives that one test point is flown for, from its flight.
 
@@ -102,6 +103,8 @@ def single_point_widths(
         As `virtual_flight` returns it.
     aircraft : str
         Name or file.
+    last_s : float
+        The point began in these last seconds of the table: what was flown before is another one.
 
     Raises
     ------
@@ -109,7 +112,12 @@ def single_point_widths(
         No equation can be identified.
     """
     columns, instrument = flown_columns(table, aircraft)
-    own = [m for m in detect_maneuvers(columns) if m.axis.removesuffix("_rad") in point.axes]
+    since_s = float(columns["t_s"][-1]) - last_s
+    own = [
+        m
+        for m in detect_maneuvers(columns)
+        if m.axis.removesuffix("_rad") in point.axes and m.start_s > since_s
+    ]
     answer = identify_coefficients(
         columns, aircraft, windows=own, model=_model_of(point), instrument=instrument
     )

@@ -15,6 +15,7 @@ from host.planning.wanted_input import RESPONSE_S, SURFACES, input_length_s, wan
 from host.sysid.flight.maneuver_detection import FLYING_SHARE, LEAST_EDGE_RAD, DetectedManeuver
 from host.twin.testcard.cards import Segment
 
+LEAD_S = 0.7  # before the input, of which every row counts for an estimate
 TRIM_S = 1.0  # before the input, which is where the surfaces' trim is read
 GUST_S = 0.25  # over which a change of the vanes is no motion of the whole aircraft
 GUSTS_OVER_S, GUSTS_LEAST_S = 7.0, 1.5
@@ -55,7 +56,8 @@ class PointMeasures:
     gusts : float
         Of the air before, over those of the card (of a calm morning where it names none).
     lost : float
-        Share of the point's rows that did not arrive.
+        Share of the rows that did not arrive, of the point and of the moment before that an
+        estimate uses too.
     """
 
     axis: str
@@ -103,6 +105,7 @@ def measure(
     amplitude = max((swings[axis] for axis in own), default=0.0) / size
     before = (t >= found.start_s - TRIM_S) & (t < found.start_s - 0.05)
     inside = (t >= found.start_s) & (t <= found.input_end_s + RESPONSE_S)
+    lead = (t >= found.start_s - LEAD_S) & (t < found.start_s)
     rate = columns[_RATE_OF.get(own[0] if own else "elevator", "q_radps")]
     speed = columns["airspeed_mps"]
     names = point_derivatives(wanted)
@@ -126,7 +129,7 @@ def measure(
         airspeed=float(speed[before].mean()) / response.airspeed_mps - 1.0,
         airspeed_change=float(np.ptp(speed[inside])) / response.airspeed_mps,
         gusts=gust_change_mps(columns, since_s, found.start_s) / (CHANGE_OF_GUST * gusts_mps),
-        lost=1.0 - float(columns["arrived"][inside].mean()),
+        lost=1.0 - float(columns["arrived"][inside | lead].mean()),
     )
 
 

@@ -1,7 +1,10 @@
 """The verdict of one test point: its measures in, a score and words for the pilot out.
 
 The score is the half-width that the card promises over the one that is to be expected of what was
-flown, 100 at best. Which flights fixed the constants: `studies/point_verdicts.md`.
+flown, 100 at best. Two things tell what to expect: the movement of the surfaces, and the estimate
+from the rows that the radio brought. The latter knows gusts and the aircraft's answer, the former
+neither the noise of 20 rows a second nor their losses: it is their mean that counts. Which flights
+fixed the constants: `studies/point_verdicts.md`.
 """
 
 from __future__ import annotations
@@ -11,7 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.arrays import Array
+from host.live.test_point.point_estimate import PointEstimate
 from host.live.test_point.point_measures import PointMeasures
+from host.planning.point_widths import point_derivatives
 from host.twin.testcard.cards import Segment
 
 GOOD = 77  # 1.3 times the promised half-width
@@ -22,6 +28,15 @@ NOISE_SHARE = {
     ("aileron", "doublet"): 0.38, ("rudder", "doublet"): 0.15,
 }  # fmt: skip
 OTHER_SHARE = 0.3
+# Where the promise is known, so are its shares. It was flown by a pilot too, whose edges tell less
+# than the card's; gusts count from a little more than the card's on.
+PILOT = 1.1  # times the deviation of the card's input
+LEAST_DEVIATION = 0.8
+CALM, GUSTS_POWER = 1.4, 0.9
+# Weight of the estimate in the logarithm: over points within 2.6 times the promise it scatters by
+# 11 % of what the card's log gives later, the movement by 17 %.
+WHOLE_SHARE, GAPS_SHARE = 0.7, 0.5
+RADIO_WIDER = 1.05  # than of the card's 100 rows: less is averaged
 WEAK, LOUD = 0.7, 1.5  # of the wanted amplitude
 SHORT, LONG = 0.75, 1.35  # of the wanted length
 ROUND = 1.25  # times the card's deviation: what there is to say where nothing else is wrong
@@ -45,10 +60,13 @@ class PointVerdict:
         0 to 100; `GOOD` and more is good.
     remarks : tuple of str
         What is wrong, the worst first.
+    estimated : bool
+        False where movement alone was judged.
     """
 
     score: int
     remarks: tuple[str, ...]
+    estimated: bool = False
 
     @property
     def good(self) -> bool:
@@ -63,7 +81,9 @@ class PointVerdict:
         return "repeat: " + "; ".join(self.remarks[:2] or (f"{self.score} of 100",))
 
 
-def judge_point(measures: PointMeasures, wanted: Segment) -> PointVerdict:
+def judge_point(
+    measures: PointMeasures, wanted: Segment, estimate: PointEstimate | None = None
+) -> PointVerdict:
     """Judge one test point.
 
     Parameters
@@ -71,29 +91,76 @@ def judge_point(measures: PointMeasures, wanted: Segment) -> PointVerdict:
     measures : PointMeasures
     wanted : Segment
         The card's.
+    estimate : PointEstimate, optional
+        Its promise and what the radio's rows tell.
     """
-    score = round(min(100.0, 100.0 / expected_width(measures, wanted)))
-    return PointVerdict(score, _remarks(measures, wanted))
+    estimate = estimate or PointEstimate()
+    moved, estimated = moved_width(measures, wanted, estimate), estimated_width(wanted, estimate)
+    share = _share(measures, moved, estimated)
+    width = moved if estimated is None else moved ** (1.0 - share) * estimated**share
+    score = round(min(100.0, 100.0 / width))
+    said = _remarks(measures, wanted)
+    if not said and share and score < GOOD:
+        said = (f"half-widths {width:.1f} times the promised ones",)
+    return PointVerdict(score, said, share > 0.0)
 
 
-def expected_width(m: PointMeasures, wanted: Segment) -> float:
-    """Return the half-width to expect over the promised one.
+def moved_width(m: PointMeasures, wanted: Segment, estimate: PointEstimate) -> float:
+    """Return the half-width to expect of the movement over the promised one, geometric mean.
 
-    The information of the movement counts as far as noise does. What the linear model does not see
-    is a factor: a pilot or a gust moves the aircraft besides.
+    The information of the movement counts as far as noise does: tolerances stay. What the linear
+    model does not see is a factor: a pilot or a gust moves the aircraft besides.
     """
     if not m.axis_wanted or m.edge < LEAST_EDGE:
         return NOTHING_TOLD
-    shares = [NOISE_SHARE.get((axis, wanted.kind), OTHER_SHARE) for axis in wanted.axes]
-    deviation = float(np.exp(np.mean(np.log(np.maximum(m.deviations, 1.0)))))
-    width = math.sqrt(1.0 + max(shares) * (deviation**2 - 1.0))
-    for value, limit in (
-        (m.corrected, CORRECTED_MUCH),
-        (m.gusts, _gusty(wanted)),
-        (m.airspeed_change, SPEED_CHANGE),
-    ):
+    shares = _noise_shares(wanted, estimate)
+    factors = [(m.corrected, CORRECTED_MUCH), (m.airspeed_change, SPEED_CHANGE)]
+    if estimate.promised:
+        noise = np.maximum(m.deviations / PILOT, LEAST_DEVIATION)
+        noise *= max(1.0, m.gusts / CALM) ** GUSTS_POWER
+    else:
+        factors.append((m.gusts, _gusty(wanted)))
+        mean = np.exp(np.mean(np.log(np.maximum(m.deviations, 1.0))))
+        noise = np.full(len(shares), mean)
+    width = math.exp(0.5 * float(np.mean(np.log(1.0 + shares * (noise**2 - 1.0)))))
+    for value, limit in factors:
         width *= max(1.0, value / limit)
     return width
+
+
+def estimated_width(wanted: Segment, estimate: PointEstimate) -> float | None:
+    """Return the half-width that the radio's rows gave over the promised one, geometric mean.
+
+    None where there is no promise, or no estimate.
+    """
+    promised = {w.name: w.half_width for w in estimate.promised}
+    names = point_derivatives(wanted)
+    if not names or not all(n in promised and n in estimate.half_widths for n in names):
+        return None
+    ratios = [math.log(estimate.half_widths[n] / promised[n] / RADIO_WIDER) for n in names]
+    return math.exp(float(np.mean(ratios)))
+
+
+def _noise_shares(wanted: Segment, estimate: PointEstimate) -> Array:
+    """Return the share of noise in the promised variance of each derivative of the point."""
+    shares = {w.name: w.noise_share for w in estimate.promised}
+    names = point_derivatives(wanted)
+    if shares and all(name in shares for name in names):
+        return np.array([shares[name] for name in names])
+    usual = [NOISE_SHARE.get((axis, wanted.kind), OTHER_SHARE) for axis in wanted.axes]
+    return np.full(len(names), max(usual))
+
+
+def _share(m: PointMeasures, moved: float, estimated: float | None) -> float:
+    """Return how much the estimate counts, beside the movement.
+
+    A line over rows that are missing makes an estimate wider, so only a narrow one tells then.
+    """
+    if estimated is None or moved >= NOTHING_TOLD:
+        return 0.0
+    if m.lost > 0.0:
+        return GAPS_SHARE if estimated < moved else 0.0
+    return WHOLE_SHARE
 
 
 def _gusty(wanted: Segment) -> float:

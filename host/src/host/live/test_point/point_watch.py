@@ -1,34 +1,74 @@
-"""Waits for test points in the stream, has each judged when it is over, and knows what is next."""
+"""Waits for test points in the stream, has each judged when it is over, and knows what is next.
+
+A point that is over is estimated somewhere else first, from the bytes of the last seconds; where no
+answer comes in time its movement alone is judged.
+"""
 
 from __future__ import annotations
 
 import itertools
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 from host.aircraft.linear_aircraft import load
 from host.live.live_sample import LiveUpdate
 from host.live.test_point.card_progress import CardPoint, CardProgress
 from host.live.test_point.finished_input import finished_inputs
-from host.live.test_point.point_measures import measure
+from host.live.test_point.point_estimate import PointEstimate
+from host.live.test_point.point_measures import PointMeasures, measure
 from host.live.test_point.point_verdict import judge_point
-from host.live.test_point.recent_flight import RecentFlight
+from host.live.test_point.recent_flight import KEPT_S, RecentFlight
 from host.live.test_point.weak_input import weak_input
 from host.planning.aircraft_response import AircraftResponse
 from host.planning.next_point import INPUT_NAMES
 from host.planning.predicted_widths import LIGHT_GUSTS_MPS
 from host.planning.wanted_input import RESPONSE_S
 from host.sysid.flight.maneuver_detection import FLYING_SHARE, DetectedManeuver
-from host.twin.testcard.cards import Card
+from host.twin.testcard.cards import Card, Segment
 
 LOOKED_S = 0.5  # of the stream between two looks: a verdict is that late at most
 EARLY_S, LATE_S = 1.5, 6.0  # of an input, against the countdown
+ANSWER_S = 1.0  # of the computer's clock: an estimate takes a tenth of it
+AHEAD_S = 10.0  # a recording played fast is held here until the answer is there
+EDGE_S = 1.0  # a finder at another rate may place the first edge as much earlier
 _SHOWN = 8
 
 
+class EstimateSource(Protocol):
+    """Who estimates a point, somewhere else."""
+
+    def ask(self, point: Segment, data: bytes, last_s: float) -> None:
+        """Ask what bytes tell of a point that began in their last seconds."""
+        ...
+
+    def answer(self, timeout_s: float = 0.0) -> PointEstimate | None:
+        """Return the answer if it is there."""
+        ...
+
+    def close(self) -> None:
+        """End."""
+        ...
+
+
+@dataclass(slots=True)
+class _Over:
+    """A point that is over and waits for its estimate."""
+
+    item: DetectedManeuver
+    point: CardPoint
+    measures: PointMeasures
+    asked_s: float | None = None  # of the computer's clock
+
+    @property
+    def end_s(self) -> float:
+        return self.item.input_end_s + RESPONSE_S
+
+
 class PointWatch:
-    """Judges test points as they end; `hear` is a consumer of the stream.
+    """Judges test points as they end; `take` and `hear` are given the stream.
 
     Parameters
     ----------
@@ -36,6 +76,10 @@ class PointWatch:
         What is flown; its aircraft is the one whose modes count.
     judged : callable, optional
         Called with each verdict.
+    estimates : EstimateSource, optional
+        Without, movement alone is judged.
+    clock : callable
+        The computer's, s.
 
     Raises
     ------
@@ -44,7 +88,11 @@ class PointWatch:
     """
 
     def __init__(
-        self, card: Card, judged: Callable[[Mapping[str, Any]], None] | None = None
+        self,
+        card: Card,
+        judged: Callable[[Mapping[str, Any]], None] | None = None,
+        estimates: EstimateSource | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         aircraft = load(card.aircraft)
         speed = card.flight.airspeed_mps or aircraft.scalar("trim.airspeed_mps")
@@ -56,18 +104,38 @@ class PointWatch:
         self._recent = RecentFlight()
         self._looked_s = self._since_s = float("-inf")
         self._number = itertools.count(1)
-        self._told = judged
+        self._on_verdict, self._estimates, self._clock = judged, estimates, clock
+        self._over: _Over | None = None
+        self._bytes: deque[tuple[float, bytes]] = deque()
 
     def take(self, data: bytes) -> None:
-        """Not the bytes: `hear` takes what the stream makes of them."""
+        """Take bytes of the stream, behind `hear`: an estimate is made of the last seconds."""
+        now_s = self._recent.now_s
+        self._bytes.append((now_s, data))
+        while not 0.0 <= now_s - self._bytes[0][0] < KEPT_S and len(self._bytes) > 1:
+            self._bytes.popleft()
+        over = self._over
+        if over is not None and over.asked_s is None and self._estimates is not None:
+            over.asked_s = self._clock()
+            last_s = now_s - over.item.start_s + EDGE_S
+            self._estimates.ask(over.point.segment, b"".join(d for _, d in self._bytes), last_s)
 
     def tick(self) -> None:
-        """Nothing to do."""
+        """Give the verdict that an estimate was waited for."""
+        self._settle(self._recent.now_s)
+
+    def close(self) -> None:
+        """End who estimates."""
+        if self._estimates is not None:
+            self._estimates.close()
 
     def hear(self, update: LiveUpdate) -> None:
         """Take rows; judge what has come to its end."""
         self._recent.add(update)
         now_s = self._recent.now_s
+        if self._over is not None:
+            self._settle(now_s)
+            return
         if not len(update) or 0.0 <= now_s - self._looked_s < LOOKED_S:
             return
         if now_s < self._looked_s:
@@ -81,24 +149,40 @@ class PointWatch:
         columns = self._recent.columns()
         wanted, speed = point.segment, self._response.airspeed_mps
         for item in finished_inputs(columns, wanted, speed, self._since_s)[:1]:
-            self._judge(columns, item, point, now_s)
+            self._ended(columns, item, point)
             return
         if columns and self.progress.due_s is not None:
             due_s = self.progress.due_s
             first_s = max(due_s - EARLY_S, self._since_s)
             weak = weak_input(columns, wanted, self._response, (first_s, due_s + LATE_S))
             if weak is not None:
-                self._judge(columns, weak, point, now_s)
+                self._ended(columns, weak, point)
 
-    def _judge(
-        self, columns: dict[str, Any], item: DetectedManeuver, point: CardPoint, now_s: float
-    ) -> None:
+    def _ended(self, columns: dict[str, Any], item: DetectedManeuver, point: CardPoint) -> None:
+        """Measure a point that is over; it is judged with its estimate, or without one at once."""
         measures = measure(
             columns, item, point.segment, self._response, self._gusts_mps, self._since_s
         )
-        verdict = judge_point(measures, point.segment)
+        self._over = _Over(item, point, measures)
+        if self._estimates is None:
+            self._judge(self._over, PointEstimate())
+
+    def _settle(self, now_s: float) -> None:
+        """Judge the point that waits, with its estimate or when that has taken too long."""
+        over = self._over
+        if over is None or over.asked_s is None or self._estimates is None:
+            return
+        left_s = ANSWER_S - (self._clock() - over.asked_s)
+        far = now_s - over.end_s > AHEAD_S
+        estimate = self._estimates.answer(max(left_s, 0.0) if far else 0.0)
+        if estimate is not None or left_s <= 0.0:
+            self._judge(over, estimate or PointEstimate())
+
+    def _judge(self, over: _Over, estimate: PointEstimate) -> None:
+        item, point = over.item, over.point
+        verdict = judge_point(over.measures, point.segment, estimate)
         shape = INPUT_NAMES.get(item.kind, item.kind)
-        self._since_s = item.input_end_s + RESPONSE_S
+        self._over, self._since_s = None, over.end_s
         self.verdicts.append(
             {
                 "number": next(self._number),
@@ -106,17 +190,18 @@ class PointWatch:
                 "what": point.text,
                 "flown": f"{item.axis.removesuffix('_rad')} {shape}",
                 "start_s": round(item.start_s, 2),
-                "end_s": round(item.input_end_s + RESPONSE_S, 2),
-                "said_s": round(now_s, 2),
+                "end_s": round(over.end_s, 2),
+                "said_s": round(self._recent.now_s, 2),
                 "good": verdict.good,
                 "score": verdict.score,
+                "estimated": verdict.estimated,
                 "text": verdict.text,
                 "remarks": list(verdict.remarks),
             }
         )
-        if self._told is not None:
-            self._told(self.verdicts[-1])
-        self.progress.judged(item.input_end_s + RESPONSE_S, good=verdict.good)
+        if self._on_verdict is not None:
+            self._on_verdict(self.verdicts[-1])
+        self.progress.judged(over.end_s, good=verdict.good)
 
     def as_json(self) -> dict[str, Any]:
         """Return the last verdicts and what is next."""

@@ -14,6 +14,7 @@ from host.sysid.flight.even_grid import BRIDGED, even_arrays
 from host.sysid.identification_error import IdentificationError
 
 KEPT_S = 45.0
+NEAR = 0.6  # of a step: that far from an instant of the grid its row may be
 _ROWS = 10_000  # 50 s at 200 Hz
 _IDLE_US, _FULL_US = 1120.0, 1920.0
 _RESET_S = 5.0  # without a row: what was before is another flight
@@ -52,7 +53,7 @@ class RecentFlight:
     def columns(self) -> dict[str, Array]:
         """Return SI columns on an even grid, lines drawn over what did not arrive.
 
-        ``arrived`` is 1 where a row came within one step of the grid. Empty where there are too
+        ``arrived`` is 1 where a row came. Empty where there are too
         few rows.
         """
         if not self._rows:
@@ -69,7 +70,7 @@ class RecentFlight:
         off = np.minimum(
             np.abs(raw["t_s"][nearest] - even["t_s"]), np.abs(raw["t_s"][nearest - 1] - even["t_s"])
         )
-        return even | {"arrived": (off < step_s).astype(np.float64)}
+        return even | {"arrived": (off < NEAR * step_s).astype(np.float64)}
 
 
 def surface_columns(rows: Mapping[str, Array]) -> dict[str, Array]:
