@@ -1,0 +1,81 @@
+"""Take the pictures of the pages in `host/*.md` anew: a virtual flight and a virtual walk.
+
+    python -m tests.browser.page_pictures            # two minutes; then look at them
+
+The flight is the card that `host plan` designs, received from its radio twice as fast.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+from host.export.toml import dumps
+from host.planning.card_planning import design, document
+from studies.radio_flights import radio_flight
+
+from tests.browser.chromium import LAPTOP, PHONE, Chromium, Page
+from tests.browser.served_page import served_page
+
+AIRCRAFT, SEED = "ultrastick25e", 31
+POINTS = 6  # flown and judged before the picture: of roll and yaw nothing is known yet
+PATIENCE_S = 150.0
+WALK = "sim:walk/half_travel@4x"
+
+
+def flight(folder: Path, into: Path) -> None:
+    """Picture the page in flight, on a phone, and when nothing comes any more."""
+    card = design(AIRCRAFT)
+    (folder / "plan.toml").write_text(dumps(document(card)), encoding="utf-8")
+    flown = radio_flight(card, SEED)
+    (folder / "plan.radio").write_bytes(b"".join(part.data for part in flown.sent))
+    (folder / "calibration.toml").write_text(flown.calibration, encoding="utf-8")
+    words = ("--card", "plan.toml", "--aircraft", AIRCRAFT, "--calibration", "calibration.toml")
+    with served_page(folder, "live", "plan.radio@2x", *words) as live, Chromium() as browser:
+        page = browser.open(live.url)
+        which = "document.getElementById('point-which').textContent"
+        page.wait_for(f"{which} === 'point {POINTS}'", PATIENCE_S)  # each stands for seconds
+        page.wait_for("document.getElementById('estimates-next').textContent !== ''", PATIENCE_S)
+        page.press(" ", "Space", " ")
+        page.wait_for("document.querySelector('#events').textContent.includes('mark 1')")
+        taken(page, into / "live-page.png", LAPTOP)
+        taken(page, into / "live-phone.png", PHONE)
+        page.resize(LAPTOP)
+        page.wait_for("document.getElementById('banner').textContent !== ''", PATIENCE_S)
+        page.wait_for("parseFloat(document.getElementById('link-age').textContent) > 8")
+        taken(page, into / "live-old.png", LAPTOP)
+
+
+def walk(folder: Path, into: Path) -> None:
+    """Picture the guided list where a surface has half its travel."""
+    with served_page(folder, "preflight", WALK) as live, Chromium() as browser:
+        page = browser.open(live.url)
+        title = "document.getElementById('preflight-title').textContent"
+        page.wait_for(f"{title}.startsWith('supply')", PATIENCE_S)
+        taken(page, into / "preflight-page.png", LAPTOP)
+
+
+def taken(page: Page, path: Path, size: tuple[int, int]) -> None:
+    """Take one picture, and refuse it where the page complained."""
+    page.resize(size)
+    page.evaluate("new Promise((done) => setTimeout(done, 500))")  # drawn at its new size
+    page.screenshot(path)
+    assert page.console_errors == [], page.console_errors
+    print(f"wrote {path}")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Take all of them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("host"))
+    into = parser.parse_args(arguments).folder.absolute()
+    with tempfile.TemporaryDirectory() as folder:
+        walk(Path(folder), into)
+        flight(Path(folder), into)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
