@@ -30,6 +30,7 @@ from host.twin.sensors.local_flow import air_data
 from host.twin.testcard import cards
 
 from tests.host.readers.autopilot_flights import CARD
+from tests.host.sysid import recorded
 
 AIRCRAFT = "ultrastick25e"
 STANDS_RAD, SEEN_RAD, SD_RAD = 0.20, 0.23, 0.005
@@ -45,7 +46,7 @@ def _columns(pitch_rad: float = SEEN_RAD, bank_rad: float = 0.0) -> dict[str, Ar
     columns = {"t_s": t, "airspeed_mps": np.where(t < 6.0, 1.0, 17.0)}
     rng = np.random.default_rng(3)
     for k, axis in enumerate("xyz"):
-        columns[f"a{axis}_mps2"] = force[k] + 0.02 * rng.standard_normal(len(t))
+        columns[f"a{axis}_mps2"] = force[k] + 0.005 * rng.standard_normal(len(t))
         columns[f"{'pqr'[k]}_radps"] = 0.01 + 0.002 * rng.standard_normal(len(t))
     return columns
 
@@ -164,3 +165,14 @@ def test_the_file_says_how_well_it_was_measured(tmp_path: Path) -> None:
     ):
         with pytest.raises(AircraftError, match=re.escape(words)):
             airframe_data(written(lines))
+
+
+def test_our_own_log_tells_it_too() -> None:
+    """Its columns begin when all sensors are there, a second before the launch."""
+    record, columns, found = *recorded.flown("demo", 3), recorded.reconstructed("demo", 3)
+    flight = record.record
+    stands = float(true_table(flight, air_data(flight))["theta_rad"].iloc[50])
+    told, notes = update_by_standstill(found, columns, _airframe(stands, 0.004))
+    assert "its tilt is known to" in notes[0]
+    true = float(flight.draws.vector("misalignment_rad")[1])
+    assert abs(told[TILT].value - true) < told[TILT].half_width < 0.7 * found[TILT].half_width

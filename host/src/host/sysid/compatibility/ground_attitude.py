@@ -19,7 +19,7 @@ from host.constants import GRAVITY_MPS2, NORMAL_95
 from host.sysid.compatibility.reconstruction import POSTERIOR_PRIOR_RATIO, Compatibility
 
 TILT, BIAS = "imu_tilt_y_rad", "accel_bias_x_mps2"
-LEAST_S = 1.0  # of a standstill
+LEAST_S = 0.5  # of a standstill; our own log may begin a second before the launch
 STILL_RADPS, STILL_MPS2 = 0.03, 0.5  # motion about its mean: a hand's is ten times that
 GRAVITY_SHARE = 0.05  # specific force within this of gravity's
 GROUND_SPEED, STILL_MPS = ("v_north_mps", "v_east_mps"), 1.0  # of GPS, where there is one
