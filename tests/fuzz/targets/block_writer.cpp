@@ -13,7 +13,8 @@ constexpr uint16_t kMostFrames = 4096;
 struct Card {
   uint8_t block[core::kBlockSize];
   uint16_t at = 0;
-  void put(const uint8_t* data, uint16_t size) {
+  void put(const uint8_t* data, uint16_t size, core::Crc32& crc) {
+    crc.add(data, size);
     ALWAYS(at + size <= core::kBlockSize);
     memcpy(block + at, data, size);
     at = static_cast<uint16_t>(at + size);
