@@ -10,8 +10,10 @@ import pytest
 from host.aircraft.file import Aircraft
 from host.aircraft.linear_aircraft import load
 from host.cli import main
+from host.constants import NORMAL_95
 from host.planning import prior_range
 from host.planning.card_planning import TARGET_EXCURSIONS, exact, point_of
+from host.planning.identified_aircraft import identified_range
 from host.planning.optimal_card import (
     FIRST_DRAW,
     OptimalCard,
@@ -158,3 +160,56 @@ def test_tones_that_cannot_be_flown_are_named(tones: object, said: str, tmp_path
     with pytest.raises(CardError) as error:
         cards.parse({"format": 1, "aircraft": "ultrastick25e", "segment": [row]}, "card")
     assert said in str(error.value)
+
+
+MODEL = """\
+name = "longitudinal"
+states = ["airspeed_mps", "alpha_rad", "q_radps", "theta_rad"]
+inputs = ["elevator_rad"]
+outputs = ["q_radps"]
+A = [[-0.4, 2.4, 0.0, -9.8], [-0.07, "Z_alpha", 0.97, 0.0], [0.1, "M_alpha", "M_q", 0.0],
+     [0.0, 0.0, 1.0, 0.0]]
+B = [[0.0], [-0.9], ["M_de"], [0.0]]
+C = [[0.0, 0.0, 1.0, 0.0]]
+D = [[0.0]]
+[parameters]
+Z_alpha = { start = -7.0 }
+M_alpha = { start = -200.0 }
+M_q = { start = -13.0 }
+M_de = { start = -150.0 }
+[fit]
+method = "output error"
+Z_alpha = [-7.0, 0.0]
+M_alpha = [-200.0, 40.0]
+M_q = [-13.0, 2.0]
+M_de = [-150.0, 15.0]
+[trim]
+airspeed_mps = 17.0
+alpha_rad = 0.1
+theta_rad = 0.1
+"""
+
+
+def test_an_identified_model_is_a_prior_within_its_intervals(
+    aircraft: Aircraft, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text(MODEL)
+    fleet = identified_range(aircraft, [model], 400)
+    # Body axes: w = V alpha (all but the cosine of alpha), so M_alpha stands divided by V.
+    pitch = np.array([a.straight.longitudinal_a[2] for a in fleet if a.straight is not None])
+    share = float(np.std(pitch[:, 1] / pitch[0, 1]))
+    assert share == pytest.approx(0.2 / NORMAL_95, rel=0.12)
+    assert np.std(pitch[:, 2]) == pytest.approx(2.0 / NORMAL_95, rel=0.12)
+    lateral = np.array([a.straight.lateral_a[1, 1] for a in fleet if a.straight is not None])
+    assert np.std(lateral) / abs(lateral[0]) > 0.05  # of roll it says nothing: as before a flight
+
+    card = tmp_path / "card.toml"
+    command = ["plan", "--optimal", "--prior", str(model), "--flights", "0", "--save", str(card)]
+    assert main(command) == 0
+    assert "drawn from their intervals" in capsys.readouterr().err
+    assert cards.load(str(card)).segments[1].kind == "multisine"
+    assert main([*command, "--airspeed", "25"]) == 2
+    assert "says nothing of another airspeed" in capsys.readouterr().err
+    assert main([*command, "--prior", "handbook.toml"]) == 2
+    assert "--prior" in capsys.readouterr().err

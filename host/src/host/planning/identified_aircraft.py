@@ -13,9 +13,16 @@ from host.aircraft.linear_aircraft import load, with_linear_dynamics
 from host.aircraft.linear_dynamics import LinearDynamics
 from host.aircraft.linearisation import linearise
 from host.aircraft.trim import solve
+from host.arrays import Array
+from host.constants import NORMAL_95
 from host.errors import UsageError
 from host.files.user_text import read_text
+from host.planning.prior_range import LARGEST, random_aircraft
+from host.sysid.answer.conversion_table import saved_values
 from host.sysid.models.model_file import read_model, read_trim
+from host.sysid.models.state_space_model import LinearModel
+
+FIRST_DRAW = 980_101
 
 # States of identified models, and those of the equations of motion they stand for.
 AXES = {
@@ -48,7 +55,9 @@ def is_model(source: str | Path) -> bool:
     return any(line.startswith("states =") for line in text.splitlines())
 
 
-def with_models(base: Aircraft, models: Sequence[Path]) -> Aircraft:
+def with_models(
+    base: Aircraft, models: Sequence[Path], draw: np.random.Generator | None = None
+) -> Aircraft:
     """Return a linear aircraft: `base` about its trim, with the entries of identified models.
 
     Parameters
@@ -57,6 +66,8 @@ def with_models(base: Aircraft, models: Sequence[Path]) -> Aircraft:
         With coefficients; gives what no model has.
     models : sequence of Path
         Models as `host identify --save-model` writes them, of one airspeed.
+    draw : Generator, optional
+        Draws every parameter from the 95 % interval beside it; none changes its sign.
 
     Returns
     -------
@@ -94,7 +105,7 @@ def with_models(base: Aircraft, models: Sequence[Path]) -> Aircraft:
         own_a, own_b = np.linalg.solve(t, a[axis] @ t), np.linalg.solve(t, b[axis])
         rows = [AXES[axis].index(name) for name in model.states]
         columns = [INPUTS[axis].index(name) for name in model.inputs]
-        found_a, found_b, _, _ = model.matrices(model.start)
+        found_a, found_b, _, _ = model.matrices(_values(path, model, draw))
         own_a[np.ix_(rows, rows)] = found_a
         own_b[np.ix_(rows, columns)] = found_b
         a[axis], b[axis] = t @ own_a @ np.linalg.inv(t), t @ own_b
@@ -112,6 +123,36 @@ def with_models(base: Aircraft, models: Sequence[Path]) -> Aircraft:
     return with_linear_dynamics(
         base, straight, name=base.name, title=f"{base.title}, linear, with {names}"
     )
+
+
+def identified_range(base: Aircraft, models: Sequence[Path], count: int) -> list[Aircraft]:
+    """Return the aircraft of identified models, and others from their intervals.
+
+    What no model says is drawn as of any aircraft before its first flight.
+
+    Parameters
+    ----------
+    base : Aircraft
+    models : sequence of Path
+        As `with_models` takes them.
+    count : int
+        Of all; the first is the estimate itself.
+    """
+    drawn = [
+        with_models(random_aircraft(base, seed), models, np.random.default_rng([seed, 6]))
+        for seed in range(FIRST_DRAW, FIRST_DRAW + count - 1)
+    ]
+    return [with_models(base, models), *drawn]
+
+
+def _values(path: Path, model: LinearModel, draw: np.random.Generator | None) -> Array:
+    """Return the parameters of a model, or a draw from their intervals."""
+    if draw is None:
+        return model.start
+    half = {name: pair[1] for name, pair in saved_values(path).items()}
+    sd = np.array([half.get(one.name, 0.0) for one in model.parameters]) / NORMAL_95
+    most = LARGEST * np.abs(model.start)
+    return model.start + np.clip(sd * draw.standard_normal(len(sd)), -most, most)
 
 
 def _axis(path: Path, states: tuple[str, ...], inputs: tuple[str, ...]) -> str:

@@ -85,6 +85,7 @@ def optimal_card(
     gusts_mps: float = 0.3,
     wanted_share: float = WANTED_SHARE,
     duration_s: float = DURATION_S,
+    fleet: Sequence[Aircraft] = (),
 ) -> OptimalCard:
     """Design a card for an aircraft from its prior and the prior's range.
 
@@ -99,6 +100,8 @@ def optimal_card(
         95 % half-width of the principal derivatives over their values.
     duration_s : float
         Of one multisine; at most 20 s fit a row of the logger's card.
+    fleet : sequence of Aircraft
+        For which it is designed, in place of aircraft drawn from the prior's range.
 
     Raises
     ------
@@ -106,7 +109,7 @@ def optimal_card(
         The aircraft cannot be trimmed at that airspeed.
     """
     speed = airspeed_mps or aircraft.scalar("trim.airspeed_mps")
-    fleet = _fleet(aircraft)
+    fleet = fleet or _fleet(aircraft)
     harmonics = np.arange(math.ceil(LOWEST_HZ * duration_s), int(HIGHEST_HZ * duration_s) + 1)
     rng = np.random.default_rng([FIRST_DRAW, len(harmonics)])
     taken: set[int] = set()
@@ -139,7 +142,8 @@ def optimal_card(
     ]  # fmt: skip
     seconds = np.array(variance) * point_s / duration_s * (NORMAL_95 / wanted_share) ** 2
     points = min(max(math.ceil(float(np.median(seconds)) / point_s), 1), MOST_POINTS)
-    title = f"{aircraft.title}: {points} orthogonal multisines on three axes, for its prior's range"
+    many = "one orthogonal multisine" if points == 1 else f"{points} orthogonal multisines"
+    title = f"{aircraft.title}: {many} on three axes, for its prior's range"
     whole = _card(aircraft, speed, [point] * points, WATCHING)
     return OptimalCard(replace(whole, title=title), point_s, seconds)
 

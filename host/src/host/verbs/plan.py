@@ -14,6 +14,7 @@ from host.extras import install_hint
 from host.terminal import command_line
 
 if TYPE_CHECKING:
+    from host.aircraft.file import Aircraft
     from host.planning.card_planning import Bound, Plan, Point
     from host.planning.point_widths import PointPromise
     from host.planning.predicted_widths import PredictedWidth, Prediction
@@ -88,8 +89,10 @@ def _add_designs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--prior",
         type=Path,
+        action="append",
         metavar="FILE",
-        help="with --optimal: coefficients of AVL, Datcom or TOML in place of the aircraft's",
+        help="with --optimal: coefficients of AVL, Datcom or TOML in place of the aircraft's, or"
+        " models of host identify --save-model, one of each axis, with their intervals",
     )
     parser.add_argument(
         "--want",
@@ -185,7 +188,8 @@ def run(args: argparse.Namespace) -> int:
 def _optimal(args: argparse.Namespace) -> Card:
     """Design the card of the least time, and say on stderr what it promises."""
     from host.aircraft.linear_aircraft import load
-    from host.planning.optimal_card import optimal_card, prior_of
+    from host.planning.identified_aircraft import identified_range, is_model
+    from host.planning.optimal_card import AIRCRAFT, optimal_card, prior_of
 
     if args.card is not None or not args.optimal:
         raise UsageError(
@@ -195,14 +199,31 @@ def _optimal(args: argparse.Namespace) -> Card:
         raise UsageError(f"--want is {args.want:g} %, expected 0.1 to {NO_SIGN_PERCENT:g}")
     source = args.aircraft or "ultrastick25e"
     aircraft = load(source)
-    if args.prior is not None:
-        aircraft, replaced = prior_of(aircraft, args.prior, args.airspeed or 0.0)
-        print(f"host: {args.prior}: {', '.join(replaced)}", file=sys.stderr)
+    fleet: list[Aircraft] = []
+    priors = args.prior or []
+    if priors and all(map(is_model, priors)):
+        fleet = identified_range(aircraft, priors, AIRCRAFT)
+        aircraft = fleet[0]
+        speed = aircraft.scalar("trim.airspeed_mps")
+        if abs((args.airspeed or speed) - speed) > 0.05 * speed:
+            raise UsageError(
+                f"--airspeed {args.airspeed:g}: {priors[0]} is about {speed:.1f} m/s, and says"
+                " nothing of another airspeed"
+            )
+        print(f"host: {aircraft.title}: drawn from their intervals", file=sys.stderr)
+    elif len(priors) > 1:
+        raise UsageError(
+            "--prior: coefficients are of one file; models of one axis each may be two"
+        )
+    elif priors:
+        aircraft, replaced = prior_of(aircraft, priors[0], args.airspeed or 0.0)
+        print(f"host: {priors[0]}: {', '.join(replaced)}", file=sys.stderr)
     found = optimal_card(
         aircraft,
         args.airspeed or 0.0,
         gusts_mps=0.3 if args.gusts is None else max(args.gusts, 0.05),
         wanted_share=0.01 * args.want,
+        fleet=fleet,
     )
     print(f"host: {found.line()}", file=sys.stderr)
     return replace(found.card, aircraft=source)

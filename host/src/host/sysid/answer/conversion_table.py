@@ -160,6 +160,17 @@ def _from_toml(path: Path) -> tuple[dict[str, tuple[float, float]], Trim | None]
     return {n: _pair(path, n, x) for table in tables for n, x in table.items()}, None
 
 
+def saved_values(path: Path) -> dict[str, tuple[float, float]]:
+    """Return every parameter of a saved model with its 95 % half-width, 0 where it has none.
+
+    Raises
+    ------
+    IdentificationError
+        The file is no model, or holds no pair of numbers where one belongs.
+    """
+    return _from_toml(path)[0]
+
+
 def _pair(path: Path, name: str, entry: object) -> tuple[float, float]:
     """Return value and half-width of ``4.1`` or ``[4.1, 0.2]``."""
     listed = entry if isinstance(entry, list) else [entry, 0.0]
