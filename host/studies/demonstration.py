@@ -6,10 +6,8 @@ while the gust filter was taken for lateral motion; the study starts behind them
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
@@ -21,7 +19,7 @@ from host.sysid.flight.even_grid import even_columns
 from host.sysid.flight.linear_estimator import identify
 from host.twin.virtual import virtual_flight
 
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 
 FIRST_SEED = 5000
 CARD, AIRCRAFT = "demo", "ultrastick25e"
@@ -83,15 +81,9 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fly what is not in the file yet, then print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=50)
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/demonstration.csv"))
-    options = parser.parse_args(arguments)
-    seeds = range(options.first, options.first + options.flights)
-    rows = flown_rows(options.rows, COLUMNS, ((seed,) for seed in seeds), rows_of)
-    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
-    return 0
+    run = seeded_run("demonstration", __doc__, arguments, flights=50, first_seed=FIRST_SEED)
+    rows = flown_rows(run.rows, COLUMNS, ((seed,) for seed in run.seeds), rows_of)
+    return run.report(rows, table)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ row is held against the derivatives of the aircraft as flown.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -33,7 +32,7 @@ from host.twin.testcard.cards import Card, Segment, Tone, load
 from host.wire.schema_text import packed_schema
 from numpy.typing import NDArray
 
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 
 FIRST_SEED, FLIGHTS = 31_100, 20
 AIRCRAFT = "ultrastick25e"
@@ -134,15 +133,11 @@ def lines_of(rows: Sequence[Mapping[str, str]]) -> list[str]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Fly what is not in the file yet and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--flights", type=int, default=FLIGHTS)
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/learned_in_flight.csv"))
-    asked = parser.parse_args(arguments)
-    seeds = range(asked.first, asked.first + asked.flights)
-    rows = flown_rows(asked.rows, COLUMNS, ((seed,) for seed in seeds), flown)
-    print("\n".join(lines_of(rows)))
-    return 0
+    run = seeded_run(
+        "learned_in_flight", __doc__, arguments, flights=FLIGHTS, first_seed=FIRST_SEED
+    )
+    rows = flown_rows(run.rows, COLUMNS, ((seed,) for seed in run.seeds), flown)
+    return run.report(rows, lines_of)
 
 
 if __name__ == "__main__":

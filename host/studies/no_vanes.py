@@ -9,7 +9,6 @@ too. One row a number goes to a file that a later run continues.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -44,7 +43,7 @@ from host.twin.testcard.cards import load
 
 import host
 from studies.imported_logs import AIRCRAFT, AXIS, MODELS, own_log, truth
-from studies.stored_rows import Row, flown_rows
+from studies.stored_rows import Row, flown_rows, seeded_run
 
 FIRST_SEED = 440  # 400, 401 and 420-425 were looked at
 WITH_VANES = 8  # flights of each cell whose own log is identified too
@@ -231,20 +230,21 @@ def _errors(own: Sequence[dict[str, str]]) -> tuple[Array, Array, Array]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fly what is not in the file yet, then print both tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=6, help="of each cell (the page: 50)")
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/no_vanes.csv"))
-    options = parser.parse_args(arguments)
+    run = seeded_run(
+        "no_vanes",
+        __doc__,
+        arguments,
+        flights=6,
+        first_seed=FIRST_SEED,
+        each="of each cell (the page: 50)",
+    )
     prefer_machine_code()
-    seeds = range(options.first, options.first + options.flights)
 
     def both(seed: int, turbulence_mps: float) -> Iterator[Row]:
-        return rows_of(seed, turbulence_mps, beside=seed < options.first + WITH_VANES)
+        return rows_of(seed, turbulence_mps, beside=seed < run.seeds.start + WITH_VANES)
 
-    rows = flown_rows(options.rows, COLUMNS, product(seeds, TURBULENCE_MPS), both)
-    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
-    return 0
+    rows = flown_rows(run.rows, COLUMNS, product(run.seeds, TURBULENCE_MPS), both)
+    return run.report(rows, table)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ axis, instant and derivative goes to a file that a later run continues.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -48,7 +47,7 @@ from host.twin.sensors.local_flow import air_data
 from host.twin.testcard.cards import Card, Segment, load
 from numpy.typing import NDArray
 
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 
 FIRST_SEED = 22_006  # 22000-22005 were looked at
 AIRCRAFT, RATE_HZ = "ultrastick25e", 100
@@ -277,20 +276,14 @@ def _from_double(rows: Sequence[Mapping[str, str]]) -> tuple[Array, Array]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fly what is not in the file yet, then print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=20)
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/onboard_learning.csv"))
-    options = parser.parse_args(arguments)
-    seeds = range(options.first, options.first + options.flights)
+    run = seeded_run("onboard_learning", __doc__, arguments, flights=20, first_seed=FIRST_SEED)
     rows = flown_rows(
-        options.rows,
+        run.rows,
         COLUMNS,
-        [(seed,) for seed in seeds],
+        [(seed,) for seed in run.seeds],
         lambda seed: list(rows_of(flown(seed), seed)),
     )
-    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
-    return 0
+    return run.report(rows, table)
 
 
 if __name__ == "__main__":

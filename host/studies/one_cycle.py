@@ -7,7 +7,6 @@ cycles goes to a file that a later run continues.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -25,7 +24,7 @@ from host.sysid.models.model_file import model_from
 
 from studies.linear import derivatives
 from studies.radio_flights import RadioFlight, radio_flight
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 from studies.while_flying import AIRCRAFT, card_of
 
 FIRST_SEED = 9100
@@ -111,17 +110,11 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fly what is not in the file yet, then print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=50)
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/one_cycle.csv"))
-    options = parser.parse_args(arguments)
-    seeds = range(options.first, options.first + options.flights)
+    run = seeded_run("one_cycle", __doc__, arguments, flights=50, first_seed=FIRST_SEED)
     rows = flown_rows(
-        options.rows, COLUMNS, [(seed,) for seed in seeds], lambda seed: list(rows_of(seed))
+        run.rows, COLUMNS, [(seed,) for seed in run.seeds], lambda seed: list(rows_of(seed))
     )
-    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
-    return 0
+    return run.report(rows, table)
 
 
 if __name__ == "__main__":

@@ -5,13 +5,11 @@ One row a coefficient, card and flight goes to a file that a later run continues
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from host.aircraft.file import load
@@ -32,7 +30,7 @@ from host.twin.testcard.cards import BEFORE_S, Card, Pilot, Segment, duration_s
 from host.twin.virtual import virtual_flight
 
 from studies.demonstration import PRINCIPAL
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 
 AIRCRAFT = "ultrastick25e"
 FIRST_SEED = 23_100
@@ -161,16 +159,17 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fly what is not in the file yet, then print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=30, help="drawn aircraft")
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/optimal_cards.csv"))
-    options = parser.parse_args(arguments)
-    seeds = range(options.first, options.first + options.flights)
-    keys = [(name, seed) for seed in seeds for name in (OPTIMAL, LOGGER, HAND)]
-    rows = flown_rows(options.rows, COLUMNS, keys, rows_of)
-    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
-    return 0
+    run = seeded_run(
+        "optimal_cards",
+        __doc__,
+        arguments,
+        flights=30,
+        first_seed=FIRST_SEED,
+        each="drawn aircraft",
+    )
+    keys = [(name, seed) for seed in run.seeds for name in (OPTIMAL, LOGGER, HAND)]
+    rows = flown_rows(run.rows, COLUMNS, keys, rows_of)
+    return run.report(rows, table)
 
 
 if __name__ == "__main__":

@@ -5,13 +5,11 @@ One row a coefficient and flight goes to a file that a later run continues.
 
 from __future__ import annotations
 
-import argparse
 import functools
 import itertools
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from host.aircraft.mass_properties import airframe_data
@@ -27,7 +25,7 @@ from host.twin.testcard.cards import Card, load
 from host.twin.virtual import virtual_flight
 
 from studies.demonstration import PRINCIPAL
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 
 FIRST_SEED = 31_200
 KEPT = 1.5  # times the promise, or one over it
@@ -92,12 +90,9 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fly what is not in the file yet, then print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=10, help="of each cell")
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/planned_widths.csv"))
-    options = parser.parse_args(arguments)
-    seeds = range(options.first, options.first + options.flights)
+    run = seeded_run(
+        "planned_widths", __doc__, arguments, flights=10, first_seed=FIRST_SEED, each="of each cell"
+    )
     cards = cells()
 
     @functools.cache
@@ -107,9 +102,8 @@ def main(arguments: list[str] | None = None) -> int:
     def fly(cell: str, seed: int) -> list[dict[str, object]]:
         return rows_of(cell, cards[cell], seed, promised(cell))
 
-    rows = flown_rows(options.rows, COLUMNS, itertools.product(cards, seeds), fly)
-    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
-    return 0
+    rows = flown_rows(run.rows, COLUMNS, itertools.product(cards, run.seeds), fly)
+    return run.report(rows, table)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ twenty lost in bursts. A row a flight and loss goes to a file that a later run c
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 from collections.abc import Iterator, Sequence
@@ -44,7 +43,7 @@ from host.twin.testcard.cards import Card, Segment
 from host.twin.virtual import virtual_flight
 from host.wire.framing import EnvelopeReader, envelope
 
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 
 AIRCRAFT = "ultrastick25e"
 FIRST_SEED, FLIGHTS = 11240, 260
@@ -255,15 +254,9 @@ def _share_right(rows: Sequence[dict[str, str]]) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fly what is not in the file yet, then print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=FLIGHTS)
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/point_verdicts.csv"))
-    options = parser.parse_args(arguments)
-    seeds = range(options.first, options.first + options.flights)
-    rows = flown_rows(options.rows, COLUMNS, [(seed,) for seed in seeds], flight)
-    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
-    return 0
+    run = seeded_run("point_verdicts", __doc__, arguments, flights=FLIGHTS, first_seed=FIRST_SEED)
+    rows = flown_rows(run.rows, COLUMNS, [(seed,) for seed in run.seeds], flight)
+    return run.report(rows, table)
 
 
 if __name__ == "__main__":

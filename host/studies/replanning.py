@@ -7,7 +7,6 @@ A row a flight and way goes to a file that a later run continues.
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import sys
 import tempfile
@@ -25,7 +24,7 @@ from host.planning.optimal_card import standard_card
 from host.twin.testcard.cards import Card, Pilot, Segment, length_s
 
 from studies.radio_flights import RadioFlight, after_each_point, radio_flight
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 from studies.while_flying import BEHIND_S
 
 AIRCRAFT = "ultrastick25e"
@@ -147,16 +146,10 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fly what is not in the file yet, then print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=FLIGHTS)
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/replanning.csv"))
-    options = parser.parse_args(arguments)
-    seeds = range(options.first, options.first + options.flights)
-    keys = [(seed, way) for seed in seeds for way in WAYS]
-    rows = flown_rows(options.rows, COLUMNS, keys, lambda seed, way: list(rows_of(seed, way)))
-    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
-    return 0
+    run = seeded_run("replanning", __doc__, arguments, flights=FLIGHTS, first_seed=FIRST_SEED)
+    keys = [(seed, way) for seed in run.seeds for way in WAYS]
+    rows = flown_rows(run.rows, COLUMNS, keys, lambda seed, way: list(rows_of(seed, way)))
+    return run.report(rows, table)
 
 
 if __name__ == "__main__":

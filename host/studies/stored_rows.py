@@ -2,13 +2,64 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 Row = Mapping[str, object]
 Key = tuple[object, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SeededRun:
+    """What a study of seeded flights was asked for: its seeds, and the file of its rows."""
+
+    seeds: range
+    rows: Path
+
+    def report(
+        self,
+        rows: Iterable[dict[str, str]],
+        table: Callable[[Sequence[dict[str, str]]], Iterable[str]],
+    ) -> int:
+        """Print the table of the rows of these seeds; return the exit code."""
+        print("\n".join(table([r for r in rows if int(r["seed"]) in self.seeds])))
+        return 0
+
+
+def seeded_run(
+    name: str,
+    about: str | None,
+    arguments: Sequence[str] | None,
+    *,
+    flights: int,
+    first_seed: int,
+    each: str = "flights",
+) -> SeededRun:
+    """Return the seeds and the file of rows that a study's command line asks for.
+
+    Parameters
+    ----------
+    name : str
+        Of the study, and of its file in build/study.
+    about : str or None
+        Its docstring, for --help.
+    arguments : sequence of str or None
+        Of the command line; None: of the program.
+    flights, first_seed : int
+        Without options.
+    each : str
+        What is counted, for --help.
+    """
+    parser = argparse.ArgumentParser(prog=f"python -m studies.{name}", description=about)
+    parser.add_argument("--flights", type=int, default=flights, help=each)
+    parser.add_argument("--first", type=int, default=first_seed, help="first seed")
+    parser.add_argument("--rows", type=Path, default=Path(f"../build/study/{name}.csv"))
+    asked = parser.parse_args(arguments)
+    return SeededRun(range(asked.first, asked.first + asked.flights), asked.rows)
 
 
 def flown_rows(

@@ -7,10 +7,8 @@ flight, method and derivative goes to a file that a later run continues.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from host.arrays import Array
@@ -22,7 +20,7 @@ from host.sysid.models.model_file import model_from
 from scipy import signal
 
 from studies.inputs import multistep_3211
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 
 FIRST_SEED = 7200  # those below were looked at
 NOISES = ("white", "coloured", "gust")
@@ -141,16 +139,12 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fly what is not in the file yet, then print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=40, help="of each noise")
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/users_models.csv"))
-    options = parser.parse_args(arguments)
-    seeds = range(options.first, options.first + options.flights)
-    keys = ((noise, seed) for seed in seeds for noise in NOISES)
-    rows = flown_rows(options.rows, COLUMNS, keys, rows_of)
-    sys.stdout.write("\n".join(table([r for r in rows if int(r["seed"]) in seeds])) + "\n")
-    return 0
+    run = seeded_run(
+        "users_models", __doc__, arguments, flights=40, first_seed=FIRST_SEED, each="of each noise"
+    )
+    keys = ((noise, seed) for seed in run.seeds for noise in NOISES)
+    rows = flown_rows(run.rows, COLUMNS, keys, rows_of)
+    return run.report(rows, table)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ file that a later run continues.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import time
@@ -26,7 +25,7 @@ from host.twin.testcard.cards import Card, load
 
 from studies.linear import derivatives
 from studies.radio_flights import RadioFlight, after_each_point, lost_in_bursts, radio_flight
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 
 FIRST_SEED = 11_000
 LOSSES = (0.0, 0.05)
@@ -192,21 +191,15 @@ def _errors(rows: Sequence[dict[str, str]]) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fly what is not in the file yet, then print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--flights", type=int, default=50)
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed")
-    parser.add_argument("--rows", type=Path, default=Path("../build/study/while_flying.csv"))
-    options = parser.parse_args(arguments)
-    seeds = range(options.first, options.first + options.flights)
-    keys = [(air, seed) for seed in seeds for air in ("gusts", "still")]
+    run = seeded_run("while_flying", __doc__, arguments, flights=50, first_seed=FIRST_SEED)
+    keys = [(air, seed) for seed in run.seeds for air in ("gusts", "still")]
     rows = flown_rows(
-        options.rows,
+        run.rows,
         COLUMNS,
         keys,
-        lambda air, seed: list(rows_of(air, seed, seed < options.first + DEFAULTS)),
+        lambda air, seed: list(rows_of(air, seed, seed < run.seeds.start + DEFAULTS)),
     )
-    print("\n".join(table([r for r in rows if int(r["seed"]) in seeds])))
-    return 0
+    return run.report(rows, table)
 
 
 if __name__ == "__main__":

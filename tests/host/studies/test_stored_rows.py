@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from studies.stored_rows import flown_rows
+from studies.stored_rows import flown_rows, seeded_run
 
 COLUMNS = ("air_mps", "seed", "name", "estimate")
 
@@ -32,3 +32,14 @@ def test_a_run_that_was_stopped_before_its_first_flight_has_one_head(tmp_path: P
     assert flown_rows(path, COLUMNS, [], lambda *_: []) == []
     [row] = flown_rows(path, COLUMNS, [(0.5, 1)], lambda a, s: [{"air_mps": a, "seed": s}])
     assert row["seed"] == "1"
+
+
+def test_a_table_is_of_the_seeds_that_were_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--first", "7", "--flights", "2", "--rows", "here.csv"]
+    run = seeded_run("mine", "About it.", words, flights=50, first_seed=1)
+    assert (run.seeds, run.rows) == (range(7, 9), Path("here.csv"))
+    rows = [{"seed": str(seed)} for seed in (6, 7, 8, 9)]
+    assert run.report(rows, lambda own: [r["seed"] for r in own]) == 0
+    assert capsys.readouterr().out == "7\n8\n"
+    usual = seeded_run("mine", None, [], flights=50, first_seed=1)
+    assert (usual.seeds, usual.rows) == (range(1, 51), Path("../build/study/mine.csv"))
