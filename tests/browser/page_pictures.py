@@ -33,10 +33,11 @@ def flight(folder: Path, into: Path) -> None:
     (folder / "plan.radio").write_bytes(b"".join(part.data for part in flown.sent))
     (folder / "calibration.toml").write_text(flown.calibration, encoding="utf-8")
     words = ("--card", "plan.toml", "--aircraft", AIRCRAFT, "--calibration", "calibration.toml")
-    with served_page(folder, "live", "plan.radio@2x", *words) as live, Chromium() as browser:
+    # The browser first: the flight does not wait for one.
+    with Chromium() as browser, served_page(folder, "live", "plan.radio@2x", *words) as live:
         page = browser.open(live.url)
         which = "document.getElementById('point-which').textContent"
-        page.wait_for(f"{which} === 'point {POINTS}'", PATIENCE_S)  # each stands for seconds
+        page.wait_for(f"Number({which}.split(' ')[1]) >= {POINTS}", PATIENCE_S)
         page.wait_for("document.getElementById('estimates-next').textContent !== ''", PATIENCE_S)
         page.press(" ", "Space", " ")
         page.wait_for("document.querySelector('#events').textContent.includes('mark 1')")
@@ -50,10 +51,11 @@ def flight(folder: Path, into: Path) -> None:
 
 def walk(folder: Path, into: Path) -> None:
     """Picture the guided list where a surface has half its travel."""
-    with served_page(folder, "preflight", WALK) as live, Chromium() as browser:
+    with Chromium() as browser, served_page(folder, "preflight", WALK) as live:
         page = browser.open(live.url)
         title = "document.getElementById('preflight-title').textContent"
         page.wait_for(f"{title}.startsWith('supply')", PATIENCE_S)
+        page.wait_for("document.getElementById('preflight-seen').textContent !== ''", PATIENCE_S)
         taken(page, into / "preflight-page.png", LAPTOP)
 
 
