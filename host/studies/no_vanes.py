@@ -91,7 +91,7 @@ def rows_of(seed: int, turbulence_mps: float, *, beside: bool = False) -> Iterat
             vanes = _half_widths(answer)
     for flight, kind in ((found.flights[0], ""), (bare.flight, OPEN)):
         yield from ({**key, **row} for row in _angles(record, data, flight, kind))
-    yield from ({**key, **row} for row in _told(truth(record, data), found, vanes))
+    yield from ({**key, **row} for row in _coefficient_rows(truth(record, data), found, vanes))
 
 
 def _of_an_autopilot() -> InstrumentErrors:
@@ -140,7 +140,9 @@ def _angles(
         }  # fmt: skip
 
 
-def _told(true: dict[str, float], found: Identification, vanes: dict[str, float]) -> Iterator[Row]:
+def _coefficient_rows(
+    true: dict[str, float], found: Identification, vanes: dict[str, float]
+) -> Iterator[Row]:
     flat = found.table.reset_index().set_index("name")
     marks, value = flat["verdict"].to_dict(), flat["value"].to_dict()
     half = _half_widths(found)
@@ -207,7 +209,7 @@ def table(rows: Sequence[dict[str, str]]) -> list[str]:
 
 
 def _angle_numbers(own: Sequence[dict[str, str]]) -> tuple[float, ...]:
-    rms, mean, told, tilt = (
+    rms, mean, stated, tilt = (
         np.array([float(r[f"{k}_deg"]) for r in own]) for k in ("rms", "mean", "told", "tilt")
     )
     about = np.sqrt(np.maximum(rms**2 - mean**2, 0.0))
@@ -215,7 +217,7 @@ def _angle_numbers(own: Sequence[dict[str, str]]) -> tuple[float, ...]:
     level = np.sqrt(about**2 + np.minimum(np.abs(mean - tilt), np.abs(mean + tilt)) ** 2)
     return (
         float(np.median(rms)), float(rms.max()), float(np.median(about)),
-        float(np.median(level)), float(np.median(told)),
+        float(np.median(level)), float(np.median(stated)),
     )  # fmt: skip
 
 

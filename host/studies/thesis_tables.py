@@ -271,7 +271,7 @@ def figures_35_to_38(halves: Sequence[Noise]) -> Figure:
         _over_size(slopes, clean.rates, half.data.rates if noisy else None, model_slopes,
                    [f"d/dt {name}" for name in STATES])  # fmt: skip
         slopes.set_title("fig. 3.5: slopes over their size", fontsize=9)
-        t = _thinned_time(clean)
+        t = _decimated_time(clean)
         if noisy:
             rough = half.data.outputs[::ROUGHLY, 1]
             sample.plot(t[:: ROUGHLY // THIN], rough, color="0.8", lw=1.2, label="measured")
@@ -303,7 +303,7 @@ def figures_35_to_38(halves: Sequence[Noise]) -> Figure:
     return figure
 
 
-def _thinned_time(data: Maneuver) -> Array:
+def _decimated_time(data: Maneuver) -> Array:
     return np.asarray(np.arange(data.samples)[::THIN] * data.dt_s)
 
 

@@ -310,10 +310,10 @@ async def _until_ended(session: LiveSession, tell: Callable[[str], None], *, for
         if session.enough.is_set():
             return
         await asyncio.sleep(_POLL_S)
-        heard = session.stream.rows or session.stream.frames
+        received = session.stream.rows or session.stream.frames
         if (
             not said
-            and not heard
+            and not received
             and loop.time() - began_s > _SILENT_S
             and not session.source.recorded
         ):

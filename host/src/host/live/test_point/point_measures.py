@@ -110,14 +110,14 @@ def measure(
     speed = columns["airspeed_mps"]
     names = point_derivatives(wanted)
     # Handling on other axes, and a trim that was read wrongly there, tell nothing of this one.
-    alone = {axis: moved[axis] if axis in own else 0.0 * moved[axis] for axis in SURFACES}
+    own_motion = {axis: moved[axis] if axis in own else 0.0 * moved[axis] for axis in SURFACES}
     return PointMeasures(
         axis=most,
         axis_wanted=most in own or amplitude > 0.5,
         amplitude=amplitude,
         edge=amplitude * size / LEAST_EDGE_RAD,
         length=(found.input_end_s - found.start_s) / input_length_s(wanted),
-        deviations=response.deviations(names, alone) / response.deviations(names, asked),
+        deviations=response.deviations(names, own_motion) / response.deviations(names, asked),
         unquiet=_rms(rate[before] - rate[before].mean())
         / max(float(np.abs(rate[inside]).max()), 1e-6),
         others=max((swings[axis] for axis in SURFACES if axis not in own), default=0.0) / size,

@@ -40,7 +40,7 @@ RADIO_WIDER = 1.05  # than of the card's 100 rows: less is averaged
 WEAK, LOUD = 0.7, 1.5  # of the wanted amplitude
 SHORT, LONG = 0.75, 1.35  # of the wanted length
 ROUND = 1.25  # times the card's deviation: what there is to say where nothing else is wrong
-NOTHING_TOLD = 5.0  # times the promised
+UNDETERMINED_RATIO = 5.0  # times the promised
 LEAST_EDGE = 1.15  # of what `host maneuvers` takes for an input: below, nobody finds it afterwards
 UNQUIET = 0.25
 OTHERS = 0.5
@@ -112,7 +112,7 @@ def moved_width(m: PointMeasures, wanted: Segment, estimate: PointEstimate) -> f
     model does not see is a factor: a pilot or a gust moves the aircraft besides.
     """
     if not m.axis_wanted or m.edge < LEAST_EDGE:
-        return NOTHING_TOLD
+        return UNDETERMINED_RATIO
     shares = _noise_shares(wanted, estimate)
     factors = [(m.corrected, CORRECTED_MUCH), (m.airspeed_change, SPEED_CHANGE)]
     if estimate.promised:
@@ -156,7 +156,7 @@ def _share(m: PointMeasures, moved: float, estimated: float | None) -> float:
 
     A line over rows that are missing makes an estimate wider, so only a narrow one tells then.
     """
-    if estimated is None or moved >= NOTHING_TOLD:
+    if estimated is None or moved >= UNDETERMINED_RATIO:
         return 0.0
     if m.lost > 0.0:
         return GAPS_SHARE if estimated < moved else 0.0
