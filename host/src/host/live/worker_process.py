@@ -8,8 +8,8 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-from collections.abc import Callable
-from multiprocessing import get_context
+from collections.abc import Callable, Iterator
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -48,7 +48,8 @@ class WorkerProcess:
         self._process = context.Process(
             target=_run, args=(self._work, theirs, *self._given), daemon=True, name=self._name
         )
-        self._process.start()
+        with _without_ctrl_c():
+            self._process.start()
         theirs.close()
 
     def ask(self, what: Any) -> None:
@@ -80,6 +81,23 @@ class WorkerProcess:
             self._process.terminate()
             self._process.join(timeout=2.0)
         self._ours = None
+
+
+@contextlib.contextmanager
+def _without_ctrl_c() -> Iterator[None]:
+    """Hold Ctrl-C back, here for a moment; a process that starts meanwhile never gets it.
+
+    It would else end in the middle of its imports with a traceback on the terminal.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # its own start would let Ctrl-C through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _run(work: Callable[..., None], asked: Connection, *given: Any) -> None:
