@@ -17,10 +17,15 @@ from host.planning.learning_card import (
     SIX_HARMONICS,
     TEN_HARMONICS,
     LearningCondition,
+    learned_axes,
     learning_card,
 )
+from host.planning.logger_card import logger_card
 from host.sysid.estimators.onboard_equation_error import EquationError
 from host.sysid.estimators.onboard_sums import PITCH, SIGNALS, AxisCard, FourierSums
+from host.twin.testcard.cards import Card, Segment, Tone
+from host.wire.card_text import card_lines
+from host.wire.flight_card import read_card
 from numpy.typing import NDArray
 
 AIRCRAFT, V, RHO = "ultrastick25e", 17.0, 1.225
@@ -110,3 +115,26 @@ def test_friction_makes_the_vane_later() -> None:
     rubbed, free = learning_card(AIRCRAFT, PITCH, at), told(PITCH)
     assert rubbed.advance_s[0] - free.advance_s[0] == pytest.approx(6.8e-3, rel=0.05)
     assert rubbed.advance_s[1] == free.advance_s[1]
+
+
+def test_rows_that_move_the_same_axes_teach_them_in_turn() -> None:
+    tones = tuple(
+        Tone(axis, 12 + k, 0.9, 0.0) for k, axis in enumerate(("elevator", "aileron", "rudder"))
+    )
+    sines = Segment(
+        "multisine",
+        axes=("elevator", "aileron", "rudder"),
+        amplitudes=(2.0, 2.0, 2.0),
+        duration_s=8.0,
+        tones=tones,
+    )
+    roll = Segment("doublet", axes=("aileron",), amplitudes=(2.0,), width_s=0.4)
+    card = Card("sines", "", AIRCRAFT, (sines, roll, sines, sines, roll, sines))
+    data = logger_card(
+        card, load(AIRCRAFT), load_calibration(), learned=learned_axes(AIRCRAFT, card)
+    )
+    read = read_card(data)
+    assert read.teaches == ("pitch", "roll", "roll", "yaw", "roll", "pitch")
+    assert card_lines(read)[-1].endswith("; teaches pitch")
+    none = logger_card(card, load(AIRCRAFT), load_calibration())
+    assert read_card(none).teaches == ("",) * 6

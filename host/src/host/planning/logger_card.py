@@ -7,7 +7,8 @@ the vanes the counts of the sensors that the logger watches (protocol/flight-car
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,7 +74,8 @@ def logger_card(
         Of the instrument that flies it.
     envelope : Envelope, optional
     learned : sequence of AxisCard
-        What the logger learns in flight (`learned_axes`): a row teaches the first axis it moves.
+        What the logger learns in flight (`learned_axes`): rows that move the same teach in
+        turn the axes that they move.
 
     Raises
     ------
@@ -95,12 +97,23 @@ def logger_card(
         _head(card, aircraft, calibration, around, rows),
         rows,
         [learning_parts(one) for one in learned],
-        [next((taught[TURNS[a]] for a in s.axes if TURNS[a] in taught), 0) for s in points],
+        _axis_of_row(points, taught),
     )
     wrong = card_faults(data)
     if wrong:
         raise LoggerCardError(f"{card.name}: {'; '.join(wrong)}")
     return data
+
+
+def _axis_of_row(points: Sequence[Segment], taught: Mapping[str, int]) -> list[int]:
+    """Return which axis each row teaches, 0 for none: of rows that move the same, each in turn."""
+    flown: Counter[tuple[str, ...]] = Counter()
+    found = []
+    for point in points:
+        axes = [taught[TURNS[a]] for a in point.axes if TURNS[a] in taught]
+        found.append(axes[flown[point.axes] % len(axes)] if axes else 0)
+        flown[point.axes] += 1
+    return found
 
 
 def _row(where: str, s: Segment, calibration: Calibration, share: float) -> dict[str, Any]:

@@ -126,19 +126,13 @@ def _add_designs(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Judge or design a card and print it; return an exit code."""
     try:
-        from host.aircraft.aircraft_ranges import AIRSPEED
         from host.aircraft.origin import announce_aircraft
         from host.export.toml import dumps
         from host.planning import card_planning as planning
         from host.twin.testcard import cards
     except ImportError as error:
         raise UsageError(f"planning needs {error.name}: {install_hint(error.name)}") from None
-    if args.airspeed is not None:
-        AIRSPEED.check("--airspeed", args.airspeed, UsageError)
-    if not 0 <= args.flights <= MOST_FLIGHTS:
-        raise UsageError(f"--flights is {args.flights}, expected 0 to {MOST_FLIGHTS}")
-    if args.gusts is not None and not 0.0 <= args.gusts <= MOST_GUSTS_MPS:
-        raise UsageError(f"--gusts is {args.gusts:g} m/s, expected 0 to {MOST_GUSTS_MPS:g}")
+    _check(args)
     if args.optimal or args.prior:
         card = _optimal(args)
     elif args.card is None:
@@ -183,6 +177,27 @@ def run(args: argparse.Namespace) -> int:
     if args.save is not None:
         print(f"wrote {args.save}; fly it with: {command_line('host', 'simulate', args.save)}")
     return ExitCode.OK
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuse what can be seen to be wrong before anything is designed or flown."""
+    from host.aircraft.aircraft_ranges import AIRSPEED
+    from host.sysid.answer.atomic_files import check_destination
+
+    if args.airspeed is not None:
+        AIRSPEED.check("--airspeed", args.airspeed, UsageError)
+    if not 0 <= args.flights <= MOST_FLIGHTS:
+        raise UsageError(f"--flights is {args.flights}, expected 0 to {MOST_FLIGHTS}")
+    if args.gusts is not None and not 0.0 <= args.gusts <= MOST_GUSTS_MPS:
+        raise UsageError(f"--gusts is {args.gusts:g} m/s, expected 0 to {MOST_GUSTS_MPS:g}")
+    if not 0.01 <= args.amplitude <= 1.0:
+        raise UsageError(f"--amplitude is {args.amplitude:g}, expected 0.01 to 1")
+    if args.logger_card is not None:
+        check_destination("--card", args.logger_card, folder=False)
+    if args.save is not None and args.save.suffix != ".toml":
+        raise UsageError(f"--save {args.save}: ends in '{args.save.suffix}', expected .toml")
+    if args.save is not None:
+        check_destination("--save", args.save, folder=False)
 
 
 def _optimal(args: argparse.Namespace) -> Card:
@@ -235,13 +250,10 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
     from host.physical.calibration import load_calibration
     from host.planning.learning_card import learned_axes
     from host.planning.logger_card import Envelope, logger_card
-    from host.sysid.answer.atomic_files import atomic_write, check_destination
+    from host.sysid.answer.atomic_files import atomic_write
     from host.wire.card_text import card_lines
     from host.wire.flight_card import read_card
 
-    if not 0.01 <= args.amplitude <= 1.0:
-        raise UsageError(f"--amplitude is {args.amplitude:g}, expected 0.01 to 1")
-    check_destination("--card", args.logger_card, folder=False)
     calibration = load_calibration(args.calibration)
     if calibration.lines["pulse.elevator"].default:
         print(
@@ -260,11 +272,8 @@ def _write_logger_card(card: Card, args: argparse.Namespace) -> None:
 
 
 def _save(path: Path, text: str) -> None:
-    from host.sysid.answer.atomic_files import atomic_write, check_destination
+    from host.sysid.answer.atomic_files import atomic_write
 
-    if path.suffix != ".toml":
-        raise UsageError(f"--save {path}: ends in '{path.suffix}', expected .toml")
-    check_destination("--save", path, folder=False)
     with atomic_write(path) as part:
         part.write_text(text, encoding="utf-8")
 

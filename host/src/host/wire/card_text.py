@@ -16,7 +16,12 @@ def card_document(card: CardFile) -> dict[str, Any]:
     """Return a card as plain numbers and strings, raw."""
     head = {k: v.decode("ascii", "replace") if isinstance(v, bytes) else v
             for k, v in card.head.items()}  # fmt: skip
-    return {"hash": f"{card.hash:08x}", "head": head, "rows": list(card.rows)}
+    return {
+        "hash": f"{card.hash:08x}",
+        "head": head,
+        "rows": list(card.rows),
+        "teaches": list(card.teaches),
+    }
 
 
 def card_lines(card: CardFile) -> list[str]:
@@ -40,7 +45,9 @@ def card_lines(card: CardFile) -> list[str]:
         f"    travel {_travel(head)} us, at most {head['rate_max_usps']} us/s and"
         f" {head['frequency_max_chz'] / 100.0:g} Hz",
     ]
-    return lines + [f"  {k + 1:2d}  {_row(row)}" for k, row in enumerate(card.rows)]
+    for k, (row, turn) in enumerate(zip(card.rows, card.teaches, strict=True), start=1):
+        lines.append(f"  {k:2d}  {_row(row)}{f'; teaches {turn}' if turn else ''}")
+    return lines
 
 
 def _travel(head: Mapping[str, Any]) -> str:

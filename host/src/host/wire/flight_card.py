@@ -26,6 +26,7 @@ _LONGEST_FILE = 48 * 64  # longer than any good card
 HEAD, LEARNING, ROW = "card_head", "card_learning", "card_row"
 AXIS, WORTH = "card_axis", "card_worth"
 AXES = ("aileron", "elevator", "rudder")
+TURNS = ("pitch", "roll", "yaw")  # of `card_axis.axis`
 SHAPES = ("pulse", "doublet", "three_two_one_one", "sweep", "multisine")
 # Highest frequency of a shape in units of 1/duration, times 100000 (flight-card.md).
 FREQUENCY = {"pulse": 50_000, "doublet": 100_000, "three_two_one_one": 350_000}
@@ -38,10 +39,11 @@ YAW, PITCH_SIGNALS, MOST_SIGNALS, MOST_SUMS = 2, 3, 5, 30
 
 @dataclass(frozen=True, slots=True)
 class CardFile:
-    """A card in numbers: `head` and each of `rows` by field name, raw."""
+    """A card in numbers: `head` and each of `rows` by field name, raw; what each row teaches."""
 
     head: dict[str, Any]
     rows: tuple[dict[str, Any], ...]
+    teaches: tuple[str, ...]  # of `TURNS`; empty: nothing
 
     @property
     def hash(self) -> int:
@@ -137,9 +139,12 @@ def parts(data: bytes) -> list[bytes]:
 def read_card(data: bytes) -> CardFile:
     """Return a card in numbers; ask `card_faults` first."""
     heads = number("card_head_parts")
-    head = _numbers(HEAD, data)
-    rows = [_numbers(ROW, part) for part in parts(data)[heads : heads + head["rows"]]]
-    return CardFile(head, tuple(rows))
+    head, each = _numbers(HEAD, data), parts(data)
+    behind = heads + head["rows"]
+    rows = [_numbers(ROW, part) for part in each[heads:behind]]
+    learned = [_numbers(AXIS, part)["axis"] for part in each[behind :: number("card_axis_parts")]]
+    axes = _numbers(LEARNING, each[heads - 1])["axis_of_row"][: len(rows)]
+    return CardFile(head, tuple(rows), tuple(TURNS[learned[n - 1]] if n else "" for n in axes))
 
 
 def body_parts(head: bytes) -> int:

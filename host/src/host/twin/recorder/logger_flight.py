@@ -129,7 +129,7 @@ def _same_inputs(rows: CardFile, card: Card) -> None:
     if mine != theirs:
         raise UsageError(
             f"the flight card has {len(theirs)} rows of {sum(theirs)} ms, {card.name} {len(mine)}"
-            f" inputs of {sum(mine)} ms: make it with host plan {card.name} --card"
+            f" inputs of {sum(mine)} ms: make it of the same card, host plan CARD --card FILE"
         )
 
 
