@@ -300,8 +300,16 @@ TEST_CASE("values that move together, and against each other, have moved") {
     int16_t rates[3];
     int16_t force;
   };
-  const Step steps[] = {
-      {{1, -1, 0}, 0}, {{1, 1, 0}, 0}, {{3, 0, 0}, 0}, {{0, 0, 1}, 0}, {{1, 0, 0}, 1}};
+  const Step steps[] = {{{1, -1, 0}, 0},
+                        {{1, 1, 0}, 0},
+                        {{3, 0, 0}, 0},
+                        {{1, 3, 0}, 0},
+                        {{0, 0, 1}, 0},
+                        {{0, 1, 0}, 0},
+                        {{0, 1, -1}, 0},
+                        {{0, 1, 1}, 0},
+                        {{0, 1, 3}, 0},
+                        {{1, 0, 0}, 1}};
   for (const Step& step : steps) {
     Bench bench;
     bench.still[InputMotion::kImu] = true;
