@@ -70,7 +70,7 @@ hw: ## check schematic, board and mechanics in KiCad and CAD (asks for an apt so
 	@.ci/setup.sh hw
 	@.venv-hw/bin/python -m pytest --noconftest tests/hw/campaign/check_*.py
 
-mutants: setup ## share of mutants of the deciding files that their unit tests kill (a quarter of an hour)
+mutants: setup ## share of mutants of the deciding files that their unit tests kill (half an hour)
 	@$(PYTHON) -m tests.mutants $(MUTANTS)
 
 fuzz: setup ## random input, guided by coverage: 2000 of each kind (FULL=1: all, an hour or two)
