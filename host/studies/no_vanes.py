@@ -68,7 +68,7 @@ def rows_of(seed: int, turbulence_mps: float, *, beside: bool = False) -> Iterat
         air=replace(card.air, turbulence_mps=turbulence_mps),
         sensors=replace(card.sensors, servo_tolerance=True),
     )
-    record = fly(card, seed=seed, errors=_of_an_autopilot())
+    record = fly(card, seed=seed, errors=of_an_autopilot())
     data = air_data(record)
     key: dict[str, object] = {"seed": seed, "turbulence_mps": turbulence_mps}
     with tempfile.TemporaryDirectory() as folder:
@@ -94,7 +94,7 @@ def rows_of(seed: int, turbulence_mps: float, *, beside: bool = False) -> Iterat
     yield from ({**key, **row} for row in _coefficient_rows(truth(record, data), found, vanes))
 
 
-def _of_an_autopilot() -> InstrumentErrors:
+def of_an_autopilot() -> InstrumentErrors:
     """Return what its sensors are drawn from: what identification allows for, but for two.
 
     The servos' delay stays within a receiver's frame, and gyros are zeroed at start-up: what an

@@ -14,6 +14,11 @@ from host.sysid.identification_error import IdentificationError
 from host.sysid.pipeline.aircraft_data import aircraft_data
 from host.sysid.pipeline.flight_preparation import PreparedFlight, prepare
 from host.sysid.pipeline.reading_options import ReadingOptions
+from host.twin.flight.fly import fly
+from host.twin.outcome.autopilot_logs import write_autopilot_log
+from host.twin.sensors.local_flow import air_data
+from host.twin.testcard.cards import load
+from studies.no_vanes import of_an_autopilot
 
 from tests.host.readers.autopilot_flights import truth, write
 
@@ -95,6 +100,19 @@ def test_the_path_of_a_short_flight_is_found(tmp_path: Path) -> None:
     assert found.flight.angles is not None
     errors = _errors_deg(found.flight.angles, found.flight.corrected["t_s"])
     assert float(errors["alpha"].std()) < 0.6
+
+
+def test_a_tilted_imu_costs_no_path(tmp_path: Path) -> None:
+    """Lift and side force lean into ax by 1.5 deg: speed moved 1.51 times as fast as it said."""
+    card = load("demo")
+    card = replace(card, air=replace(card.air, turbulence_mps=0.0),
+                   sensors=replace(card.sensors, servo_tolerance=True))  # fmt: skip
+    record = fly(card, seed=11789, errors=of_an_autopilot())
+    stem = tmp_path / "flight"
+    path = write_autopilot_log("ulog", record, air_data(record), stem, airframe="conventional")
+    found = prepare(path, ReadingOptions(), aircraft_data(AIRCRAFT))
+    assert [f.check for f in found.findings] == ["flow-angles"]
+    assert found.flight.angles is not None
 
 
 def test_a_wrong_sign_of_lift_is_seen(prepared: PreparedFlight) -> None:

@@ -100,6 +100,19 @@ def lines(findings: list[Finding]) -> str:
     return "\n".join(finding.line for finding in findings)
 
 
+@pytest.mark.parametrize("about", list(itertools.product((-0.03, 0.03), (-0.03, 0.03))))
+def test_without_vanes_a_tilted_imu_is_no_finding(
+    about: tuple[float, float], flights: dict[str, Columns]
+) -> None:
+    """Lift and side force lean into ax by 1.7 deg about y and z; its unit is found as before."""
+    calm = {k: v for k, v in flights["calm"].items() if k not in ("alpha_rad", "beta_rad")}
+    pitched, yawed = about
+    leaning = calm["ax_mps2"] - pitched * calm["az_mps2"] + yawed * calm["ay_mps2"]
+    assert check({**calm, "ax_mps2": leaning}) == []
+    [found] = check({**calm, "ax_mps2": leaning / 9.80665})
+    assert found.check == "airspeed-against-ax"
+
+
 @pytest.mark.parametrize("case", PROVEN)
 def test_what_kinematics_forbids_is_a_proven_finding(case: str, flight: Columns) -> None:
     change, words = PROVEN[case]

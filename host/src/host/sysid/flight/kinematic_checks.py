@@ -240,12 +240,28 @@ def _slow(m: Mapping[str, Array]) -> Iterator[Identity]:
     """Speed and height."""
     if all(f"a{k}_mps2" in m for k in "xz") and "theta_rad" in m and "airspeed_mps" in m:
         zero = np.zeros(len(m["t_s"]))
-        theta, phi, alpha = m["theta_rad"], m.get("phi_rad", zero), m.get("alpha_rad", zero)
+        theta, phi = m["theta_rad"], m.get("phi_rad", zero)
+        alpha = m["alpha_rad"] if "alpha_rad" in m else _pitch_over_path(m)
         fall = np.sin(alpha) * np.cos(theta) * np.cos(phi) - np.cos(alpha) * np.sin(theta)
         known = GRAVITY_MPS2 * fall + np.sin(alpha) * m["az_mps2"]
-        yield _law("airspeed_mps", m, {"ax_mps2": np.cos(alpha) * m["ax_mps2"]}, known=known)
+        along = {"ax_mps2": np.cos(alpha) * m["ax_mps2"]}
+        # An IMU that is tilted in the aircraft lets lift and side force lean into ax. Vanes show
+        # the angle; without them 1.7 deg made speed move 1.5 times as fast as ax said.
+        lean = (m["az_mps2"], m.get("ay_mps2", zero))
+        tilted = list(factors(_law("airspeed_mps", m, along, lean, known=known)))
+        right = bool(tilted) and all(_judge(f) is None for f in tilted)
+        if "alpha_rad" in m or not right:
+            yield _law("airspeed_mps", m, along, known=known)
     if "altitude_m" in m and "v_down_mps" in m:
         yield _law("altitude_m", m, {"v_down_mps": -m["v_down_mps"]})
+
+
+def _pitch_over_path(m: Mapping[str, Array]) -> Array:
+    """Return the angle of attack that no vane measured; zero where nothing tells it."""
+    if "v_down_mps" not in m:
+        return np.zeros(len(m["t_s"]))
+    climb = -m["v_down_mps"] / np.maximum(m["airspeed_mps"], 1.0)
+    return np.asarray(m["theta_rad"] - np.arcsin(np.clip(climb, -0.5, 0.5)))
 
 
 def _law(
