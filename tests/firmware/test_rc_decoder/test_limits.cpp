@@ -75,6 +75,20 @@ TEST_CASE("a pulse that is high again too soon is gone, and counted at once") {
   CHECK_EQ(line.decoder.width_ticks(0), kWidth);
 }
 
+TEST_CASE("a pulse nobody looked at is accepted at the next rise, as its own line's") {
+  for (uint8_t input = 0; input < core::kRcInputs; ++input) {
+    RcDecoder decoder;
+    const uint8_t bit = static_cast<uint8_t>(1U << input);
+    decoder.edge(kStart, 0, false);
+    decoder.edge(kStart + 20 * kMs, bit, false);
+    decoder.edge(kStart + 20 * kMs + kWidth, 0, false);
+    decoder.edge(kStart + 40 * kMs, bit, false);
+    CHECK_EQ(decoder.valid(), bit);
+    CHECK_EQ(decoder.width_ticks(input), kWidth);
+    CHECK_EQ(decoder.glitches(), 0);
+  }
+}
+
 TEST_CASE("a candidate that was refused is not accepted by the next rise") {
   Line line;
   line.frames(5);
