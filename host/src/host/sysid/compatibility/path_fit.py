@@ -46,8 +46,9 @@ STEP_LIMIT = 0.05  # of a standard error: convergence
 DRIFT_POWERS = 4  # constants to cubics do not correlate with gusts either
 RIDGE = 1e-10  # of a column's power: a surface that never moved has none
 LARGEST_STEP = 4.0  # in prior deviations
-# Steps that go round and do not shrink are shortened: curvature that the equations leave out turned
-# a flight of 49 s about its bank, each time by 1.2 of the step before.
+# Without vanes steps that go round and do not shrink are shortened: curvature that the equations
+# leave out turned a flight of 49 s about its bank, each time by 1.2 of the step before. With vanes
+# it would end where they agree with nothing: sensors of another aircraft did (thor75).
 SHRINKS = 0.8  # over two steps
 SHORTER, SHORTEST = 0.5, 0.125  # of a step
 
@@ -95,6 +96,7 @@ def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int)
     air_unknowns = [k for k, name in enumerate(problem.names) if name in AIR_ERRORS]
     converged, near = False, False
     length, sizes = 1.0, [np.inf, np.inf]
+    without_vanes = not lagged_inputs[0].shape[1]
     iteration = 0
     origin, least_cost, halvings = theta, np.inf, 0
     constrained, adapt_from = bool(patience), max(patience, ADAPT_FROM)
@@ -156,7 +158,7 @@ def _search(problem: PathProblem, lagged_inputs: Sequence[Array], patience: int)
             most = LARGEST_STEP / np.sqrt(problem.prior_precision)
         error_size = np.sqrt(np.maximum(np.abs(np.diag(inverse)), 1e-300))
         largest = float(np.max(np.abs(step) / error_size))
-        if iteration > adapt_from + 2 and largest > SHRINKS * sizes[-2]:
+        if without_vanes and iteration > adapt_from + 2 and largest > SHRINKS * sizes[-2]:
             length = max(SHORTER * length, SHORTEST)
         sizes.append(largest)
         theta = theta + length * np.clip(step, -most, most)
