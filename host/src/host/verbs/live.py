@@ -87,9 +87,7 @@ def run(args: argparse.Namespace) -> int:
     """Receive until Ctrl-C."""
     from host.errors import ExitCode
     from host.live.live_program import LiveRequest, run_live
-
-    def tell(text: str) -> None:
-        print(f"host: {text}", file=sys.stderr, flush=True)
+    from host.live.output_lines import OutputLines
 
     request = LiveRequest(
         source=args.source,
@@ -112,11 +110,15 @@ def run(args: argparse.Namespace) -> int:
         from host.preflight.preflight_sheet import shown_sheet
 
         request.joins.append(shown_sheet(args.preflight))
-    summary = run_live(request, tell, lambda line: print(line, flush=True))
-    if sys.stderr.isatty():
-        bare(sys.stderr).write("\r")
-    for line in summary.lines():
-        tell(line)
+    lines = OutputLines()
+    try:
+        summary = run_live(request, lambda text: lines.err(f"host: {text}"), lines.out)
+        if sys.stderr.isatty():
+            bare(sys.stderr).write("\r")
+        for line in summary.lines():
+            lines.err(f"host: {line}")
+    finally:
+        lines.close()
     return int(ExitCode.OK)
 
 
