@@ -130,7 +130,7 @@ def test_a_leg_without_room_and_a_card_of_another_flight_are_refused(
     path.write_bytes(flight_card())
     folder = str(tmp_path / "out")
     assert main(["simulate", "calm", "--flight-card", str(path), "-o", folder]) == 2
-    assert "make it with host plan calm --card" in capsys.readouterr().err
+    assert "make it of the same card, host plan CARD --card" in capsys.readouterr().err
     asked = ["simulate", "calm", "--flight-card", str(path), "--firmware", "none", "-o", folder]
     assert main(asked) == 2
     assert "only sitl flies it" in capsys.readouterr().err
