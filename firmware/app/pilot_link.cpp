@@ -27,7 +27,8 @@ void PilotLink::look(const frames::ConfigFrame& config,
   if (!polls) return;
   polled_us_ = now_us;
   poll_receiver(outlet, now_us);
-  uint16_t rest_us = drive_.drive() == frames::Drive::kMegaHolding ? kHoldingRestUs : kRestUs;
+  uint16_t rest_us = inputs.running() ? kInputRestUs : kRestUs;
+  if (drive_.drive() == frames::Drive::kMegaHolding) rest_us = kHoldingRestUs;
   if (inputs.running() && may_be_silent(now_us)) {
     look_for_silence(now_us);
     if (silent_us_ > most_silent_us()) rest_us = 0;

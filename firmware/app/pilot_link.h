@@ -22,7 +22,7 @@ class PilotLink {
  public:
   void start();
   // Every turn of the main loop, and while the card makes a call wait. Decides anew when a pulse
-  // may have been accepted, else every kRestUs.
+  // may have been accepted, else every kRestUs; while an input runs every second poll.
   void step(const frames::ConfigFrame& config,
             bool self_test_passed,
             TestInputs& inputs,
@@ -55,6 +55,9 @@ class PilotLink {
  private:
   static constexpr uint16_t kPollUs = 3500;  // pulses that stay away show within this
   static constexpr uint16_t kRestUs = 10000;
+  // Two looks see a contact open, and 20 ms later a servo's pulse is plain: 45 ms in all. Of polls
+  // that are 3.5 to 4.5 ms apart every third would leave them 27.
+  static constexpr uint16_t kInputRestUs = 2 * kPollUs;
   static constexpr uint32_t kReleaseUs = 200000UL;  // by then a contact is open again
   static constexpr uint16_t kHoldingRestUs = 1000;  // a hold ends on time
 

@@ -23,6 +23,9 @@ namespace {
 
 constexpr uint8_t kLeastRateHz = 100;  // slower frames tell of a limit too late
 constexpr uint16_t kWatchUs = 5000;    // ages grow without any news
+// A plain pulse is wanted 25 ms behind an age's limit, and servos take 20 of them: 5 are left, and
+// with a long turn of the main loop two looks are 8 ms apart. So each looks ahead.
+constexpr uint16_t kAheadUs = 3000;
 constexpr uint8_t kPaShift = 4;
 constexpr uint8_t kEnabledBeeps = 3;
 constexpr uint8_t kConfigFrames = 1;  // of the card's frames, before its parts
@@ -244,7 +247,7 @@ void TestInputs::see(const Sensors& sensors, core::InputWatch& watch, uint32_t n
   }
   watch.looked_us = now;
   watch.motion.age(now_us);
-  sensors.ages(&in, now_us);
+  sensors.ages(&in, now_us + kAheadUs);
   watch.found[InputWatch::kHeard] = core::judge_heard(watch.limits, in, watch.motion, now_us);
 }
 

@@ -59,6 +59,10 @@ class InputFlight:
     gps_sent : (epochs,) array
     button : list of (float, float)
         When it is pressed, and for how long.
+    packet_delay_s : float
+        Of every packet, behind its place.
+    apart_us : int
+        Rises of two channels; 0: the receiver sends them all at once.
     """
 
     seconds: float
@@ -71,12 +75,14 @@ class InputFlight:
     gps_sent: NDArray[np.bool_]
     button: list[tuple[float, float]] = field(default_factory=list)
     frame_s: float = FRAME_S
+    packet_delay_s: float = 0.0
+    apart_us: int = 2300
 
     def receiver(self) -> Receiver:
-        """Return the pulses that are sent, channels one after the other."""
+        """Return the pulses that are sent."""
         frames = np.arange(len(self.width_us))
         start = np.round(frames * self.frame_s * TICKS_PER_S).astype(np.int64)[:, None]
-        return Receiver(start + 2000 + 4600 * np.arange(5), 2 * self.width_us)
+        return Receiver(start + 2000 + 2 * self.apart_us * np.arange(5), 2 * self.width_us)
 
     def edges(self) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
         """Return ticks and levels of the receiver's edges."""
@@ -84,7 +90,8 @@ class InputFlight:
 
     def packets(self) -> tuple[NDArray[np.int64], list[bytes]]:
         """Return START and bytes of the IMU's packets that are sent."""
-        start = np.round((np.arange(len(self.imu)) * PACKET_S + 0.003) * TICKS_PER_S)
+        first_s = 0.003 + self.packet_delay_s
+        start = np.round((np.arange(len(self.imu)) * PACKET_S + first_s) * TICKS_PER_S)
         rows = packet("imu").rows(len(self.imu))
         rows["seq"] = np.arange(len(rows)) & 0xFF
         rows["flags"], rows["age"] = IMU_FLAGS, 225

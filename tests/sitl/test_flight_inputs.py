@@ -23,6 +23,7 @@ from tests.sitl.input_flight import (
     GROUND_S,
     MEGA_S,
     MEGA_US,
+    PACKET_S,
     SIGN_S,
     SWITCH,
     TRIGGER_S,
@@ -226,6 +227,41 @@ def test_shapes_agree_with_the_page_to_the_tick(tmp_path: Path) -> None:
                 exact += int(added[i]) in recent
             # The sticks tremble: where a pulse came in between, log and command differ.
             assert exact > 0.8 * inside.size
+
+
+PLAIN_S, SENSE_S, SERVO_S, TURNS_S = 0.025, 0.045, 0.020, 0.005
+
+
+@pytest.mark.parametrize("shift_us", range(3_000, 5_000, 200))
+def test_the_first_plain_pulse_begins_25_ms_behind_a_packet_that_is_too_old(shift_us: int) -> None:
+    """Not the last deflected one: a servo's pulses are 20 ms apart."""
+    flight = calm()
+    last = int((TRIGGER_S + 0.9) / PACKET_S)
+    flight.imu_sent[last + 1 :] = False
+    flight.packet_delay_s = shift_us * 1e-6
+    known_s = float(flight.packets()[0][last]) / TICKS_PER_S + 0.030
+    bench = flown(flight, cards.eeprom_with(cards.card([ROWS[4]])))
+    late = deflected(bench.sitl.pulses(), flight, TRIGGER_S) / TICKS_PER_S
+    assert late.size > 20
+    assert late[-1] + SERVO_S <= known_s + PLAIN_S
+
+
+@pytest.mark.parametrize("behind_ms", range(2, 12))
+def test_two_looks_at_an_open_contact_leave_time_for_the_servo(
+    behind_ms: int, tmp_path: Path
+) -> None:
+    """Where no pulse calls for a look: all channels at once, and one frame is missing."""
+    flight = input_flight(TRIGGER_S + 2.0, np.random.default_rng(SEED), 0.0225)
+    flight.apart_us = 0
+    missing = int((TRIGGER_S + 0.7) / flight.frame_s)
+    flight.width_us[missing] = 0
+    at_s = (missing - 1) * flight.frame_s + behind_ms * 0.001
+    bench = flown(flight, cards.eeprom_with(cards.card(ROWS)), at_s)
+    open_s = bench.sitl.now() / TICKS_PER_S
+    bench.sitl.cut_relay()
+    bench.sitl.run_until(round(flight.seconds * TICKS_PER_S))
+    ((end_s, _),) = events(bench, tmp_path, INPUT_END)
+    assert end_s - open_s <= SENSE_S - SERVO_S - TURNS_S
 
 
 # ------------------------------------------------------------------------------ the card over USB
