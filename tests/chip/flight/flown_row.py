@@ -157,10 +157,23 @@ def _events(rig: FlightRig, name: str) -> list[int]:
 
 def deflected(rig: FlightRig, row: FlownRow) -> NDArray[np.int64]:
     """Return the starts (cycles) of pulses at the servos that the card made."""
+    return np.concatenate([_made(rig, row, channel) for channel in range(len(SERVOS))])
+
+
+def first_plain(rig: FlightRig, row: FlownRow) -> int:
+    """Return the cycle from which no servo is behind: its pulse after the card's last began."""
+    first = []
+    for channel, servo in enumerate(SERVOS):
+        starts = rig.relay.servo_pulses(servo)[:, 0]
+        for last in _made(rig, row, channel)[-1:]:
+            first.append(int(starts[starts > last].min()))
+    return max(first)
+
+
+def _made(rig: FlightRig, row: FlownRow, channel: int) -> NDArray[np.int64]:
     starts = [
         start
-        for channel, servo in enumerate(SERVOS)
-        for start, width, sticks in strange(rig, row.start, servo)
+        for start, width, sticks in strange(rig, row.start, SERVOS[channel])
         if row.made(channel, start, width, sticks)
     ]
     return np.array(starts, dtype=np.int64)
