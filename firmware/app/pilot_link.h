@@ -55,8 +55,9 @@ class PilotLink {
  private:
   static constexpr uint16_t kPollUs = 3500;  // pulses that stay away show within this
   static constexpr uint16_t kRestUs = 10000;
-  // Two looks see a contact open, and 20 ms later a servo's pulse is plain: 45 ms in all. Of polls
-  // that are 3.5 to 4.5 ms apart every third would leave them 27.
+  // The relay's contact counts as open at the second look, a plain pulse begins up to 20 ms later,
+  // and 45 ms are allowed. Polls are 3.5 to 4.5 ms apart: with a look each third poll two looks
+  // may take 27 ms, more than the 25 that are left.
   static constexpr uint16_t kInputRestUs = 2 * kPollUs;
   static constexpr uint32_t kReleaseUs = 200000UL;  // by then a contact is open again
   static constexpr uint16_t kHoldingRestUs = 1000;  // a hold ends on time

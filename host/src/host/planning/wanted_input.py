@@ -8,7 +8,7 @@ import numpy as np
 
 from host.aircraft.airframe import Array
 from host.planning.aircraft_response import STEP_S, AircraftResponse
-from host.twin.testcard.cards import Segment
+from host.twin.testcard.cards import Segment, input_s
 from host.twin.testcard.input_shapes import (
     STEPS,
     multisine,
@@ -23,13 +23,6 @@ RESPONSE_S = 3.0  # behind the input, as the finder's window
 HAND_S = 0.08  # a good one
 
 
-def input_length_s(segment: Segment) -> float:
-    """Return how long the card's input lasts, s."""
-    if segment.kind in STEPS:
-        return segment.width_s * sum(length for _, length in STEPS[segment.kind])
-    return segment.duration_s
-
-
 def wanted_surfaces(segment: Segment, response: AircraftResponse) -> dict[str, Array]:
     """Return deflections of every surface, rad, every `STEP_S`, with the response behind.
 
@@ -40,7 +33,7 @@ def wanted_surfaces(segment: Segment, response: AircraftResponse) -> dict[str, A
     response : AircraftResponse
         Gives the servo's lag.
     """
-    t = np.arange(0.0, input_length_s(segment) + RESPONSE_S, STEP_S)
+    t = np.arange(0.0, input_s(segment) + RESPONSE_S, STEP_S)
     out = {name: np.zeros(len(t)) for name in SURFACES}
     for axis, amplitude, wave in zip(
         segment.axes, segment.amplitudes, _waves(segment, t), strict=True
@@ -51,7 +44,7 @@ def wanted_surfaces(segment: Segment, response: AircraftResponse) -> dict[str, A
 
 
 def _waves(segment: Segment, t: Array) -> list[Array]:
-    many, length_s = len(segment.axes), input_length_s(segment)
+    many, length_s = len(segment.axes), input_s(segment)
     band = segment.low_hz, segment.high_hz
     if segment.kind in STEPS:
         lengths = np.array([length for _, length in STEPS[segment.kind]]) * segment.width_s

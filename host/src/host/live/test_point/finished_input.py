@@ -12,14 +12,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from host.arrays import Array
-from host.planning.wanted_input import RESPONSE_S, SURFACES, input_length_s
+from host.planning.wanted_input import RESPONSE_S, SURFACES
 from host.sysid.flight.maneuver_detection import (
     FLYING_SHARE,
     LEAST_EDGE_RAD,
     DetectedManeuver,
     detect_maneuvers,
 )
-from host.twin.testcard.cards import Segment
+from host.twin.testcard.cards import Segment, input_s
 
 LEAST_SHARE = 0.3  # of the card's amplitude: less is the pilot's handling
 ATTEMPT_SHARE = 0.5  # of it on another axis: more is a test input on the wrong one
@@ -54,7 +54,7 @@ def finished_inputs(
     gain = max(1.0, LEAST_EDGE_RAD / (LEAST_SHARE * size))
     shown = {"t_s": t[since:], "airspeed_mps": columns["airspeed_mps"][since:]}
     shown |= {f"{axis}_rad": gain * columns[f"{axis}_rad"][since:] for axis in SURFACES}
-    longest_s = LONGEST * input_length_s(wanted)
+    longest_s = LONGEST * input_s(wanted)
     found = []
     for item in detect_maneuvers(shown):
         own = item.axis.removesuffix("_rad") in wanted.axes

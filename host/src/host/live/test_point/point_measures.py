@@ -11,9 +11,9 @@ import numpy as np
 from host.arrays import Array
 from host.planning.aircraft_response import STEP_S, AircraftResponse
 from host.planning.point_widths import point_derivatives
-from host.planning.wanted_input import RESPONSE_S, SURFACES, input_length_s, wanted_surfaces
+from host.planning.wanted_input import RESPONSE_S, SURFACES, wanted_surfaces
 from host.sysid.flight.maneuver_detection import FLYING_SHARE, LEAST_EDGE_RAD, DetectedManeuver
-from host.twin.testcard.cards import Segment
+from host.twin.testcard.cards import Segment, input_s
 
 LEAD_S = 0.7  # before the input, of which every row counts for an estimate
 TRIM_S = 1.0  # before the input, which is where the surfaces' trim is read
@@ -116,7 +116,7 @@ def measure(
         axis_wanted=most in own or amplitude > 0.5,
         amplitude=amplitude,
         edge=amplitude * size / LEAST_EDGE_RAD,
-        length=(found.input_end_s - found.start_s) / input_length_s(wanted),
+        length=(found.input_end_s - found.start_s) / input_s(wanted),
         deviations=response.deviations(names, own_motion) / response.deviations(names, asked),
         unquiet=_rms(rate[before] - rate[before].mean())
         / max(float(np.abs(rate[inside]).max()), 1e-6),

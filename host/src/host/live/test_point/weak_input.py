@@ -11,14 +11,9 @@ import numpy as np
 
 from host.arrays import Array
 from host.planning.aircraft_response import STEP_S, AircraftResponse
-from host.planning.wanted_input import (
-    RESPONSE_S,
-    SURFACES,
-    input_length_s,
-    wanted_surfaces,
-)
+from host.planning.wanted_input import RESPONSE_S, SURFACES, wanted_surfaces
 from host.sysid.flight.maneuver_detection import DetectedManeuver
-from host.twin.testcard.cards import Segment
+from host.twin.testcard.cards import Segment, input_s
 from host.twin.testcard.input_shapes import STEPS
 
 LEAST_SHARE, MOST_SHARE = 0.07, 0.6  # of the card's amplitude; what is larger the finder finds
@@ -49,7 +44,7 @@ def weak_input(
         return None
     t, series = columns["t_s"], columns[f"{own[0]}_rad"]
     step_s = float(t[1] - t[0])
-    shape, length_s = wanted_surfaces(wanted, response)[own[0]], input_length_s(wanted)
+    shape, length_s = wanted_surfaces(wanted, response)[own[0]], input_s(wanted)
     at = np.arange(-_REST_S, length_s + _REST_S, step_s)
     model = np.interp(at, STEP_S * np.arange(len(shape)), shape, left=0.0)
     model -= model.mean()
