@@ -112,7 +112,7 @@ def gust_step(
     out : (6,) array
         Body axes, m/s and rad/s. A gust w that grows ahead is air that turns nose-down.
     """
-    # Dryden forms of MIL-F-8785C 3.7.2: u of first order, v and w of second.
+    # Dryden forms of MIL-F-8785C 3.7.2 (EQUATIONS.md, eq. 9): u of first order, v and w of second.
     v = max(airspeed_mps, 1.0)
     root = 1.0 / math.sqrt(step_s)
     tau_u, tau_w = t.length_u_m / v, t.length_w_m / v
@@ -126,7 +126,7 @@ def gust_step(
     three = math.sqrt(3.0)
     gust_v = t.sigma_u_mps * math.sqrt(tau_u) * (three * z[1] + (1.0 - three) * z[2])
     gust_w = t.sigma_w_mps * math.sqrt(tau_w) * (three * z[3] + (1.0 - three) * z[4])
-    # p_g, q_g and r_g of MIL-F-8785C 3.7.5, with the span as the scale.
+    # p_g, q_g and r_g of MIL-F-8785C 3.7.5 (EQUATIONS.md, eq. 10), with the span as the scale.
     roll = (
         t.sigma_w_mps
         * math.sqrt(0.8 * math.pi / v)

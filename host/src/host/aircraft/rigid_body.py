@@ -1,7 +1,7 @@
 """Rigid body, six degrees of freedom, quaternion attitude: forces and their integration.
 
-Stevens & Lewis, Aircraft Control and Simulation, chapter 1 and 2, for the equations;
-coefficients as in the aircraft file. Classical Runge-Kutta of fourth order with a fixed step,
+Stevens & Lewis, Aircraft Control and Simulation, chapter 1 and 2, and EQUATIONS.md, eq. 1 and eq.
+2; coefficients as in the aircraft file. Classical Runge-Kutta of fourth order with a fixed step,
 commands and air held over the step.
 """
 
@@ -236,13 +236,13 @@ def derivative(
         mz += -ly * tx - drive * az
         fx += tx
         fz += tz
-    # Gyroscopic moment of the rotor: - omega x h (Stevens & Lewis, ch. 1).
+    # Gyroscopic moment of the rotor: - omega x h (EQUATIONS.md, eq. 2).
     mx -= q * hz
     my -= r * hx - p * hz
     mz -= -q * hx
 
     ixx, iyy, izz, ixz = frame.ixx_kgm2, frame.iyy_kgm2, frame.izz_kgm2, frame.ixz_kgm2
-    # Euler's equations with a product of inertia Ixz (Stevens & Lewis, ch. 1).
+    # Euler's equations with a product of inertia Ixz (EQUATIONS.md, eq. 2).
     ex = mx - (izz - iyy) * q * r + ixz * p * q
     ez = mz - (iyy - ixx) * p * q - ixz * q * r
     det = ixx * izz - ixz * ixz
@@ -266,6 +266,7 @@ def derivative(
                 + frame.controls[k, 3] * (command[3] - frame.steady[3])
             )
         sx, sy, sz = out[U], out[V], out[W]
+    # EQUATIONS.md, eq. 1.
     gx, gy, gz = rotate_to_body(x, 0.0, 0.0, frame.gravity_mps2)
     out[U] = sx + gx + r * x[V] - q * x[W]
     out[V] = sy + gy + p * x[W] - r * x[U]

@@ -7,7 +7,7 @@ deviation of the column a parameter acts on, with the parameter's own gain, and 
 gravity and inertia say beyond their linear part. The model stays linear in its states, its
 parameters become those of V0 exactly, and every estimator can fit it.
 
-Klein & Morelli, Aircraft System Identification, sec. 3.4-3.6, for the equations.
+EQUATIONS.md, eq. 8.
 """
 
 from __future__ import annotations

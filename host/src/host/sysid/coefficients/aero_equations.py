@@ -140,13 +140,13 @@ def equations(
     spin = powerplant.rotor_kgm2 * history.spin_radps
     hx, hz = spin * axis[0], spin * axis[2]
     p, q, r, V = s["p"], s["q"], s["r"], s["V"]
-    # Aerodynamic force from specific force, thrust subtracted (Klein & Morelli, ch. 3 and 5).
+    # Aerodynamic force from specific force, thrust subtracted (EQUATIONS.md, eq. 1).
     X, Y, Z = mass * s["ax"] - tx, mass * s["ay"], mass * s["az"] - tz
     force = s["qbar"] * S
     ca, sa = np.cos(s["alpha"]), np.sin(s["alpha"])
     arm_x, arm_z = hub[0] - e["cg_x_m"], hub[2] - e["cg_z_m"]
-    # Aerodynamic moments from Euler's equations with the rotor's angular momentum (Stevens & Lewis,
-    # Aircraft Control and Simulation, ch. 1; Etkin & Reid, Dynamics of Flight, ch. 4).
+    # Aerodynamic moments from Euler's equations with the rotor's angular momentum (EQUATIONS.md,
+    # eq. 2).
     roll = ixx * s["pd"] - ixz * (s["rd"] + p * q) + (izz - iyy) * q * r + q * hz
     roll += history.drive_nm * axis[0]
     pitch = iyy * s["qd"] + (ixx - izz) * p * r + ixz * (p * p - r * r) + r * hx - p * hz
@@ -157,7 +157,7 @@ def equations(
     # beside it makes Cl_alpha -0.024, which left out biased Cl_r by 4 %.
     roll += e["cg_y_m"] * mass * s["az"]
     yaw -= e["cg_y_m"] * mass * s["ax"]
-    # From body to wind axes (Klein & Morelli, ch. 3).
+    # From body to wind axes (EQUATIONS.md, eq. 5).
     lift, drag = -(Z * ca - X * sa) / force, -(X * ca + Z * sa) / force
     signals = {
         "alpha": s["alpha"], "beta": s["beta"],
@@ -178,7 +178,7 @@ def equations(
         )
         for name, terms in model.equations.items()
     }
-    # Kinematic equations of the velocity through the air (Klein & Morelli, ch. 3 and 10).
+    # Kinematic equations of the velocity through the air (EQUATIONS.md, eq. 1).
     found |= {
         "u": Equation(rates[0] - (s["ax"] + gx - q * w + r * v), {}),
         "v": Equation(rates[1] - (s["ay"] + gy - r * u + p * w), {}),
@@ -188,6 +188,6 @@ def equations(
 
 
 def body_velocity(s: Mapping[str, Array]) -> tuple[Array, Array, Array]:
-    """Return velocity through the air along x, y and z (m/s), each (n,)."""
+    """Return velocity through the air along x, y and z (m/s), each (n,) (EQUATIONS.md, eq. 4)."""
     plane = s["V"] * np.cos(s["beta"])
     return plane * np.cos(s["alpha"]), s["V"] * np.sin(s["beta"]), plane * np.sin(s["alpha"])

@@ -97,10 +97,10 @@ def solve_normal_equations(
     both = np.outer(scale, scale)
     constant = diagonal * scale**2 < 0.5
     inverse = invert_normal_matrix(normal_matrix * both, constant, position) * both
-    # Tapley, Schutz & Born, ch. 6: sensitivity of the estimate to the consider parameters.
+    # Sensitivity of the estimate to the consider parameters (EQUATIONS.md, eq. 35).
     consider_sensitivity = -inverse @ equations.matrix[:, considered]
     consider_sensitivity[considered] = np.eye(len(considered))
-    # Sandwich with the instrumental variables Z; Ljung, System Identification, sec. 7.6.
+    # Sandwich with the instrumental variables Z (EQUATIONS.md, eq. 18).
     covariance = inverse @ (equations.score_covariance + prior.information) @ inverse.T
     covariance += consider_covariance((consider_sensitivity * sd).T)
     return GaussNewtonStep(inverse @ right_side, covariance, normal_matrix, right_side, inverse)

@@ -112,8 +112,7 @@ def gust_information(
         for j in range(len(of)):
             if of[j] == gust:
                 lag = np.abs(at_m[i][:, None] - at_m[j]) / LENGTH_M[gust]
-                # Dryden correlation, MIL-F-8785C 3.7.2: exp(-x/L) along the gust, times
-                # 1 - x/(2 L) across it.
+                # Dryden correlation (EQUATIONS.md, eq. 11).
                 correlation = np.exp(-lag) * (1.0 - 0.5 * lag if gust == "w" else 1.0)
                 found[i, :, j] = strength[gust] ** 2 * inverse @ correlation @ inverse.T
     size = len(of) * LEGENDRE_TERMS

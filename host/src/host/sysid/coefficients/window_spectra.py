@@ -1,6 +1,6 @@
 """Spectra of the equations over the windows of a flight, and weights from residual spectra.
 
-Equation error in the frequency domain: Klein & Morelli, Aircraft System Identification, ch. 7.
+Equation error in the frequency domain: EQUATIONS.md, eq. 20.
 """
 
 from __future__ import annotations

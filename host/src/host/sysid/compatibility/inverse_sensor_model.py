@@ -134,7 +134,7 @@ def attitude(record: Record, s: Mapping[str, Array]) -> tuple[Array, Array]:
     """Return phi and theta, rad, by a complementary filter.
 
     Low frequencies come from the attitude filter, high ones from phi' = p + tan(theta) (q sin(phi)
-    + r cos(phi)) and theta' = q cos(phi) - r sin(phi).
+    + r cos(phi)) and theta' = q cos(phi) - r sin(phi) (EQUATIONS.md, eq. 3).
     """
     phi, theta = record.smooth("phi_rad"), record.smooth("theta_rad")
     across = s["q"] * np.sin(phi) + s["r"] * np.cos(phi)

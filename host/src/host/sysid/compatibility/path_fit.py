@@ -68,9 +68,8 @@ def fit_path(problem: PathProblem, lagged_inputs: Sequence[Array]) -> PathFit:
     """Solve the instrumental-variable equations (Z'J + P0^-1) step = Z'e + P0^-1 (mean - theta).
 
     e are whitened residuals, J their sensitivities, Z the instruments and P0 the prior covariance;
-    the covariance of the estimate is H^-1 (Z'Z + P0^-1) H^-T with H = Z'J + P0^-1 (Soderstrom &
-    Stoica, Instrumental Variable Methods for System Identification, 1983; Ljung, System
-    Identification, 2nd ed., sec. 7.6).
+    the covariance of the estimate is H^-1 (Z'Z + P0^-1) H^-T with H = Z'J + P0^-1 (EQUATIONS.md,
+    eq. 18).
 
     Parameters
     ----------

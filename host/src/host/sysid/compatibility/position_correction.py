@@ -12,9 +12,9 @@ def transfer_to_cg(columns: dict[str, Array], airframe: AirframeData) -> dict[st
     """Return columns with vanes and accelerometers moved to the CG.
 
     The air at a vane at r moves by omega x r relative to that at the CG, and upwash increases its
-    angle. An accelerometer at r measures omega' x r + omega x (omega x r) more than at the CG
-    (Klein & Morelli, Aircraft System Identification, ch. 10). The mean of the vanes is corrected
-    for the mean of their positions: roll cancels between two tips.
+    angle (EQUATIONS.md, eq. 13). An accelerometer at r measures omega' x r + omega x (omega x r)
+    more than at the CG (eq. 14). The mean of the vanes is corrected for the mean of their
+    positions: roll cancels between two tips.
 
     Parameters
     ----------

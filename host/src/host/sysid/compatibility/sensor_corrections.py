@@ -81,7 +81,7 @@ def correct_columns(
     """Return columns corrected for errors of scale, zero, bias and misalignment.
 
     A sensor reads s = (1 + scale) x + bias in the IMU's own, misaligned axes; the pitot likewise
-    for V squared (Klein & Morelli, Aircraft System Identification, ch. 10).
+    for V squared (EQUATIONS.md, eq. 12).
 
     Parameters
     ----------

@@ -1,9 +1,8 @@
 """Surfaces behind their servos, where the columns have the commands.
 
-A servo follows its pulse as a first order of limited rate (Stevens & Lewis, Aircraft Control and
-Simulation, 2nd ed., sec. 4.1, with a limit). On a virtual flight of the card `demo` commands are
-22 ms ahead of the surfaces; through the servos of the aircraft file 1 to 3 ms are left, the age of
-a pulse in its row.
+A servo follows its pulse as a first order of limited rate (EQUATIONS.md, eq. 15). On a virtual
+flight of the card `demo` commands are 22 ms ahead of the surfaces; through the servos of the
+aircraft file 1 to 3 ms are left, the age of a pulse in its row.
 """
 
 from __future__ import annotations

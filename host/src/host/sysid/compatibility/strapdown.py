@@ -13,8 +13,8 @@ def strapdown(
 ) -> tuple[Array, Array]:
     """Integrate attitude (n, 3, 3; body to north-east-down) and velocity (n, 3), m/s.
 
-    C[k+1] = C[k] exp([omega x] dt), v' = C f + g over a flat, non-rotating earth (Titterton &
-    Weston, Strapdown Inertial Navigation Technology, ch. 3 and 11).
+    C[k+1] = C[k] exp([omega x] dt), v' = C f + g over a flat, non-rotating earth (EQUATIONS.md,
+    eq. 16).
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def path_sensitivities(
 
     The attitude error psi (small rotation, earth axes) obeys psi' = C d_omega, the velocity error
     d_v' = C d_f - (C f) x psi, with errors d_omega and d_f of the measured rates and forces
-    (Titterton & Weston, Strapdown Inertial Navigation Technology, sec. 12.3).
+    (EQUATIONS.md, eq. 17).
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ def fit_equation_error(
     bandwidth: float | None = None,
     use_rates: bool = True,
 ) -> FitResult:
-    """Fit by equation error (Klein & Morelli, Aircraft System Identification, ch. 5).
+    """Fit by equation error (EQUATIONS.md, eq. 19).
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def coloured_covariance(
 ) -> Array:
     """Return (X'X)^-1 (sum X' R X) (X'X)^-1, the covariance corrected for coloured residuals.
 
-    Klein & Morelli, Aircraft System Identification, sec. 5.2.
+    EQUATIONS.md, eq. 34.
     """
     score_covariance = np.zeros_like(white)
     for block, scale in zip(equations, scales, strict=True):

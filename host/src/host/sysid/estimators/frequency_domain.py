@@ -29,7 +29,7 @@ MAX_ITERATIONS = 40
 def transform(values: Array, dt_s: float, frequency_hz: Array) -> Spectrum:
     """Return the sums of values exp(-j w t) at evenly spaced frequencies, (frequencies, columns).
 
-    Chirp-z transform: Morelli, NASA TM-1999-209120.
+    EQUATIONS.md, eq. 20, by chirp-z transform: Morelli, NASA TM-1999-209120.
     """
     spacing = frequency_hz[1] - frequency_hz[0]
     return np.asarray(

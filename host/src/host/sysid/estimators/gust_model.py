@@ -30,8 +30,8 @@ def gust_model(
     A vertical (or side) gust is an angle of attack (sideslip) to vanes, forces and moments alike,
     so its entries are those of the angle and only its intensity is new. Where the model has the
     parameters of `gust_penetration.with_gust_penetration`, the tail meets it later. Its
-    Dryden spectrum (MIL-F-8785C, sec. 3.7) is that of white noise behind 1 / (1 + T s) with
-    T = L / V, or with `span_m` behind (1 + sqrt(3) T s) / (1 + T s)^2.
+    Dryden spectrum (EQUATIONS.md, eq. 9) is that of white noise behind 1 / (1 + T s) with
+    T = L / V, or with `span_m` behind (1 + sqrt(3) T s) / (1 + T s)^2; air that turns is eq. 10.
 
     Parameters
     ----------

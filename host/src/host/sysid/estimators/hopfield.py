@@ -54,7 +54,7 @@ RHO_LIST = np.concatenate(
 def iterate(
     W: Array, b: Array, start: Array, gain: float, rho: float, iterations: int, limit: float
 ) -> tuple[Array, int]:
-    """Run the printed iteration (thesis, equations 3.11 and 3.17); `gain` is dt times lambda.
+    """Run the printed iteration (EQUATIONS.md, eq. 22); `gain` is dt times lambda.
 
     v = W beta + b, then beta += gain (rho^2 - beta^2) / (2 rho) v, all neurons at once.
 

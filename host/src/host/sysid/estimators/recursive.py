@@ -31,7 +31,7 @@ def update(theta: Array, P: Array, regressors: Array, targets: Array, forgetting
     """Run recursive least squares over samples, in place.
 
     The gain is K = P x / (lambda + x'P x); theta moves by K (z - x'theta), P becomes (P - K x'P) /
-    lambda with the forgetting factor lambda (Ljung, System Identification, 2nd ed., sec. 11.2).
+    lambda with the forgetting factor lambda (EQUATIONS.md, eq. 21).
 
     Parameters
     ----------

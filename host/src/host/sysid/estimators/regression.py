@@ -26,7 +26,7 @@ NO_EXCITATION = "a parameter has no regressor: its state or input never moved"
 class RegressionEquation:
     """One equation of the model in one maneuver, z = X theta + residual.
 
-    Klein & Morelli, Aircraft System Identification, ch. 5.
+    EQUATIONS.md, eq. 19.
 
     Attributes
     ----------

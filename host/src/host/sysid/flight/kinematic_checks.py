@@ -209,7 +209,7 @@ def _wind_angles(
 ) -> Iterator[Identity]:
     """Return the identities of the wind angles: by rates, and by forces where measured."""
     p, q, r = rates
-    # Kinematic equations of the wind angles (Klein & Morelli, ch. 3 and 10).
+    # Kinematic equations of the wind angles (EQUATIONS.md, eq. 6).
     pitch = q - beta * (np.cos(alpha) * p + np.sin(alpha) * r)
     yaw = np.sin(alpha) * p - np.cos(alpha) * r
     zero = np.zeros(len(alpha))

@@ -121,8 +121,8 @@ def _others_move(columns: Mapping[str, Array], name: str, first: int, end: int) 
 def expected_motion(columns: Mapping[str, Array], name: str) -> Array | None:
     """Return how the other sensors say that a sensor moves, up to a constant; None if they do not.
 
-    Kinematics of a rigid body (Klein & Morelli, Aircraft System Identification, sec. 10.2): angles
-    and speed are integrals of rates and forces, rates and forces their slopes.
+    Kinematics of a rigid body (EQUATIONS.md, eq. 3 and eq. 6): angles and speed are integrals of
+    rates and forces, rates and forces their slopes.
     """
     t, c = columns["t_s"], columns
     zero = np.zeros(len(t))

@@ -17,7 +17,7 @@ DOMINANT_SHARE = 0.25  # of the variance: an error with less is not named
 def consider_covariance(shifts: Array) -> Array:
     """Return the covariance that systematic errors add, sum over errors k of s_k s_k', (P, P).
 
-    Tapley, Schutz & Born, Statistical Orbit Determination, ch. 6.
+    EQUATIONS.md, eq. 35.
 
     Parameters
     ----------

@@ -84,11 +84,10 @@ class DelayGroup:
 class AccelerometerOffset:
     """An accelerometer away from its assumed place: output += gain * parameter * rate of a state.
 
-    It is the tangential term omega' x r of the acceleration at r (Klein & Morelli, Aircraft System
-    Identification, ch. 10). A wrong position of 1 cm turns angular acceleration into false side
-    force. The offset is then a parameter with a prior, and every derivative of the state's equation
-    enters the output through it. The output should have a bias of its own, which takes the constant
-    part.
+    It is the tangential term omega' x r of the acceleration at r (EQUATIONS.md, eq. 14). A wrong
+    position of 1 cm turns angular acceleration into false side force. The offset is then a
+    parameter with a prior, and every derivative of the state's equation enters the output through
+    it. The output should have a bias of its own, which takes the constant part.
     """
 
     output: str

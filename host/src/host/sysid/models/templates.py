@@ -149,7 +149,7 @@ def longitudinal(
 ) -> LinearModel:
     """Return the four-state longitudinal model.
 
-    Etkin & Reid, Dynamics of Flight, ch. 4-5, linearised in wind axes; the accelerometers measure
+    EQUATIONS.md, eq. 7, linearised in wind axes; the accelerometers measure
     a_x = f cos(alpha) - n sin(alpha) and a_z = f sin(alpha) + n cos(alpha), with the specific force
     f along and n normal to the velocity.
     """
@@ -229,7 +229,7 @@ def short_period(
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
-    """Return the two-state short-period model at constant speed (Etkin & Reid, ch. 6)."""
+    """Return the two-state short-period model at constant speed (EQUATIONS.md, eq. 7)."""
     V = trim.airspeed_mps
     cosine = float(np.cos(trim.alpha_rad))
     states = ("alpha_rad", "q_radps")
@@ -266,7 +266,7 @@ def phugoid(
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
-    """Return the two-state phugoid model, alpha quasi-steady (Etkin & Reid, ch. 6)."""
+    """Return the two-state phugoid model, alpha quasi-steady (EQUATIONS.md, eq. 7)."""
     del accelerometers, imu_sd_m  # in slow motion they measure only gravity
     model = _Builder(
         "phugoid",
@@ -292,7 +292,7 @@ def lateral(
     delays: tuple[DelayGroup, ...] = (),
     hold: str = "foh",
 ) -> LinearModel:
-    """Return the four-state lateral model (Etkin & Reid, Dynamics of Flight, ch. 4-5)."""
+    """Return the four-state lateral model (EQUATIONS.md, eq. 7)."""
     states = ("beta_rad", "p_radps", "r_radps", "phi_rad")
     model = _Builder(
         "lateral",

@@ -3,8 +3,7 @@
 U = rms(z - y) / (rms(z) + rms(y)) is 0 for perfect agreement and at most 1. The mean square error
 is the sum of three parts: bias, (mean z - mean y)^2, a constant offset; variance, (sd z - sd y)^2,
 motion of another size; covariance, 2 (1 - rho) sd z sd y, what moves at another time, noise
-included (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 11; Theil, Economic
-Forecasts and Policy, 1961).
+included (EQUATIONS.md, eq. 37; Theil, Economic Forecasts and Policy, 1961).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Autoregressive models of output noise: whitening, estimation, choice of the order.
 
-The noise of an output is e[k] = a1 e[k-1] + ... + ap e[k-p] + w[k] with white innovations w (Ljung,
-System Identification, 2nd ed., ch. 4).
+The noise of an output is e[k] = a1 e[k-1] + ... + ap e[k-p] + w[k] with white innovations w
+(EQUATIONS.md, eq. 27).
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """Covariance of a score whose residuals are coloured.
 
-It is the middle factor of the covariance that corrects a white-noise fit: Morelli & Klein,
-Accuracy of aerodynamic model parameters estimated from flight test data, Journal of Guidance,
-Control and Dynamics 20 (1997).
+It is the middle factor of the covariance that corrects a white-noise fit (EQUATIONS.md, eq. 34).
 """
 
 from __future__ import annotations
@@ -17,8 +15,8 @@ LAG_SHARE = 5  # a fifth of the record
 def coloured_score_covariance(residual: Array, sensitivities: Array) -> Array:
     """Return S' R S with sensitivities S and the residual's autocorrelation R.
 
-    R is a Toeplitz matrix of the sample autocorrelation up to `LAG_SHARE` of the record (Morelli &
-    Klein 1997).
+    R is a Toeplitz matrix of the sample autocorrelation up to `LAG_SHARE` of the record
+    (EQUATIONS.md, eq. 34).
 
     Parameters
     ----------

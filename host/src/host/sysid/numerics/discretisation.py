@@ -36,8 +36,8 @@ def discretise(
 ) -> tuple[Array, Array]:
     """Discretise [A B b] and its derivatives.
 
-    The block exponential exp([[A, B], [0, 0]] dt) = [[Phi, Gamma], [0, I]] (Van Loan, IEEE
-    Transactions on Automatic Control 23, 1978) is computed by scaling, a Taylor series and
+    The block exponential exp([[A, B], [0, 0]] dt) = [[Phi, Gamma], [0, I]] (EQUATIONS.md, eq. 23)
+    is computed by scaling, a Taylor series and
     squaring; a first-order hold adds integrators for the increments of the inputs.
 
     Parameters

@@ -151,8 +151,7 @@ class FilterProblem:
         """Return innovations and cost; None where the filter or the model fails.
 
         The cost is J = 1/2 sum nu' S^-1 nu + N/2 ln det S over the innovations nu of N samples
-        (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5; Klein & Morelli,
-        Aircraft System Identification, ch. 6), plus the prior.
+        (EQUATIONS.md, eq. 31), plus the prior.
         """
         model = self.model
         n, m = len(model.states), len(model.inputs)
@@ -205,7 +204,7 @@ def _steady_state_filter(
 ) -> SteadyStateFilter | None:
     """Return the filter with P of the Riccati equation, S = C P C' + R and K = P C' S^-1.
 
-    Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5. None where none exists.
+    EQUATIONS.md, eq. 29. None where none exists.
     """
     F, Qd = discrete_noise(A, intensity, dt_s)
     if not np.isfinite(Qd).all() or np.max(np.abs(F)) > 1e6:
@@ -226,7 +225,7 @@ def discrete_noise(A: Array, intensity: Array, dt_s: float) -> tuple[Array, Arra
     """Return F over a sample and Q, the covariance that white process noise adds in it.
 
     Q is the integral of exp(A t) W exp(A' t) over the sample, computed exactly from the exponential
-    of [[-A, W], [0, A']] (Van Loan, IEEE Transactions on Automatic Control 23, 1978). A trapezoid
+    of [[-A, W], [0, A']] (EQUATIONS.md, eq. 30). A trapezoid
     instead biases Cl_p by 5 % in rolling gusts at 50 Hz.
 
     Parameters

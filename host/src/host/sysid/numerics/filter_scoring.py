@@ -28,8 +28,7 @@ def fisher_scoring(
     """Return Fisher information and negative gradient of the cost, per maneuver.
 
     With innovations nu of covariance S over N samples, M_ij = sum (d nu/d i)' S^-1 (d nu/d j) + N/2
-    tr(S^-1 dS/di S^-1 dS/dj); the gradient has the same two parts (Klein & Morelli, Aircraft System
-    Identification, ch. 6; Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5).
+    tr(S^-1 dS/di S^-1 dS/dj); the gradient has the same two parts (EQUATIONS.md, eq. 32).
 
     Parameters
     ----------

@@ -52,8 +52,7 @@ def gain_sensitivities(
 
     The Riccati equation in Joseph's form, P = F (I - K C) P (I - K C)' F' + F K R K' F' + Q, does
     not depend on the gain to first order. The derivative of P therefore obeys the Lyapunov equation
-    dP = A_c dP A_c' + X with A_c = F (I - K C), one for all unknowns (Jategaonkar, Flight Vehicle
-    System Identification, 2nd ed., ch. 5).
+    dP = A_c dP A_c' + X with A_c = F (I - K C), one for all unknowns (EQUATIONS.md, eq. 33).
     """
     A, _, C, _ = problem.model.matrices(theta)
     n, p = len(A), len(C)

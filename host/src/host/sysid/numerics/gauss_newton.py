@@ -128,8 +128,7 @@ def gauss_newton(
 ) -> GaussNewtonResult[Trial] | None:
     """Minimise the cost from `theta`; None if the model fails there.
 
-    Klein & Morelli, Aircraft System Identification, ch. 6 (modified Newton-Raphson); Jategaonkar,
-    Flight Vehicle System Identification, 2nd ed., ch. 4.
+    EQUATIONS.md, eq. 26 (modified Newton-Raphson).
 
     Parameters
     ----------

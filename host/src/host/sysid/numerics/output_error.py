@@ -65,8 +65,7 @@ def minimise(
 
     The cost is J = 1/2 sum_j N ln s_j with s_j the variance of output j's innovations, concentrated
     out of the Gaussian likelihood and re-estimated at every step, or 1/2 sum v_j'v_j / s_j with s_j
-    given (Klein & Morelli, Aircraft System Identification, ch. 6; Jategaonkar, Flight Vehicle
-    System Identification, 2nd ed., ch. 4); plus the prior.
+    given (EQUATIONS.md, eq. 24); plus the prior.
 
     Parameters
     ----------

@@ -224,8 +224,8 @@ class OutputProblem:
     def respond(self, theta: Array) -> list[Response] | None:
         """Simulate every maneuver with sensitivities; None if a response diverges.
 
-        The sensitivities obey dx/dtheta[k+1] = Phi dx/dtheta[k] + d[Phi Gamma]/dtheta z[k] (Klein &
-        Morelli, Aircraft System Identification, ch. 6, output sensitivities).
+        The sensitivities obey dx/dtheta[k+1] = Phi dx/dtheta[k] + d[Phi Gamma]/dtheta z[k]
+        (EQUATIONS.md, eq. 25).
         """
         model = self.model
         n, m = len(model.states), len(model.inputs)

@@ -51,8 +51,8 @@ def propagate(
 ) -> None:
     """Run the sensitivity equations of the states and map them to the outputs.
 
-    S[k+1] = F S[k] + sum over c of z_c[k] dstep_c, out[k] = C S[k] (Klein & Morelli, Aircraft
-    System Identification, ch. 6).
+    S[k+1] = F S[k] + sum over c of z_c[k] dstep_c, out[k] = C S[k] (EQUATIONS.md,
+    eq. 25).
 
     Parameters
     ----------

@@ -13,10 +13,10 @@ DOUBLINGS = 40
 def predicted_covariance(F: Array, C: Array, Q: Array, R: Array) -> tuple[bool, Array]:
     """Solve P = F P F' - F P C' (C P C' + R)^-1 C P F' + Q by the structured doubling algorithm.
 
-    Chu, Fan, Lin & Wang, Structure-preserving algorithms for periodic discrete-time algebraic
-    Riccati equations, International Journal of Control 77 (2004). For 5 states and 6 outputs it
-    takes 0.29 ms where `scipy.linalg.solve_discrete_are` takes 1.36 (same to rounding), and a
-    flight's answer solves it 63 times.
+    EQUATIONS.md, eq. 29. Chu, Fan, Lin & Wang, Structure-preserving algorithms for periodic
+    discrete-time algebraic Riccati equations, International Journal of Control 77 (2004). For 5
+    states and 6 outputs it takes 0.29 ms where `scipy.linalg.solve_discrete_are` takes 1.36 (same
+    to rounding), and a flight's answer solves it 63 times.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def filter_innovations(
     """Run a constant-gain Kalman filter.
 
     x[k+1] = Phi (x[k] + K nu[k]) + Gamma u[k] with the innovation nu[k] = y[k] - C x[k] - D u[k] -
-    b (Jategaonkar, Flight Vehicle System Identification, 2nd ed., ch. 5).
+    b (EQUATIONS.md, eq. 28).
 
     Parameters
     ----------

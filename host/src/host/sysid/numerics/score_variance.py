@@ -130,7 +130,7 @@ def variance_ratio(
     Returns
     -------
     Array, shape (P,)
-        1 where nothing is larger. White, J' R J / (J' J)^2 of each output (Morelli & Klein 1997).
+        1 where nothing is larger. White, J' R J / (J' J)^2 of each output (EQUATIONS.md, eq. 34).
     """
     total = np.diag(problem.prior_precision)
     score = total.copy()

@@ -38,7 +38,7 @@ class SignatureTest:
         Those that show it.
     shift : Array, shape (P,)
         Of the estimate, had the model this error at the size that the residual shows: the bias of
-        omitted variables, -C J' W z a with signature z and size a (Klein & Morelli, ch. 5).
+        omitted variables, -C J' W z a with signature z and size a (EQUATIONS.md, eq. 36).
     """
 
     name: str

@@ -20,7 +20,7 @@ class AirData:
     Attributes
     ----------
     airspeed_mps, alpha_rad, beta_rad, qbar_pa, static_pa, density_kgpm3, temperature_k : arrays
-        At the CG; alpha = atan2(w, u), beta = asin(v/V), gusts included.
+        At the CG, gusts included (EQUATIONS.md, eq. 4).
     velocity_mps, rates_radps : (n, 3) arrays
         Motion against the air, body axes.
     """
