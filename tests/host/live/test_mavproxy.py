@@ -34,7 +34,8 @@ class MavProxy:
                     sys.executable, str(PROGRAM), f"--master=udpin:127.0.0.1:{port}",
                     f"--state-basedir={folder}", "--default-modules=param,mode,arm,wp,misc",
                 ],
-                cwd=folder, env=os.environ | {"HOME": str(folder)}, stdin=subprocess.PIPE, stdout=out, stderr=subprocess.STDOUT,
+                cwd=folder, env=os.environ | {"HOME": str(folder)},
+                stdin=subprocess.PIPE, stdout=out, stderr=subprocess.STDOUT,
             )  # fmt: skip
 
     def type(self, line: str) -> None:
