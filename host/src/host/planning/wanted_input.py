@@ -8,15 +8,8 @@ import numpy as np
 
 from host.aircraft.airframe import Array
 from host.planning.aircraft_response import STEP_S, AircraftResponse
-from host.twin.testcard.cards import Segment, input_s
-from host.twin.testcard.input_shapes import (
-    STEPS,
-    multisine,
-    multisine_signal,
-    staircase,
-    sweep_signal,
-    tone_signal,
-)
+from host.twin.testcard.cards import Segment, input_s, sine_inputs
+from host.twin.testcard.input_shapes import STEPS, staircase
 
 SURFACES = ("elevator", "aileron", "rudder")
 RESPONSE_S = 3.0  # behind the input, as the finder's window
@@ -44,19 +37,12 @@ def wanted_surfaces(segment: Segment, response: AircraftResponse) -> dict[str, A
 
 
 def _waves(segment: Segment, t: Array) -> list[Array]:
-    many, length_s = len(segment.axes), input_s(segment)
-    band = segment.low_hz, segment.high_hz
     if segment.kind in STEPS:
         lengths = np.array([length for _, length in STEPS[segment.kind]]) * segment.width_s
         switches = np.concatenate([[0.0], np.cumsum(lengths)])
         levels = np.array([sign for sign, _ in STEPS[segment.kind]])
-        return [staircase(t, switches, levels, HAND_S)] * many
-    if segment.tones:
-        return [tone_signal(t, length_s, segment.tones_of(axis)) for axis in segment.axes]
-    if segment.kind == "multisine":
-        sums = multisine(length_s, *band, many)
-        return [multisine_signal(t, length_s, f, phase) for f, phase in zip(*sums, strict=True)]
-    return [sweep_signal(t, length_s, *band)] * many
+        return [staircase(t, switches, levels, HAND_S)] * len(segment.axes)
+    return sine_inputs(segment, t)
 
 
 def _behind_servo(wave: Array, servo_radps: float) -> Array:

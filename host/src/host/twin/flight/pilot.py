@@ -10,16 +10,17 @@ import numpy as np
 from host.aircraft.airframe import Airframe, Array
 from host.aircraft.linearisation import linearise
 from host.aircraft.trim import Trim
-from host.twin.testcard.cards import AXES, Card, Segment, duration_s, input_s, length_s
-from host.twin.testcard.flown_by_logger import AT_ARMED_S, LEVEL_S, SWITCH_S
-from host.twin.testcard.input_shapes import (
-    STEPS,
-    multisine,
-    multisine_signal,
-    staircase,
-    sweep_signal,
-    tone_signal,
+from host.twin.testcard.cards import (
+    AXES,
+    Card,
+    Segment,
+    duration_s,
+    input_s,
+    length_s,
+    sine_inputs,
 )
+from host.twin.testcard.flown_by_logger import AT_ARMED_S, LEVEL_S, SWITCH_S
+from host.twin.testcard.input_shapes import STEPS, staircase
 
 CROSSOVER_RADPS = 1.2  # of attitude control by eye; a person on the ground manages about 1-2 rad/s
 WINDOW_TAIL_S = 3.0
@@ -217,16 +218,7 @@ def _fly_input(
         begin, end = start_s, start_s + s.duration_s
         span = _span(t, begin - 0.1, end + 0.1)
         local = t[span] - start_s
-        if s.tones:
-            waves = [tone_signal(local, s.duration_s, s.tones_of(axis)) for axis in s.axes]
-        elif s.kind == "multisine":
-            sums = multisine(s.duration_s, s.low_hz, s.high_hz, len(s.axes))
-            waves = [
-                multisine_signal(local, s.duration_s, f, phase)
-                for f, phase in zip(*sums, strict=True)
-            ]
-        else:
-            waves = [sweep_signal(local, s.duration_s, s.low_hz, s.high_hz)] * len(s.axes)
+        waves = sine_inputs(s, local)
         attention = 0.25 if s.attention < 0.0 else s.attention
     for axis, amplitude, wave in zip(s.axes, s.amplitudes, waves, strict=True):
         size = amplitude if axis == "throttle" else math.radians(amplitude)

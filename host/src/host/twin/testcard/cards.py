@@ -8,14 +8,22 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from host.aircraft.air import Air
+from host.aircraft.airframe import Array
 from host.errors import UsageError
 from host.files import toml_reader
 from host.twin.faults import FAULTS, Fault
 from host.twin.testcard.card_ranges import LONGEST_FLIGHT_S, RANGES
-from host.twin.testcard.input_shapes import KINDS, STEPS, harmonics
+from host.twin.testcard.input_shapes import (
+    KINDS,
+    STEPS,
+    harmonics,
+    multisine,
+    multisine_signal,
+    sweep_signal,
+    tone_signal,
+)
 
 FOLDER = Path(__file__).parent / "cards"
 MOST_SEGMENTS = 2000  # repeated ones counted each
@@ -121,7 +129,7 @@ class Segment:
     attention: float = -1.0  # of the pilot during the input; -1: 0 for steps, 0.25 for long inputs
     tones: tuple[Tone, ...] = ()
 
-    def tones_of(self, axis: str) -> NDArray[np.float64]:
+    def tones_of(self, axis: str) -> Array:
         """Return the tones of one axis (k, 3), as `tone_signal` takes them."""
         own = [(t.harmonic, t.share, t.phase_turn) for t in self.tones if t.axis == axis]
         return np.array(own, dtype=np.float64).reshape(-1, 3)
@@ -238,6 +246,24 @@ def length_s(card: Card, s: Segment) -> float:
 def input_s(s: Segment) -> float:
     """Return the length of an input itself."""
     return sum(length for _, length in STEPS.get(s.kind, ())) * s.width_s or s.duration_s
+
+
+def sine_inputs(s: Segment, t_s: Array) -> list[Array]:
+    """Return the inputs of a multisine or a sweep in units of their amplitude, one per axis.
+
+    Parameters
+    ----------
+    s : Segment
+        Of a kind that has no steps.
+    t_s : Array, shape (n,)
+        Time from the start of the input.
+    """
+    if s.tones:
+        return [tone_signal(t_s, s.duration_s, s.tones_of(axis)) for axis in s.axes]
+    if s.kind == "multisine":
+        sums = multisine(s.duration_s, s.low_hz, s.high_hz, len(s.axes))
+        return [multisine_signal(t_s, s.duration_s, *one) for one in zip(*sums, strict=True)]
+    return [sweep_signal(t_s, s.duration_s, s.low_hz, s.high_hz)] * len(s.axes)
 
 
 def _table(where: str, value: object) -> dict[str, object]:
