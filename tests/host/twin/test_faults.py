@@ -1,7 +1,4 @@
-"""Every fault a card can name, flown short through the recorder: what its log says of it.
-
-What must come of each is in the list of 25 faults (hardware facts, section 5).
-"""
+"""Every fault a card can name, on a short flight through the recorder, must show in its log."""
 
 from __future__ import annotations
 

@@ -31,8 +31,8 @@ class Air:
     wind_north_mps: float = 0.0
     wind_east_mps: float = 0.0
     turbulence_mps: float = 0.0  # standard deviation of the vertical gust
-    length_w_m: float = 0.0  # 0: height
-    length_u_m: float = 0.0  # 0: MIL-F-8785C for the height; also for v
+    length_w_m: float = 0.0  # of gust w; 0: the height over the ground, as MIL-F-8785C
+    length_u_m: float = 0.0  # of gusts u and v; 0: MIL-F-8785C for the height
     ratio_u: float = 0.0  # sigma_u / sigma_w; 0: MIL-F-8785C for the height
 
 
@@ -44,7 +44,7 @@ class Atmosphere(NamedTuple):
 
 
 class Turbulence(NamedTuple):
-    """Intensities and lengths of one flight."""
+    """Dryden intensities (m/s) and scale lengths (m) that hold for one flight."""
 
     sigma_u_mps: float
     sigma_w_mps: float
@@ -72,7 +72,7 @@ def density_kgpm3(air: Atmosphere, height_m: float) -> float:
 
 
 def turbulence(air: Air, height_m: float) -> Turbulence:
-    """Return intensities and lengths, by MIL-F-8785C where `air` leaves them open.
+    """Return Dryden intensities and scale lengths, from MIL-F-8785C where `air` has zeros.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def gust_step(
         Independent standard normal numbers.
     airspeed_mps, span_m, step_s : float
     out : (6,) array
-        Body axes, m/s and rad/s. A gust w that grows ahead is air that turns nose-down.
+        Body axes, m/s and rad/s. Where gust w grows towards the nose, the air turns nose-down.
     """
     # Dryden forms of MIL-F-8785C 3.7.2 (EQUATIONS.md, eq. 9): u of first order, v and w of second.
     v = max(airspeed_mps, 1.0)
@@ -144,7 +144,7 @@ def gust_step(
 
 @compiled_fast
 def gusts(t: Turbulence, noise: Array, airspeed_mps: float, span_m: float, step_s: float) -> Array:
-    """Return gusts (n, 6) at constant airspeed, for statistics."""
+    """Return a gust history (n, 6) at constant airspeed, from which a test takes statistics."""
     z = np.zeros(GUST_STATES)
     out = np.empty((noise.shape[0], 6))
     for i in range(noise.shape[0]):

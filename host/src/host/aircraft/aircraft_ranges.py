@@ -23,10 +23,10 @@ _INERTIA = Quantity("kg m2", 0.0, 1e8, "An-225 about 1e8 kg m2", above=True)
 _ANGLE = Quantity("rad", -1.6, 1.6, "90 degrees; in degrees it would be larger")
 _PLACE_M = Quantity("m", -100.0, 100.0, _PLACE)
 _TOLERANCE = Quantity("", 0.0, 0.5, _SHARE)
-_TOLERANCE_M = Quantity("m", 0.0, 5.0, "a place that is known to less is not known")
+_TOLERANCE_M = Quantity("m", 0.0, 5.0, "a place with a larger tolerance is unknown")
 _TORQUE = Quantity("N m", 0.0, 1e6, "largest turboprops 1e5 N m")
-UNKNOWN_ANGLE_RAD = 1.6  # a tolerance that says nothing
-# Of a flight condition.
+UNKNOWN_ANGLE_RAD = 1.6  # 90 degrees: as a tolerance it means that nobody measured the angle
+# Ranges of a flight condition, wherever it is given.
 AIRSPEED = Quantity("m/s", 0.5, 2000.0, _SPEED)
 DENSITY = Quantity("kg/m3", 1e-3, 10.0, "from 50 km to wind tunnels under pressure")
 ALPHA_DEG = Quantity("deg", -89.0, 89.0, "at 90 degrees derivatives have no axes")
@@ -53,7 +53,11 @@ RANGES: Mapping[str, Quantity] = {
         "rad", -0.8, 0.8, "tail-draggers stand at 0.15 to 0.3; in degrees it would be larger"
     ),
     "geometry.ground_pitch_tolerance_rad": Quantity(
-        "rad", 0.0, UNKNOWN_ANGLE_RAD, "an inclinometer 0.003, a runway 0.01", above=True
+        "rad",
+        0.0,
+        UNKNOWN_ANGLE_RAD,
+        "an inclinometer reads to 0.003, a runway is level to 0.01",
+        above=True,
     ),
     "trim.airspeed_mps": AIRSPEED,
     "trim.minimum_airspeed_mps": AIRSPEED,

@@ -1,7 +1,7 @@
-"""An aircraft known by tape measure and scale alone: its dimensions become an aircraft file.
+"""An aircraft of which only dimensions and mass were measured: turned into an aircraft file.
 
-A file of dimensions has no format and no kind, but `span_m` and `wing_area_m2` at its top, as those
-of `dimensions/`; the handbook gives its coefficients, good to 10 to 30 % each.
+A file of dimensions has `span_m` and `wing_area_m2` at its top and neither format nor kind, as
+those in `dimensions/`. The handbook estimates its coefficients to 10 to 30 % each.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def is_dimensions(document: Mapping[str, object]) -> bool:
 def from_dimensions(
     document: Mapping[str, object], source: str | Path, error: type[UsageError]
 ) -> dict[str, object]:
-    """Return the aircraft file that the handbook makes of dimensions.
+    """Return the aircraft file that handbook methods give for these dimensions.
 
     Parameters
     ----------

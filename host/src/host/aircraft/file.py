@@ -50,7 +50,7 @@ _VECTORS: Mapping[str, tuple[str, ...]] = {
     "sensors": ("imu_m", "vane_a_m", "vane_b_m", "pitot_a_m", "pitot_b_m", "gps_m"),
 }
 
-# May be left out of a file: what it then counts as.
+# Keys that a file may leave out, with the value that then counts.
 _OPTIONAL: Mapping[str, Mapping[str, float]] = {
     "geometry": {
         "elevator_arm_m": 0.0, "rudder_arm_m": 0.0, "arm_tolerance": 0.10,
@@ -58,7 +58,7 @@ _OPTIONAL: Mapping[str, Mapping[str, float]] = {
     },
 }  # fmt: skip
 
-# What is known before the first flight: enough to identify an aircraft, not to fly it here.
+# Sections of a measured aircraft: enough to identify it, not enough to simulate it.
 MEASURED = ("mass", "geometry", "trim", "sensors")
 MEASURED_IF_THERE = ("propulsion", "servo", "surfaces")
 _MEASURED_TRIM = ("airspeed_mps",)
@@ -82,8 +82,8 @@ class Aircraft:
         Numbers under "section.key", SI.
     sources : mapping
         Where each of them comes from, under the same keys.
-    straight : Straight, optional
-        Of a linear aircraft: what it does instead of aerodynamics and propulsion.
+    straight : LinearDynamics, optional
+        Matrices of a linear aircraft, which replace its aerodynamics and propulsion.
     """
 
     name: str
@@ -99,7 +99,7 @@ class Aircraft:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What no known aircraft has, in words; a line each for whoever uses the file."""
+        """Warnings for the user, a line for each ratio of sizes that no known aircraft has."""
         return tuple(f"{self.name}: {one}" for one in doubts(self.scalars, self.vectors))
 
     def vector(self, key: str) -> Array:
@@ -157,7 +157,7 @@ def names() -> list[str]:
 
 
 def read_document(source: str | Path) -> dict[str, object]:
-    """Read an aircraft file as it stands, or as the handbook makes it of dimensions.
+    """Read an aircraft file; a file of dimensions is first completed by the handbook.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def load_measured(source: str | Path) -> Aircraft:
         A number is missing, is not a number or has no source.
     """
     document = read_document(source)
-    if document.get("kind") == "linear":  # its sizes are those of another
+    if document.get("kind") == "linear":  # its sizes are those of its base aircraft
         base = load_measured(str(document.get("base", "")))
         return replace(base, title=str(document.get("title", source)))
     if document.get("kind") != "measured":

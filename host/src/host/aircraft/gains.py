@@ -1,7 +1,6 @@
-"""What a dimensional derivative is made of, stated once: gains of coefficients, and their inverse.
+"""Gains that turn coefficients into dimensional derivatives, and the inverse conversion.
 
-Every way between both goes through here: the coefficients of a linear answer, templates with
-coefficients for parameters, conversions with a covariance. Etkin & Reid, Dynamics of Flight, ch. 4.
+Every conversion between the two uses these gains. Etkin & Reid, Dynamics of Flight, ch. 4.
 """
 
 from __future__ import annotations
@@ -14,26 +13,26 @@ import numpy as np
 if TYPE_CHECKING:
     from host.aircraft.mass_properties import AirframeData, Condition
 
-# Rows of dimensional derivatives, and of the coefficients they stand for.
+# Force or moment of a dimensional derivative -> coefficient of the same force or moment.
 COEFFICIENT_ROWS = {"Z": "CL", "D": "CD", "M": "Cm", "Y": "CY", "L": "Cl", "N": "Cn"}
 DIMENSIONAL_ROWS = {c: d for d, c in COEFFICIENT_ROWS.items()}
 MOMENTS = ("L", "N")  # mixed by Ixz
 
 
 def dimensional_name(coefficient: str) -> str:
-    """Return the dimensional derivative that a coefficient rules: ``M_q`` of ``Cm_q``."""
+    """Return the name of a coefficient's dimensional derivative: ``M_q`` for ``Cm_q``."""
     row, _, label = coefficient.partition("_")
     return f"{DIMENSIONAL_ROWS[row]}_{label}"
 
 
 def coefficient_name(derivative: str) -> str:
-    """Return the coefficient that rules a dimensional derivative: ``Cm_q`` of ``M_q``."""
+    """Return the name of a dimensional derivative's coefficient: ``Cm_q`` for ``M_q``."""
     row, _, label = derivative.partition("_")
     return f"{COEFFICIENT_ROWS[row]}_{label}"
 
 
 def dimensional_gains(airframe: AirframeData, condition: Condition) -> dict[str, dict[str, float]]:
-    """Return, per dimensional derivative of the templates, the coefficients it is made of.
+    """Return the gain of each coefficient in each dimensional derivative of the templates.
 
     Parameters
     ----------
@@ -76,10 +75,10 @@ def dimensional_gains(airframe: AirframeData, condition: Condition) -> dict[str,
 def from_dimensional(
     derivatives: Mapping[str, float], airframe: AirframeData, condition: Condition
 ) -> dict[str, float]:
-    """Return the coefficients that dimensional derivatives stand for: `dimensional_gains` undone.
+    """Return coefficients from dimensional derivatives: the inverse of `dimensional_gains`.
 
-    Of rolling and yawing moment one may be absent and counts as zero; names that are no derivative
-    are left out.
+    A rolling moment without its yawing moment, or the reverse, is solved with zero for the absent
+    one. Names that are no derivative are left out.
     """
     gains = dimensional_gains(airframe, condition)
     found = {}

@@ -1,4 +1,4 @@
-"""The same aircraft as a JSBSim model: an independent implementation to agree with.
+"""An aircraft file as a JSBSim model: an independent implementation to test ours against.
 
 All forces and moments, propulsion included, are functions in body axes, so that no default of
 JSBSim's own engine or propeller models comes in. Surfaces are inputs (``fcs/elevator-pos-rad`` and

@@ -16,7 +16,7 @@ from host.aircraft.linear_dynamics import LinearDynamics
 from host.constants import GRAVITY_MPS2
 from host.files.quantities import Quantity
 
-# Of the gravity terms of a file, against g and its own angle of attack.
+# Largest relative error of a file's gravity terms against g and the file's own angle of attack.
 GRAVITY_TOLERANCE = 0.01
 _CONDITION = {
     "u_mps": RANGES["trim.airspeed_mps"],
@@ -68,7 +68,7 @@ def load(source: str | Path) -> Aircraft:
             raise AircraftError(
                 f"{source}: gravity enters with {found:.4g} m/s2, expected {expected:.4g}"
             )
-    # Of a motor it says nothing: the throttle moves, the aircraft does not feel it.
+    # Such matrices have no motor: the throttle is recorded and moves nothing.
     wide = np.hstack([matrices["longitudinal_b"], np.zeros((4, 1))])
     straight = LinearDynamics(
         **numbers,
@@ -88,7 +88,7 @@ def load(source: str | Path) -> Aircraft:
 def with_linear_dynamics(
     base: Aircraft, straight: LinearDynamics, *, name: str, title: str
 ) -> Aircraft:
-    """Return `base` with straight lines for its aerodynamics and propulsion."""
+    """Return `base` with the linear dynamics in place of its aerodynamics and propulsion."""
     speed = math.hypot(straight.u_mps, straight.w_mps)
     return replace(
         base,

@@ -1,5 +1,4 @@
-"""A linear aircraft: dimensional matrices about one steady flight, as the equations of motion take
-them.
+"""A linear aircraft: dimensional matrices about one steady flight, for the equations of motion.
 
 Gravity, attitude and path are those of a rigid body; only the forces and moments of air and motor
 are linear. At its steady flight such an aircraft has exactly the A and B it was made from.
@@ -44,10 +43,11 @@ class LinearDynamics:
     lateral_b: Array
 
     def fitted(self, frame: Airframe) -> Airframe:
-        """Return the frame with these slopes in place of its coefficients and propeller.
+        """Return the airframe with these derivatives in place of its coefficients and propeller.
 
-        The columns of theta and phi are left to gravity itself, and the parts of the others that
-        come from turning axes (W0, U0) are taken out: u' = X_u u + X_w w + (X_q - W0) q and so on.
+        The equations of motion add gravity and the turning of the axes themselves. So the columns
+        of theta and phi are dropped and W0, U0 taken out: u' = X_u u + X_w w + (X_q - W0) q and so
+        on.
         """
         slopes, controls = np.zeros((6, 6)), np.zeros((6, 4))
         slopes[np.ix_(LONGITUDINAL, LONGITUDINAL)] = self.longitudinal_a[:3, :3]

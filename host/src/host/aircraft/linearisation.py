@@ -60,7 +60,7 @@ def linearise(frame: Airframe, trim: Trim, width: float = 1e-5) -> Linear:
     still = np.zeros(9)
 
     def rates(values: Array) -> Array:
-        """Rates of u v w p q r phi theta for these and the surfaces."""
+        """Return the time derivatives of u v w p q r phi theta at these states and surfaces."""
         x = trim.state.copy()
         x[:6] = values[:6]
         phi, theta = values[6], values[7]
@@ -109,7 +109,7 @@ def linear_aircraft_derivatives(frame: Airframe, trim: Trim) -> dict[str, float]
         for i, row in enumerate(rows):
             found |= {f"{row}_{name}": float(a[i, j]) for j, name in enumerate(states)}
             found |= {f"{row}_{name}": float(b[i, j]) for j, name in enumerate(controls)}
-    # The matrices hold what turning axes add to these four.
+    # The matrices of these four contain W0, U0 of the turning axes, which are no derivatives.
     u, w = trim.state[0], trim.state[2]
     for name, turn in (("X_q", w), ("Z_q", -u), ("Y_p", -w), ("Y_r", u)):
         found[name] += float(turn)

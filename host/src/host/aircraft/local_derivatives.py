@@ -1,4 +1,4 @@
-"""Local derivatives: the truth an identification of one maneuver is to find."""
+"""Local derivatives of a simulated aircraft: the true values for one maneuver's identification."""
 
 from __future__ import annotations
 

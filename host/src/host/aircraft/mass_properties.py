@@ -1,6 +1,6 @@
 """Mass, inertia, sizes and places of the sensors out of an aircraft file, each with its tolerance.
 
-The file's reader has checked every number: whatever is wrong with one is said there, in one line.
+`host.aircraft.file` has checked every number, so nothing is checked again here.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class AirframeData:
 
     Positions are in metres from the CG, x forward, y right, z down; relative numbers are standard
     deviations. `upwash` is the share by which the vanes over-read. Arms reach from the nominal CG
-    back to where a tail surface's control force acts; 0 is not known. `ground_pitch_rad` is that of
-    the x axis while it stands on its wheels; of an infinite deviation nobody measured it.
+    back to where a tail surface's control force acts; 0 means unknown. `ground_pitch_rad` is the
+    pitch angle of the x axis on the wheels; if nobody measured it, its deviation is infinite.
     """
 
     name: str
@@ -52,7 +52,7 @@ class AirframeData:
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """Where a coefficient is taken: mean over the maneuvers."""
+    """Flight condition at which coefficients hold: the mean over the maneuvers."""
 
     airspeed_mps: float
     qbar_pa: float

@@ -22,20 +22,20 @@ from host.arrays import Array
 Step = Callable[[float, float, float, float], tuple[float, float, float]]
 OfPower = Callable[[Array, Array, Array], Array]
 History = Callable[[RotorInputs, float, float, int], Array]
-SUBSTEPS = 3  # a rotor takes 0.1 s and more to answer; records come at 33 Hz
-START_RADPS = 600.0  # forgotten within half a second
+SUBSTEPS = 3  # Euler steps per 33 Hz sample: a rotor's time constant is 0.1 s or more
+START_RADPS = 600.0  # a guess whose effect is gone within half a second
 SETTLED, SETTLING_S = 200, 0.03  # samples until a rotor keeps its speed, and their distance
 
 
 @dataclass(frozen=True, slots=True)
 class Powerplant:
-    """How the propeller answers.
+    """Thrust, torque and rotor inertia of a propeller with its motor.
 
     Attributes
     ----------
     step : callable
-        From rotor speed, throttle, airspeed and density to thrust (N), torque of the air and of the
-        motor (N m).
+        Takes rotor speed, throttle, airspeed and density; returns thrust (N), torque of the air
+        and torque of the motor (N m).
     history : callable
         `propulsion.rotor_history` of this aircraft.
     rotor_kgm2 : float
@@ -44,8 +44,8 @@ class Powerplant:
     hub_m : (3,) Array
         From the nominal CG.
     of_power : callable, optional
-        From shaft power (W), airspeed and density of a flight to thrust (N), (n,); none where the
-        aircraft file does not describe a propeller.
+        Takes shaft power (W), airspeed and density of a flight; returns thrust (N), (n,). None
+        where the aircraft file does not describe a propeller.
     """
 
     step: Step
@@ -75,8 +75,9 @@ class Powerplant:
     def settled_slopes(
         self, throttle: float, airspeed_mps: float, density_kgpm3: float
     ) -> tuple[float, float]:
-        """Return how thrust, the rotor settled, changes with airspeed (N per m/s) and with density
-        (N per unit share)."""
+        """Return the slopes of thrust, rotor speed settled, by airspeed (N per m/s) and by
+        relative density (N).
+        """
 
         def thrust(faster: float, denser: float) -> float:
             around = np.full(SETTLED, airspeed_mps + faster)

@@ -230,7 +230,8 @@ def derivative(
         thrust, load = propeller(frame, x[ROTOR], ua * ax + wa * az, density_kgpm3)
         tx, tz = thrust * ax, thrust * az
         lx, ly, lz = frame.hub_m[0] - cx, frame.hub_m[1] - cy, frame.hub_m[2] - cz
-        # The motor's stator feels minus the motor torque; the air's torque ends on the rotor.
+        # Minus the motor torque acts on the stator, so on the airframe; the air's acts on the
+        # rotor.
         mx += ly * tz - drive * ax
         my += lz * tx - lx * tz
         mz += -ly * tx - drive * az

@@ -1,9 +1,9 @@
 """Whether the numbers of an aircraft file can belong to one aircraft.
 
-Judged by ratios that model aircraft and airliners share. A ratio that no body can have is an
-error; one that no known aircraft has is told to whoever uses the file, with both numbers, because
-it is most often a wrong unit. Figures of the bounds: F-104, X-15, F-16, Concorde, An-225, eta
-(sailplane of 31 m), Ultra Stick 25e, indoor models; Roskam, Airplane Design part V, table B.1.
+Ratios serve for model aircraft and airliners alike. A ratio that no body can have is an error. One
+that no known aircraft has is a warning with both numbers, most often of a wrong unit. Bounds are
+from: F-104, X-15, F-16, Concorde, An-225, eta (sailplane of 31 m), Ultra Stick 25e, indoor models;
+Roskam, Airplane Design part V, table B.1.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class Ratio:
         In words, with the numbers it is made of.
     value : float
     usual : (float, float)
-        Of the aircraft there are: beyond, it is told.
+        Range of known aircraft; outside it the user is warned.
     possible : (float, float)
-        Beyond, it is refused.
+        Outside this range the file is refused.
     """
 
     name: str

@@ -30,7 +30,7 @@ from host.errors import UsageError
 
 
 class TrimError(UsageError):
-    """No steady flight at the asked condition."""
+    """No steady flight exists at the requested condition."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,9 +132,9 @@ def solve(
     scale = [0.1, 0.1, 0.1, 0.1, 0.1, max(abs(guess[5]), 0.1)]
     try:
         fit = least_squares(residual, guess, x_scale=scale, xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    except ValueError:  # no throttle carries the propeller's load, or a number is none
+    except ValueError:  # no throttle balances the propeller's torque, or a number is NaN
         raise TrimError(
-            f"no trim at {airspeed_mps:.1f} m/s: the propeller has no answer there"
+            f"no trim at {airspeed_mps:.1f} m/s: no throttle balances the propeller"
         ) from None
     x, command, load = place(fit.x)
     if motor:

@@ -1,1 +1,1 @@
-"""What an instrument may be wrong by."""
+"""Errors that an instrument may have, with one standard deviation each."""

@@ -21,9 +21,9 @@ from host.instrument.instrument_errors import (
 from host.instrument.recording import FOREIGN, OWN, Recording
 from host.physical.calibration import Calibration
 
-LEAST_LAG_S = 1e-5  # of an IMU that nothing filtered
-LEAST_CLOCK_SHARE = 1e-5  # GPS leaves 0.2 ppm, which no interval shows
-VANE_DELAY_S = 8e-3  # about a vane's delay at trim: the filter model's error is a share of it
+LEAST_LAG_S = 1e-5  # stands for no low-pass at all, so that its bandwidth stays finite
+LEAST_CLOCK_SHARE = 1e-5  # GPS leaves 0.2 ppm, far too little to change an interval
+VANE_DELAY_S = 8e-3  # usual vane delay at trim, of which the filter model's error is a share
 POTS = {
     "elevator": ("pot_elevator",),
     "aileron": ("pot_aileron_left", "pot_aileron_right"),
@@ -61,9 +61,9 @@ class SensorErrorModel:
         return usual_servo.BANDWIDTH_HZ, usual_servo.RATE_LIMIT_RADPS
 
     def recorded(self, recording: Recording) -> SensorErrorModel:
-        """Return the same for a flight recorded so, with the low-pass that its IMU had.
+        """Return the model for one flight's recording, with the low-pass that its IMU had.
 
-        Of a table of others nobody says one: it is not taken out of the columns.
+        A table from others does not state one, so none is taken out of its columns.
         """
         if recording.imu_lag_s is None:
             of_others = recording.maker == FOREIGN
@@ -91,9 +91,9 @@ def sensor_error_model(
     source : str
         Aircraft.
     calibration : Calibration, optional
-        Of the instrument; standard errors without.
+        Calibration of the instrument; without one the standard errors count.
     defaults : bool
-        Whether its lines that nobody measured count too, as in `instrument_errors`.
+        Whether calibration lines that nobody measured count too, as in `instrument_errors`.
     maker : str
         Whose sensors they are (`Recording.maker`).
 
@@ -124,7 +124,7 @@ def sensor_error_model(
 def unknown_sensors(recording: Recording | None = None) -> SensorErrorModel:
     """Return the sensors of an aircraft without a file: typical dynamics, places at the CG.
 
-    Of a recording that is not our logger's they are wrong by more.
+    Sensors of a recording that is not our logger's have larger errors.
     """
     nowhere = (0.0, 0.0, 0.0)
     recording = recording or Recording()
@@ -199,7 +199,7 @@ def deviations(instrument: SensorErrorModel, airframe: AirframeData) -> dict[str
 
 
 def surface_deviations(instrument: SensorErrorModel) -> dict[str, float]:
-    """Return the standard deviations of the surfaces: of a pot, or of the servo without one."""
+    """Return the standard deviation of each surface angle: that of its pot, else of its servo."""
     e, commanded = instrument.errors, instrument.recording.commanded
     result = {
         f"{surface}_scale": e["pot_scale"].of_mean(*pots)

@@ -1,4 +1,4 @@
-"""Names of the errors of instrument and aircraft in sentences, and notes on what is uncertain."""
+"""Names of the errors of instrument and aircraft for people, and notes on uncertain recordings."""
 
 from __future__ import annotations
 

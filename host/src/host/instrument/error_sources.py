@@ -1,7 +1,7 @@
-"""Whose each error is: a file of the aircraft, an instrument, or one flight alone.
+"""What each error belongs to: an aircraft type, an aircraft file, an instrument or one flight.
 
-An error that a file has is the same in every flight that was read with it. So flights of one
-calibration share its errors, and those of one aircraft file its tolerances, however many they are.
+Flights read with one calibration share its errors, and flights of one aircraft file share its
+tolerances. Averaging such flights does not reduce these errors.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from host.instrument.instrument_errors import InstrumentErrors
 
 AIRCRAFT_FILE, INSTRUMENT, FLIGHT = "aircraft file", "instrument", "flight"
 TYPE = "type"
-# Where the air takes hold of a surface, and what ailerons do to the fin, no file and no flight has.
+# Arms of control forces and the sidewash of ailerons are the same in every aircraft of a type.
 _OF_TYPE = ("elevator_arm_share", "rudder_arm_share", "sidewash_share")
-# A quantity of `deviations` to the error of `standard.toml` that it is made of.
+# Error in `deviations` -> error in `standard.toml` that it follows from.
 _MADE_OF = {
     "mass_share": "mass_share",
     **{f"i{axis}{axis}_share": "inertia_share" for axis in "xyz"},
@@ -30,14 +30,14 @@ _MADE_OF = {
 
 
 def error_source(name: str, errors: InstrumentErrors) -> str:
-    """Return who has an error: `TYPE`, `AIRCRAFT_FILE`, `INSTRUMENT` or `FLIGHT`.
+    """Return what an error belongs to: `TYPE`, `AIRCRAFT_FILE`, `INSTRUMENT` or `FLIGHT`.
 
     Parameters
     ----------
     name : str
-        Of `host.instrument.deviations.deviations`.
+        A name in `host.instrument.deviations.deviations`.
     errors : InstrumentErrors
-        Of the flight. What they do not know by name is the instrument's.
+        Errors of the flight. A name that they do not have belongs to the instrument.
     """
     if name in _OF_TYPE:
         return TYPE

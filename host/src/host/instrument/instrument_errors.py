@@ -80,7 +80,7 @@ class NamedError:
         return self.sigmas[self.sensors.index(sensor)]
 
     def of_mean(self, *sensors: str) -> float:
-        """Return one standard deviation of the mean of some sensors' errors; none: of all."""
+        """Return one standard deviation of the mean error of these sensors (no names: of all)."""
         named = sensors or self.sensors
         common = sum(self.sigma(s) for s in named if s in self.shared)
         own = sum(self.sigma(s) ** 2 for s in named if s not in self.shared)
@@ -102,7 +102,7 @@ class InstrumentErrors:
         return iter(self.named.values())
 
     def scaled(self, factor: float, *names: str) -> InstrumentErrors:
-        """Return the same with some errors, or all, that many times as large."""
+        """Return a copy in which the named errors, or all, are `factor` times as large."""
         wanted = names or tuple(self.named)
         changed = {
             n: replace(self[n], width=tuple(factor * w for w in self[n].width)) for n in wanted
@@ -125,8 +125,9 @@ def standard_errors() -> InstrumentErrors:
 
 @cache
 def usual_errors(maker: str) -> InstrumentErrors:
-    """Return the errors of the sensors of a maker (`Recording.maker`) of whom no file says better:
-    those of `autopilot.toml` or `foreign.toml` in place of ours."""
+    """Return the errors to assume for a maker's sensors (`Recording.maker`) without a calibration:
+    those of `standard.toml`, with `autopilot.toml` or `foreign.toml` over them.
+    """
     found = dict(standard_errors().named)
     if maker == OWN:
         return InstrumentErrors(found)
@@ -152,11 +153,11 @@ def instrument_errors(
     calibration : Calibration, optional
         Gives the deviations of its measured lines and its tables [error.NAME].
     defaults : bool
-        Whether a line that nobody measured on this instrument counts too, because the columns
-        were made with it. Its deviations are those of a sensor out of the box. Without, the
-        standard holds.
+        Whether calibration lines that nobody measured on this instrument count too, because the
+        columns were made with them. Their deviations are those of a sensor out of the box; if they
+        do not count, the standard errors stay.
     maker : str
-        Whose sensors they are (`Recording.maker`); those of others are wrong by more.
+        Whose sensors they are (`Recording.maker`); sensors of others have larger errors.
 
     Raises
     ------
@@ -189,7 +190,7 @@ def instrument_errors(
 
 
 def _apply_line(found: dict[str, NamedError], name: str, line: Line) -> None:
-    """Replace the deviations of zero and slope of the sensors that a calibration's line is of."""
+    """Take zero and slope deviations from a calibration line for the sensors of that line."""
     channel = name.partition(".")[2]
     if name in IMU_LINES:
         zero, scale = IMU_LINES[name]
@@ -212,7 +213,7 @@ def _apply_line(found: dict[str, NamedError], name: str, line: Line) -> None:
 
 
 def _apply_table(error: NamedError, table: Mapping[str, object], where: str) -> NamedError:
-    """Return an error with the keys of its table in place of what it had; refuse a wrong one."""
+    """Return the error updated by its table [error.NAME]; raise for a wrong key or value."""
     unknown = [key for key in table if key not in KEYS]
     if unknown:
         raise CalibrationError(f"{where} has {unknown[0]!r}, expected of {', '.join(KEYS)}")

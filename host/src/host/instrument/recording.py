@@ -1,7 +1,8 @@
-"""How a flight was recorded, as far as its errors depend on it: surfaces commanded, clock checked.
+"""What the errors of a flight depend on: measured or commanded surfaces, clock with or without
+GPS.
 
-Where a pot measured a surface, no error of its servo is in the data; where GPS fitted the clock,
-what the fit left is all that stays open of its scale.
+A surface measured by a pot has no servo error. A clock fitted to GPS has only the scale error that
+the fit left.
 """
 
 from __future__ import annotations
@@ -14,20 +15,19 @@ OWN, AUTOPILOT, FOREIGN = "own", "autopilot", "foreign"  # who recorded a flight
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Which errors are in the columns of one flight.
+    """How the columns of one flight were recorded.
 
     Attributes
     ----------
     commanded : tuple of str
-        Of `SURFACES`, those whose column is the command: no pot measured them.
+        Surfaces whose column is the command, because no pot measured them.
     clock_share : float or None
-        One standard deviation of the clock's scale as GPS left it; None: nothing checked the
-        instrument's own clock.
+        One standard deviation of the clock's scale after the fit to GPS; None without GPS.
     maker : str
         ``own``: our logger; ``autopilot``: a log of PX4 or ArduPilot; ``foreign``: a table of
         others, of which no calibration of ours speaks.
     imu_lag_s : float or None
-        Delay of the IMU's low-pass as the recording says it; None: that of our own.
+        Delay of the IMU's low-pass as the recording states it; None for that of our own IMU.
     """
 
     commanded: tuple[str, ...] = ()

@@ -1,8 +1,7 @@
-"""What is known of servos beforehand: a prior of delay, bandwidth and rate limit.
+"""Prior of the servos: delay, bandwidth and rate limit.
 
-A column that is a command is ahead of its surface by all three. How far, and how well that is
-known, comes from the aircraft file and the instrument's errors; of a table of others from
-`foreign.toml`.
+A commanded column leads its surface by all three. Means and deviations come from the aircraft file
+and the instrument's errors, for a table of others from `foreign.toml`.
 """
 
 from __future__ import annotations
@@ -12,14 +11,14 @@ from dataclasses import dataclass
 
 from host.instrument.deviations import SensorErrorModel, imu_delay_s
 
-# One deviation of the rate limit: of the aircraft file's, and of usual servos, of which data sheets
-# say 0.10 to 0.23 s for 60 deg.
+# Relative standard deviation of the rate limit: from the aircraft file, and for usual servos,
+# whose data sheets give 0.10 to 0.23 s for 60 deg.
 KNOWN_RATE_SHARE, USUAL_RATE_SHARE = 0.10, 0.25
 
 
 @dataclass(frozen=True, slots=True)
 class ServoPrior:
-    """Means and standard deviations of what brings a surface behind its command.
+    """Means and standard deviations of the three numbers that make a surface lag its command.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The digital twin: pilot, aircraft, air and sensors that the logger flies in.
+"""The digital twin: pilot, aircraft, air and sensors around the logger.
 
 Nothing in here is imported by `host --help`; the compiled kernels need the extra ``compiled``.
 """

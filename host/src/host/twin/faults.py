@@ -1,8 +1,8 @@
-"""What may break in a flight: the faults a card can name, and what each one means.
+"""The faults that a flight card can name, and what each does.
 
-Numbers are those of the 25 faults of hardware facts, section 5. Two of them no card can hold: a
-program that hangs (23) is inside the recorder, a card has its consequence, `watchdog_reset`; power
-cuts at random instants (6) are many flights, a card has one, `power_cut`.
+Numbers 1 to 25 are those of the table in `twin/README.md`. Two of them are not in a card as such.
+A program that hangs (23) is inside the recorder; a card has its consequence, `watchdog_reset`.
+Power cuts at random instants (6) take many flights; a card has one, `power_cut`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class FaultKind:
     Attributes
     ----------
     number : int
-        Of hardware facts, section 5; 0 for others.
+        Its number in the table of `twin/README.md`; 0 for a fault outside it.
     text : str
         What happens, for the list a user reads.
     value : float
@@ -47,7 +47,7 @@ class FaultKind:
     lasts : bool
         Whether it ends after `duration_s`.
     from_start : bool
-        It stands at power-on: `at_s` must be 0.
+        Whether it is present from power-on on, so that `at_s` must be 0.
     """
 
     number: int
@@ -156,8 +156,7 @@ class Fault:
 
 
 def without_recorder(faults: Sequence[Fault]) -> list[Fault]:
-    """Return those that change nothing where no recorder flies along: the others are in the
-    aircraft, its vanes, pitots and pots."""
+    """Return the faults that only a recorder shows, not the aircraft, its vanes, pitots or pots."""
     outside = ("motor_cut", "receiver_lost", "receiver_failsafe")
     return [
         fault
@@ -178,7 +177,7 @@ class Action:
 def recorder_actions(faults: Sequence[Fault]) -> list[Action]:
     """Return, in order of time, what faults of card, supply and barometer do to the recorder.
 
-    All others are in what reaches its pins.
+    All other faults are in the signals at its pins (`stimuli`).
     """
     found = []
     for fault in faults:

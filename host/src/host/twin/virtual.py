@@ -25,16 +25,17 @@ CHAINS = ("sitl", "gps", "none", "true", "thesis")
 
 @dataclass(frozen=True, slots=True)
 class VirtualFlight:
-    """One flight as a study wants it.
+    """One simulated flight with its truth.
 
     Attributes
     ----------
     table : DataFrame
-        What the host gets, SI; ``t_s`` in true seconds since power-on, so that windows match.
+        The columns that identification gets, SI; ``t_s`` in true seconds since power-on, as the
+        windows.
     maneuvers : list of dict
         Windows, conditions, local derivatives and modes, as in the truth file.
     record : FlightRecord
-        Everything else that is true.
+        The simulated motion itself, with the drawn errors.
     """
 
     table: pd.DataFrame

@@ -1,1 +1,1 @@
-"""What is said of an aircraft before it flies: a handbook, a vortex lattice, a table."""
+"""Coefficients predicted before the flight: from a handbook, a vortex lattice, a table."""

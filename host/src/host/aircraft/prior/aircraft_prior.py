@@ -1,4 +1,4 @@
-"""What an aircraft's own file says of its coefficients: handbook, publication or other flights."""
+"""Prior coefficients out of an aircraft file: from a handbook, a publication or other flights."""
 
 from __future__ import annotations
 

@@ -4,9 +4,9 @@ Several outputs in one file make a table over the angle of attack. Derivatives b
 are per radian, rates are referred to half chord and half span over airspeed, as ours are. SB has
 derivatives by the velocities u, v, w over the airspeed instead of alpha and beta. Controls are per
 unit of AVL's control variable, taken for one degree of surface; their sign is the geometry file's
-choice and is turned to ours (Cm_de < 0, Cl_da > 0, Cn_dr < 0) by the moment they are for. Elevons
-are elevator or aileron by their larger moment. What Fortran had no room for (stars) or could not
-compute, and controls of other names, are named and left out.
+choice, so it is turned until Cm_de < 0, Cl_da > 0, Cn_dr < 0. Elevons count as elevator or as
+aileron by their larger moment. Values printed as stars or as no number, and controls of other
+names, are reported and left out.
 """
 
 from __future__ import annotations

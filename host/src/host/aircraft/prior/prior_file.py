@@ -1,4 +1,4 @@
-"""What a handbook or a vortex lattice said before the flight, beside what the flight says.
+"""Coefficients predicted before the flight (handbook, vortex lattice), to compare with the answer.
 
 TOML (`[coefficients]` with names as in the answer, per radian, body axes; with `alpha_deg = [...]`
 each may be a list, a table over the angle of attack; `[half_width]` their 95 % half-widths, as

@@ -19,7 +19,7 @@ class PriorError(UsageError):
 
 @dataclass(frozen=True, slots=True)
 class PriorTable:
-    """What a handbook or a vortex lattice says.
+    """Coefficients over the angle of attack, and where they come from.
 
     Attributes
     ----------
@@ -30,8 +30,8 @@ class PriorTable:
     source : tuple of str
         In words: configuration, flight condition, reference sizes, axes as printed.
     half_widths : dict
-        95 % half-width of some coefficients, at every angle of attack: what `host fleet` says of a
-        further aircraft. A handbook has none.
+        95 % half-width of some coefficients, the same at every angle of attack. `host fleet`
+        writes them for the next aircraft of a fleet; a handbook has none.
     """
 
     points: Points

@@ -1,7 +1,7 @@
-"""What differs from flight to flight and is not told to the host: drawn by seed.
+"""The random errors of one flight, drawn by seed and hidden from the host.
 
-How large, and how distributed, the instrument's own file says (`host.instrument`): the host sees
-the aircraft file and the calibration with the same deviations.
+Sizes and distributions come from `host.instrument`. The host gets the same deviations in the
+aircraft file and the calibration, but not the drawn values.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ PITOT_PA_PER_COUNT = 4.8828125  # MPXV7002DP on a 10-bit converter, hw/calibrati
 VANES = ("alpha_a", "alpha_b", "beta_a", "beta_b")
 PITOTS = ("dp_a", "dp_b")
 POTS = ("pot_elevator", "pot_aileron_left", "pot_aileron_right", "pot_rudder")
-# What is drawn, in this order: its error, whose, how often for each (x, y, z), in which unit.
+# In the order of drawing: name of the draw, its error, sensors, numbers per sensor (0: one in all;
+# 3: x, y, z), units of the error per unit of the draw.
 DRAWN_ERRORS: tuple[tuple[str, str, tuple[str, ...], int, float], ...] = (
     ("mass_share", "mass_share", (), 0, 1.0),
     ("inertia_share", "inertia_share", ("x", "y", "z"), 1, 1.0),
@@ -63,7 +64,7 @@ DRAWN_ERRORS: tuple[tuple[str, str, tuple[str, ...], int, float], ...] = (
     ("servo_delay_s", "servo_delay_s", SURFACES, 1, 1.0),
 )  # fmt: skip
 
-# Switches of a card and the draws they leave nominal.
+# Switch in a card's [sensors] -> draws that are nominal while it is off.
 GROUPS: dict[str, tuple[str, ...]] = {
     "imu_bias": ("gyro_bias_radps", "accel_bias_mps2"),
     "imu_scale": ("gyro_scale_share", "accel_scale_share"),
@@ -140,10 +141,11 @@ def draw(
     nominal : collection of str
         Keys of `GROUPS` whose draws are nominal while the others stay as they were.
     errors : InstrumentErrors, optional
-        Of the instrument that flies; without, the standard ones with the aircraft's tolerances.
+        Errors of the instrument that flies; without, the standard ones with the aircraft's
+        tolerances.
     of_instrument : numpy Generator, optional
-        What is constant of an instrument comes from here, so that several flights can share it;
-        without, every flight has an instrument of its own.
+        Draws the errors that are constant for an instrument, so that several flights can share
+        them; without, every flight has an instrument of its own.
 
     Returns
     -------
@@ -203,7 +205,7 @@ def flown(aircraft: Aircraft, draws: Draws) -> Airframe:
 def delay_s(
     nominal_s: float, share: float, least_s: float, errors: InstrumentErrors | None = None
 ) -> float:
-    """Return a drawn delay: by a share of the nominal one, by the least where that is more."""
+    """Return a delay with its drawn error: `share` of it, or `least_s` where that varies more."""
     e = errors or standard_errors()
     off = share * nominal_s
     if e["delay_share"].sigma("imu") * nominal_s < e["delay_least_s"].sigma("imu"):

@@ -40,18 +40,18 @@ from host.twin.testcard.cards import Card
 STEP_S = 1e-3
 RC_PERIOD_S = 0.020
 RC_CHANNELS = 5  # aileron, elevator, rudder, throttle, switch
-# Futaba: neutral 1520 us, +-400 us full throw (hardware facts 2.7).
+# Futaba: neutral 1520 us, +-400 us full throw.
 NEUTRAL_US = 1520.0
 THROW_US = 400.0
 IDLE_US = 1120.0
-STEER_RAD = 0.35  # bank towards what is aimed at
+STEER_RAD = 0.35  # bank with which the pilot turns towards the aim
 GAP_US = 300.0  # between the pulses of a sequential receiver
 JITTER_US = 1.0  # rms of a receiver's width
 LINK_OK, LINK_LOST, LINK_PRESET = 0, 1, 2  # state of the radio in one receiver frame
 
 
 class Hands(NamedTuple):
-    """Numbers of the pilot, the radio and what the servos make of it that the kernel needs."""
+    """Numbers of pilot, radio and servos that the kernel needs."""
 
     bank_gain: float
     pitch_gain: float
@@ -64,7 +64,7 @@ class Hands(NamedTuple):
     ground_steps: int
     cut_step: int
     height_m: float
-    servo_gain: Array  # of elevator, aileron, rudder: deflection over what the pulse asks for
+    servo_gain: Array  # elevator, aileron, rudder: real deflection over commanded deflection
     servo_zero_rad: Array
     servo_late_us: float
 
@@ -198,7 +198,7 @@ def fly_steps(
                 )
                 sine = min(max(-2 * (s[Q1] * s[Q3] - s[Q0] * s[Q2]), -1.0), 1.0)
                 theta = math.asin(sine)
-                # A pilot feels airspeed by sound and response, gusts left out.
+                # A pilot judges airspeed by sound and response, so gusts are left out.
                 su, sv, sw = rotate_to_body(s, wind[0], wind[1], wind[2])
                 seen = math.sqrt((s[0] - su) ** 2 + (s[1] - sv) ** 2 + (s[2] - sw) ** 2)
                 weight = attention[i]
@@ -429,7 +429,7 @@ def fly(
 
 
 def _refuse_unfit(plane: Aircraft, card: Card) -> None:
-    """Raise AircraftError where a card asks a linear aircraft for what it knows nothing of."""
+    """Raise AircraftError where a linear aircraft lacks the card's motor cut or airspeed."""
     speed = plane.scalar("trim.airspeed_mps")
     if any(fault.kind == "motor_cut" for fault in card.faults):
         raise AircraftError(f"{plane.name}: linear, it has no motor to cut as {card.name} wants")

@@ -1,4 +1,4 @@
-"""The pilot: from a flight card to what the hands and the eyes do, second by second."""
+"""The pilot: from a flight card to stick inputs and corrections on the time grid of the flight."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from host.twin.testcard.input_shapes import STEPS, staircase
 
 CROSSOVER_RADPS = 1.2  # of attitude control by eye; a person on the ground manages about 1-2 rad/s
 WINDOW_TAIL_S = 3.0
-BROKEN_OFF = (0.2, 0.7)  # share of an input after which it is let go, drawn evenly
+BROKEN_OFF = (0.2, 0.7)  # an input broken off ends after a share of its length, drawn evenly
 SWITCH_DIRECT_US, SWITCH_MEGA_US, SWITCH_ARMED_US = 1100.0, 1675.0, 1900.0
 LET_GO_S = 0.4  # before the trigger the sticks are let go
 RELEASED_S = 0.3  # behind the input the switch goes back
@@ -32,7 +32,7 @@ RELEASED_S = 0.3  # behind the input the switch goes back
 STIR_S, SIGN_S, SIGN_END_S = 7.0, 12.0, 15.4
 AIM_M = 500.0  # from home, ahead or behind: what a pilot steers at
 NOWHERE_M = 1e9
-FULL_RAD = 10.0  # beyond every surface: held at its end
+FULL_RAD = 10.0  # larger than any surface limit, so that the surface goes to its end
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def schedule(
     ----------
     card : Card
     airspeed_mps : float
-        Wanted where the card does not say.
+        Airspeed to hold where the card does not state one.
     step_s : float
     rng : numpy Generator
     by_logger : bool
@@ -135,7 +135,7 @@ def schedule(
         if s.airspeed_mps > 0.0:
             result.airspeed_mps[span] = s.airspeed_mps
         if s.kind == "turn":
-            # The bank is rolled in and out over a second each by the wish itself.
+            # The wanted bank itself takes a second to roll in and a second to roll out.
             local = t[span] - begin
             share = np.clip(np.minimum(local, s.duration_s - local), 0.0, 1.0)
             result.bank_rad[span] = math.radians(s.bank_deg) * share
@@ -197,7 +197,7 @@ def _fly_input(
         lengths = np.array([length for _, length in STEPS[s.kind]]) * s.width_s
         edges = np.concatenate([[0.0], np.cumsum(lengths)])
         edges = edges + rng.normal(0.0, pilot.timing_s, len(edges))
-        edges = start_s + np.maximum.accumulate(edges)  # a hand is never back before it left
+        edges = start_s + np.maximum.accumulate(edges)  # drawn errors must not swap two edges
         broken_off = pilot.breaks_off > 0.0 and rng.random() < pilot.breaks_off
         if broken_off:
             share = rng.uniform(*BROKEN_OFF)
@@ -242,7 +242,7 @@ def _span(t: Array, first_s: float, last_s: float) -> slice:
 def gains(frame: Airframe, trim: Trim) -> Array:
     """Return the pilot's gains: aileron per bank, elevator per pitch error (rad/rad).
 
-    They give every aircraft the same crossover, as a pilot does who knows his aircraft.
+    With them every aircraft has the same crossover frequency, as with a pilot who knows it.
 
     Returns
     -------

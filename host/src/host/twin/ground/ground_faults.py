@@ -1,6 +1,6 @@
-"""What may be wrong with an aircraft on the ground: each draws its place and its size.
+"""Faults of an aircraft on the ground; each draws where it occurs and how large it is.
 
-A fault spoils what hands do (`walk`), or what the logger says of it (`frames`).
+A fault alters the motions of the aircraft (`walk`), or the logger's frames of them (`frames`).
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def _airspeed_offset(walk: GroundWalk) -> str:
 
 
 def _counts(value: int, names: tuple[str, ...]) -> Callable[[GroundWalk, GroundFrames], str]:
-    """An open or shorted wire: the end of the range, marked as such by the logger."""
+    """Return an open or shorted wire: counts at an end of the range, marked invalid."""
 
     def spoil(walk: GroundWalk, frames: GroundFrames) -> str:
         name = _one(walk, names)
@@ -261,7 +261,7 @@ def _gyro_saturated(walk: GroundWalk, frames: GroundFrames) -> str:
 
 
 def _gyro_deaf(walk: GroundWalk, frames: GroundFrames) -> str:
-    """Noise, but no rate."""
+    """Leave the noise of a gyro and take away its rate."""
     name, ident = _one(walk, ("p", "q", "r")), frames.ident
     ident[name] = np.round(walk.rng.normal(0.0, 3.3, len(ident)))
     return "imu_turned"
@@ -274,7 +274,7 @@ def _gyro_reversed(walk: GroundWalk, frames: GroundFrames) -> str:
 
 
 def _gyros_swapped(walk: GroundWalk, frames: GroundFrames) -> str:
-    """An IMU turned on its floor: x and y of gyros and accelerometer are each other's."""
+    """Turn the IMU on its floor: x and y of gyros and accelerometers are exchanged."""
     ident = frames.ident
     for one, other in (("p", "q"), ("ax", "ay")):
         ident[one], ident[other] = ident[other].copy(), ident[one].copy()
@@ -347,7 +347,7 @@ def _sense(engaged: bool) -> Callable[[GroundWalk, GroundFrames], str]:
 
 
 def _welded(walk: GroundWalk, frames: GroundFrames) -> str:
-    """A contact that welds when it first closes."""
+    """Weld the relay's contact when it first closes."""
     bit = np.uint16(frames.schema.bit("valid", SENSE))
     first = int(np.argmax((frames.ident["valid"] & bit) != 0))
     frames.ident["valid"][first:] |= bit
@@ -487,7 +487,7 @@ def _radio_bursts(walk: GroundWalk, frames: GroundFrames) -> str:
 
 
 def _row_after_rest(walk: GroundWalk) -> int:
-    """Return a row behind the aircraft's rest, before the radio's turn."""
+    """Draw a row after the aircraft's rest and before the item of the radio."""
     return int(walk.rng.integers(walk.rows("imu_turned").stop, walk.rows("supply").start))
 
 

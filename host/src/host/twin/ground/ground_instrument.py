@@ -1,4 +1,4 @@
-"""A walk as the logger says it: counts with every tolerance drawn, frames of the radio."""
+"""The logger's frames of a walk: counts with every tolerance drawn, as the radio sends them."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def surface_angles(walk: GroundWalk, draws: Draws) -> dict[str, Array]:
 
 
 def ground_frames(walk: GroundWalk) -> GroundFrames:
-    """Return what a healthy logger with drawn tolerances says of a walk.
+    """Return the frames of a walk from a healthy logger with drawn tolerances.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def _health(walk: GroundWalk, schema: Schema, ident: Any, system: Any) -> None:
 
 
 def working(walk: GroundWalk, system: Any) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Return at which frames `system` all servos work."""
+    """Return a mask of the frames `system` during which all servos are moving."""
     rows = walk.rows("supply")
     t_s = (system["t_us"] - START_US) * 1e-6
     return np.asarray((t_s > rows.start * STEP_S + 1.0) & (t_s < rows.stop * STEP_S - 0.5))

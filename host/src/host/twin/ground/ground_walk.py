@@ -1,6 +1,6 @@
-"""What hands do before a flight, item by item: motions drawn as people differ.
+"""The motions of a preflight walk, item by item, drawn as people differ.
 
-True values at the rows of the radio, 20 a second; nothing of the instrument is in here.
+True values at the radio's 20 rows a second; errors of the instrument are not in here.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ class GroundWalk:
     throttle_us, switch_us : (n,) array
     transmitter : (n,) array of bool
     preset : bool
-        What the receiver does without it: preset pulses, else none.
+        Whether the receiver sends preset pulses while the transmitter is off; else none.
     preset_us : dict of str to float
         Those pulses.
     surface_share : dict of str to float
-        Of its travel that a surface does, with a sign.
+        Share of its travel that a surface moves, with a sign.
     """
 
     aircraft: Aircraft
@@ -140,7 +140,7 @@ def _moved(
 
 
 def _lifted(walk: GroundWalk, name: str) -> Array:
-    """A vane lifted to both stops of its housing, and let go."""
+    """Return the angle of a vane that is lifted to both stops of its housing and let go."""
     rng = walk.rng
     before, after = rng.uniform(-8.0, 8.0, 2)
     up, down = STOP_DEG + rng.uniform(-1.5, 1.5), -STOP_DEG + rng.uniform(-1.5, 1.5)
@@ -151,7 +151,7 @@ def _lifted(walk: GroundWalk, name: str) -> Array:
 
 
 def _blown(walk: GroundWalk, item: str) -> Array:
-    """A pitot blown into through a hose that is pinched and let go."""
+    """Return the pressure in a pitot that is blown into through a hose, pinched and let go."""
     rng = walk.rng
     peak, lost = rng.uniform(120.0, 700.0), rng.uniform(0.0, 0.08)
     times = np.cumsum([0.0, rng.uniform(0.2, 0.6), rng.uniform(2.3, 3.5), rng.uniform(0.03, 0.15)])
@@ -160,7 +160,7 @@ def _blown(walk: GroundWalk, item: str) -> Array:
 
 
 def _full_stick(walk: GroundWalk, surface: str) -> Array:
-    """A stick to one end, to the other, and let go."""
+    """Return the motion of a stick to one end, to the other, and back."""
     rng = walk.rng
     one, other = rng.uniform(0.97, 1.0, 2)
     go, hold = rng.uniform(0.25, 0.6), rng.uniform(0.25, 0.5)
@@ -170,7 +170,7 @@ def _full_stick(walk: GroundWalk, surface: str) -> Array:
 
 
 def _stirred(walk: GroundWalk) -> Array:
-    """Every stick stirred at once while the supply is watched."""
+    """Return the motion of a stick while all are stirred and the supply is watched."""
     rng, rows = walk.rng, walk.rows("supply")
     out = np.zeros(walk.windows[-1][2])
     t_s = np.arange(rows.stop - rows.start) * STEP_S

@@ -1,1 +1,1 @@
-"""What is written of a flight: tables, truth, verdict, picture."""
+"""Files written after a flight: tables, truth, verdict, picture."""

@@ -1,4 +1,4 @@
-"""A flight as an ArduPilot plane would have logged it: messages, rates, parameters."""
+"""A flight as an ArduPilot plane logs it: messages, rates, parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The same flight as other autopilots had logged it, by the name of the format."""
+"""Writers of the same flight as logs of other autopilots, by the name of the format."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from host.twin.outcome.ardupilot_log import write_ardupilot_log
 from host.twin.outcome.px4_log import write_px4_log
 from host.twin.sensors.local_flow import AirData
 
-# No `flight.BIN`: on many disks that is `flight.bin`, the recorder's own.
+# Not `flight.BIN`: where case does not count, that is the recorder's own `flight.bin`.
 NAMES = {"ulog": ".ulg", "dataflash": ".ardupilot.bin", "tlog": ".tlog"}
 
 

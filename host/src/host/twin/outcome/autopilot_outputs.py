@@ -1,4 +1,4 @@
-"""What an autopilot's outputs are for the surfaces of the twin: mixers and servo pulses, forward.
+"""An autopilot's outputs for the surfaces of the twin: mixers and servo pulses, forward.
 
 Shares are of full travel in our signs: trailing edge down and left positive. An autopilot's demand
 is positive for roll right, nose up, nose right.
@@ -37,7 +37,7 @@ class Servo:
         return np.round(self.trim_us + np.where(asked > 0.0, asked * up, asked * down))
 
 
-# Ends and trims are uneven on purpose: a reader that takes 1500 for neutral is found out.
+# Ends and trims are uneven on purpose, so that a reader that takes 1500 for neutral fails.
 ARDUPILOT: dict[str, tuple[Servo, ...]] = {
     "conventional": (
         Servo(4, 1100, 1500, 1900),
@@ -78,7 +78,7 @@ def demands(record: FlightRecord, at_s: Array, airframe: str) -> dict[str, Array
     ends_s = np.cumsum(record.pulses_us[:, :4] + GAP_US, axis=1) * 1e-6
     share = {}
     for column, axis in enumerate(RECEIVER):
-        # A servo moves when its pulse has ended: that is the output of then.
+        # A servo moves when its pulse has ended, so the output is that of the last whole pulse.
         latched_s = record.pulse_starts_s + ends_s[:, column]
         row = np.maximum(np.searchsorted(latched_s, at_s, side="right") - 1, 0)
         share[axis] = record.pulses_us[row, column]

@@ -1,4 +1,4 @@
-"""A decoded table against the truth of its flight, within what the sensors' errors allow."""
+"""Compare a decoded table with the truth of its flight, within limits from the sensors' errors."""
 
 from __future__ import annotations
 

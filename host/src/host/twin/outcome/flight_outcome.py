@@ -28,7 +28,7 @@ Progress = Callable[[str, float], None]
 
 @dataclass(slots=True)
 class Outcome:
-    """What a virtual flight left behind.
+    """The results of a virtual flight, and its files.
 
     Attributes
     ----------
@@ -36,9 +36,9 @@ class Outcome:
     data : AirData
     files : list of Path
     table : DataFrame or None
-        What the picture shows: decoded, ideal or thesis rows.
+        Table that the picture shows: decoded, ideal or thesis rows.
     recording : Recording or None
-        With the firmware on this computer.
+        What the recorder left, with `firmware` ``sitl`` or ``avr``.
     deviations : list of Deviation
         The decoded log against the truth.
     first_row_s : float
@@ -203,7 +203,7 @@ def simulate(
                 second_name="thesis logger",
             )
             outcome.files.append(image)
-        except ImportError as error:  # the flight is worth more than its picture
+        except ImportError as error:  # a missing picture must not cost the flight
             outcome.missing = error.name or "matplotlib"
         clock.mark("picture")
     outcome.wall_s, outcome.processor_s = clock.wall_s, clock.processor_s
@@ -245,7 +245,7 @@ def _written(recording: sitl.Recording, outcome: Outcome, folder: Path) -> Path 
 
 
 def _decoded(outcome: Outcome, path: Path, folder: Path, chip: Imu | None) -> pd.DataFrame:
-    """Decode the log as its owner would, and put its rows on true time for the picture.
+    """Decode the log with its calibration, and put its rows on true time for the picture.
 
     `chip` are the IMU's samples where the recorder's clock begins later than the flight.
     """
@@ -260,7 +260,8 @@ def _decoded(outcome: Outcome, path: Path, folder: Path, chip: Imu | None) -> pd
 
 
 def _csv(table: pd.DataFrame, path: Path) -> list[Path]:
-    # The bytes of pandas' own `to_csv` in a fifth of its time, which was half of a flight's.
+    # Writes the same bytes as pandas' `to_csv` in a fifth of its time, which was half of a
+    # flight's.
     row = ",".join(["%.9g"] * len(table.columns)) + "\n"
     text = "".join(row % tuple(values) for values in table.to_numpy(float).tolist())
     header = ",".join(table.columns) + "\n"

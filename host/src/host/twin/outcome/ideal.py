@@ -1,4 +1,4 @@
-"""`--firmware none`: the table that a perfect recorder would decode to, for studies.
+"""`--firmware none`: the table that a perfect recorder would give, for studies.
 
 Either what the sensors measured (noise, lags, errors of the flight, converted with the nominal
 calibration) without any firmware between, or the truth itself.
@@ -148,7 +148,7 @@ def measured_table(record: FlightRecord, data: AirData | None = None) -> pd.Data
     for name in CHANNELS[:6]:
         unit = "pa" if name.startswith("dp") else "rad"
         columns[f"{name}_{unit}"] = on(vane_at, si[name])
-    # What makes a table one of our logger (`sysid/flight/recorded.py`): pots, and who drives.
+    # By these columns a table counts as our logger's: pots, and who drives the servos.
     columns |= {
         "elevator_pot_rad": columns["elevator_rad"],
         "aileron_left_rad": on(vane_at, si["pot_aileron_left"]),
@@ -160,7 +160,7 @@ def measured_table(record: FlightRecord, data: AirData | None = None) -> pd.Data
 
 
 def gps_columns(record: FlightRecord) -> dict[str, Array]:
-    """Return what GPS says at the rows of `measured_table`: lines between fixes as they arrive.
+    """Return GPS velocity at the rows of `measured_table`: linear between fixes as they arrive.
 
     Parameters
     ----------

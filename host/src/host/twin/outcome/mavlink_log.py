@@ -1,4 +1,4 @@
-"""A flight as a ground station recorded an ArduPilot plane over a fast link."""
+"""A flight as a ground station records it from an ArduPilot plane over a fast link."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
 """The thesis's own logger as a chain of sensors: rows of 10 or 20 a second, with all its faults.
 
-Hardware facts 1.2, 1.3 and 1.6, by their numbers: D1 the vane expression overflows int16; D3 zeros
-from boot, one sample of a vane and 4 s of pressure; D4 the halves of an IMU sample alternate and
-are one or two rows old; D8 altitude in whole metres with a dead band; D9 sea-level standard
-pressure; D10 pressure clipped at zero, filtered twice; D11 surfaces are commands through hand-made
-maps; D12 no time in the row. Speed in km/h.
+Faults of its program (thesis, appendix C), numbered for the comments below: D1 the vane expression
+overflows int16; D3 zeros are taken at boot, from one sample of a vane and 4 s of pressure; D4 the
+halves of an IMU sample alternate and are one or two rows old; D8 altitude in whole metres with a
+dead band; D9 sea-level standard pressure; D10 pressure clipped at zero and filtered twice; D11
+surfaces are commands through hand-made maps; D12 no time in the row. Speed is in km/h.
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ def _speed_kmh(count: Array, reference: float) -> Array:
 def _boot_reference(record: FlightRecord, data: AirData, rng: np.random.Generator) -> Array:
     """Return both zeros of pressure (kPa): 200 readings in 4 s of boot through the same filter.
 
-    D3; a shorter stand leaves less time for the same 200.
+    D3. Where the flight stands for less than 4 s, the 200 readings are closer together.
     """
     last_s = max(0.05, min(4.05, record.card.flight.ground_s - 0.1))
     at = np.linspace(0.05, last_s, BOOT_READINGS)
@@ -183,7 +183,7 @@ def _kpa(count: Array) -> Array:
 
 
 def _altitude(record: FlightRecord, data: AirData, at: Array, rng: np.random.Generator) -> Array:
-    """Whole metres above sea-level standard, a 2 m dead band, locked beyond 100 m: D8, D9."""
+    """Return altitude by standard sea level in whole metres, dead band 2 m: D8, D9."""
     pressure = np.interp(at + PRESSURE_AT_S, record.t_s, data.static_pa)
     pressure = pressure + rng.normal(0.0, 3.0, len(at)) + record.draws.scalar("baro_offset_pa")
     metres = np.trunc(44330.0 * (1.0 - (pressure / 101325.0) ** 0.1903))

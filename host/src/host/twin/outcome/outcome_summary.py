@@ -1,4 +1,4 @@
-"""What a virtual flight is worth saying: lines for people, the same for programs, its check."""
+"""Summary of a virtual flight: lines for people, a document for programs, the check of its log."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ APART = ("load", "picture")  # stages that are not the flight
 
 
 def document(outcome: Outcome, firmware: str) -> dict[str, Any]:
-    """Return a flight for programs."""
+    """Return the summary for programs."""
     record = outcome.record
     return {
         "card": record.card.name,
@@ -39,7 +39,7 @@ def document(outcome: Outcome, firmware: str) -> dict[str, Any]:
 
 
 def lines(outcome: Outcome, firmware: str) -> list[str]:
-    """Return a flight for people: what was flown, how fast, what came of it, what was written."""
+    """Return the summary for people: what was flown and how fast, the outcome, the files."""
     record, duration_s = outcome.record, _duration_s(outcome)
     card = record.card
     found = [
@@ -64,7 +64,7 @@ def lines(outcome: Outcome, firmware: str) -> list[str]:
 
 
 def check(outcome: Outcome) -> None:
-    """Hold the decoded log against the truth, unless a fault makes it wrong.
+    """Compare the decoded log with the truth, unless a fault makes it wrong.
 
     Raises
     ------

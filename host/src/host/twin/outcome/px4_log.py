@@ -1,4 +1,4 @@
-"""A flight as a PX4 plane would have logged it: topics, rates, parameters."""
+"""A flight as a PX4 plane logs it: topics, rates, parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The truth of a flight: what an identification is judged by, and never given.
+"""The truth files of a flight, against which an identification is judged; it never reads them.
 
 `NAME.truth.npz` holds time series, `NAME.truth.toml` everything that is one number per flight or
 per maneuver.
@@ -197,7 +197,8 @@ def write(
     data : AirData
     stem : Path
     first_row_s : float
-        True time since power-on of the log's first row: times here minus it are times of its table.
+        True time since power-on of the log's first row. Subtracted from a time here it gives the
+        table's `t_s`.
 
     Raises
     ------

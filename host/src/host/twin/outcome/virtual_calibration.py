@@ -35,7 +35,7 @@ def calibration(aircraft: Aircraft, errors: InstrumentErrors | None = None) -> s
     ----------
     aircraft : Aircraft
     errors : InstrumentErrors, optional
-        What the file is to say of the instrument; the standard without.
+        Errors to state in the file; the standard ones by default.
     """
     errors = errors or instrument_errors(aircraft)
     default = tomllib.loads(resource("default.toml").read_text(encoding="utf-8"))
@@ -89,7 +89,7 @@ def calibration(aircraft: Aircraft, errors: InstrumentErrors | None = None) -> s
 
 
 def _is_stated(error: NamedError) -> bool:
-    """Return whether neither a line nor the aircraft file says all of an error."""
+    """Return whether an error needs a table: no line and no aircraft file states all of it."""
     if error.aircraft_file:
         return False
     usual = standard_errors()[error.name]
@@ -98,7 +98,7 @@ def _is_stated(error: NamedError) -> bool:
 
 
 def _table(error: NamedError) -> dict[str, object]:
-    """Return a table [error.NAME]; of what the lines say, how it is drawn only."""
+    """Return a table [error.NAME], without the size where lines state it."""
     table: dict[str, object] = {
         "distribution": error.distribution,
         "drawn": error.drawn,

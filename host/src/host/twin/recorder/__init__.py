@@ -1,1 +1,3 @@
-"""The firmware flown: as a library of this computer or in the chip simulator."""
+"""The recorder's firmware run through a flight: as a library of this computer or on the simulated
+chip.
+"""

@@ -54,7 +54,7 @@ def record(
     seed: int = 0,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Recording:
-    """Let the Mega's image live through a flight in the chip simulator.
+    """Run the Mega's image through a flight in the chip simulator.
 
     Parameters and return value are those of `sitl.record`.
 

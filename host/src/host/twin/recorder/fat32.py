@@ -15,7 +15,7 @@ PARTITION_START = 2048
 RESERVED = 32
 SECTORS_PER_CLUSTER = 8
 END_OF_CHAIN = 0x0FFFFFF8
-CARD_BYTES = 512 * 1024 * 1024  # address space only: untouched pages cost nothing
+CARD_BYTES = 512 * 1024 * 1024  # reserved address space: untouched pages take no memory
 
 
 class CardImageError(ValueError):

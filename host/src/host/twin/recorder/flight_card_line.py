@@ -6,7 +6,7 @@ from host.link.card_console import CardConsole
 from host.twin.recorder.recorder_build import recorder_library
 from host.twin.recorder.sitl_library import TICKS_PER_S, Port, Sitl
 
-GROUND_S = 20.0  # with a single sensor the ground is known after 18 s
+GROUND_S = 20.0  # with a single sensor the recorder is sure of the ground after 18 s
 STEP_S = 0.02
 
 
@@ -23,7 +23,7 @@ class SitlLine:
         return self._sitl.now() / TICKS_PER_S
 
     def data(self) -> bytes:
-        """Return the bytes that the instrument sent in the next moment."""
+        """Return the bytes that the instrument sends in the next millisecond."""
         self._sitl.run_for(STEP_S)
         sent = self._sitl.sent(Port.USB)
         new, self._read = sent[self._read :], len(sent)
@@ -36,7 +36,7 @@ class SitlLine:
 
 
 def eeprom_with_card(settings: bytes, flight_card: bytes) -> bytes:
-    """Return the EEPROM (4096 bytes) behind `host card write`.
+    """Return the EEPROM (4096 bytes) after `host card write` of a flight card.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def eeprom_with_card(settings: bytes, flight_card: bytes) -> bytes:
     Raises
     ------
     CardError
-        What the recorder says against the card.
+        The recorder refuses the card.
     """
     sitl = Sitl(recorder_library())
     try:

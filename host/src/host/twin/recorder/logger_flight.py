@@ -1,8 +1,8 @@
-"""A flight whose inputs the logger flies: aircraft and recorder, each with the other's answer.
+"""A flight whose inputs the logger flies: aircraft and recorder are run in turns.
 
-The aircraft is flown with what the logger added, the logger lives through that flight, and both
-are repeated until neither changes. What is added follows the clock and the card, so two rounds
-are enough, a third where a limit ended an input.
+The aircraft flies with the inputs that the logger added, then the recorder runs through that
+flight, until neither changes. The inputs follow from clock and card, so two rounds are enough, or
+three where a limit ended an input.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ BEHIND_S = 0.05  # the last pulse of a row, behind its end
 
 @dataclass(frozen=True, slots=True)
 class LoggedInput:
-    """One row as the log tells it.
+    """One row of the flight card, as the log's events date it.
 
     Attributes
     ----------
@@ -69,11 +69,11 @@ def logger_flight(
     Parameters
     ----------
     flight_card : bytes
-        What the logger has, made of `card` by `host plan --card`.
+        Flight card in the logger, made from `card` by `host plan --card`.
     card : Card
     seed : int
     recorder : callable
-        Lets the recorder with that flight card live through the stimuli of a flight.
+        Runs the recorder with that flight card through the stimuli of a flight.
     aircraft : Aircraft, optional
         In place of the card's.
 
@@ -82,7 +82,7 @@ def logger_flight(
     FlightRecord
         Its windows are the rows that were flown.
     Stimuli, Recording
-        Of a round in which aircraft and logger agreed on what the logger added.
+        Those of the last round, in which the added inputs no longer changed.
 
     Raises
     ------
@@ -157,7 +157,8 @@ def added_us(
 ) -> Array:
     """Return what the logger added to the sticks (n, 3), us, at the steps of a flight.
 
-    A pulse is held against the stick's last one before it, as the recorder made it of that.
+    Each servo pulse is compared with the stick's last pulse before it, from which the recorder
+    made it.
     """
     ticks = np.arange(len(flown.t_s)) * STEP_S * (1.0 + clock_share(flown)) * TICKS_PER_S
     added = np.zeros((len(ticks), len(AXES)))

@@ -1,8 +1,8 @@
-"""A walk through the recorder's own program: what its pins see, and what its radio sends of it.
+"""A preflight walk run through the recorder's own program: its pins and its radio.
 
-The pins see what the frames of `ground_instrument` say, 50 times finer: voltages, pulses, packets
-and messages whose readings those frames are. So a fault of sensors or hands is one of the pins too;
-what the logger itself makes of it (events, counters, marks of validity) is its own.
+The pins get the voltages, pulses, packets and messages that `ground_instrument` put into frames,
+50 times finer. So a fault of sensors or hands reaches the pins too. Events, counters and marks of
+validity come from the recorder itself.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from host.wire.schema_text import packed_schema
 
 GRID_S = 0.01
 CONVERSIONS = 4  # summed in a logged count
-OFF = -32768  # of the IMU: no value, so no packet
+OFF = -32768  # an IMU value that means none, so that no packet is sent
 SPREAD_COUNT = 0.4  # rms, as in flight; a sum of four lies finer than a count
 _LOG_RATE_HZ = 100
 _FILE_BLOCKS = 20_000
@@ -43,7 +43,7 @@ Prepare = Callable[[Sitl], None]
 def recorded_walk(
     walk: GroundWalk, frames: GroundFrames, prepare: Prepare = lambda _: None
 ) -> Iterator[tuple[float, bytes]]:
-    """Yield the time (us since power-on) and what the recorder's radio sends until then.
+    """Yield times (us since power-on) and the bytes that the recorder's radio sent up to each.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def recorded_walk(
     frames : GroundFrames
         As `ground_frames` or `broken_walk` gives them.
     prepare : callable
-        Alters the world of the recorder before it is switched on: a relay that is cut.
+        Alters the simulated hardware before power-on, for example cuts the relay.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def recorded_walk(
 
 
 def _give(instrument: Sitl, frames: GroundFrames) -> None:
-    """Hand over everything that reaches the pins from power-on to the walk's end."""
+    """Give the instrument every signal at its pins from power-on to the walk's end."""
     ident, slow = frames.ident, frames.slow
     offset = int(ident["t_us"][0]) - START_US
     t_s = ((ident["t_us"].astype(np.int64) - offset) % (1 << 32)) * 1e-6

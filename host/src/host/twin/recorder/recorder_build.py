@@ -1,8 +1,8 @@
-"""The recorder for this computer: found, or built on first use from the sources in the package.
+"""Find the recorder's library for this computer, or build it from the sources in the package.
 
-The wheel carries the firmware's own C++ (`host/data/recorder`); in a clone they are the clone's.
-Nothing is downloaded: the compiler is the user's, or that of PyPI's ziglang if it is installed.
-Light imports only, so that a computer without a compiler is told so at once.
+The wheel holds the firmware's own C++ (`host/data/recorder`); a clone uses its firmware folder.
+Nothing is downloaded: the compiler is the user's, or PyPI's ziglang if it is installed. Imports
+are light, so that a missing compiler is reported at once.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from host.resources import CLONE, PACKED, user_cache
 
 Progress = Callable[[str, float], None]
 
-# Those of firmware/toolchain/build_sitl.py, which a test compares.
+# The same flags as in firmware/toolchain/build_sitl.py; a test compares them.
 ROOMS = ("core", "core/learning", "drivers", "storage", "app", "boards/sitl")
 HEADERS = ("hal", "generated")
 STANDARD = "-std=gnu++14"
@@ -41,7 +41,7 @@ _RUNTIME_S = 100  # ziglang compiles its C++ library first
 
 
 def recorder_library(progress: Progress = lambda *_: None) -> Path:
-    """Return the library: HOST_SITL, that of the clone, one built before, else build it.
+    """Return the library: HOST_SITL's, the clone's, one built before, or one built now.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def existing_library() -> Path | None:
 
 
 def check_recorder() -> None:
-    """Refuse at once where no recorder is there and none can be built.
+    """Raise at once where there is no recorder and none can be built.
 
     Raises
     ------

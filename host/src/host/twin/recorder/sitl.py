@@ -1,6 +1,7 @@
-"""The recorder itself, as a shared library in simulated time.
+"""Run the recorder, a shared library, through a flight in simulated time.
 
-What a flight does to it and what a card is afterwards; the C interface is `sitl_library`.
+Gives it the stimuli and faults of the flight and reads its card; `sitl_library` is the C
+interface.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ class Recording:
 
 
 def recorder_rate_hz(wanted_hz: float) -> int:
-    """Return the recorder's rate for a card: the card's if it knows it, else 100 Hz."""
+    """Return the rate to set: the flight card's if the recorder has it, else 100 Hz."""
     return int(wanted_hz) if wanted_hz in RATES_HZ else 100
 
 
@@ -86,7 +87,7 @@ def record(
     flight_card: bytes = b"",
     progress: Callable[[float], None] = lambda _: None,
 ) -> Recording:
-    """Let the recorder live through a flight.
+    """Run the recorder through a flight.
 
     Parameters
     ----------
@@ -178,7 +179,7 @@ def _record(
     state = sitl.state()
     servos = np.rec.fromarrays(sitl.pulses(), dtype=SERVO_PULSE)
 
-    # The pilot pulls the battery; at the bench the next power-on closes the file.
+    # The pilot pulls the battery; the next power-on, at the bench, closes the file.
     sitl.power_cut(seed & 0xFFFFFFFF)
     close_start = end + TICKS_PER_S
     sitl.run_until(close_start)
@@ -195,7 +196,8 @@ def _record(
 
 
 def file_of(image: mmap.mmap, faults: Sequence[Fault]) -> tuple[bytes, str]:
-    """Return the flight's file and its name; no bytes and why, where a fault lets be none."""
+    """Return the flight's file and its name; no bytes and the reason where a fault prevents one.
+    """
     reasons = [NO_FILE[fault.kind] for fault in faults if fault.kind in NO_FILE]
     try:
         files = CardReader(image).files()
@@ -212,7 +214,7 @@ def file_of(image: mmap.mmap, faults: Sequence[Fault]) -> tuple[bytes, str]:
 
 
 def card_image(faults: Sequence[Fault], file_blocks: int | None = None) -> mmap.mmap:
-    """Return the card the flight begins with: a file prepared on it, unless a fault says else.
+    """Return the memory card at the start: with a prepared file, unless a fault forbids it.
 
     A flight's stimuli begin in the air, where the recorder makes no file. So it had power on the
     ground before.
@@ -242,7 +244,7 @@ def still_analog(given: Stimuli) -> NDArray[np.float64]:
 
 
 def _act(sitl: Sitl, given: Stimuli, at: int, action: Action) -> None:
-    """Do something to the recorder's world now."""
+    """Carry out one action on the simulated hardware now."""
     if action.what in CARD_EVENTS:
         # Milliseconds to microseconds for a busy card, else a count.
         value = round(action.value * (1000.0 if action.what == "card_busy" else 1.0))
@@ -284,7 +286,7 @@ def configure(sitl: Sitl, rate_hz: int, aircraft: str, *, damaged: bool = False)
 
 
 def give(sitl: Sitl, given: Stimuli, end: int) -> None:
-    """Hand over what reaches the pins before `end`: the next power-on is at the bench."""
+    """Give the stimuli that reach the pins before tick `end`; the next power-on is at the bench."""
     edges, gps = given.edges[given.edges["at"] < end], given.gps[given.gps["at"] < end]
     sitl.add_edges(edges["at"], edges["levels"])
     sitl.add_gps(gps["at"], gps["levels"])

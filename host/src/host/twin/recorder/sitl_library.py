@@ -44,7 +44,7 @@ class Recorder(IntEnum):
 
 
 class Volume(IntEnum):
-    """How the card stands (storage::VolumeStatus)."""
+    """Status of the card's volume (storage::VolumeStatus)."""
 
     READY = 0
     NO_CARD = 1
@@ -55,7 +55,7 @@ class Volume(IntEnum):
 
 
 class CardFault(IntEnum):
-    """What a card may do to its host; times in us."""
+    """Faults of a card towards its host; times in us."""
 
     BUSY = 0
     REJECT = 1
@@ -323,7 +323,7 @@ class Sitl:
         return int(self.state().now)
 
     def state(self) -> State:
-        """Return how the instrument stands now."""
+        """Return the state of the instrument now."""
         state = State()
         self._c.sitl_state(ctypes.byref(state))
         return state

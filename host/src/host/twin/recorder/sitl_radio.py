@@ -39,7 +39,7 @@ def radio(
     flight_card: bytes = b"",
     step_s: float = _STEP_S,
 ) -> Iterator[Sent]:
-    """Let the recorder live through a flight and yield what it sends, portion by portion.
+    """Run the recorder through a flight and yield the bytes it sends, portion by portion.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def radio(
     Yields
     ------
     Sent
-        As fast as it is asked for: who wants real time waits between two portions.
+        Portions come as fast as they are taken; for real time the caller waits between them.
 
     Raises
     ------

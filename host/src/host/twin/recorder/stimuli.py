@@ -1,4 +1,4 @@
-"""Everything that reaches the recorder's pins in one flight, on the recorder's own clock.
+"""The signals at the recorder's pins in one flight, on the recorder's own clock.
 
 The same stimuli go to the recorder on the PC and to the chip simulator. Times are ticks of 0.5 us
 of the Mega's clock: true time times one plus the clock's error.
@@ -33,7 +33,7 @@ OVERSAMPLING = 3
 
 @dataclass(frozen=True, slots=True)
 class Stimuli:
-    """What the recorder's pins see.
+    """Signals at the recorder's pins.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ def _pressure(
     coarse = grid_s[::17]
     pressure = np.interp(coarse, record.t_s, data.static_pa) + record.draws.scalar("baro_offset_pa")
     if record.card.sensors.noise:
-        # As for the voltages.
+        # Noise as for the voltages: a mean of two grid points has less of it.
         pressure = pressure + rng.normal(0.0, bmp085.NOISE_PA * 1.5**0.5, len(coarse))
     warm = np.interp(coarse, record.t_s, data.temperature_k) - 273.15 + 3.0  # inside the box
     ut = bmp085.raw_temperature(warm)

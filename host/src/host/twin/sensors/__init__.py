@@ -1,1 +1,1 @@
-"""From true motion to volts, edges and bytes, each as late as the real part."""
+"""Sensor models: from true motion to volts, edges and bytes, each with the real part's delay."""

@@ -21,8 +21,8 @@ from host.twin.sensors.sensor_delays import dlpf_for, nominal_vane_s, sensor_del
 CHANNELS = (*VANES, *PITOTS, *POTS)
 # Far enough beyond the converter's range that its noise cannot bring it back.
 OPEN_COUNT, SHORT_COUNT = 1040.0, -16.0
-# Noise before the converter, counts rms: MA3 analogue 0.12 deg (hardware facts 2.8) = 0.34 counts;
-# MPXV7002 and pots: 2 mV of broadband noise on a 4.9 mV count.
+# Noise before the converter, counts rms: MA3 analogue 0.12 deg (data sheet) is 0.34 counts;
+# MPXV7002 and pots have 2 mV of broadband noise, and a count is 4.9 mV.
 NOISE_COUNT = {"alpha": 0.34, "beta": 0.34, "dp": 0.4, "pot": 0.4}
 DRIFT_TAU_S = 60.0  # warm-up of the pressure sensor
 
@@ -51,7 +51,7 @@ def nominal() -> dict[str, tuple[float, float]]:
 
 
 def analog(record: FlightRecord, data: AirData) -> Analog:
-    """Compute what the analogue sensors put out.
+    """Return the outputs of the analogue sensors.
 
     Parameters
     ----------

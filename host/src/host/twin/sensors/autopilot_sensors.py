@@ -1,7 +1,7 @@
-"""What an autopilot in place of our logger senses on a flight: IMU, attitude, air data, GPS.
+"""Sensors of an autopilot that flies in place of our logger: IMU, attitude, air data, GPS.
 
-Errors and delays are those drawn for the flight's own instrument, so that a log of either kind is
-of the same aircraft and the same sensors.
+Errors and delays are those drawn for our instrument on the same flight, so that both logs differ
+in rates and formats only.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """BMP085: the data sheet's integer compensation, and the raw values that lead to a pressure.
 
 Bosch BST-BMP085-DS000, figure 3; coefficients of its own example, as other firmware's unit tests
-use them (hardware facts 2.1).
+use them.
 """
 
 from __future__ import annotations

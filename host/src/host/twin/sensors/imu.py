@@ -36,7 +36,7 @@ class Imu:
     Attributes
     ----------
     t_s : (m,) array
-        True time of each sample (what its registers held then is late by the filter's delay).
+        True time of each sample; its registers then hold values as old as the filter's delay.
     dlpf : int
         DLPF_CFG.
     rates_radps, force_mps2 : (m, 3) arrays
@@ -44,7 +44,7 @@ class Imu:
     attitude_rad : (m, 3) array
         phi, theta, psi of the attitude filter, psi within +-pi.
     bias_radps : (m, 3) array
-        What the filter believes the gyro bias to be.
+        Gyro bias as the attitude filter estimates it.
     magnetic_t : (m, 3) array
         Magnetometer.
     raw : (m, 9) int16 array
@@ -122,8 +122,8 @@ def complementary(
         angles[i, 1] = -math.asin(min(max(ahead[2, 0], -1.0), 1.0))
         angles[i, 2] = math.atan2(ahead[1, 0], ahead[0, 0])
         biases[i] = bias
-        # Gravity as felt: minus specific force, with the turn's own acceleration omega x V taken
-        # out.
+        # Measured direction of gravity: minus specific force, less the acceleration omega x V of
+        # the turn.
         gx = -force[i, 0]
         gy = -(force[i, 1] - now[2] * speed[i])
         gz = -(force[i, 2] + now[1] * speed[i])
@@ -188,7 +188,7 @@ def sensed_motion(
 def imu(
     record: FlightRecord, data: AirData, at_s: Array, dlpf: int, rng: np.random.Generator
 ) -> Imu:
-    """Compute what the IMU sends.
+    """Return the IMU's samples.
 
     Parameters
     ----------
@@ -260,7 +260,7 @@ def imu(
 
 
 def _low_pass(x: Array, t: Array, at_s: Array, bandwidth_hz: float, late_s: float) -> Array:
-    """Lag of the filter's bandwidth, and a pure delay for the rest of its drawn delay."""
+    """Return x behind a lag of the filter's bandwidth and a pure delay for the rest of `late_s`."""
     tau = min(1.0 / (2.0 * math.pi * bandwidth_hz), late_s)
     slow = np.column_stack([first_order(x[:, k], tau, STEP_S) for k in range(x.shape[1])])
     return delayed(t, slow, late_s - tau, at_s)

@@ -18,8 +18,7 @@ from host.wire.packets import packet
 from host.wire.schema_text import packed_schema
 
 RATE_HZ = 200.0
-# Sample to START of the transfer: filter turn and packing on the 328P, estimate from hardware
-# facts 6.2.
+# Sample to START of the transfer, s: attitude filter and packing on the 328P, estimated.
 AGE_S = 0.9e-3
 AGE_JITTER_S = 0.15e-3
 BYTE_S = 9.0 / 400_000.0
@@ -125,7 +124,7 @@ def _flag(name: str) -> int:
 def _fail(
     fault: Fault, at: Array, rows: NDArray[np.void], own_clock: float, rng: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """Change what the IMU itself makes in a fault; return which packets it sends."""
+    """Alter the IMU's own samples during a fault; return a mask of the packets that it sends."""
     inside = fault.inside(at)
     sent = np.ones(len(at), dtype=bool)
     if not inside.any():
@@ -163,7 +162,7 @@ def _transfer(start: int, data: bytes) -> ImuPacket:
 def _damage(
     fault: Fault, at: Array, packets: list[ImuPacket], rng: np.random.Generator
 ) -> list[ImuPacket]:
-    """Change what becomes of packets on their way."""
+    """Alter or drop packets on their way to the Mega during a fault."""
     if fault.kind not in ("imu_garbage", "imu_short", "imu_repeated"):
         return packets
     hit = fault.inside(at) & (rng.random(len(at)) < fault.amount)

@@ -1,4 +1,4 @@
-"""The Mega's clock: ticks of 0.5 us, fast or slow by what was drawn."""
+"""The Mega's clock: ticks of 0.5 us, with the drawn rate error."""
 
 from __future__ import annotations
 

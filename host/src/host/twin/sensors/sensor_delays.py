@@ -1,4 +1,4 @@
-"""How late each sensor of one flight is: the nominal delay of its kind and what was drawn."""
+"""The delay of each sensor on one flight: the nominal one of its kind and the drawn error."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from host.aircraft.file import Aircraft
 from host.twin.faults import PITOTS, VANES
 from host.twin.flight.draws import Draws, delay_s
 
-# DLPF_CFG of the MPU-6000: bandwidth Hz and delay s of gyro and accelerometer (register map;
-# hardware facts 2.3).
+# DLPF_CFG of the MPU-6000: bandwidth Hz and delay s of gyro and accelerometer (register map).
 FILTERS = {
     2: ((98.0, 2.8e-3), (94.0, 3.0e-3)),
     3: ((42.0, 4.8e-3), (44.0, 4.9e-3)),
     4: ((20.0, 8.3e-3), (21.0, 8.5e-3)),
 }
-GPS_LATENCY_S = 0.15  # 50 to 200 ms without PPS (hardware facts 2.5); +-20 % drawn
+GPS_LATENCY_S = 0.15  # u-blox 6 without PPS: 50 to 200 ms; +-20 % drawn
 
 
 def dlpf_for(rate_hz: float) -> int:

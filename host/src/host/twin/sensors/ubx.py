@@ -26,7 +26,7 @@ ROLLED_WEEK = 1024
 WEEK_MS = 7 * 86_400_000
 FIRST_ITOW_MS = 288_000_000
 GARBAGE_SHARE = 0.1  # of the bytes, one bit each
-FAR_DEG = 100.0  # 1e9 of the message's 1e-7 deg
+FAR_DEG = 100.0  # 1e9 in the message's unit of 1e-7 deg
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def packet(kind: int, payload: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Fixes:
-    """Solutions of the receiver: when they are true, how late they come, what they say.
+    """Solutions of the receiver: instants, latency, positions and velocities.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def fixes(record: FlightRecord, rng: np.random.Generator) -> Fixes:
     at = np.arange(0.2, record.t_s[-1] - 0.01, 1.0 / RATE_HZ)
     place = record.states[:, NORTH : DOWN + 1]
     velocity = np.gradient(place, STEP_S, axis=0)
-    # The launch is a cut, not a motion.
+    # The jump from the stand to flight is no motion, so it must not show as velocity.
     velocity[np.abs(record.t_s - flight.ground_s) < 3 * STEP_S] = 0.0
     noise = rng.standard_normal((len(at), 6)) * (1.0 if switches.noise else 0.0)
     late = 0.0

@@ -1,1 +1,1 @@
-"""What is flown and what breaks: cards, maneuvers, faults."""
+"""Flight cards: maneuvers and faults."""

@@ -1,4 +1,4 @@
-"""What each number of a flight card may be."""
+"""Permitted range of each number of a flight card, with the reason."""
 
 from __future__ import annotations
 

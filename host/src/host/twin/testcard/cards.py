@@ -64,7 +64,7 @@ class Pilot:
     delay_s: float = 0.25  # from seeing to moving
     gain: float = 1.0  # of the corrections, 1: crossover at 1.2 rad/s
     early: float = 0.1  # share of maneuvers corrected before they end
-    hands_off_s: float = 2.5  # after the last input
+    hands_off_s: float = 2.5  # time after the last input before the pilot corrects again
     breaks_off: float = 0.0  # share of step inputs let go before their end, and corrected at once
 
 
@@ -72,7 +72,7 @@ class Pilot:
 class Sensors:
     """One switch per error; false makes that part of the chain ideal."""
 
-    tolerances: bool = True  # per-flight draws, all of them; the next eleven: one group each
+    tolerances: bool = True  # false: every draw is nominal; the next eleven switch one group each
     imu_bias: bool = True
     imu_scale: bool = True
     imu_misalignment: bool = True
@@ -84,7 +84,7 @@ class Sensors:
     place_tolerance: bool = True  # of CG and sensors
     mass_tolerance: bool = True  # and inertia
     barometer_offset: bool = True
-    # What no calibration measures; off, so that cards fly as they did before these were drawn.
+    # Errors that no calibration measures; off by default, so that older cards fly unchanged.
     friction_tolerance: bool = False
     thrust_tolerance: bool = False
     servo_tolerance: bool = False
@@ -237,7 +237,8 @@ def duration_s(card: Card) -> float:
 
 
 def length_s(card: Card, s: Segment) -> float:
-    """Return the length of one of its segments, with the trim before and the rest behind."""
+    """Return the length of a segment with the trim before its input and the hands-off time after.
+    """
     if s.kind in ("trim", "turn"):
         return s.duration_s
     return s.before_s + input_s(s) + card.pilot.hands_off_s

@@ -1,4 +1,4 @@
-"""A card whose inputs the logger flies: what is left to the pilot between them.
+"""The pilot's part of a card whose inputs the logger flies.
 
 The pilot shows the travel and gives the sign on the ground, climbs, stays near home, and moves the
 switch (hw/test-inputs.md).
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from host.constants import GRAVITY_MPS2
 from host.twin.testcard.cards import Card, CardError, Segment, length_s
 
-GROUND_S = 17.0  # known to be the ground, sticks stirred, the sign, idle
+GROUND_S = 17.0  # the logger makes sure of the ground; sticks stirred, enabling sign, idle
 # At Mega for half a second, at armed for 0.3 s; both with room for the receiver's frames.
 AT_MEGA_S, AT_ARMED_S = 0.9, 0.32
 SWITCH_S = AT_MEGA_S + AT_ARMED_S
@@ -21,7 +21,7 @@ PREPARE_S = STEER_S + LEVEL_S + SWITCH_S
 # The logger asks for height above the field: 60 m at the 2.5 m/s of the pilot, then level.
 CLIMB_M, CLIMB_S = 60.0, 32.0
 BANK_DEG = 30.0
-SETTLED_S = 3.0  # behind a turn
+SETTLED_S = 3.0  # straight flight after a turn
 REACH_SHARE = 0.75  # of the distance the logger allows: the turns' own width needs the rest
 
 
@@ -78,7 +78,7 @@ def flown_by_logger(card: Card, airspeed_mps: float, distance_m: float) -> Card:
     airspeed_mps : float
         Wanted where the card does not say.
     distance_m : float
-        Farthest from home at which the logger flies an input; 0 for any.
+        Largest distance from home at which the logger starts an input; 0 for no limit.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def flown_by_logger(card: Card, airspeed_mps: float, distance_m: float) -> Card:
     Raises
     ------
     CardError
-        One input alone leaves the distance.
+        A single input already leads farther away than that.
     """
     speed = card.flight.airspeed_mps or airspeed_mps
     heading = math.radians(card.flight.heading_deg)
